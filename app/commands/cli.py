@@ -17,7 +17,6 @@ from typing import Annotated
 import typer
 
 from app.commands import (
-    abx,
     batch,
     faust,
     info,
@@ -96,7 +95,6 @@ for command in (
     cli.command()(command)
 cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
-cli.add_typer(abx.abx, name="abx")
 cli.add_typer(instruments.instruments, name="instruments")
 cli.add_typer(family.family, name="family")
 

@@ -1,33 +1,32 @@
-"""The last settings of the export dialog."""
+"""The last settings of the export dialog, of notes and performances."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import BaseModel, ConfigDict
 
-from app.shared.vocabulary import Bits, Source
+from app.shared.vocabulary import Bits
 
+if TYPE_CHECKING:
+    from app.export.wav import WavSettings
 
-class BatchChoices(BaseModel):
-    """The last settings of the batch page; lists as they were typed. One of a single value is not used again."""
-
-    model_config = ConfigDict(extra="forbid")
-
-    presets: tuple[str, ...] = ()
-    positions: str = ""
-    amplitudes: str = ""
-    sources: tuple[Source, ...] = ("model",)
-    folder: str = ""
+Chosen = Literal["model", "truth", "difference", "files"]
 
 
 class ExportChoices(BaseModel):
-    """The last settings. `rate_hz`: 0 for the model's own; `source`: "files" for model and truth in a file each."""
+    """The last settings.
 
-    model_config = ConfigDict(extra="forbid")
+    Attributes:
+        source: "files" for model and truth in a file each.
+        rate_hz: 0 for the model's own.
+        alone: the string without level, body and room of the instrument.
+    """
+
+    model_config = ConfigDict(extra="ignore")  # versions with a page for batches have more fields
 
     folder: str = ""
-    source: Literal["model", "truth", "difference", "both", "files"] = "model"
+    source: Chosen = "model"
     rate_hz: int = 48_000
     bits: Bits = "24"
     until_decayed: bool = True
@@ -36,4 +35,10 @@ class ExportChoices(BaseModel):
     seconds: float = 4.0
     normalise: bool = False
     difference_gain_db: float = 20.0
-    batch: BatchChoices = BatchChoices()
+    alone: bool = False
+
+    @property
+    def wav(self) -> WavSettings:
+        from app.export.wav import WavSettings  # brings NumPy
+
+        return WavSettings(bits=self.bits, rate_hz=self.rate_hz or None, normalise=self.normalise)

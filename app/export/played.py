@@ -16,10 +16,13 @@ from app.instrument.offline import channels_played, render_events
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
-from engine.presets import Preset, preset_digest
+from app.shared.worker import Progress
+from engine.presets import Preset, load_preset, preset_digest
 from engine.result_file import whole_file
 
 RATE_HZ = 48_000
+TAIL_S = 6.0  # a guess at how long it rings after the last event, for progress
+DEFAULT = WavSettings("24", RATE_HZ)
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,7 @@ def write_played(
     events: Sequence[TimedEvent],
     midi: str,
     source: PlayedSource = "model",
-    settings: WavSettings = WavSettings("24", RATE_HZ),  # noqa: B008 - immutable
+    settings: WavSettings = DEFAULT,
     seconds: float | None = None,
     advanced: Callable[[float], None] = lambda seconds: None,
     difference_gain_db: float = 0.0,
@@ -110,26 +113,46 @@ def recorded_files(path: Path) -> tuple[Path, Path]:
     return sound, sound.with_suffix(".mid")
 
 
-def write_recorded(
-    path: Path, played: Played, preset: Preset, advanced: Callable[[float], None] = lambda seconds: None
-) -> str:
-    """Writes both `recorded_files` and returns in words what was written. Raises as `write_played`.
+@dataclass(frozen=True, eq=False)
+class PlayedExport:
+    """Writes what was played to `recorded_files` of `path`. See `ExportJob`.
 
-    The MIDI file is there at once; the sound takes a part of the time in which it was played.
+    Attributes:
+        preset: the file of the preset that plays the patch.
     """
-    sound_file, midi_file = recorded_files(path)
-    with whole_file(midi_file) as file:
-        file.write(midi_bytes(played.events))
-    written = write_played(
-        sound_file,
-        played.patch,
-        preset,
-        played.events,
-        midi_file.name,
-        played.source,
-        advanced=advanced,
-        difference_gain_db=played.difference_gain_db,
-        recorded=played.recorded,
-    )
-    heard, level = source_words(played.source, played.difference_gain_db), f"peak {written.level.peak_db:.1f} dBFS"
-    return f"{sound_file} and {midi_file.name}: {written.seconds:.1f} s of {heard}, {level}"
+
+    played: Played
+    preset: Path
+    path: Path
+    settings: WavSettings = DEFAULT
+
+    @property
+    def folder(self) -> Path:
+        return self.path.parent
+
+    def run(self, progress: Progress) -> str:
+        """The MIDI file is there at once; the sound takes a part of the time in which it was played."""
+        played, (sound_file, midi_file) = self.played, recorded_files(self.path)
+        with whole_file(midi_file) as file:
+            file.write(midi_bytes(played.events))
+        whole_s = played.events[-1].time_s + TAIL_S
+        written = write_played(
+            sound_file,
+            played.patch,
+            load_preset(self.preset),
+            played.events,
+            midi_file.name,
+            played.source,
+            self.settings,
+            advanced=lambda done_s: progress(min(0.99, done_s / whole_s)),
+            difference_gain_db=played.difference_gain_db,
+            recorded=played.recorded,
+        )
+        heard, level = (
+            source_words(played.source, played.difference_gain_db),
+            f"peak {written.level.peak_db:.1f} dBFS",
+        )
+        return f"Saved {sound_file} and {midi_file.name}: {written.seconds:.1f} s of {heard}, {level}."
+
+    def cancelled(self) -> str:
+        return "the MIDI file is kept."

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import soundfile
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from app.export.sound import LONGEST_S, SoundRequest
+from app.export.sound import LONGEST_S, SoundRequest, Through
 from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, Bits, Pickup, PlayedSource, Source
@@ -23,7 +23,8 @@ from engine.resonators.string import StringParameters
 from engine.schema import parse_json, read
 from engine.sources import FULL_SCALE_M
 
-REQUESTED = ("pluck", "listen", "listen_right", "pickup", "seconds", "decay_db", "source")  # of `SoundRequest`
+# fields of `SoundRequest`
+REQUESTED = ("pluck", "listen", "listen_right", "pickup", "seconds", "decay_db", "source", "through")
 
 
 class RecipeError(Exception):
@@ -89,7 +90,7 @@ class Recipe(BaseModel):
         preset_rate_hz: the rate at which the model played.
         string: the string that a preset of many played, with so many `modes`; None: the preset's own.
         horizon_s: the training horizon, past which the model extrapolates.
-        full_scale_m: the displacement that is 0 dBFS.
+        full_scale_m: the displacement that is 0 dBFS, of a string alone.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -116,6 +117,7 @@ class Recipe(BaseModel):
     fade_out_s: float = Field(0.010, ge=0, le=LONGEST_S)
     string: StringParameters | None = None
     modes: int | None = Field(None, ge=1, le=SIZES["grid_points"][1])
+    through: Through | None = None
 
     @field_validator("string", mode="before")
     @classmethod

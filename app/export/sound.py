@@ -12,10 +12,15 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.export.recording import BLOCK_FRAMES, Recording, Sound, blocks
+from app.instrument.bodies import body_digest
+from app.instrument.effects import effects_from
+from app.patches.patch import Body, Patch, Room
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PICKUPS, Pickup, Source
 from app.shared.worker import Progress
+from engine.effects import Effects
 from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.sources import ModelSource, Runaway
@@ -27,9 +32,42 @@ SOURCES: tuple[Source, ...] = get_args(Source)
 LONGEST_S = 600.0
 DECAY_RANGE_DB = (10.0, 120.0)
 DECAYED_FOR_SURE_DB = 30.0  # rendering continues until the whole string is so far below the wanted decay
+MOST_GAIN = 1e6
 LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level does not depend on phase
 
 Samples = NDArray[np.float64]
+
+
+class Through(BaseModel):
+    """What an instrument adds to its strings.
+
+    Attributes:
+        instrument: its name.
+        gain: the factor of the string, which makes all keys equally loud; with the instrument's level.
+        body_sha256: of the file of a body of the user's own.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    instrument: str
+    gain: float = Field(ge=0, le=MOST_GAIN)
+    body: Body = Body()
+    room: Room = Room()
+    body_sha256: str = ""
+
+    @classmethod
+    def of(cls, patch: Patch, gain: float) -> Through:
+        digest = body_digest(patch.body.name)
+        return cls(instrument=patch.name, gain=gain, body=patch.body, room=patch.room, body_sha256=digest)
+
+    @property
+    def effects(self) -> Effects | None:
+        """Raises ValueError: the body is not here, or another of its name."""
+        if body_digest(self.body.name) != self.body_sha256:
+            raise ValueError(
+                f"the body {self.body.name} is not the one of {self.instrument}; get its file and add it"
+            )
+        return effects_from(self.body, self.room)
 
 
 @dataclass(frozen=True)
@@ -45,6 +83,8 @@ class SoundRequest:
         difference_gain_db: gain of the difference.
         decay_db: the sound ends where both model and truth have fallen this far below their maximum, so that all
             files of a pluck have the same length. None: it lasts `seconds`.
+        through: level, body and room of an instrument; a difference is heard without body and room. None: the string
+            alone.
 
     Raises:
         ValueError: a value is out of its range; the message names it and the range.
@@ -59,6 +99,7 @@ class SoundRequest:
     pickup: Pickup = "displacement"
     difference_gain_db: float = 0.0
     decay_db: float | None = None
+    through: Through | None = None
 
     def __post_init__(self) -> None:
         for name, point in (("listening point", self.listen), ("right listening point", self.listen_right)):
@@ -69,20 +110,25 @@ class SoundRequest:
         for name, value, known in (("source", self.source, SOURCES), ("pickup", self.pickup, PICKUPS)):
             if value not in known:
                 raise ValueError(f"{name} {value!r} is not one of {', '.join(known)}")
-        if self.source == "both" and self.listen_right is not None:
+        if self.source == "both" and (self.listen_right is not None or self.effects is not None):
             raise ValueError("model and truth cannot share one file in stereo; choose two files, or mono")
         _check("decay_db", self.decay_db, DECAY_RANGE_DB)
         _check("difference_gain_db", self.difference_gain_db, DIFFERENCE_GAIN_RANGE_DB)
 
     @property
+    def effects(self) -> Effects | None:
+        """Body and room."""
+        return None if self.through is None or self.source == "difference" else self.through.effects
+
+    @property
     def points(self) -> tuple[float, ...]:
-        """The listening points, one a channel."""
+        """The listening points."""
         return (self.listen,) if self.listen_right is None else (self.listen, self.listen_right)
 
 
 @dataclass(frozen=True)
 class Voices:
-    """Model and truth of one request, (frames, points) each, of which those are rendered that are needed.
+    """Model and truth of one request, (frames, channels) each, of which those are rendered that are needed.
 
     Attributes:
         ended: False where the sound was to end by its decay but reached its longest duration first.
@@ -148,7 +194,9 @@ def render_voices(
     all_voices: bool = False,
     progress: Progress = lambda *_: None,
 ) -> Voices:
-    """Renders model and truth once for any number of sources of one pluck; `request.source` is ignored.
+    """Renders model and truth once for any number of sources of one pluck.
+
+    `request.source` counts for body and room alone, which a difference does not have.
 
     Args:
         rate_hz: of the samples; 0 for the preset's own.
@@ -197,11 +245,11 @@ def decayed_frames(sound: Sound, rate_hz: int, decay_db: float) -> int:
 
 
 def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Callable[[float], None]) -> Recording:
-    """The samples (frames, points) of the voice that a device would play."""
+    """The samples (frames, channels) of the voice that a device would play."""
     preset, info = request.preset, request.preset.info
     program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset.model, info, rate_hz)
     ear = Ear(request.points, request.pickup)
-    recording = Recording(len(request.points))
+    through, recording = request.through, None
     for block in voice_blocks(
         program,
         ModelSource(preset) if program.rendered else None,
@@ -211,8 +259,12 @@ def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Callabl
         request.seconds,
         progress,
         None if request.decay_db is None else request.decay_db + DECAYED_FOR_SURE_DB,
+        1.0 if through is None else through.gain,
+        request.effects,
     ):
+        recording = recording or Recording(block.shape[1])
         recording.append(block)
+    assert recording is not None
     return recording
 
 

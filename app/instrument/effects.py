@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from app.audio.impulse_file import ImpulseError
 from app.instrument.bodies import own_impulse
+from app.patches.patch import Body as ChosenBody
 from app.patches.patch import Patch
+from app.patches.patch import Room as ChosenRoom
 from engine.effects import BODIES, Body, Effects, Room
 
 RESPONSE_HZ = 48_000
@@ -37,14 +39,20 @@ class Response:
 
 def effects_of(patch: Patch) -> Effects | None:
     """Body and room of a patch; None: it has neither. A body that cannot be used is left out: see `body_problem`."""
-    body = _body(patch)[0]
-    room = Room(patch.room.mix, patch.room.t60_s) if patch.room.mix > 0 else None
-    return None if body is None and room is None else Effects(body, room)
+    return effects_from(patch.body, patch.room)
+
+
+def effects_from(chosen: ChosenBody, room: ChosenRoom) -> Effects | None:
+    """As `effects_of`."""
+    body = _body(chosen)[0]
+    made = Room(room.mix, room.t60_s) if room.mix > 0 else None
+    return None if body is None and made is None else Effects(body, made)
 
 
 def body_problem(patch: Patch) -> str:
     """Why its body is not heard, in one line; "" where nothing is wrong."""
-    return _body(patch)[1]
+    problem = _body(patch.body)[1]
+    return problem and f"{patch.name} is played without its body: {problem}"
 
 
 def channels_of(patch: Patch, wheeled: bool = False) -> int:
@@ -57,19 +65,20 @@ def channels_of(patch: Patch, wheeled: bool = False) -> int:
     """
     if wheeled and patch.mod_wheel in ("body.mix", "room.mix"):
         patch = patch.with_value(patch.mod_wheel, 1.0)
-    body = _body(patch)[0]
+    body = _body(patch.body)[0]
     wide = body is not None and (body.impulse is None or body.impulse.samples.shape[1] == 2)
     return 2 if len(patch.pickup.points) == 2 or patch.room.mix > 0 or wide else 1
 
 
 def body_response(patch: Patch) -> Response | None:
     """The response of a patch's body, whose resonances favour some keys; None: it has no body."""
-    body = _body(patch)[0]
+    body = _body(patch.body)[0]
     return None if body is None else _response(body)
 
 
-def _body(patch: Patch) -> tuple[Body | None, str]:
-    name, mix, size = patch.body.name, patch.body.mix, patch.body.size
+def _body(chosen: ChosenBody) -> tuple[Body | None, str]:
+    """The body, and why it cannot be used."""
+    name, mix, size = chosen.name, chosen.mix, chosen.size
     if not name or mix == 0:
         return None, ""
     if name in BODIES:
@@ -77,7 +86,7 @@ def _body(patch: Patch) -> tuple[Body | None, str]:
     try:
         return Body(mix, size, impulse=own_impulse(name)), ""
     except ImpulseError as error:
-        return None, f"{patch.name} is played without its body: {error}"
+        return None, str(error)
 
 
 @lru_cache(maxsize=16)

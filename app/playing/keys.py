@@ -140,6 +140,14 @@ class Keys:
             found[struck.event.key] = max(found.get(struck.event.key, 0.0), share)
         return found
 
+    @property
+    def heard_through(self) -> Patch | None:
+        """The patch whose body and room are heard, as controllers have turned them."""
+        player, wanted = self._player, self._wanted
+        if player is not None:
+            return player.heard_through
+        return None if wanted is None else wanted.patch
+
     def gain_of(self, string: StringParameters | None) -> float:
         """The factor of the string that a key played last, so that a pluck by hand is as loud; 1 for any other."""
         struck, player = self._struck, self._player
@@ -165,11 +173,7 @@ class Keys:
 
     def _set_present_effects(self) -> None:
         """Body and room of what is played now."""
-        player, wanted = self._player, self._wanted
-        if player is not None:
-            patch: Patch | None = player.heard_through
-        else:
-            patch = None if wanted is None else wanted.patch
+        patch = self.heard_through
         effects = None if self._dry or patch is None else effects_of(patch)
         if effects != self._effects:
             self._effects = effects

@@ -32,16 +32,15 @@ from app.views.controls.knob import Knob
 from app.views.controls.slot_buttons import SLOTS
 from app.views.dialogs.about_dialog import AboutDialog
 from app.views.dialogs.abx_dialog import AbxDialog
-from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.help_dialog import HelpDialog
-from app.views.dialogs.preset_browser import PresetBrowser
-from app.views.instrument.patch_browser import PatchBrowser
+from app.views.dialogs.preset_card import preset_browser
+from app.views.instrument.patch_card import patch_browser
 from app.views.string.view import StringView
 from app.window.about import about_text
 from app.window.appearance import Appearance
 from app.window.audio_control import AudioControl
-from app.window.dragged_export import DraggedExport
 from app.window.dropped_files import receive
+from app.window.exports import Exports
 from app.window.instruments import Instruments
 from app.window.main_window import KEY_NAMES, KEYS, PLAYED_KEYS, MainWindow
 from app.window.panels import Moment, StringPanel
@@ -50,7 +49,6 @@ from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
 from app.window.remembering import Keeper
-from app.window.sampled_export import SampledExport
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
 
@@ -106,7 +104,7 @@ class Controller(QObject):
         self.library = Library([])
         problems = self.library.refresh()
         self.presets = PresetDesk(
-            self.session, self.library, window.presets, PresetBrowser(window), settings.favourites
+            self.session, self.library, window.presets, preset_browser(window), settings.favourites
         )
         self.panels = fill(window, self.session, self.library)
         self.performance = Performance(window, self.session, self.library, self.sound, self.panels)
@@ -131,7 +129,7 @@ class Controller(QObject):
             self.performance,
             self.instruments,
             window.instrument,
-            PatchBrowser(window),
+            patch_browser(window),
             settings.patch_favourites,
         )
         self.patches.told.connect(window.notices.tell)
@@ -144,13 +142,18 @@ class Controller(QObject):
         for dragged in (window.instrument.bar, window.instrument.knobs):
             dragged.drag_started.connect(self.history.hold)
             dragged.drag_ended.connect(self.history.let_go)
-        self.dragged = DraggedExport(
-            window.transport.export, lambda: (self.library.entries, self.session.choices, self._settings.export)
+        self.exports = Exports(
+            self.session,
+            self.library,
+            self.patches.recordings,
+            self.performance.through,
+            (settings.export, settings.sampled),
+            window,
         )
-        self.dragged.told.connect(window.notices.tell)
-        self.sampled = SampledExport(self.session, self.library, settings.sampled, window)
-        self.sampled.told.connect(window.notices.tell)
-        window.sampled_asked.connect(self.sampled.open)
+        self.exports.told.connect(window.notices.tell)
+        window.transport.export_asked.connect(lambda: self.exports.open("note"))
+        window.export_asked.connect(lambda: self.exports.open("note"))
+        window.sampled_asked.connect(lambda: self.exports.open("sampler"))
         self.keeper = Keeper(settings_path, settings, self.settings, self)
         self.keeper.failed.connect(window.notices.tell)
         for problem in problems:
@@ -172,7 +175,7 @@ class Controller(QObject):
             panel.seek_asked.connect(self.performance.seek)
             panel.pluck_asked.connect(self.pluck)
             panel.told.connect(window.notices.tell)
-        self.presets.pluck_asked.connect(self.pluck)
+        self.presets.browser.played.connect(lambda name: self.pluck())
         self.presets.told.connect(window.notices.tell)
         window.previous_asked.connect(lambda: self.presets.step(-1))
         window.next_asked.connect(lambda: self.presets.step(1))
@@ -182,8 +185,6 @@ class Controller(QObject):
         self.library.changed.connect(lambda: window.transport.slots.set_entries(self.library.entries))
         window.transport.change_asked.connect(self._change)
         window.transport.play_asked.connect(self.play_or_stop)
-        window.transport.export_asked.connect(self.export)
-        window.export_asked.connect(self.export)
         window.abx_asked.connect(self.listening_test)
         window.play_asked.connect(self.play_or_stop)
         window.pluck_asked.connect(self.pluck)
@@ -243,21 +244,6 @@ class Controller(QObject):
             if self.performance.playing or not played:  # in a rest of a file nothing rings
                 self.performance.play_or_stop()
             self.window.transport.show_playing(self.performance.playing)
-
-    def export(self) -> None:
-        choices = self.session.choices
-        if self.entry is None:
-            self.window.notices.tell("There is no preset to export: choose one first.")
-            return
-        dialog = ExportDialog(
-            self.library.entries,
-            choices,
-            self._settings.export,
-            self.window,
-        )
-        dialog.exec()
-        dialog.accept()  # ends a job that still runs, where the program was quit
-        self._settings = self._settings.model_copy(update={"export": dialog.export_choices()})
 
     def listening_test(self) -> None:
         """Opens the ABX test of the chosen pluck; until it is closed nothing else plays."""
@@ -323,9 +309,8 @@ class Controller(QObject):
             self._abx.abandon()
         self._timer.stop()
         self._deck_timer.stop()
-        self.dragged.close()
         self.keeper.close()
-        self.sampled.close()
+        self.exports.close()
         self.patches.close()
         self.instruments.close()
         for panel in self.panels:
@@ -338,13 +323,14 @@ class Controller(QObject):
         return self._settings.model_copy(
             update={
                 "choices": self.session.choices,
-                "sampled": self.sampled.choices,
+                "export": self.exports.choices[0],
+                "sampled": self.exports.choices[1],
                 "device": self.audio.device,
                 "sound": self.audio.sound,
                 "look": self.appearance.look,
                 "midi": self.instruments.midi.choices,
                 "favourites": tuple(sorted(self.presets.favourites)),
-                "patch_favourites": tuple(sorted(self.patches.favourites)),
+                "patch_favourites": tuple(sorted(self.patches.desk.favourites)),
                 "instrument": InstrumentChoice(
                     shown=self.window.shows_instrument,
                     surface=self.window.instrument.surface,
@@ -372,7 +358,7 @@ class Controller(QObject):
             panel.choices_changed(names)
         window.show_solo(choices.solo)
         self.patches.choices_changed(names)
-        self.sampled.choices_changed(names)
+        self.exports.choices_changed(names)
         if "volume_db" in names and self._abx is None:  # a blind test keeps the one that it began with
             self.sound.set_volume_db(choices.volume_db)
         self._wake()

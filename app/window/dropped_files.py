@@ -73,6 +73,8 @@ def _recipe(file: Path, library: Library) -> Dropped:
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     choices = {"instrument": SingleString(preset=path.stem), **restored_choices(recipe)}
     notices = [] if exact else [changed_preset_notice(recipe)]
+    if recipe.through is not None:
+        notices.append(f"it was heard through {recipe.through.instrument}; choose it to hear body, room and level")
     if choices.get("seconds", recipe.seconds) != recipe.seconds:
         low, high = OF_CHOICES["seconds"].limits
         limits = f"the window's range ({low:g} … {high:g} s)"

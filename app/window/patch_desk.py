@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from pathlib import Path
 
-from PySide6.QtCore import QObject, QTimer, QUrl, Signal
-from PySide6.QtGui import QDesktopServices
+from PySide6.QtCore import QObject, QTimer, Signal
 from PySide6.QtWidgets import QInputDialog
 
 from app.instrument.beyond_training import outside_of_key, outside_of_string
@@ -38,8 +37,10 @@ from app.session.choices import Session
 from app.session.monitor import Monitor
 from app.session.slots import other_preset, source_title
 from app.shared.key_names import note_name
+from app.views.controls.browser import Browser
 from app.views.instrument.panel import InstrumentPanel
-from app.views.instrument.patch_browser import PatchBrowser
+from app.views.instrument.patch_card import patch_row
+from app.window.browsing import BrowserDesk
 from app.window.instruments import Instruments
 from app.window.performance import Performance
 from app.window.recordings import Recordings
@@ -63,7 +64,7 @@ class PatchDesk(QObject):
     """Lives in the window's thread, as long as the window.
 
     Attributes:
-        favourites: names of patches.
+        desk: the browser's.
         recordings: of what is played.
     """
 
@@ -77,21 +78,29 @@ class PatchDesk(QObject):
         performance: Performance,
         instruments: Instruments,
         panel: InstrumentPanel,
-        browser: PatchBrowser,
+        browser: Browser,
         favourites: Iterable[str] = (),
     ) -> None:
         super().__init__(panel)
         self._session, self._library, self._performance = session, library, performance
         self._instruments, self._panel, self.browser = instruments, panel, browser
-        self.favourites = set(favourites)
         self._entries: list[PatchEntry] = []
+        self.desk = BrowserDesk(
+            browser,
+            lambda: [patch_row(entry) for entry in self._entries],
+            lambda: self.entry.name if self.entry is not None else "",
+            self.choose,
+            own_patches,
+            favourites,
+        )
+        self.desk.told.connect(self.told)
         self._shown_s = 0.0
         self._noted: Patch | None = None  # the patch, when the note in the bar was judged last
         self._told_other = ""  # the source that a notice reported as not heard from keys
         self._playback = Playback(instruments.play, performance.notes, performance.notes.cancel)
         self._note_timer = QTimer(self, interval=NOTE_TOLD_AFTER_MS, singleShot=True)
         self._note_timer.timeout.connect(self._show_latest_note)
-        self.recordings = Recordings(session, library, performance.notes.keys, panel.bar, self)
+        self.recordings = Recordings(session, performance.notes.keys, panel.bar, self)
         self.recordings.told.connect(self.told)
         self.recordings.informed.connect(self.informed)
         self.reload()
@@ -101,9 +110,9 @@ class PatchDesk(QObject):
         session, panel, bar, browser = self._session, self._panel, self._panel.bar, self.browser
         panel.pressed.connect(self._press)
         panel.released.connect(lambda key: self._instruments.play(NoteOff(key, KEYS)))
-        bar.previous_asked.connect(lambda: self.step(-1))
-        bar.next_asked.connect(lambda: self.step(1))
-        bar.browse_asked.connect(self.toggle)
+        bar.previous_asked.connect(lambda: self.desk.step(-1))
+        bar.next_asked.connect(lambda: self.desk.step(1))
+        bar.browse_asked.connect(self.desk.toggle)
         bar.save_asked.connect(self.save)
         bar.rename_asked.connect(self.rename)
         bar.revert_asked.connect(self.revert)
@@ -119,11 +128,7 @@ class PatchDesk(QObject):
         panel.knobs.changed.connect(self.change)
         panel.knobs.figure_asked.connect(self.turn_to)
         browser.opened.connect(self.reload)
-        browser.chosen.connect(self.choose)
-        browser.audition_asked.connect(self.audition)
-        browser.favourite_asked.connect(self._toggle_favourite)
-        browser.file_dropped.connect(lambda path: self.take_file(Path(path)))
-        browser.folder_asked.connect(self._open_folder)
+        browser.played.connect(self.audition)
         browser.delete_asked.connect(self.delete)
         browser.rename_asked.connect(self.rename)
 
@@ -148,7 +153,7 @@ class PatchDesk(QObject):
         for problem in problems:
             self.told.emit(problem)
         self._panel.bar.set_bodies(body_titles())
-        self._show_entries()
+        self.desk.show()
         self._show_patch()
 
     # Intents
@@ -158,21 +163,6 @@ class PatchDesk(QObject):
         for entry in self._entries:
             if entry.name == name:
                 self._session.update(instrument=entry.patch)
-
-    def step(self, step: int) -> None:
-        """To the next or previous patch of the filtered list, going round."""
-        names = list(self.browser.listed) or [entry.name for entry in self._entries]
-        entry = self.entry
-        if names:
-            here = names.index(entry.name) if entry is not None and entry.name in names else -1
-            self.choose(names[(here + step) % len(names)] if here >= 0 else names[0 if step > 0 else -1])
-
-    def toggle(self) -> None:
-        """Opens the browser, or closes it."""
-        if self.browser.isVisible():
-            self.browser.dismiss()
-        else:
-            self.browser.show_over()
 
     def audition(self, name: str) -> None:
         """Chooses a patch, unless it is there already, maybe changed, and plays a note in the middle of its range."""
@@ -263,8 +253,8 @@ class PatchDesk(QObject):
         except WriteError as error:
             self.told.emit(one_line(str(error)))
             return
-        if entry.name in self.favourites:
-            self.favourites = self.favourites - {entry.name} | {renamed.name}
+        if entry.name in self.desk.favourites:
+            self.desk.favourites ^= {entry.name, renamed.name}
         if self.patch is not None and self.patch.name == entry.patch.name:
             self._session.update(patch=self.patch.model_copy(update={"name": renamed.patch.name}))
         self.reload()
@@ -280,7 +270,7 @@ class PatchDesk(QObject):
         except OSError as error:
             self.told.emit(f"{entry.path}: cannot be deleted ({error.strerror}).")
         else:
-            self.favourites = self.favourites - {entry.name}
+            self.desk.favourites.discard(entry.name)
         self.reload()
 
     def revert(self) -> None:
@@ -497,14 +487,9 @@ class PatchDesk(QObject):
         self.recordings.tick(now_s)
 
     def close(self) -> None:
-        """Ends the playback, and waits until a recording is written; may be called again."""
+        """Ends the playback; may be called again."""
         self._note_timer.stop()
         self._playback.stop()
-        self.recordings.close()
-
-    def _show_entries(self) -> None:
-        entry = self.entry
-        self.browser.show_entries(self._entries, self.favourites, entry.name if entry else "")
 
     def _show_patch(self) -> None:
         patch, entry, panel = self.patch, self.entry, self._panel
@@ -519,11 +504,7 @@ class PatchDesk(QObject):
             panel.neck.set_strings([(note_name(each.note), each.note) for each in strings.strings])
         else:
             panel.neck.set_strings([(note_name(patch.range[0]), patch.range[0])])
-        self.browser.set_chosen(entry.name if entry is not None else "")
-
-    def _toggle_favourite(self, name: str) -> None:
-        self.favourites ^= {name}
-        self._show_entries()
+        self.desk.show_chosen()
 
     def _press(self, key: int, velocity: int) -> None:
         """Plays a key on the screen, which is one of the patch, where there is one."""
@@ -543,16 +524,6 @@ class PatchDesk(QObject):
             chosen = {**dict(self.patch.body), "name": name}
             body = Body(**chosen) if chosen["mix"] > 0 else Body(name=name, size=chosen["size"])
             self._session.update(patch=self.patch.model_copy(update={"body": body}))
-
-    def _open_folder(self) -> None:
-        folder = own_patches()
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            self.told.emit(f"{folder}: cannot be created ({error.strerror}).")
-            return
-        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self.told.emit(f"No file manager was found here; your own patches are in {folder}.")
 
 
 def _note(key: int) -> list[TimedEvent]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
+from app.export.sound import Through
 from app.instrument.events import PluckAt
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch
@@ -203,6 +204,14 @@ class Performance(QObject):
         if patch is not None:
             choices = choices.changed({"patch": patch})
         self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
+
+    def through(self, choices: Choices) -> Through | None:
+        """What the instrument adds to the chosen string: its level, body and room; None: there is no instrument."""
+        keys, string = self.notes.keys, choices.string
+        patch = keys.heard_through
+        if patch is None:
+            return None
+        return Through.of(patch, 1.0 if string is None else keys.gain_of(string.parameters))
 
     def render_sound(self, choices: Choices, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
         """Model and truth of a pluck as they are heard, (frames, channels) by source, rendered in the background.

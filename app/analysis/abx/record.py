@@ -1,11 +1,7 @@
-"""The result of a test: its words, and the JSON file that keeps it.
-
-Score and p-value follow from the trials. The file has them for its readers; they are computed again when it is read.
-"""
+"""The result of a test: score and p-value from its trials, and the JSON file that keeps it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Literal
@@ -23,9 +19,7 @@ from engine.read_file import read_bounded
 from engine.result_file import WriteError, explain, whole_file
 from engine.schema import SchemaError, parse_json
 
-KIND: Literal["learned-strings-abx"] = "learned-strings-abx"
 LARGEST_FILE_BYTES = 2**20  # 200 trials are a tenth of that
-SCORE_FIELDS = {"kind", "trials", "planned_trials", "correct", "complete", "p_value"}
 PLUCK_FIELDS = {"seconds", *PluckedString.model_fields, *Listener.model_fields} - {"listen_right", "stereo"}
 MEANING = (
     "The p-value is the probability that guessing alone would give at least this many right answers. "
@@ -35,10 +29,9 @@ MEANING = (
 
 
 class Candidate(BaseModel):
-    """A sound that can be A or B.
+    """A or B.
 
     Attributes:
-        source: its name among the sounds of a pluck.
         label: its name for people.
         preset, preset_sha256: the preset that made it; for the truth, the one whose string it is.
         gain_db: its attenuation.
@@ -46,45 +39,17 @@ class Candidate(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    source: str = ""
     label: str
     preset: str
     preset_sha256: str
     gain_db: float = 0.0
 
 
-@dataclass(frozen=True)
-class Material:
-    """What is compared.
-
-    Attributes:
-        candidates: two or more; the first two are A and B until others are chosen.
-        pluck: its fields, and where it is heard, by name.
-        volume_db: of the playback, which stays the same during the test.
-    """
-
-    candidates: tuple[Candidate, ...]
-    pluck: dict[str, object]
-    volume_db: float
-
-
-def material_of(entry: PresetEntry, choices: Choices) -> Material:
-    """Model and truth of a preset, plucked and heard as chosen.
-
-    Raises:
-        PresetError: its file cannot be read.
-    """
-    made = {"preset": entry.name, "preset_sha256": preset_digest(entry.path)}
-    candidates = tuple(Candidate(source=name, label=name.capitalize(), **made) for name in ("model", "truth"))
-    fields = PLUCK_FIELDS | ({"listen_right"} if choices.stereo else set())
-    return Material(candidates, choices.model_dump(mode="json", include=fields), choices.volume_db)
-
-
 class AbxRecord(BaseModel):
-    """The result.
+    """The result; before the test what is compared, without trials.
 
     Attributes:
-        pluck: see `Material`.
+        pluck: its fields, and where it is heard, by name.
         through: the sound device, and how it was played.
         trials: those that were answered, in order.
         remark: why the test is not complete, if that is known.
@@ -92,7 +57,7 @@ class AbxRecord(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    kind: Literal["learned-strings-abx"] = KIND
+    kind: Literal["learned-strings-abx"] = "learned-strings-abx"
     program: str = Field(default_factory=program_version)
     date: AwareDatetime = Field(default_factory=lambda: datetime.now().astimezone().replace(microsecond=0))
     a: Candidate
@@ -101,7 +66,7 @@ class AbxRecord(BaseModel):
     through: dict[str, object]
     planned_trials: Annotated[int, Field(ge=1, le=MOST_TRIALS)]
     seed: int
-    trials: Annotated[tuple[Trial, ...], Field(max_length=MOST_TRIALS)]
+    trials: Annotated[tuple[Trial, ...], Field(max_length=MOST_TRIALS)] = ()
     remark: str = ""
 
     @computed_field  # type: ignore[prop-decorator]
@@ -112,14 +77,13 @@ class AbxRecord(BaseModel):
 
     @computed_field  # type: ignore[prop-decorator]
     @property
-    def complete(self) -> bool:
-        return len(self.trials) == self.planned_trials
-
-    @computed_field  # type: ignore[prop-decorator]
-    @property
     def p_value(self) -> float | None:
         """None unless the test is complete: stopping early would bias it."""
         return p_value(self.correct, self.planned_trials) if self.complete else None
+
+    @property
+    def complete(self) -> bool:
+        return len(self.trials) == self.planned_trials
 
     @property
     def verdict(self) -> str:
@@ -131,20 +95,22 @@ class AbxRecord(BaseModel):
         return "This test did not show that you can tell them apart."
 
 
+def material_of(entry: PresetEntry, choices: Choices) -> AbxRecord:
+    """Model (A) and truth (B) of a preset, plucked and heard as chosen.
+
+    Raises:
+        PresetError: its file cannot be read.
+    """
+    digest = preset_digest(entry.path)
+    a, b = (Candidate(label=label, preset=entry.name, preset_sha256=digest) for label in ("Model", "Truth"))
+    fields = PLUCK_FIELDS | ({"listen_right"} if choices.stereo else set())
+    pluck, through = choices.model_dump(mode="json", include=fields), {"volume_db": choices.volume_db}
+    return AbxRecord(a=a, b=b, pluck=pluck, through=dict(through), planned_trials=1, seed=0)
+
+
 def p_text(p_value: float) -> str:
     """A p-value for people: three decimals, the smallest as a bound."""
     return "p < 0.001" if p_value < 0.001 else f"p = {p_value:.3f}"
-
-
-def as_text(record: AbxRecord) -> str:
-    """The result and its circumstances, a line each."""
-    p = "incomplete" if record.p_value is None else p_text(record.p_value)
-    lines = [f"{record.correct} of {len(record.trials)} right, {record.planned_trials} planned: {p}", record.verdict]
-    for name, value in record.model_dump(mode="json", exclude=SCORE_FIELDS).items():
-        parts = [f"{key} {each}" for key, each in value.items()] if isinstance(value, dict) else [f"{value}"]
-        lines.append(f"{name:<14} {', '.join(parts)}")
-    lines += [f"trial {n}: X is {t.x}, answer {t.answer}" for n, t in enumerate(record.trials, 1)]
-    return "\n".join(lines) + "\n"
 
 
 def default_folder() -> Path:
@@ -172,11 +138,7 @@ def save_record(folder: Path, record: AbxRecord) -> Path:
 
 
 def load_record(path: Path) -> AbxRecord:
-    """Reads a result, of this version or an earlier one.
-
-    Raises:
-        SchemaError: it is missing, damaged, or no result of a listening test.
-    """
+    """Reads a result, of this version or an earlier one. Raises SchemaError: it is missing, damaged, or none."""
     try:
         return AbxRecord.model_validate(parse_json(read_bounded(path, LARGEST_FILE_BYTES), "the result"))
     except OSError as error:

@@ -6,7 +6,7 @@ A difference in level, or a limiter that acts on one of the two, would give X aw
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +17,7 @@ from app.analysis.abx.trials import Identity
 from engine.kernels.limiter import CEILING
 from engine.spectra import spectral_distances
 
+SOURCES = ("model", "truth")  # of A and B
 LARGEST_PEAK = CEILING / 2  # at a restart two sounds overlap: the new beginning and the end of the old one
 END_S = 0.008  # the fade at the end of each repetition
 TRIVIAL_CONVERGENCE = 0.5  # spectral distance above which the difference is obvious without a test
@@ -41,23 +42,20 @@ class Stimuli:
     trivial: bool
 
 
-def make_stimuli(
-    sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, sources: Sequence[str], volume_db: float = 0.0
-) -> Stimuli:
-    """Two sources of a pluck with equal RMS over all of it, and faded at their ends, because they are looped.
+def make_stimuli(sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, volume_db: float = 0.0) -> Stimuli:
+    """Model (A) and truth (B) of a pluck with equal RMS, and faded at their ends, because they are looped.
 
     Args:
         sounds: samples by source, (frames, channels), of one length; ±1 is full scale.
-        sources: the names of A and B.
         volume_db: with which they are played, as it counts for the limiter.
 
     Raises:
         ValueError: one of them is silent.
     """
-    a, b = (sounds[source].astype(np.float64) for source in sources)
+    a, b = (sounds[source].astype(np.float64) for source in SOURCES)
     rms = [math.sqrt(float(np.mean(np.square(samples)))) if samples.size else 0.0 for samples in (a, b)]
     if min(rms) == 0:
-        raise ValueError(f"{sources[rms.index(0)].capitalize()} is silent with this pluck and listening point.")
+        raise ValueError(f"{SOURCES[rms.index(0)].capitalize()} is silent with this pluck and listening point.")
     gains = [min(rms) / level for level in rms]
     peak = max(gain * float(np.abs(samples).max()) for gain, samples in zip(gains, (a, b), strict=True))
     peak *= 10 ** (volume_db / 20)

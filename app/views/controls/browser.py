@@ -1,20 +1,45 @@
-"""Base of both browsers: a search field and a list over the window. Typing searches wherever the focus is."""
+"""A browser over the window: a search, filters, a list under headings, and a card. It stays open while in use.
+
+type              filters the list (words in any order) and selects the best hit, which the card shows
+arrows            load what is selected, or move in the list and load
+Space             loads what is selected and plays it; while text is typed in the search it is a space
+Ctrl+D            adds to the favourites, or removes
+Enter, Escape     close
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 
-from PySide6.QtCore import QEvent, QObject, QSignalBlocker, Qt, Signal
+from PySide6.QtCore import QEvent, QModelIndex, QObject, QSignalBlocker, Qt, QTimer, Signal, SignalInstance
 from PySide6.QtGui import QKeyEvent
-from PySide6.QtWidgets import QApplication, QFrame, QLineEdit, QListWidget, QTreeWidget, QWidget
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
+    QComboBox,
+    QFrame,
+    QGridLayout,
+    QHBoxLayout,
+    QHeaderView,
+    QLineEdit,
+    QPushButton,
+    QTreeView,
+    QVBoxLayout,
+    QWidget,
+)
 
+from app.views.controls.browser_rows import STAR, TITLE, Column, ListedRows, Row, RowsModel
 from app.views.controls.notice_bar import NoticeBar
+from app.views.controls.parts import combo_box, faint, scrolled, tool_button
+from app.views.controls.plain import Label
 
 KEYS = Qt.Key
 MOVES = (KEYS.Key_Up, KEYS.Key_Down, KEYS.Key_PageUp, KEYS.Key_PageDown)
 CLOSES = (KEYS.Key_Return, KEYS.Key_Enter, KEYS.Key_Escape)
 NARROWEST_SEARCH, SHORTEST_CHOICE = 120, 6  # pixels; letters of a box beside it
 TOP = 52  # pixels: of its place without notices
+REST_MS = 160  # after the last step in the list, what is loaded is played
+DELETE, REALLY = "Delete", "Delete it for good?"
 _COMMAND = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
 _ALT_GR = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier  # on Windows
 
@@ -22,46 +47,216 @@ _ALT_GR = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier 
 class Browser(QFrame):
     """Hidden at first; closing gives the focus back to the widget that had it.
 
-    One entry of the list is selected, loaded or not: card and keys are for it.
-
-    A subclass makes `list`, calls `watch_keys` at the end of its `__init__`, and overrides what raises
-    NotImplementedError here.
+    One row of the list is selected, loaded or not: card and keys are for it.
 
     Args:
-        what: of what it is a browser, in the plural, for labels.
-        tip: the tooltip of the search field.
+        what: of what it is a browser, in the plural.
+        searched: what the words are searched in.
+        columns: of the list, the title's first; one alone has no heading.
+        filters: the accessible name of each box, and the words for no filter.
+        orders: in which the list can be sorted.
+        plays: the word for playing what is selected; `at_rest`: arrows play too.
+        size: in pixels, and how much of the window below it stays free.
+        folder_tip: the tooltip of the button that opens the user's folder.
 
     Attributes:
-        loaded: the name of the entry that is loaded, listed or not.
-        selected: the name of the selected entry; "" where none is listed.
+        loaded: the name of the row that is loaded, listed or not.
+        selected: the name of the selected row; "" where none is listed.
     """
 
     opened = Signal()
-    chosen = Signal(str)  # the name of an entry: to be loaded
+    chosen = Signal(str)  # the name of a row: to be loaded
+    played = Signal(str)  # a row that is loaded: to be played
     favourite_asked = Signal(str)  # add or remove
+    rename_asked = Signal(str)
+    delete_asked = Signal(str)  # and confirmed
+    folder_asked = Signal()
+    listed_changed = Signal()
 
-    list: QListWidget | QTreeWidget
-
-    def __init__(self, what: str, tip: str, parent: QWidget | None) -> None:
+    def __init__(
+        self,
+        what: str,
+        searched: str,
+        columns: Sequence[Column],
+        filters: Sequence[tuple[str, str]],
+        orders: Sequence[str],
+        plays: str,
+        at_rest: bool,
+        size: tuple[int, int, int],
+        folder_tip: str,
+        parent: QWidget | None = None,
+    ) -> None:
         super().__init__(parent)
         self.setObjectName("browser")
         self.setAccessibleName(f"Browser of {what}")
-        self.loaded = self.selected = ""
+        self.what, self._size, self._at_rest = what, size, at_rest
+        self.loaded = self.selected = self._folder = ""
         self._before: QWidget | None = None  # had the focus
+        self._filling = False
+        self._rest = QTimer(self, interval=REST_MS, singleShot=True)
+        self._rest.timeout.connect(self.play)
+        self._rows = RowsModel(columns)
+        self._listed = ListedRows(self._rows)
         self.search = QLineEdit(placeholderText=f"Search {what}")
         self.search.setAccessibleName(f"Search {what}")
-        self.search.setToolTip(tip)
+        self.search.setToolTip(f"Words in any order, separated by spaces or commas: {searched}")
         self.search.setClearButtonEnabled(True)
         self.search.setMinimumWidth(NARROWEST_SEARCH)
-
-    def watch_keys(self) -> None:
-        """Watches the keys of all its widgets, and hides the browser; to be called once all are made."""
+        self.search.textChanged.connect(self._filter_changed)
+        self.filters = {name: combo_box(name, [(anything, "")]) for name, anything in filters}
+        self.order = combo_box("Order", [(order, number) for number, order in enumerate(orders)])
+        if len(orders) < 2:
+            self.order.hide()
+        for box in (*self.filters.values(), self.order):
+            box.setMinimumContentsLength(SHORTEST_CHOICE)
+            box.setToolTip(f"Show only {what} of this {box.accessibleName().lower()}")
+            box.currentIndexChanged.connect(self._filter_changed)
+        self.order.setToolTip("Sort the list; favourites first under each heading")
+        self.starred = tool_button("★  Favourites", "Favourites only", "Show only favourites")
+        self.starred.setCheckable(True)
+        self.starred.toggled.connect(self._filter_changed)
+        self.list = self._build_list(columns)
+        self.card = Label(textFormat=Qt.TextFormat.RichText, wordWrap=True)
+        self.card.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
+        self.card.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.card.setContentsMargins(14, 4, 10, 10)
+        self.state = faint()
+        self.play_button = _button(f"▶  {plays}", f"{plays} (Space)", self.play)
+        self.star = _button("☆  Favourite", "Add to the favourites, or remove (Ctrl+D)", self.ask_favourite)
+        tip = "Give your own another name"
+        self.rename = _button("Rename …", tip, lambda: self._tell(self.rename_asked))
+        self.delete = _button(DELETE, "Delete your own; needs a second click", self._ask_delete)
+        self._lay_out(folder_tip, f"↑ ↓ load{' and play' if at_rest else ''}")
         for widget in self.findChildren(QWidget):
             if widget.focusPolicy() != Qt.FocusPolicy.NoFocus and widget.window() is self.window():  # no pop-up
                 widget.installEventFilter(self)
-        if (parent := self.parentWidget()) is not None:
+        if parent is not None:
             parent.installEventFilter(self)
         self.hide()
+
+    def _build_list(self, columns: Sequence[Column]) -> QTreeView:
+        made = QTreeView(rootIsDecorated=False, itemsExpandable=False, uniformRowHeights=True, indentation=0)
+        made.setModel(self._listed)
+        made.setAccessibleName(self.what.capitalize())
+        made.setToolTip("Arrows load, Space plays, Enter closes")
+        made.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # some differ at the end
+        made.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        made.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        made.setHeaderHidden(len(columns) == 1)
+        header = made.header()
+        header.setStretchLastSection(False)
+        header.setMinimumSectionSize(26)
+        for column in range(1 + len(columns)):
+            header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
+        header.setSectionResizeMode(TITLE, QHeaderView.ResizeMode.Stretch)
+        made.selectionModel().currentChanged.connect(self._current_changed)
+        made.clicked.connect(self._clicked)
+        made.doubleClicked.connect(self._double_clicked)
+        return made
+
+    def _lay_out(self, folder_tip: str, arrows: str) -> None:
+        close = tool_button("✕", "Close the browser", "Close (Escape)")
+        close.clicked.connect(self.dismiss)
+        folder = tool_button("Open folder", tip=folder_tip)
+        folder.clicked.connect(self.folder_asked)
+        head, foot, buttons = QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
+        head.addWidget(self.search, 1)
+        for widget in (*self.filters.values(), self.order, self.starred, close):
+            head.addWidget(widget)
+        foot.addWidget(self.state, 1)
+        foot.addWidget(folder)
+        for button in (self.play_button, self.star, self.rename, self.delete):
+            buttons.addWidget(button)
+        buttons.addStretch(1)
+        aside = QVBoxLayout()
+        aside.addWidget(scrolled(self.card), 1)
+        aside.addLayout(buttons)
+        hint = f"Type to search   ·   {arrows}   ·   Space plays   ·   Ctrl+D favourite   ·   Enter closes"
+        grid = QGridLayout(self)
+        grid.setContentsMargins(14, 14, 14, 12)
+        grid.setSpacing(10)
+        grid.addLayout(head, 0, 0, 1, 2)
+        grid.addWidget(self.list, 1, 0)
+        grid.addLayout(aside, 1, 1)
+        grid.addLayout(foot, 2, 0, 1, 2)
+        grid.addWidget(faint(hint), 3, 0, 1, 2)
+        grid.setColumnStretch(0, 6)
+        grid.setColumnStretch(1, 4)
+        grid.setRowStretch(1, 1)
+
+    # What is shown
+
+    def show_rows(self, rows: Sequence[Row], favourites: Collection[str], loaded: str, folder: str) -> None:
+        """All rows there are; which are favourites; which one is loaded; the user's own folder."""
+        self._folder = folder
+        self._filling = True
+        for number, box in enumerate(self.filters.values()):
+            _refill(box, sorted({row.kinds[number] for row in rows}, key=lambda kind: (str(type(kind[0])), kind[0])))
+        self._rows.show(rows, favourites)
+        if loaded != self.loaded:
+            self.loaded = self.selected = loaded
+        self._fill()
+
+    def _fill(self) -> None:
+        """Lists what passes the filter."""
+        listed, self._filling = self._listed, True
+        listed.words = self.words
+        listed.kinds = tuple(box.currentData() for box in self.filters.values())
+        listed.starred, listed.order = self.starred.isChecked(), max(0, self.order.currentIndex())
+        listed.refresh()
+        for row in range(listed.rowCount()):
+            heading = isinstance(listed.line(listed.index(row, STAR)), str)
+            self.list.setFirstColumnSpanned(row, QModelIndex(), heading)
+        self._filling = False
+        found, total = len(self.listed), len(self._rows.rows)
+        count = f"{found} of {total} {self.what}" if found < total else f"{total} {self.what}"
+        self.state.setText(f"{count}   ·   your own: {self._folder}")
+        self.select(self.selected)
+        self.listed_changed.emit()
+
+    @property
+    def listed(self) -> list[str]:
+        """The names that pass the filter, in the order shown: previous and next go through these."""
+        return [row.name for row in self._listed.listed]
+
+    @property
+    def total(self) -> int:
+        return len(self._rows.rows)
+
+    def clear_filter(self) -> None:
+        """Lists all again; the order is no filter. Emits `listed_changed` once."""
+        parts = (self.search, *self.filters.values(), self.starred)
+        blockers = [QSignalBlocker(part) for part in parts]
+        self.search.clear()
+        for box in self.filters.values():
+            box.setCurrentIndex(0)
+        self.starred.setChecked(False)
+        del blockers
+        self._filter_changed()
+
+    def _filter_changed(self) -> None:
+        self.selected = ""  # the best hit is selected
+        self._fill()
+
+    def show_card(self, name: str) -> None:
+        """Shows the card of a row; "" of none."""
+        row = next((row for row in self._listed.listed if row.name == name), None)
+        self.delete.setText(DELETE)
+        for button in (self.play_button, self.star):
+            button.setVisible(row is not None)
+        for button in (self.rename, self.delete):
+            button.setVisible(row is not None and row.own)
+        nothing = f"No matching {self.what.removesuffix('es').removesuffix('s')}: clear the search or filters."
+        self.card.setText(nothing if row is None else row.card())
+        self.star.setText("★  Favourite" if name in self._rows.favourites else "☆  Favourite")
+
+    def place(self) -> None:
+        """Sets the geometry within the parent; called when opened and when the parent is resized."""
+        parent = self.parentWidget()
+        if parent is not None:
+            most, high, below = self._size
+            width, height = min(most, parent.width() - 28), min(high, parent.height() - self.top - below)
+            self.setGeometry(14, self.top, width, max(300, height))
 
     def show_over(self) -> None:
         """Opens with the focus in the search field."""
@@ -73,11 +268,11 @@ class Browser(QFrame):
         self.raise_()
         self.search.setFocus()
         self.search.selectAll()
-        if (item := self.list.currentItem()) is not None:
-            self.list.scrollToItem(item)  # type: ignore[arg-type]
+        self.list.scrollTo(self.list.currentIndex())
 
     def dismiss(self) -> None:
         """Closes, and gives the focus back; a filter that nothing passes is cleared."""
+        self._rest.stop()
         self.hide()
         if self._before is not None and self._before.isVisible():
             self._before.setFocus()
@@ -119,8 +314,9 @@ class Browser(QFrame):
 
         "" where none is listed.
         """
-        listed, words = self.listed, self.words
-        hits = tuple(name for name in listed if all(word in self.title(name).casefold() for word in words)) or listed
+        rows, words = self._listed.listed, self.words
+        hits = [row.name for row in rows if all(word in row.title.casefold() for word in words)]
+        hits = hits or [row.name for row in rows]
         return self.loaded if self.loaded in hits else next(iter(hits), "")
 
     def set_chosen(self, name: str) -> None:
@@ -132,8 +328,9 @@ class Browser(QFrame):
     def select(self, name: str = "") -> None:
         """Selects an entry, or the best hit where it is not listed. Loads nothing."""
         self.selected = name if name in self.listed else self.best_hit
-        with QSignalBlocker(self.list):
-            self.mark(self.selected)
+        self._filling = True
+        self.list.setCurrentIndex(self._listed.index_of(self.selected))
+        self._filling = False
         self.show_card(self.selected)
 
     def load(self, name: str) -> None:
@@ -151,6 +348,7 @@ class Browser(QFrame):
             self.list.setFocus()  # where Space plays
             row = listed.index(self.selected) + (self.step(key) if self.selected == self.loaded else 0)
             self.load(listed[min(max(row, 0), len(listed) - 1)])
+            self._start_rest()
 
     def press(self, key: Qt.Key) -> None:
         """Handles one of MOVES, Space, D or one of CLOSES."""
@@ -166,40 +364,47 @@ class Browser(QFrame):
             self.dismiss()
 
     def ask_favourite(self) -> None:
-        """Asks for the selected entry to become a favourite, or none."""
-        if self.selected:
-            self.favourite_asked.emit(self.selected)
-
-    # For subclasses
-
-    def place(self) -> None:
-        """Sets the geometry within the parent; called when opened and when the parent is resized."""
-        raise NotImplementedError
+        """Asks for the selected row to become a favourite, or none."""
+        self._tell(self.favourite_asked)
 
     def play(self) -> None:
-        """Plays the selected entry."""
-        raise NotImplementedError
+        """Loads the selected row, and has it played."""
+        self._rest.stop()
+        self.load(self.selected)
+        self._tell(self.played)
 
-    @property
-    def listed(self) -> Sequence[str]:
-        """The names of the entries that pass the filter, in the order shown."""
-        raise NotImplementedError
+    def _tell(self, signal: SignalInstance) -> None:
+        if self.selected:
+            signal.emit(self.selected)
 
-    def title(self, name: str) -> str:
-        """The title of a listed entry."""
-        raise NotImplementedError
+    def _ask_delete(self) -> None:
+        if self.delete.text() == DELETE:
+            self.delete.setText(REALLY)
+        else:
+            self.delete.setText(DELETE)
+            self._tell(self.delete_asked)
 
-    def mark(self, name: str) -> None:
-        """Makes an entry the list's current one; "" leaves none."""
-        raise NotImplementedError
+    def _start_rest(self) -> None:
+        if self._at_rest:
+            self._rest.start()
 
-    def show_card(self, name: str) -> None:
-        """Shows the card of an entry; "" of none."""
-        raise NotImplementedError
+    def _current_changed(self, index: QModelIndex) -> None:
+        if not self._filling and index.isValid() and isinstance(line := self._listed.line(index), Row):
+            self.load(line.name)
 
-    def clear_filter(self) -> None:
-        """Lists everything again; emits the change of the filter once."""
-        raise NotImplementedError
+    def _clicked(self, index: QModelIndex) -> None:
+        line = self._listed.line(index)
+        if isinstance(line, str):
+            self.select(self.selected)  # a heading took the mark
+        elif index.column() == STAR:
+            self.favourite_asked.emit(line.name)
+        else:
+            self.load(line.name)  # the best hit may be selected and not loaded
+            self._start_rest()
+
+    def _double_clicked(self, index: QModelIndex) -> None:
+        if index.column() != STAR and isinstance(self._listed.line(index), Row):
+            self.dismiss()
 
     def page(self) -> int:
         """Rows that a page up or down goes."""
@@ -235,6 +440,25 @@ class Browser(QFrame):
         if event.key() == KEYS.Key_Space and watched is self.search:
             return not control and self.search.selectedText() == self.search.text()  # nothing is being written
         return event.key() in (*CLOSES, KEYS.Key_Space, *MOVES) and not control
+
+
+def _button(text: str, tip: str, act: Callable[[], object]) -> QPushButton:
+    made = QPushButton(text)
+    made.setAccessibleName(text.lstrip("▶☆ "))
+    made.setToolTip(tip)
+    made.clicked.connect(lambda: act())
+    return made
+
+
+def _refill(box: QComboBox, kinds: Sequence[tuple[object, str]]) -> None:
+    """What can be filtered by, after the entry for no filter; what is chosen stays."""
+    with QSignalBlocker(box):
+        chosen = box.currentData()
+        while box.count() > 1:
+            box.removeItem(1)
+        for value, words in kinds:
+            box.addItem(words, value)
+        box.setCurrentIndex(max(0, box.findData(chosen)))
 
 
 def open_browser(window: QWidget) -> Browser | None:

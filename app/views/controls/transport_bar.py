@@ -14,7 +14,6 @@ from PySide6.QtWidgets import (
 
 from app.session.choices import Choices
 from app.shared.parameters import OF_CHOICES
-from app.views.controls.drag_button import DragButton
 from app.views.controls.knob import Knob
 from app.views.controls.meter import Meter
 from app.views.controls.parts import tool_button, vertical_rule
@@ -161,9 +160,9 @@ class TransportBar(QFrame):
         return column
 
     def _build_output(self) -> QVBoxLayout:
-        self.export = self._export = DragButton("Export WAV …")
+        self.export = self._export = QPushButton("Export WAV …")
         self._export.setAccessibleName("Export WAV")
-        self._export.setToolTip("Save this pluck as a WAV file (Ctrl+E), or drag the file out of the window")
+        self._export.setToolTip("Save what you hear as a WAV file (Ctrl+E)")
         self._export.clicked.connect(self.export_asked)
         column = QVBoxLayout()
         column.addWidget(self.meter)

@@ -6,7 +6,7 @@ give X away.
 
 from __future__ import annotations
 
-import time
+import secrets
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
 from pathlib import Path
@@ -16,16 +16,15 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QStackedWidget, QVBoxLayout, QWidget
 
-from app.analysis.abx.record import AbxRecord, Material, default_folder, save_record
+from app.analysis.abx.record import AbxRecord, default_folder, load_record, save_record
 from app.analysis.abx.sound import Stimuli, make_stimuli
-from app.analysis.abx.trials import AbxChoices, Identity, Run, Sound, new_seed
+from app.analysis.abx.trials import AbxChoices, Identity, Run, Sound
 from app.audio.sound import Sound as SoundOutput
 from app.audio.sound import SoundStatus
 from app.playing.pair import Pair
-from app.views.dialogs.abx_result import ResultPage
-from app.views.dialogs.abx_setup import SetupPage
-from app.views.dialogs.abx_trial import TrialPage
+from app.views.dialogs.abx_pages import ResultPage, SetupPage, TrialPage
 from engine.result_file import WriteError
+from engine.schema import SchemaError
 
 Render = Callable[[int], "Future[Mapping[str, NDArray[np.float32]]]"]
 
@@ -39,12 +38,14 @@ TRIVIAL = (
 )
 DEVICE_CHANGED = "The sound device changed during the test."
 CLOSED = "The window was closed during the test."
+LARGEST_SEED = 2**32
 
 
 class AbxDialog(QDialog):
     """The pages, the sound and the result of the test.
 
     Args:
+        material: what is compared: a result without trials.
         render: starts to render model and truth of the pluck at a rate in Hz; gives the future of their samples,
             (frames, channels), by source.
         seed: draws a seed for each test.
@@ -53,11 +54,11 @@ class AbxDialog(QDialog):
     def __init__(
         self,
         output: SoundOutput,
-        material: Material,
+        material: AbxRecord,
         choices: AbxChoices,
         render: Render,
         parent: QWidget | None = None,
-        seed: Callable[[], int] = new_seed,
+        seed: Callable[[], int] = lambda: secrets.randbelow(LARGEST_SEED),
     ) -> None:
         super().__init__(parent)
         self.setWindowTitle("Listening test (ABX)")
@@ -70,12 +71,12 @@ class AbxDialog(QDialog):
         self._silence = RENDERING  # why there are no stimuli
         self._run: Run | None = None
         self._sounding: Sound | None = None
-        self._trial_began_s = 0.0
         self._through: dict[str, object] | None = None  # the device, and how it is played, during the test
         self._record: AbxRecord | None = None
-        folder = Path(choices.folder) if choices.folder else default_folder()
-        self._setup = SetupPage(material.candidates, choices.trials, choices.restart, folder)
-        self._trial, self._result = TrialPage(), ResultPage()
+        self._folder = choices.folder
+        self._volume_db = float(str(material.through["volume_db"]))
+        labels = material.a.label, material.b.label
+        self._setup, self._trial, self._result = SetupPage(labels, choices), TrialPage(labels), ResultPage()
         self._pages = QStackedWidget()
         for page in (self._setup, self._trial, self._result):
             self._pages.addWidget(page)
@@ -97,8 +98,8 @@ class AbxDialog(QDialog):
 
     def choices(self) -> AbxChoices:
         """The dialog's state, to be remembered."""
-        folder = "" if self._setup.folder == default_folder() else str(self._setup.folder)
-        return AbxChoices(trials=self._setup.trials, restart=self._setup.restart, folder=folder)
+        setup = self._setup
+        return AbxChoices(trials=setup.trials.value(), restart=setup.restart.isChecked(), folder=self._folder)
 
     def abandon(self) -> None:
         """Closes without a question; a test under way is recorded as incomplete."""
@@ -109,7 +110,7 @@ class AbxDialog(QDialog):
     def _connect(self) -> None:
         setup, trial, result = self._setup, self._trial, self._result
         setup.start.clicked.connect(self._start)
-        setup.pair_changed.connect(self._prepare)
+        setup.open_result.clicked.connect(self._open_result)
         setup.audition_asked.connect(self._audition)
         trial.audition_asked.connect(self._audition)
         trial.replay_asked.connect(lambda: self._audition(self._sounding or "X", again=True))
@@ -133,9 +134,8 @@ class AbxDialog(QDialog):
         self._silence = RENDERING
         rendering = self._rendering
         if rendering is not None and rendering.done() and self._rate_hz == self._output.rate_hz:
-            sources = [candidate.source for candidate in self._setup.pair]
             try:
-                made = make_stimuli(rendering.result(), self._rate_hz, sources, self._material.volume_db)
+                made = make_stimuli(rendering.result(), self._rate_hz, self._volume_db)
             except Exception as error:  # a model that ran away, or silence
                 self._silence = str(error)
             else:
@@ -151,7 +151,7 @@ class AbxDialog(QDialog):
             identity = self._run.heard_as(sound)
             self._run = self._run.auditioned(sound)
         self._pair.select(identity)
-        self._pair.play(anew=again or self._setup.restart or self._sounding is None)
+        self._pair.play(anew=again or self._setup.restart.isChecked() or self._sounding is None)
         self._sounding = sound
         if self._run is not None:
             self._trial.show_sounding(sound, self._run.x_heard)
@@ -167,12 +167,9 @@ class AbxDialog(QDialog):
         status = self._output.status()
         if self._obstacle(status) or status.device is None:
             return
-        self._through = _device_of(status) | {
-            "volume_db": self._material.volume_db,
-            "restart_at_switch": self._setup.restart,
-        }
-        self._run = Run(self._seed(), self._setup.trials)
-        self._trial.show_pair(*self._setup.pair)
+        restarts = self._setup.restart.isChecked()
+        self._through = {**_device_of(status), "volume_db": self._volume_db, "restart_at_switch": restarts}
+        self._run = Run(self._seed(), self._setup.trials.value())
         self._pages.setCurrentWidget(self._trial)
         self._trial.setFocus()
         self._begin_trial()
@@ -180,13 +177,12 @@ class AbxDialog(QDialog):
     def _begin_trial(self) -> None:
         assert self._run is not None
         self._hush()
-        self._trial_began_s = time.monotonic()
-        self._trial.show_trial(self._run.number, self._run.planned)
+        self._trial.show_trial(len(self._run.trials) + 1, self._run.planned)
 
     def _answer(self, answer: Identity) -> None:
         if self._run is None or not self._run.x_heard:
             return
-        self._run = self._run.answered(answer, round(time.monotonic() - self._trial_began_s, 2))
+        self._run = self._run.answered(answer)
         if self._run.complete:
             self._end()
         else:
@@ -202,9 +198,10 @@ class AbxDialog(QDialog):
         if not run.trials:
             self._show_setup()
             return
+        gains_db = (round(gain_db, 3) for gain_db in self._stimuli.gains_db)
         a, b = (
-            candidate.model_copy(update={"gain_db": round(gain_db, 3)})
-            for candidate, gain_db in zip(self._setup.pair, self._stimuli.gains_db, strict=True)
+            candidate.model_copy(update={"gain_db": gain_db})
+            for candidate, gain_db in zip((self._material.a, self._material.b), gains_db, strict=True)
         )
         self._record = AbxRecord(
             a=a,
@@ -216,9 +213,27 @@ class AbxDialog(QDialog):
             trials=run.trials,
             remark=remark,
         )
+        self._show_result(self._record)
+        self._save(Path(self._folder) if self._folder else default_folder())
+
+    def _show_result(self, record: AbxRecord) -> None:
+        self._hush()
         self._pages.setCurrentWidget(self._result)
-        self._result.show_record(self._record)
-        self._save(self._setup.folder)
+        self._result.show_record(record)
+
+    def _open_result(self) -> None:
+        """Shows a result that was saved."""
+        folder = self._folder or str(default_folder())
+        path, _ = QFileDialog.getOpenFileName(self, "Open the result of a listening test", folder, "JSON (*.json)")
+        if not path:
+            return
+        try:
+            record = load_record(Path(path))
+        except SchemaError as error:
+            QMessageBox.warning(self, "Listening test", str(error))
+            return
+        self._show_result(record)
+        self._result.show_saved(path, failed=False)
 
     def _save(self, folder: Path) -> None:
         assert self._record is not None
@@ -230,8 +245,8 @@ class AbxDialog(QDialog):
             self._result.show_saved(f"Saved {path}", failed=False)
 
     def _save_elsewhere(self) -> None:
-        chosen = QFileDialog.getExistingDirectory(self, "Folder of the result")
-        if chosen:
+        if chosen := QFileDialog.getExistingDirectory(self, "Folder of the result"):
+            self._folder = chosen
             self._save(Path(chosen))
 
     # What is shown, and leaving

@@ -1,143 +1,258 @@
-"""The export dialog: what to save and how; then progress, which can be cancelled, and the result."""
+"""The export dialog: a page for each kind of export, then progress, which can be cancelled, and the result.
+
+It does not block the window: several minutes are for playing.
+"""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Sequence
-from pathlib import Path
+import time
+from collections.abc import Mapping
+from typing import Any
 
-from PySide6.QtWidgets import QTabBar, QWidget
+from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer, QUrl, Signal
+from PySide6.QtGui import QDesktopServices, QKeyEvent
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QPushButton, QTabBar, QVBoxLayout, QWidget
 
-from app.export.batch import INDEX, BatchRow, run_batch
 from app.export.choices import ExportChoices
-from app.export.files import WavReport
-from app.presets.library import PresetEntry
-from app.session.choices import Choices
-from app.views.dialogs.chosen_sound import export_chosen
-from app.views.dialogs.export_pages import BatchPage, SoundPage, as_heard
-from app.views.dialogs.job_dialog import JobDialog
-from app.views.dialogs.sound_form import SoundForm
+from app.export.files import ExportError
+from app.export.job import EXPECTED, ExportJob
+from app.export.sampled.choices import SampledChoices
+from app.views.background import Background
+from app.views.controls.parts import label
+from app.views.dialogs.export_pages import (
+    PAGES,
+    ExportPage,
+    Kind,
+    NotePage,
+    PerformancePage,
+    SamplerPage,
+    WavForm,
+)
+from engine.plain_text import duration
 
-_RECIPE_NOTE = "Each file stores its settings: drop it on the window to restore its preset and pluck."
+KINDS = tuple(PAGES)
+SETTLE_MS = 150  # after the last change: a knob that is turned changes the patch at each step
+MEANWHILE = "You can play on meanwhile."
 
 
-class ExportDialog(JobDialog):
-    """Offers first the source that is heard, and remembers its last state in `export_choices`.
+class ExportDialog(QDialog):
+    """Follows what the window plays (`show_subjects`) until an export begins.
 
-    Args:
-        entries: the presets of a batch; `choices.preset` is among them.
+    While one runs, the keyboard goes to the parent's window; Escape in the dialog still cancels.
+
+    Attributes:
+        state: a line or more on what is to come, on progress, or on the result.
+        save: the button that starts.
     """
 
-    def __init__(
-        self,
-        entries: Sequence[PresetEntry],
-        choices: Choices,
-        export: ExportChoices,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__("Export WAV", 680, parent)
-        choices, export = as_heard(entries, choices, export)
-        self._preset = next(entry for entry in entries if entry.name == choices.preset)
-        self._choices, self._export = choices, export
-        self.sound = SoundPage(self._preset, choices, export)
-        self.batch = BatchPage(entries, choices, export)
-        self.form = SoundForm(export, self._preset.info.rate_hz)
-        self.tabs = QTabBar()
-        self.tabs.setAccessibleName("What to export")
-        self.tabs.setToolTip("One pluck, or many")
-        self.tabs.addTab("This pluck")
-        self.tabs.addTab("Batch")
-        self.tabs.setDrawBase(False)
-        self.tabs.setExpanding(False)
-        choosers = (self.tabs, self.sound, self.batch, self.form)
-        self._lay_out(choosers, choosers, state_height=34)
-        self._say(_RECIPE_NOTE)
-        for part in (self.sound, self.batch, self.form):
-            part.changed.connect(self._show_choices)
-        self.tabs.currentChanged.connect(self._turn)
-        self.batch.hide()
-        self._show_choices()
+    exported = Signal(object)  # the job that has ended well
 
-    def export_choices(self) -> ExportChoices:
-        """The dialog's state."""
-        folder = str(Path(self.sound.path.text()).parent)
-        more = {"folder": folder, "source": self.sound.source.currentData(), "batch": self.batch.choices()}
-        return ExportChoices.model_validate({**self._export.model_dump(), **self.form.choices(), **more})
+    def __init__(self, export: ExportChoices, sampled: SampledChoices, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Export")
+        self.setMinimumWidth(680)
+        self._window = None if parent is None else parent.window()
+        self._export = export
+        self._background = Background("export", self, expected=EXPECTED)
+        self._background.progressed.connect(self._show_progress)
+        self._background.finished.connect(self._finished)
+        self._background.failed.connect(lambda message, details: self._end(message, failed=True))
+        self._background.cancelled.connect(self._cancelled)
+        self._job: ExportJob | None = None  # the latest
+        self._subjects: Mapping[Kind, Any] = {}
+        self.wav = WavForm(export)
+        self.note, self.performance = NotePage(export, self.wav), PerformancePage(export, self.wav)
+        self.sampler = SamplerPage(sampled)
+        self.pages: dict[Kind, ExportPage] = dict(
+            zip(KINDS, (self.note, self.performance, self.sampler), strict=True)
+        )
+        self.tabs = QTabBar(drawBase=False, expanding=False)
+        self.tabs.setAccessibleName("What to export")
+        self.tabs.setToolTip("A note, what was recorded, or the patch for samplers")
+        self._settled = QTimer(self, singleShot=True, interval=SETTLE_MS)
+        self._settled.timeout.connect(self._update)
+        self._lay_out()
+        for page in self.pages.values():
+            self.tabs.addTab(page.title)
+            page.changed.connect(self._settled.start)
+        self.wav.changed.connect(self._settled.start)
+        self.tabs.currentChanged.connect(self._turn)
+
+    def _lay_out(self) -> None:
+        self.state = label("faint", selectable=True)
+        self.state.setMinimumHeight(52)
+        self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
+        self.bar = QProgressBar(maximum=1000)
+        self.bar.setAccessibleName("Progress")
+        self.show_folder = QPushButton("Show in folder")
+        self.show_folder.setToolTip("Open the folder of what was saved")
+        self.show_folder.clicked.connect(self._open_folder)
+        self.save = QPushButton("Export", default=True)
+        self.save.setObjectName("primary")
+        self.save.setToolTip("Render and save")
+        self.save.clicked.connect(self._start)
+        self.close_button = QPushButton("Close")
+        self.close_button.setToolTip("Close, or cancel the rendering (Escape)")
+        self.close_button.clicked.connect(self.reject)
+        buttons = QHBoxLayout()
+        buttons.addWidget(self.show_folder)
+        buttons.addStretch(1)
+        buttons.addWidget(self.close_button)
+        buttons.addWidget(self.save)
+        self._choosers = (self.tabs, *self.pages.values(), self.wav)
+        column = QVBoxLayout(self)
+        column.setSpacing(12)
+        for part in self._choosers:
+            column.addWidget(part)
+        column.addStretch(1)
+        column.addWidget(self.bar)
+        column.addWidget(self.state)
+        column.addLayout(buttons)
+        self.bar.hide()
+        self.show_folder.hide()
 
     @property
-    def _is_batch(self) -> bool:
-        return self.tabs.currentIndex() == 1
+    def kind(self) -> Kind:
+        return KINDS[self.tabs.currentIndex()]
+
+    @property
+    def page(self) -> ExportPage:
+        return self.pages[self.kind]
+
+    @property
+    def job(self) -> ExportJob | None:
+        """The one under way."""
+        return self._job if self._background.busy else None
+
+    def choices(self) -> ExportChoices:
+        """Of notes and performances, to be remembered."""
+        return ExportChoices.model_validate({**self.note.choices(), **self.wav.choices()})
+
+    def sampled_choices(self) -> SampledChoices:
+        return self.sampler.choices()
+
+    def open_at(self, kind: Kind) -> None:
+        """Shows a page, unless an export is under way, and brings the dialog to the front."""
+        if self.job is None:
+            self.tabs.setCurrentIndex(KINDS.index(kind))
+            self._turn()
+        self.show()
+        self.raise_()
+        self.activateWindow()
+
+    def show_subjects(self, subjects: Mapping[Kind, Any]) -> None:
+        """What there is now, by kind; an export that has begun goes on with what it began with."""
+        self._subjects = subjects
+        if self.job is None:
+            for kind, page in self.pages.items():
+                page.show_subject(subjects.get(kind))
+            self._settled.start()
 
     def _turn(self) -> None:
-        """To the other page."""
-        self.sound.setVisible(not self._is_batch)
-        self.batch.setVisible(self._is_batch)
-        self._say(_RECIPE_NOTE)
-        self._show_choices()
+        for page in self.pages.values():
+            page.setVisible(page is self.page)
+        self.wav.setVisible(self.page.writes_wav)
+        self._update()
         self.adjustSize()
 
-    def _show_choices(self) -> None:
-        if self._job.busy:
+    def _update(self) -> None:
+        """What would be written. Nothing is, until it begins."""
+        self._settled.stop()
+        if self.job is not None:
             return
-        export = self.export_choices()
-        self.sound.suggest_name(export.rate_hz)
-        self.form.show_difference("difference" in (export.batch.sources if self._is_batch else (export.source,)))
-        if not self._is_batch:
-            there = any(path.is_file() for path in self.sound.paths().values())
-            self.save.setText("Replace" if there else "Export")
-            self.save.setEnabled(bool(self.sound.path.text().strip()))
-            return
+        self.show_folder.hide()
         try:
-            files = self.batch.plan(export).files
-        except ValueError as error:
-            self.save.setText("Export")
+            text, words = self.page.offer()
+        except (ValueError, ExportError) as error:
+            self._tell(str(error), failed=True)
             self.save.setEnabled(False)
-            self._say(str(error), failed=True)
-        else:
-            self.save.setText(f"Export {files} file{'s' if files > 1 else ''}")
-            self.save.setEnabled(True)
-            self._say(f"{_RECIPE_NOTE} {INDEX} lists them with peaks and errors.")
+            return
+        self.save.setText(text)
+        self.save.setEnabled(True)
+        self._tell(words)
 
     # Work
 
     def _start(self) -> None:
-        export = self.export_choices()
-        if self._is_batch:
-            plan = self.batch.plan(export)
-            self._run(lambda job: run_batch(plan, job.progress), self._tell_batch, self._tell_cancelled, plan.folder)
+        self._update()  # of choices that have not settled
+        if not self.save.isEnabled():
             return
-        preset, choices, paths = self._preset, self._choices, self.sound.paths()
+        self._job = job = self.page.job()
+        self._started_s = time.monotonic()
+        for part in (*self._choosers, self.save):
+            part.setEnabled(False)
+        self.close_button.setText("Cancel")
+        self.bar.setValue(0)
+        self.bar.show()
+        self._tell("Rendering …")
+        self._background.start(lambda work: job.run(work.progress))
+        self._lend_keyboard(True)
 
-        self._run(
-            lambda job: export_chosen(preset, choices, export, paths, job.progress),
-            self._tell_sound,
-            self._tell_cancelled,
-            next(iter(paths.values())).parent,
-        )
+    def _lend_keyboard(self, lent: bool) -> None:
+        """While a tool window has the focus, its parent's shortcuts work."""
+        if self._window is None:
+            return
+        kind = Qt.WindowType.Tool if lent else Qt.WindowType.Dialog
+        self.overrideWindowFlags((self.windowFlags() & ~Qt.WindowType.WindowType_Mask) | kind)
+        if lent:
+            self._window.activateWindow()
 
-    def _tell_cancelled(self) -> None:
-        kept = "finished files are kept; export again to resume." if self._is_batch else "no file was written."
-        self._end(f"Cancelled; {kept}")
+    def event(self, event: QEvent) -> bool:
+        """Passes keys on to the parent's window while a job lends it the keyboard, all but Escape."""
+        if isinstance(event, QKeyEvent) and self.job is not None and self._window is not None:
+            if event.key() == Qt.Key.Key_Escape:
+                event.accept()  # no shortcut of the window
+            elif event.type() != QEvent.Type.ShortcutOverride:
+                return QCoreApplication.sendEvent(self._window, event)
+        return super().event(event)
 
-    def _tell_sound(self, reports: list[WavReport]) -> None:
-        lines = []
-        for report in reports:
-            level = f"peak {report.peak_db:.1f} dBFS, {report.clipped} clipped"
-            lines.append(f"Saved {report.path} ({report.seconds:.2f} s, {level}).")
-        if past_s := max(report.past_training_s for report in reports):
-            lines.append(f"The last {past_s:.2f} s lie past the model's training; a marker says where it ends.")
-        if not reports[0].decayed:
-            lines.append("Not decayed at the maximum length: faded out there.")
-        if any(report.clipped for report in reports):
-            lines.append("Clipped: lower the amplitude, normalise, or choose floating point.")
-        self._end("\n".join(lines), saved=True)
+    def _show_progress(self, share: float, text: str, left_s: float | None) -> None:
+        self.bar.setValue(round(1000 * share))
+        if left_s is None and share > 0:
+            left_s = (time.monotonic() - self._started_s) * (1 - share) / share
+        left = f", about {duration(left_s)} left" if left_s else ""
+        self._tell(f"{text or 'Rendering'}{left}. {MEANWHILE}")
 
-    def _tell_batch(self, rows: list[BatchRow]) -> None:
-        counts = Counter(row.status for row in rows)
-        text = f"{counts['written']} files written, {counts['kept']} kept, {counts['failed']} failed."
-        clipped = sum(row.clipped or 0 for row in rows)
-        peaks = [row.peak_db for row in rows if row.peak_db is not None]
-        level = f" Loudest peak {max(peaks):.1f} dBFS, {clipped} samples clipped." if peaks else ""
-        messages = list(dict.fromkeys(row.message for row in rows if row.message))
-        failed = f"\n{messages[0]}" + (f"\n… {INDEX} has the others" if len(messages) > 1 else "") if messages else ""
-        self._end(f"{text}{level}{failed}", failed=bool(messages), saved=True)
+    def _finished(self, words: str) -> None:
+        self.exported.emit(self._job)
+        self._end(words)
+        self.show_folder.show()
+
+    def _cancelled(self) -> None:
+        assert self._job is not None
+        try:
+            self._end(f"Cancelled; {self._job.cancelled()}")
+        except ExportError as error:
+            self._end(str(error), failed=True)
+
+    def _end(self, text: str, failed: bool = False) -> None:
+        """The job is over, with this result."""
+        self._lend_keyboard(False)
+        self.bar.hide()
+        for part in (*self._choosers, self.save):
+            part.setEnabled(True)
+        self.close_button.setText("Close")
+        self.show_subjects(self._subjects)  # as they are by now
+        self._update()
+        self._tell(text, failed)
+
+    def _tell(self, text: str, failed: bool = False) -> None:
+        self.state.setObjectName("warning" if failed else "faint")
+        self.state.style().polish(self.state)
+        self.state.setText(text)
+
+    def _open_folder(self) -> None:
+        assert self._job is not None
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(self._job.folder))):
+            self._tell(f"No file manager was found here; the folder is {self._job.folder}.")
+
+    def done(self, result: int) -> None:
+        """Closes the dialog. A job under way is cancelled and waited for; what is whole is kept."""
+        self._background.close(None)
+        super().done(result)
+
+    def reject(self) -> None:
+        if self.job is not None:
+            self._background.stop()
+        else:
+            self.accept()

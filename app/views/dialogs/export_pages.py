@@ -1,302 +1,447 @@
-"""The pages of the export dialog: the present pluck, and a batch of many."""
+"""The pages of the export dialog, one for each kind of export: a note, a performance, an instrument for samplers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from pathlib import Path
+from shutil import disk_usage
+from typing import Any, Literal
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QShowEvent
+from PySide6.QtCore import QSignalBlocker, Signal, SignalInstance
 from PySide6.QtWidgets import (
+    QAbstractButton,
     QCheckBox,
-    QFileDialog,
+    QComboBox,
+    QDoubleSpinBox,
     QFormLayout,
-    QLineEdit,
-    QListWidget,
-    QListWidgetItem,
+    QLayout,
+    QSpinBox,
     QWidget,
 )
 
-from app.export.batch import BatchPlan, NamedString
-from app.export.choices import BatchChoices, ExportChoices
-from app.export.files import Source
-from app.export.sound import SOURCES
+from app.export.choices import Chosen, ExportChoices
+from app.export.files import ExportError
+from app.export.job import ExportJob
+from app.export.note import HeardNote, Note, NoteExport
+from app.export.played import Played, PlayedExport, recorded_files
+from app.export.recipe import source_words
+from app.export.sampled.choices import SampledChoices
+from app.export.sampled.export import SampledExport
+from app.export.sampled.job import kept_samples, plain_stem
+from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampledPlan
+from app.export.sampled.words import counted, megabytes, needed_bytes, number_of, pitch_words, size_words
+from app.export.sound import DECAY_RANGE_DB, LONGEST_S
+from app.instrument.bodies import body_digest
+from app.instrument.effects import body_problem
+from app.instrument.events import NoteOn
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry
-from app.presets.words import shape_word
-from app.session.choices import Choices
-from app.session.slots import other_preset
-from app.views.controls.parts import combo_box, faint, tool_button
-from app.views.controls.plain import Label, plain_tip
-from app.views.dialogs.chosen_sound import string_word, suggested_name
-from app.views.dialogs.sound_form import label, row_of, wav_settings
-from engine.pluck import Pluck
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits, Source
+from app.views.controls.form import FilePicker, count_box, form_label, row_of, spin_box
+from app.views.controls.note_box import NoteBox
+from app.views.controls.parts import combo_box, faint, label
+from engine.presets import PresetError, preset_digest
+from engine.result_file import explain
 
-SOURCE_NAMES = (
+Rows = dict[str, QWidget | QLayout]
+Kind = Literal["note", "performance", "sampler"]
+SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (
     ("Model", "model"),
     ("Truth", "truth"),
     ("Difference: model minus truth", "difference"),
     ("Both, in two files", "files"),
-    ("Both, model left and truth right", "both"),
 )
+RATES_HZ = (44_100, 48_000, 96_000)
+BITS_NAMES: dict[Bits, str] = {"16": "16-bit PCM, dithered", "24": "24-bit PCM", "32f": "32-bit floating point"}
+FORM_NAMES = (("SFZ with FLAC samples", "flac"), ("SFZ with WAV samples", "wav"), ("SoundFont 2", "sf2"))
+RECIPE_NOTE = "Each file stores its settings: drop it on the window to restore its preset and pluck."
+MIDI_NOTE = "What was played is written beside it, as a MIDI file."
+RESUMES = "A cancelled export keeps its samples, and goes on from there the next time."
 
 
-def as_heard(
-    entries: Sequence[PresetEntry], choices: Choices, export: ExportChoices
-) -> tuple[Choices, ExportChoices]:
-    """Both choices, with the source that is heard as the one to save.
+@dataclass(frozen=True)
+class HeardPerformance:
+    """What was played, and the file of the preset that plays its patch; None: that is gone."""
 
-    Where model and truth were saved together last and one of them is heard, both are saved again. Where the heard
-    slot holds another preset, that preset's model is saved.
-    """
-    source = choices.source_heard
-    if name := other_preset(source):
-        if any(entry.name == name for entry in entries):
-            choices = choices.changed({"preset": name})
-        source = "model"
-    if source == "difference":
-        gain_db = choices.difference_gain_db
-        return choices, export.model_copy(update={"source": source, "difference_gain_db": gain_db})
-    if export.source in ("files", "both") and not name:
-        return choices, export
-    return choices, export.model_copy(update={"source": source})
+    played: Played
+    preset: Path | None
 
 
-class SoundPage(QWidget):
-    """One pluck to one file, or two."""
+@dataclass(frozen=True)
+class HeardInstrument:
+    """A patch and the preset that plays it."""
+
+    patch: Patch
+    preset: PresetEntry
+
+
+class WavForm(QWidget):
+    """Sample rate, format and level of WAV files; notes and performances share it."""
 
     changed = Signal()
 
-    def __init__(
-        self,
-        preset: PresetEntry,
-        choices: Choices,
-        export: ExportChoices,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
-        self._preset, self._choices = preset, choices
-        self._named_by_user = False
-        self._folder = export.folder or str(Path.home())
-        names = [entry for entry in SOURCE_NAMES if not (choices.stereo and entry[1] == "both")]
-        self.source = combo_box("Source", names, export.source)
-        self.source.currentIndexChanged.connect(self.changed)
-        self.source.setToolTip("What to save")
-        self.path = QLineEdit()
-        self.path.setAccessibleName("File")
-        self.path.setToolTip("With two files, the source is appended to each name")
-        self.path.textEdited.connect(self._name_edited)
-        browse = tool_button("Browse …", tip="Choose the file")
-        browse.clicked.connect(self._browse)
-        self.what = Label(_pluck_text(preset, choices))
-        self.what.setObjectName("faint")
-        self.what.setWordWrap(True)
-        form = QFormLayout(self)
-        form.setContentsMargins(0, 12, 0, 0)
-        form.addRow(label("Sound"), self.what)
-        form.addRow(label("Source"), row_of(self.source))
-        place = row_of(browse)
-        place.insertWidget(0, self.path, 100)
-        form.addRow(label("File"), place)
-        self.names = faint()
-        form.addRow(label("Saved as"), self.names)
-        self._form = form
+    def __init__(self, export: ExportChoices) -> None:
+        super().__init__()
+        rates = [("The model's rate", 0), *((f"{rate / 1000:g} kHz", rate) for rate in RATES_HZ)]
+        self.rate = combo_box("Sample rate", rates, export.rate_hz)
+        self.rate.setToolTip("A rate above the model's own adds no bandwidth")
+        self.note = faint()
+        self.bits = combo_box("Format", [(name, bits) for bits, name in BITS_NAMES.items()], export.bits)
+        self.bits.setToolTip("16 bits are dithered; floating point never clips")
+        self.normalise = QCheckBox("Normalise to −1 dBFS, one gain for model and truth")
+        self.normalise.setMinimumHeight(28)
+        self.normalise.setToolTip("Off: as loud as it is played at 0 dB; of a string alone, 10 mm are full scale")
+        self.normalise.setChecked(export.normalise)
+        rows: Rows = {
+            "Sample rate": row_of(self.rate, self.note),
+            "Format": row_of(self.bits),
+            "Level": row_of(self.normalise),
+        }
+        _lay_out(self, rows)
+        _watch((self.rate, self.bits, self.normalise), self.changed)
 
-    def suggest_name(self, rate_hz: int) -> None:
-        """A name after what is in the file, unless the user gave one; two files are named beneath."""
-        if not self._named_by_user:
-            chosen = self.source.currentData()
-            source: Source = "model" if chosen == "files" else chosen
-            name = suggested_name(self._preset, self._choices, rate_hz, source)
-            self.path.setText(str(Path(self._folder) / name))
-        self.names.setText("\n".join(path.name for path in self.paths().values()))
-        self._form.setRowVisible(self.names, len(self.paths()) > 1)
+    def choices(self) -> dict[str, Any]:
+        """Fields of `ExportChoices`."""
+        rate_hz, bits = self.rate.currentData(), self.bits.currentData()
+        return {"rate_hz": rate_hz, "bits": bits, "normalise": self.normalise.isChecked()}
+
+
+class ExportPage(QWidget):
+    """What is exported, and how; a further kind is a further subclass.
+
+    Attributes:
+        title: of its tab.
+        missing: why there is nothing to export.
+        writes_wav: whether the form for WAV files belongs to it.
+        file: where it is written.
+    """
+
+    changed = Signal()
+    title = missing = ""
+    writes_wav = True
+    file: FilePicker
+
+    def show_subject(self, subject: Any) -> None:
+        """Follows what the window plays; None: there is nothing of this kind."""
+        raise NotImplementedError
+
+    def job(self) -> ExportJob:
+        """What would be done. Raises ValueError: the choices cannot be; the message names the field."""
+        raise NotImplementedError
+
+    def offer(self) -> tuple[str, str]:
+        """The button's text, and a note on what will be written. Raises ValueError, ExportError or OSError."""
+        raise NotImplementedError
+
+
+class NotePage(ExportPage):
+    """One pluck to one file, or two."""
+
+    title, missing = "Note", "There is no preset to export: choose one first."
+
+    def __init__(self, export: ExportChoices, wav: WavForm) -> None:
+        super().__init__()
+        self._export, self._wav = export, wav
+        self._subject: HeardNote | None = None
+        self.what = label("faint")
+        self.source = combo_box("Source", SOURCE_NAMES, export.source)
+        self.source.setToolTip("What to save")
+        self.alone = QCheckBox("String alone")
+        self.alone.setMinimumHeight(28)
+        self.alone.setToolTip("Leaves out level, body and room of the instrument")
+        self.alone.setChecked(export.alone)
+        limits = 0.1, LONGEST_S
+        ends = (("Until it has decayed", True), ("Fixed", False))
+        self.length = combo_box("Length", ends, export.until_decayed)
+        self.length.setToolTip("Where the file ends: when the sound has decayed, or after a fixed time")
+        tip = "The sound ends where model and truth are this far below their peak"
+        self.decay = spin_box("Decay", DECAY_RANGE_DB, export.decay_db, tip, " dB", step=5, prefix="by ")
+        tip = "A string that rings longer is faded out at this length"
+        self.longest = spin_box("Longest duration", limits, export.longest_s, tip, " s", 1, prefix="at most ")
+        self.seconds = spin_box("Duration", limits, export.seconds, "The end is faded out within 10 ms", " s", 1, 0.5)
+        tip, gain_db = "Gain of the difference, model − truth", export.difference_gain_db
+        self.gain = spin_box(
+            "Gain of the difference", DIFFERENCE_GAIN_RANGE_DB, gain_db, tip, " dB", step=6, prefix="+"
+        )
+        self.file = FilePicker(export.folder, "With two files, the source is appended to each name")
+        self.names = faint()
+        rows: Rows = {
+            "Sound": self.what,
+            "Source": row_of(self.source, self.gain, self.alone),
+            "Length": row_of(self.length, self.decay, self.longest, self.seconds),
+            "File": self.file,
+            "Saved as": self.names,
+        }
+        self._form = _lay_out(self, rows)
+        controls = (self.source, self.alone, self.length, self.decay, self.longest, self.seconds, self.gain)
+        for signal in (*_watch(controls, self.changed), wav.changed):
+            signal.connect(self._show)
+        self.file.changed.connect(self._show)
+        self.file.changed.connect(self.changed)
+
+    def show_subject(self, subject: HeardNote | None) -> None:
+        before, self._subject = self._subject, subject
+        if subject is not None and (before is None or before.source != subject.source):
+            self.source.setCurrentIndex(self.source.findData(subject.chosen(self.source.currentData())))
+            if subject.source == "difference":
+                self.gain.setValue(subject.difference_gain_db)
+        self._show()
+
+    def choices(self) -> dict[str, Any]:
+        """Fields of `ExportChoices`."""
+        return {
+            "folder": self.file.folder,
+            "source": self.source.currentData(),
+            "alone": self.alone.isChecked(),
+            "until_decayed": self.length.currentData(),
+            "decay_db": self.decay.value(),
+            "longest_s": self.longest.value(),
+            "seconds": self.seconds.value(),
+            "difference_gain_db": self.gain.value(),
+        }
 
     def paths(self) -> dict[Source, Path]:
-        """The files that will be written, by source."""
-        path, source = Path(self.path.text().strip()), self.source.currentData()
-        if path.name and path.suffix.lower() != ".wav":
-            path = path.with_name(f"{path.name}.wav")
+        """The files that will be written, by source. Raises ValueError: no name is given."""
+        path, source = self.file.path, self.source.currentData()
         if source != "files":
             return {source: path}
         stem = path.stem.removesuffix("_model").removesuffix("_truth")
         return {name: path.with_name(f"{stem}_{name}.wav") for name in ("model", "truth")}
 
-    def _name_edited(self) -> None:
-        self._named_by_user = True
-        self.changed.emit()
+    def job(self) -> NoteExport:
+        if self._subject is None:
+            raise ValueError(self.missing)
+        choices = ExportChoices.model_validate({**self.choices(), **self._wav.choices()})
+        return NoteExport(self._subject.note, self.paths(), choices)
 
-    def _browse(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(self, "Export WAV", self.path.text(), "WAV (*.wav)")
-        if path:
-            self.path.setText(path if path.lower().endswith(".wav") else f"{path}.wav")
-            self._name_edited()
+    def offer(self) -> tuple[str, str]:
+        there = any(path.is_file() for path in self.job().paths.values())
+        return "Replace" if there else "Export", RECIPE_NOTE
+
+    def _show(self) -> None:
+        decays = self.length.currentData()
+        for spin, shown in ((self.decay, decays), (self.longest, decays), (self.seconds, not decays)):
+            spin.setVisible(shown)
+        if self._subject is None:
+            return
+        note = self._subject.note
+        self.alone.setVisible(note.through is not None)
+        source, rate_hz = self.source.currentData(), self._wav.rate.currentData()
+        self.gain.setVisible(source == "difference")
+        alone = "" if note.through is None else ". The string alone" if self.alone.isChecked() else _through(note)
+        self.what.setText(self._subject.words + alone)
+        beyond = f"adds no bandwidth: the model ends at {note.preset_rate_hz / 2000:g} kHz"
+        own = "" if rate_hz else f"{note.preset_rate_hz / 1000:g} kHz"
+        self._wav.note.setText(beyond if rate_hz > note.preset_rate_hz else own)
+        self.file.suggest(note.file_name(rate_hz, "model" if source == "files" else source))
+        two = source == "files"
+        self.names.setText("\n".join(path.name for path in self.paths().values()) if two else "")
+        self._form.setRowVisible(self.names, two)
 
 
-class BatchPage(QWidget):
-    """Positions × amplitudes × presets × sources to a folder.
+class PerformancePage(ExportPage):
+    """What was played, to a WAV and a MIDI file of one name."""
 
-    Lists of several are remembered; where there is one preset, position or amplitude, it is the present one.
-    """
+    title, missing = "Performance", "Nothing was recorded: click Record, play, and click it again."
 
-    changed = Signal()
+    def __init__(self, export: ExportChoices, wav: WavForm) -> None:
+        super().__init__()
+        self._wav = wav
+        self._subject: HeardPerformance | None = None
+        self.what = label("faint")
+        self.file = FilePicker(export.folder, "The MIDI file has the same name")
+        _lay_out(self, {"Sound": self.what, "File": self.file})
+        self.file.changed.connect(self.changed)
 
-    def __init__(
-        self,
-        entries: Sequence[PresetEntry],
-        choices: Choices,
-        export: ExportChoices,
-        parent: QWidget | None = None,
-    ) -> None:
-        super().__init__(parent)
-        self._entries, self._choices = list(entries), choices
-        batch = export.batch
-        self.presets = QListWidget()
-        self.presets.setAccessibleName("Presets")
-        self.presets.setToolTip("Space checks and unchecks")
-        self.presets.setFixedHeight(128)
-        checked = set(batch.presets) if len(batch.presets) > 1 else {choices.preset}
-        for entry in self._entries:
-            item = QListWidgetItem(entry.title)
-            item.setToolTip(plain_tip(entry.path.name))
-            item.setCheckState(Qt.CheckState.Checked if entry.name in checked else Qt.CheckState.Unchecked)
-            self.presets.addItem(item)
-        self.presets.setCurrentRow(next((row for row, e in enumerate(self._entries) if e.name in checked), 0))
-        self.what = faint(f"{_shape_text(choices)}, {_heard_text(choices)}{_dry_text(choices)}")
-        self.what.setWordWrap(True)
-        self.positions = _line("Positions", _several_or(batch.positions, choices.position), "0.1, 0.2, 0.35")
-        self.amplitudes = _line("Amplitudes in mm", _several_or(batch.amplitudes, choices.amplitude_mm), "1, 2, 5")
-        self.sources = {
-            source: QCheckBox(source.capitalize()) for source in SOURCES if not (choices.stereo and source == "both")
+    def show_subject(self, subject: HeardPerformance | None) -> None:
+        self._subject = subject
+        if subject is not None:
+            played = subject.played
+            notes = number_of(sum(isinstance(each.event, NoteOn) for each in played.events), "note")
+            heard = source_words(played.source, played.difference_gain_db)
+            self.what.setText(f"{played.patch.name}: {notes} in {played.events[-1].time_s:.0f} s, {heard}")
+            self.file.suggest(f"{played.patch.name}.wav")
+
+    def job(self) -> PlayedExport:
+        if self._subject is None:
+            raise ValueError(self.missing)
+        played, preset = self._subject.played, self._subject.preset
+        if preset is None:
+            raise ValueError(f"The preset {played.patch.preset}, which plays the patch, was not found.")
+        choices = ExportChoices.model_validate(self._wav.choices())
+        return PlayedExport(played, preset, self.file.path, choices.wav)
+
+    def offer(self) -> tuple[str, str]:
+        there = [path.name for path in recorded_files(self.job().path) if path.exists()]
+        return "Replace" if there else "Export", f"Replaces {' and '.join(there)}." if there else MIDI_NOTE
+
+
+class SamplerPage(ExportPage):
+    """A patch as an instrument for samplers: format, keys, layers, length, source, place."""
+
+    title, missing, writes_wav = "Sampler", "There is no patch to export: choose one first.", False
+
+    def __init__(self, choices: SampledChoices) -> None:
+        super().__init__()
+        self._subject: HeardInstrument | None = None
+        self._chosen_keys, self._digest = choices.keys, ""
+        self.what = label()
+        self.form = combo_box("Format", FORM_NAMES, choices.form)
+        self.form.setToolTip("An SFZ has a folder of samples beside it; a SoundFont is one file, of 16 bits")
+        self.bits = combo_box("Bits", [("24-bit", "24"), ("16-bit, dithered", "16")], choices.bits)
+        self.bits.setToolTip("Of each sample")
+        self.rate = combo_box("Sample rate", [(f"{hz / 1000:g} kHz", hz) for hz in RATES_HZ], choices.rate_hz)
+        self.rate.setToolTip("Of the samples")
+        self.lowest = NoteBox("Lowest key", "The lowest key: a note, as E2, or a MIDI number")
+        self.highest = NoteBox("Highest key", "The highest key: a note, as E6, or a MIDI number")
+        tip = "One sample for so many keys; those between are transposed"
+        self.every = count_box("Keys a sample", WIDEST_STEP, choices.every, tip)
+        tip = "How many velocities are rendered of each key"
+        self.layers = count_box("Velocity layers", MOST_LAYERS, choices.layers, tip)
+        tip = "Silent ones end sooner; one that still rings is faded out"
+        self.seconds = spin_box("Longest sample", SECONDS_RANGE, choices.seconds, tip, " s", 1, prefix="at most ")
+        self.source = combo_box("Source", [("Model", "model"), ("Truth", "truth")], choices.source)
+        self.source.setToolTip("What plays the patch")
+        self.dry = QCheckBox("Dry: the room is left to the sampler")
+        self.dry.setToolTip("A room in the samples ends with each key that is let go")
+        self.dry.setMinimumHeight(28)
+        self.dry.setChecked(choices.dry)
+        self.file = FilePicker(choices.folder, "Where the instrument is written")
+        self.size_text = label(selectable=True)
+        self.size_text.setMinimumHeight(36)  # of two lines
+        every = (faint("a sample for every"), self.every, faint("keys"))
+        rows: Rows = {
+            "Sound": self.what,
+            "Format": row_of(self.form, self.bits, self.rate),
+            "Keys": row_of(self.lowest, faint("to"), self.highest, *every),
+            "Velocity layers": row_of(self.layers),
+            "Length": row_of(self.seconds),
+            "Source": row_of(self.source, self.dry),
+            "File": self.file,
+            "": self.size_text,
         }
-        for source, box in self.sources.items():
-            box.setMinimumSize(92, 28)
-            box.setToolTip({data: text for text, data in SOURCE_NAMES}[source])
-            box.setChecked(source in batch.sources)
-        self.overwrite = QCheckBox("Overwrite existing files")
-        self.overwrite.setToolTip("Off: existing files with the same settings are kept")
-        self.folder = _line("Folder", batch.folder or str(Path(export.folder or Path.home()) / "strings"), "")
-        browse = tool_button("Browse …", tip="Choose the folder")
-        browse.clicked.connect(self._browse)
-        place = row_of(browse)
-        place.insertWidget(0, self.folder, 100)
-        form = QFormLayout(self)
-        form.setContentsMargins(0, 12, 0, 0)
-        form.addRow(label("Presets"), self.presets)
-        form.addRow(label("Plucks"), self.what)
-        for name, edit in (("Positions", self.positions), ("Amplitudes, mm", self.amplitudes)):
-            several = row_of(faint("comma-separated"))
-            several.insertWidget(0, edit, 100)
-            form.addRow(label(name), several)
-        form.addRow(label("Sources"), row_of(*self.sources.values()))
-        form.addRow(label("Folder"), place)
-        form.addRow(label(""), row_of(self.overwrite))
-        self.presets.itemChanged.connect(self.changed)
-        for edit in (self.positions, self.amplitudes, self.folder):
-            edit.textChanged.connect(self.changed)
-        for box in (*self.sources.values(), self.overwrite):
-            box.toggled.connect(self.changed)
+        _lay_out(self, rows)
+        controls = (self.form, self.bits, self.rate, self.lowest, self.highest, self.every, self.layers)
+        for signal in _watch((*controls, self.seconds, self.source, self.dry), self.changed):
+            signal.connect(self._suggest_name)
+        self.file.changed.connect(self.changed)
 
-    def showEvent(self, event: QShowEvent) -> None:
-        super().showEvent(event)
-        self.presets.scrollToItem(self.presets.currentItem())
+    def show_subject(self, subject: HeardInstrument | None) -> None:
+        """Another patch, or the same that was turned: chosen keys stay as far as it has them."""
+        keys, before, self._subject = self.keys(), self._subject, subject
+        if subject is None:
+            return
+        patch, preset = subject.patch, subject.preset
+        if before is None or before.preset != preset or not self._digest:
+            try:
+                self._digest = preset_digest(preset.path)
+            except (OSError, PresetError):  # told when it is to be played
+                self._digest = ""
+        low, high = patch.range
+        chosen = keys if keys and low <= keys[0] <= keys[1] <= high else patch.range
+        for box, key in zip((self.lowest, self.highest), chosen, strict=True):
+            with QSignalBlocker(box):
+                box.setRange(low, high)
+                box.setValue(key)
+        self.dry.setEnabled(patch.room.mix > 0)
+        problem = body_problem(patch)
+        self.what.setText(f"{patch.name}, played by {preset.title}" + (f"\n{problem}" if problem else ""))
+        self._suggest_name()
 
-    def choices(self) -> BatchChoices:
-        return BatchChoices(
-            presets=tuple(entry.name for entry in self._checked()),
-            positions=self.positions.text(),
-            amplitudes=self.amplitudes.text(),
-            sources=tuple(source for source, box in self.sources.items() if box.isChecked()),
-            folder=self.folder.text(),
+    def keys(self) -> tuple[int, int] | None:
+        """None for all of the patch."""
+        if self._subject is None:
+            return self._chosen_keys
+        keys = self.lowest.value(), self.highest.value()
+        return None if keys == self._subject.patch.range else keys
+
+    def choices(self) -> SampledChoices:
+        return SampledChoices(
+            folder=self.file.folder,
+            form=self.form.currentData(),
+            bits=self.bits.currentData(),
+            rate_hz=self.rate.currentData(),
+            keys=self.keys(),
+            every=self.every.value(),
+            layers=self.layers.value(),
+            seconds=self.seconds.value(),
+            source=self.source.currentData(),
+            dry=self.dry.isChecked(),
         )
 
-    def plan(self, export: ExportChoices) -> BatchPlan:
-        """The batch as chosen. Raises ValueError: positions or amplitudes are no numbers; the message names them."""
-        choices = self._choices
-        return BatchPlan(
-            tuple(entry.path for entry in self._checked()),
-            _numbers("positions", self.positions.text()),
-            _numbers("amplitudes", self.amplitudes.text()),
-            tuple(source for source, box in self.sources.items() if box.isChecked()),
-            Path(self.folder.text().strip()),
-            export.longest_s if export.until_decayed else export.seconds,
-            choices.listen,
-            Pluck(shape=choices.shape, width=choices.width),
-            choices.listen_right if choices.stereo else None,
-            choices.pickup,
-            export.difference_gain_db,
-            export.decay_db if export.until_decayed else None,
-            wav_settings(export),
-            self.overwrite.isChecked(),
-            self._strings(),
+    def job(self) -> SampledExport:
+        if self._subject is None:
+            raise ValueError(self.missing)
+        if self.lowest.value() > self.highest.value():
+            raise ValueError("keys: the lowest is above the highest; exchange them")
+        patch, chosen = self._subject.patch, self.choices()
+        plan = SampledPlan(
+            patch.with_value("room.mix", 0.0) if chosen.dry else patch,
+            chosen.keys,
+            chosen.every,
+            chosen.layers,
+            chosen.seconds,
+            chosen.rate_hz,
+            source=chosen.source,
+            preset_sha256=self._digest,
+            body_sha256=body_digest(patch.body.name),
         )
+        if chosen.form != "sf2":
+            plan = replace(plan, format=chosen.form, bits=chosen.bits)
+        return SampledExport(plan, self.file.path, self._subject.preset.path)
 
-    def _strings(self) -> tuple[NamedString, ...]:
-        """The chosen string, where every preset of the batch can play it; else none: presets play their own."""
-        string = self._choices.string
-        if string is None or any(entry.info.family is None for entry in self._checked()):
-            return ()
-        return (NamedString(string_word(self._choices).replace(" ", ""), string.parameters),)
+    def offer(self) -> tuple[str, str]:
+        self.size_text.setText("")
+        job = self.job()
+        plan, out, soundfont = job.plan, job.out, job.out.suffix.lower() == ".sf2"
+        try:
+            kept, free = kept_samples(plan, out), disk_usage(out.parent).free
+        except OSError as error:
+            raise ExportError(explain(out.parent, error)) from error
+        short = f"; {megabytes(free)} are free there" if needed_bytes(plan, soundfont) > free else ""
+        pitch = pitch_words(plan.pitch_error_cents)
+        self.size_text.setText(f"{counted(plan)}, {size_words(plan, soundfont)}{short}; {pitch}")
+        words = f"{kept} of {len(plan.zones)} samples are there already, and are kept." if kept else RESUMES
+        return "Replace" if out.is_file() else "Continue" if kept else "Export", words
 
-    def _checked(self) -> list[PresetEntry]:
-        rows = range(self.presets.count())
-        return [self._entries[row] for row in rows if self.presets.item(row).checkState() == Qt.CheckState.Checked]
-
-    def _browse(self) -> None:
-        if folder := QFileDialog.getExistingDirectory(self, "Folder of the batch", self.folder.text()):
-            self.folder.setText(folder)
-
-
-def _pluck_text(preset: PresetEntry, choices: Choices) -> str:
-    pluck = f"{_shape_text(choices)}, at {choices.position:.2f}, {choices.amplitude_mm:g} mm"
-    modes = f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""
-    string = f", a string of {string_word(choices)}" if choices.string else ""
-    return f"{preset.title}{string}: {pluck}, {_heard_text(choices)}{modes}{_dry_text(choices)}"
-
-
-def _dry_text(choices: Choices) -> str:
-    """What of the patch is heard in the window and is not in these files, which are to be compared."""
-    patch = choices.instrument
-    if not isinstance(patch, Patch):
-        return ""
-    left_out = "body, room and level" if patch.body.name or patch.room.mix > 0 else "level"
-    return f". The string alone, without the {left_out} that {patch.name} gives it"
+    def _suggest_name(self) -> None:
+        soundfont = self.form.currentData() == "sf2"
+        self.bits.setVisible(not soundfont)
+        self.file.suffix = ".sf2" if soundfont else ".sfz"
+        if self._subject is not None:
+            self.file.suggest(plain_stem(self._subject.patch.name) + self.file.suffix)
 
 
-def _shape_text(choices: Choices) -> str:
-    width = "" if choices.shape == "triangular" else f" {choices.width:.3f} wide"
-    return f"{shape_word(choices.shape)}{width}"
+PAGES: dict[Kind, type[ExportPage]] = {"note": NotePage, "performance": PerformancePage, "sampler": SamplerPage}
 
 
-def _heard_text(choices: Choices) -> str:
-    if choices.pickup == "bridge":
-        return "heard at the bridge"
-    heard = f"heard at {choices.listen:.2f}"
-    if choices.stereo:
-        heard += f" (left) and {choices.listen_right:.2f} (right)"
-    return f"{heard}, velocity" if choices.pickup == "velocity" else heard
+def _through(note: Note) -> str:
+    """What the instrument adds, in words."""
+    assert note.through is not None
+    through = note.through
+    there = "body, room and level" if through.body.name or through.room.mix > 0 else "level"
+    return f". With the {there} of {through.instrument}"
 
 
-def _line(name: str, text: str, example: str) -> QLineEdit:
-    edit = QLineEdit(text)
-    edit.setAccessibleName(name)
-    edit.setToolTip(f"{name}: one or more, comma-separated, for example {example}" if example else name)
-    if example:
-        edit.setPlaceholderText(f"for example {example}")
-    return edit
+def _lay_out(page: QWidget, rows: Rows) -> QFormLayout:
+    form = QFormLayout(page)
+    form.setContentsMargins(0, 0, 0, 0)
+    for name, row in rows.items():
+        form.addRow(form_label(name), row)
+    return form
 
 
-def _words(text: str) -> list[str]:
-    return [word for word in text.replace(";", ",").split(",") if word.strip()]
-
-
-def _several_or(text: str, present: float) -> str:
-    """A list of more than one as it was typed, else the present value."""
-    return text if len(_words(text)) > 1 else f"{present:g}"
-
-
-def _numbers(name: str, text: str) -> tuple[float, ...]:
-    try:
-        return tuple(float(word) for word in _words(text))
-    except ValueError as error:
-        raise ValueError(f"{name}: comma-separated numbers, not {text!r}") from error
+def _watch(controls: Iterable[QWidget], changed: SignalInstance) -> list[SignalInstance]:
+    """Connects every change of a control to `changed`, and returns the signals."""
+    signals: list[SignalInstance] = []
+    for control in controls:
+        if isinstance(control, QComboBox):
+            signals.append(control.currentIndexChanged)
+        elif isinstance(control, QSpinBox | QDoubleSpinBox):
+            signals.append(control.valueChanged)
+        elif isinstance(control, QAbstractButton):
+            signals.append(control.toggled)
+    for signal in signals:
+        signal.connect(changed)
+    return signals

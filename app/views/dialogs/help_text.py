@@ -58,9 +58,9 @@ TOUR = (
     ),
     (
         "Export",
-        "Ctrl+E saves plucks of the string alone as WAV files that store their settings; drop one on the window to "
-        "restore them. What you play through a patch, with its body and room, is saved by Record. Ctrl+Shift+E "
-        "exports the patch as an instrument for samplers.",
+        "Ctrl+E saves what you hear as WAV: a note with body, room and level, its string alone, or a recording. "
+        "A note's file stores its settings; drop it on the window to restore them. Ctrl+Shift+E exports the patch as "
+        "an instrument for samplers.",
     ),
 )
 

@@ -1,10 +1,10 @@
-"""A preset's card: what it is, how good it is and where it comes from, as rich text."""
+"""Presets in their browser: a row each, and a card on what it is, how good it is and where it comes from."""
 
 from __future__ import annotations
 
 from html import escape
 
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.presets.library import PresetEntry
 from app.presets.words import (
@@ -17,10 +17,59 @@ from app.presets.words import (
     size_word,
     string_word,
 )
+from app.views.controls.browser import Browser
+from app.views.controls.browser_rows import Column, Row
 from engine.plain_text import duration
 from engine.schema import SchemaError
 from training.cell import load
-from training.heard_words import heard_sentence
+from training.heard_words import HEARD_TIP, heard_sentence, heard_word
+
+HEADINGS = {True: "STUDIO PRESETS", False: "RESEARCH PRESETS"}
+STRINGS = {"linear": "Linear", "nonlinear": "With pitch glide"}
+COLUMNS = (
+    Column("Preset"),
+    Column("Rate", "Sample rate of the model", right=True),
+    Column("Error", "Relative mean absolute error of the model on validation data", right=True),
+    Column("Heard", HEARD_TIP),
+)
+
+
+def preset_browser(parent: QWidget | None = None) -> Browser:
+    return Browser(
+        "presets",
+        "title, model, string, rate, what is heard",
+        COLUMNS,
+        (("String", "All strings"), ("Model", "All models"), ("Rate", "All rates")),
+        ("Most accurate first", "By name", "Smallest error"),
+        "Pluck",
+        at_rest=False,
+        size=(1240, 560, 140),
+        folder_tip="Show the folder of your presets; a preset file dropped on the window is copied there",
+        parent=parent,
+    )
+
+
+def preset_row(entry: PresetEntry) -> Row:
+    """In the browser: studio presets before research ones; unknown errors come last."""
+    info, heard = entry.info, heard_word(entry.heard)
+    model, rate = model_word(info.model), rate_word(info.rate_hz)
+    kind = string_word(info.tension_modulated)
+    searched = (
+        *(info.title, entry.name, info.description, info.model, model, kind),
+        *(initial_word(info.initial), rate, f"{info.rate_hz}", heard),
+    )
+    distance_db = None if entry.heard is None else entry.heard.distance_db
+    return Row(
+        entry.name,
+        entry.title,
+        HEADINGS[entry.studio],
+        " ".join(searched).casefold(),
+        ((info.string_kind, STRINGS[info.string_kind]), (info.model, model), (info.rate_hz, rate)),
+        lambda: preset_card(entry),
+        ((rate, ""), (error_word(info), ""), (heard, heard_sentence(entry.heard, entry.name))),
+        f"{entry.title}\n{model}, {kind}\n{entry.path.name}",
+        tuple((known is None, known or 0.0) for known in (distance_db, 0.0, info.rel_mae)),
+    )
 
 
 def preset_card(entry: PresetEntry) -> str:

@@ -10,14 +10,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soundfile
+from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
 from app.export.files import SoundRequest, export_sound
 from app.patches.instrument import SingleString
-from app.presets.filter import PresetFilter
 from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets
 from app.shared.parameters import PARAMETERS
+from app.views.controls.browser_rows import ListedRows, RowsModel
+from app.views.dialogs.preset_card import COLUMNS as BROWSER_COLUMNS
+from app.views.dialogs.preset_card import preset_row
 from app.window.dropped_files import receive
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset, preset_digest
@@ -209,25 +212,6 @@ def test_every_shipped_preset_has_a_title_of_its_own_and_studio_ones_come_first(
     assert [one.studio for one in entries] == sorted((one.studio for one in entries), reverse=True)
 
 
-def test_the_filter_finds_words_in_any_order_and_every_field(preset_folder: Path) -> None:
-    low = entry(name="low", title="Nylon B3, plucked")
-    high = entry(name="high", title="Steel E4", rate_hz=16_000, tension_modulated=False, model="koopman")
-    both = [low, high]
-    for search, found in (
-        (PresetFilter(), [high, low]),  # a favourite is on top
-        (PresetFilter("b3, nyl"), [low]),
-        (PresetFilter("STEEL 16"), [high]),
-        (PresetFilter("steel nylon"), []),
-        (PresetFilter("glide"), [low]),
-        (PresetFilter(string="linear"), [high]),
-        (PresetFilter(model="koopman"), [high]),
-        (PresetFilter(rate_hz=4000), [low]),
-        (PresetFilter("koopman", rate_hz=16_000), [high]),
-        (PresetFilter(favourites_only=True), [high]),
-    ):
-        assert search.applied(both, {"high"}) == found, search
-
-
 def heard(path: Path, distance_db: float) -> Heard:
     return Heard(path.stem, preset_digest(path), 4.0, distance_db, 0.0, 0.0)
 
@@ -256,8 +240,8 @@ def test_a_hostile_table_is_told_and_every_preset_listed(library: Library, prese
         assert 1 <= len(problems) <= 4
 
 
-def test_the_truest_come_first_and_what_was_not_measured_last(
-    library: Library, preset_folder: Path, small_preset: Path
+def test_the_most_accurate_come_first_and_what_was_not_measured_last(
+    qtbot: QtBot, library: Library, preset_folder: Path, small_preset: Path
 ) -> None:
     for name, word in (("third", b"Another string"), ("fourth", b"Fourth  string")):
         path = preset_folder / f"{name}.safetensors"
@@ -265,11 +249,39 @@ def test_the_truest_come_first_and_what_was_not_measured_last(
         add_heard(preset_folder, [heard(path, {"third": 3.0, "fourth": 0.1}[name])])
     library.refresh()
 
-    def order(wanted: PresetFilter, favourites: tuple[str, ...] = ()) -> list[str]:
-        return [entry.name for entry in wanted.applied(library.entries, favourites)]
+    listed = ListedRows(rows := RowsModel(BROWSER_COLUMNS))
 
-    assert order(PresetFilter()) == ["fourth", "third", "first", "second"]
-    assert order(PresetFilter(), ("second", "third")) == ["third", "second", "fourth", "first"]
-    assert order(PresetFilter(order="name")) == ["first", "fourth", "second", "third"]
-    assert order(PresetFilter(order="error")) == ["first", "fourth", "second", "third"]
-    assert order(PresetFilter("not measured")) == ["first", "second"]
+    def order(number: int = 0, favourites: tuple[str, ...] = (), words: str = "") -> list[str]:
+        rows.show([preset_row(entry) for entry in library.entries], favourites)
+        listed.order, listed.words = number, (words,) if words else ()
+        listed.refresh()
+        return [row.name for row in listed.listed]
+
+    assert order() == ["fourth", "third", "first", "second"]
+    assert order(0, ("second", "third")) == ["third", "second", "fourth", "first"]
+    assert order(1) == ["first", "fourth", "second", "third"]
+    assert order(2) == ["first", "fourth", "second", "third"]
+    assert order(words="not measured") == ["first", "second"]
+
+
+def test_the_filter_finds_words_in_any_order_and_every_kind(qtbot: QtBot, preset_folder: Path) -> None:
+    low = preset_row(entry(name="low", title="Nylon B3, plucked"))
+    high = preset_row(entry(name="high", title="Steel E4", rate_hz=16_000, tension_modulated=False, model="koopman"))
+    listed = ListedRows(rows := RowsModel(BROWSER_COLUMNS))
+    rows.show([low, high], {"high"})
+    for words, kinds, starred, found in (
+        ("", (), False, [high, low]),  # a favourite is on top
+        ("b3 nyl", (), False, [low]),
+        ("steel 16", (), False, [high]),
+        ("steel nylon", (), False, []),
+        ("glide", (), False, [low]),
+        ("", ("linear", "", ""), False, [high]),
+        ("", ("", "koopman", ""), False, [high]),
+        ("", ("", "", 4000), False, [low]),
+        ("koopman", ("", "", 16_000), False, [high]),
+        ("", (), True, [high]),
+    ):
+        listed.words, listed.kinds, listed.starred = tuple(words.split()), kinds, starred
+        listed.refresh()
+        assert listed.listed == found, (words, kinds)
+        assert listed.rowCount() == len(found) + bool(found), "with the heading"

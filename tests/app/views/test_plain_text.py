@@ -17,7 +17,7 @@ from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
 from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED, PatchEntry, read_patch
-from app.presets.library import PresetEntry
+from app.presets.library import Library, PresetEntry
 from app.session.choices import Choices
 from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.plain import Label, plain_tip
@@ -25,10 +25,11 @@ from app.views.controls.preset_bar import PresetBar
 from app.views.controls.readout import Readout
 from app.views.controls.slot_buttons import SlotButtons
 from app.views.dialogs.export_dialog import ExportDialog
-from app.views.dialogs.preset_browser import PresetBrowser
-from app.views.dialogs.sampled_dialog import SampledDialog
+from app.views.dialogs.export_pages import HeardInstrument
+from app.views.dialogs.preset_card import preset_browser, preset_row
 from app.views.instrument.panel import InstrumentPanel
-from app.views.instrument.patch_browser import PatchBrowser
+from app.views.instrument.patch_card import patch_browser, patch_row
+from app.window.exports import heard_note
 from engine.presets import read_info
 
 EVIL = "<img src=evil>"
@@ -67,12 +68,13 @@ def texts(root: QObject) -> str:
 def test_no_view_that_holds_a_files_text_takes_it_for_markup(
     qtbot: QtBot, entry: PresetEntry, tmp_path: Path
 ) -> None:
-    notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), PresetBrowser(), Readout()
+    notices, bar, slots, browser, readout = NoticeBar(), PresetBar(), SlotButtons(), preset_browser(), Readout()
     export = ExportChoices.model_validate({"folder": str(tmp_path / EVIL)})
-    dialog = ExportDialog([entry], Choices(instrument=SingleString(preset=entry.name)), export)
+    dialog = ExportDialog(export, SampledChoices(folder=str(tmp_path / EVIL)))
     patch = read_patch(SHIPPED / "classical_guitar.json")
-    sampled = SampledDialog(patch, entry, SampledChoices(folder=str(tmp_path / EVIL)))
-    views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog, sampled]
+    note = heard_note(Choices(instrument=SingleString(preset=entry.name)), Library([entry]), None)
+    dialog.show_subjects({"note": note, "sampler": HeardInstrument(patch, entry)})
+    views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog]
     for view in views:
         qtbot.addWidget(view)
     notices.tell(f"{EVIL}: tensor {EVIL} is unknown", EVIL)
@@ -80,7 +82,7 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
     bar.set_chosen(entry)
     slots.set_entries([entry])
     slots.show_choices(Choices(a=f"preset:{entry.name}", b="difference"))
-    browser.show_entries([entry], (), entry.name, 1, str(tmp_path / EVIL))
+    browser.show_rows([preset_row(entry)], (), entry.name, str(tmp_path / EVIL))
     readout.tell(EVIL)
     for view in views:
         assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
@@ -94,7 +96,7 @@ def test_a_patch_is_shown_as_it_is(qtbot: QtBot) -> None:
     body = patch.body.model_copy(update={"name": EVIL})
     patch = patch.model_copy(update={"description": EVIL, "author": EVIL, "macros": macros, "body": body})
     entry = PatchEntry(Path("/x") / f"{EVIL}.json", patch)
-    panel, browser = InstrumentPanel(), PatchBrowser()
+    panel, browser = InstrumentPanel(), patch_browser()
     views: list[QWidget] = [panel, browser]
     for view in views:
         qtbot.addWidget(view)
@@ -102,7 +104,7 @@ def test_a_patch_is_shown_as_it_is(qtbot: QtBot) -> None:
     panel.bar.show_note(EVIL)
     panel.knobs.show_facts({EVIL: EVIL})
     panel.neck.set_strings([(EVIL, 40), (EVIL, 45)])
-    browser.show_entries([entry], (), entry.name)
+    browser.show_rows([patch_row(entry)], (), entry.name, EVIL)
     for view in views:
         assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
         assert "evil" in texts(view)

@@ -91,7 +91,7 @@ def test_the_sound_comes_back_as_it_was(qtbot: QtBot, heard: Controller, tmp_pat
     qtbot.waitUntil(lambda: not sounds(heard))
     dialog._setup.audition_asked.emit("B")
     qtbot.waitUntil(lambda: sounds(heard))
-    dialog._setup._trials.setValue(25)
+    dialog._setup.trials.setValue(25)
     qtbot.keyClick(dialog, Qt.Key.Key_Escape)
     qtbot.waitUntil(lambda: not sounds(heard))
     heard.pluck()
@@ -149,11 +149,11 @@ def test_closing_the_window_keeps_an_incomplete_record(qtbot: QtBot, heard: Cont
         qtbot.keyClick(dialog._trial, key)
     heard.window.close()
     (path,) = (tmp_path / "records").iterdir()
-    assert '"complete": false' in path.read_text()
+    assert '"p_value": null' in path.read_text()
 
 
 def test_it_waits_for_no_picture(qtbot: QtBot, heard: Controller) -> None:
     heard.session.update(preset="second")
     dialog = open_test(qtbot, heard)
-    assert [candidate.label for candidate in dialog._setup.pair]
+    assert dialog._material.a.preset == "second"
     dialog.abandon()

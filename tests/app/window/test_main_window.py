@@ -394,7 +394,7 @@ def test_a_browser_covers_a_notice_below_the_header_and_has_room_for_a_search(
     window = controller.window
     window.resize(*size)
     window.notices.tell(LONG)
-    for desk in (controller.presets, controller.patches):
+    for desk in (controller.presets, controller.patches.desk):
         desk.toggle()
         browser = desk.browser
         qtbot.waitUntil(lambda: window.presets.geometry().bottom() < window.notices.y())

@@ -6,13 +6,13 @@ import shutil
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, QRect, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QTreeWidget
+from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QTreeView
 from pytestqt.qtbot import QtBot
 
 from app.export.files import SoundRequest, export_sound
-from app.views.dialogs.preset_browser import PresetBrowser
+from app.views.controls.browser import Browser
 from app.window.controller import Controller
 from app.window.settings import FIRST_FAVOURITES, load_settings
 from engine.pluck import Pluck
@@ -24,7 +24,7 @@ CONTROL = Qt.KeyboardModifier.ControlModifier
 
 
 @pytest.fixture
-def browser(qtbot: QtBot, controller: Controller) -> PresetBrowser:
+def browser(qtbot: QtBot, controller: Controller) -> Browser:
     """Open, with the keyboard in its search."""
     qtbot.waitUntil(controller.window.isActiveWindow)
     qtbot.keyClick(controller.window, KEY.Key_P, CONTROL)
@@ -34,13 +34,24 @@ def browser(qtbot: QtBot, controller: Controller) -> PresetBrowser:
     return found
 
 
-def listed(browser: PresetBrowser) -> list[str]:
-    return [entry.name for entry in browser._entries]
+def listed(browser: Browser) -> list[str]:
+    return browser.listed
 
 
-def test_arrows_load_from_the_search_and_enter_closes(
-    qtbot: QtBot, controller: Controller, browser: PresetBrowser
-) -> None:
+def headings(browser: Browser) -> list[str]:
+    lines = (
+        browser._listed.line(browser.list.model().index(row, 0)) for row in range(browser.list.model().rowCount())
+    )
+    return [line for line in lines if isinstance(line, str)]
+
+
+def row_rect(browser: Browser, number: int) -> QRect:
+    """Of a listed row, with its star."""
+    title = browser._listed.index_of(listed(browser)[number])
+    return browser.list.visualRect(title.siblingAtColumn(0)).united(browser.list.visualRect(title))
+
+
+def test_arrows_load_from_the_search_and_enter_closes(qtbot: QtBot, controller: Controller, browser: Browser) -> None:
     qtbot.keyClick(browser.search, KEY.Key_Down)
     assert controller.session.choices.preset == "second"
     assert browser.isVisible()
@@ -53,7 +64,7 @@ def test_arrows_load_from_the_search_and_enter_closes(
     assert not browser.isVisible()
 
 
-def test_space_plucks_and_the_browser_stays(qtbot: QtBot, controller: Controller, browser: PresetBrowser) -> None:
+def test_space_plucks_and_the_browser_stays(qtbot: QtBot, controller: Controller, browser: Browser) -> None:
     qtbot.keyClick(browser.search, KEY.Key_Space)
     assert browser.isVisible()
     assert browser.search.text() == ""
@@ -61,10 +72,10 @@ def test_space_plucks_and_the_browser_stays(qtbot: QtBot, controller: Controller
 
 
 def test_space_between_two_words_is_typed_and_after_an_arrow_plucks(
-    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+    qtbot: QtBot, controller: Controller, browser: Browser
 ) -> None:
     asked: list[None] = []
-    browser.pluck_asked.connect(lambda: asked.append(None))
+    browser.played.connect(lambda name: asked.append(None))
     for key in "small sec":
         qtbot.keyClick(browser.search, key)
     assert (browser.search.text(), listed(browser), asked) == ("small sec", ["second"], [])
@@ -81,17 +92,15 @@ def test_space_between_two_words_is_typed_and_after_an_arrow_plucks(
     assert (browser.search.text(), len(asked)) == ("small se", 2)
 
 
-def test_typing_filters_and_what_was_chosen_stays(
-    qtbot: QtBot, controller: Controller, browser: PresetBrowser
-) -> None:
+def test_typing_filters_and_what_was_chosen_stays(qtbot: QtBot, controller: Controller, browser: Browser) -> None:
     qtbot.keyClicks(browser.list, "sec")
     assert browser.search.text() == "sec"
     assert listed(browser) == ["second"]
     assert controller.session.choices.preset == "first"
-    assert "File</td><td style='padding: 3px 0'>second, " in browser._card.text(), "the card is that of the hit"
+    assert "File</td><td style='padding: 3px 0'>second, " in browser.card.text(), "the card is that of the hit"
     qtbot.keyClicks(browser.search, "x")
     assert listed(browser) == []
-    assert "No matching preset" in browser._card.text()
+    assert "No matching preset" in browser.card.text()
     qtbot.keyClick(browser.search, KEY.Key_Down)  # nothing to move to
     browser.search.setText("sec")
     qtbot.keyClick(browser.search, KEY.Key_Return)
@@ -104,30 +113,29 @@ def test_typing_filters_and_what_was_chosen_stays(
 
 
 def test_keys_of_the_window_rest_while_the_search_is_typed_in(
-    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+    qtbot: QtBot, controller: Controller, browser: Browser
 ) -> None:
     qtbot.keyClick(browser.list, KEY.Key_X)
     assert controller.session.choices.heard == "a"
     assert browser.search.text() == "x"
 
 
-def test_filters_by_kind(controller: Controller, browser: PresetBrowser) -> None:
-    browser._strings.setCurrentIndex(browser._strings.findData("linear"))
-    assert listed(browser) == []
-    browser._strings.setCurrentIndex(0)
-    browser._rates.setCurrentIndex(browser._rates.findData(4000))
-    browser._models.setCurrentIndex(browser._models.findData("koopman_var"))
+def test_filters_by_kind(controller: Controller, browser: Browser) -> None:
+    strings = browser.filters["String"]
+    assert [strings.itemText(row) for row in range(strings.count())] == ["All strings", "With pitch glide"]
+    browser.filters["Rate"].setCurrentIndex(browser.filters["Rate"].findData(4000))
+    browser.filters["Model"].setCurrentIndex(browser.filters["Model"].findData("koopman_var"))
     assert listed(browser) == ["first", "second"]
 
 
 def test_a_filter_is_told_beside_the_preset_and_cleared_there(
-    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+    qtbot: QtBot, controller: Controller, browser: Browser
 ) -> None:
     """Previous and next go through what it leaves."""
     bar, session = controller.window.presets, controller.session
     assert not bar.filtered.isVisible()
     qtbot.keyClicks(browser.search, "second")
-    browser._rates.setCurrentIndex(1)
+    browser.filters["Rate"].setCurrentIndex(1)
     browser.dismiss()
     assert bar.filtered.isVisible()
     assert bar.filtered.text() == "1 of 2  ✕"
@@ -136,13 +144,13 @@ def test_a_filter_is_told_beside_the_preset_and_cleared_there(
         assert session.choices.preset == "second"
     bar.filtered.click()
     assert not bar.filtered.isVisible()
-    assert (browser.search.text(), browser._rates.currentIndex(), len(listed(browser))) == ("", 0, 2)
+    assert (browser.search.text(), browser.filters["Rate"].currentIndex(), len(listed(browser))) == ("", 0, 2)
     bar.step_asked.emit(1)
     assert session.choices.preset == "first"
 
 
 def test_a_search_without_a_find_ends_with_the_browser(
-    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+    qtbot: QtBot, controller: Controller, browser: Browser
 ) -> None:
     qtbot.keyClicks(browser.search, "zzz")
     assert controller.window.presets.filtered.isVisible()
@@ -152,19 +160,19 @@ def test_a_search_without_a_find_ends_with_the_browser(
     assert controller.session.choices.preset == "second"
 
 
-def test_the_marked_row_is_the_chosen_preset_or_the_first_hit(controller: Controller, browser: PresetBrowser) -> None:
+def test_the_marked_row_is_the_chosen_preset_or_the_first_hit(controller: Controller, browser: Browser) -> None:
     controller.session.update(preset="second")
     for words, marked in (("first", ["first"]), ("", ["second"]), ("zzz", []), ("", ["second"])):
         browser.search.setText(words)
         rows = browser.list.selectionModel().selectedRows()
-        assert [listed(browser)[row.row()] for row in rows] == marked
+        assert [browser._listed.line(row).name for row in rows] == marked
 
 
 def test_the_card_and_the_keys_are_those_of_the_first_hit(
-    qtbot: QtBot, controller: Controller, browser: PresetBrowser
+    qtbot: QtBot, controller: Controller, browser: Browser
 ) -> None:
     browser.search.setText("second")
-    assert "File</td><td style='padding: 3px 0'>second, " in browser._card.text()
+    assert "File</td><td style='padding: 3px 0'>second, " in browser.card.text()
     with qtbot.waitSignal(browser.favourite_asked) as asked:
         qtbot.keyClick(browser.list, KEY.Key_D, CONTROL)
     assert asked.args == ["second"]
@@ -174,9 +182,9 @@ def test_the_card_and_the_keys_are_those_of_the_first_hit(
     qtbot.waitUntil(lambda: controller.performance.playing)
 
 
-def test_a_click_loads_the_first_hit(qtbot: QtBot, controller: Controller, browser: PresetBrowser) -> None:
+def test_a_click_loads_the_first_hit(qtbot: QtBot, controller: Controller, browser: Browser) -> None:
     browser.search.setText("second")
-    place = browser.list.visualItemRect(browser._rows[0]).center()
+    place = row_rect(browser, 0).center()
     qtbot.mouseClick(browser.list.viewport(), Qt.MouseButton.LeftButton, pos=place)
     assert controller.session.choices.preset == "second"
 
@@ -196,7 +204,7 @@ def test_an_old_search_does_not_hide_what_was_just_added(
     assert browser.search.text() == "second", "nothing was added since"
 
 
-def test_favourites_are_on_top(controller: Controller, browser: PresetBrowser) -> None:
+def test_favourites_are_on_top(controller: Controller, browser: Browser) -> None:
     browser.favourite_asked.emit("second")
     assert listed(browser) == ["second", "first"]
     browser.favourite_asked.emit("second")
@@ -204,13 +212,13 @@ def test_favourites_are_on_top(controller: Controller, browser: PresetBrowser) -
 
 
 def test_studio_presets_are_a_group_of_their_own_before_the_research_ones(
-    qtbot: QtBot, controller: Controller, browser: PresetBrowser, preset_folder: Path, small_preset: Path
+    qtbot: QtBot, controller: Controller, browser: Browser, preset_folder: Path, small_preset: Path
 ) -> None:
     """The headings are passed over by arrows and page keys, which go through both groups in the listed order."""
 
     def groups() -> dict[str, int]:
-        headings = [browser.list.topLevelItem(row) for row in range(browser.list.topLevelItemCount())]
-        return {heading.text(0): heading.childCount() for heading in headings}
+        rows = browser._listed.listed
+        return {heading: sum(row.heading == heading for row in rows) for heading in headings(browser)}
 
     shutil.copy(small_preset, preset_folder / "studio_zither.safetensors")
     browser.favourite_asked.emit("second")
@@ -224,7 +232,7 @@ def test_studio_presets_are_a_group_of_their_own_before_the_research_ones(
     assert controller.session.choices.preset == "studio_zither"
     qtbot.keyClick(browser.list, KEY.Key_Up)
     assert controller.session.choices.preset == "studio_zither"
-    heading = browser.list.visualItemRect(browser.list.topLevelItem(1)).center()
+    heading = browser.list.visualRect(browser.list.model().index(2, 0)).center()
     qtbot.mouseClick(browser.list.viewport(), Qt.MouseButton.LeftButton, pos=heading)
     assert controller.session.choices.preset == "studio_zither"
     browser.search.setText("second")
@@ -236,16 +244,16 @@ def test_studio_presets_are_a_group_of_their_own_before_the_research_ones(
         assert controller.session.choices.preset == name
 
 
-def test_favourites_are_kept(qtbot: QtBot, controller: Controller, browser: PresetBrowser, tmp_path: Path) -> None:
+def test_favourites_are_kept(qtbot: QtBot, controller: Controller, browser: Browser, tmp_path: Path) -> None:
     qtbot.keyClick(browser.search, KEY.Key_D, CONTROL)
     assert controller.presets.favourites == {"first", *FIRST_FAVOURITES}
     assert "★" in controller.window.presets.name.text()
-    browser._starred.click()
+    browser.starred.click()
     assert listed(browser) == ["first"]
-    place = browser.list.visualItemRect(browser._rows[0]).topLeft() + QPoint(6, 6)
+    place = row_rect(browser, 0).topLeft() + QPoint(6, 6)
     qtbot.mouseClick(browser.list.viewport(), Qt.MouseButton.LeftButton, pos=place)
     assert listed(browser) == []
-    browser._starred.click()
+    browser.starred.click()
     browser.favourite_asked.emit("second")
     controller.window.close()
     assert load_settings(tmp_path / "settings.json")[0].favourites == ("second", *sorted(FIRST_FAVOURITES))
@@ -255,8 +263,8 @@ def test_the_first_favourites_are_shipped() -> None:
     assert {path.stem for path in preset_files()} >= set(FIRST_FAVOURITES)
 
 
-def test_the_card_tells_what_a_musician_wants_to_know(controller: Controller, browser: PresetBrowser) -> None:
-    card = browser._card.text()
+def test_the_card_tells_what_a_musician_wants_to_know(controller: Controller, browser: Browser) -> None:
+    card = browser.card.text()
     for words in ("A small string", "4 kHz", "the first 0.1 s", "25 % of the motion", "Licence", "MIT", "kB"):
         assert words in card
     assert "To remake" not in card
@@ -271,11 +279,9 @@ def test_the_error_stays_in_the_header_where_there_is_little_room(controller: Co
     assert "parameters" in card.text()
 
 
-def test_every_control_of_bar_and_browser_has_a_name_and_a_tip(
-    controller: Controller, browser: PresetBrowser
-) -> None:
+def test_every_control_of_bar_and_browser_has_a_name_and_a_tip(controller: Controller, browser: Browser) -> None:
     for part in (browser, controller.window.presets):
-        for kind in (QAbstractButton, QComboBox, QLineEdit, QTreeWidget):
+        for kind in (QAbstractButton, QComboBox, QLineEdit, QTreeView):
             for control in part.findChildren(kind):
                 if control.focusPolicy() != Qt.FocusPolicy.NoFocus:
                     assert control.accessibleName(), control
@@ -292,7 +298,7 @@ def test_presets_put_into_the_folder_appear_when_it_is_opened(
     controller.presets.toggle()
     assert listed(controller.presets.browser) == ["first", "mine", "second"]
     assert "bad.safetensors" in controller.window.notices.text
-    assert str(tmp_path / "own") in controller.presets.browser._state.text()
+    assert str(tmp_path / "own") in controller.presets.browser.state.text()
 
 
 def drop(controller: Controller, *files: Path) -> None:
@@ -344,7 +350,7 @@ def test_dropped_files_are_taken_in(
 
 
 def test_browser_and_card_say_how_true_a_preset_sounds(
-    qtbot: QtBot, controller: Controller, browser: PresetBrowser, preset_folder: Path, small_preset: Path
+    qtbot: QtBot, controller: Controller, browser: Browser, preset_folder: Path, small_preset: Path
 ) -> None:
     second = preset_folder / "second.safetensors"
     second.write_bytes(small_preset.read_bytes().replace(b"A small string", b"<i>sma</i> str"))
@@ -353,15 +359,15 @@ def test_browser_and_card_say_how_true_a_preset_sounds(
     browser.dismiss()
     controller.presets.toggle()
     assert listed(browser) == ["second", "first"]  # what was not measured is last
-    heard = [browser._rows[row].text(4) for row in range(2)]
-    assert heard == ["pitch +13 cents …", "not measured"]
-    assert browser._rows[0].toolTip(1).startswith("<p>&lt;i&gt;sma&lt;/i&gt; str")
-    assert "evaluate first --heard --write" in browser._card.text()
+    rows = [browser._listed.index_of(name) for name in listed(browser)]
+    assert [row.siblingAtColumn(4).data() for row in rows] == ["pitch +13 cents …", "not measured"]
+    assert "&lt;i&gt;sma&lt;/i&gt; str" in rows[0].data(Qt.ItemDataRole.ToolTipRole)
+    assert "evaluate first --heard --write" in browser.card.text()
     controller.session.update(preset="second")
-    card = browser._card.text()
+    card = browser.card.text()
     assert "past training: pitch +13 cents; grows, +5 dB; spectra 7.4 dB apart over 4 s" in card
     assert "<b>bold</b>" not in card
-    browser._order.setCurrentIndex(browser._order.findData("name"))
+    browser.order.setCurrentIndex(browser.order.findText("By name"))
     assert listed(browser) == ["first", "second"]
     browser.clear_filter()  # the order is no filter
     assert listed(browser) == ["first", "second"]

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import threading
-import time
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 import pytest
 import soundfile
-from PySide6.QtWidgets import QFileDialog, QMessageBox
+from PySide6.QtWidgets import QMessageBox
 from pytestqt.qtbot import QtBot
 
-from app.export.played import Played
 from app.export.recipe import InstrumentSound, read_origin
 from app.instrument.bodies import own_bodies
-from app.instrument.events import NoteOff, NoteOn, PatchTurned, TimedEvent
+from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import read_midi
 from app.shared.version import program_version
-from app.window import recordings as module
+from app.views.dialogs.export_dialog import ExportDialog
 from app.window.controller import Controller
 
 
@@ -29,11 +27,9 @@ class Told:
     def __init__(self, played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
         self.errors: list[str] = []
         self.good: list[str] = []
-        self.answers: list[Path | str] = []
         self.loses = True  # the answer to whether the window may be closed, and lose a recording
         played.patches.told.connect(self.errors.append)
         played.patches.informed.connect(self.good.append)
-        monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *args, **words: (str(self.answers.pop(0)), ""))
         monkeypatch.setattr(QMessageBox, "question", self._question)
 
     def _question(self, *_: object) -> QMessageBox.StandardButton:
@@ -43,6 +39,23 @@ class Told:
 @pytest.fixture
 def told(played: Controller, monkeypatch: pytest.MonkeyPatch) -> Told:
     return Told(played, monkeypatch)
+
+
+def dialog_of(played: Controller) -> ExportDialog:
+    """The export dialog, which the end of a recording opens."""
+    dialog = played.exports.dialog
+    assert dialog is not None and dialog.kind == "performance"
+    return dialog
+
+
+def save(qtbot: QtBot, played: Controller, path: Path, words: str = "Saved") -> str:
+    """Exports the latest recording; what the dialog says then."""
+    dialog = dialog_of(played)
+    dialog.performance.file.edit.setText(str(path))
+    dialog.performance.file.edit.textEdited.emit(str(path))
+    dialog.save.click()
+    qtbot.waitUntil(lambda: words in dialog.state.text())
+    return dialog.state.text()
 
 
 def play(played: Controller, key: int = 60) -> None:
@@ -65,49 +78,50 @@ def test_what_is_played_is_recorded_as_wav_and_midi(
     recordings.record()
     assert "Nothing was played" in told.errors[0]
     out = tmp_path / "take.wav"
-    told.answers = [out]
     record(played)
-    qtbot.waitUntil(lambda: len(told.good) == 1)
-    assert str(out) in told.good[0]
-    assert "of the model" in told.good[0]
+    assert "1 note in" in dialog_of(played).performance.what.text()
+    words = save(qtbot, played, out)
+    assert f"Saved {out} and take.mid" in words and "of the model" in words
     assert len(told.errors) == 1  # to have written it is no error
     sound, rate_hz = soundfile.read(out)
     assert rate_hz == 48_000
     assert 0.001 < abs(sound).max() < 1
     assert [type(each.event) for each in read_midi(out.with_suffix(".mid"))] == [NoteOn, NoteOff]
+    assert recordings.latest is None
 
 
 def test_a_recording_replaces_no_file_that_nobody_asked_about(
     qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
 ) -> None:
     (tmp_path / "song.mid").write_bytes(b"mine")
-    (tmp_path / "take.wav").write_bytes(b"mine")
-    told.answers = [tmp_path / name for name in ("song.wav", "take", "take 1.5")]
     record(played)
-    qtbot.waitUntil(lambda: len(told.good) == 1)
-    assert "song.mid exists already" in told.errors[0]
-    assert "take.wav exists already" in told.errors[1]
-    assert (tmp_path / "song.mid").read_bytes() == (tmp_path / "take.wav").read_bytes() == b"mine"
+    dialog = dialog_of(played)
+    dialog.performance.file.edit.setText(str(tmp_path / "song.wav"))
+    dialog.performance.file.edit.textEdited.emit("")
+    qtbot.waitUntil(lambda: dialog.save.text() == "Replace")
+    assert dialog.state.text() == "Replaces song.mid."
+    assert (tmp_path / "song.mid").read_bytes() == b"mine"
+    save(qtbot, played, tmp_path / "take 1.5")
     assert {path.name for path in tmp_path.glob("take 1.5*")} == {"take 1.5.wav", "take 1.5.mid"}
 
 
-def test_a_cancelled_recording_is_kept_until_it_is_saved_or_discarded(
+def test_a_recording_is_kept_until_it_is_saved_or_discarded(
     qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
 ) -> None:
     bar, recorder = played.window.instrument.bar, played.performance.notes.keys.recorder
-    told.answers = [""]
     record(played)
     assert "Unsaved" in bar.record.text()
-    save, discard = bar._unsaved_menu.actions()
+    ask, discard = bar._unsaved_menu.actions()
     played.patches.choose("concert_harp")  # it was played by the other one
-    told.answers = ["", tmp_path / "kept.wav"]
-    save.trigger()
-    played.patches.recordings.record()  # asks again, and records nothing over it
+    dialog_of(played).reject()
+    ask.trigger()
+    dialog_of(played).reject()
+    played.patches.recordings.record()  # opens it again, and records nothing over it
     assert not recorder.recording
+    save(qtbot, played, tmp_path / "kept.wav")
     assert "Unsaved" not in bar.record.text()
-    qtbot.waitUntil(lambda: len(told.good) == 1)
-    assert (tmp_path / "kept.wav").exists()
-    told.answers = [""]
+    origin = read_origin(tmp_path / "kept.wav")
+    assert isinstance(origin, InstrumentSound) and origin.instrument == "Steel-string acoustic"
     record(played)
     discard.trigger()
     assert "Record" in bar.record.text()
@@ -120,14 +134,24 @@ def test_a_cancelled_recording_is_kept_until_it_is_saved_or_discarded(
 def test_a_recording_that_cannot_be_written_is_kept(
     qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
 ) -> None:
-    told.answers = [tmp_path / "absent" / "take.wav", tmp_path / "take.wav"]
     record(played)
-    qtbot.waitUntil(lambda: len(told.errors) == 1)
-    assert "absent" in told.errors[0]
-    assert "is kept" in told.errors[0]
+    save(qtbot, played, tmp_path / "absent" / "take.wav", "absent")
     assert "Unsaved" in played.window.instrument.bar.record.text()
-    played.patches.recordings.save()
-    qtbot.waitUntil(lambda: len(told.good) == 1)
+    save(qtbot, played, tmp_path / "take.wav")
+
+
+def test_rate_format_and_level_are_those_of_the_dialog(
+    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+) -> None:
+    record(played)
+    wav = dialog_of(played).wav
+    for box, data in ((wav.rate, 44_100), (wav.bits, "16")):
+        box.setCurrentIndex(box.findData(data))
+    wav.normalise.setChecked(True)
+    save(qtbot, played, tmp_path / "take.wav")
+    info = soundfile.info(tmp_path / "take.wav")
+    assert (info.samplerate, info.subtype) == (44_100, "PCM_16")
+    assert abs(soundfile.read(tmp_path / "take.wav")[0]).max() == pytest.approx(10 ** (-1 / 20), abs=1e-4)
 
 
 @pytest.mark.parametrize("button", ["_pickup", "_stereo"])
@@ -135,18 +159,17 @@ def test_it_is_recorded_as_it_is_heard(
     qtbot: QtBot, played: Controller, told: Told, tmp_path: Path, button: str
 ) -> None:
     """Not as the patch was saved."""
-    told.answers = [tmp_path / "before.wav", tmp_path / "after.wav"]
     played.patches.change("knobs.decay", 10.0)
     played.session.update(pickup="displacement")  # at the bridge both sides hear the same
     control = getattr(played.window.transport, button)
     change = control.click if button == "_stereo" else lambda: control.activated.emit(control.findData("velocity"))
-    for turn in (lambda: None, change):
+    for name, turn in {"before.wav": lambda: None, "after.wav": change}.items():
         turn()
         played.patches.recordings.record()
         played.window.instrument.pressed.emit(60, 100)  # and held: when it is released would differ
         played.patches.recordings.record()
         played.window.instrument.released.emit(60)
-    qtbot.waitUntil(lambda: len(told.good) == 2)
+        save(qtbot, played, tmp_path / name, f"{name} and")
     before, after = (soundfile.read(tmp_path / name, always_2d=True)[0] for name in ("before.wav", "after.wav"))
     assert before.shape[1] == after.shape[1] == 2
     side = {"_pickup": 0, "_stereo": 1}[button]  # the left one stays where it was
@@ -158,10 +181,8 @@ def test_the_source_that_was_heard_is_written(
     qtbot: QtBot, played: Controller, told: Told, tmp_path: Path, source: str, words: str
 ) -> None:
     played.session.update(a=source, heard="a", difference_gain_db=40.0)
-    told.answers = [tmp_path / "take.wav"]
     record(played)
-    qtbot.waitUntil(lambda: len(told.good) == 1)
-    assert words in told.good[0]
+    assert words in save(qtbot, played, tmp_path / "take.wav")
     origin = read_origin(tmp_path / "take.wav")
     assert isinstance(origin, InstrumentSound)
     assert (origin.instrument, origin.preset) == ("Steel-string acoustic", "studio_any_string")
@@ -177,9 +198,8 @@ def test_a_recording_that_is_dropped_says_what_it_is_and_changes_nothing(
     qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
 ) -> None:
     """It is neither a recipe nor a body."""
-    told.answers = [tmp_path / "take.wav"]
     record(played)
-    qtbot.waitUntil(lambda: len(told.good) == 1)
+    save(qtbot, played, tmp_path / "take.wav")
     before = played.session.choices
     played.take_file(tmp_path / "take.wav")
     notice = played.window.notices.text
@@ -191,13 +211,12 @@ def test_a_recording_that_is_dropped_says_what_it_is_and_changes_nothing(
 
 def test_that_a_soloed_mode_is_not_recorded_alone_is_told(played: Controller, told: Told) -> None:
     played.session.update(solo=3)
-    told.answers = [""]
     record(played)
     assert told.good == ["The recording has all modes, although mode 3 is soloed."]
 
 
 def test_the_window_is_not_closed_over_a_recording_without_a_question(played: Controller, told: Told) -> None:
-    told.answers, told.loses = [""], False
+    told.loses = False
     record(played)
     played.window.close()
     assert played.window.isVisible()
@@ -211,40 +230,21 @@ def test_the_window_is_not_closed_over_a_recording_without_a_question(played: Co
 
 
 def test_the_window_is_not_closed_over_a_recording_that_is_being_written(
-    played: Controller, told: Told, tmp_path: Path
+    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
 ) -> None:
     """An hour of playing takes minutes. Its notes are there at once; its sound is given up if the user says so."""
-    patch = played.session.choices.patch
-    assert patch is not None
-    strikes = (TimedEvent(1.0 * second, NoteOn(60, 100)) for second in range(3_600))
-    events = (TimedEvent(0.0, PatchTurned(patch)), *strikes)
+    record(played)
+    hour = [TimedEvent(float(second), NoteOn(60, 100)) for second in range(3_600)]
+    latest = played.patches.recordings.latest
+    assert latest is not None
+    played.patches.recordings._unsaved[-1] = replace(latest, events=(latest.events[0], *hour))
+    played.exports.refresh()
     told.loses = False
-    played.patches.recordings.write(tmp_path / "take.wav", Played(patch, events))
+    save(qtbot, played, tmp_path / "take.wav", "Rendering")
+    qtbot.waitUntil((tmp_path / "take.mid").is_file)
     played.window.close()
     assert played.window.isVisible()
     told.loses = True
-    began_s = time.monotonic()
     played.window.close()
     assert not played.window.isVisible()
-    assert time.monotonic() - began_s < module.WAIT_S
     assert [path.name for path in tmp_path.iterdir() if "take" in path.name] == ["take.mid"]
-
-
-def test_what_is_written_is_waited_for(played: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where nobody can be asked, as at the end of a session of the system."""
-    begun, done = threading.Event(), []
-
-    def write(path: Path, *_: object) -> str:
-        begun.set()
-        time.sleep(0.3)
-        done.append(path)
-        return ""
-
-    monkeypatch.setattr(module, "write_recorded", write)
-    patch = played.session.choices.patch
-    assert patch is not None
-    events = (TimedEvent(0.0, PatchTurned(patch)), TimedEvent(0.0, NoteOn(60, 100)))
-    played.patches.recordings.write(tmp_path / "take.wav", Played(patch, events))
-    assert begun.wait(20)
-    played.patches.close()
-    assert done == [tmp_path / "take.wav"]

@@ -17,7 +17,7 @@ from app.export.sampled.choices import SampledChoices
 from app.export.sampled.plan import SampledPlan
 from app.patches.library import find_patch
 from app.shared.worker import Cancelled
-from app.views.dialogs.sampled_dialog import SampledDialog
+from app.views.dialogs.export_dialog import ExportDialog
 from app.window.controller import Controller
 from app.window.settings import load_settings
 from engine.presets.finding import SHIPPED
@@ -30,7 +30,8 @@ def patched(controller: Controller, preset_folder: Path, tmp_path: Path) -> Cont
     """With a patch, and choices that are soon rendered."""
     shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
     controller.library.refresh()
-    controller.sampled._choices = SampledChoices(folder=str(tmp_path), keys=(60, 61), layers=1, seconds=0.2)
+    sampled = SampledChoices(folder=str(tmp_path), keys=(60, 61), layers=1, seconds=0.2)
+    controller.exports._choices = controller.exports.choices[0], sampled
     controller.session.update(instrument=find_patch(PATCH).patch)
     return controller
 
@@ -40,14 +41,14 @@ def open_dialog(qtbot: QtBot, controller: Controller):
     qtbot.keyClick(
         controller.window, Qt.Key.Key_E, Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.ShiftModifier
     )
-    return controller.sampled.dialog
+    return controller.exports.dialog
 
 
 def test_without_a_patch_it_says_so(controller: Controller) -> None:
     controller.session.update(patch=None)
     action = next(action for action in controller.window.menu.asked if action.text().startswith("Export instrument"))
     action.trigger()
-    assert controller.sampled.dialog is None
+    assert controller.exports.dialog is None
     assert "There is no patch to export" in controller.window.notices.notices[-1].message
 
 
@@ -56,10 +57,10 @@ def test_the_patch_is_exported_while_the_window_plays(qtbot: QtBot, patched: Con
     assert dialog.isVisible()
     assert not dialog.isModal()
     open_dialog(qtbot, patched)
-    assert patched.sampled.dialog is dialog
-    assert dialog.what.text().startswith(PATCH)
+    assert patched.exports.dialog is dialog
+    assert dialog.sampler.what.text().startswith(PATCH)
     patched.session.update(instrument=find_patch("Concert harp").patch)
-    assert dialog.what.text().startswith("Concert harp")
+    assert dialog.sampler.what.text().startswith("Concert harp")
     qtbot.waitUntil(lambda: patched.performance.notes.keys.player is not None)
     dialog.save.click()
     qtbot.keyPress(patched.window, Qt.Key.Key_A)
@@ -74,7 +75,7 @@ def test_the_patch_is_exported_while_the_window_plays(qtbot: QtBot, patched: Con
 
 
 @pytest.fixture
-def exporting(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch) -> SampledDialog:
+def exporting(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch) -> ExportDialog:
     """Its dialog, which had the focus when the export began; it ends when it is cancelled."""
     begun = threading.Event()
 
@@ -84,7 +85,7 @@ def exporting(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch
             progress(0.0)
             time.sleep(0.01)
 
-    monkeypatch.setattr("app.views.dialogs.sampled_dialog.export_sampled", export)
+    monkeypatch.setattr("app.export.sampled.export.export_sampled", export)
     qtbot.waitUntil(lambda: patched.performance.notes.keys.player is not None)
     dialog = open_dialog(qtbot, patched)
     qtbot.waitUntil(dialog.isActiveWindow)
@@ -95,7 +96,7 @@ def exporting(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch
 
 @pytest.mark.parametrize("in_front", ["window", "dialog"])
 def test_keys_play_and_shortcuts_work_while_it_runs(
-    qtbot: QtBot, patched: Controller, exporting: SampledDialog, in_front: str
+    qtbot: QtBot, patched: Controller, exporting: ExportDialog, in_front: str
 ) -> None:
     """Without a click, and after the dialog was moved by its title bar, which gives it the focus."""
     qtbot.waitUntil(patched.window.isActiveWindow)
@@ -115,7 +116,7 @@ def test_keys_play_and_shortcuts_work_while_it_runs(
     assert not patched.window.isVisible()
 
 
-def test_escape_in_the_dialog_cancels(qtbot: QtBot, patched: Controller, exporting: SampledDialog) -> None:
+def test_escape_in_the_dialog_cancels(qtbot: QtBot, patched: Controller, exporting: ExportDialog) -> None:
     exporting.activateWindow()
     qtbot.waitUntil(exporting.isActiveWindow)
     patched.session.update(solo=2)
@@ -123,17 +124,17 @@ def test_escape_in_the_dialog_cancels(qtbot: QtBot, patched: Controller, exporti
     qtbot.waitUntil(lambda: "Cancelled" in exporting.state.text())
     assert patched.session.choices.solo == 2
     looped = patched.session.choices.loop
-    qtbot.keyClick(exporting.form, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
+    qtbot.keyClick(exporting.sampler, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
     assert patched.session.choices.loop == looped  # its own keys again
 
 
 def test_what_was_chosen_is_remembered(qtbot: QtBot, patched: Controller, tmp_path: Path) -> None:
     dialog = open_dialog(qtbot, patched)
-    dialog.form.layers.setValue(7)
+    dialog.sampler.layers.setValue(7)
     assert patched.settings().sampled.layers == 7  # should the process be killed now
     dialog.close()
-    assert patched.sampled.dialog is None
-    assert open_dialog(qtbot, patched).form.layers.value() == 7
+    assert patched.exports.dialog is None
+    assert open_dialog(qtbot, patched).sampler.layers.value() == 7
     patched.window.close()
     remembered = load_settings(tmp_path / "settings.json")[0].sampled
     assert (remembered.layers, remembered.keys, remembered.folder) == (7, (60, 61), str(tmp_path))
@@ -152,11 +153,11 @@ def test_closing_the_window_ends_it(qtbot: QtBot, patched: Controller, monkeypat
             ended.set()
             raise ValueError("shown to nobody") from None
 
-    monkeypatch.setattr("app.views.dialogs.sampled_dialog.export_sampled", export)
+    monkeypatch.setattr("app.export.sampled.export.export_sampled", export)
     dialog = open_dialog(qtbot, patched)
     dialog.save.click()
     assert begun.wait(60)
     patched.window.close()
     assert ended.is_set()
     QApplication.processEvents()
-    assert not [thread for thread in threading.enumerate() if thread.name == "Export instrument"]
+    assert not [thread for thread in threading.enumerate() if thread.name == "export"]

@@ -12,7 +12,7 @@ def finished(planned: int, right: int, answered: int | None = None) -> Run:
     for place in range(planned if answered is None else answered):
         x = run.heard_as("X")
         other = "B" if x == "A" else "A"
-        run = run.auditioned("A").auditioned("X").answered(x if place < right else other, 2.25)
+        run = run.auditioned("A").auditioned("X").answered(x if place < right else other)
     return run
 
 

@@ -25,7 +25,7 @@ def rms(samples: np.ndarray) -> float:
 
 def test_levels_are_equal_and_gains_are_told() -> None:
     model, truth = decay(200, 0.4), decay(200, 0.1)
-    made = make_stimuli({"model": model, "truth": truth}, RATE_HZ, ("truth", "model"))
+    made = make_stimuli({"model": truth, "truth": model}, RATE_HZ)
     a, b = (made.samples[name] for name in IDENTITIES)
     assert rms(a) == pytest.approx(rms(b), rel=1e-6)
     kept = RATE_HZ - round(END_S * RATE_HZ)  # before the fade at the end
@@ -37,7 +37,7 @@ def test_levels_are_equal_and_gains_are_told() -> None:
 @pytest.mark.parametrize("volume_db", [-20.0, 0.0, 12.0])
 def test_two_overlapping_sounds_stay_below_the_limiter(volume_db: float) -> None:
     sounds = {"model": decay(200, 1.4), "truth": decay(300, 0.9)}
-    made = make_stimuli(sounds, RATE_HZ, ("model", "truth"), volume_db)
+    made = make_stimuli(sounds, RATE_HZ, volume_db)
     peaks = [np.abs(made.samples[name]).max() for name in IDENTITIES]
     assert 2 * max(peaks) * 10 ** (volume_db / 20) <= CEILING * 1.000001
     assert max(made.gains_db) <= 0
@@ -46,24 +46,24 @@ def test_two_overlapping_sounds_stay_below_the_limiter(volume_db: float) -> None
 def test_what_says_nothing_is_noticed() -> None:
     hertz = {"model": 200, "truth": 200, "other": 450, "near": 200.2}
     sounds = {source: decay(hz, 0.5) for source, hz in hertz.items()}
-    same = make_stimuli(sounds, RATE_HZ, ("model", "truth"))
+    same = make_stimuli(sounds, RATE_HZ)
     assert (same.same, same.trivial) == (True, False)
-    other = make_stimuli(sounds, RATE_HZ, ("model", "other"))
+    other = make_stimuli({**sounds, "truth": sounds["other"]}, RATE_HZ)
     assert (other.same, other.trivial) == (False, True)
-    near = make_stimuli(sounds, RATE_HZ, ("model", "near"))
+    near = make_stimuli({**sounds, "truth": sounds["near"]}, RATE_HZ)
     assert (near.same, near.trivial) == (False, False)
 
 
 def test_silence_is_refused() -> None:
     for silence in (np.zeros((RATE_HZ, 1)), np.zeros((0, 1))):
         with pytest.raises(ValueError, match="Truth is silent"):
-            make_stimuli({"model": decay(200, 0.5), "truth": silence}, RATE_HZ, ("model", "truth"))
+            make_stimuli({"model": decay(200, 0.5), "truth": silence}, RATE_HZ)
 
 
 def test_a_turn_ends_in_silence_and_both_sides_stay() -> None:
     """They are looped; a stereo pair keeps its two points."""
     stereo = np.concatenate([decay(200, 0.5), 0.25 * decay(200, 0.5)], axis=1) + 0.1
-    made = make_stimuli({"model": stereo, "truth": stereo[:, ::-1]}, RATE_HZ, ("model", "truth"))
+    made = make_stimuli({"model": stereo, "truth": stereo[:, ::-1]}, RATE_HZ)
     for name in IDENTITIES:
         assert made.samples[name].shape == (RATE_HZ, 2)
         assert np.abs(made.samples[name][-1]).max() < 1e-3

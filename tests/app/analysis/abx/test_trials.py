@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pytest
-from pydantic import ValidationError
 from scipy.stats import binomtest
 
 from app.analysis.abx.trials import Run, Trial, draw_order, needed_correct, p_value
@@ -29,8 +28,6 @@ def test_p_values_are_those_of_scipy(trials: int) -> None:
     for correct in range(trials + 1):
         expected = binomtest(correct, trials, 0.5, alternative="greater").pvalue
         assert p_value(correct, trials) == pytest.approx(expected, rel=1e-9)
-    with pytest.raises(ValueError, match="cannot be right"):
-        p_value(trials + 1, trials)
 
 
 @pytest.mark.parametrize(("trials", "needed"), [(4, None), (5, 5), (10, 9), (16, 12), (25, 18)])
@@ -56,29 +53,17 @@ def test_a_run_keeps_what_happened_in_each_trial() -> None:
     run = Run(seed=3, planned=2)
     assert run.heard_as("X") == order[0]
     assert (run.heard_as("A"), run.heard_as("B")) == ("A", "B")
-    run = run.auditioned("A").auditioned("X").auditioned("X").answered(order[0], 4.5)
-    assert run.trials == (Trial(x=order[0], answer=order[0], seconds=4.5, auditions=3),)
-    assert (run.number, run.auditions, run.x_heard, run.complete) == (2, 0, False, False)
+    run = run.auditioned("A").auditioned("X").auditioned("X").answered(order[0])
+    assert run.trials == (Trial(x=order[0], answer=order[0]),)
+    assert (len(run.trials), run.x_heard, run.complete) == (1, False, False)
     wrong = "A" if order[1] == "B" else "B"
-    run = run.auditioned("X").answered(wrong, 1)
+    run = run.auditioned("X").answered(wrong)
     assert run.complete
     assert [trial.correct for trial in run.trials] == [True, False]
     with pytest.raises(ValueError, match="complete"):
-        run.answered("A", 1)
+        run.answered("A")
 
 
 def test_without_hearing_x_there_is_no_answer() -> None:
     with pytest.raises(ValueError, match="X has not been heard"):
-        Run(seed=1, planned=3).auditioned("A").auditioned("B").answered("A", 1)
-
-
-@pytest.mark.parametrize(("seed", "planned"), [(-1, 10), (1, 0), (1, 201), (2**32, 10)])
-def test_impossible_runs_are_refused(seed: int, planned: int) -> None:
-    with pytest.raises(ValueError, match="not"):
-        Run(seed, planned)
-
-
-def test_impossible_trials_are_refused() -> None:
-    for changes in ({"seconds": float("nan")}, {"seconds": -1}, {"auditions": 0}, {"x": "X"}):
-        with pytest.raises(ValidationError):
-            Trial.model_validate({"x": "A", "answer": "B", "seconds": 1.0, "auditions": 1, **changes})
+        Run(seed=1, planned=3).auditioned("A").auditioned("B").answered("A")

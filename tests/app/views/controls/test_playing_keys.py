@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication, QComboBox, QLineEdit, QVBoxLayout, Q
 from pytestqt.qtbot import QtBot
 
 from app.views.controls.playing_keys import X11, PlayingKeys
-from app.views.instrument.patch_browser import PatchBrowser
+from app.views.instrument.patch_card import patch_browser
 
 
 @pytest.fixture
@@ -50,7 +50,7 @@ def test_who_writes_is_left_alone(qtbot: QtBot, window: QWidget, heard: list[str
 
 
 def test_while_a_browser_is_open_keys_search_in_it(qtbot: QtBot, window: QWidget, heard: list[str]) -> None:
-    browser = PatchBrowser(window)
+    browser = patch_browser(window)
     browser.show_over()
     box = window.findChild(QComboBox)
     for focused in (browser.list, browser, box, window):

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractButton, QLabel, QMessageBox, QWidget
+from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel, QMessageBox, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.analysis.abx.record import AbxRecord, Candidate, Material, load_record
-from app.analysis.abx.trials import AbxChoices, draw_order
+from app.analysis.abx.record import AbxRecord, Candidate, load_record, save_record
+from app.analysis.abx.trials import AbxChoices, Trial, draw_order
 from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
@@ -26,10 +26,8 @@ RATE_HZ = 48_000
 FRAMES = 4800
 HEADPHONES = AudioDevice("Headphones", "Test API", RATE_HZ)
 PLUCK: dict[str, object] = {"position": 0.4, "amplitude_mm": 4.0, "seconds": 0.1}
-CANDIDATES = tuple(
-    Candidate(source=name, label=name.capitalize(), preset="small", preset_sha256="0f" * 32)
-    for name in ("model", "truth")
-)
+A, B = (Candidate(label=label, preset="small", preset_sha256="0f" * 32) for label in ("Model", "Truth"))
+MATERIAL = AbxRecord(a=A, b=B, pluck=PLUCK, through={"volume_db": 0.0}, planned_trials=1, seed=0)
 Open = Callable[..., AbxDialog]
 Sounds = Mapping[str, NDArray[np.float32]]
 
@@ -61,9 +59,7 @@ def open_dialog(qtbot: QtBot, sound: Sound, tmp_path: Path) -> Open:
     ) -> AbxDialog:
         choices = AbxChoices(trials=trials, folder=str(tmp_path / "records"))
         rendering = rendered or done(sounds_of())
-        dialog = AbxDialog(
-            through, Material(CANDIDATES, PLUCK, 0.0), choices, lambda rate_hz: rendering, seed=lambda: seed
-        )
+        dialog = AbxDialog(through, MATERIAL, choices, lambda rate_hz: rendering, seed=lambda: seed)
         qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())  # without its question
         with qtbot.waitExposed(dialog):
             dialog.open()
@@ -111,7 +107,7 @@ def test_a_whole_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Pat
     record = saved(tmp_path)
     assert str(tmp_path / "records") in text
     assert (record.seed, record.correct, record.complete) == (seed, 3, True)
-    assert [(trial.x, trial.auditions) for trial in record.trials] == [(x, 4) for x in order]
+    assert [trial.x for trial in record.trials] == list(order)
     assert (record.through["device"], record.through["rate_hz"]) == ("Headphones", RATE_HZ)
     assert (record.a.label, record.b.label) == ("Model", "Truth")
     assert record.a.gain_db == pytest.approx(0, abs=0.01)
@@ -239,7 +235,7 @@ def test_at_another_rate_of_the_device_it_is_rendered_anew(qtbot: QtBot, sound: 
         asked.append(rate_hz)
         return done(sounds_of())
 
-    dialog = AbxDialog(sound, Material(CANDIDATES, PLUCK, 0.0), AbxChoices(folder=str(tmp_path)), render)
+    dialog = AbxDialog(sound, MATERIAL, AbxChoices(folder=str(tmp_path)), render)
     qtbot.addWidget(dialog, before_close_func=lambda closed: closed.abandon())
     dialog.open()
     for rate_hz, channels in ((44_100, 2), (44_100, 1)):
@@ -271,9 +267,34 @@ def test_trials_are_chosen_and_remembered(open_dialog: Open) -> None:
     dialog = open_dialog(trials=16)
     assert "12 right of 16" in texts(dialog)
     setup = dialog._setup
-    setup._usual.button(25).click()
+    setup.trials.setValue(25)
     assert "18 right of 25" in texts(dialog)
-    setup._trials.setValue(4)
+    setup.trials.setValue(4)
     assert "Too few" in texts(dialog)
-    assert not any(button.isChecked() for button in setup._usual.buttons())
     assert dialog.choices().trials == 4
+
+
+def test_a_result_is_opened_again(
+    qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trials = tuple(Trial(x="A", answer="A") for _ in range(10))
+    path = save_record(tmp_path, MATERIAL.model_copy(update={"planned_trials": 10, "trials": trials}))
+    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
+    dialog = open_dialog()
+    dialog._setup.open_result.click()
+    for words in ("10 of 10 right", "p < 0.001", "You can tell them apart", "Model and Truth of small", str(path)):
+        assert words in texts(dialog)
+    dialog._result.again.click()
+    path.write_bytes(b"{}")
+    told: list[str] = []
+    monkeypatch.setattr(QMessageBox, "warning", lambda *words: told.append(words[-1]))
+    dialog._setup.open_result.click()
+    assert "or damaged" in told[0] and not dialog._result.isVisible()
+
+
+def test_clicks_hear_and_answer(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
+    dialog = open_dialog(trials=1)
+    start(dialog)
+    for button in (dialog._trial._sounds["X"], dialog._trial._answers["A"]):
+        qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert saved(tmp_path).trials[0].answer == "A"

@@ -1,4 +1,4 @@
-"""The dialog that exports an instrument: what it says, writes, keeps when cancelled, and says when it cannot."""
+"""The export of an instrument for samplers: what the dialog says, writes and keeps."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ import numpy as np
 import pytest
 import soundfile
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QComboBox, QFileDialog
+from PySide6.QtWidgets import QAbstractButton, QAbstractSpinBox, QComboBox, QFileDialog, QTabBar
 from pytestqt.qtbot import QtBot
 
+from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
 from app.export.sampled.plan import SampledPlan
 from app.export.sampled.words import pitch_words
 from app.patches.library import find_patch
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry, list_presets
-from app.views.dialogs.sampled_dialog import RESUMES, SampledDialog
+from app.views.dialogs.export_dialog import ExportDialog
+from app.views.dialogs.export_pages import RESUMES, HeardInstrument
 
 SMALL = {"keys": (60, 62), "layers": 2, "seconds": 0.2}
 MADE = 3 * 2
@@ -73,15 +75,16 @@ def folder(tmp_path: Path) -> Path:
 @pytest.fixture
 def made(
     qtbot: QtBot, patch: Patch, preset: PresetEntry, notes: Notes, folder: Path
-) -> Iterator[Callable[..., SampledDialog]]:
+) -> Iterator[Callable[..., ExportDialog]]:
     dialogs = []
 
-    def make(**choices: object) -> SampledDialog:
+    def make(**choices: object) -> ExportDialog:
         remembered = SampledChoices.model_validate({"folder": str(folder), **SMALL, **choices})
-        dialog = SampledDialog(patch, preset, remembered)
+        dialog = ExportDialog(ExportChoices(), remembered)
         dialogs.append(dialog)
         qtbot.addWidget(dialog)
-        dialog.show()
+        show(dialog, patch, preset)
+        dialog.open_at("sampler")
         return dialog
 
     yield make
@@ -90,12 +93,16 @@ def made(
         dialog.accept()
 
 
-def settle(qtbot: QtBot, dialog: SampledDialog) -> None:
+def show(dialog: ExportDialog, patch: Patch, preset: PresetEntry) -> None:
+    dialog.show_subjects({"sampler": HeardInstrument(patch, preset)})
+
+
+def settle(qtbot: QtBot, dialog: ExportDialog) -> None:
     """Until what the choices mean is shown."""
     qtbot.waitUntil(lambda: not dialog._settled.isActive())
 
 
-def run(qtbot: QtBot, dialog: SampledDialog, words: str) -> None:
+def run(qtbot: QtBot, dialog: ExportDialog, words: str) -> None:
     dialog.save.click()
     qtbot.waitUntil(lambda: words in dialog.state.text())
 
@@ -104,8 +111,8 @@ def test_an_sfz_is_written_as_it_was_told(
     qtbot: QtBot, made, folder: Path, notes: Notes, patch: Patch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dialog = made(rate_hz=44_100, source="truth", form="wav", bits="16")
-    assert "6 samples (3 keys, 2 velocity layers), at most 0.2 MB" in dialog.size_text.text()
-    assert dialog.what.text().startswith(patch.name)
+    assert "6 samples (3 keys, 2 velocity layers), at most 0.2 MB" in dialog.sampler.size_text.text()
+    assert dialog.sampler.what.text().startswith(patch.name)
     assert dialog.state.text() == RESUMES
     run(qtbot, dialog, "Saved")
     out = folder / "Classical_guitar.sfz"
@@ -126,34 +133,36 @@ def test_an_sfz_is_written_as_it_was_told(
 
 def test_a_soundfont_is_one_file(qtbot: QtBot, made, folder: Path) -> None:
     dialog = made()
-    dialog.form.form.setCurrentIndex(dialog.form.form.findData("sf2"))
-    assert not dialog.form.bits.isVisible()
+    dialog.sampler.form.setCurrentIndex(dialog.sampler.form.findData("sf2"))
+    assert not dialog.sampler.bits.isVisible()
     run(qtbot, dialog, "Saved")
     assert [path.name for path in folder.iterdir()] == ["Classical_guitar.sf2"]
     assert "louder than the patch" in dialog.state.text() or "softer" in dialog.state.text()
 
 
-def test_size_follows_the_choices_and_nothing_is_written(qtbot: QtBot, made, folder: Path, notes: Notes) -> None:
+def test_size_follows_the_choices_and_nothing_is_written(
+    qtbot: QtBot, made, folder: Path, notes: Notes, patch: Patch
+) -> None:
     dialog = made()
-    before = dialog.size_text.text()
-    dialog.form.layers.setValue(8)
+    before = dialog.sampler.size_text.text()
+    dialog.sampler.layers.setValue(8)
     settle(qtbot, dialog)
-    assert "24 samples (3 keys, 8 velocity layers)" in dialog.size_text.text() != before
-    dialog.form.every.setValue(3)
+    assert "24 samples (3 keys, 8 velocity layers)" in dialog.sampler.size_text.text() != before
+    dialog.sampler.every.setValue(3)
     settle(qtbot, dialog)
-    assert "8 samples (1 key, each for 3 keys, 8 velocity layers)" in dialog.size_text.text()
-    dialog.form.highest.setValue(60)
-    dialog.form.every.setValue(1)
-    dialog.form.layers.setValue(1)
-    dialog.form.seconds.setValue(10)
+    assert "8 samples (1 key, each for 3 keys, 8 velocity layers)" in dialog.sampler.size_text.text()
+    dialog.sampler.highest.setValue(60)
+    dialog.sampler.every.setValue(1)
+    dialog.sampler.layers.setValue(1)
+    dialog.sampler.seconds.setValue(10)
     settle(qtbot, dialog)
     counted = "1 sample (1 key, 1 velocity layer)"
-    pitch = pitch_words(SampledPlan(dialog._patch, (60, 60), layers=1).pitch_error_cents)
-    assert dialog.size_text.text() == f"{counted}, at most 2.9 MB, before FLAC compression; {pitch}"
-    dialog.form.form.setCurrentIndex(dialog.form.form.findData("sf2"))
+    pitch = pitch_words(SampledPlan(patch, (60, 60), layers=1).pitch_error_cents)
+    assert dialog.sampler.size_text.text() == f"{counted}, at most 2.9 MB, before FLAC compression; {pitch}"
+    dialog.sampler.form.setCurrentIndex(dialog.sampler.form.findData("sf2"))
     settle(qtbot, dialog)
     told = f"{counted}, at most 1.9 MB (16-bit), and up to 2.9 MB more while it is written"
-    assert dialog.size_text.text() == f"{told}; {pitch}"
+    assert dialog.sampler.size_text.text() == f"{told}; {pitch}"
     dialog.close_button.click()
     assert not dialog.isVisible()
     assert list(folder.iterdir()) == [] and notes.rendered == []
@@ -162,24 +171,24 @@ def test_size_follows_the_choices_and_nothing_is_written(qtbot: QtBot, made, fol
 def test_the_error_of_pitch_is_reported_before_and_after(qtbot: QtBot, made, patch: Patch) -> None:
     dialog = made(layers=1)
     for layers in (1, 8):
-        dialog.form.layers.setValue(layers)
+        dialog.sampler.layers.setValue(layers)
         settle(qtbot, dialog)
         cents = SampledPlan(patch, SMALL["keys"], layers=layers).pitch_error_cents
-        assert dialog.size_text.text().endswith(f"; note starts within {cents:.1f} cents of the patch")
+        assert dialog.sampler.size_text.text().endswith(f"; note starts within {cents:.1f} cents of the patch")
     run(qtbot, dialog, "Saved")
     assert f"note starts within {cents:.1f} cents of the patch)." in dialog.state.text()
 
 
 def test_more_than_there_is_room_for_is_told(made, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.views.dialogs.sampled_dialog.disk_usage", lambda path: SimpleNamespace(free=100_000))
-    assert "; 0.1 MB are free there" in made().size_text.text()
+    monkeypatch.setattr("app.views.dialogs.export_pages.disk_usage", lambda path: SimpleNamespace(free=100_000))
+    assert "; 0.1 MB are free there" in made().sampler.size_text.text()
 
 
 def test_dry_takes_the_room_away(qtbot: QtBot, made, notes: Notes, patch: Patch) -> None:
     assert patch.room.mix > 0
     dialog = made(keys=(60, 60), layers=1)
     run(qtbot, dialog, "Dry leaves the room to the sampler")
-    dialog.form.dry.setChecked(True)
+    dialog.sampler.dry.setChecked(True)
     run(qtbot, dialog, "1 sample rendered, 0 kept")
     assert "the room" not in dialog.state.text()
     assert [note[0].room.mix for note in notes.rendered] == [patch.room.mix, 0.0]
@@ -188,27 +197,27 @@ def test_dry_takes_the_room_away(qtbot: QtBot, made, notes: Notes, patch: Patch)
 def test_a_body_that_is_not_here_is_told(made, patch: Patch, preset: PresetEntry) -> None:
     dialog = made()
     gone = patch.model_copy(update={"body": patch.body.model_copy(update={"name": "gone", "mix": 0.5})})
-    dialog.show_patch(gone, preset)
-    assert "the body gone is not here" in dialog.what.text()
+    show(dialog, gone, preset)
+    assert "the body gone is not here" in dialog.sampler.what.text()
 
 
 def test_progress_is_shown_and_the_choices_wait(
-    qtbot: QtBot, made, notes: Notes, monkeypatch: pytest.MonkeyPatch
+    qtbot: QtBot, made, notes: Notes, patch: Patch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("app.shared.worker.REPORT_EVERY_S", 0.0)
     notes.last = 3
     dialog = made()
     dialog.save.click()
-    assert not dialog.form.isEnabled()
+    assert not dialog.sampler.isEnabled()
     assert not dialog.save.isEnabled()
     qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     qtbot.waitUntil(lambda: dialog.bar.isVisible() and dialog.bar.value() == 500)
-    fourth = SampledPlan(dialog._patch, SMALL["keys"], layers=SMALL["layers"]).zones[3]
+    fourth = SampledPlan(patch, SMALL["keys"], layers=SMALL["layers"]).zones[3]
     assert f"key 61, velocity {fourth.velocity}, about " in dialog.state.text()
     assert " s left. You can play on meanwhile." in dialog.state.text()
     notes.gate.set()
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
-    assert dialog.form.isEnabled()
+    assert dialog.sampler.isEnabled()
     assert dialog.bar.isHidden()
 
 
@@ -226,13 +235,13 @@ def test_a_cancelled_export_goes_on_where_it_was(qtbot: QtBot, made, notes: Note
     qtbot.waitUntil(lambda: told in dialog.state.text())
     kept = int(dialog.state.text().removeprefix("Cancelled; ").split()[0])
     assert kept == len(notes.rendered) < MADE
-    assert not dialog.form.out.exists()
+    assert not dialog.sampler.file.path.exists()
     assert dialog.save.text() == "Continue"
     again = made(form=form)  # the window was started again
     assert f"{kept} of {MADE} samples are there already, and are kept" in again.state.text()
     run(qtbot, again, f"{MADE - kept} samples rendered, {kept} kept")
     assert len(notes.rendered) == MADE
-    assert again.form.out.is_file()
+    assert again.sampler.file.path.is_file()
 
 
 def test_cancelled_where_the_index_is_gone_bad_it_says_so(
@@ -244,11 +253,11 @@ def test_cancelled_where_the_index_is_gone_bad_it_says_so(
     qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     dialog.close_button.click()
     notes.gate.set()
-    dialog._job._worker.close(None)  # its report has not arrived
+    dialog._background._worker.close(None)  # its report has not arrived
     (folder / "Classical_guitar_samples" / "index.json").write_text("{}")
     qtbot.waitUntil(lambda: "no index of samples" in dialog.state.text())
     assert dialog.state.objectName() == "warning"
-    assert dialog.form.isEnabled()
+    assert dialog.sampler.isEnabled()
     assert dialog.close_button.text() == "Close"
 
 
@@ -259,11 +268,11 @@ def test_what_the_choices_mean_is_computed_once_they_settle(
     settle(qtbot, dialog)
     computed: list[int] = []
     monkeypatch.setattr(
-        "app.views.dialogs.sampled_dialog.kept_samples", lambda plan, out: computed.append(len(plan.zones)) or 0
+        "app.views.dialogs.export_pages.kept_samples", lambda plan, out: computed.append(len(plan.zones)) or 0
     )
     for layers in (3, 4, 5):
-        dialog.form.layers.setValue(layers)
-        dialog.show_patch(patch.with_value("knobs.decay", layers), preset)
+        dialog.sampler.layers.setValue(layers)
+        show(dialog, patch.with_value("knobs.decay", layers), preset)
     assert computed == []
     settle(qtbot, dialog)
     assert computed == [15]
@@ -271,10 +280,10 @@ def test_what_the_choices_mean_is_computed_once_they_settle(
 
 def test_an_export_takes_choices_that_have_not_settled(qtbot: QtBot, made, notes: Notes) -> None:
     dialog = made()
-    dialog.form.layers.setValue(1)
+    dialog.sampler.layers.setValue(1)
     run(qtbot, dialog, "Saved")
     assert len(notes.rendered) == 3
-    dialog.form.lowest.setValue(63)  # above the highest
+    dialog.sampler.lowest.setValue(63)  # above the highest
     dialog.save.click()
     assert "the lowest is above the highest" in dialog.state.text()
     assert len(notes.rendered) == 3
@@ -283,9 +292,9 @@ def test_an_export_takes_choices_that_have_not_settled(qtbot: QtBot, made, notes
 def test_other_choices_have_nothing_to_go_on_from(qtbot: QtBot, made, notes: Notes) -> None:
     dialog = made()
     run(qtbot, dialog, "Saved")
-    dialog.form.path.setText(str(dialog.form.out))
+    dialog.sampler.file.edit.setText(str(dialog.sampler.file.path))
     assert dialog.save.text() == "Replace"
-    dialog.form.source.setCurrentIndex(1)
+    dialog.sampler.source.setCurrentIndex(1)
     settle(qtbot, dialog)
     assert dialog.state.text() == RESUMES
 
@@ -294,7 +303,7 @@ def test_cancelled_before_a_whole_sample_nothing_is_left(
     qtbot: QtBot, made, notes: Notes, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     loaded = threading.Event()
-    monkeypatch.setattr("app.views.dialogs.sampled_dialog.load_preset", lambda path: loaded.wait(20))
+    monkeypatch.setattr("app.export.sampled.export.load_preset", lambda path: loaded.wait(20))
     dialog = made()
     dialog.save.click()
     dialog.close_button.click()
@@ -307,7 +316,6 @@ def test_cancelled_before_a_whole_sample_nothing_is_left(
     ("change", "words"),
     [
         (lambda form, folder: form.lowest.setValue(63), "the lowest is above the highest"),
-        (lambda form, folder: edit(form, str(folder / "x.wav")), "must end with .sfz"),
         (lambda form, folder: edit(form, ""), "choose where"),
         (lambda form, folder: edit(form, str(folder / "nowhere" / "x.sfz")), "make the folder first"),
         (lambda form, folder: (form.form.setCurrentIndex(2), form.rate.setCurrentIndex(2)), "a SoundFont's rate"),
@@ -318,22 +326,22 @@ def test_what_cannot_be_is_told_before_it_begins(
     qtbot: QtBot, made, folder: Path, change: Callable, words: str
 ) -> None:
     dialog = made()
-    change(dialog.form, folder)
+    change(dialog.sampler, folder)
     settle(qtbot, dialog)
     assert words in dialog.state.text()
     assert dialog.state.objectName() == "warning"
     assert not dialog.save.isEnabled()
-    assert dialog.size_text.text() == ""
-    edit(dialog.form, str(folder / f"y{dialog.form._suffix}"))
-    dialog.form.rate.setCurrentIndex(1)
-    dialog.form.lowest.setValue(60)
+    assert dialog.sampler.size_text.text() == ""
+    edit(dialog.sampler, str(folder / f"y{dialog.sampler.file.suffix}"))
+    dialog.sampler.rate.setCurrentIndex(1)
+    dialog.sampler.lowest.setValue(60)
     settle(qtbot, dialog)
     assert dialog.save.isEnabled()
 
 
 def edit(form, text: str) -> None:
-    form.path.setText(text)
-    form.path.textEdited.emit(text)
+    form.file.edit.setText(text)
+    form.file.edit.textEdited.emit(text)
 
 
 def broken_index(form, folder: Path) -> None:
@@ -355,7 +363,7 @@ def test_an_error_of_the_work_is_one_line(qtbot: QtBot, made, notes: Notes, fold
 
 
 def test_an_unforeseen_error_ends_the_work(qtbot: QtBot, made, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("app.views.dialogs.sampled_dialog.load_preset", lambda path: {}["absent"])
+    monkeypatch.setattr("app.export.sampled.export.load_preset", lambda path: {}["absent"])
     dialog = made()
     run(qtbot, dialog, "failed: 'absent'")
     assert dialog.state.objectName() == "warning"
@@ -373,21 +381,21 @@ def test_a_preset_that_is_gone_is_told(qtbot: QtBot, made, preset: PresetEntry) 
 
 def test_its_state_is_remembered(made, folder: Path, patch: Patch) -> None:
     dialog = made()
-    form = dialog.form
+    form = dialog.sampler
     for box, data in ((form.form, "wav"), (form.bits, "16"), (form.rate, 44_100), (form.source, "truth")):
         box.setCurrentIndex(box.findData(data))
     form.every.setValue(2)
     form.dry.setChecked(True)
-    choices = dialog.choices()
+    choices = dialog.sampled_choices()
     assert choices == SampledChoices(
         folder=str(folder), form="wav", bits="16", rate_hz=44_100, every=2, source="truth", dry=True, **SMALL
     )
-    assert made(**choices.model_dump()).choices() == choices
+    assert made(**choices.model_dump()).sampled_choices() == choices
     assert json.loads(choices.model_dump_json())["keys"] == [60, 62]
     whole = made(keys=None)
-    assert (whole.form.lowest.value(), whole.form.highest.value()) == patch.range
-    assert whole.choices().keys is None
-    assert made(keys=(0, 127)).choices().keys is None  # not of this patch
+    assert (whole.sampler.lowest.value(), whole.sampler.highest.value()) == patch.range
+    assert whole.sampled_choices().keys is None
+    assert made(keys=(0, 127)).sampled_choices().keys is None  # not of this patch
 
 
 def test_the_file_is_named_after_the_patch_and_ends_as_its_format(
@@ -395,17 +403,17 @@ def test_the_file_is_named_after_the_patch_and_ends_as_its_format(
 ) -> None:
     dialog = made()
     other = find_patch("Concert harp").patch
-    dialog.show_patch(other, preset)
-    assert dialog.form.out == folder / "Concert_harp.sfz"
-    assert dialog.what.text().startswith("Concert harp")
-    assert dialog.choices().keys == (60, 62)
+    show(dialog, other, preset)
+    assert dialog.sampler.file.path == folder / "Concert_harp.sfz"
+    assert dialog.sampler.what.text().startswith("Concert harp")
+    assert dialog.sampled_choices().keys == (60, 62)
     monkeypatch.setattr(QFileDialog, "getSaveFileName", lambda *words: (str(folder / "mine"), words[-1]))
-    dialog.form._browse()
-    assert dialog.form.out == folder / "mine.sfz"
-    dialog.form.form.setCurrentIndex(2)
-    assert dialog.form.out == folder / "mine.sf2"
-    dialog.show_patch(patch, preset)
-    assert dialog.form.out == folder / "mine.sf2"
+    dialog.sampler.file.browse()
+    assert dialog.sampler.file.path == folder / "mine.sfz"
+    dialog.sampler.form.setCurrentIndex(2)
+    assert dialog.sampler.file.path == folder / "mine.sf2"
+    show(dialog, patch, preset)
+    assert dialog.sampler.file.path == folder / "mine.sf2"
 
 
 def test_a_patch_that_is_turned_meanwhile_waits_for_the_next_time(
@@ -415,7 +423,7 @@ def test_a_patch_that_is_turned_meanwhile_waits_for_the_next_time(
     dialog = made()
     dialog.save.click()
     qtbot.waitUntil(lambda: len(notes.rendered) == 1)
-    dialog.show_patch(patch.with_value("knobs.decay", 3.0), preset)
+    show(dialog, patch.with_value("knobs.decay", 3.0), preset)
     notes.gate.set()
     qtbot.waitUntil(lambda: "6 samples rendered" in dialog.state.text())
     assert {note[0].knobs.decay for note in notes.rendered} == {patch.knobs.decay}
@@ -428,6 +436,8 @@ def test_every_control_of_the_dialog_has_a_name_and_a_tip(made) -> None:
     dialog = made()
     for kind in (QAbstractButton, QComboBox, QAbstractSpinBox):
         for control in dialog.findChildren(kind):
+            if isinstance(control.parent(), QTabBar):  # its arrows, where it is too narrow
+                continue
             assert control.accessibleName() or getattr(control, "text", lambda: "")(), control
             assert control.toolTip(), control.accessibleName()
-    assert dialog.form.path.accessibleName() and dialog.form.path.toolTip()
+    assert dialog.sampler.file.edit.accessibleName() and dialog.sampler.file.edit.toolTip()

@@ -1,0 +1,34 @@
+"""What every export is for the window: work with progress, which can be cancelled, and its result in words."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Protocol
+
+from app.export.files import ExportError
+from app.export.recipe import RecipeError
+from app.shared.worker import Progress
+from engine.presets import PresetError
+from engine.result_file import WriteError
+from engine.sources import Runaway
+
+EXPECTED = (ExportError, PresetError, RecipeError, Runaway, WriteError, ValueError)  # their messages are for the user
+
+
+class ExportJob(Protocol):
+    """An export whose choices are made."""
+
+    @property
+    def folder(self) -> Path:
+        """Where the files are written."""
+
+    def run(self, progress: Progress) -> str:
+        """Writes the files and returns the result in words, a line each. Any thread.
+
+        Raises:
+            Cancelled: `progress` raised it.
+            One of EXPECTED: it failed.
+        """
+
+    def cancelled(self) -> str:
+        """What is there after it was cancelled, in words. Raises ExportError: what is there is damaged."""

@@ -1,0 +1,117 @@
+"""Parts of a dialog's form: labels of one width, rows, number boxes, and the choice of a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QDoubleSpinBox, QFileDialog, QHBoxLayout, QLabel, QLineEdit, QSpinBox, QWidget
+
+from app.views.controls.parts import tool_button
+from app.views.controls.plain import Label
+
+LABEL_WIDTH = 104
+FILTERS = {".wav": "WAV (*.wav)", ".sfz": "SFZ (*.sfz)", ".sf2": "SoundFont 2 (*.sf2)"}
+
+
+def form_label(text: str) -> QLabel:
+    """A form's label; all are of one width, so that the forms of a dialog are aligned."""
+    made = Label(text)
+    made.setFixedWidth(LABEL_WIDTH)
+    made.setMinimumHeight(28)
+    made.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+    return made
+
+
+def row_of(*widgets: QWidget) -> QHBoxLayout:
+    """Side by side, with empty space at the end."""
+    row = QHBoxLayout()
+    row.setContentsMargins(0, 0, 0, 0)
+    for widget in widgets:
+        row.addWidget(widget)
+    row.addStretch(1)
+    return row
+
+
+def spin_box(
+    name: str,
+    limits: tuple[float, float],
+    value: float,
+    tip: str,
+    suffix: str = "",
+    decimals: int = 0,
+    step: float = 1,
+    prefix: str = "",
+) -> QDoubleSpinBox:
+    low, high = limits
+    spin = QDoubleSpinBox(minimum=low, maximum=high, singleStep=step, suffix=suffix, prefix=prefix, decimals=decimals)
+    spin.setAccessibleName(name)
+    spin.setToolTip(tip)
+    spin.lineEdit().setTextMargins(6, 0, 0, 0)
+    spin.setMinimumWidth(84)
+    spin.setValue(value)
+    return spin
+
+
+def count_box(name: str, most: int, value: int, tip: str) -> QSpinBox:
+    spin = QSpinBox(minimum=1, maximum=most, value=value)
+    spin.setAccessibleName(name)
+    spin.setToolTip(tip)
+    spin.setMinimumWidth(56)
+    spin.lineEdit().setTextMargins(6, 0, 0, 0)
+    return spin
+
+
+class FilePicker(QWidget):
+    """The path of a file that will be written; a name is suggested until the user gives one.
+
+    Attributes:
+        suffix: of the file, one of FILTERS; a name without it gets it.
+    """
+
+    changed = Signal()
+
+    def __init__(self, folder: str, tip: str, suffix: str = ".wav") -> None:
+        super().__init__()
+        self._folder, self.suffix = folder or str(Path.home()), suffix
+        self._named_by_user = False
+        self.edit = QLineEdit()
+        self.edit.setAccessibleName("File")
+        self.edit.setToolTip(tip)
+        self.edit.textEdited.connect(self._name_edited)
+        browse = tool_button("Browse …", tip="Choose the file")
+        browse.clicked.connect(self.browse)
+        row = row_of(browse)
+        row.insertWidget(0, self.edit, 100)
+        self.setLayout(row)
+
+    @property
+    def folder(self) -> str:
+        return str(Path(self.edit.text().strip()).parent)
+
+    @property
+    def path(self) -> Path:
+        """Raises ValueError: no name is given."""
+        path = Path(self.edit.text().strip())
+        if not path.name:
+            raise ValueError("file: choose where it is written")
+        return path if path.suffix.lower() == self.suffix else path.with_name(path.name + self.suffix)
+
+    def suggest(self, name: str) -> None:
+        """Sets a name with its suffix, unless the user has given one; that gets the suffix of the format."""
+        typed = self.edit.text().strip()
+        if not self._named_by_user:
+            self.edit.setText(str(Path(self._folder) / name))
+        elif Path(typed).suffix.lower() in FILTERS:
+            self.edit.setText(str(Path(typed).with_suffix(self.suffix)))
+
+    def browse(self) -> None:
+        path, _ = QFileDialog.getSaveFileName(self, "Export", self.edit.text(), FILTERS[self.suffix])
+        if path:
+            self.edit.setText(path)
+            self.edit.setText(str(self.path))
+            self._name_edited()
+
+    def _name_edited(self) -> None:
+        self._named_by_user = True
+        self.changed.emit()

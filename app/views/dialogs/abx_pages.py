@@ -1,0 +1,246 @@
+"""The pages of the listening test: what is compared, a trial, the result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QFormLayout,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QSpinBox,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.analysis.abx.record import MEANING, AbxRecord, p_text
+from app.analysis.abx.trials import LEVEL, MOST_TRIALS, AbxChoices, needed_correct
+from app.views.controls.form import count_box, form_label, row_of
+from app.views.controls.parts import label
+from app.views.controls.plain import Label
+
+HEAR = "Listen to X, then answer which one it is."
+SAY = "Which one is X?"
+RULES = (
+    "In each trial X is A or B, chosen at random and hidden. Listen to A, B and X as often as you like, "
+    "then answer which one X is. Both play at the same level."
+)
+KEYS = "A  B  X  hear   ·   Space  replay   ·   1 or ←  X is A   ·   2 or →  X is B"
+_LARGE = "QPushButton { font-size: 17px; min-height: 74px; min-width: 130px; }"
+
+
+class SetupPage(QWidget):
+    """Asks with signals; `show_state` says whether the test can start."""
+
+    audition_asked = Signal(str)  # "A" or "B"
+
+    def __init__(self, labels: Sequence[str], choices: AbxChoices) -> None:
+        super().__init__()
+        tip = "Fixed before the start: a test that could stop at any time would prove nothing"
+        self.trials: QSpinBox = count_box("Number of trials", MOST_TRIALS, choices.trials, tip)
+        self.trials.valueChanged.connect(self._show_trials)
+        self.restart = QCheckBox("Restart from the pluck at each switch")
+        self.restart.setChecked(choices.restart)
+        self.restart.setMinimumHeight(30)
+        self.restart.setToolTip("Otherwise the switch happens at the playhead, with a cross-fade")
+        self._needed, self._warning = label("faint"), label("warning")
+        self.start = _button("Start the test", "Begin the first trial")
+        self.start.setObjectName("play")
+        self.open_result = _button("Open result …", "Show a result that was saved")
+        self.close_button = _button("Close", "Close the listening test")
+        self._listen = []
+        form = QFormLayout()
+        for name, text in zip("AB", labels, strict=True):
+            listen = _button(f"▶  Hear {name}", f"Listen to {name} before the test ({name})")
+            listen.clicked.connect(lambda _=False, name=name: self.audition_asked.emit(name))
+            self._listen.append(listen)
+            form.addRow(form_label(name), row_of(listen, Label(text)))
+        form.addRow(form_label("Trials"), row_of(self.trials, self._needed))
+        form.addRow(form_label("Switch"), self.restart)
+        self._needed.setMinimumWidth(320)
+        _stack(self, label(text=RULES), form, label("faint", MEANING), None, self._warning)
+        _buttons(self, self.open_result, None, self.close_button, self.start)
+        self._show_trials(choices.trials)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        name = {Qt.Key.Key_A: "A", Qt.Key.Key_B: "B"}.get(Qt.Key(event.key()))
+        if name is None or event.modifiers():
+            super().keyPressEvent(event)
+        else:
+            self.audition_asked.emit(name)
+
+    def show_state(self, obstacle: str, advice: str) -> None:
+        """`obstacle`: why the test cannot start, or ""; `advice`: what to know before it does, or ""."""
+        for button in (self.start, *self._listen):
+            button.setEnabled(not obstacle)
+        self._warning.setText(obstacle or advice)
+        self._warning.setVisible(bool(obstacle or advice))
+
+    def _show_trials(self, trials: int) -> None:
+        needed = needed_correct(trials)
+        self._needed.setText(
+            f"Too few: even with all of them right, the p-value is not below {LEVEL:g}."
+            if needed is None
+            else f"{needed} right of {trials} give a p-value below {LEVEL:g}."
+        )
+
+
+class TrialPage(QWidget):
+    """A trial, with keys for everything. Nothing here may depend on whether X is A or B.
+
+    The page itself has the focus, not its buttons, so that its keys always work: Space would press a button.
+    """
+
+    audition_asked = Signal(str)  # "A", "B" or "X"
+    replay_asked = Signal()
+    answered = Signal(str)  # "A" or "B"
+
+    def __init__(self, labels: Sequence[str]) -> None:
+        super().__init__()
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName("Trial")
+        self.setAccessibleDescription(
+            "A, B and X: hear them. 1 or left: X is A. 2 or right: X is B. Space: replay. Escape: stop the test."
+        )
+        self._number = _centred("font-size: 20px; font-weight: 600;")
+        self._bar = QProgressBar(textVisible=False)
+        self._bar.setFixedHeight(6)
+        self._bar.setAccessibleName("Trials answered")
+        self._hint = _centred()
+        texts = {"A": labels[0], "X": "?", "B": labels[1]}
+        self._sounds = {name: self._sound_button(name, text) for name, text in texts.items()}
+        self._answers = {
+            "A": _button("←  X is A", "Answer: X is A (1 or ←)"),
+            "B": _button("X is B  →", "Answer: X is B (2 or →)"),
+        }
+        for name, button in self._answers.items():
+            button.setMinimumHeight(42)
+            button.clicked.connect(lambda _=False, name=name: self.answered.emit(name))
+        self.stop = _button("Stop the test", "An unfinished test is recorded as incomplete, without p-value (Esc)")
+        for button in (*self._sounds.values(), *self._answers.values(), self.stop):
+            button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        keys = _centred()
+        keys.setText(KEYS)
+        sounds, answers = QHBoxLayout(), QHBoxLayout()
+        for row, buttons in ((sounds, self._sounds), (answers, self._answers)):
+            for button in buttons.values():
+                row.addWidget(button, 1)
+        _stack(self, self._number, self._bar, None, sounds, self._hint, answers, None, keys)
+        _buttons(self, None, self.stop)
+        self._acts: dict[int, Callable[[], object]] = {
+            **{getattr(Qt.Key, f"Key_{name}"): partial(self.audition_asked.emit, name) for name in "ABX"},
+            **dict.fromkeys((Qt.Key.Key_1, Qt.Key.Key_Left), self._answers["A"].click),  # nothing while disabled
+            **dict.fromkeys((Qt.Key.Key_2, Qt.Key.Key_Right), self._answers["B"].click),
+            Qt.Key.Key_Space: self.replay_asked.emit,
+        }
+
+    def _sound_button(self, name: str, text: str) -> QPushButton:
+        button = _button(f"{name}\n{text}", f"Hear {name} ({name})")
+        button.setObjectName(text.lower() if name != "X" else "")  # its colour in the style sheet
+        button.setAccessibleName(f"Hear {name}: {text}" if name != "X" else "Hear X")
+        button.setCheckable(True)
+        button.setStyleSheet(_LARGE)
+        button.clicked.connect(lambda _=False, name=name: self.audition_asked.emit(name))
+        return button
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        act = self._acts.get(event.key())
+        if act is None:
+            super().keyPressEvent(event)
+        elif not event.isAutoRepeat():
+            act()
+
+    def show_trial(self, number: int, trials: int) -> None:
+        """A new trial, in which nothing has been heard."""
+        self._number.setText(f"Trial {number} of {trials}")
+        self._bar.setRange(0, trials)
+        self._bar.setValue(number - 1)
+        self.show_sounding(None, x_heard=False)
+
+    def show_sounding(self, sound: str | None, x_heard: bool) -> None:
+        """Which of "A", "B" and "X" sounds (None: none), and whether X was heard, so that it can be answered."""
+        for name, button in self._sounds.items():
+            button.setChecked(name == sound)
+        for button in self._answers.values():
+            button.setEnabled(x_heard)
+        self._hint.setText(SAY if x_heard else HEAR)
+
+
+class ResultPage(QWidget):
+    """One result, and whether it has been saved; `save` is to save it elsewhere after a failure."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._score, self._p = _centred("font-size: 26px; font-weight: 600;"), _centred("font-size: 17px;")
+        self._marks, self._verdict = _centred(), _centred()
+        self._marks.setToolTip("The trials in their order: filled where the answer was right")
+        self._meaning, self._saved = label("faint", MEANING), label("faint", selectable=True)
+        self.save = _button("Save elsewhere …", "Choose another folder")
+        self.again = _button("New test", "Back to the first page")
+        self.close_button = _button("Close", "Close the listening test")
+        _stack(self, None, self._score, self._marks, self._p, self._verdict, None, self._meaning, self._saved)
+        _buttons(self, None, self.save, self.again, self.close_button)
+
+    def show_record(self, record: AbxRecord) -> None:
+        answered = len(record.trials)
+        self._score.setText(f"{record.correct} of {answered} right")
+        self._marks.setText(" ".join("●" if trial.correct else "○" for trial in record.trials))
+        unfinished = f"{answered} of {record.planned_trials} trials answered"
+        self._p.setText(unfinished if record.p_value is None else p_text(record.p_value))
+        pair = f"{record.a.label} and {record.b.label} of {record.a.preset}, {record.date:%Y-%m-%d %H:%M}."
+        self._verdict.setText(" ".join(filter(None, (record.remark, record.verdict, pair))))
+        self._meaning.setVisible(record.complete)
+        self.close_button.setFocus()
+
+    def show_saved(self, text: str, failed: bool) -> None:
+        """Where the result was saved; or why it was not, with a button to save it elsewhere."""
+        self._saved.setObjectName("warning" if failed else "faint")
+        self._saved.style().polish(self._saved)
+        self._saved.setText(text)
+        self.save.setVisible(failed)
+
+
+def _button(text: str, tip: str) -> QPushButton:
+    made = QPushButton(text, autoDefault=False)
+    made.setToolTip(tip)
+    return made
+
+
+def _centred(style: str = "") -> QLabel:
+    made = label("" if style else "faint")
+    made.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    made.setStyleSheet(style)
+    return made
+
+
+def _stack(page: QWidget, *parts: QWidget | QFormLayout | QHBoxLayout | None) -> None:
+    """From top to bottom; None takes the room that is left."""
+    column = QVBoxLayout(page)
+    column.setContentsMargins(0, 0, 0, 0)
+    column.setSpacing(14)
+    for part in parts:
+        if isinstance(part, QWidget):
+            column.addWidget(part)
+        elif part is None:
+            column.addStretch(1)
+        else:
+            column.addLayout(part)
+
+
+def _buttons(page: QWidget, *buttons: QPushButton | None) -> None:
+    """The page's last row; None takes the room that is left."""
+    row = QHBoxLayout()
+    for button in buttons:
+        if button is None:
+            row.addStretch(1)
+        else:
+            row.addWidget(button)
+    layout = page.layout()
+    assert isinstance(layout, QVBoxLayout)
+    layout.addLayout(row)

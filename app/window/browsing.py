@@ -1,0 +1,82 @@
+"""What both browsers have in common in the window: rows, favourites, previous and next, the user's folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+from PySide6.QtCore import QObject, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
+
+from app.views.controls.browser import Browser
+from app.views.controls.browser_rows import Row
+
+
+class BrowserDesk(QObject):
+    """Lives in the window's thread, as long as the window.
+
+    Args:
+        rows: what there is now.
+        chosen: the name of the row that is loaded; "": none.
+        choose: loads one.
+        folder: of the user's own files.
+
+    Attributes:
+        favourites: names of rows, also of those whose files are missing at present.
+    """
+
+    told = Signal(str)  # a notice for the user
+
+    def __init__(
+        self,
+        browser: Browser,
+        rows: Callable[[], Sequence[Row]],
+        chosen: Callable[[], str],
+        choose: Callable[[str], None],
+        folder: Callable[[], Path],
+        favourites: Iterable[str],
+    ) -> None:
+        super().__init__(browser)
+        self.browser, self.favourites = browser, set(favourites)
+        self._rows, self._chosen, self._choose = rows, chosen, choose
+        self._folder = folder
+        browser.chosen.connect(choose)
+        browser.favourite_asked.connect(self.toggle_favourite)
+        browser.folder_asked.connect(self._open_folder)
+
+    def show(self) -> None:
+        """Lists what there is now."""
+        self.browser.show_rows(self._rows(), self.favourites, self._chosen(), str(self._folder()))
+
+    def show_chosen(self) -> None:
+        """To be called when another one is loaded."""
+        self.browser.set_chosen(self._chosen())
+
+    def toggle(self) -> None:
+        """Opens the browser, or closes it."""
+        if self.browser.isVisible():
+            self.browser.dismiss()
+        else:
+            self.browser.show_over()
+
+    def step(self, step: int) -> None:
+        """To the next or previous one of the filtered list, going round; from outside, to its first or last."""
+        names, chosen = self.browser.listed, self._chosen()
+        if names:
+            here = names.index(chosen) if chosen in names else -1
+            self._choose(names[(here + step) % len(names) if here >= 0 else (0 if step > 0 else -1)])
+
+    def toggle_favourite(self, name: str) -> None:
+        self.favourites ^= {name}
+        self.show()
+
+    def _open_folder(self) -> None:
+        folder = self._folder()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            remedy = "choose another with LEARNED_STRINGS_PRESETS"
+            self.told.emit(f"{folder}: cannot be created ({error.strerror}); {remedy}.")
+            return
+        if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
+            self.told.emit(f"No file manager was found here; your own {self.browser.what} are in {folder}.")

@@ -1,0 +1,142 @@
+"""Exports: what can be exported now, and its dialog, which does not block the window."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from PySide6.QtCore import QObject, Signal
+from PySide6.QtWidgets import QWidget
+
+from app.export.choices import ExportChoices
+from app.export.note import HeardNote, Note
+from app.export.played import PlayedExport
+from app.export.sampled.choices import SampledChoices
+from app.export.sound import Through
+from app.presets.library import Library
+from app.presets.words import shape_word
+from app.session.choices import Choices, Session
+from app.session.slots import other_preset
+from app.shared.vocabulary import DIFFERENCE, PlayedSource
+from app.views.dialogs.export_dialog import ExportDialog
+from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerformance, Kind
+from app.window.recordings import Recordings
+
+PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "patch"}
+HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "difference_gain_db"}
+
+
+class Exports(QObject):
+    """Lives as long as the window; `told` has notices for the user.
+
+    Args:
+        through: what the present instrument adds to a string of `Choices`; None: nothing.
+    """
+
+    told = Signal(str)
+
+    def __init__(
+        self,
+        session: Session,
+        library: Library,
+        recordings: Recordings,
+        through: Callable[[Choices], Through | None],
+        choices: tuple[ExportChoices, SampledChoices],
+        window: QWidget,
+    ) -> None:
+        super().__init__(window)
+        self._session, self._library, self._window = session, library, window
+        self._recordings, self._through = recordings, through
+        self._choices = choices
+        self.dialog: ExportDialog | None = None
+        recordings.save_asked.connect(lambda: self.open("performance"))
+        recordings.unsaved_changed.connect(self.refresh)
+
+    @property
+    def choices(self) -> tuple[ExportChoices, SampledChoices]:
+        """The dialog's choices, to be saved."""
+        return self._choices if self.dialog is None else (self.dialog.choices(), self.dialog.sampled_choices())
+
+    def open(self, kind: Kind) -> None:
+        """Opens the dialog at a page, or brings it to the front."""
+        subjects = self._subjects()
+        if subjects[kind] is None:
+            self.told.emit(PAGES[kind].missing)
+            return
+        if self.dialog is None:
+            self.dialog = ExportDialog(*self._choices, self._window)
+            self.dialog.finished.connect(self._closed)
+            self.dialog.exported.connect(self._exported)
+        self.dialog.show_subjects(subjects)
+        self.dialog.open_at(kind)
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        if names & (PLUCK_FIELDS | HEARD_FIELDS):
+            self.refresh()
+
+    def refresh(self) -> None:
+        """What can be exported may have changed."""
+        if self.dialog is not None:
+            self.dialog.show_subjects(self._subjects())
+
+    def close(self) -> None:
+        """Ends an export that has begun; what is whole is kept. May be called again."""
+        if self.dialog is not None:
+            self.dialog.accept()
+
+    def _subjects(self) -> dict[Kind, Any]:
+        """By kind, what can be exported now; None: nothing."""
+        choices, played = self._session.choices, self._recordings.latest
+        patch = choices.patch
+        preset = None if played is None else self._library.find(played.patch.preset)
+        player = None if patch is None else self._library.find(patch.preset)
+        return {
+            "note": heard_note(choices, self._library, self._through(choices)),
+            "performance": played and HeardPerformance(played, None if preset is None else preset.path),
+            "sampler": None if patch is None or player is None else HeardInstrument(patch, player),
+        }
+
+    def _exported(self, job: object) -> None:
+        if isinstance(job, PlayedExport):
+            self._recordings.forget(job.played)
+
+    def _closed(self) -> None:
+        assert self.dialog is not None
+        self._choices = self.choices
+        self.dialog.deleteLater()
+        self.dialog = None
+
+
+def heard_note(choices: Choices, library: Library, through: Through | None) -> HeardNote | None:
+    """The chosen pluck as it is heard, of another preset where that is heard; None: there is no preset."""
+    source, another = choices.source_heard, library.find(other_preset(choices.source_heard) or "")
+    if another is not None:
+        choices = choices.changed({"preset": another.name})
+    entry = library.find(choices.preset)
+    if entry is None:
+        return None
+    note = Note(
+        entry.path,
+        entry.info.rate_hz,
+        choices.pluck,
+        choices.listen,
+        choices.listen_right if choices.stereo else None,
+        choices.pickup,
+        None if choices.string is None else choices.string.parameters,
+        through,
+    )
+    saved: PlayedSource = "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
+    return HeardNote(note, saved, another is not None, choices.difference_gain_db, _words(entry.title, choices))
+
+
+def _words(title: str, choices: Choices) -> str:
+    """The pluck and where it is heard."""
+    width = "" if choices.shape == "triangular" else f" {choices.width:.3f} wide"
+    string = f", a string of {choices.string.first_hz:.1f} Hz" if choices.string else ""
+    pluck = f"{shape_word(choices.shape)}{width}, at {choices.position:.2f}, {choices.amplitude_mm:g} mm"
+    heard = f"heard at {choices.listen:.2f}"
+    if choices.stereo:
+        heard += f" (left) and {choices.listen_right:.2f} (right)"
+    velocity = ", velocity" if choices.pickup == "velocity" else ""
+    modes = f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""
+    return f"{title}{string}: {pluck}, {heard}{velocity}{modes}"

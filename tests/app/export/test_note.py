@@ -1,0 +1,94 @@
+"""A note through an instrument: the file is what a device is given, and its recipe renders it again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+
+from app.export.choices import ExportChoices
+from app.export.files import export_sound
+from app.export.note import HeardNote, Note, NoteExport
+from app.export.recipe import read_recipe, request_of
+from app.export.sound import SoundRequest, Through
+from app.instrument.effects import effects_of
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
+from engine.pluck import Pluck
+from engine.presets import SHIPPED, load_preset
+from engine.sources import project
+from engine.voices import Ear, Mixer, Voice, model_program
+
+PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
+GUITAR = read_patch(PATCHES / "classical_guitar.json")
+FIXED = ExportChoices(until_decayed=False, seconds=0.3, bits="32f")
+
+
+def a_note(**more: object) -> Note:
+    return Note(PRESET, 4_000, Pluck(0.35, 4.0), 0.37, **{"through": Through.of(GUITAR, 0.5), **more})  # type: ignore[arg-type]
+
+
+def write(note: Note, path: Path, choices: ExportChoices = FIXED, source: str = "model") -> np.ndarray:
+    NoteExport(note, {source: path}, choices).run(lambda *_: None)  # type: ignore[dict-item]
+    return soundfile.read(path, dtype="float32", always_2d=True)[0]
+
+
+def test_body_room_and_level_are_those_that_a_device_is_given(tmp_path: Path) -> None:
+    found = write(a_note(), tmp_path / "a.wav")
+    preset = load_preset(PRESET)
+    program = model_program(preset.model, preset.info, 48_000)
+    voice = Voice(program, project(Pluck(0.35, 4.0).displacement(101), preset.info.modes), Ear((0.37,)), 0.5)
+    mixer = Mixer(48_000, limited=False)
+    mixer.set_effects(effects_of(GUITAR))
+    mixer.add(voice)
+    played = mixer.render(len(found))
+    until = len(found) - round(0.010 * 48_000)  # the fade-out
+    assert found.shape == (14_400, 2)
+    assert (found[:until] == played[:until]).all()
+    assert np.abs(found).max() > 0.01
+
+
+@pytest.mark.parametrize("source", ["model", "difference"])
+def test_the_recipe_renders_it_again(tmp_path: Path, source: str) -> None:
+    first, again = tmp_path / "a.wav", tmp_path / "b.wav"
+    write(a_note(), first, source=source)
+    recipe = read_recipe(first)
+    export_sound(request_of(recipe, load_preset(PRESET), first), again, recipe.settings)
+    assert first.read_bytes() == again.read_bytes()
+
+
+def test_the_string_alone_and_a_difference_have_neither_body_nor_room(tmp_path: Path) -> None:
+    plain = write(a_note(through=None), tmp_path / "a.wav")
+    assert (write(a_note(), tmp_path / "b.wav", FIXED.model_copy(update={"alone": True})) == plain).all()
+    dry = write(a_note(through=None), tmp_path / "c.wav", source="difference")
+    assert (write(a_note(), tmp_path / "d.wav", source="difference") == np.float32(0.5) * dry).all()
+
+
+def test_a_room_rings_out_after_the_string(tmp_path: Path) -> None:
+    decays = ExportChoices(decay_db=60)
+    room = GUITAR.room.model_copy(update={"mix": 0.5, "t60_s": 3.0})
+    through = Through.of(GUITAR.model_copy(update={"room": room}), 0.5)
+    wet, dry = (write(a_note(through=each), tmp_path / "a.wav", decays) for each in (through, None))
+    assert len(wet) > len(dry) + 24_000
+
+
+def test_a_body_that_has_changed_is_told() -> None:
+    body = GUITAR.body.model_copy(update={"name": "mine", "mix": 0.5})
+    through = Through.of(GUITAR.model_copy(update={"body": body}), 0.5).model_copy(update={"body_sha256": "0" * 64})
+    with pytest.raises(ValueError, match="the body mine is not the one of Classical guitar"):
+        SoundRequest(load_preset(PRESET), Pluck(), 0.3, 1.0, "both", through=through)
+
+
+@pytest.mark.parametrize(
+    ("source", "another", "last", "chosen"),
+    [
+        ("truth", False, "model", "truth"),
+        ("model", False, "files", "files"),
+        ("difference", False, "files", "difference"),
+        ("model", True, "files", "model"),
+    ],
+)
+def test_what_is_heard_is_saved_and_both_again(source: str, another: bool, last: str, chosen: str) -> None:
+    assert HeardNote(a_note(), source, another, 20.0, "").chosen(last) == chosen  # type: ignore[arg-type]
