@@ -1,4 +1,4 @@
-"""A note as WAV files: what is heard of a pluck, or its string alone."""
+"""A note as WAV files: a pluck with body, room and level, or its string alone."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class HeardNote:
     words: str
 
     def chosen(self, last: Chosen) -> Chosen:
-        """What is saved: what is heard; where both were saved last and one of them is heard, both again."""
+        """The sources to save: the audible one, or both where both were saved last and one of them is audible."""
         both = last == "files" and self.source != "difference" and not self.another
         return "files" if both else self.source
 

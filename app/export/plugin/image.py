@@ -233,7 +233,8 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     for index, id in enumerate(VALUES):
         if id in OF_PATCHES:
             yield _record(id, VALUE, index, patch.value(id), OF_PATCHES[id], OF_PATCHES[id].group.capitalize())
-    for index, point in enumerate(patch.pickup.points):
+    points = () if patch.pickup.kind == "bridge" else patch.pickup.points  # at the bridge there is no place to choose
+    for index, point in enumerate(points):
         id = f"pickup.points.{index}"
         yield _record(id, POINT, index, point, OF_PATCHES[id], OF_PATCHES[id].group.capitalize())
 

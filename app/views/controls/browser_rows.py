@@ -128,7 +128,7 @@ class ListedRows(QSortFilterProxyModel):
         self.setSourceModel(rows)
 
     def refresh(self) -> None:
-        """Filters and sorts anew."""
+        """Filters and sorts again."""
         self.invalidate()
         self.sort(STAR)
 

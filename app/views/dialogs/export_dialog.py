@@ -141,7 +141,7 @@ class ExportDialog(QDialog):
         self.activateWindow()
 
     def show_subjects(self, subjects: Mapping[Kind, Any]) -> None:
-        """What there is now, by kind; an export that has begun goes on with what it began with."""
+        """What there is now, by kind; an export that has begun keeps its own."""
         self._subjects = subjects
         if self.job is None:
             for kind, page in self.pages.items():

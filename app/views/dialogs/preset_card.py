@@ -37,7 +37,7 @@ COLUMNS = (
 def preset_browser(parent: QWidget | None = None) -> Browser:
     return Browser(
         "presets",
-        "title, model, string, rate, what is heard",
+        "title, model, string, rate, audible errors",
         COLUMNS,
         (("String", "All strings"), ("Model", "All models"), ("Rate", "All rates")),
         ("Most accurate first", "By name", "Smallest error"),

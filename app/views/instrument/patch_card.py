@@ -1,4 +1,4 @@
-"""Patches in their browser: a row each, and a card on what it is and by which model it is played."""
+"""Patches in their browser: a row each, and a card with its description and its model."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from app.instrument.bodies import own_bodies
 from app.patches.instrument import SingleString
 from app.patches.tuning import Tuning
 from app.window.controller import Controller
-from engine.effects import Effects
+from engine.effects import BODIES, Effects
 from engine.pluck import Pluck
 from engine.presets import load_preset
 
@@ -119,10 +119,10 @@ def test_a_dropped_sound_without_a_recipe_is_a_body_and_the_patch_stands_on_it(
 ) -> None:
     before = patched.patches.patch
     assert before is not None
-    assert bodies(patched) == ["", "guitar"]
+    assert bodies(patched) == ["", *BODIES]
     drop(patched, knock(tmp_path / name))
     assert (own_bodies() / name).read_bytes() == (tmp_path / name).read_bytes()
-    assert bodies(patched) == ["", "guitar", "knock"]
+    assert bodies(patched) == ["", *BODIES, "knock"]
     assert patched.window.instrument.bar.body.currentData() == "knock"
     patch = patched.patches.patch
     assert patch is not None
@@ -177,6 +177,7 @@ def test_a_recipe_of_the_model_that_plays_the_patch_leaves_the_patch_and_its_pic
     played: Controller, tmp_path: Path
 ) -> None:
     """The patch is heard in stereo, the recipe in mono; both are of the model of many strings."""
+    played.session.update(pickup="displacement", stereo=True)
     before, entry = played.session.choices, played.entry
     assert before.patch is not None and before.plays_patch and before.stereo and entry is not None
     assert entry.name == before.patch.preset

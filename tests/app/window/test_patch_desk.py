@@ -462,6 +462,7 @@ def test_knobs_tell_the_string_that_was_struck_last_and_take_figures(qtbot: QtBo
 
 def test_the_pluck_of_a_patch_is_given_a_shape(played: Controller) -> None:
     knobs = played.window.instrument.knobs
+    knobs.changed.emit("pluck.shape", "triangular")
     assert knobs.shape.currentText() == "Triangle"
     assert not knobs.knobs["pluck.width_hard"].isEnabled()
     for shape, named in (("gaussian", "Gaussian"), ("raised_cosine", "Raised cosine")):

@@ -94,7 +94,7 @@ def test_a_trial_differs_from_the_cells_that_it_is_named_after(path: Path) -> No
         ("4000, 400]", "400_000]", "horizon must lie in 1 … 4000"),
         ("[0, 1]", "[-1]", "block[0]: seed must be at least 0"),
         ("[0, 1]", "[]", "block[0]: seeds is empty"),
-        ('recipe = "ours"', 'recipe = "theirs"', "block[1]: recipe 'theirs' is not one of blind, hinted, ours"),
+        ('recipe = "ours"', 'recipe = "theirs"', "recipe 'theirs' is not one of blind, hinted, ours"),
         ("seeds", "seed", "block[0]: unknown field 'seed'; known are models"),
         ("models =", "model =", "block[0]: unknown field 'model'"),
         ("[[block]]", "[data]\ncuont = 1\n[[block]]", "data: unknown field 'cuont'"),

@@ -155,7 +155,7 @@ def test_strings_that_ring_on_end_where_they_are_plucked_again(
 def test_the_whole_is_at_full_level(patch_db: float, patch_of: PatchOf, render: Render, tmp_path: Path) -> None:
     patch = patch_of(level_db=patch_db, pluck={"softest_mm": 1.0, "hardest_mm": 10.0})
     report = export_sampled(small(patch), tmp_path / "a.sf2", render)
-    assert report.gain_db == pytest.approx(-1 - patch_db, abs=0.3)
+    assert report.gain_db == pytest.approx(-1 - patch_db, abs=0.5)  # the peak is estimated from quiet plucks
     loudest = np.abs(SoundFont(tmp_path / "a.sf2").frames.astype(int)).max()
     assert 20 * np.log10(loudest / 2**15) == pytest.approx(-1, abs=0.02)
 

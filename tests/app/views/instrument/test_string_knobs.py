@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from app.patches.patch import Patch, TuningChoice
+from app.patches.patch import Patch, Pickup, TuningChoice
 from app.views.instrument.string_knobs import StringKnobs
 
 
@@ -20,6 +20,7 @@ def knobs(qtbot: QtBot) -> StringKnobs:
 
 
 def test_every_field_is_shown_and_can_be_turned_to_both_ends(knobs: StringKnobs, guitar: Patch) -> None:
+    guitar = guitar.model_copy(update={"pickup": Pickup(points=(0.1, 0.6))})
     knobs.show_patch(guitar)
     for field, knob in knobs.knobs.items():
         if field.startswith("tuning."):
@@ -78,8 +79,9 @@ def test_what_a_patch_does_not_have_cannot_be_turned(knobs: StringKnobs, guitar:
 def test_the_shape_of_the_pluck_is_chosen_in_words(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:
     knobs.show_patch(guitar)
     box = knobs.shape
-    assert box.currentText() == "Raised cosine"
-    assert [box.itemText(row) for row in range(box.count())] == ["Gaussian", "Triangle", "Raised cosine"]
+    assert box.currentText() == "Round triangle"
+    shapes = [box.itemText(row) for row in range(box.count())]
+    assert shapes == ["Gaussian", "Triangle", "Raised cosine", "Round triangle"]
     with qtbot.waitSignal(knobs.changed) as told:
         box.activated.emit(box.findText("Triangle"))
     assert told.args == ["pluck.shape", "triangular"]
