@@ -5,6 +5,7 @@ python3 run.py                 open the app
 python3 run.py FILE ...        open it with these: presets, patches, MIDI files, WAVs, whatever can be dropped on it
 python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with args, if given)
 python3 run.py test --fuzz     the attack on whatever reads a file, at length: thousands of damaged ones; and kills
+python3 run.py docs            build the documents as a site in site/; warnings are errors
 python3 run.py bench NAME      measure speed, sound and memory on this machine (without NAME: which there are)
 python3 run.py setup           only prepare
 python3 run.py -- render ...   the command line: everything after -- goes to learned-strings
@@ -104,6 +105,8 @@ def main(words: list[str]) -> int:
         prepare(action, window=action == "start" and words[:1] != ["--"])
         if action == "test":
             return check(arguments)
+        if action == "docs":
+            return documents()
         if action == "bench":
             return subprocess.call([PYTHON, "-m", "tests.bench", *arguments], cwd=ROOT)
         return start(arguments) if action == "start" else 0
@@ -121,8 +124,8 @@ def parse(words: list[str]) -> tuple[str, list[str]]:
         return "start", words[1:]
     if words[0] in ("test", "bench"):
         return words[0], words[1:]
-    if words == ["setup"]:
-        return "setup", []
+    if words in (["setup"], ["docs"]):
+        return words[0], []
     usage = (__doc__ or "").strip()
     if words[0] in ("-h", "--help"):
         print(usage)
@@ -167,6 +170,15 @@ def check(arguments: list[str]) -> int:
         env = {"OMP_NUM_THREADS": "1", **env}
     status = subprocess.call([PYTHON, "-m", "pytest", *arguments], cwd=ROOT, env=env)
     return fail("failed before the tests: " + ", ".join(failed), status or 1) if failed else status
+
+
+def documents() -> int:
+    """Build the site with MkDocs, which is installed when it is first needed."""
+    with locked():
+        if not all((site_packages() / name).is_dir() for name in ("mkdocs", "material", "mkdocstrings")):
+            pip("--no-build-isolation", "-e", ".[docs]")
+    env = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
+    return subprocess.call([PYTHON, "-m", "mkdocs", "build", "--strict"], cwd=ROOT, env=env)
 
 
 def prepare(action: str, window: bool) -> None:
@@ -307,7 +319,7 @@ def sound() -> bool:
 
 
 def mend() -> None:
-    """Remove what a pip cut short left, and the record of each package not whole: pip then brings it anew."""
+    """Remove what a pip cut short left, and the record of each package not whole: pip then brings it again."""
     for package in [*site_packages().glob("~*"), *site_packages().glob("*.dist-info")]:
         if not whole(package):
             say(f"mending {package.stem}")
@@ -333,7 +345,7 @@ def remove(path: Path) -> None:
 
 
 def make_venv() -> None:
-    """Make .venv from nothing, but for the lock in it."""
+    """Make .venv from nothing, except the lock in it."""
     say(f"making {VENV}; this takes minutes the first time")
     for path in set(VENV.iterdir()) - {LOCK}:
         remove(path)

@@ -11,7 +11,7 @@ import math
 import torch
 from torch import Tensor
 
-from engine.resonators.sine_transform import grid_positions
+from engine.resonators.sine_transform import grid_positions, to_grid
 
 CENTRE_RANGE = (0.3, 0.7)  # of a random Gaussian, in lengths
 WIDTH_RANGE = (0.02, 0.1)  # of a random Gaussian, in lengths
@@ -40,6 +40,21 @@ def raised_cosine(position: float, width: float, peak_m: float, grid_points: int
     distance = (grid_positions(grid_points) - position) / width
     bump = peak_m / 2 * (1 + torch.cos(2 * torch.pi * distance))
     return _held(torch.where(distance.abs() < 0.5, bump, 0.0))
+
+
+def rounded(position: float, width: float, peak_m: float, grid_points: int) -> Tensor:
+    """A string pulled by something of a width: a triangle with a round corner. float64 (grid_points,).
+
+    The static shape under a force that is spread as a raised cosine of full width `width`: each mode of the triangle
+    times that force's Fourier transform, sinc(μw/2) / (1 - (μw/2)²).
+    """
+    _check_pluck(position, width, peak_m)
+    mu = torch.arange(1, grid_points - 1, dtype=torch.float64)
+    half = mu * width / 2
+    near = (half - 1).abs() < 1e-6  # there it is 1/2
+    spread = torch.where(near, 0.5, torch.sinc(half) / torch.where(near, 1.0, 1 - half.square()))
+    shape = to_grid(torch.sin(torch.pi * mu * position) / mu.square() * spread, grid_points)
+    return _held(shape * (peak_m / shape.max()))
 
 
 def draw_gaussians(count: int, grid_points: int, generator: torch.Generator) -> Tensor:

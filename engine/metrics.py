@@ -54,7 +54,7 @@ class ErrorSums:
         Args:
             first: where a block of frames belongs: 0 where it starts with frame 1.
             row: which trajectory the block's first one is. By default a block with `first` 0 is of new trajectories,
-                and any other goes on with those of the block before it.
+                and any other continues with those of the block before it.
         """
         if predicted.shape != truth.shape:
             raise ValueError(f"prediction {tuple(predicted.shape)} and truth {tuple(truth.shape)} differ in shape")

@@ -120,8 +120,8 @@ def track_partials(predicted: Tensor, truth: Tensor, length: int) -> PartialTrac
 class PartialErrors:
     """The partials of trajectories in windows of time: float64 (trajectories, windows, modes), NaN where absent.
 
-    A window tells of those of its segments where the truth lies at most 60 dB below its loudest mode, and is
-    resolved; with less than four of them the mode is absent. Level is told of every prediction, phase and frequency
+    A window reports those of its segments where the truth lies at most 60 dB below its loudest mode, and is
+    resolved; with less than four of them the mode is absent. Level is of every prediction; phase and frequency
     only of segments where it lies at most 30 dB below the truth.
 
     Attributes:

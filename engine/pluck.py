@@ -8,26 +8,28 @@ from typing import TYPE_CHECKING, Literal, get_args
 if TYPE_CHECKING:
     from torch import Tensor
 
-Shape = Literal["gaussian", "triangular", "raised_cosine"]
+Shape = Literal["gaussian", "triangular", "raised_cosine", "rounded"]
 SHAPES: tuple[Shape, ...] = get_args(Shape)
 POSITION_RANGE = (0.02, 0.98)
 WIDTH_RANGE = (0.02, 0.5)
 LARGEST_AMPLITUDE_MM = 20.0
 FULL_SCALE_M = 0.010  # the displacement that is 0 dBFS in sound
 FULL_SCALE_M_S = 30.0  # the velocity that is 0 dBFS: a Gaussian of width 0.08 is as loud as its displacement
-RUNAWAY_FACTOR = 20.0  # times its initial peak: a string let go never exceeds about that peak
+FULL_SCALE_N = 20.0  # the force at the bridge that is 0 dBFS: a Gaussian of width 0.06 and 20 mm on a nylon B3
+RUNAWAY_FACTOR = 20.0  # times its initial peak: a released string never exceeds about that peak
 LEAST_PEAK_M = 1e-4  # of an initial displacement, for that factor
 DEFAULT_LISTEN = 0.37  # the listening point beside a pluck: no low mode is still there
 
 
 @dataclass(frozen=True)
 class Pluck:
-    """Where and how the string is pulled before it is let go.
+    """Where and how the string is pulled before its release.
 
     Attributes:
         position: 0 and 1 are the fixed ends, 0.5 the middle.
         amplitude_mm: peak displacement; 0 is silence.
-        width: of the Gaussian (its s) or the raised cosine (all of it), in lengths; a triangle has none.
+        width: of the Gaussian (its s), of the raised cosine, or of what pulls a rounded triangle, in lengths. A
+            triangle has none.
 
     Raises:
         ValueError: a value is out of its range; the message names it and the range.
@@ -62,4 +64,5 @@ class Pluck:
             return excitation.gaussian(self.position, self.width, peak_m, grid_points)
         if self.shape == "triangular":
             return excitation.triangular(self.position, peak_m, grid_points)
-        return excitation.raised_cosine(self.position, self.width, peak_m, grid_points)
+        bump = excitation.rounded if self.shape == "rounded" else excitation.raised_cosine
+        return bump(self.position, self.width, peak_m, grid_points)

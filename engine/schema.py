@@ -130,7 +130,7 @@ def without_retired(data: object, retired: Mapping[str, Any], where: str) -> Any
         return data
     for name in retired.keys() & data.keys():
         if write(data[name]) != retired[name]:
-            raise SchemaError(f"{where}.{name}: {bounds.brief(data[name])} is of an earlier version; train it anew")
+            raise SchemaError(f"{where}.{name}: {bounds.brief(data[name])} is of an earlier version; train it again")
     return {name: value for name, value in data.items() if name not in retired}
 
 

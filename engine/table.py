@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Sequence
+import io
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any, TypeVar, get_args, get_type_hints
 
 from engine.bounds import brief
+from engine.read_file import UnusableFile, read_bounded
 from engine.schema import SchemaError, read
-from engine.whole_file import whole_file
+from engine.whole_file import naming, whole_file
 
 T = TypeVar("T")
 
@@ -20,11 +22,71 @@ def columns_of(kind: type) -> tuple[str, ...]:
     return tuple(field.name for field in fields(kind))
 
 
-def read_record(kind: type[T], columns: Sequence[str], texts: Sequence[str], where: str) -> T:
-    """The record of a line.
+def read_table(
+    kind: type[T], path: Path, what: str, most_bytes: int, *, lines_apart: bool = False
+) -> Iterator[T | SchemaError]:
+    """The records of a table in order, and an error in place of a line that holds none.
+
+    Columns with a default may be missing.
 
     Args:
-        columns: of the table, in the order of `texts`; `where` names the line in errors.
+        what: the name of such a table, for errors.
+        lines_apart: no value holds a line break, so that an open quote spoils one line only.
+
+    Raises:
+        SchemaError: it is no such table, or has a column of a newer version.
+        OSError: it cannot be read.
+    """
+    known = columns_of(kind)
+    try:
+        lines = io.StringIO(read_bounded(path, most_bytes).decode("utf-8"), newline="")
+    except UnusableFile as error:
+        raise SchemaError(f"{path}: {error.strerror}; remove it") from error
+    except UnicodeDecodeError as error:
+        raise SchemaError(f"{path}: not a {what}: not a text file; restore it, or remove it") from error
+    rows = _rows(lines, lines_apart)
+    columns = next(rows, [])
+    if isinstance(columns, SchemaError):
+        raise SchemaError(f"{path}: not a {what}: {columns}")
+    if known[0] not in columns:
+        raise SchemaError(f"{path}: not a {what}: its first line must name {', '.join(known[:3])}, …")
+    if unknown := sorted(set(columns) - set(known)):
+        raise SchemaError(f"{path}: unknown column {unknown[0]!r}; it is of a newer version: update this program")
+    for number, row in enumerate(rows, 2):
+        where = f"{path}: line {number}"
+        try:
+            if isinstance(row, SchemaError):
+                raise SchemaError(f"{where}: {row}")
+            record = _record(kind, columns, row, where)
+        except SchemaError as error:
+            yield error
+        else:
+            yield record
+
+
+def checked(records: Iterable[T | SchemaError]) -> Iterator[T]:
+    """The records of `read_table`. Raises SchemaError at the first line that holds none."""
+    for record in records:
+        if isinstance(record, SchemaError):
+            raise record
+        yield record
+
+
+def _rows(lines: io.StringIO, apart: bool) -> Iterator[list[str] | SchemaError]:
+    reader = (next(csv.reader([line]), []) for line in lines) if apart else csv.reader(lines)
+    while True:
+        try:
+            yield next(reader)
+        except StopIteration:
+            return
+        except csv.Error as error:
+            yield SchemaError(f"not a line of values ({error})")
+            if apart:  # a generator ends with its error
+                reader = (next(csv.reader([line]), []) for line in lines)
+
+
+def _record(kind: type[T], columns: Sequence[str], texts: Sequence[str], where: str) -> T:
+    """The record of a line. `where` names it in errors.
 
     Raises:
         SchemaError: another number of values, one that is no number, or one that `kind` refuses.
@@ -57,3 +119,9 @@ def write_table(path: Path, kind: type, records: Iterable[Any]) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns_of(kind))
         writer.writerows(map(texts_of, records))
+
+
+def append_record(path: Path, record: Any) -> None:
+    """Adds a line to a table. Raises OSError."""
+    with naming(path), path.open("a", newline="", encoding="utf-8") as file:
+        csv.writer(file, lineterminator="\n").writerow(texts_of(record))

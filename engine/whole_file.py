@@ -54,7 +54,7 @@ def _remove_left_over(folder: Path, stem: str) -> None:
 
 
 def this_computer() -> str:
-    """In a name, what tells processes of this computer from those of others."""
+    """In a name, the mark of processes of this computer."""
     return f"{zlib.crc32(platform.node().encode()):08x}"
 
 

@@ -1,4 +1,4 @@
-"""Everything that run.py installs has wheels, resolved by uv for each Python and system that README names."""
+"""Everything that run.py installs has wheels, resolved by uv for each Python and system of docs/install.md."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PYTHONS = ("3.11", "3.12", "3.13", "3.14")
-SYSTEMS = {  # uv's names, and README's
+SYSTEMS = {  # uv's names, and those of docs/install.md
     "x86_64-manylinux_2_34": "| Linux, x86-64 | glibc 2.34:",
     "aarch64-manylinux_2_39": "| Linux, ARM64 | glibc 2.39:",
     "aarch64-apple-darwin": "| macOS, Apple silicon | macOS 14 |",
@@ -22,7 +22,7 @@ SYSTEMS = {  # uv's names, and README's
 MACOS = "14.0"
 # Nothing is built, and no other Python is fetched: this one stands in for it.
 COMPILE = ("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--no-build", "--no-python-downloads")
-WHAT = ("pyproject.toml", "--constraints", "constraints.txt", "--extra", "dev", "--extra", "midi")
+WHAT = ("pyproject.toml", "--constraints", "constraints.txt", "--extra", "dev", "--extra", "midi", "--extra", "docs")
 CUDA = ("cuda-", "nvidia-", "triton")  # comes with torch's usual build for Linux, which pins it itself
 AT_ONCE = 8
 
@@ -57,8 +57,8 @@ def test_every_python_and_system_installs_from_wheels() -> None:
     assert sorted(name for name in installed - pinned if not name.startswith(CUDA)) == []
 
 
-def test_systems_that_readme_leaves_out_have_no_wheels() -> None:
-    """Or README asks for more than is needed."""
+def test_systems_that_the_documents_leave_out_have_no_wheels() -> None:
+    """Otherwise the documents ask for more than is needed."""
     older = ["x86_64-manylinux_2_33", "aarch64-manylinux_2_38", "x86_64-apple-darwin", "aarch64-pc-windows-msvc"]
     found = resolved([(PYTHONS[0], system) for system in older])
     reason = "no wheels with a matching platform tag"
@@ -66,7 +66,8 @@ def test_systems_that_readme_leaves_out_have_no_wheels() -> None:
     assert {system: why for system, why in answers.items() if reason not in why} == {}
 
 
-def test_readme_names_these_pythons_and_systems() -> None:
-    readme = (ROOT / "README.md").read_text("utf-8")
-    assert [row for row in SYSTEMS.values() if row not in readme] == []
-    assert f"Python {PYTHONS[0]} to {PYTHONS[-1]}" in readme
+def test_documents_name_these_pythons_and_systems() -> None:
+    readme, install = ((ROOT / name).read_text("utf-8") for name in ("README.md", "docs/install.md"))
+    assert [row for row in SYSTEMS.values() if row not in install] == []
+    for text in (readme, install):
+        assert f"Python {PYTHONS[0]} to {PYTHONS[-1]}" in text

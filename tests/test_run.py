@@ -70,6 +70,7 @@ def run(tmp_path, monkeypatch):
         (["--", "render", "--", "a b"], ("start", ["render", "--", "a b"])),
         (["test", "-k", "x"], ("test", ["-k", "x"])),
         (["setup"], ("setup", [])),
+        (["docs"], ("docs", [])),
         (["./setup", "song.mid"], ("start", ["./setup", "song.mid"])),
     ],
 )
@@ -80,7 +81,9 @@ def test_words_are_understood(run, words, meant, monkeypatch, tmp_path):
     assert run.parse(words) == meant
 
 
-@pytest.mark.parametrize("words", [["render"], ["setup", "now"], ["--frob"], ["song.mid", "now"], ["--frob.mid"]])
+@pytest.mark.parametrize(
+    "words", [["render"], ["setup", "now"], ["docs", "now"], ["--frob"], ["song.mid", "now"], ["--frob.mid"]]
+)
 def test_other_words_are_answered_with_the_usage(run, words, capsys):
     with pytest.raises(SystemExit) as exit:
         run.main(words)
@@ -227,6 +230,22 @@ def test_midi_that_cannot_be_installed_is_a_warning(run, monkeypatch, capsys):
     run.prepare("start", True)
     assert run.read_stamp()
     assert "warning: MIDI input was not installed" in capsys.readouterr().err
+
+
+def test_the_site_installs_what_it_needs_once_and_builds_with_warnings_as_errors(run, monkeypatch):
+    installed, called = [], []
+
+    def pip(*arguments):
+        installed.append(arguments[-1])
+        for name in ("mkdocs", "material", "mkdocstrings"):
+            (run.site_packages() / name).mkdir()
+
+    monkeypatch.setattr(run, "pip", pip)
+    monkeypatch.setattr(run.subprocess, "call", lambda command, **_: called.append(command[1:]) or 3)
+    assert [run.main(["docs"]), run.main(["docs"])] == [3, 3]
+    assert installed == [".[docs]"]
+    assert called == [["-m", "mkdocs", "build", "--strict"]] * 2
+    assert run.read_stamp()
 
 
 @pytest.fixture

@@ -45,7 +45,7 @@ def test_a_wheel_has_presets_recipes_and_pictures(tmp_path: Path) -> None:
         run(*command, start + "from app.commands import cli; cli.main(['patches', '--json'])", folder=elsewhere)
     )
     assert {each["name"] for each in patches} == {path.stem for path in (ROOT / "presets/patches").glob("*.json")}
-    looked_up = start + "from training.by_name import load; from app.views.theme import SIGNS; "
+    looked_up = start + "from training.cell import load; from app.views.theme import SIGNS; "
     looked_up += "print(load('studio_nylon_b3').model, load('nylon_linear_noise_4k_lru').model, SIGNS.is_dir())"
     assert run(*command, looked_up, folder=elsewhere).split() == ["koopman_integrated", "lru", "True"]
     assert list(elsewhere.iterdir()) == []

@@ -1,7 +1,7 @@
 """A cell of the paper's tables: one model on one data set over one horizon, by one recipe, from one seed.
 
 A cell has a name, which is its preset's, and from the name alone its whole configuration follows: the paper's
-protocol gives the data, `recipes/RECIPE.toml` gives the rest.
+protocol gives the data, `recipes/RECIPE.toml` gives the rest. `load` reads runs that are no cells, too.
 
     nylon_nonlinear_noise_16k_koopman_var                     4000 frames, our recipe, seed 0
     nylon_linear_gaussian_4k_lru_400_paper_seed3              400 frames, the paper's recipe, seed 3
@@ -20,6 +20,7 @@ from engine.schema import SchemaError, read, read_toml, write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 
 RECIPES = Path(__file__).parent / "recipes"
+CONFIGURATIONS = Path(__file__).parent / "configurations"
 MODES = {4000: 10, 16000: 25}  # kept by the authors at each sample rate in Hz
 HORIZON = 4000  # frames, unless a name says otherwise
 RECIPE = "ours"
@@ -76,8 +77,6 @@ class Cell:
             raise ValueError(f"horizon must be at least 1 frame, not {self.horizon}")
         if self.seed < 0:
             raise ValueError(f"seed must be at least 0, not {self.seed}")
-        if self.recipe not in recipe_names():
-            raise ValueError(f"recipe {self.recipe!r} is not one of {', '.join(recipe_names())}")
 
     @property
     def string_kind(self) -> str:
@@ -176,6 +175,26 @@ def recipe_names() -> list[str]:
     return sorted(path.stem for path in RECIPES.glob("*.toml"))
 
 
+def load(name_or_path: str) -> TrainingConfiguration:
+    """A committed configuration by its file's name, a cell of the tables by its name, or any TOML file by path.
+
+    Raises:
+        SchemaError: not found, not TOML, or a field is wrong; the message names the file and the field.
+    """
+    path = Path(name_or_path)
+    if not path.suffix:
+        path = CONFIGURATIONS / f"{name_or_path}.toml"
+        if not path.is_file() and (cell := Cell.parse(name_or_path)) is not None:
+            return configuration_of(cell)
+    if not path.is_file():
+        known = "".join(f", {p.stem}" for p in sorted(CONFIGURATIONS.glob("*.toml")))
+        raise SchemaError(
+            f"no training configuration {name_or_path!r}; give a .toml file, or a name: a cell of the tables like "
+            f"nylon_nonlinear_noise_16k_koopman_var_400_seed1{known}"
+        )
+    return read(TrainingConfiguration, read_toml(path), str(path))
+
+
 def configuration_of(
     cell: Cell, data: Mapping[str, Any] | None = None, recipe: Mapping[str, Any] | None = None
 ) -> TrainingConfiguration:
@@ -188,6 +207,8 @@ def configuration_of(
         SchemaError: the recipe's file, or a field given here, is wrong.
     """
     path = RECIPES / f"{cell.recipe}.toml"
+    if not path.is_file():
+        raise SchemaError(f"{cell.name}: recipe {cell.recipe!r} is not one of {', '.join(recipe_names())}")
     book = read(RecipeBook, read_toml(path), str(path))
     settings: dict[str, Any] = dict(book.default)
     sizes: dict[str, Any] = {}

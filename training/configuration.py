@@ -14,9 +14,9 @@ from engine.models import RETIRED as RETIRED_SIZES
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, without_retired, write
+from training.start import BLIND_PURSUIT, PHASES, PURSUIT, starts_of
 
-FROM_PHASES = ("koopman_integrated", "fgru", "frnn")  # what can start from what the displacement shows
-DIGEST_VERSION = 2  # of the rule by which runs are told apart; see `training.migration`
+DIGEST_VERSION = 3  # of the rule that distinguishes runs; see `training.migration`
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 
 
@@ -72,7 +72,7 @@ class Recipe:
 
     epochs: int  # passes over the training set
     seed: int = 0
-    initialisation: str = ""  # one of the model's `initialisations`; empty: the first, its source's own
+    start: str = ""  # one of the model's `starts_of`; empty: the first, its source's own
     batch_size: int = 50
     peak_learning_rate: float = 3e-3
     schedule: Literal["one_cycle", "constant"] = "one_cycle"
@@ -84,19 +84,13 @@ class Recipe:
     eigenvalue_decay: bool = False  # whether it decays the eigenvalues' parameters too
     clip_norm: float = 1.0
     loss: Literal["mse", "log10_mse", "relative_mse"] = "mse"  # of the prediction; relative: to each string's own
-    latent_epochs: int = 0  # at first, in which Koopman's encoder learns the latents of a matching pursuit
-    # Koopman's pursuit, or an integrated phase, starts from what the displacement shows and knows no string
-    blind: bool = False
-    # of a blind integrated phase: its state_size is so many for each mode that the data show; 0: as it is configured
-    latents_per_mode: int = 0
+    latent_epochs: int = 0  # at first, in which Koopman's encoder learns the latents of its matching pursuit
     latent_learning_rate: float = 3e-3  # the peak of these epochs' own cycle
     latent_polish: int = 0  # the last steps of these epochs are L-BFGS over all trajectories (`pursuit`)
     steps_per_batch: int = 64  # random frames of a batch; 0: every frame of the horizon
     first_horizon: int = 150  # frames; grows geometrically to all of them …
     grow_until: float = 0.5  # … over this share of the run
-    prediction_weight: float = 1.0  # α₁ of the paper's loss
-    encoding_weight: float = 1.0  # α₂
-    consistency_weight: float = 0.01  # α₃
+    consistency_weight: float = 0.01  # α₃ of the paper's loss, whose α₁ and α₂ are 1
     flip: bool = True  # sign and mirror augmentation: -u and u(ℓ-x) are solutions too
     validate_every: int = 10  # epochs
     patience: int = 0  # epochs without a better validation error until the run ends early; 0: never
@@ -108,7 +102,7 @@ class Recipe:
         for name in ("epochs", "batch_size", "first_horizon", "validate_every"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} must be at least 1, not {getattr(self, name)}")
-        for name in ("steps_per_batch", "patience", "latent_epochs", "latent_polish", "latents_per_mode"):
+        for name in ("steps_per_batch", "patience", "latent_epochs", "latent_polish"):
             if getattr(self, name) < 0:
                 raise ValueError(f"{name} must be at least 0, not {getattr(self, name)}")
         if self.latent_polish and not self.latent_epochs:
@@ -138,20 +132,18 @@ class TrainingConfiguration:
         try:
             model = read_model_configuration(self.model, self.model_configuration, "model_configuration")
         except SchemaError as error:
-            raise ValueError(str(error)) from error  # whoever reads this knows the file
+            raise ValueError(str(error)) from error  # the reader of the file adds its name
         if model.grid_points != self.data.grid_points:
             raise ValueError(
                 f"model_configuration.grid_points is {model.grid_points}, the data's are {self.data.grid_points}"
             )
-        known = MODELS[self.model][0].initialisations
-        if self.recipe.initialisation and self.recipe.initialisation not in known:
-            raise ValueError(f"initialisation {self.recipe.initialisation!r} is not one of {', '.join(known)}")
-        if self.recipe.blind and not self.recipe.latent_epochs and self.model not in FROM_PHASES:
-            raise ValueError(f"blind needs latent_epochs, or one of {', '.join(FROM_PHASES)}, not {self.model!r}")
-        if self.recipe.latents_per_mode and not (self.recipe.blind and self.model == "koopman_integrated"):
-            raise ValueError(f"latents_per_mode needs blind and the model 'koopman_integrated', not {self.model!r}")
-        if self.recipe.latents_per_mode and "state_size" in self.model_configuration:
-            raise ValueError("state_size follows latents_per_mode; leave one of them out")
+        if self.start not in starts_of(self.model):
+            raise ValueError(f"start {self.start!r} is not one of {', '.join(starts_of(self.model))}")
+        if (self.start in (PURSUIT, BLIND_PURSUIT)) != (self.recipe.latent_epochs > 0):
+            raise ValueError(
+                f"latent_epochs is {self.recipe.latent_epochs} with the start {self.start!r}; a pursuit needs some, "
+                "any other start none"
+            )
         if self.model == "dmd" and self.data.stride > 1:
             raise ValueError(f"a DMD goes from frame to frame: its data's stride must be 1, not {self.data.stride}")
         if self.steps % self.data.stride:
@@ -167,9 +159,9 @@ class TrainingConfiguration:
         return self.data.steps if self.horizon is None else self.horizon
 
     @property
-    def own_start(self) -> str:
-        """How the model itself is initialised: the recipe's choice, or its source's own."""
-        return self.recipe.initialisation or MODELS[self.model][0].own_initialisation()
+    def start(self) -> str:
+        """The name of the model's start: the recipe's choice, or its source's own."""
+        return self.recipe.start or next(iter(starts_of(self.model)))
 
     @property
     def digest(self) -> str:
@@ -187,7 +179,7 @@ class TrainingConfiguration:
                 "model_configuration": sizes | RETIRED_SIZES.get(self.model, {}),
                 "data": unlike_default(self.data),
                 "data_version": DATA_VERSION,
-                "recipe": {**unlike_default(self.recipe), "initialisation": self.own_start},
+                "recipe": {**unlike_default(self.recipe), "start": self.start},
                 "horizon": self.steps,
             }
         )
@@ -199,10 +191,7 @@ def digest_of(plain: dict[str, Any]) -> str:
 
 
 # fields of earlier versions, and the only value that they ever had in a run that was kept
-RETIRED: dict[str, dict[str, Any]] = {
-    "recipe": {"random_start": False, "koopman_terms": "text"},
-    "model_configuration": {"input": "displacement"},
-}
+RETIRED = {"random_start": False, "koopman_terms": "text", "prediction_weight": 1.0, "encoding_weight": 1.0}
 
 
 def read_configuration(plain: Any, where: str) -> TrainingConfiguration:
@@ -211,11 +200,21 @@ def read_configuration(plain: Any, where: str) -> TrainingConfiguration:
     Raises:
         SchemaError: it is none, or sets what is no longer there; the message names the field.
     """
-    if isinstance(plain, dict):
-        plain = {
-            name: without_retired(value, RETIRED.get(name, {}), f"{where}.{name}") for name, value in plain.items()
-        }
+    if isinstance(plain, dict) and isinstance(plain.get("recipe"), dict):
+        recipe = without_retired(plain["recipe"], RETIRED, f"{where}.recipe")
+        plain = {**plain, "recipe": recipe if "start" in recipe else _with_start(recipe)}
     return read(TrainingConfiguration, plain, where)
+
+
+def _with_start(recipe: dict[str, Any]) -> dict[str, Any]:
+    """An earlier recipe with its start by name; before, `blind` and `latent_epochs` chose it."""
+    own = {
+        name: value for name, value in recipe.items() if name not in ("initialisation", "blind", "latents_per_mode")
+    }
+    blind, pursued = recipe.get("blind"), recipe.get("latent_epochs")
+    if pursued:
+        return {**own, "start": BLIND_PURSUIT if blind else PURSUIT}
+    return {**own, "start": PHASES if blind else recipe.get("initialisation", "")}
 
 
 def unlike_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:

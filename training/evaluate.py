@@ -9,12 +9,13 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import torch
 from torch import Tensor
 
-from engine.metrics import ErrorSums
+from engine.metrics import ErrorSums, RelativeError
 from engine.models import StringModel
 from engine.partials import (
     PartialErrors,
@@ -34,6 +35,8 @@ from training.fitting.losses import KoopmanModel
 
 TRAJECTORIES_AT_ONCE = 10
 FRAMES_AT_ONCE = 1000
+ALL = slice(None)
+RISE_PARTS = (0.0, 0.5, 0.75, 0.9, 0.95, 1.0)  # of the trajectories, from the softest to the hardest
 
 Windows = Sequence[tuple[float, float]]  # (start, stop) of each, in s
 
@@ -73,11 +76,13 @@ class MotionErrors:
         string: over the whole string, as in the tables.
         sound: at the listening point; its `null_depth_db` is what subtraction leaves of the sound.
         spectra: of the sound, one for each window that was asked for.
+        sounds: of the last trajectories, the model's and the true one from frame 0 on, (2, trajectories, frames).
     """
 
     string: ErrorSums
     sound: ErrorSums
     spectra: list[SpectralDistance]
+    sounds: Tensor
 
 
 @dataclass(frozen=True)
@@ -97,7 +102,8 @@ def evaluate_past_horizon(
     *,
     horizon: int | None = None,
     windows_s: Windows = (),
-    trajectories: int | None = None,
+    trajectories: slice = ALL,
+    listen: float = DEFAULT_LISTEN,
     frames_at_once: int = FRAMES_AT_ONCE,
     report: Callable[[float], None] = _silent,
 ) -> MotionErrors:
@@ -108,23 +114,25 @@ def evaluate_past_horizon(
     Args:
         horizon: in frames; None is all of the data's.
         windows_s: of the spectral distances; none may be empty.
-        trajectories: only so many, the split's first ones.
+        trajectories: of the split.
+        listen: the listening point, in lengths.
         frames_at_once: of a block; the result does not depend on it.
-        report: is told the share that is done.
+        report: receives the share that is done.
     """
     c = dataset.configuration
     steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)
     device = next(model.parameters()).device
     synthesis = c.resonator.shapes / dataset.scale_m
-    ear = listening_weights(torch.tensor([DEFAULT_LISTEN]), c.grid_points).float()
+    ear = listening_weights(torch.tensor([listen]), c.grid_points).float()
     spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
     string, sound, distances = ErrorSums(steps), ErrorSums(steps), []
     parts = _parts(c, split, trajectories)
     with _in_evaluation(model):
         for part, rows in enumerate(parts):
-            sounds = torch.empty(2, rows.stop - rows.start, steps)
+            sounds = torch.empty(2, rows.stop - rows.start, steps + 1)
             initial, blocks = _true_motion(dataset, rows, steps, frames_at_once)
-            state, first = model.encode((initial @ synthesis).float().to(device)), 0
+            start, first = (initial @ synthesis).float(), 0
+            state, sounds[..., 0] = model.encode(start.to(device)), (start @ ear)[:, 0]
             for amplitudes in blocks:
                 last = first + amplitudes.shape[1]
                 predicted, state = model.advance(state, last - first)
@@ -132,11 +140,12 @@ def evaluate_past_horizon(
                 string.add(predicted, truth, first)
                 heard = torch.stack([predicted @ ear, truth @ ear])
                 sound.add(heard[0], heard[1], first)
-                sounds[..., first:last] = heard[..., 0]
+                sounds[..., first + 1 : last + 1] = heard[..., 0]
                 first = last
                 report((part + first / steps) / len(parts))
-            distances.append([spectral_distances(*sounds[..., span]) for span in spans])
-    return MotionErrors(string, sound, [_mean_distance(of_window) for of_window in zip(*distances, strict=True)])
+            distances.append([spectral_distances(*sounds[..., 1:][..., span]) for span in spans])
+    spectra = [_mean_distance(of_window) for of_window in zip(*distances, strict=True)]
+    return MotionErrors(string, sound, spectra, sounds)
 
 
 @torch.inference_mode()
@@ -146,7 +155,7 @@ def evaluate_partials(
     split: str,
     windows_s: Windows,
     *,
-    trajectories: int | None = None,
+    trajectories: slice = ALL,
     frames_at_once: int = FRAMES_AT_ONCE,
     report: Callable[[float], None] = _silent,
 ) -> PartialErrors:
@@ -186,6 +195,45 @@ def evaluate_partials(
     return PartialErrors.join(found)
 
 
+@dataclass(frozen=True)
+class RiseErrors(RelativeError):
+    """The errors of the trajectories between two rises of the tension.
+
+    Attributes:
+        trajectories: how many.
+        from_rise, to_rise: ΔT/T₀ at the release.
+        share: of the split's squared error that is theirs.
+        largest: of the split's squared error, the share of the one among them that has most.
+    """
+
+    trajectories: int
+    from_rise: float
+    to_rise: float
+    share: float
+    largest: float
+
+
+def errors_by_rise(sums: ErrorSums, configuration: DatasetConfiguration, split: str) -> list[RiseErrors]:
+    """The errors of a split's trajectories, as far as `sums` has them, in groups of growing rise, none empty."""
+    shares = sums.shares()
+    initial = draw_initial(configuration)[split_rows(configuration.count, split)][: len(shares)]
+    rise = configuration.resonator.relative_tension_rise(initial)
+    order = torch.argsort(rise).tolist()
+    edges = [round(part * len(order)) for part in RISE_PARTS]
+    groups = [order[first:last] for first, last in pairwise(edges) if last > first]
+    return [
+        RiseErrors(
+            **vars(sums.of(rows)),
+            trajectories=len(rows),
+            from_rise=float(rise[rows[0]]),
+            to_rise=float(rise[rows[-1]]),
+            share=float(shares[rows].sum()),
+            largest=float(shares[rows].max()),
+        )
+        for rows in groups
+    ]
+
+
 @contextmanager
 def _in_evaluation(model: StringModel[Any]) -> Iterator[None]:
     was_training = model.training
@@ -207,12 +255,10 @@ def held_out(configuration: DatasetConfiguration, scale_m: float, count: int, se
     return Dataset(replace(configuration, count=count, seed=seed), torch.empty(0), scale_m)
 
 
-def _parts(c: DatasetConfiguration, split: str, trajectories: int | None) -> list[slice]:
+def _parts(c: DatasetConfiguration, split: str, trajectories: slice) -> list[slice]:
     """The rows of a split's trajectories, some at a time."""
-    rows = split_rows(c.count, split)
-    stop = rows.stop if trajectories is None else min(rows.stop, rows.start + trajectories)
-    firsts = range(rows.start, stop, TRAJECTORIES_AT_ONCE)
-    return [slice(first, min(first + TRAJECTORIES_AT_ONCE, stop)) for first in firsts]
+    rows = range(c.count)[split_rows(c.count, split)][trajectories]
+    return [slice(first, min(first + TRAJECTORIES_AT_ONCE, rows.stop)) for first in rows[::TRAJECTORIES_AT_ONCE]]
 
 
 def _true_motion(dataset: Dataset, rows: slice, steps: int, block: int) -> tuple[Tensor, Iterator[Tensor]]:

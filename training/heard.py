@@ -1,4 +1,4 @@
-"""Listens to a preset: a few plucks as the app plays them, model beside truth, well past the training."""
+"""Listens to a preset: a few plucks as the app plays them, model and truth, well past the training."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ def standard_plucks(info: PresetInfo) -> list[Pluck]:
 
 
 def listen_to(preset: Preset, report: Callable[[float], None] = lambda share: None) -> Heard:
-    """What is heard of a preset.
+    """The audible errors of a preset.
 
     Args:
-        report: is told the share that is done, 0 … 1.
+        report: receives the share that is done, 0 … 1.
 
     Raises:
-        ValueError: its model cannot be let go from rest.
+        ValueError: its model cannot be released from rest.
         PresetError: its file cannot be read any more.
     """
     source, digest = ModelSource(preset), preset_digest(preset.path)

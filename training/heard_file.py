@@ -1,13 +1,11 @@
 """What was heard of presets, in a table beside them: one a line, known by the digest of the preset's file.
 
 So a preset that changes carries no old claim, and a copy keeps its own. The table may come from anywhere: whatever is
-wrong in it is told, and skipped.
+wrong in it is reported, and skipped.
 """
 
 from __future__ import annotations
 
-import csv
-import io
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
@@ -15,10 +13,8 @@ from pathlib import Path
 
 from filelock import FileLock
 
-from engine.plain_text import one_line
-from engine.read_file import UnusableFile, read_bounded
 from engine.schema import SchemaError
-from engine.table import columns_of, read_record, write_table
+from engine.table import columns_of, read_table, write_table
 
 NAME = "heard.csv"
 METHOD = 1  # of the measurement: lines of another one say nothing
@@ -84,17 +80,23 @@ COLUMNS = columns_of(Heard)
 def read_heard(folder: Path) -> tuple[dict[str, Heard], list[str]]:
     """What is known of a folder's presets by their digest, and a line for whatever is wrong. Raises nothing."""
     path = folder / NAME
+    found: dict[str, Heard] = {}
+    problems: list[str] = []
     try:
-        text = read_bounded(path, LARGEST_BYTES).decode("utf-8")
+        for heard in read_table(Heard, path, "table of heard presets", LARGEST_BYTES, lines_apart=True):
+            if isinstance(heard, SchemaError):
+                problems.append(str(heard))
+            elif heard.method == METHOD:
+                found[heard.sha256] = heard
     except (FileNotFoundError, NotADirectoryError):
         return {}, []
-    except UnusableFile as error:
-        return {}, [one_line(f"{path}: {error.strerror}; remove it")]
+    except SchemaError as error:
+        return {}, [str(error)]
     except OSError as error:
         return {}, [f"{path}: cannot be read ({error.strerror or error}); presets are listed without it"]
-    except UnicodeDecodeError:
-        return {}, [f"{path}: not a text file; remove it, or measure the presets again"]
-    return _parsed(path, text)
+    if (more := len(problems) - MOST_TOLD) > 0:
+        problems = [*problems[:MOST_TOLD], f"{path}: {more} more lines cannot be used"]
+    return found, problems
 
 
 def add_heard(folder: Path, measured: Iterable[Heard]) -> None:
@@ -110,36 +112,6 @@ def add_heard(folder: Path, measured: Iterable[Heard]) -> None:
         known = {heard.name: heard for heard in read_heard(folder)[0].values()}
         known |= {heard.name: heard for heard in measured}
         write_table(path, Heard, (_rounded(known[name]) for name in sorted(known)))
-
-
-def _parsed(path: Path, text: str) -> tuple[dict[str, Heard], list[str]]:
-    found: dict[str, Heard] = {}
-    problems: list[str] = []
-    lines = iter(io.StringIO(text, newline="").readlines())
-    if next(lines, "").strip() not in (",".join(COLUMNS), ",".join(COLUMNS[:-1])):
-        return {}, [f"{path}: not a table of this program's: its first line must be {','.join(COLUMNS)}"]
-    for number, line in enumerate(lines, 2):
-        try:
-            heard = _line(line, f"{path}: line {number}")
-        except SchemaError as error:
-            problems.append(str(error))
-        else:
-            if heard is not None:
-                found[heard.sha256] = heard
-    if (more := len(problems) - MOST_TOLD) > 0:
-        problems = [*problems[:MOST_TOLD], f"{path}: {more} more lines cannot be used"]
-    return found, problems
-
-
-def _line(line: str, where: str) -> Heard | None:
-    """None for a measurement by another method."""
-    try:
-        (texts,) = csv.reader([line])
-    except (csv.Error, ValueError) as error:
-        raise SchemaError(f"{where}: not a line of values ({error})") from error
-    columns = COLUMNS[:-1] if len(texts) == len(COLUMNS) - 1 else COLUMNS  # before the last one was measured
-    heard = read_record(Heard, columns, texts, where)
-    return heard if heard.method == METHOD else None
 
 
 def _rounded(heard: Heard) -> Heard:

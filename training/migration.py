@@ -10,21 +10,32 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
+from engine.models import MODELS, RETIRED, read_model_configuration
 from engine.schema import SchemaError, write
-from training.by_name import load
+from training.cell import load
 from training.configuration import DATA_VERSION, TrainingConfiguration, digest_of, unlike_default
 from training.results import Row
+from training.start import BLIND_PURSUIT, PHASES, STARTS
 
 
 def earlier_digest(configuration: TrainingConfiguration) -> str:
-    """By the first rule: a model's sizes as far as a file set them."""
+    """By the second rule: a start had a name where it was the model's own, and flags for others."""
+    start, model, given = configuration.start, configuration.model, configuration.model_configuration
+    recipe = {name: value for name, value in unlike_default(configuration.recipe).items() if name != "start"}
+    recipe["initialisation"] = MODELS[model][0].own_initialisation() if start in STARTS else start
+    if start in (BLIND_PURSUIT, PHASES):
+        recipe["blind"] = True
+    if start == PHASES and model == "koopman_integrated" and "state_size" not in given:
+        recipe["latents_per_mode"] = 1
+    sizes = write(read_model_configuration(model, given, "model_configuration"))
     return digest_of(
         {
-            "model": configuration.model,
-            "model_configuration": write(configuration.model_configuration),
+            "digest_version": 2,
+            "model": model,
+            "model_configuration": sizes | RETIRED.get(model, {}),
             "data": unlike_default(configuration.data),
             "data_version": DATA_VERSION,
-            "recipe": unlike_default(configuration.recipe),
+            "recipe": recipe,
             "horizon": configuration.steps,
         }
     )

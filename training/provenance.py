@@ -26,7 +26,7 @@ def commit() -> str:
 
 
 def processor() -> str:
-    """The processor's name; Linux tells it in a file alone."""
+    """The processor's name; Linux has it in a file alone."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:

@@ -6,8 +6,6 @@ of the same run. From a row's `name` follows the command that repeats it: `learn
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,9 +13,7 @@ from typing import Literal
 
 from filelock import FileLock
 
-from engine.read_file import UnusableFile, read_bounded
-from engine.schema import SchemaError
-from engine.table import columns_of, read_record, write_table
+from engine.table import checked, columns_of, read_table, write_table
 from training.start import given_to
 
 QUARTERS = 4  # windows of the horizon, with an error each
@@ -44,8 +40,8 @@ class Row:
         rel_mse_400, rel_mae_400: over the first 400 frames, where the horizon reaches so far.
         start_…: of the untrained model, over the validation set; the result is never worse.
         test_…: the same of the test set, which chose neither weights nor recipes.
-        …_se: standard error of a figure by which trajectories are in the split; see `ErrorSums.standard_error`. None
-            in rows of before they were measured; `learned-strings results measure` fills them from a kept preset.
+        …_se: standard error of a figure over the split's trajectories; see `ErrorSums.standard_error`. None
+            in rows older than the measurement; `learned-strings results measure` fills them from a kept preset.
         seconds: of training, what it starts from among it; in rows without start_… the optimiser alone.
         commit: of the code, "" where it is not known.
         finished: UTC, ISO 8601.
@@ -120,21 +116,9 @@ def read_results(path: Path) -> list[Row]:
         OSError: it cannot be read.
     """
     try:
-        text = read_bounded(path, LARGEST_BYTES).decode("utf-8")
-        lines = csv.reader(io.StringIO(text, newline=""))
-        columns = next(lines, [])
-        if "digest" not in columns:
-            raise SchemaError(f"{path}: not a results file: its first line must name {', '.join(COLUMNS[:3])}, …")
-        if unknown := sorted(set(columns) - set(COLUMNS)):
-            raise SchemaError(f"{path}: unknown column {unknown[0]!r}; it is of a newer version: update this program")
-        # one at a time, so that it ends at the first fault
-        return [read_record(Row, columns, row, f"{path}: line {n}") for n, row in enumerate(lines, 2)]
+        return list(checked(read_table(Row, path, "results file", LARGEST_BYTES)))
     except FileNotFoundError:
         return []
-    except UnusableFile as error:
-        raise SchemaError(f"{path}: {error.strerror}") from error
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise SchemaError(f"{path}: not a CSV file ({error}); restore it, or remove it to begin anew") from error
 
 
 def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:

@@ -1,4 +1,4 @@
-"""What a row of the results tells of both splits: errors, their standard errors, and the same over 400 frames."""
+"""The figures of both splits in a row of the results: errors, their standard errors, and the same over 400 frames."""
 
 from __future__ import annotations
 
@@ -10,8 +10,9 @@ from typing import Any
 
 from engine.metrics import ErrorSums
 from engine.models import StringModel
-from engine.presets import PresetInfo, load_preset
-from training.configuration import TrainingConfiguration, read_configuration
+from engine.presets import Preset, PresetError, PresetInfo, load_preset
+from engine.schema import SchemaError
+from training.configuration import DatasetConfiguration, TrainingConfiguration, read_configuration
 from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
 from training.results import SHORT_HORIZON, Row
@@ -46,6 +47,25 @@ def configuration_of(info: PresetInfo, where: str) -> TrainingConfiguration:
         SchemaError: the preset does not tell it.
     """
     return read_configuration(info.training, f"{where}: metadata.training")
+
+
+def data_of(preset: Preset) -> DatasetConfiguration:
+    """The data set on which a preset of one string was trained.
+
+    Raises:
+        PresetError: the preset does not name it, or names that of another model.
+    """
+    try:
+        data = configuration_of(preset.info, str(preset.path)).data
+    except SchemaError as error:
+        raise PresetError(f"{error}; without it the preset's data set is not known") from error
+    for name in ("rate_hz", "modes", "grid_points"):
+        mine, its = getattr(data, name), getattr(preset.info, name)
+        if mine != its:
+            raise PresetError(
+                f"{preset.path}: metadata.training.data.{name} is {mine}, the model's is {its}; get the preset again"
+            )
+    return data
 
 
 def filled(row: Row, preset: Path, cache: Path | None = None) -> Row:

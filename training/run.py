@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import os
 import tempfile
@@ -26,18 +25,17 @@ from engine.metrics import ErrorSums
 from engine.models import count_parameters
 from engine.presets import PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
 from engine.schema import SchemaError, read, write
-from engine.whole_file import naming, whole_file
+from engine.whole_file import whole_file
 from training import provenance
 from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import Diverged, FitResult, Progress, fit
+from training.fitting.log import TrainingLog
 from training.migration import carried_over
 from training.results import QUARTERS, Row
 from training.row_errors import REPEATED, configuration_of, row_errors
-from training.start import initialisation_of, knowledge_of
-
-LOG_FIELDS = ("epoch", "horizon", "learning_rate", "loss", "rel_mse", "rel_mae", "seconds")
+from training.start import knowledge_of
 
 
 def _trained(
@@ -50,7 +48,7 @@ def _trained(
     report: Callable[[Progress], None],
     checkpoint_every_s: float | None,
 ) -> dict[str, Any]:
-    """Makes the preset `output`, or goes on with the run in `run_folder`; its errors and what it took, as in a row.
+    """Makes the preset `output`, or continues with the run in `run_folder`; its errors and what it took, as in a row.
 
     An epoch is in `run_folder`/log.csv when it is reported; the run ends with a plot, log.png.
 
@@ -83,7 +81,7 @@ def _trained(
         raise
     _plot(log.path)
     model = result.model.cpu()
-    sums = {split: evaluate_model(model, dataset, split, configuration.steps) for split in ("validation", "test")}
+    sums = {"validation": result.validation, "test": evaluate_model(model, dataset, "test", configuration.steps)}
     figures = row_errors(model, dataset, sums, configuration.steps)
     save_preset(output, preset_info(configuration, dataset, result, figures), model)
     weights = load_preset(output).model.state_dict()
@@ -114,7 +112,7 @@ def run_row(
     Args:
         name, recipe: as the row shall carry them.
         runs: the run's folder is runs/name: checkpoint, log and its plot, row, and the preset where `preset` is None.
-        waits: is told where another process trains in that folder, whose end is awaited.
+        waits: is called where another process trains in that folder, whose end is awaited.
 
     Raises:
         ValueError, RuntimeError, OSError: see `_trained`.
@@ -141,7 +139,7 @@ def run_row(
             "horizon": configuration.steps,
             "recipe": recipe,
             "seed": configuration.recipe.seed,
-            "initialisation": initialisation_of(configuration),
+            "initialisation": configuration.start,
             "device": torch.device(device).type,
             "threads": torch.get_num_threads(),
             "hardware": provenance.hardware(device),
@@ -241,7 +239,7 @@ def preset_info(
         horizon_steps=configuration.steps,
         scale_m=dataset.scale_m,
         trained_range=trained_range(data),
-        initialisation=initialisation_of(configuration),
+        initialisation=configuration.start,
         knows=knowledge_of(configuration),
         seed=recipe.seed,
         **{name: errors[name] for name in REPEATED},
@@ -261,34 +259,6 @@ def trained_range(data: DatasetConfiguration) -> TrainedRange:
     return TrainedRange(CENTRE_RANGE, {"gaussian": WIDTH_RANGE}, PEAK_RANGE_M, data.largest_tension_rise)
 
 
-class TrainingLog:
-    """A CSV file with one line per epoch, also across interruptions.
-
-    A run continues from its checkpoint, which may be older than its last line: lines from the first epoch
-    that comes on are dropped before it is added.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._trimmed = False
-
-    def add(self, progress: Progress) -> None:
-        if not self._trimmed:
-            self._keep_before(progress.epoch)
-            self._trimmed = True
-        with naming(self.path), self.path.open("a", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerow(_row(progress))
-
-    def _keep_before(self, epoch: int) -> None:
-        kept = []
-        if self.path.exists():
-            with self.path.open(newline="", encoding="utf-8") as file:
-                kept = [row for row in csv.reader(file) if _is_whole(row) and int(row[0]) < epoch]
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(self.path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
-            csv.writer(file).writerows([LOG_FIELDS, *kept])
-
-
 def _plot(log: Path) -> None:
     """A picture of the run beside its log; none where it ended before its first epoch."""
     if not log.exists():
@@ -296,21 +266,3 @@ def _plot(log: Path) -> None:
     from training.figures.run_plot import plot_run  # Matplotlib only where there is something to draw
 
     plot_run(log, log.with_suffix(".png"))
-
-
-def _row(progress: Progress) -> list[str]:
-    validation = progress.validation
-    return [
-        str(progress.epoch),
-        str(progress.horizon),
-        f"{progress.learning_rate:.6g}",
-        f"{progress.loss:.6g}",
-        f"{validation.rel_mse:.6g}" if validation else "",
-        f"{validation.rel_mae:.6g}" if validation else "",
-        f"{progress.seconds:.2f}",
-    ]
-
-
-def _is_whole(row: list[str]) -> bool:
-    """Whether it is a line of an epoch; a run that was killed may leave half of one."""
-    return len(row) == len(LOG_FIELDS) and row[0].isdigit() and row[-1] != ""

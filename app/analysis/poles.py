@@ -1,7 +1,7 @@
 """A model's learned eigenvalues beside the string's own, as frequencies and decay times.
 
 An eigenvalue determines a frequency up to its sign and multiples of the sample rate. It is assigned to the mode that
-is nearest to one of these frequencies, and compared with it there. Decay counts a little in the distance, as it tells
+is nearest to one of these frequencies, and compared with it there. Decay counts a little there: it separates
 a mode above half the rate from the one that it aliases to.
 """
 

@@ -1,4 +1,4 @@
-"""Levels over time and frequency of what is heard at the listening point, by short-time Fourier transforms."""
+"""Levels over time and frequency of the sound at the listening point, by short-time Fourier transforms."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def output_devices(rescan: bool = False) -> list[AudioDevice]:
     """All sound outputs, the system's default first.
 
     Args:
-        rescan: starts PortAudio anew, as it looks for devices only when it starts. Has no effect while a stream is
+        rescan: starts PortAudio again, as it looks for devices only when it starts. Has no effect while a stream is
             open, which a new start would end.
 
     Raises:
@@ -126,7 +126,7 @@ def close_device(stream: RawStream) -> None:
 
 
 _lock = threading.RLock()  # PortAudio does not allow listing and opening from two threads
-_streams: set[RawStream] = set()  # open ones: while there are any, PortAudio must not be started anew
+_streams: set[RawStream] = set()  # open ones: while there are any, PortAudio must not be started again
 
 
 def _find(name: str, host_api: str, rescan: bool = False) -> tuple[int, AudioDevice]:

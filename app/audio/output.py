@@ -41,7 +41,7 @@ class Output(Protocol):
         """Whether it has taken no frames for a while, and may recover."""
 
     def lost(self) -> bool:
-        """Whether it has gone and must be opened anew."""
+        """Whether it has gone and must be opened again."""
 
     def close(self) -> None: ...
 

@@ -30,7 +30,7 @@ class AudioProblem:
 
 
 class AudioUnavailable(Exception):
-    """No sound output can be used at present; pictures and export go on."""
+    """No sound output can be used at present; pictures and export continue."""
 
     def __init__(self, problem: AudioProblem) -> None:
         super().__init__(str(problem))
@@ -106,7 +106,7 @@ def vanished(device_name: str, detail: str = "") -> AudioUnavailable:
 
 
 def refused(error: Exception, device_name: str, rate_hz: int) -> AudioUnavailable:
-    """Tells by PortAudio's error code and the text of the error why a device did not open or start."""
+    """Returns why a device did not open or start, from PortAudio's error code and text."""
     detail = str(error)
     text = detail.lower()
     code = next((value for value in error.args[1:2] if isinstance(value, int)), 0)

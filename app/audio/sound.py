@@ -123,7 +123,7 @@ class Sound:
     ) -> None:
         """Asks the caretaker thread to open another device, or the present one in another way.
 
-        If it is refused, the present device is opened again as it was, and `on_problem` is called. Voices go on
+        If it is refused, the present device is opened again as it was, and `on_problem` is called. Voices continue
         ringing where rate and channels stay; otherwise there is a new mixer, and notes that ring need new voices.
 
         Args:
@@ -141,7 +141,7 @@ class Sound:
         return self.mixer.rate_hz
 
     def now_s(self) -> float:
-        """The output's time in seconds, by which gestures are timed; 0 while the output is being changed."""
+        """The output's time in seconds, the clock of gestures; 0 while the output is being changed."""
         try:
             return self._output.now_s()
         except Exception:  # the output is being changed

@@ -16,7 +16,20 @@ from typing import Annotated
 
 import typer
 
-from app.commands import batch, faust, info, listing, motion, patches, play, render, sampled
+from app.commands import (
+    batch,
+    faust,
+    info,
+    instruments,
+    learn,
+    listing,
+    motion,
+    patches,
+    play,
+    plugin,
+    render,
+    sampled,
+)
 from app.shared.thread_priority import wait_asleep
 from engine.result_file import explain
 from training.cli import evaluation, family, sweep, tables, training
@@ -64,10 +77,13 @@ for command in (
     motion.simulate,
     motion.predict,
     render.render,
+    learn.learn,
+    learn.judge,
     play.play,
     batch.batch,
     sampled.sampled,
     faust.faust,
+    plugin.plugin,
     info.info,
     motion.compare,
     training.dataset,
@@ -79,6 +95,7 @@ for command in (
     cli.command()(command)
 cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
+cli.add_typer(instruments.instruments, name="instruments")
 cli.add_typer(family.family, name="family")
 
 

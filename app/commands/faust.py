@@ -26,7 +26,7 @@ def faust(
 
     try:
         chosen = find_patch(patch).patch
-        written = write_faust(out, chosen, open_preset(chosen.preset).info.grid_points, modes)
+        written = write_faust(out, chosen, open_preset(chosen.preset).info, modes)
     except (PatchError, ValueError, WriteError) as error:
         raise Failure(str(error)) from error
     if chosen.body.name or chosen.room.mix:

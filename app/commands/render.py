@@ -34,7 +34,10 @@ ListenRight = Annotated[
 ]
 PickupOption = Annotated[
     Pickup,
-    typer.Option(help="What is picked up; velocity is brighter by 6 dB per octave, its full scale is 30 m/s."),
+    typer.Option(
+        help="What is picked up; velocity is brighter by 6 dB per octave, its full scale is 30 m/s; bridge is the "
+        "force on the end at 0, its full scale is 20 N."
+    ),
 ]
 DecayDb = Annotated[
     float | None,
@@ -71,6 +74,14 @@ def render(
     shape: arguments.Shape = arguments.DEFAULT_SHAPE,
     width: arguments.Width = arguments.DEFAULT_WIDTH,
     normalise: Normalise = False,
+    as_recorded: Annotated[
+        bool,
+        typer.Option(
+            "--as-recorded",
+            help="Render the recorded note of a learned preset: pitch, level, onset, rate and length. Give PRESET "
+            "and OUT.wav with it, and --bits.",
+        ),
+    ] = False,
     recipe: Annotated[
         Path | None,
         typer.Option(
@@ -93,6 +104,9 @@ def render(
                 param_hint="--recipe",
             )
         _render_again(recipe, Path(preset) if preset else None)
+        return
+    if as_recorded:
+        _render_as_recorded(_given("PRESET", preset), _given("OUT.wav", out), bits)
         return
     preset, out = _given("PRESET", preset), _given("OUT.wav", out)
     position, amplitude_mm = _given("--position", position), _given("--amplitude-mm", amplitude_mm)
@@ -147,6 +161,22 @@ def _given(name: str, value: Value | None) -> Value:
     if value is None:
         raise typer.BadParameter("is missing (only --recipe goes without it)", param_hint=name)
     return value
+
+
+def _render_as_recorded(preset: str, out: Path, bits: Bits) -> None:
+    from app.export.wav import WavSettings, write_wav
+    from engine.folders import usable_files
+    from engine.presets import find_preset, read_info
+    from engine.result_file import whole_file
+
+    info = read_info(find_preset(preset, usable_files()))
+    if info.recorded is None:
+        raise Failure(f"{preset}: was not learned from a recording; leave out --as-recorded, or choose one that was")
+    note = info.recorded.note
+    tags = {"title": info.title, "comment": f"as recorded in {info.recorded.file}, SHA-256 {info.recorded.digest}"}
+    with whole_file(out) as file:
+        level = write_wav(file, note.sound(), note.rate_hz, WavSettings(bits, fade_out_s=0.0), tags)
+    print(f"{out}: {note.frames} frames at {note.rate_hz} Hz, peak {level.peak_db:.1f} dBFS")
 
 
 def _render_again(file: Path, out: Path | None) -> None:

@@ -19,10 +19,12 @@ from app.instrument.strings import HIGHEST_HZ
 from app.patches.patch import Body, Patch, Room
 from app.patches.tuning import A4_KEY
 from app.shared.version import PROGRAM, program_version
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, LARGEST_AMPLITUDE_MM
+from engine.pluck import LARGEST_AMPLITUDE_MM
+from engine.presets import PresetInfo
 from engine.resonators.sine_transform import mode_shapes, to_modes
 from engine.result_file import whole_file
 from engine.voices import Ear
+from engine.voices.ear import FULL_SCALES
 from engine.voices.voice import ATTACK_S
 
 WIDTHS = 9  # of plucks whose width follows the velocity: so many are in the table, and those between are interpolated
@@ -33,37 +35,45 @@ VOICES = 16
 NUMBERS_A_LINE = 8
 
 
-def write_faust(path: Path, patch: Patch, grid_points: int, most_modes: int | None = None) -> int:
+def write_faust(path: Path, patch: Patch, preset: PresetInfo, most_modes: int | None = None) -> int:
     """Writes the program, and returns how many modes it has.
 
     Args:
-        grid_points: of the model that plays the patch.
+        preset: that plays the patch.
         most_modes: the lowest of them, for a program that costs less; default all below 20 kHz.
 
     Raises:
         ValueError: no key has a string.
         WriteError: the file cannot be written.
     """
-    text, modes = faust_program(patch, grid_points, most_modes)
+    text, modes = faust_program(patch, preset, most_modes)
     with whole_file(path) as file:
         file.write(text.encode())
     return modes
 
 
-def faust_program(patch: Patch, grid_points: int, most_modes: int | None = None) -> tuple[str, int]:
+def faust_program(patch: Patch, preset: PresetInfo, most_modes: int | None = None) -> tuple[str, int]:
     """The program's text and how many modes it has, as `write_faust` writes it. Raises ValueError as it does."""
     patch = Patch.model_validate({**dict(patch), "body": Body(), "room": Room()})
     ear = Ear(tuple(patch.pickup.points), patch.pickup.kind)
-    loud = LoudKeys(patch, ear, grid_points)
+    if preset.recorded is not None:
+        raise ValueError(
+            f"{patch.name}: its string was learned from a recording, which a Faust program has no modes for"
+        )
+    grid_points = preset.grid_points
+    loud = LoudKeys(patch, ear, preset)
     low, high = patch.range
     keys = [_possible(loud, key) for key in range(low, high + 1)]
     sounding = [key for key in keys if key is not None]
     if not sounding:
         raise ValueError(f"{patch.name}: none of its keys has a possible string; change its range, strings or tuning")
     modes = min(max(key.resonator.modes for key in sounding), most_modes or grid_points)
-    tables = key_tables(keys)
+    bridge = patch.pickup.kind == "bridge"
+    tables = key_tables(keys, bridge)
     pulls = _pulls(patch, modes, grid_points)
-    ears = [mode_shapes(torch.tensor([point]), modes)[:, 0].tolist() for point in ear.points]
+    ears = [
+        [1.0] * modes if bridge else mode_shapes(torch.tensor([point]), modes)[:, 0].tolist() for point in ear.points
+    ]
     lines = [
         *_comments(patch, modes),
         f'declare name "{patch.name}";',
@@ -97,7 +107,7 @@ def faust_program(patch: Patch, grid_points: int, most_modes: int | None = None)
         "strike = edge * plays * loud * millimetres;",
         *_pull_lines(pulls),
         "",
-        "// A key that is let go: its damper",
+        "// A key that is released: its damper",
         *_damper_lines(patch),
         "",
         f"// Out of rest it begins within {1000 * ATTACK_S:g} ms",
@@ -139,8 +149,12 @@ def _comments(patch: Patch, modes: int) -> list[str]:
     ]
 
 
-def key_tables(keys: list[LoudKey | None]) -> list[list[float]]:
-    """t, b, c, d and loudness of each key; a silent one has its neighbour's string and no loudness."""
+def key_tables(keys: list[LoudKey | None], bridge: bool = False) -> list[list[float]]:
+    """t, b, c, d and loudness of each key; a silent one has its neighbour's string and no loudness.
+
+    Args:
+        bridge: the force at the bridge is heard, ρA ω²/η of each mode; ρAℓ/π of it is in the loudness.
+    """
     rows: list[list[float]] = []
     for key in keys:
         if key is None:
@@ -154,7 +168,7 @@ def key_tables(keys: list[LoudKey | None]) -> list[list[float]]:
                 string.youngs_modulus_pa * string.second_moment_m4 / mass * eta2**2,
                 string.damping_d1_kg_m_s / (2 * mass),
                 string.damping_d3_kg_m_s / (2 * mass) * eta2,
-                key.gain * key.string.shortened,
+                key.gain * key.string.shortened * (mass / math.sqrt(eta2) if bridge else 1.0),
             ]
         )
     table = np.array(rows)
@@ -167,10 +181,10 @@ def key_tables(keys: list[LoudKey | None]) -> list[list[float]]:
 def _pulls(patch: Patch, modes: int, grid_points: int) -> list[list[float]]:
     """What a pluck of 1 mm gives each mode, of full scale: a row for each width."""
     shares = np.linspace(0, 1, WIDTHS) if patch.pluck.shape != "triangular" else [0.0]
-    full_scale = FULL_SCALE_M if patch.pickup.kind == "displacement" else FULL_SCALE_M_S
+    full_scale = FULL_SCALES[patch.pickup.kind]
     found = []
     for share in shares:
-        width = patch.pluck.width + float(share) * (patch.pluck.width_hard - patch.pluck.width)
+        width = patch.pluck.width * (patch.pluck.width_hard / patch.pluck.width) ** float(share)
         pluck = replace(patch.pluck.pluck(1), amplitude_mm=1.0, width=width)
         found.append((to_modes(pluck.displacement(grid_points), modes) / full_scale).tolist())
     return found
@@ -199,15 +213,16 @@ def _damper_lines(patch: Patch) -> Iterable[str]:
 
 
 def _rest_s(patch: Patch) -> float:
-    """So long after a key was let go its string is at rest."""
+    """So long after a key was released its string is at rest."""
     return LONGEST_RING_S if patch.damping.let_ring else patch.damping.release_t60_s
 
 
 def _heard(patch: Patch) -> str:
-    """Displacement of a mode that is let go at rest, or its velocity."""
-    if patch.pickup.kind == "displacement":
-        return "a + b * sigma / omega"
-    return "0 - b * w2 / omega"
+    """Displacement of a mode that is let go at rest, its velocity, or its force at the bridge but for a factor."""
+    if patch.pickup.kind == "velocity":
+        return "0 - b * w2 / omega"
+    displacement = "a + b * sigma / omega"
+    return displacement if patch.pickup.kind == "displacement" else f"({displacement}) * w2 / (i + 1)"
 
 
 def _table(name: str, values: list[float], index: str) -> Iterable[str]:

@@ -1,6 +1,6 @@
 """The sound of a pluck at the listening points: model, truth, their difference, or both side by side.
 
-It is rendered by the same voices that a sound device plays, so that a file holds what is heard; ±1 is full scale.
+It is rendered by the same voices that a sound device plays, so that a file holds the sound; ±1 is full scale.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ VOICES: tuple[Voice, ...] = get_args(Voice)
 SOURCES: tuple[Source, ...] = get_args(Source)
 LONGEST_S = 600.0
 DECAY_RANGE_DB = (10.0, 120.0)
-DECAYED_FOR_SURE_DB = 30.0  # rendering goes on until the whole string is so far below the wanted decay
+DECAYED_FOR_SURE_DB = 30.0  # rendering continues until the whole string is so far below the wanted decay
 MOST_GAIN = 1e6
 LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level does not depend on phase
 

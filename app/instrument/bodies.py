@@ -22,7 +22,6 @@ from engine.folders import user_folder
 from engine.read_file import read_bounded
 from engine.result_file import WriteError, explain, whole_file
 
-TITLES = {"guitar": "Guitar"}  # of the engine's bodies
 ENDINGS = (".wav", ".flac", ".aif", ".aiff")
 _NAME: TypeAdapter[str] = TypeAdapter(Reference)
 
@@ -39,7 +38,7 @@ def body_names() -> list[str]:
 
 def body_titles() -> list[tuple[str, str]]:
     """The name and the title of each body, as `body_names`. The user's own are called what their files are."""
-    return [(name, TITLES.get(name, name)) for name in body_names()]
+    return [(name, BODIES[name].title if name in BODIES else name) for name in body_names()]
 
 
 def own_impulse(name: str) -> Impulse:

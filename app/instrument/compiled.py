@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from app.instrument import events
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.loud_keys import LoudKeys
 from app.instrument.table import fill_gain, programs_of, strings_of, table_of, wheeled
 from app.patches.patch import Patch
@@ -56,7 +56,10 @@ def event_of(record: Record) -> NoteOn | NoteOff | Bend | Controller:
 
 
 class InstrumentPlayer:
-    """Plays one patch. Every public method may be called from any thread.
+    """Plays one patch, as `Player` does, but with the mixer's next quantum; what began is reported then.
+
+    Every public method may be called from any thread. Strings that ring follow a patch that is taken.
+    A mixer of another rate needs another player.
 
     Args:
         preset: a preset of many strings.
@@ -82,16 +85,18 @@ class InstrumentPlayer:
             raise ValueError(
                 f"{preset.path}: it knows one string only; choose a preset of many, as studio_any_string"
             )
-        self._grid_points = preset.model.configuration.grid_points
+        if preset.info.recorded is not None:
+            raise ValueError(f"{preset.path}: its string was learned from a recording; `Player` plays it")
+        self._info, self.grid_points = preset.info, preset.model.configuration.grid_points
         self._sources = tuple(gains)
         self._programs = programs_of(preset.model, rate_hz, self._sources)
         self._lock = threading.Lock()
         self._serial = self._instrument = 0
-        self._table: Table | None = None
-        self.compiled = CompiledPlayer(rate_hz, min(of.MOST_MODES, self._grid_points - 2), most_notes)
+        self.table: Table | None = None
+        self.compiled = CompiledPlayer(rate_hz, min(of.MOST_MODES, self.grid_points - 2), most_notes)
         self.compiled.set_source_gains(gains.values())
         heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        self._loud = LoudKeys(patch, heard, self._grid_points)
+        self._loud = LoudKeys(patch, heard, self._info)
         self.take(self._loud)
 
     # What is played
@@ -111,7 +116,7 @@ class InstrumentPlayer:
         return wheeled(self.patch, self.compiled.wheel[0], "body.", "room.")
 
     @property
-    def controllers(self) -> list[Event]:
+    def at_hand(self) -> list[Event]:
         """The events that bring wheels and pedals of a new player where they stand."""
         found: list[Event] = []
         for number in range(of.CHANNELS):
@@ -148,7 +153,7 @@ class InstrumentPlayer:
             ValueError: the tuning is impossible.
         """
         heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        return LoudKeys(patch, heard, self._grid_points, self._loud if nearly else None)
+        return LoudKeys(patch, heard, self._info, self._loud if nearly else None)
 
     def take(self, loud: LoudKeys, frame: int = 0) -> None:
         """Plays these keys from a frame on; strings that ring glide to them.
@@ -156,17 +161,17 @@ class InstrumentPlayer:
         Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
         """
         with self._lock:
-            before = self._table
+            before = self.table
             if before is None or is_another(loud.patch, self._loud.patch):
                 self._instrument += 1
             self._serial += 1
-            self._loud, self._table = (
+            self._loud, self.table = (
                 loud,
                 table_of(
-                    loud, self._grid_points, self._sources, self._programs, self._serial, self._instrument, before
+                    loud, self.grid_points, self._sources, self._programs, self._serial, self._instrument, before
                 ),
             )
-            self.compiled.take(self._table, frame)
+            self.compiled.take(self.table, frame)
 
     def prepare(self, keys: Sequence[int] | None = None) -> None:
         """Computes the gains of keys, so that a strike need not. None: all keys of the patch."""
@@ -179,14 +184,14 @@ class InstrumentPlayer:
                     continue  # raised again when it is struck
 
     def _fill(self, key: int, string: int | None) -> None:
-        table, loud = self._table, self._loud
+        table, loud = self.table, self._loud
         assert table is not None
         fill_gain(table, loud, key, string)
 
     # Events
 
     def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
-        """Hands an event over; its number, which the reports of a note carry.
+        """Hands an event over; its number, which the reports of a note carry. 0 for a pluck at a place: no key's.
 
         Args:
             frame: of the mixer, at which it counts: a note begins with it, all else within a quantum after it. 0: at
@@ -198,6 +203,8 @@ class InstrumentPlayer:
         """
         if isinstance(event, PatchTurned):
             self.take(self.loud_keys(event.patch), frame)
+            return 0
+        if isinstance(event, PluckAt):
             return 0
         if isinstance(event, NoteOn) and event.velocity > 0:
             self._make_ready(event)

@@ -58,13 +58,15 @@ def body_problem(patch: Patch) -> str:
 def channels_of(patch: Patch, wheeled: bool = False) -> int:
     """How many channels a patch sounds in: 2 with two listening points, a room, or a body of two channels, else 1.
 
+    All of the engine's bodies have two.
+
     Args:
         wheeled: whether the modulation wheel is moved, which may bring in body or room.
     """
     if wheeled and patch.mod_wheel in ("body.mix", "room.mix"):
         patch = patch.with_value(patch.mod_wheel, 1.0)
     body = _body(patch.body)[0]
-    wide = body is not None and body.impulse is not None and body.impulse.samples.shape[1] == 2
+    wide = body is not None and (body.impulse is None or body.impulse.samples.shape[1] == 2)
     return 2 if len(patch.pickup.points) == 2 or patch.room.mix > 0 or wide else 1
 
 

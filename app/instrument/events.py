@@ -32,7 +32,7 @@ class NoteOn:
 
 @dataclass(frozen=True)
 class NoteOff:
-    """A key is let go."""
+    """A key is released."""
 
     key: int
     channel: int = 0
@@ -75,7 +75,7 @@ def fixed_function(number: int) -> str:
 
 
 def moves_effects(event: object, patch: Patch) -> bool:
-    """Whether it changes the body or the room of what is heard of a patch."""
+    """Whether it changes a patch's body or room."""
     if isinstance(event, Controller):
         return event.number in (MOD_WHEEL, RESET) and patch.mod_wheel.startswith(("body.", "room."))
     return isinstance(event, PatchTurned)
@@ -99,7 +99,7 @@ def let_go(channels: Iterable[int]) -> list[Event]:
 
 
 def still_down(events: Iterable[Event]) -> list[Event]:
-    """What lets go the keys that are down and the pedals after these events."""
+    """The events that release the keys and pedals that are down after these events."""
     down: dict[NoteOff | Controller, None] = {}  # in their order
     for event in events:
         if isinstance(event, NoteOn | NoteOff):

@@ -14,7 +14,7 @@ from engine.resonators.family import BRIGHT_HZ, inharmonicity
 from engine.resonators.string import StringParameters
 
 HALVINGS = 40  # of a knob's range, until it stands at a wanted figure
-SLOWEST = 1e-9  # decay rate in 1/s, of which a string without damping is told
+SLOWEST = 1e-9  # decay rate in 1/s, shown for a string without damping
 
 
 @dataclass(frozen=True)

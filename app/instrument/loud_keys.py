@@ -11,6 +11,7 @@ from app.instrument.loudness import HIGHEST_PEAK_DB, REFERENCE_VELOCITY, gain_of
 from app.instrument.strings import KeyString, Strings
 from app.patches.patch import Patch
 from engine.pluck import LARGEST_AMPLITUDE_MM, Pluck
+from engine.presets import PresetInfo
 from engine.resonators.base import Resonator
 from engine.voices import Ear
 
@@ -25,7 +26,7 @@ class LoudKey:
 
 
 class LoudKeys:
-    """Of one patch, heard at `ear`, on a model's grid. A soloed mode is as loud as it is in the whole note.
+    """Of one patch, heard at `ear`, played by a preset. A soloed mode is as loud as it is in the whole note.
 
     What all keys share is computed when it is made, in up to 40 ms: the body's response, and how far peaks are too
     high. Each key takes half a millisecond more.
@@ -34,10 +35,10 @@ class LoudKeys:
         near: keys of nearly the same patch, of which both are taken instead, in no time.
     """
 
-    def __init__(self, patch: Patch, ear: Ear, grid_points: int, near: LoudKeys | None = None) -> None:
+    def __init__(self, patch: Patch, ear: Ear, preset: PresetInfo, near: LoudKeys | None = None) -> None:
         """Raises ValueError: the tuning is impossible."""
         self.patch, self.ear = patch, ear
-        self._whole, self._grid_points = replace(ear, solo=0), grid_points
+        self._whole, self._preset = replace(ear, solo=0), preset
         self.strings = Strings(patch)
         self._response: Response | None = body_response(patch) if near is None else near._response
         self._over_db: float = self._peaks_over_db() if near is None else near._over_db
@@ -67,7 +68,7 @@ class LoudKeys:
         low, high = self.patch.range
         peaks_db = []
         for key in {low + round(share * (high - low)) for share in LOOKED_AT}:
-            with contextlib.suppress(ValueError):  # told when it is struck
+            with contextlib.suppress(ValueError):  # reported when it is struck
                 if (found := self._alone(key)) is not None:
                     pluck = self._pluck(found.string)
                     peak = peak_db(found.resonator, pluck, self._whole, self._response)
@@ -79,8 +80,7 @@ class LoudKeys:
         string = self.strings.of_key(key, number)
         if string is None:
             return None
-        modes = min(string.modes, self._grid_points - 2)
-        resonator = string.parameters.resonator(modes, grid_points=self._grid_points)
+        resonator = self._preset.resonator_of(string.parameters, self._preset.modes_of(string.modes))
         return LoudKey(string, resonator, gain_of(resonator, self._pluck(string), self._whole, self._response))
 
     def _pluck(self, string: KeyString) -> Pluck:

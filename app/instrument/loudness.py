@@ -18,7 +18,7 @@ from engine.resonators.base import Resonator
 from engine.voices import Ear
 
 PART_S = 0.4  # of the note: a loudness meter's block
-# The level of a note at REFERENCE_VELOCITY. Six such notes of the classical guitar, strummed, peak at -9 dBFS.
+# The level of a note at REFERENCE_VELOCITY. Six such notes of the classical guitar, strummed, peak at -5 dBFS.
 WANTED_DB = -24.0
 HIGHEST_PEAK_DB = WANTED_DB + 15.0  # of such a note of any key
 PEAK_BLOCKS = 54  # blocks of 54 frames: 60 ms
@@ -76,7 +76,7 @@ def peak_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | N
     sounds = []
     for point in amplitudes.T:
         turned = ((begins * point) @ within.T).ravel()
-        sound = turned.real if ear.pickup == "displacement" else turned.imag
+        sound = turned.imag if ear.pickup == "velocity" else turned.real
         if response is not None:
             frames, impulse = len(sound), response.impulse[: len(sound)]  # later ones are heard after it
             points = 2 ** math.ceil(math.log2(frames + len(impulse)))
@@ -91,7 +91,7 @@ def _heard(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """The amplitudes of the partials as heard, (modes, points), re full scale; σ and ω in 1/s, (modes,)."""
     q = resonator.to_modes(pluck.displacement(resonator.points)).numpy()
-    weights = (resonator.shapes @ ear.weights(resonator.points)).numpy() / FULL_SCALE_M
+    weights = (resonator.shapes @ ear.weights(resonator.points, resonator.force_weights)).numpy() / FULL_SCALE_M
     sigma, omega = resonator.sigma.numpy(), resonator.omega.numpy()
     if ear.pickup == "velocity":
         weights = weights * omega[:, None] * (FULL_SCALE_M / FULL_SCALE_M_S)

@@ -44,7 +44,7 @@ def checked_chunks(file: bytes, most: int) -> bytes:
 
 
 def _walk(raw: bytearray, place: int, end: int, left: int) -> int:
-    """Goes through the messages of one track, and renames meta messages but for tempo and end.
+    """Goes through the messages of one track, and renames meta messages except tempo and end.
 
     Returns how many of the messages that are allowed are left.
     """

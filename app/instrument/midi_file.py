@@ -165,7 +165,7 @@ def _silent(patch: Patch, keys: Sequence[int]) -> int:
     """For how many of these keys a patch has no string."""
     strings, known = Strings(patch), dict.fromkeys(keys, False)
     for key in known:
-        with contextlib.suppress(ValueError):  # an impossible string is told when it is struck
+        with contextlib.suppress(ValueError):  # an impossible string is reported when it is struck
             known[key] = strings.of_key(key) is None
     return sum(known[key] for key in keys)
 

@@ -20,6 +20,7 @@ from app.instrument.events import (
     TimedEvent,
     moves_effects,
 )
+from app.instrument.player import Player, Struck
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.layout import AHEAD, QUANTUM
@@ -29,6 +30,7 @@ from engine.voices import Mixer
 BLOCK_FRAMES = 4_096
 LONGEST_TAIL_S = 60.0
 SILENT_DB = -90.0  # re full scale: after the last event it ends where the peak of a block is lower
+STOLEN_S = 0.03
 MOST_RINGING = 96  # where more strings ring, the oldest fade out
 
 
@@ -58,15 +60,54 @@ class _Stage:
         return self.mixer.render(frames)
 
     def _set_effects(self) -> None:
-        effects = None if self._dry else effects_of(self.player.heard_through)
+        effects = None if self._dry else effects_of(self._heard_through())
         self.mixer.set_effects(effects)
         if effects is not None:
             self.tail_s = max(self.tail_s, effects.tail_s(self.mixer.rate_hz))
+
+    def _heard_through(self) -> Patch:
+        return self.player.heard_through
 
     @property
     def silent(self) -> bool:
         """Whether nothing rings any more."""
         return not self.mixer.active
+
+
+class _VoicedStage(_Stage):
+    """The same for a string learned from a recording, whose modes the compiled player does not compute."""
+
+    def __init__(self, patch: Patch, preset: Preset, rate_hz: int, gains: Mapping[str, float], limited: bool) -> None:
+        self.mixer = Mixer(rate_hz, limited=limited)
+        self._gains = gains
+        self._struck: list[Struck] = []
+        self.voiced = Player(patch, preset, rate_hz, self._take, tuple(gains))
+        self._dry = len(gains) > 1
+        self.tail_s = 0.0
+        self._set_effects()
+
+    def _take(self, struck: Struck) -> None:
+        self._struck = [each for each in self._struck if not each.over]
+        for each in self._struck[: max(0, len(self._struck) + 1 - MOST_RINGING)]:
+            for voice in each.voices.values():
+                voice.release(STOLEN_S)
+        for source, voice in struck.voices.items():
+            voice.start_with_gain(self._gains[source] * struck.gain)
+        self._struck.append(struck)
+        self.mixer.add(*struck.voices.values())
+
+    def handle(self, event: Event, frame: int) -> None:
+        self.voiced.handle(event, frame)
+        if moves_effects(event, self.voiced.patch):
+            self._set_effects()
+
+    def _heard_through(self) -> Patch:
+        return self.voiced.heard_through
+
+    @property
+    def silent(self) -> bool:
+        self.mixer.forget_ended()
+        return not self.mixer.voices
 
 
 def render_events(
@@ -93,7 +134,8 @@ def render_events(
     Raises:
         ValueError: a key has no possible string, or there is no such `source`.
     """
-    stage = _Stage(patch, preset, rate_hz, _gains(source, difference_gain_db), limited)
+    kind = _Stage if preset.info.recorded is None else _VoicedStage
+    stage = kind(patch, preset, rate_hz, _gains(source, difference_gain_db), limited)
     channels = channels_played(patch, timed)
     skipped = AHEAD if limited else 0  # the delay of the limiter
     done, events = 0, sorted(timed, key=lambda each: each.time_s)

@@ -27,7 +27,7 @@ from app.patches.patch import Patch, StringSet
 from app.shared.parameters import OF_PATCHES
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
-from engine.presets import Preset
+from engine.presets import Preset, PresetInfo
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
 from engine.voices import Ear, Program, Voice
@@ -73,6 +73,7 @@ class Struck:
         gain: the factor of its voices.
         voices: by source.
         parameters: of the string, with bends, slides, dampers and knobs.
+        preset: that gives its modes.
         begin_frame: of the mixer, for which it was struck; 0: at once.
         held: whether the key is down.
         kept: whether it was released while the pedal was down.
@@ -88,6 +89,7 @@ class Struck:
     gain: float
     voices: dict[str, Voice]
     parameters: StringParameters
+    preset: PresetInfo
     begin_frame: int = 0
     held: bool = True
     kept: bool = False
@@ -106,15 +108,7 @@ class Struck:
 
     def retune(self, parameters: StringParameters, seconds: float, frame: int = 0) -> None:
         """Lets the voices glide to the modes of other parameters, from a frame on. Any thread; the latest counts."""
-        own = self.key.resonator
-        modes = own.modes
-        resonator = replace(
-            own,
-            omega=parameters.undamped_frequencies(modes),
-            sigma=parameters.decay_rates(modes),
-            coupling=parameters.tension_coupling(modes) if own.tension_modulated else own.coupling,
-            stretch=parameters.wavenumbers(modes).square(),
-        )
+        resonator = self.preset.retuned(self.key.resonator, parameters)
         with self.retuning:
             self.parameters = parameters
             for voice in self.voices.values():
@@ -205,7 +199,7 @@ class Player:
             nearly: whether body and peaks may be those of the present patch, for which it takes no time.
         """
         heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        return LoudKeys(patch, heard, self._model.configuration.grid_points, self._keys if nearly else None)
+        return LoudKeys(patch, heard, self._preset.info, self._keys if nearly else None)
 
     def take(self, keys: LoudKeys) -> None:
         """Plays these keys from now on; strings that ring follow with `glide`."""
@@ -375,7 +369,9 @@ class Player:
         for voice in voices.values():
             voice.begin_at(self._frame)
         own = key.string.parameters
-        struck = Struck(place, string, event, key, pluck, self._ear, key.gain, voices, own, self._frame)
+        struck = Struck(
+            place, string, event, key, pluck, self._ear, key.gain, voices, own, self._preset.info, self._frame
+        )
         parameters = self._with_hands(struck)
         if parameters != own:
             struck.retune(parameters, 0.0)
@@ -464,7 +460,7 @@ class Player:
         return struck.string if self._patch.mode == "guitar" else None
 
     def _ratio(self, struck: Struck) -> float:
-        """The factor by which pitch wheels raise its frequency."""
+        """The factor of pitch wheels on its frequency."""
         return float(2 ** (self._hands.semitones(self._patch, struck.event.channel) / 12))
 
     def _pluck(self, event: NoteOn) -> Pluck:

@@ -107,7 +107,7 @@ def fretting(strings: StringSet, key: int) -> list[int]:
 
 
 def turned(string: StringParameters, knobs: Knobs) -> StringParameters:
-    """The string with a patch's multipliers: pitch and decay rates stay, but for what bending and d₃ have in them.
+    """The string with a patch's multipliers: pitch and decay rates stay, except for the parts of bending and d₃.
 
     The tension follows the mass and the square of the length, the damping the mass.
     """

@@ -25,7 +25,12 @@ VALUES = (
     "bend_semitones",
 )
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
-SHAPES = {"gaussian": of.GAUSSIAN, "triangular": of.TRIANGULAR, "raised_cosine": of.RAISED_COSINE}
+SHAPES = {
+    "gaussian": of.GAUSSIAN,
+    "triangular": of.TRIANGULAR,
+    "raised_cosine": of.RAISED_COSINE,
+    "rounded": of.ROUNDED,
+}
 BENDS = {"tension": of.BY_TENSION, "length": of.BY_LENGTH}
 SOURCES = ("model", "truth")
 GOALS = 8  # values that are tried for a wheel all the way up
@@ -86,7 +91,8 @@ def table_of(
     counts[of.TABLE_SHAPE], counts[of.TABLE_STOPS] = SHAPES[patch.pluck.shape], patch.pluck.stops
     counts[of.TABLE_LET_RING] = patch.damping.let_ring
     counts[of.TABLE_POINTS], counts[of.TABLE_VELOCITY] = len(ear.points), ear.pickup == "velocity"
-    memory[of.TABLE_POINT : of.TABLE_POINT + len(ear.points)] = ear.points
+    points = [of.BRIDGE] * len(ear.points) if ear.pickup == "bridge" else ear.points
+    memory[of.TABLE_POINT : of.TABLE_POINT + len(points)] = points
     counts[of.TABLE_SOLO], counts[of.TABLE_GRID] = ear.solo, grid_points
     goal = wheel_goal(patch) if patch.mod_wheel in VALUES else None
     counts[of.TABLE_WHEEL] = -1 if goal is None else VALUES.index(patch.mod_wheel)

@@ -177,7 +177,7 @@ class PluckChoices(_Value):
     """How a key plucks its string. Widths are as in `engine.pluck.Pluck`; a triangle has none.
 
     Attributes:
-        width, width_hard: of the softest and of the hardest pluck.
+        width, width_hard: of the softest and of the hardest pluck; between them a step of velocity is a ratio.
         softest_mm, hardest_mm: amplitudes of velocity 1 and 127; between them a step of velocity is a step in dB.
         curve: 0 is even; towards 1 the middle velocities are louder, towards -1 softer.
         stops: whether what plucks a string that rings stops it first, as a finger or a plectrum does. Otherwise the
@@ -207,7 +207,7 @@ class PluckChoices(_Value):
             self.position,
             self.softest_mm * (self.hardest_mm / self.softest_mm) ** share,
             self.shape,
-            self.width + (self.width_hard - self.width) * share,
+            self.width * (self.width_hard / self.width) ** share,
         )
 
 

@@ -1,7 +1,7 @@
 """Models that are no compiled voice: their samples are rendered ahead of the playhead, by one thread.
 
 A model that renders slower than it sounds begins only when the rest will be ready in time. Where a voice has no
-samples it pauses by itself; the others go on.
+samples it pauses by itself; the others continue.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ class AheadVoice:
 
     @property
     def lead_s(self) -> float:
-        """How far the rendering is ahead of what is heard."""
+        """How far the rendering is ahead of playback."""
         return self.rendered_s - (self.voice.seconds if self.begun else -1.0)
 
     def advance(self) -> None:

@@ -153,7 +153,7 @@ class Keys:
         struck, player = self._struck, self._player
         if struck is None or struck.key.string.parameters != string:
             return 1.0
-        with contextlib.suppress(ValueError):  # told when it is struck
+        with contextlib.suppress(ValueError):  # reported when it is struck
             return struck.gain if player is None else player.gain_of(struck)
         return struck.gain
 

@@ -68,7 +68,7 @@ class Levels:
         subject, ear = note.subject(source), note.request.ear
         program = self._sources.program(subject, source, rate_hz)
         if program.rendered:
-            return note.voices[source].level_of_samples(seconds) if ear.pickup == "displacement" else 0.0
+            return note.voices[source].level_of_samples(seconds) if ear.pickup != "velocity" else 0.0
         mixer = Mixer(rate_hz, limited=False)
         initial_m, begin = self._sources.begin(subject, source, rate_hz, note.request.pluck)
         mixer.add(Voice(program, initial_m, ear, begin=begin))

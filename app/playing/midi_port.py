@@ -16,7 +16,7 @@ class MidiInput:
 
     Args:
         on_message: is called with what comes, in the input's thread.
-        on_let_go: is called with what lets go what came, in the thread of `let_go`, `close` or `open`.
+        on_let_go: is called with the events that release what came, in the thread of `let_go`, `close` or `open`.
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class MidiInput:
             raise MidiUnavailable(f"The system's MIDI does not answer ({error}).") from error
 
     def open(self, name: str) -> None:
-        """Opens the input of that name, and closes any other, whose keys are let go.
+        """Opens the input of that name, and closes any other, whose keys are released.
 
         Raises:
             MidiUnavailable: no backend, no such input, or another program has it.
@@ -70,7 +70,7 @@ class MidiInput:
         self.let_go()
 
     def let_go(self) -> None:
-        """Lets go the keys that are held through the input, and leaves its wheels and pedals at rest."""
+        """Releases the keys that are held through the input, and leaves its wheels and pedals at rest."""
         channels, self._channels = self._channels, set()
         for event in let_go(channels):
             self._on_let_go(event)
@@ -88,7 +88,7 @@ class MidiInput:
 
 
 def same_device(one: str, other: str) -> bool:
-    """Whether two names are the same but for ALSA's numbers, which change with each connection ("Keys:Keys 20:0")."""
+    """Whether two names differ in ALSA's numbers alone, which change with each connection ("Keys:Keys 20:0")."""
     return _without_numbers(one) == _without_numbers(other)
 
 

@@ -29,7 +29,7 @@ class Note:
         ahead: those of its voices that are rendered ahead.
         match: by source, the factor that brings it to the level of the truth; None until it is known.
         pending: it was not handed to a mixer yet.
-        released: it was told to fade out.
+        released: whether it was asked to fade out.
         mixer: to which it was handed.
         cut: it is not heard any more: its mixer was replaced, or it could not be played.
     """

@@ -48,7 +48,7 @@ REPLACED_S = 0.02  # the fade of notes that another replaces
 BUSY = 0.75  # load of the device: above it the oldest notes end, so that the others have no gaps
 LEAST_RELIEF = 2  # notes that end then, at each look at the load
 MOST_CARRIED = 4  # notes that ring on when the device changes its rate
-LOOP_AHEAD_S = 0.5  # by which the next turn of a loop is handed to the mixer early
+LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the mixer
 
 Report = Callable[[str, str], None]  # a message and its details
 
@@ -124,7 +124,7 @@ class Notes:
             self._chosen = request
 
     def set_monitor(self, monitor: Monitor) -> None:
-        """Sets what is heard of all notes; those that ring are cross-faded."""
+        """Sets the sources of all notes; those that ring are cross-faded."""
         with self._lock:
             self._monitor = monitor
             notes = list(self._notes)
@@ -388,7 +388,7 @@ class Notes:
             self._skip(note)
             if self._hand_over(note, mixer):
                 return
-            note.begin_frame = 0  # another mixer counts anew
+            note.begin_frame = 0  # another mixer counts again
 
     def _skip(self, note: Note) -> None:
         if note.from_s > 0:
@@ -418,7 +418,7 @@ class Notes:
                     voice,
                     model,
                     initial_m,
-                    asked.ear.weights(model.grid_points),
+                    program.grid_weights(asked.ear),
                     (subject, asked.pluck, asked.ear.points, asked.ear.solo, asked.seconds),
                     lambda: self._rendered_enough(note, ahead, struck_s),
                     lambda error: self._cannot_render(note, error),

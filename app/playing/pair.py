@@ -31,7 +31,7 @@ class Pair:
             voice.set_gain(float(each == name))
 
     def play(self, anew: bool = False) -> None:
-        """Starts both where nothing sounds, or `anew`; otherwise they go on."""
+        """Starts both where nothing sounds, or `again`; otherwise they continue."""
         if self._voices and not anew:
             return
         self.stop()

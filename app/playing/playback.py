@@ -11,7 +11,7 @@ from app.instrument.events import Event, TimedEvent, channels_in, let_go
 from app.playing.due import Due
 from engine.voices import Mixer
 
-AHEAD_S = 0.05  # by which an event is handed over early, and by the device's buffer: so late the thread may be
+AHEAD_S = 0.05  # lead of a handed-over event, besides the device's buffer: so late the thread may be
 LOOK_S = 0.05  # between two looks at the mixer, at most: it may be another
 JOIN_S = 2.0
 
@@ -93,7 +93,7 @@ class Playback:
 
 
 class _Beginning:
-    """The frame at which a list of events begins; if there is another mixer, it goes on in that one."""
+    """The frame at which a list of events begins; if there is another mixer, it continues in that one."""
 
     def __init__(self, clock: Clock, ahead_s: float) -> None:
         self._clock, self._mixer = clock, clock.mixer

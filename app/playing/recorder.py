@@ -63,7 +63,7 @@ class EventRecorder:
     def end(self) -> list[TimedEvent]:
         """The events, with times in s from the first note on; empty where there was no note.
 
-        Keys that are down and pedals are let go at its end.
+        Keys and pedals that are down are released at its end.
         """
         with self._lock:
             recorded, self._recorded = self._recorded or [], None

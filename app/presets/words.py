@@ -21,7 +21,7 @@ _MODELS = {
 
 
 def model_word(model: str) -> str:
-    """The name by which a model is shown; its key in `MODELS` where it has no name here."""
+    """The name that a model is shown with; its key in `MODELS` where it has no name here."""
     return _MODELS.get(model, (model, ""))[0]
 
 

@@ -19,7 +19,7 @@ from engine.voices import Ear, OfflineVoice, Program
 FIRST_FRAMES = 2_048  # of a compiled voice; blocks double from this length
 BLOCK_FRAMES = 32_768  # up to this one
 RENDERED_FRAMES = 2_048  # a block of any other voice
-BEHIND = 4 * QUANTUM  # frames at most by which a voice that is given its samples reads ahead
+BEHIND = 4 * QUANTUM  # frames that a voice with given samples reads ahead at most
 MIRRORED = 2 * REACH + 2 * QUANTUM  # samples added after the end, which the differentiator of a velocity reads
 
 
@@ -46,7 +46,7 @@ class Listening:
         seconds = (signal.frames + MIRRORED) / signal.rate_hz if program.rendered else 0.0
         self._offline = OfflineVoice(program, initial_m[0], ear, seconds, signal.rate_hz)
         self._offline.voice.begin_at_once()
-        self._weights = ear.weights(initial_m.shape[1])
+        self._weights = program.grid_weights(ear)
         self._given = 0  # samples that the voice was given
         self._last = np.zeros((0, len(ear.points)), np.float32)  # the last of them
         self._state: SourceState | None = None

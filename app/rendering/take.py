@@ -1,6 +1,6 @@
 """A take: one pluck as pictures and signals, which grow while it is rendered.
 
-Each source has a *motion*, the string as a series of pictures, and a *signal*, what is heard of it at the present
+Each source has a *motion*, the string as a series of pictures, and a *signal*, its sound at the present
 listening points, sample by sample. One thread appends and any thread reads: values are written first, then the count
 of what is ready is raised, and values below it never change.
 """
@@ -65,7 +65,7 @@ class Series:
 
 
 class Signal(Series):
-    """What is heard of a source at the listening points, in m or m/s, at the source's own rate."""
+    """The signal of a source at the listening points, in m or m/s, at the source's own rate."""
 
     rate_hz: int
 

@@ -91,7 +91,7 @@ class RenderWorker:
             except PresetError as error:
                 job = None
                 self._listener.render_failed(str(error), "")
-            except Exception as error:  # reported to the user; the worker goes on
+            except Exception as error:  # reported to the user; the worker continues
                 job = None
                 self._listener.render_failed(f"Rendering failed: {error}", traceback.format_exc())
 

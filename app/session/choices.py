@@ -156,7 +156,7 @@ class Session:
     every change, `played` just before it where a note has brought the change (`play`), so that undo can leave it out.
 
     While a patch is played, its pick-up is what `listen`, `listen_right`, `stereo` and `pickup` say: whichever of the
-    two changes, the other follows, so that what is heard is what is saved, recorded and exported.
+    two changes, the other follows, so that the sound is also saved, recorded and exported so.
     """
 
     changed = Signal(frozenset)
@@ -214,7 +214,7 @@ class Session:
         self.update(listen=OF_CHOICES["listen"].clamped(listen))
 
     def switch_source(self) -> None:
-        """Switches what is heard from slot A to slot B, or back."""
+        """Switches the sound from slot A to slot B, or back."""
         self.update(heard="b" if self._choices.heard == "a" else "a")
 
 

@@ -10,8 +10,7 @@ from app.session.choices import Choices
 from app.session.monitor import Monitor
 from app.session.slots import source_title
 from app.shared.vocabulary import DIFFERENCE
-from engine.pluck import FULL_SCALE_M_S
-from engine.sources import FULL_SCALE_M
+from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N
 
 LEGEND_FIELDS = {*Monitor.model_fields, "solo", "stereo"}  # of `Choices`: what legends depend on
 _PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))  # factor from the SI unit, name
@@ -70,13 +69,14 @@ def part_words(choices: Choices) -> str:
 
 
 def full_scale_words(choices: Choices) -> str:
-    """Which displacement, or velocity, 0 dB stands for."""
-    return f"{FULL_SCALE_M_S:g} m/s" if choices.pickup == "velocity" else f"{1000 * FULL_SCALE_M:g} mm"
+    """Which displacement, velocity or force 0 dB stands for."""
+    words = {"displacement": f"{1000 * FULL_SCALE_M:g} mm", "velocity": f"{FULL_SCALE_M_S:g} m/s"}
+    return words.get(choices.pickup, f"{FULL_SCALE_N:g} N")
 
 
 def readable_unit(peak: float, pickup: str) -> tuple[float, str]:
-    """Factor and name of a unit in which `peak`, in m or m/s, has few digits; mm and smaller for a displacement."""
-    unit = "m/s" if pickup == "velocity" else "m"
-    prefixes = _PREFIXES if pickup == "velocity" else _PREFIXES[1:]
+    """Factor and name of a unit in which `peak`, in m, m/s or N, has few digits; mm or smaller for displacement."""
+    unit = {"displacement": "m", "velocity": "m/s"}.get(pickup, "N")
+    prefixes = _PREFIXES[1:] if pickup == "displacement" else _PREFIXES
     factor, prefix = next((pair for pair in prefixes if peak * pair[0] >= 0.1), prefixes[-1] if peak else prefixes[0])
     return factor, prefix + unit

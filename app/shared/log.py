@@ -43,7 +43,7 @@ def faults_logged(told: Callable[[str], None]) -> Iterator[None]:
     A log that cannot be opened is done without.
 
     Args:
-        told: called with the text of each of them, in the thread where it was raised.
+        `told`: called with the text of each of them, in the thread where it was raised.
     """
     handler = _open(log_file())
     before = sys.excepthook, threading.excepthook

@@ -6,8 +6,9 @@ from typing import Literal, get_args
 
 Source = Literal["model", "truth", "difference", "both"]
 PlayedSource = Literal["model", "truth", "difference"]  # of an instrument
-Pickup = Literal["displacement", "velocity"]
+Pickup = Literal["displacement", "velocity", "bridge"]
 PICKUPS: tuple[Pickup, ...] = get_args(Pickup)
+PICKUP_TITLES: dict[Pickup, str] = {"displacement": "Point", "velocity": "Velocity", "bridge": "Bridge"}
 Bits = Literal["16", "24", "32f"]  # of a WAV's samples; f: floating point
 BITS: tuple[Bits, ...] = get_args(Bits)
 DIFFERENCE_GAIN_RANGE_DB = (0.0, 80.0)

@@ -57,7 +57,7 @@ class Job:
             raise Cancelled
 
     def check(self) -> None:
-        """Returns when the job may go on.
+        """Returns when the job may continue.
 
         Raises:
             Cancelled: see `wait`.
@@ -165,7 +165,7 @@ class Worker:
                 self._say(job, "cancelled")
             except self._expected as error:
                 self._say(job, "failed", str(error), "")
-            except Exception as error:  # shown to the user; the thread goes on
+            except Exception as error:  # shown to the user; the thread continues
                 self._say(job, "failed", f"Computing failed: {error}", traceback.format_exc())
             result = None
             del job, work  # they may hold a take

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QWidget
 from app.shared.log import log_file
 from app.views.dialogs.fault_dialog import FaultDialog
 
-UNEXPECTED = "An unexpected error. Sound and picture may go on; if they do not, restart the program."
+UNEXPECTED = "An unexpected error. Sound and picture may continue; if they do not, restart the program."
 
 
 class Faults(QObject):

@@ -96,7 +96,7 @@ class PatchDesk(QObject):
         self.desk.told.connect(self.told)
         self._shown_s = 0.0
         self._noted: Patch | None = None  # the patch, when the note in the bar was judged last
-        self._told_other = ""  # the source that the user was told is not heard from keys
+        self._told_other = ""  # the source that a notice reported as not heard from keys
         self._playback = Playback(instruments.play, performance.notes, performance.notes.cancel)
         self._note_timer = QTimer(self, interval=NOTE_TOLD_AFTER_MS, singleShot=True)
         self._note_timer.timeout.connect(self._show_latest_note)

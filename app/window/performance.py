@@ -176,16 +176,17 @@ class Performance(QObject):
         elif names & Listener.model_fields.keys():
             self.notes.listen(choices.ear)
         asked = request_of(choices, self._library)
-        self.notes.choose(asked)
         if names & PLACED and not (choices.plays_patch or entry is None or asked is None):
             plucks = [replace(asked.pluck, position=place) for place in Reach.of(entry.info).row]
             self.notes.prepare_plucks(asked.preset, plucks)
         if "loop" in names and not choices.loop:
             self._forget_turn()
-        if asked is not None and asked != self._asked:
+        if asked != self._asked:  # else an event may have chosen another pluck, which the session takes later
             self._asked = asked
-            self.notes.prepare(asked.preset, *asked.others)
-            self._worker.submit(asked)
+            self.notes.choose(asked)
+            if asked is not None:
+                self.notes.prepare(asked.preset, *asked.others)
+                self._worker.submit(asked)
         self.follow()
 
     def play_preset(self, name: str) -> None:
@@ -201,7 +202,7 @@ class Performance(QObject):
         """Lets keys play this patch until another is chosen; None: the chosen one. The choices stay."""
         choices = self._session.choices
         if patch is not None:
-            choices = choices.changed({"instrument": patch})
+            choices = choices.changed({"patch": patch})
         self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
 
     def through(self, choices: Choices) -> Through | None:
@@ -230,7 +231,7 @@ class Performance(QObject):
     # Sixty times a second
 
     def tick(self) -> None:
-        """Forgets notes that ended, goes on with the loop, and updates the header."""
+        """Forgets notes that ended, continues with the loop, and updates the header."""
         self.notes.poll()
         if self._session.choices.loop:
             self._turn()

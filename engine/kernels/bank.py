@@ -307,7 +307,7 @@ def generate(
     """The next quantum, (4, QUANTUM): two sets of weights, the second where `fading`, at two points.
 
     Args:
-        heard: otherwise only time goes on.
+        heard: otherwise only time advances.
     """
     whole = program.view(np.int64)
     counts = voice.view(np.int64)

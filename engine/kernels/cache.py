@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept, and whether all of them are there; told without loading the compiler."""
+"""Where compiled kernels are kept, and whether all of them are there, found without loading the compiler."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ _SHARE = -(-(at.WINDOW + 1) // _SUMMING)  # frequencies in each
 
 @njit(**COMPILED)
 def convolve(mixer: np.ndarray) -> None:
-    """Replaces the mix, (QUANTUM, 2), by what is heard of it. Without a response it is left as it is."""
+    """Replaces the mix, (QUANTUM, 2), by its sound with the response. Without a response it is left as it is."""
     counts = mixer.view(np.int64)
     if counts[at.M_EFFECTS] == 0 and counts[at.M_EFFECTS_NOW] == 0 and counts[at.M_EFFECTS_NEXT] == 0:
         return
@@ -79,7 +79,7 @@ def _clean(counts: np.ndarray, mix: np.ndarray) -> bool:
 
 @njit(**COMPILED)
 def _exchange(counts: np.ndarray, whole: np.ndarray) -> None:
-    """Goes on with a change of the response, or begins one; it is made at once where nothing is heard of it."""
+    """Continues with a change of the response, or begins one; it is made at once where it is inaudible."""
     if whole[at.C_STEP] >= 0:
         whole[at.C_STEP] += 1
         if whole[at.C_STEP] <= whole[at.C_FADE_WINDOWS]:
@@ -276,7 +276,7 @@ def _transform(convolver: np.ndarray, re: np.ndarray, im: np.ndarray, re2: np.nd
 
 @njit(**COMPILED)
 def _mix(convolver: np.ndarray, whole: np.ndarray, mix: np.ndarray, wet_now: bool, wet_next: bool) -> None:
-    """What is heard: a lane, or the way from one to the other; a lane without a response is the mix itself."""
+    """The output: a lane, or the fade from one to the other; a lane without a response is the mix itself."""
     step, lane = whole[at.C_STEP], whole[at.C_LANE]
     now, following = at.C_WET + lane * 2 * at.QUANTUM, at.C_WET + (1 - lane) * 2 * at.QUANTUM
     done = (step - 1) * at.WINDOW + whole[at.C_PHASE] * at.QUANTUM

@@ -1,6 +1,6 @@
 """The safety limiter: its gain falls before the peak that it is for, so smoothly that nothing clicks.
 
-What is given waits for `AHEAD` frames. The gain that a frame needs is held for as long (the highest of the last
+The input waits for `AHEAD` frames. The gain that a frame needs is held for as long (the highest of the last
 `AHEAD` + 1 frames, or what is left of an earlier peak by an exponential release) and then averaged over as many
 frames: of the gains averaged each has held what the delayed frame needs, so that their mean is low enough for it.
 The average is two moving averages, one of the other: a triangle of weights, so that the gain has no corners. It

@@ -1,7 +1,7 @@
 """A voice's modes, which may change while it rings: another tension, length or damping.
 
 What they shall be is a block of memory that somebody else wrote; its address is the command. The kernel goes there in
-equal steps, one a quantum, of ω², σ, k and η² (`engine.resonators.base`). Amplitude and speed of each mode go on as
+equal steps, one a quantum, of ω², σ, k and η² (`engine.resonators.base`). Amplitude and speed of each mode stay as
 they are: it is their equation that changes.
 """
 

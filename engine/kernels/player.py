@@ -32,7 +32,14 @@ from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
 from engine.kernels.modes import TOO_HIGH
-from engine.pluck import FULL_SCALE_M, LARGEST_AMPLITUDE_MM, LEAST_PEAK_M, POSITION_RANGE, RUNAWAY_FACTOR
+from engine.pluck import (
+    FULL_SCALE_M,
+    FULL_SCALE_N,
+    LARGEST_AMPLITUDE_MM,
+    LEAST_PEAK_M,
+    POSITION_RANGE,
+    RUNAWAY_FACTOR,
+)
 
 MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the key
 MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
@@ -118,7 +125,7 @@ def _sounds(players: np.ndarray, note: int) -> bool:
 
 @njit(**COMPILED)
 def _rest(player: np.ndarray, players: np.ndarray, number: int, pedal: int, plays: int) -> None:
-    """A channel as if nobody had moved anything on it, but for these."""
+    """A channel as if nobody had moved anything on it, except for these."""
     channel = _channel(number)
     player[channel + of.CHANNEL_BEND] = 0.0
     player[channel + of.CHANNEL_RANGE] = -1.0
@@ -324,7 +331,7 @@ def _pull(
         distance = (x - position) / width
         if shape == of.TRIANGULAR:
             found = peak_m * min(x / position, (1 - x) / (1 - position))
-        elif point == 0 or point == grid - 1:
+        elif point == 0 or point == grid - 1 or shape == of.ROUNDED:
             found = 0.0
         elif shape == of.GAUSSIAN:
             found = peak_m * math.exp(-distance * distance)
@@ -333,6 +340,8 @@ def _pull(
         player[of.PLAYER_PULLED + point] = found
         highest = max(highest, found)
     turn = 2 * (grid - 1)
+    if shape == of.ROUNDED:
+        highest = _round(player, table, grid, position, peak_m, width)
     for mode in range(modes):
         total, place = 0.0, 0
         for point in range(1, grid - 1):
@@ -345,6 +354,27 @@ def _pull(
 
 
 @njit(**COMPILED)
+def _round(player: np.ndarray, table: np.ndarray, grid: int, position: float, peak_m: float, width: float) -> float:
+    """Fills the pulled shape, which is 0, with a rounded triangle, and returns its peak: as `excitation.rounded`."""
+    turn = 2 * (grid - 1)
+    for mode in range(1, grid - 1):
+        half = mode * width / 2
+        spread = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
+        each, place = math.sin(math.pi * mode * position) / (mode * mode) * spread, 0
+        for point in range(1, grid - 1):
+            place += mode
+            if place >= turn:
+                place -= turn
+            player[of.PLAYER_PULLED + point] += each * table[of.TABLE_SINES + place]
+    highest = 0.0
+    for point in range(grid):
+        highest = max(highest, player[of.PLAYER_PULLED + point])
+    for point in range(grid):
+        player[of.PLAYER_PULLED + point] *= peak_m / highest
+    return peak_m
+
+
+@njit(**COMPILED)
 def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: int, note: int) -> None:
     """Sets one of the two sets of weights of a voice for the points of its note; modes too high are not heard."""
     n, solo = players[note + of.NOTE_MODES], players[note + of.NOTE_SOLO]
@@ -354,9 +384,13 @@ def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: in
         omega = math.sqrt(max(strings.omega_squared(own, mode) - sigma * sigma, 0.0))
         for point in range(players[note + of.NOTE_POINTS]):
             first = at.weights(n, which, point, 0) + mode - 1
-            sine = math.sin(math.pi * mode * player[note + of.NOTE_POINT + point])
+            place = player[note + of.NOTE_POINT + point]
+            if place == of.BRIDGE:
+                weight = strings.bridge_force(own, mode) / FULL_SCALE_N
+            else:
+                weight = math.sin(math.pi * mode * place) / FULL_SCALE_M
             heard = omega <= highest and (solo == 0 or solo == mode)
-            voice[first] = sine / FULL_SCALE_M if heard else 0.0
+            voice[first] = weight if heard else 0.0
             voice[first + n] = 0.0
 
 
@@ -379,7 +413,7 @@ def _make_voice(
     velocity: int,
     highest_m: float,
 ) -> None:
-    """A voice of the modes of a note's own string, which is let go at the amplitudes of `_pull`: as `Voice`."""
+    """A voice of the modes of a note's own string, which is released at the amplitudes of `_pull`: as `Voice`."""
     voice, counts, rate_hz, n = _at(address), _whole(address), player[of.PLAYER_RATE], players[note + of.NOTE_MODES]
     for slot in range(at.state(n) + at.TRUTH_ROWS * n):
         voice[slot] = 0.0
@@ -396,11 +430,16 @@ def _make_voice(
     first += at.OMEGA_SQUARED * n
     strings.rows(player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING], n, voice[first : first + 4 * n])
     _weigh(player, players, voice, 0, note)
+    if player[note + of.NOTE_POINT] == of.BRIDGE:
+        largest = 0.0
+        for mode in range(n):
+            largest += abs(player[of.PLAYER_AMPLITUDES + mode] * voice[at.weights(n, 0, 0, 0) + mode])
+        voice[at.LIMIT] = max(voice[at.LIMIT], RUNAWAY_FACTOR * largest)
 
 
 @njit(inline="always", **COMPILED)
 def _release(address: int, frames: int) -> None:
-    """Lets a voice fade out; a release under way goes on."""
+    """Lets a voice fade out; a release under way continues."""
     counts = _whole(address)
     if counts[at.RELEASE] == 0:
         counts[at.RELEASE] = frames
@@ -641,7 +680,7 @@ def _take_out(mixers: np.ndarray, address: int) -> None:
 
 @njit(**COMPILED)
 def _follow(player: np.ndarray, players: np.ndarray, tables: np.ndarray, note: int, before: int) -> None:
-    """A note has the string of the one before, which is stopped, or whose motion goes on in it."""
+    """A note has the string of the one before, which is stopped, or whose motion continues in it."""
     stops = _frames(player, PLUCK_STOPS_S)
     for source in range(of.MOST_SOURCES):
         address, other = players[note + of.NOTE_VOICES + source], players[before + of.NOTE_VOICES + source]
@@ -714,7 +753,7 @@ def _note_on(
         harder = _value(player, players, table, tables, of.HARDEST_MM) / soft
         amplitude_mm = min(soft * harder**share * shortened, LARGEST_AMPLITUDE_MM)
         width = _value(player, players, table, tables, of.WIDTH)
-        width += (_value(player, players, table, tables, of.WIDTH_HARD) - width) * share
+        width *= (_value(player, players, table, tables, of.WIDTH_HARD) / width) ** share
         position, slide = (
             _value(player, players, table, tables, of.POSITION),
             players[_channel(channel) + of.CHANNEL_SLIDE],
@@ -942,7 +981,7 @@ def _cancel(player: np.ndarray, players: np.ndarray, now: int) -> None:
 
 @njit(**COMPILED)
 def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: int) -> None:
-    """Plays an event now. Those of a player without a table do nothing, but for a note, which is refused."""
+    """Plays an event now. Those of a player without a table do nothing, except for a note, which is refused."""
     kind, frame, now = players[event + of.EVENT_KIND], players[event + of.EVENT_FRAME], mixers[at.M_FRAMES]
     channel, key = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
     value, address = player[event + of.EVENT_VALUE], players[of.PLAYER_TABLE]
@@ -1039,6 +1078,16 @@ def _listen(player: np.ndarray, players: np.ndarray, note: int) -> None:
 
 
 @njit(**COMPILED)
+def _superseded(players: np.ndarray, event: int, following: int) -> bool:
+    """Whether an event moves a wheel, and the one that follows it at once moves the same: a burst costs one glide."""
+    kind, key = players[event + of.EVENT_KIND], players[event + of.EVENT_KEY]
+    same = kind == players[following + of.EVENT_KIND] and key == players[following + of.EVENT_KEY]
+    if not same or players[event + of.EVENT_CHANNEL] != players[following + of.EVENT_CHANNEL]:
+        return False
+    return kind == of.BEND or (kind == of.CONTROLLER and key == MOD_WHEEL)
+
+
+@njit(**COMPILED)
 def play(player_address: int, mixer_address: int) -> None:
     """Plays all events that are due in the mixer's next quantum, before it is rendered."""
     player, players, mixers = _at(player_address), _whole(player_address), _whole(mixer_address)
@@ -1046,8 +1095,13 @@ def play(player_address: int, mixer_address: int) -> None:
     fence()
     _tend(player, players, now)
     while players[of.PLAYER_TAKEN] < pushed:
-        event = of.PLAYER_EVENTS + players[of.PLAYER_TAKEN] % of.EVENTS * of.EVENT_SLOTS
-        if players[event + of.EVENT_FRAME] <= now or players[event + of.EVENT_KIND] == of.CANCEL:
+        taken = players[of.PLAYER_TAKEN]
+        event = of.PLAYER_EVENTS + taken % of.EVENTS * of.EVENT_SLOTS
+        following = of.PLAYER_EVENTS + (taken + 1) % of.EVENTS * of.EVENT_SLOTS
+        at_once = taken + 1 < pushed and players[following + of.EVENT_FRAME] <= now
+        if at_once and players[event + of.EVENT_FRAME] <= now and _superseded(players, event, following):
+            pass
+        elif players[event + of.EVENT_FRAME] <= now or players[event + of.EVENT_KIND] == of.CANCEL:
             _handle(player, players, mixers, event)
         elif players[of.PLAYER_QUEUED] < of.QUEUED:
             _queue(players, event)
@@ -1060,8 +1114,12 @@ def play(player_address: int, mixer_address: int) -> None:
         event = of.PLAYER_QUEUE + done * of.EVENT_SLOTS
         if players[event + of.EVENT_FRAME] >= now + at.QUANTUM:
             break
-        _handle(player, players, mixers, event)
         done += 1
+        following = event + of.EVENT_SLOTS
+        frame = players[event + of.EVENT_FRAME]
+        together = done < players[of.PLAYER_QUEUED] and players[following + of.EVENT_FRAME] == frame
+        if not (together and _superseded(players, event, following)):
+            _handle(player, players, mixers, event)
     if done > 0:
         players[of.PLAYER_QUEUED] -= done
         for each in range(players[of.PLAYER_QUEUED] * of.EVENT_SLOTS):

@@ -1,7 +1,7 @@
 """What lies where in what is played: events, an instrument's table, a player with its notes, and its reports.
 
 Flat arrays of eight-byte numbers as in `layout`. A player and a table hold no reference to Python: a table is
-written by whoever prepares it, then handed over by its address, and only read from then on.
+written by the thread that prepares it, then handed over by its address, and only read from then on.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from engine.kernels import layout as at
 
 HIGHEST_HZ = 20_000.0  # of modes: those above are inaudible
 MOST_MODES = 99  # of a key's string: the shipped model's grid holds no more
-MOST_SLACKENED = 5  # keys by which a guitar's string may be tuned lower than the set's
+MOST_SLACKENED = 5  # keys that a guitar's string may be tuned below the set's
 
 # A string: the fields of `StringParameters`, in their order
 LENGTH, AREA, MOMENT, DENSITY, MODULUS, D1, D3, TENSION = range(8)
@@ -41,7 +41,8 @@ EVENT_SLOTS = 16
 
 # Slots of an instrument's table
 POLY, GUITAR, MPE = 0, 1, 2
-GAUSSIAN, TRIANGULAR, RAISED_COSINE = 0, 1, 2
+GAUSSIAN, TRIANGULAR, RAISED_COSINE, ROUNDED = 0, 1, 2, 3
+BRIDGE = -1.0  # a listening point that is none: the force on the end at 0
 BY_TENSION, BY_LENGTH = 0, 1
 KEYS = 128
 GUITAR_STRINGS = 8  # at most, of a guitar that sends MIDI

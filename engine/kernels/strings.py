@@ -1,7 +1,7 @@
 """The string of a key and how a bend, a slide, a damper or a knob changes it, in closed form.
 
 A string is a row of eight numbers, the fields of `StringParameters`. Pitch is that of the first partial of a quiet
-pluck, √(ω₁² - σ₁²)/2π. Without fast mathematics: whoever computes a string again finds the same numbers.
+pluck, √(ω₁² - σ₁²)/2π. Without fast mathematics: computing a string again gives the same numbers.
 """
 
 from __future__ import annotations
@@ -51,6 +51,13 @@ def omega_squared(string: np.ndarray, mode: int) -> float:
     eta = mode * math.pi / string[of.LENGTH]
     squared = eta * eta
     return (string[of.MODULUS] * string[of.MOMENT] * squared * squared + string[of.TENSION] * squared) / mass(string)
+
+
+@njit(**EXACT)
+def bridge_force(string: np.ndarray, mode: int) -> float:
+    """Force of a mode at amplitude 1 m on the end at 0, in N: as `StringParameters.bridge_forces`."""
+    eta = mode * math.pi / string[of.LENGTH]
+    return string[of.TENSION] * eta + string[of.MODULUS] * string[of.MOMENT] * eta**3
 
 
 @njit(**EXACT)

@@ -220,7 +220,7 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
     As `KoopmanTension._set_out`.
 
     Args:
-        bounded: the largest energy is there, and may only fall; otherwise it follows from what is given.
+        bounded: the largest energy is there, and may only fall; otherwise it follows from the input.
     """
     counts = voice.view(np.int64)
     n = counts[at.MODES]
@@ -263,7 +263,7 @@ def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
     if counts[at.PREPARED]:
         physical(voice, q, v)
         glide(voice)
-        raised = 1.0  # by the work of whoever raises the tension
+        raised = 1.0  # by the work that raises the tension
         for m in range(n):
             omega = damped(row(voice, n, at.OMEGA_SQUARED)[m], row(voice, n, at.SIGMA)[m])
             raised = max(raised, omega * omega / squares[m])
@@ -281,7 +281,7 @@ def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray) -> None:
-    """The next quantum, (4, QUANTUM); frame 0 is the string as it is let go."""
+    """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     _bring_up_to_date(voice, program)
     counts = voice.view(np.int64)
     n = counts[at.MODES]

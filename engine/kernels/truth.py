@@ -52,7 +52,7 @@ def _prepare(voice: np.ndarray, program: np.ndarray, sub_steps: int) -> None:
 
 @njit(**COMPILED)
 def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray) -> None:
-    """The next quantum, (4, QUANTUM); frame 0 is the string as it is let go.
+    """The next quantum, (4, QUANTUM); frame 0 is the string at its release.
 
     The highest modes are left out from when they are below the program's silence: sub-steps follow those left.
     """

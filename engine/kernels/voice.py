@@ -178,7 +178,7 @@ def _past(voice: np.ndarray, before: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def _look_at_wishes(voice: np.ndarray, now: int) -> None:
-    """Goes on to the latest modes that are due. Wishes count in their order, and wait for those before them."""
+    """Continues to the latest modes that are due. Wishes count in their order, and wait for those before them."""
     counts = voice.view(np.int64)
     latest = counts[at.RESONATOR]
     wished = counts[at.WISHES] if latest == 0 else carray(pointer(latest), (at.B_HEADER,), np.int64)[at.B_NEXT]

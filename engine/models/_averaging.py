@@ -31,7 +31,7 @@ def stiffening(energies: Tensor, omega: Tensor, coupling: Tensor) -> Tensor:
 
 
 def adiabatic_change(squares: Tensor, weight: Tensor) -> Tensor:
-    """The nepers by which a mode's amplitude is below its action's root, or above: ± log(1 + 4|A q²|)/4.
+    """The nepers of a mode's amplitude below its action's root, or above: ± log(1 + 4|A q²|)/4.
 
     Args:
         squares: of the amplitudes where A is positive (an encoder's), of the actions' roots where it is negative.
@@ -52,7 +52,7 @@ def averaged_coupling(physics: Physics) -> Tensor:
 
 
 def averaged_amplitude(physics: Physics) -> Tensor:
-    """A_in of `initialise`, float64 (modes, modes): half the share by which each frequency rises, in nepers.
+    """A_in of `initialise`, float64 (modes, modes): half of each frequency's relative rise, in nepers.
 
     The action ω q² / 2 stays while ω changes slowly, so that √ω q does.
     """

@@ -22,7 +22,7 @@ from torch import Tensor, nn
 from engine.resonators.base import Resonator
 
 State = TypeVar("State")
-LINEAR_STRING = "the modes of the string at rest"  # what a start "physics" is told
+LINEAR_STRING = "the modes of the string at rest"  # given to a start "physics"
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class StringModel(nn.Module, ABC, Generic[State]):
 
     grid_points: int
     configuration: Any  # the frozen dataclass that it was built from
-    # by name what a start is told of the resonator, in words; empty: nothing. The first is the source's own.
+    # by name what a start receives of the resonator, in words; empty: nothing. The first is the source's own.
     initialisations: ClassVar[Mapping[str, str]]
     # names of parameters, or of their last parts, that a recipe gives a rate of their own
     eigenvalue_parameters: ClassVar[frozenset[str]] = frozenset()
@@ -75,7 +75,7 @@ class StringModel(nn.Module, ABC, Generic[State]):
     def encode(self, displacement: Tensor) -> State:
         """The state at frame 0 of strings that are released at rest from displacements (batch, grid_points).
 
-        Displacement alone tells no phase but that of a string at rest (the paper, §4.1 and its conclusion).
+        Displacement alone gives no phase but that of a string at rest (the paper, §4.1 and its conclusion).
         """
 
     @abstractmethod

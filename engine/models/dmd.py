@@ -151,7 +151,7 @@ def _exact_dmd(trajectories: Tensor, c: DMDConfiguration) -> tuple[Tensor, Tenso
         r = torch.linalg.qr(torch.cat([r, rows]), mode="r").R
     after, before = r[:, : -c.grid_points].T, r[:, c.grid_points :].T
     u, s, v = torch.linalg.svd(before, full_matrices=False)
-    # beyond the rank of the data there is only rounding, from which no mode can be told
+    # beyond the rank of the data there is only rounding, which shows no mode
     noise = s[0] * torch.finfo(trajectories.dtype).eps * len(before)
     kept = min(c.rank, int((s > noise).sum()))
     if kept == 0:

@@ -70,7 +70,7 @@ from engine.models.string_modes import StringModes
 
 GAIN_LIMIT = 6.0 * math.log(10) / 20  # b in nepers: the largest change of level that Re f can add up to
 RATE_UNIT = 1e-3  # of K E and of g in rad and nepers a sample: a weight of 1 turns a phase by 1 rad in a horizon
-SEGMENT = 8  # samples at most between the times at which a render computes gain and phase anew
+SEGMENT = 8  # samples at most between the times at which a render computes gain and phase again
 SETTLED = 16  # node spacings after which the segments of a sample may be as long as those
 MODULATION_UNIT = 1e-3  # of M: with it a weight of 1 suits an optimiser's usual steps
 SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
@@ -89,7 +89,7 @@ class IntegratedPhaseConfiguration:
         adiabatic: whether f follows the mean tension to all orders and there are A_in and A_out, too, which need
             the modulation.
         node_spacing: samples between the nodes of the integral of g; energies hardly change in between.
-        physical_units: K, g and M are told the tension that each mode adds, as a share of that at rest, instead of
+        physical_units: K, g and M receive the tension that each mode adds, as a share of that at rest, instead of
             the energies, and yield shares of each mode's frequency: numbers of the order of 1 for every mode,
             which an optimiser and a network need. A start from the physics fills the units in.
         second_order: whether g counts by Σ E_m.
@@ -176,7 +176,7 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         n = c.state_size
         self.encoder = nn.Linear(c.grid_points, 2 * n)
         self.encoder_residual = _mlp(c.grid_points, c.encoder_widths, 2 * n)
-        # float64: of frequencies rounded to 1e-7 the phase errs within seconds by more than all else does
+        # float64: of frequencies rounded to 1e-7 the phase has within seconds a larger error than all else
         self.nu_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))
         self.theta_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))
         self.K = nn.Parameter(torch.zeros(2 * n, n))  # real parts first

@@ -36,7 +36,7 @@ from engine.models.eigenvalues import pack
 
 SELU_SLOPE = 1.0507009873554805  # of its straight part, which is what is above 0
 HELD_AT = 4.0  # standard deviations of displacement above SELU's bend: most plucks stay above it ("physics")
-SHARPEST = 0.05  # "physics": share by which the strongest plucks raise a mode's frequency
+SHARPEST = 0.05  # "physics": relative rise of a mode's frequency by the strongest plucks
 HELD_AT_EXACT = 12.0  # the same for `store_basis`: the strongest plucks stay above it, too
 SPARE_WEIGHT = 1e-3  # "physics": size of the decoder's weights for the latents that are to spare
 

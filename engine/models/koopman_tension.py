@@ -8,7 +8,7 @@ adds turns them together (κ_n = h² k_n, which is a share of (hω_n)²):
     y_n ← y_n + (h k_n/ω_n) [A_n S (1 - 2R) - κ_n r_n S²] x_n,      z_n ← λ_n z_n,
 
 the exact flow of the potential c/4 (S² - 2 S² R), between exact flows of the damped linear string. What sets out and
-what is seen are other coordinates than those in which the kicks act:
+the output uses other coordinates than those in which the kicks act:
 
     x_n(0) = q_n (1 + p_n κ_n S₀),      q̂_n = x_n (1 - p_n κ_n S),      S₀ = Σ_m η_m² q_m².
 
@@ -25,7 +25,7 @@ with any number of modes: pitch, length, density and tension change nothing but 
 enter by them too. At rest all corrections vanish: a quiet string is the linear one, exactly.
 
 What they have to learn is the error that kicks at nodes make, and it is large: without them, a hundred nodes in a
-period of the first mode leave 1e-7 to 1e-3 of a second's energy wrong. For h → 0 backward error analysis tells
+period of the first mode leave 1e-7 to 1e-3 of a second's energy wrong. For h → 0 backward error analysis gives
 them: r = p = 1/12 (Takahashi and Imada 1984; Blanes, Casas and Ros 1999 for a processed integrator), the start
 "series". A fit that sets out from 0 finds the twelfths by itself, and departs from them where hω is not small.
 

@@ -14,7 +14,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, cast
 
 import torch
 from torch import Tensor, nn
@@ -228,14 +228,6 @@ class Block(nn.Module):
         gated = functional.glu(self.gate(functional.gelu(outputs, approximate="tanh")), dim=-1)
         return inputs + gated, last
 
-    def folded_weights(self) -> list[Tensor]:
-        """What `fold` depends on; the gate is used as it is."""
-        norm = self.normalization
-        assert norm.running_mean is not None and norm.running_var is not None
-        assert norm.num_batches_tracked is not None  # counts where the statistics change: their versions do not
-        statistics = [norm.running_mean, norm.running_var, norm.num_batches_tracked]
-        return [norm.weight, norm.bias, *statistics, *self.seq.parameters(recurse=False)]
-
     def fold(self) -> FoldedBlock:
         """This block in evaluation."""
         norm = self.normalization
@@ -258,29 +250,6 @@ class Block(nn.Module):
         self.seq.initialise(how, generator)
         self.gate.weight.copy_(draw_lecun(tuple(self.gate.weight.shape), self.gate.in_features, generator))
         self.gate.bias.zero_()
-
-
-class Weight(NamedTuple):
-    """A tensor as it was at a time, to tell whether it has changed since.
-
-    Attributes:
-        tensor: itself.
-        alias: of its memory, which is thus not given to another tensor.
-        version: what counts its changes in place; None where nothing does.
-    """
-
-    tensor: Tensor
-    alias: Tensor
-    version: int | None
-
-    @classmethod
-    def of(cls, tensor: Tensor) -> Weight:
-        return cls(tensor, tensor.detach(), None if tensor.is_inference() else tensor._version)
-
-    def is_still(self, tensor: Tensor) -> bool:
-        """Whether `tensor` is the same, with the same values."""
-        same = tensor is self.tensor and tensor.data_ptr() == self.alias.data_ptr()
-        return same and self.version is not None and tensor._version == self.version
 
 
 @dataclass(frozen=True)
@@ -327,9 +296,13 @@ class SSMState:
     """Every layer's x, complex128 (batch, states) each, the first layer's first.
 
     Double precision keeps the carried phases exact; the layers themselves run in the precision of the weights.
+
+    Attributes:
+        folded: the blocks with the weights with which the motion's rendering began; empty before it.
     """
 
     latents: tuple[Tensor, ...]
+    folded: tuple[FoldedBlock, ...] = ()
 
 
 class SSMString(StringModel[SSMState], ABC):
@@ -342,7 +315,6 @@ class SSMString(StringModel[SSMState], ABC):
         self.grid_points = grid_points = first_layer.C.shape[0]
         self.first_layer = first_layer
         self.layers = nn.ModuleList([Block(seq, grid_points) for seq in blocks])
-        self._folded: tuple[list[Weight], list[FoldedBlock]] = [], []
 
     def encode(self, displacement: Tensor) -> SSMState:
         origin = self.first_layer.input(displacement, self.first_layer.input_matrix()).to(torch.complex128)
@@ -389,32 +361,18 @@ class SSMString(StringModel[SSMState], ABC):
     def _ssms(self) -> list[DiagonalSSM]:
         return [module for module in self.modules() if isinstance(module, DiagonalSSM)]  # the first layer's first
 
-    def __getstate__(self) -> dict[str, Any]:
-        return {**self.__dict__, "_folded": ([], [])}  # a copy folds its own weights
-
-    def _folded_blocks(self) -> list[FoldedBlock]:
-        """The blocks for rendering: folded once, and again when a weight is another."""
-        weights, folded = self._folded
-        layers = cast("list[Block]", list(self.layers))
-        tensors = [tensor for block in layers for tensor in block.folded_weights()]
-        if len(weights) != len(tensors) or not all(map(Weight.is_still, weights, tensors)):
-            folded = [block.fold() for block in layers]
-            weights = [Weight.of(tensor) for tensor in tensors]
-            if all(weight.version is not None for weight in weights):
-                self._folded = weights, folded
-        return folded
-
     def advance(self, state: SSMState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SSMState]:
         # batch statistics need the whole time at once
         at_once = steps if self.training else max(CHUNK, ROWS_AT_ONCE // state.latents[0].shape[0])
         rendering = not (self.training or torch.is_grad_enabled()) and self.first_layer.B.device.type == "cpu"
         layers = cast("Iterable[Block]", self.layers)
-        blocks: Sequence[Block | FoldedBlock] = self._folded_blocks() if rendering else list(layers)
+        folded = (state.folded or tuple(block.fold() for block in layers)) if rendering else ()
+        blocks: Sequence[Block | FoldedBlock] = folded or list(layers)
         parts = []
         for done in range(0, steps, at_once):
             part, state = self._stretch(blocks, state, min(at_once, steps - done))
             parts.append(part if readout is None else part @ readout.to(part))
-        return torch.cat(parts).transpose(0, 1), state
+        return torch.cat(parts).transpose(0, 1), SSMState(state.latents, folded)
 
     def _stretch(self, blocks: Sequence[Block | FoldedBlock], state: SSMState, steps: int) -> tuple[Tensor, SSMState]:
         """Frames, time-major, and the state after them."""

@@ -143,7 +143,7 @@ def _digest(path: Path, changed_ns: int, size_bytes: int) -> str:
 
 
 class _open:
-    """`safe_open` with the file checked first and every failure told in our words."""
+    """`safe_open` with the file checked first and every failure in our words."""
 
     def __init__(self, path: Path) -> None:
         self._path = path

@@ -15,7 +15,7 @@ SHIPPED = Path(__file__).parents[2] / "presets"
 def preset_files(*folders: Path) -> list[Path]:
     """The preset files of the given folders (the shipped ones by default), by name.
 
-    A folder that is missing, or that nobody may look into, has none; `unreadable` tells why.
+    A folder that is missing, or that nobody may look into, has none; `unreadable` gives the reason.
     """
     found = []
     for folder in folders or (SHIPPED,):

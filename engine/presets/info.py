@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -13,6 +13,7 @@ from engine.pluck import SHAPES, Pluck
 from engine.presets.migrations import FORMAT_VERSION
 from engine.resonators.base import Resonator
 from engine.resonators.family import Bounds, StringFamily
+from engine.resonators.recorded import RecordedString
 from engine.resonators.string import StringParameters
 
 # A model of many strings plays wider plucks than the trained ones as well, until the ends cut a Gaussian off.
@@ -56,9 +57,10 @@ class PresetInfo:
         modes: modes kept in the training data; the initial displacement is projected on them.
         scale_m: the model's unit of displacement.
         initialisation: how the training began, by name.
-        knows: what its start was told of the string, in words; empty: nothing but the displacement.
+        knows: what its start received of the string, in words; empty: nothing but the displacement.
         rel_mse, rel_mae: validation errors over the horizon (the paper's metrics), test errors beside them.
-        family: of a model of many strings, which were learned; `string` is the one that it plays unless told.
+        family: of a model of many strings, which were learned; `string` is the one that it plays by default.
+        recorded: of a string that was learned from a recording, what that adds to `string`.
         training: the complete training configuration, so that the run can be repeated.
     """
 
@@ -85,6 +87,7 @@ class PresetInfo:
     description: str = ""
     knows: str = ""
     family: StringFamily | None = None
+    recorded: RecordedString | None = None
     licence: str = "MIT"
     format_version: int = FORMAT_VERSION
 
@@ -105,9 +108,32 @@ class PresetInfo:
     @cached_property
     def resonator(self) -> Resonator:
         """What its model learned, at rest and with the tension that it knows."""
-        return self.string.resonator(
-            self.modes, tension_modulated=self.tension_modulated, grid_points=self.grid_points
+        return self.resonator_of(self.string, self.modes)
+
+    def resonator_of(self, string: StringParameters, modes: int) -> Resonator:
+        """The modes of another string that it plays; of a recorded one with what the recording adds to the law."""
+        modulated, points = self.tension_modulated, self.grid_points
+        if self.recorded is not None:
+            return self.recorded.resonator(string, modes, tension_modulated=modulated, grid_points=points)
+        return string.resonator(modes, tension_modulated=modulated, grid_points=points)
+
+    def retuned(self, resonator: Resonator, string: StringParameters) -> Resonator:
+        """A resonator of `resonator_of` with the frequencies, decays and coupling of another string; same shapes."""
+        if self.recorded is not None:
+            other = self.resonator_of(string, resonator.modes)
+            return replace(other, shapes=resonator.shapes, analysis=resonator.analysis)
+        modes = resonator.modes
+        return replace(
+            resonator,
+            omega=string.undamped_frequencies(modes),
+            sigma=string.decay_rates(modes),
+            coupling=string.tension_coupling(modes) if resonator.tension_modulated else resonator.coupling,
+            stretch=string.wavenumbers(modes).square(),
         )
+
+    def modes_of(self, partials: int) -> int:
+        """How many modes it plays so many partials with: of a recorded string two for each, if its grid allows."""
+        return min(partials * (2 if self.recorded is not None else 1), self.grid_points - 2)
 
     def tension_rise(self, pluck: Pluck) -> float:
         """ΔT/T₀ of its string as it is pulled."""

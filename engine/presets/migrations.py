@@ -24,7 +24,7 @@ _KNOWN_TO_VERSION_1 = {
 
 
 def _knows(data: Metadata) -> Metadata:
-    """1 → 2: what a training was told of the string stands in words of its own."""
+    """1 → 2: what a training received of the string stands in words of its own."""
     knows = _KNOWN_TO_VERSION_1.get(str(data.get("initialisation")), "")
     if knows == _BLIND and data.get("model") == "koopman_integrated":
         knows += _COUNTED

@@ -31,6 +31,8 @@ class Resonator:
         analysis: (points, modes), its inverse for what lies in its modes: displacement @ analysis = amplitudes.
         mirror: the sign that each mode takes where the resonator is turned end to end, (modes,); None: it is not
             symmetrical. That -q solves what q does needs no attribute: the tension does not know signs.
+        end_force: force of each mode at amplitude 1 m on the end at the start of the grid, in N, (modes,), by the
+            tension at rest; None: it has no such end.
 
     Raises:
         ValueError: shapes that do not go together, or numbers that are not finite.
@@ -44,6 +46,7 @@ class Resonator:
     shapes: Tensor
     analysis: Tensor
     mirror: Tensor | None = None
+    end_force: Tensor | None = None
 
     def __post_init__(self) -> None:
         modes, points = self.shapes.shape
@@ -67,6 +70,11 @@ class Resonator:
     def points(self) -> int:
         """Of the grid."""
         return self.shapes.shape[1]
+
+    @property
+    def force_weights(self) -> Tensor | None:
+        """float64 (points,): displacement @ weights = force on that end in N; None: it has no such end."""
+        return None if self.end_force is None else self.analysis @ self.end_force
 
     @property
     def tension_modulated(self) -> bool:

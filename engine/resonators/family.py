@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from engine.resonators.string import StringParameters
 
-BRIGHT_HZ = 3_000.0  # where the second decay time is told
+BRIGHT_HZ = 3_000.0  # where the second decay time is given
 NEAR = 1.03  # of a range's end: nothing changes there
 
 Bounds = tuple[float, float]
@@ -23,7 +23,7 @@ class Beyond(NamedTuple):
 
 @dataclass(frozen=True)
 class StringFamily:
-    """Ranges (low, high) of what is heard of a string; two of them where the middle is left out.
+    """Ranges (low, high) of a string's audible properties; two of them where the middle is left out.
 
     Attributes:
         pitch_hz: of the quiet first mode.

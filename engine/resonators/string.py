@@ -80,6 +80,15 @@ class StringParameters:
         """
         return self.youngs_modulus_pa * self.area_m2 * self.wavenumbers(modes) ** 2 / (4 * self.mass_per_length_kg_m)
 
+    def bridge_forces(self, modes: int) -> Tensor:
+        """Force of each mode at amplitude 1 m on the support at x = 0, in N, float64 (modes,).
+
+        The transverse force that a stiff string exerts on its support is T₀ ∂y/∂x - EI ∂³y/∂x³ (N. H. Fletcher,
+        T. D. Rossing, "The Physics of Musical Instruments", 2nd ed., sections 2.12 and 2.18), here T₀η + EIη³.
+        """
+        eta = self.wavenumbers(modes)
+        return self.tension_n * eta + self.youngs_modulus_pa * self.second_moment_m4 * eta**3
+
     def resonator(self, modes: int, *, tension_modulated: bool = True, grid_points: int = 101) -> Resonator:
         """Its first modes, on a grid of so many points with both ends; linear, or with the tension that stretch adds.
 
@@ -99,6 +108,7 @@ class StringParameters:
             shapes=synthesis_matrix(grid_points, modes),
             analysis=analysis_matrix(grid_points, modes),
             mirror=signs,
+            end_force=self.bridge_forces(modes),
         )
 
     def modes_below(self, frequency_hz: float) -> int:

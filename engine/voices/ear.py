@@ -10,8 +10,12 @@ from typing import Literal
 import torch
 from torch import Tensor
 
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
-from engine.resonators.sine_transform import analysis_matrix, listening_weights
+from engine.kernels.layout import BRIGHTER
+from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, LEAST_PEAK_M
+from engine.resonators.sine_transform import analysis_matrix, listening_weights, synthesis_matrix
+
+PickupKind = Literal["displacement", "velocity", "bridge"]
+FULL_SCALES = {"displacement": FULL_SCALE_M, "velocity": FULL_SCALE_M_S, "bridge": FULL_SCALE_N}
 
 
 @dataclass(frozen=True)
@@ -20,25 +24,60 @@ class Ear:
 
     Attributes:
         points: one listening point, or two for left and right, 0 … 1 in lengths of the string.
-        pickup: "velocity" is what a magnetic pick-up senses, brighter by 6 dB an octave.
+        pickup: "velocity" is what a magnetic pick-up senses, brighter by 6 dB an octave. "bridge" is the force on the
+            end at 0, which drives an instrument's body; it is the same whatever the points are.
         solo: above 0, this mode alone is heard.
     """
 
     points: tuple[float, ...]
-    pickup: Literal["displacement", "velocity"] = "displacement"
+    pickup: PickupKind = "displacement"
     solo: int = 0
 
     @property
     def full_scale(self) -> float:
-        """What is 0 dBFS, in m or m/s."""
-        return FULL_SCALE_M if self.pickup == "displacement" else FULL_SCALE_M_S
+        """What is 0 dBFS, in m, m/s or N."""
+        return FULL_SCALES[self.pickup]
 
-    def weights(self, grid_points: int) -> Tensor:
-        """float64 (grid_points, points): displacement @ weights is what is heard; 0 for a mode beyond the grid."""
-        return _weights(self.points, self.solo, grid_points)
+    def weights(self, grid_points: int, force: Tensor | None = None) -> Tensor:
+        """float64 (grid_points, points): displacement @ weights is what is heard; 0 for a mode beyond the grid.
+
+        It is in m, of which the velocity is taken later; at the bridge, in N times the ratio of the full scales.
+
+        Args:
+            force: `Resonator.force_weights` of what is heard at the bridge.
+
+        Raises:
+            ValueError: it has no bridge.
+        """
+        if self.pickup != "bridge":
+            return _weights(self.points, self.solo, grid_points)
+        if force is None:
+            raise ValueError("it has no end whose force can be heard; choose another pick-up")
+        if self.solo > grid_points - 2:
+            force = torch.zeros_like(force)
+        elif self.solo > 0:
+            shape = synthesis_matrix(grid_points, self.solo)[-1]
+            force = analysis_matrix(grid_points, self.solo)[:, -1] * (shape @ force)
+        return (force * (FULL_SCALE_M / FULL_SCALE_N))[:, None].repeat(1, len(self.points))
+
+    def largest(self, displacement_m: Tensor, force: Tensor | None = None) -> float:
+        """A bound of what is heard of a string that is let go so, in the unit of `weights`; narrow plucks pass it.
+
+        A velocity is bounded by ten times the displacement of full scale. The force at an end never passes tension
+        times the steepest slope: waves to both sides have half of it each, and the end doubles it.
+        """
+        peak = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
+        if self.pickup != "bridge" or force is None:
+            return peak * (BRIGHTER if self.pickup == "velocity" else 1.0)
+        place = torch.linspace(0, 1, len(force), dtype=torch.float64)
+        tension = float((place * (1 - place)) @ force)  # per length: the slope of this curve is 1 at the end
+        steepest = float(displacement_m.double().diff().abs().max()) * (len(force) - 1)
+        return max(peak, tension * steepest * (FULL_SCALE_M / FULL_SCALE_N))
 
     def is_on_node(self, point: float) -> bool:
         """Whether nothing can be heard there: a fixed end, or a node of the mode that is heard alone."""
+        if self.pickup == "bridge":
+            return False
         return point in (0.0, 1.0) or (self.solo > 0 and abs(math.sin(math.pi * self.solo * point)) < 1e-3)
 
 

@@ -133,7 +133,7 @@ class Mixer:
     def _forget_impulses(self) -> None:
         """Frees those that the kernels use no more; in the order in which none that moves up is missed."""
         in_use = [int(self._counts[slot]) for slot in (at.M_EFFECTS, at.M_EFFECTS_NEXT, at.M_EFFECTS_NOW)]
-        # one that the kernel has just turned away from may be told once more, after it was freed
+        # one that the kernel has just turned away from may be reported once more, after it was freed
         self._impulses = {address: self._impulses[address] for address in in_use if address in self._impulses}
 
     def forget_ended(self) -> None:

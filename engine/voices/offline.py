@@ -97,7 +97,7 @@ def voice_blocks(
 
     Args:
         source: what renders the samples of a program that is not compiled.
-        advanced: is told the share that is done now and then; may raise, to end it.
+        advanced: receives the share that is done now and then; may raise, to end it.
         until_db: ends, with a little silence, where all of the string has fallen so far below its start, or where the
             voice is over; body and room then ring out.
         gain, effects: see `OfflineVoice`.
@@ -128,7 +128,7 @@ def voice_blocks(
 
 def _fill(voice: Voice, source: ModelSource, initial_m: Tensor, ear: Ear, advanced: Callable[[float], None]) -> None:
     """Renders all samples of a voice beforehand."""
-    weights = ear.weights(source.grid_points)
+    weights = voice.program.grid_weights(ear)
     state = source.start(initial_m[None])
     voice.append(((initial_m.double() @ weights)[None] / FULL_SCALE_M).float().numpy())
     total = voice.room

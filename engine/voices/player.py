@@ -267,7 +267,7 @@ class CompiledPlayer:
         for number in range(max(self._read, total - of.REPORTS), total):
             record = self._reports[number % of.REPORTS].copy()
             if int(self._counts[of.PLAYER_REPORTED]) - number >= of.REPORTS:
-                continue  # written anew meanwhile
+                continue  # written again meanwhile
             known = {name: record[name].item() for name in REPORTED}
             struck = record["kind"] == of.BEGAN and record["modes"] > 0
             parameters = StringParameters(*record["own"].tolist()) if struck else None

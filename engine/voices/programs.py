@@ -32,7 +32,7 @@ from engine.voices.ear import Ear
 
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
 STRING_SILENT_DB = 120.0  # its slowest mode, below its start
-HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below what is heard
+HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below audibility
 FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
 
 Array = NDArray[np.float64]
@@ -51,6 +51,7 @@ class Program:
             scale.
         resonator: whose modes its voices begin with, and may leave; None: its kind has none of its own.
         ends_s: since the pluck, when a voice ends whatever its model still gives.
+        force: `Resonator.force_weights` of the string that is played; None: it cannot be heard at a bridge.
     """
 
     kind: int
@@ -62,17 +63,22 @@ class Program:
     read: Callable[[Tensor], tuple[Array, Array]]
     resonator: Resonator | None = None
     ends_s: float = math.inf
+    force: Tensor | None = None
     _known: dict[Ear, tuple[Array, Array]] = field(default_factory=dict)
 
     def weights(self, ear: Ear) -> tuple[Array, Array]:
         """As `read`, of a pair of listening points; remembered. Any thread may ask."""
         found = self._known.get(ear)
         if found is None:
-            found = self.read(ear.weights(self.grid_points))
+            found = self.read(self.grid_weights(ear))
             if len(self._known) >= KEPT_WEIGHTS:
                 self._known.clear()
             self._known[ear] = found
         return found
+
+    def grid_weights(self, ear: Ear) -> Tensor:
+        """As `Ear.weights`, for its string; displacement @ weights is what is heard."""
+        return ear.weights(self.grid_points, self.force)
 
     @property
     def rendered(self) -> bool:
@@ -171,7 +177,19 @@ def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int
         scale = info.scale_m / FULL_SCALE_M
         return (scale * weights.T @ weight).numpy(), (scale * offset @ weights).numpy()
 
-    return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read, ends_s=voice_ends_s(info))
+    return _bank(memory, n, rate_hz, start, read, info)
+
+
+def _bank(
+    memory: Array,
+    modes: int,
+    rate_hz: int,
+    start: Strike,
+    read: Callable[[Tensor], tuple[Array, Array]],
+    info: PresetInfo,
+) -> Program:
+    force = info.resonator.force_weights
+    return Program(at.BANK, memory, modes, rate_hz, info.grid_points, start, read, None, voice_ends_s(info), force)
 
 
 @bank_program.register
@@ -207,7 +225,7 @@ def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program | None:
     def read(weights: Tensor) -> tuple[Array, Array]:
         return (info.scale_m / FULL_SCALE_M * weights.T @ modes).numpy(), np.zeros(weights.shape[1])
 
-    return Program(at.BANK, memory, n, rate_hz, info.grid_points, start, read, ends_s=voice_ends_s(info))
+    return _bank(memory, n, rate_hz, start, read, info)
 
 
 @bank_program.register
@@ -286,7 +304,7 @@ def _with_modes(kind: int, memory: Array, resonator: Resonator, rate_hz: int, al
         found = (weights.double().T @ shapes.T / FULL_SCALE_M).numpy()
         return np.concatenate([found, np.zeros_like(found)], axis=1), np.zeros(len(found))
 
-    return Program(kind, memory, n, rate_hz, resonator.points, start, read, resonator)
+    return Program(kind, memory, n, rate_hz, resonator.points, start, read, resonator, force=resonator.force_weights)
 
 
 def model_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Program:
@@ -296,7 +314,8 @@ def model_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Pr
 
 def rendered_program(info: PresetInfo, rate_hz: int) -> Program:
     """For samples that are rendered ahead at the preset's own rate."""
-    return _samples_program(info.rate_hz, rate_hz, info.grid_points, voice_ends_s(info))
+    force = info.resonator.force_weights
+    return _samples_program(info.rate_hz, rate_hz, info.grid_points, voice_ends_s(info), force)
 
 
 @lru_cache(maxsize=4)
@@ -305,7 +324,9 @@ def plain_program(rate_hz: int) -> Program:
     return _samples_program(rate_hz, rate_hz, 0, math.inf)
 
 
-def _samples_program(source_rate_hz: int, rate_hz: int, grid_points: int, ends_s: float) -> Program:
+def _samples_program(
+    source_rate_hz: int, rate_hz: int, grid_points: int, ends_s: float, force: Tensor | None = None
+) -> Program:
     """Converts by a Kaiser-windowed sinc in `FILTER_PHASES` phases; equal rates leave every sample as it is."""
     ratio = source_rate_hz / rate_hz
     cutoff = min(1.0, 1 / ratio)
@@ -327,7 +348,7 @@ def _samples_program(source_rate_hz: int, rate_hz: int, grid_points: int, ends_s
     def read(weights: Tensor) -> tuple[Array, Array]:
         return np.zeros((weights.shape[1], 0)), np.zeros(weights.shape[1])
 
-    return Program(at.RENDERED, memory, 0, rate_hz, grid_points, start, read, ends_s=ends_s)
+    return Program(at.RENDERED, memory, 0, rate_hz, grid_points, start, read, None, ends_s, force)
 
 
 def _flat(layer: nn.Linear) -> NDArray[np.float32]:
@@ -339,7 +360,7 @@ def _flat(layer: nn.Linear) -> NDArray[np.float32]:
 def _packed(
     header_slots: int, reals: dict[int, float], wholes: dict[int, int], parts: dict[int, Tensor | NDArray[np.generic]]
 ) -> Array:
-    """One array of a header and its parts, whose places the header tells."""
+    """One array of a header and its parts, whose places the header gives."""
     arrays: Sequence[NDArray[np.generic]] = [np.asarray(part).ravel() for part in parts.values()]
     header = _header(header_slots, reals, wholes)
     memory = np.concatenate([header, np.zeros(sum(len(array) for array in arrays))])

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from torch import Tensor
 
 from engine.kernels import layout as at
-from engine.kernels.layout import ATTACK_S, BRIGHTER, END_FADE_S, FADE_S, LONGEST_S, SILENT_DB
+from engine.kernels.layout import ATTACK_S, END_FADE_S, FADE_S, LONGEST_S, SILENT_DB
 from engine.kernels.memory import publish
 from engine.pluck import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.resonators.base import Resonator
@@ -21,10 +21,10 @@ SPARE_S = 0.1  # of samples that are rendered ahead, behind that fade
 
 
 class Voice:
-    """Made and told by one thread, rendered by another: what is told is heard within a quantum.
+    """Made and commanded by one thread, rendered by another: a command is heard within a quantum.
 
     Args:
-        displacement_m: as it is let go, (grid_points,), projected on the modes in use.
+        displacement_m: at its release, (grid_points,), projected on the modes in use.
         gain: with which it is heard, 0 for a source that is only kept ready.
         seconds: of a rendered voice: how much room there is for its samples, of which none is needed after its end.
         begin: what `program.start` gives for this displacement, where it is known.
@@ -54,8 +54,8 @@ class Voice:
         counts[at.ENDS_AT] = round(min(program.ends_s, LONGEST_S) * program.rate_hz)
         counts[at.ENDS_IN] = round(END_FADE_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
-        memory[at.PEAK] = peak = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
-        memory[at.LIMIT] = RUNAWAY_FACTOR * peak / FULL_SCALE_M * (BRIGHTER if counts[at.VELOCITY] else 1.0)
+        memory[at.PEAK] = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
+        memory[at.LIMIT] = RUNAWAY_FACTOR * ear.largest(displacement_m, program.force) / FULL_SCALE_M
         first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
         memory[place : place + len(first)], memory[place + n : place + n + len(second)] = first, second
@@ -174,7 +174,7 @@ class Voice:
         return max(0, int(self._counts[at.BEGAN_FRAME]))
 
     def release(self, seconds: float) -> None:
-        """Fades to silence and ends; a release under way goes on."""
+        """Fades to silence and ends; a release under way continues."""
         if self._counts[at.RELEASE] == 0:
             self._counts[at.RELEASE] = max(1, round(seconds * self.program.rate_hz))
 
@@ -197,7 +197,7 @@ class Voice:
     def retune(self, resonator: Resonator, seconds: float = 0.005, frame: int = 0) -> None:
         """Other modes while it rings, as a tension, a length or a damping that changes: it gets there evenly.
 
-        Amplitude and speed of each mode go on. Any one thread; the latest wish counts.
+        Amplitude and speed of each mode continue. Any one thread; the latest wish counts.
 
         Args:
             frame: of the mixer, from which they count, within a quantum; they wait for those wished for before.
@@ -272,7 +272,7 @@ class Voice:
         return 0 if self._samples is None else len(self._samples) - int(self._counts[at.READY])
 
     def loop(self) -> None:
-        """A rendered voice of the device's own rate begins anew after its last sample."""
+        """A rendered voice of the device's own rate begins again after its last sample."""
         self._counts[at.LOOPED] = 1
 
     def begin_at_once(self) -> None:
@@ -280,7 +280,7 @@ class Voice:
         self._counts[at.ATTACK] = 0
 
     def never_ends(self) -> None:
-        """It goes on when it has become silent: whoever renders it knows how long."""
+        """It continues when it has become silent: its renderer knows how long."""
         self.memory[at.SILENT] = -math.inf
 
     def end_here(self) -> None:

@@ -81,7 +81,7 @@ class Holes:
         heard: in the recording: of one who plays all silences, of a restless user those that begin or end at once.
         heard_ms, longest_ms: of them together, and of the longest.
         heard_at_s: since the recording began.
-        told: by the app's mixer, by cause; of very many the latest.
+        `told`: by the app's mixer, by cause; of very many the latest.
         control: of a steady tone that another process plays meanwhile in the same way: the machine's, not the app's.
         late: how often a thread of that process which only wakes, in real time, was later than 3 ms.
         latest_ms: by how much at most; 0 where never.
@@ -114,9 +114,9 @@ class Soak:
         drift_mib: how far any other was from the first, above or below.
         peak_mib: the most that it ever was, with all.
         threads_left: names of those that outlived the window.
-        faults: tracebacks of exceptions, whether the app told its user or nobody caught them, and warnings of Python
+        faults: tracebacks of exceptions, whether the app showed them or nobody caught them, and warnings of Python
             and of Qt; each once, with its number.
-        notices: all that the app told its user, with how often.
+        notices: all that the app showed its user, with how often.
     """
 
     machine: Machine

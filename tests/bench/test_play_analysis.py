@@ -17,7 +17,7 @@ STEP = RATE_HZ // 12
 
 
 def pluck(seconds: float, pitch_hz: float, place: float, heard_at: float = 0.37) -> NDArray[np.float64]:
-    """A string that is let go at a place: a broad hump runs to both sides, and each partial decays."""
+    """A string that is released at a place: a broad hump runs to both sides, and each partial decays."""
     t = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
     number = np.arange(1, 30)[:, np.newaxis]
     stiff_hz = pitch_hz * number * np.sqrt(1 + 1e-4 * number**2)
@@ -148,7 +148,7 @@ def test_the_first_frame_after_silence_is_exact() -> None:
 
 @pytest.mark.parametrize("place", [0.12, 0.3, 0.44, 0.61])
 def test_a_pluck_among_others_is_found_within_a_millisecond_of_its_sound(place: float) -> None:
-    """Of its sound at the listening point, where a far hump arrives later than it is let go."""
+    """Of its sound at the listening point, where a far hump arrives later than its release."""
     sound = np.zeros(3 * RATE_HZ)
     for number, other in enumerate((0.2, 0.55, 0.83, 0.35)):
         sound[number * 9000 :] += pluck(3.0, 123.0, other)[: sound.size - number * 9000]

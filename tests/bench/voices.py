@@ -1,7 +1,7 @@
 """Voices: the cost of one while it rings, its error, and the cost of a pluck.
 
 Costs are processor time of this thread, less that of an empty mixer, so that other processes have little effect.
-Errors are relative L2 over the first second of what is heard.
+Errors are relative L2 over the first second of the sound.
 """
 
 from __future__ import annotations

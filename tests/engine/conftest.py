@@ -60,7 +60,7 @@ def shipped() -> Callable[[str], Preset]:
 
 @pytest.fixture(scope="session")
 def initial_m() -> Callable[[PresetInfo, Pluck], Tensor]:
-    """What a string of a preset's is let go from, (grid_points,)."""
+    """The displacement that a string of a preset's is released from, (grid_points,)."""
     return _initial_m
 
 

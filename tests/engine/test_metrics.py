@@ -92,14 +92,14 @@ def spoilt(shares: list[float], loudness: list[float] | None = None) -> ErrorSum
 
 
 def test_the_standard_error_of_equal_trajectories_is_that_of_a_mean() -> None:
-    """Half of 100 err by 0.1, half by 0.3: what is drawn with replacement is binomial, and its deviation known."""
+    """Half of 100 have an error of 0.1, half of 0.3: a draw with replacement is binomial; its deviation is known."""
     found = spoilt([0.1, 0.3] * 50).standard_error(20_000)
     assert found.rel_mae == pytest.approx(0.1 / 100**0.5, rel=0.02)  # the population's deviation over √count
     assert found.rel_mse == pytest.approx((0.09 - 0.01) / 2 / 100**0.5, rel=0.02)
 
 
 def test_the_standard_error_of_a_ratio_of_sums_counts_loud_trajectories_more() -> None:
-    """A quarter is ten times as loud and errs more: the deviation of a ratio to first order, √Σ(eᵢ - R tᵢ)² / Σtᵢ."""
+    """A quarter is ten times as loud: the deviation of a ratio to first order, √Σ(eᵢ - R tᵢ)² / Σtᵢ."""
     shares, loudness = [0.01, 0.01, 0.01, 0.2] * 100, [1.0, 1.0, 1.0, 10.0] * 100
     sums = spoilt(shares, loudness)
     truth, wrong = np.array(loudness) ** 2, (np.array(shares) * loudness) ** 2

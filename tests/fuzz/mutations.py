@@ -116,7 +116,7 @@ def attacked(
 ) -> None:
     """Runs an attack so often, each from a seed of its own, and prints how many were refused or did no harm.
 
-    Where `costs` of its readings are given, they are printed, and memory is held to `MOST_MB`; time is only told.
+    Where `costs` of its readings are given, they are printed, and memory is held to `MOST_MB`; time is only printed.
     """
     failures = []
     for number in range(rounds):

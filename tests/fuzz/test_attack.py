@@ -50,7 +50,7 @@ from engine.sources import ModelSource, Runaway, TruthSource, project
 from engine.voices import Ear, model_program, render_voice, truth_program
 from tests.fuzz.costs import MOST_MB, Costs
 from tests.fuzz.mutations import HOSTILE, attacked, damaged_bytes, damaged_preset, damaged_text, damaged_value
-from training.by_name import load
+from training.cell import load
 from training.cli.console import Failure
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import COLUMNS, read_heard
@@ -119,7 +119,7 @@ def test_presets(name: str, small_preset: Path, tmp_path: Path, rounds: int, see
 
 
 def test_patches(tmp_path: Path, rounds: int, seed: int) -> None:
-    """A stranger's patch, with a scale and a mapping, is listed or told, and hides no other."""
+    """A stranger's patch, with a scale and a mapping, is listed or reported, and hides no other."""
     tuning = {"scale": SCALE.decode(), "keymap": "0\n0\n127\n60\n69\n440.0\n5\n"}
     facts = {**json.loads(PATCH.read_bytes()), "tuning": tuning}
     whole, path = json.dumps(facts).encode(), tmp_path / "stranger.json"
@@ -399,7 +399,7 @@ def test_recipes(of: str, small_preset: Path, tmp_path: Path, rounds: int, seed:
 def test_what_is_dropped(
     small_preset: Path, tmp_path: Path, rounds: int, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A sound is a recipe's, a recording, a body, or told: its reader is chosen by what is in it."""
+    """A sound is a recipe's, a recording, a body, or refused: its reader is chosen by what is in it."""
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
     library = Library([])
     recorded = wav(tmp_path, played_text())

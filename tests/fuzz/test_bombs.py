@@ -32,7 +32,7 @@ from engine.presets import PresetError, load_preset, preset_digest, read_string
 from engine.read_file import UnusableFile, read_bounded
 from engine.schema import SchemaError, read_toml
 from tests.fuzz.costs import MOST_MB, Costs
-from training.by_name import load
+from training.cell import load
 from training.cli.console import Failure
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import read_heard
@@ -95,7 +95,7 @@ MIDI = {
     "a length without end": midi(b"\x00\xff\x01" + b"\xff" * (2**20 - 40)),
     "a time within a chunk of another name": midi(b"\x00\x90\x3c\x40" + b"\x80" * 9),
     "too many messages": midi(b"\x00\x90\x3c\x40" + b"\x00\x3c\x40" * 340_000),
-    "a system message that goes on": midi(b"\x00\xf0\x01\xf7\x00\x05" + b"\xff" * 1000),
+    "a system message that never ends": midi(b"\x00\xf0\x01\xf7\x00\x05" + b"\xff" * 1000),
 }
 
 

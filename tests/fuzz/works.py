@@ -21,7 +21,7 @@ from app.patches.patch import Patch
 from app.window.settings import Settings, save_settings
 from engine.kernels import warm
 from engine.presets import SHIPPED, load_preset
-from training.by_name import load
+from training.cell import load
 from training.results import read_results
 from training.run import run_row
 
@@ -55,7 +55,7 @@ horizons = [60]
 """
 MANY = 100  # times that a small file is saved
 WORKS = ("render", "batch", "dataset", "train", "train_lru", "sweep", "save_patches", "save_many_settings")
-# of two runs, however equal; whoever works on the code may commit meanwhile
+# of two runs, however equal; a developer may commit meanwhile
 UNLIKE = ("seconds", "training_seconds", "finished", "commit")
 
 
@@ -137,7 +137,7 @@ def _content(path: Path) -> object:
         return [replace(row, seconds=None, finished="", commit="") for row in read_results(path)]
     if path.name == "row.json":
         return {name: value for name, value in json.loads(path.read_text()).items() if name not in UNLIKE}
-    if path.name in ("log.csv", "index.csv"):  # a batch tells which files it kept
+    if path.name in ("log.csv", "index.csv"):  # a batch lists the files it kept
         unlike = UNLIKE if path.name == "log.csv" else ("status",)
         with path.open(newline="") as file:
             return [{name: line[name] for name in line if name not in unlike} for line in csv.DictReader(file)]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from engine.schema import SchemaError
-from training.by_name import load
+from training.cell import load
 from training.results import read_results
 from training.sweeping.plan import load_plan
 
@@ -32,7 +32,7 @@ FAULTS = {
         CONFIGURATION + "[model_configuration]\ngrid_points = 51\n",
         "grid_points is 51, the data's are 101",
     ),
-    "unknown start": (CONFIGURATION + 'initialisation = "guess"\n', "initialisation 'guess' is not one of"),
+    "unknown start": (CONFIGURATION + 'start = "guess"\n', "start 'guess' is not one of"),
     "too much data": (CONFIGURATION.replace("modes = 10", "modes = 10\ncount = 100_000_000"), "GiB of data"),
     "too many sub-steps": (
         CONFIGURATION.replace("modes = 10", "modes = 10\nsubsteps = 10_000_000"),

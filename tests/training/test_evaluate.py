@@ -69,7 +69,7 @@ def test_the_truth_has_no_error_to_any_time(data: Dataset) -> None:
     for sums in (found.string, found.sound):
         assert len(sums.per_frame()[0]) == 2100
         assert len(sums.per_trajectory()[0]) == 2
-        assert sums.total().rel_mse < 1e-11  # the model is told float32
+        assert sums.total().rel_mse < 1e-11  # the model receives float32
     assert found.sound.total().null_depth_db < -110
     assert all(spectrum.convergence < 1e-5 for spectrum in found.spectra)
     partials = evaluate_partials(model, data, "test", [(0, HORIZON_S), (HORIZON_S, 0.525)])
@@ -119,9 +119,11 @@ def test_any_splitting_into_blocks_gives_the_same_errors(data: Dataset) -> None:
 
 def test_some_trajectories_and_the_progress(data: Dataset) -> None:
     told: list[float] = []
-    found = evaluate_past_horizon(Truth(data), data, "validation", 0.05, trajectories=1, report=told.append)
+    found = evaluate_past_horizon(Truth(data), data, "validation", 0.05, trajectories=slice(1), report=told.append)
     assert len(found.string.per_trajectory()[0]) == 1
-    partials = evaluate_partials(Truth(data), data, "validation", [(0, 0.05)], trajectories=1, report=told.append)
+    partials = evaluate_partials(
+        Truth(data), data, "validation", [(0, 0.05)], trajectories=slice(1), report=told.append
+    )
     assert partials.energy.shape == (1, 1, 10)
     assert told.count(1.0) == 2
     assert max(told) == 1

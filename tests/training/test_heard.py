@@ -175,8 +175,8 @@ def test_lines_of_another_method_say_nothing(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "told"),
     [
-        (b"", "first line must be"),
-        (b"some text\n", "first line must be"),
+        (b"", "first line must name"),
+        (b"some text\n", "first line must name"),
         (b"\xff\xfe\x00", "not a text file"),
         (HEAD.encode() + b"\n" + b"a,b\n" * 1_000_000, "larger than"),
         (b" " * (LARGEST_BYTES + 1), "larger than"),

@@ -45,13 +45,32 @@ def test_the_committed_rows_are_carried_over() -> None:
 def test_a_configuration_of_an_earlier_version_is_the_same_run_as_today() -> None:
     now = configuration_of(CELL)
     plain = write(now)
-    plain["recipe"]["random_start"] = False
-    plain["recipe"]["koopman_terms"] = "text"
-    plain["model_configuration"]["input"] = "displacement"
+    plain["recipe"] |= {"random_start": False, "koopman_terms": "text"}
     assert read_configuration(plain, "a preset") == now
     plain["recipe"]["random_start"] = True
-    with pytest.raises(SchemaError, match=r"recipe\.random_start: True is of an earlier version; train it anew"):
+    with pytest.raises(SchemaError, match=r"recipe\.random_start: True is of an earlier version; train it again"):
         read_configuration(plain, "a preset")
+
+
+@pytest.mark.parametrize(
+    ("cell", "flags"),
+    [
+        (Cell("koopman_var", True, "noise", 4000), {"initialisation": "physics"}),
+        (Cell("koopman", True, "noise", 4000), {"initialisation": "paper", "latent_epochs": 1000}),
+        (Cell("koopman", True, "noise", 4000, recipe="blind"), {"blind": True, "latent_epochs": 1000}),
+        (Cell("koopman_integrated", True, "noise", 4000, recipe="blind"), {"blind": True, "latents_per_mode": 1}),
+        (Cell("koopman_integrated", True, "noise", 4000, recipe="hinted"), {"blind": True, "latents_per_mode": 0}),
+        (Cell("frnn", True, "noise", 4000, 400), {"blind": True}),
+        (Cell("lru", True, "noise", 4000, recipe="paper"), {"blind": False, "initialisation": ""}),
+    ],
+)
+def test_the_flags_of_before_starts_had_one_name_are_read(cell: Cell, flags: dict[str, object]) -> None:
+    now = configuration_of(cell)
+    plain = write(now)
+    del plain["recipe"]["start"]
+    plain["recipe"] |= flags
+    found = read_configuration(plain, "a preset")
+    assert (found.start, found.digest) == (now.start, now.digest)
 
 
 def test_sizes_that_are_no_longer_there_count_in_the_digest_and_are_read_with_the_value_that_they_had() -> None:

@@ -179,7 +179,7 @@ def test_a_full_disk_leaves_the_file_as_it_was(path: Path, monkeypatch: pytest.M
         ("name,status\nx,done\n", "not a results file"),
         ("digest,name,colour\nx,y,red\n", "unknown column 'colour'; it is of a newer version: update"),
         ("digest,name\nx,y\n", "line 2: field 'status' is missing"),
-        (b"\xff\xfe\x00", "not a CSV file"),
+        (b"\xff\xfe\x00", "not a text file"),
     ],
 )
 def test_what_is_no_results_file_is_refused_and_left_alone(path: Path, text: str | bytes, message: str) -> None:

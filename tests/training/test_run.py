@@ -16,10 +16,11 @@ from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import Progress
+from training.fitting.log import Epoch, TrainingLog
 from training.migration import earlier_digest
 from training.results import Row
 from training.row_errors import filled
-from training.run import LOG_FIELDS, TrainingLog, run_row, trained_range
+from training.run import run_row, trained_range
 
 
 def progress(epoch: int, loss: float = 1.0) -> Progress:
@@ -37,9 +38,9 @@ def test_the_log_has_a_line_per_epoch(tmp_path: Path) -> None:
     log.add(progress(1))
     log.add(progress(2))
     assert read(tmp_path / "run" / "log.csv") == [
-        list(LOG_FIELDS),
-        ["1", "150", "0.001", "1", "", "", "2.00"],
-        ["2", "150", "0.001", "1", "0.5", "0.25", "4.00"],
+        list(Epoch.__dataclass_fields__),
+        ["1", "150", "0.001", "1.0", "", "", "2.0"],
+        ["2", "150", "0.001", "1.0", "0.5", "0.25", "4.0"],
     ]
 
 
@@ -53,7 +54,7 @@ def test_a_run_that_goes_on_from_an_older_checkpoint_repeats_no_epoch(tmp_path: 
     log = TrainingLog(path)
     log.add(progress(3, loss=7))
     log.add(progress(4, loss=8))
-    assert [(row[0], row[3]) for row in read(path)[1:]] == [("1", "1"), ("2", "1"), ("3", "7"), ("4", "8")]
+    assert [(row[0], row[3]) for row in read(path)[1:]] == [("1", "1.0"), ("2", "1.0"), ("3", "7.0"), ("4", "8.0")]
 
 
 @pytest.mark.parametrize("kind", ["gaussian", "noise", "pluck"])

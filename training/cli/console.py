@@ -13,7 +13,7 @@ from typing import Any, Protocol
 
 from engine.plain_text import duration, one_line
 
-LINE_EVERY_S = 10.0  # between two lines of progress, where standard error is not a terminal
+LINE_EVERY_S = 10.0  # between two lines of progress
 WIDTH_WITHOUT_TERMINAL = 1000  # characters: no row of a table is wrapped
 
 
@@ -77,44 +77,57 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> Non
 
 
 @contextmanager
-def progress(what: str) -> Iterator[Report]:
-    """A function that shows the progress of the work and the time left: a bar in a terminal, else lines.
+def bars(every_s: float = LINE_EVERY_S) -> Iterator[Callable[[str], Report]]:
+    """A function that begins the progress of a named piece of work; several may be under way.
+
+    In a terminal each has a bar with the time left until its share is 1; elsewhere each prints lines.
 
     Args:
-        what: the name of the work.
+        every_s: between two lines of a piece of work, at least.
     """
     if not sys.stderr.isatty():
-        yield _Lines(what)
+        yield lambda what: _Lines(what, every_s)
         return
-    from rich import progress as bars
+    from rich import progress as rich
     from rich.console import Console
 
     columns = (
-        bars.TextColumn("{task.description}", markup=False),
-        bars.BarColumn(bar_width=10),
-        bars.TextColumn("{task.fields[left]}", markup=False),
-        bars.TextColumn("{task.fields[text]}", markup=False),
+        rich.TextColumn("{task.description}", markup=False),
+        rich.BarColumn(bar_width=10),
+        rich.TextColumn("{task.fields[left]}", markup=False),
+        rich.TextColumn("{task.fields[text]}", markup=False),
     )
-    started = time.monotonic()
-    with bars.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=1.0, left="", text="")
+    with rich.Progress(*columns, console=Console(stderr=True), transient=True) as bar:
 
-        def report(share: float, text: str = "", left_s: float | None = None) -> None:
-            bar.update(task, completed=share, text=text, left=_left(started, share, left_s))
+        def begin(what: str) -> Report:
+            task, started = bar.add_task(what, total=1.0, left="", text=""), time.monotonic()
 
-        yield report
+            def report(share: float, text: str = "", left_s: float | None = None) -> None:
+                left = _left(started, share, left_s)
+                bar.update(task, completed=share, text=text, left=left, visible=share < 1)
+
+            return report
+
+        yield begin
+
+
+@contextmanager
+def progress(what: str) -> Iterator[Report]:
+    """A function that shows the progress of one piece of work, as `bars` does."""
+    with bars() as begin:
+        yield begin(what)
 
 
 class _Lines:
-    """Progress for a log: a line every `LINE_EVERY_S` at most, none for work that takes less."""
+    """Progress for a log: a line now and then, none for work that takes less."""
 
-    def __init__(self, what: str) -> None:
-        self._what = what
+    def __init__(self, what: str, every_s: float) -> None:
+        self._what, self._every_s = what, every_s
         self._started = self._last = time.monotonic()
 
     def __call__(self, share: float, text: str = "", left_s: float | None = None) -> None:
         now = time.monotonic()
-        if now - self._last >= LINE_EVERY_S and share < 1:
+        if now - self._last >= self._every_s and share < 1:
             self._last = now
             say(f"{self._what}: {share:.0%}, {_left(self._started, share, left_s)} {text}")
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Iterator
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
@@ -17,7 +16,7 @@ import typer
 from engine.pluck import DEFAULT_LISTEN
 from training.cli import arguments
 from training.cli.arguments import Cache, Json, check_range, open_preset_of_string
-from training.cli.console import Failure, Shares, number, print_json, print_table, progress, say
+from training.cli.console import Shares, number, print_json, print_table, progress, say
 from training.cli.training import load_data
 
 if TYPE_CHECKING:
@@ -31,11 +30,12 @@ LONGEST_PAST_S = 60.0
 FEWEST_PLUCKS = 10  # of a string that none was trained on
 HELD_OUT = "held_out"  # what fresh trajectories are called in place of a split
 TOLD = {
-    "se": "standard error, by which trajectories are drawn (bootstrap)",
+    "se": "standard error over trajectories (bootstrap)",
     "spread": "spread over the trajectories",
     "400": "first 400 frames",
 }
-CSV_COLUMNS = ("preset", "split", "start_s", "stop_s", "past_horizon", "mode", "quantity", "value")
+PLACE = ("start_s", "stop_s", "past_horizon")  # of a figure
+CSV_COLUMNS = ("preset", "split", *PLACE, "mode", "quantity", "value")
 
 
 def evaluate(
@@ -185,8 +185,7 @@ class _Measurement:
 
     def of(self, split: str) -> dict[str, Any]:
         """All figures of a split, by name."""
-        from training.by_rise import errors_by_rise
-        from training.evaluate import evaluate_past_horizon
+        from training.evaluate import errors_by_rise, evaluate_past_horizon
         from training.results import SHORT_HORIZON
 
         info = self.preset.info
@@ -198,7 +197,7 @@ class _Measurement:
             self.past_s,
             horizon=info.horizon_steps,
             windows_s=[(0.0, info.horizon_s), *windows],
-            trajectories=self.trajectories,
+            trajectories=slice(self.trajectories),
             report=self.report.next(),
         )
         whole, sound = motion.string.total(info.horizon_steps), motion.sound.total(info.horizon_steps)
@@ -258,7 +257,12 @@ class _Measurement:
         horizon_s, end_s = self.preset.info.horizon_s, windows[-1][1]
         windows = [(0.0, horizon_s), *([(horizon_s, end_s)] if self.past_s else []), *windows]
         errors = evaluate_partials(
-            self.preset.model, self.data, split, windows, trajectories=self.trajectories, report=self.report.next()
+            self.preset.model,
+            self.data,
+            split,
+            windows,
+            trajectories=slice(self.trajectories),
+            report=self.report.next(),
         )
         return [
             {
@@ -285,21 +289,21 @@ class _Measurement:
 def _on(preset: Preset, run: str) -> Preset:
     """A preset of many strings with the string, rate, modes and horizon of a run's data."""
     from engine.presets import of_string
-    from training.by_name import load
+    from training.cell import load
 
     data = load(run).data
     told = replace(preset.info, tension_modulated=data.tension_modulated)
     own = of_string(replace(preset, info=told), data.string, data.rate_hz, data.modes)
-    # the errors that it tells are those of the family
+    # the errors that it reports are those of the family
     info = replace(own.info, rel_mse=None, rel_mae=None, test_rel_mse=None, test_rel_mae=None)
     return replace(own, info=replace(info, horizon_steps=data.steps))
 
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
     """The data set of a preset, or of a run; for a string of many, of plucks as hard as the family's."""
-    from engine.schema import SchemaError
-    from training.by_name import load
-    from training.configuration import DatasetConfiguration, read_configuration
+    from training.cell import load
+    from training.configuration import DatasetConfiguration
+    from training.row_errors import data_of
 
     info = preset.info
     if on is not None:
@@ -317,17 +321,7 @@ def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
             string=info.string,
             largest_tension_rise=info.family.tension_rise[1],
         )
-    try:
-        data = read_configuration(info.training, f"{preset.path}: metadata.training").data
-    except SchemaError as error:
-        raise Failure(f"{error}; without it the preset's data set cannot be made") from error
-    for name in ("rate_hz", "modes"):
-        if getattr(data, name) != getattr(info, name):
-            raise Failure(
-                f"{preset.path}: metadata.training.data.{name} is {getattr(data, name)}, the model's is "
-                f"{getattr(info, name)}; get the preset again"
-            )
-    return data
+    return data_of(preset)
 
 
 def _check_trajectories(wanted: int | None, data: DatasetConfiguration, splits: tuple[str, ...]) -> None:
@@ -406,25 +400,17 @@ def _csv(preset: str, measured: dict[str, dict[str, Any]]) -> str:
     writer.writerow(CSV_COLUMNS)
     for split, errors in measured.items():
         stop_s = max(w["stop_s"] for w in errors["windows"] if not w["past_horizon"])
-        writer.writerows((preset, split, *row) for row in _figures(errors, (0.0, stop_s, False), ""))
+        whole = {"start_s": 0.0, "stop_s": stop_s, "past_horizon": False}
+        parts: list[tuple[dict[str, Any], object]] = [(errors | whole, "")]
         for place, group in enumerate(errors.get("by_rise", ()), 1):
-            named = {f"rise{place}_{name}": value for name, value in group.items()}
-            writer.writerows((preset, split, *row) for row in _figures(named, (0.0, stop_s, False), ""))
-        for window in errors["windows"]:
-            writer.writerows((preset, split, *row) for row in _figures(window, _label(window), ""))
+            parts.append(({f"rise{place}_{name}": value for name, value in group.items()} | whole, ""))
+        parts += [(window, "") for window in errors["windows"]]
         for window in errors.get("partials", ()):
-            for mode in window["modes"]:
-                writer.writerows((preset, split, *row) for row in _figures(mode, _label(window), mode["mode"]))
-            writer.writerows((preset, split, *row) for row in _figures(window["weighted"], _label(window), "all"))
+            parts += [(window | mode, mode["mode"]) for mode in window["modes"]]
+            parts.append((window | window["weighted"], "all"))
+        for facts, mode in parts:
+            where = (preset, split, *(facts[name] for name in PLACE), mode)
+            for quantity, value in facts.items():
+                if quantity not in (*PLACE, "mode") and isinstance(value, int | float):
+                    writer.writerow((*where, quantity, value if math.isfinite(value) else "inf"))
     return text.getvalue()
-
-
-def _label(window: dict[str, Any]) -> tuple[float, float, bool]:
-    return window["start_s"], window["stop_s"], window["past_horizon"]
-
-
-def _figures(facts: dict[str, Any], label: tuple[float, float, bool], mode: object) -> Iterator[tuple[object, ...]]:
-    for quantity, value in facts.items():
-        if quantity in ("start_s", "stop_s", "past_horizon", "mode") or not isinstance(value, int | float):
-            continue
-        yield *label, mode, quantity, value if math.isfinite(value) else "inf"

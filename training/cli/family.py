@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from training.cli.arguments import Cache, Json, PresetName, check_range, open_preset
+from training.cli.arguments import Json, PresetName, check_range, open_preset
 from training.cli.console import Failure, Shares, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
@@ -48,7 +48,6 @@ def train(
     output: Annotated[
         Path | None, typer.Option(help="The preset to write; default presets/CONFIG.safetensors.")
     ] = None,
-    cache: Cache = None,
 ) -> None:
     """Learn from the motions of many strings, and write the preset."""
     import torch
@@ -64,7 +63,6 @@ def train(
         info = train_preset(
             configuration,
             file,
-            cache=cache,
             made=lambda share: report(0.5 * share, "true motions"),
             report=lambda p: report(
                 0.5 + 0.5 * p.step / p.steps, f"step {p.step}, validation {p.validation:.3g}", p.left_s
@@ -96,7 +94,7 @@ def evaluate(
         Path | None,
         typer.Option(
             metavar="FILE",
-            help="Draw a dot for each string, by rise and inharmonicity: .png, .svg, .pdf.",
+            help="Draw the distribution of errors by rise of tension: .png, .svg, .pdf.",
         ),
     ] = None,
     rate: Rate = 48_000,
@@ -106,7 +104,7 @@ def evaluate(
     """Errors on held-out strings, inside the family and beyond it."""
     import torch
 
-    from training.family.errors import Player, by_cell, by_rise, measure, player
+    from training.family.errors import Player, in_ranges, measure, player
 
     torch.set_num_threads(1)
     if tenth > strings:
@@ -132,7 +130,7 @@ def evaluate(
             own += of_preset
             facts["by_rise"] = [
                 {"from": low, "to": high, "strings": len(part.strings), **_facts(part)}
-                for (low, high), part in by_rise(of_preset, RISES)
+                for ((low, high),), part in in_ranges(of_preset, tension_rise=RISES)
             ]
             if tenth:
                 alone = {loaded.name: players[loaded.name]}
@@ -141,13 +139,15 @@ def evaluate(
                 facts["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
     cells = [
         {"rise": rises, "inharmonicity": edges, "strings": len(part.strings), **_facts(part)}
-        for rises, edges, part in (by_cell(own, RISES, INHARMONICITIES) if error_map else ())
+        for (rises, edges), part in in_ranges(own, tension_rise=RISES, inharmonicity=INHARMONICITIES)
+        if error_map
     ]
     if picture is not None:
-        from training.figures.family_map import family_map
+        from training.figures.family_errors import family_errors
         from training.figures.style import save_figure
 
-        save_figure(family_map(own, loaded.name), picture)
+        columns: dict[str, Sequence[StringError]] = {c: errors[loaded.name].strings for c, errors in measured.items()}
+        save_figure(family_errors(columns, loaded.name), picture)
     if json:
         told_map = {"map": cells} if error_map else {}
         print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **found, **told_map})
@@ -223,7 +223,7 @@ def baseline(
         int | None,
         typer.Option(min=1, max=100_000, help="Strings to learn from; default as studio_any_string."),
     ] = None,
-    runs: Annotated[Path | None, typer.Option(help="Folder of runs: a stopped one goes on there.")] = None,
+    runs: Annotated[Path | None, typer.Option(help="Folder of runs: a stopped one continues there.")] = None,
     strings: Strings = 40,
     rate: Rate = 48_000,
     seed: Seed = 0,
@@ -231,7 +231,7 @@ def baseline(
 ) -> None:
     """Train and measure a model by others on the same strings.
 
-    A stopped training goes on. It is measured as `evaluate` does, and no preset is written.
+    A stopped training continues. It is measured as `evaluate` does, and no preset is written.
     """
     import torch
 

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 import contextlib
-import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import astuple, dataclass, field
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import astuple
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from engine.plain_text import duration, one_line
 from training.cli.arguments import Cache, Device, Json, Runs
-from training.cli.console import Failure, number, print_json, print_table, say
+from training.cli.console import Failure, Report, bars, number, print_json, print_table, say
+from training.cli.training import training_report
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
+    from training.fitting.fit import Progress
     from training.results import Row
     from training.sweeping.plan import Plan, Run
     from training.sweeping.workers.base import Noted, Progressed
 
-LINE_EVERY_S = 60.0  # between two lines of a run's progress, where standard error is not a terminal
+LINE_EVERY_S = 60.0  # between two lines of a run's progress
 NAMED = 3  # failed runs that a message names at most
 
 results = typer.Typer(no_args_is_help=True, help="The results file: one row per run.", rich_markup_mode=None)
@@ -93,10 +91,10 @@ def sweep(
         try:
             with opened as found:
                 say(f"on {found.description}")
-                with _watching(left, found.capacity) as watch:
-                    rows = run(chosen, found, options, watch)
+                with bars(LINE_EVERY_S) as begin:
+                    rows = run(chosen, found, options, Shown(begin, left, found.capacity()))
         except KeyboardInterrupt:
-            say("stopped; the same command goes on")
+            say("stopped; the same command continues")
             raise
     _tell(rows, json)
 
@@ -206,123 +204,52 @@ def _time(row: Row) -> str:
     return "-" if row.seconds is None else duration(row.seconds)
 
 
-@dataclass
-class Board:
-    """The progress of a sweep.
+class Shown:
+    """Shows a sweep: the progress of each run, and a line for what is worth one."""
 
-    Attributes:
-        left: number of runs that have not ended.
-        ended: number of runs by status.
-        running: the last report of each run; None before its first.
-        maes: of the last validation of each run.
-    """
-
-    left: int
-    ended: dict[str, int] = field(default_factory=lambda: {"done": 0, "diverged": 0, "failed": 0})
-    running: dict[str, Progressed | None] = field(default_factory=dict)
-    maes: dict[str, float] = field(default_factory=dict)
-    _seconds: list[float] = field(default_factory=list)  # that finished runs took
+    def __init__(self, begin: Callable[[str], Report], left: int, at_once: int) -> None:
+        """`left`: runs that have not ended; `at_once`: how many run at a time."""
+        self._begin, self._left, self._at_once = begin, left, at_once
+        self._reports: dict[str, Report] = {}
+        self._shown: dict[str, Callable[[Progress], None]] = {}
+        self._last: dict[str, Progress] = {}  # of each run that is under way
+        self._seconds: list[float] = []  # that finished runs took
+        self._ended: Counter[str] = Counter(done=0)
 
     def started(self, run: Run) -> None:
-        self.running[run.name] = None
+        self._reports[run.name] = self._begin(run.name)
+        self._shown[run.name] = training_report(self._reports[run.name])
 
     def progressed(self, event: Progressed) -> None:
-        if event.name in self.running:
-            self.running[event.name] = event
-            if event.progress.validation:
-                self.maes[event.name] = event.progress.validation.rel_mae
-
-    def finished(self, row: Row) -> None:
-        self.running.pop(row.name, None)
-        self.maes.pop(row.name, None)
-        self.left -= 1
-        self.ended[row.status] += 1
-        if row.seconds is not None:
-            self._seconds.append(row.seconds)
-
-    def seconds_left(self, at_once: int) -> float | None:
-        """Until all runs have ended, `at_once` at a time, if each takes as long as those so far; None: unknown."""
-        told = [event.progress for event in self.running.values() if event]
-        whole = self._seconds + [progress.seconds + progress.seconds_left for progress in told]
-        if not whole:
-            return None
-        mean = sum(whole) / len(whole)
-        work = sum(progress.seconds_left for progress in told) + mean * (self.left - len(told))
-        return work / max(1, min(at_once, self.left))
-
-    def summary(self, at_once: int) -> str:
-        parts = [f"{count} {status}" for status, count in self.ended.items() if count or status == "done"]
-        parts += [f"{len(self.running)} running", f"{self.left - len(self.running)} waiting"]
-        seconds = self.seconds_left(at_once)
-        return ", ".join(parts) + ("" if seconds is None else f"; about {duration(seconds)} left")
-
-    def line(self, event: Progressed) -> list[str]:
-        """A run's name, epoch, horizon, loss, validation error and time."""
-        p = event.progress
-        mae = number(self.maes.get(event.name))
-        return [event.name, f"{p.epoch}/{p.epochs}", str(p.horizon), number(p.loss), mae, duration(p.seconds_left)]
-
-
-class _Lines:
-    """Shows a sweep as lines of a log."""
-
-    def __init__(self, board: Board, at_once: int) -> None:
-        self._board, self._at_once = board, at_once
-        self._told: dict[str, float] = {}
-
-    def started(self, run: Run) -> None:
-        self._board.started(run)
-        self._told[run.name] = time.monotonic()
-
-    def progressed(self, event: Progressed) -> None:
-        self._board.progressed(event)
-        now = time.monotonic()
-        if now - self._told.get(event.name, now) >= LINE_EVERY_S:
-            self._told[event.name] = now
-            name, epoch, horizon, loss, mae, left = self._board.line(event)
-            self.say(f"{name}: epoch {epoch}, horizon {horizon}, loss {loss}, val. MAE {mae}, {left} left")
+        if event.name in self._reports:
+            self._last[event.name] = event.progress
+            self._shown[event.name](event.progress)
 
     def noted(self, event: Noted) -> None:
-        self.say(f"{event.name}: {event.text}")
+        say(f"{event.name}: {event.text}")
 
     def finished(self, row: Row) -> None:
-        self._board.finished(row)
+        self._reports.pop(row.name)(1.0)
+        self._last.pop(row.name, None)
+        self._left -= 1
+        self._ended[row.status] += 1
+        if row.seconds is not None:
+            self._seconds.append(row.seconds)
         result = f"rel. MAE {number(row.rel_mae)}, {_time(row)}" if row.status == "done" else row.message
-        self.say(f"{row.name}: {row.status}, {result} ({self._board.summary(self._at_once)})")
+        say(f"{row.name}: {row.status}, {result} ({self.summary()})")
 
-    def say(self, text: str) -> None:
-        say(text)
+    def seconds_left(self) -> float | None:
+        """Until all runs have ended, if each takes as long as those so far; None: unknown."""
+        under_way = self._last.values()
+        whole = self._seconds + [progress.seconds + progress.seconds_left for progress in under_way]
+        if not whole:
+            return None
+        work = sum(progress.seconds_left for progress in under_way)
+        work += sum(whole) / len(whole) * (self._left - len(under_way))
+        return work / max(1, min(self._at_once, self._left))
 
-
-class _Live(_Lines):
-    """Shows a sweep as lines with a live table of the present runs below them."""
-
-    def progressed(self, event: Progressed) -> None:
-        self._board.progressed(event)
-
-    def picture(self) -> RenderableType:
-        from rich import box
-        from rich.console import Group
-        from rich.table import Table
-        from rich.text import Text
-
-        table = Table("run", "epoch", "horizon", "loss", "val. MAE", "left", box=box.SIMPLE_HEAD)
-        for name, event in list(self._board.running.items()):
-            table.add_row(*(self._board.line(event) if event else [name, *["-"] * 5]))
-        return Group(table, Text(self._board.summary(self._at_once)))
-
-
-@contextmanager
-def _watching(left: int, capacity: Any) -> Iterator[_Lines]:
-    """What shows the sweep on standard error: a live table in a terminal, else lines."""
-    if not sys.stderr.isatty():
-        yield _Lines(Board(left), capacity())
-        return
-    from rich.console import Console
-    from rich.live import Live
-
-    console = Console(stderr=True, markup=False, highlight=False)
-    watch = _Live(Board(left), capacity())
-    # lines that are printed meanwhile appear above the table
-    with Live(get_renderable=watch.picture, console=console, refresh_per_second=2, transient=True):
-        yield watch
+    def summary(self) -> str:
+        running, seconds = len(self._reports), self.seconds_left()
+        parts = [f"{count} {status}" for status, count in self._ended.items()]
+        parts += [f"{running} running", f"{self._left - running} waiting"]
+        return ", ".join(parts) + ("" if seconds is None else f"; about {duration(seconds)} left")

@@ -1,4 +1,4 @@
-"""table, figure: the results beside the paper's, and figures of presets."""
+"""table, figure: our results with the paper's, and figures of presets."""
 
 from __future__ import annotations
 
@@ -17,18 +17,10 @@ from training.cli.console import Failure, progress, say
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from engine.presets import Preset
     from training.cli.console import Report
 
-figure = typer.Typer(help="Draw figures of presets beside the truth, as PNG, SVG or PDF.", no_args_is_help=True)
+figure = typer.Typer(help="Draw figures of presets and the truth, as PNG, SVG or PDF.", no_args_is_help=True)
 
-PresetNames = Annotated[
-    list[str], typer.Argument(metavar="PRESET...", help="Names of presets or paths of their files.")
-]
-Trajectory = Annotated[int, typer.Option(min=0, help="Number of the trajectory in the validation set.")]
-Listen = Annotated[
-    float, typer.Option(metavar="X", help="Listening point, 0 … 1 of the length; 0.37 is the paper's 24 cm.")
-]
 Output = Annotated[
     Path | None, typer.Option(help="The file; its suffix gives the format. Default FIGURE.png in this folder.")
 ]
@@ -43,30 +35,35 @@ def table(
         typer.Option(help="Only runs of this recipe of training/recipes."),
     ] = "all",
     format: Annotated[
-        Literal["markdown", "csv"], typer.Option(help="csv has a line for each cell (tidy data).")
-    ] = "markdown",
-    rows: Annotated[
-        bool, typer.Option("--rows", help="List the runs behind the figures, with the command that repeats each.")
-    ] = False,
+        Literal["compact", "full", "csv"],
+        typer.Option(
+            help="compact and full are Markdown, full with deviations; csv has a line per cell (tidy data)."
+        ),
+    ] = "compact",
+    metric: Annotated[
+        Literal["mse", "mae"], typer.Option(help="Relative error of the compact tables; the others have both.")
+    ] = "mse",
     output: Annotated[Path | None, typer.Option(help="Write to this file instead of standard output.")] = None,
     into: Annotated[
         Path | None,
         typer.Option(metavar="FILE.md", help=f"Replace all that follows the line {MARKER} in this file."),
     ] = None,
 ) -> None:
-    """Print the paper's two tables with our results beside its figures."""
-    if rows and format == "csv":
-        raise typer.BadParameter("is for markdown; in CSV each line names its runs", param_hint="--rows")
+    """Print the paper's two tables with our results."""
     if into is not None and (format == "csv" or output is not None):
-        raise typer.BadParameter("takes Markdown, and goes without --output", param_hint="--into")
+        raise typer.BadParameter("takes Markdown and excludes --output", param_hint="--into")
     from training.results import RESULTS, read_results
+    from training.tables.compact import as_compact
     from training.tables.markdown import as_markdown
     from training.tables.tidy_csv import as_csv
 
     found = read_results(results or RESULTS)
     if not found:
         say(f"note: {results or RESULTS} has no rows; the tables hold the paper's figures only")
-    text = as_csv(found, recipe) if format == "csv" else as_markdown(found, recipe, listing=rows)
+    if format == "compact":
+        text = as_compact(found, recipe, f"rel_{metric}")
+    else:
+        text = as_csv(found, recipe) if format == "csv" else as_markdown(found, recipe)
     if into is not None:
         text, output = _before(into) + text, into
     if output is None:
@@ -86,40 +83,20 @@ def _before(document: Path) -> str:
 
 
 @figure.command()
-def evolution(
-    presets: PresetNames,
-    trajectory: Trajectory = 0,
-    seconds: Annotated[float, typer.Option(metavar="S", help="Time shown, from the start, in s.")] = 0.1,
-    listen: Listen = DEFAULT_LISTEN,
-    output: Output = None,
-) -> None:
-    """Figure 2 of the paper: displacement, errors and spectra.
-
-    Of the whole string over time.
-    """
-    from training.figures import evolution as drawing
-
-    check_range("--listen", listen, *LISTEN_RANGE)
-    check_range("--seconds", seconds, 0, drawing.LONGEST_S, "s")
-    _write(
-        presets,
-        output,
-        "evolution",
-        lambda loaded, report: drawing.evolution(loaded, trajectory, seconds, listen, report),
-    )
-
-
-@figure.command()
 def extrapolation(
-    presets: PresetNames,
+    presets: Annotated[
+        list[str], typer.Argument(metavar="PRESET...", help="Names of presets or paths of their files.")
+    ],
     seconds: Annotated[
         float | None, typer.Option(metavar="S", help="Time shown, in s; default twice the training horizon.")
     ] = None,
-    trajectory: Trajectory = 0,
+    trajectory: Annotated[int, typer.Option(min=0, help="Number of the trajectory in the validation set.")] = 0,
     trajectories: Annotated[
         int, typer.Option(min=1, help="How many of the validation set the error is taken over, from the first on.")
     ] = 10,
-    listen: Listen = DEFAULT_LISTEN,
+    listen: Annotated[
+        float, typer.Option(metavar="X", help="Listening point, 0 … 1 of the length; 0.37 is the paper's 24 cm.")
+    ] = DEFAULT_LISTEN,
     output: Output = None,
 ) -> None:
     """Figure 3 of the paper: past the training horizon.
@@ -131,48 +108,29 @@ def extrapolation(
     check_range("--listen", listen, *LISTEN_RANGE)
     if seconds is not None:
         check_range("--seconds", seconds, 0, drawing.LONGEST_S, "s")
-    _write(
-        presets,
+    loaded = [open_preset(name) for name in presets]
+    _save(
         output,
         "extrapolation",
-        lambda loaded, report: drawing.extrapolation(loaded, seconds, trajectory, trajectories, listen, report),
+        lambda report: drawing.extrapolation(loaded, seconds, trajectory, trajectories, listen, report),
     )
 
 
 @figure.command()
-def error(
-    presets: PresetNames,
-    seconds: Annotated[
-        float | None, typer.Option(metavar="S", help="Time shown, in s; default 1.5 times the training horizon.")
-    ] = None,
-    trajectories: Annotated[
-        int | None, typer.Option(min=1, help="How many of the validation set, from the first on; default all.")
-    ] = None,
+def ratios(
+    results: Annotated[Path | None, typer.Option(help="The results file; default the project's.")] = None,
+    metric: Annotated[Literal["mse", "mae"], typer.Option(help="Relative error.")] = "mae",
     output: Output = None,
 ) -> None:
-    """Figure 4 of the paper: relative error in each time step.
+    """Heat map of our errors over the paper's."""
+    from training.figures.ratios import ratios as drawing
+    from training.results import RESULTS, read_results
 
-    Over the validation set.
-    """
-    from training.figures import error as drawing
-
-    if seconds is not None:
-        check_range("--seconds", seconds, 0, drawing.LONGEST_S, "s")
-    _write(presets, output, "error", lambda loaded, report: drawing.error(loaded, seconds, trajectories, report))
+    rows = read_results(results or RESULTS)
+    _save(output, "ratios", lambda report: drawing(rows, f"rel_{metric}"))
 
 
-@figure.command()
-def eigenvalues(presets: PresetNames, output: Output = None) -> None:
-    """Learned eigenvalues beside the linear string's.
-
-    In the unit circle, and as decay rates over frequency.
-    """
-    from training.figures import eigenvalues as drawing
-
-    _write(presets, output, "eigenvalues", lambda loaded, report: drawing.eigenvalues(loaded))
-
-
-def _write(names: list[str], output: Path | None, kind: str, draw: Callable[[list[Preset], Report], Figure]) -> None:
+def _save(output: Path | None, kind: str, draw: Callable[[Report], Figure]) -> None:
     from training.figures.style import check_format, figure_bytes
 
     path = output or Path(f"{kind}.png")
@@ -180,7 +138,6 @@ def _write(names: list[str], output: Path | None, kind: str, draw: Callable[[lis
         check_format(path)
     except ValueError as error:
         raise typer.BadParameter(str(error), param_hint="--output") from error
-    loaded = [open_preset(name) for name in names]
     with whole_file(path) as file, progress(f"figure {kind}") as report:
-        file.write(figure_bytes(draw(loaded, report), path.suffix))
+        file.write(figure_bytes(draw(report), path.suffix))
     print(path)

@@ -33,7 +33,7 @@ def dataset(config: Configuration, cache: Cache = None, json: Json = False) -> N
 
     A data set that is in the cache is not made again.
     """
-    from training.by_name import load
+    from training.cell import load
     from training.data.dataset import dataset_folder, dataset_key, draw_initial
 
     configuration = load(config).data
@@ -78,8 +78,7 @@ def train(
     import torch
 
     from engine.presets import SHIPPED
-    from training.by_name import load
-    from training.cell import Cell
+    from training.cell import Cell, load
     from training.run import default_runs, run_row
 
     configuration = load(config)
@@ -98,12 +97,12 @@ def train(
                 folder,
                 cache=cache,
                 device=_device(device),
-                report=_training_report(report),
+                report=training_report(report),
                 waits=lambda: say(f"{folder / name}: another process trains there; waiting for its end"),
                 preset=file,
             )
     except KeyboardInterrupt:
-        say(f"stopped; the same command goes on with {folder / name}")
+        say(f"stopped; the same command continues with {folder / name}")
         raise
     if row.status != "done":
         raise Failure(f"{name}: {row.message}")
@@ -151,7 +150,7 @@ def _device(wanted: Device) -> str:
     return "cpu"
 
 
-def _training_report(report: Report) -> Callable[[Progress], None]:
+def training_report(report: Report) -> Callable[[Progress], None]:
     """Step, epoch, horizon, loss and the last validation as progress."""
     last = ""
 

@@ -32,7 +32,7 @@ class StringError:
     Attributes:
         rel_mse: relative squared error over the grid.
         processor_s: for a second of the whole string's motion.
-        sounds: whether the string still moves, as far as `UNHEARD` tells.
+        sounds: whether the string still moves, by the limit `UNHEARD`.
     """
 
     pitch_hz: float
@@ -127,29 +127,23 @@ def rollout(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tens
 Edges = tuple[float, float]
 
 
-def by_rise(errors: Sequence[StringError], rises: Sequence[float]) -> list[tuple[Edges, FamilyErrors]]:
-    """In ranges of the rise of tension, those that hold strings; the last has both ends."""
-    return [(edges, FamilyErrors(part)) for edges, part in _in_ranges(errors, rises, "tension_rise")]
+def in_ranges(
+    errors: Sequence[StringError], **edges: Sequence[float]
+) -> list[tuple[tuple[Edges, ...], FamilyErrors]]:
+    """Errors in ranges of one or several figures of the strings, each given by its edges.
+
+    Of a figure's ranges the last has both ends; ranges without a string are left out.
+    """
+    found: list[tuple[tuple[Edges, ...], tuple[StringError, ...]]] = [((), tuple(errors))]
+    for figure, of_figure in edges.items():
+        found = [
+            ((*ranges, (low, high)), inside)
+            for ranges, part in found
+            for low, high in pairwise(of_figure)
+            if (inside := tuple(one for one in part if _inside(getattr(one, figure), low, high, of_figure[-1])))
+        ]
+    return [(ranges, FamilyErrors(part)) for ranges, part in found]
 
 
-def by_cell(
-    errors: Sequence[StringError], rises: Sequence[float], inharmonicities: Sequence[float]
-) -> list[tuple[Edges, Edges, FamilyErrors]]:
-    """The same in ranges of the rise of tension and of inharmonicity."""
-    return [
-        (of_rise, of_inharmonicity, FamilyErrors(part))
-        for of_rise, strings in _in_ranges(errors, rises, "tension_rise")
-        for of_inharmonicity, part in _in_ranges(strings, inharmonicities, "inharmonicity")
-    ]
-
-
-def _in_ranges(
-    errors: Sequence[StringError], edges: Sequence[float], figure: str
-) -> list[tuple[Edges, tuple[StringError, ...]]]:
-    found = []
-    for low, high in pairwise(edges):
-        values = ((one, getattr(one, figure)) for one in errors)
-        inside = tuple(one for one, value in values if low <= value < high or value == high == edges[-1])
-        if inside:
-            found.append(((low, high), inside))
-    return found
+def _inside(value: float, low: float, high: float, last: float) -> bool:
+    return low <= value < high or value == high == last

@@ -22,7 +22,7 @@ from training.family.strings import PluckedString, displacement_m
 
 DIFFERENCE = 1e-4
 FLOOR = 1e-13  # of a relative error, below which it counts no more
-FRAMES = 256  # of a string that enter the matrix, drawn anew for each step
+FRAMES = 256  # of a string that enter the matrix, drawn again for each step
 DAMPINGS = (0.01, 0.1, 1.0, 10.0, 100.0)  # times the last that was best
 
 

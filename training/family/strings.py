@@ -2,7 +2,7 @@
 
 A string's motion depends on three numbers of its own (inharmonicity B, two damping rates) and on the shape and the
 relative rise of tension of its pluck; pitch, length, density and tension rescale it exactly. So the ranges are those
-of what is heard, and strings of one length and density stand for all.
+of audible properties, and strings of one length and density stand for all.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class PluckedString:
     """One string with all its modes below 20 kHz, and one pluck of it.
 
     Attributes:
-        amplitudes_m: as it is let go, float64 (modes,).
+        amplitudes_m: at its release, float64 (modes,).
         tension_rise: ΔT/T₀ then.
     """
 
@@ -108,7 +108,7 @@ def string_of(pitch_hz: float, inharmonicity: float, t60_s: float, bright_t60_s:
 
 
 def displacement_m(plucked: PluckedString) -> Tensor:
-    """As it is let go, float64 (grid_points,)."""
+    """At its release, float64 (grid_points,)."""
     return plucked.resonator.to_grid(plucked.amplitudes_m)
 
 
@@ -118,6 +118,3 @@ def _log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> fl
 
 def _either(random: np.random.Generator, bounds: tuple[tuple[float, float], ...]) -> float:
     return _log_uniform(random, bounds[int(random.integers(len(bounds)))])
-
-
-__all__ = ["COLUMNS", "FAMILY", "Column", "PluckedString", "displacement_m", "draw_from", "draw_string", "string_of"]

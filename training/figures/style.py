@@ -22,7 +22,6 @@ TRUTH = "#222222"
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 DASHES = ("-", "--", ":")
 MARKED = "#777777"  # what is said beside the data: horizons, circles
-DISPLACEMENT_MAP = "coolwarm"  # Moreland's: even steps of perception to both sides of zero
 DPI = 200
 LARGEST_ERROR = 100.0  # relative, that is drawn
 FORMATS = (".png", ".svg", ".pdf")

@@ -19,7 +19,7 @@ from torch import Tensor
 from torch.nn import BatchNorm1d
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
-from engine.metrics import RelativeError
+from engine.metrics import ErrorSums, RelativeError
 from engine.models import StringModel
 from engine.plain_text import one_line
 from engine.schema import SchemaError, read, write
@@ -30,7 +30,7 @@ from training.evaluate import evaluate_model
 from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.fitting.losses import training_loss
 from training.fitting.soap import SOAP
-from training.start import LEAST_SQUARES, begin, initialisation_of
+from training.start import LEAST_SQUARES, begin
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 TELL_EVERY_S = 5.0  # within an epoch
@@ -42,7 +42,7 @@ class Diverged(RuntimeError):
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is: told at the end of every epoch, and within long ones.
+    """How far a run is: reported at the end of every epoch, and within long ones.
 
     Attributes:
         step, steps: optimiser's steps, done and in all.
@@ -72,13 +72,14 @@ class FitResult:
 
     Attributes:
         best_epoch: 0 where training did not beat the start.
+        validation: the error sums of the model.
         seconds: of all of it, what it starts from and the measuring among it.
         start: validation error of the untrained model; None where there is none: a fit in one go, a start whose
             latents are still to be learned, or a model that runs away.
     """
 
     model: StringModel[Any]
-    validation: RelativeError
+    validation: ErrorSums
     epochs: int
     best_epoch: int
     seconds: float
@@ -94,7 +95,7 @@ def fit(
     report: Callable[[Progress], None] = lambda progress: None,
     checkpoint_every_s: float | None = None,
 ) -> FitResult:
-    """Trains, or goes on with the run in `run_folder`; what has a closed form (DMD) is computed at once.
+    """Trains, or continues with the run in `run_folder`; what has a closed form (DMD) is computed at once.
 
     Args:
         report: called after every epoch, and every few seconds within.
@@ -104,7 +105,7 @@ def fit(
         Diverged: the loss became infinite or not a number, or no validation error was ever a number.
         ValueError: the checkpoint there is damaged or of another configuration.
     """
-    if initialisation_of(configuration) == LEAST_SQUARES:
+    if configuration.start == LEAST_SQUARES:
         return _fit_at_once(configuration, dataset, report)
     begun = time.monotonic()
     run = _Run(configuration, dataset, torch.device(device))
@@ -174,6 +175,7 @@ class _Run:
         self._total = torch.zeros((), device=device)  # of this epoch's losses
         self._start: RelativeError | None = None
         self._best: RelativeError | None = None
+        self._best_sums: ErrorSums | None = None  # None where they were measured before the last checkpoint
         self._best_epoch = 0
         self._best_model = _copy(self._model)
 
@@ -238,7 +240,7 @@ class _Run:
             self._average.update_parameters(model)
 
     def _descend(self, loss: Tensor, error: Tensor) -> None:
-        """A step of the optimiser against `loss`; `error` is what is told."""
+        """A step of the optimiser against `loss`; `error` is reported."""
         self._optimiser.zero_grad(set_to_none=True)
         loss.backward()
         torch.nn.utils.clip_grad_norm_(self._model.parameters(), self._recipe.clip_norm)
@@ -265,9 +267,11 @@ class _Run:
     def validate(self) -> RelativeError:
         """The validation error; the best model so far is kept."""
         model = self._measured()
-        error = evaluate_model(model, self._dataset, "validation", self._configuration.steps).total()
+        sums = evaluate_model(model, self._dataset, "validation", self._configuration.steps)
+        error = sums.total()
         if _is_finite(error) and (self._best is None or error.rel_mae < self._best.rel_mae):
-            self._best, self._best_epoch, self._best_model = error, self.epoch, _copy(model)
+            self._best, self._best_sums = error, sums
+            self._best_epoch, self._best_model = self.epoch, _copy(model)
         return error
 
     def measure_start(self) -> None:
@@ -281,7 +285,8 @@ class _Run:
             raise Diverged("the validation error was never a number; lower peak_learning_rate")
         model = self._measured()
         model.load_state_dict(self._best_model)
-        return FitResult(model.eval(), self._best, self.epoch, self._best_epoch, self.seconds, self._start)
+        sums = self._best_sums or evaluate_model(model, self._dataset, "validation", self._configuration.steps)
+        return FitResult(model.eval(), sums, self.epoch, self._best_epoch, self.seconds, self._start)
 
     def checkpoint(self) -> Checkpoint:
         facts = {
@@ -335,7 +340,8 @@ def _fit_at_once(
     """Of a model whose start is all there is."""
     started = time.monotonic()
     model, _ = begin(configuration, dataset)
-    error = evaluate_model(model, dataset, "validation", configuration.steps).total()
+    sums = evaluate_model(model, dataset, "validation", configuration.steps)
+    error = sums.total()
     if not _is_finite(error):
         raise Diverged("the fit grows beyond all numbers on the validation set; choose a lower rank")
     seconds = time.monotonic() - started
@@ -344,7 +350,7 @@ def _fit_at_once(
     with torch.no_grad():
         loss = float((model(truth[:, 0], configuration.steps) - truth[:, 1:]).square().mean())
     report(Progress(1, 1, 1, 1, configuration.steps, 0.0, loss, error, seconds, 0.0))
-    return FitResult(model.eval(), error, 1, 1, seconds)
+    return FitResult(model.eval(), sums, 1, 1, seconds)
 
 
 def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer:
@@ -369,7 +375,7 @@ def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer
 
 
 def _keep_statistics(model: torch.nn.Module) -> None:
-    """Batch norm divides by what it has stored: a batch of loud strings is then told from one of soft ones."""
+    """Batch norm divides by what it has stored: a batch of loud strings then differs from one of soft ones."""
     for module in model.modules():
         if isinstance(module, BatchNorm1d):
             module.eval()

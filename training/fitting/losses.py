@@ -33,19 +33,16 @@ class KoopmanModel(Protocol):
 
 
 def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tuple[Tensor, Tensor]:
-    """The weighted loss that is minimised, and the mean square of the prediction's error alone.
+    """The loss that is minimised, and the mean square of the prediction's error alone.
 
-    A term of weight 0 costs nothing. Consistency compares with the encoded truth.
+    Consistency compares with the encoded truth; without a weight it costs nothing.
     """
     if not isinstance(model, KoopmanModel):
-        loss, prediction = _prediction(_predicted(model, batch), batch.target, recipe)
-        return recipe.prediction_weight * loss, prediction
+        return _prediction(_predicted(model, batch), batch.target, recipe)
     origin = model.encode(batch.initial).origin
     latents = model.latents(origin, batch.frames)
     loss, prediction = _prediction(model.decode(latents), batch.target, recipe)
-    loss = recipe.prediction_weight * loss
-    if recipe.encoding_weight:
-        loss = loss + recipe.encoding_weight * _mean_square(model.decode(origin), batch.initial)
+    loss = loss + _mean_square(model.decode(origin), batch.initial)
     if recipe.consistency_weight:
         encoded = model.encode(batch.target.flatten(0, 1)).origin.view_as(latents)
         consistency = torch.view_as_real(encoded - latents).square().sum(-1).mean()

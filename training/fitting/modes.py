@@ -69,7 +69,7 @@ def found_modes(dataset: Dataset, steps: int) -> Modes:
     """
     points, stride = dataset.configuration.grid_points, dataset.configuration.stride
     if stride != 1:
-        raise ValueError(f"blind needs every frame: the data's stride must be 1, not {stride}")
+        raise ValueError(f"a blind start needs every frame: the data's stride must be 1, not {stride}")
     now, next_to_it = torch.zeros(2, points, points, dtype=torch.float64)
     for frames in _displacements(dataset, steps):
         middle = frames[:, 1:-1].flatten(0, 1)

@@ -23,14 +23,13 @@ from scipy.optimize import least_squares
 
 from engine.models import FGRU, FRNN, KoopmanIntegrated, StringModel
 from engine.models.string_modes import StringModes
-from training.configuration import FROM_PHASES
 from training.fitting.modes import SLOWEST, Modes
 from training.research.fourier_wiring import store_in_fgru, store_in_frnn
 
 FIRST_FRAMES = 12
 MORE_FRAMES = 1.4  # times as many in each further fit
 SAMPLES = 10_000  # of all motions' frames, which a fit sees
-EVALUATIONS = 12  # of a fit, at most: the next one goes on from there
+EVALUATIONS = 12  # of a fit, at most: the next one continues from there
 
 Floats = NDArray[np.float64]
 
@@ -41,16 +40,15 @@ def start_from_phases(model: StringModel, modes: Modes, seed: int) -> None:
     FRNN, whose frequencies follow nothing, is given each mode's mean motion (`mean_motions`).
 
     Raises:
-        ValueError: the model has no such start, or cannot hold as many modes.
+        ValueError: the model cannot hold as many modes.
     """
     if isinstance(model, KoopmanIntegrated):
         model.store_modes(fit_phases(modes, seed))
     elif isinstance(model, FGRU):
         store_in_fgru(model, fit_phases(modes, seed))
-    elif isinstance(model, FRNN):
-        store_in_frnn(model, mean_motions(modes))
     else:
-        raise ValueError(f"blind without latent_epochs needs one of the models {', '.join(FROM_PHASES)}")
+        assert isinstance(model, FRNN)
+        store_in_frnn(model, mean_motions(modes))
 
 
 def fit_phases(modes: Modes, seed: int) -> StringModes:

@@ -120,7 +120,7 @@ class LatentFit:
 def pursue(
     model: StringModel, dataset: Dataset, steps: int, generator: torch.Generator, blind: bool = False
 ) -> LatentFit:
-    """Gives a Koopman its eigenvalues and its decoder, and tells what its encoder shall learn.
+    """Gives a Koopman its eigenvalues and its decoder, and returns what its encoder shall learn.
 
     Args:
         steps: frames of the horizon.

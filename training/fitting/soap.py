@@ -24,7 +24,7 @@ class SOAP(Optimizer):
     """See the module; the decay of weights is AdamW's.
 
     A tensor of more than two axes is the matrix that is nearest to a square. The first iteration only finds the
-    eigenvectors. All of the state are contiguous tensors, so that a run goes on from a checkpoint bit for bit.
+    eigenvectors. All of the state are contiguous tensors, so that a run continues from a checkpoint bit for bit.
     """
 
     def __init__(self, params: Iterable[dict[str, Any]], lr: float, weight_decay: float = 0.0) -> None:

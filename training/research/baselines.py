@@ -152,7 +152,7 @@ class ModalSynthesis(Baseline):
 
     The blocks are DMSP's: random Fourier features of each input with learned scale, a network of five layers with
     PReLU, a gated linear unit. It differs where this task does: whole strings instead of one point, so that the place
-    is no input; every mode's own decay; no noise; and modes are told by their shares of the tension, in more numbers
+    is no input; every mode's own decay; no noise; and modes are given their shares of the tension, in more numbers
     than the mean that theirs is.
     """
 
@@ -193,7 +193,7 @@ class ModalSynthesis(Baseline):
         return swing * (strings.start * strings.present)[:, None]
 
     def _bent(self, strings: Strings, nodes: Tensor) -> tuple[Tensor, Tensor]:
-        """Shares by which frequencies are higher, and factors of amplitudes, at nodes, float64."""
+        """Relative rises of frequencies, and factors of amplitudes, at nodes, float64."""
         of_string = torch.cat([strings.parameters, strings.rise], dim=-1)[:, None].expand(-1, nodes.shape[1], -1)
         of_time = torch.stack([torch.log10(1 + nodes) - 2, (-2 * strings.sigma[:, :1] * nodes).exp()], dim=-1)
         inputs = torch.cat([of_time.float(), of_string], dim=-1)

@@ -1,7 +1,7 @@
 """Training of a baseline on the family's strings: gradient steps on random frames for a budget of processor time.
 
 The loss is `fit_curves`' own, the mean logarithm of each string's relative error, over a growing part of the first
-second; the strings are those of the same configuration and split. A run that was stopped goes on from its checkpoint.
+second; the strings are those of the same configuration and split. A stopped run continues from its checkpoint.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def trained_baseline(path: Path) -> TrainedBaseline:
 
 @contextmanager
 def _naming(path: Path) -> Iterator[None]:
-    """What a checkpoint lacks is told with its file and the remedy."""
+    """What a checkpoint lacks is reported with its file and the remedy."""
     try:
         yield
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
@@ -101,7 +101,7 @@ def fit_baseline(
     made: Callable[[float], None] = lambda share: None,
     report: Callable[[BaselineProgress], None] = lambda progress: None,
 ) -> TrainedBaseline:
-    """Trains, or goes on with the run whose checkpoint is at `path`; the best model on the validation strings.
+    """Trains, or continues with the run whose checkpoint is at `path`; the best model on the validation strings.
 
     Args:
         minutes: of processor time of one thread, the making of the motions not counted.

@@ -10,7 +10,7 @@ numbers only where they belong. The three layers are analysis of the field at th
 synthesis. So the field is a part of the state, and a linear string is kept exactly.
 
 FGRU. tanh is the identity for numbers that are small, and the gates' biases are factors of single points: the cosine
-and the sine by which mode n turns in a sample are r's at the point n of channels that hold copies of all modes'
+and the sine of mode n's phase per sample are r's at the point n of channels that hold copies of all modes'
 states, z's say where anything is written. How far a mode turns follows the squares of all: a product r ⊙ h of two
 copies is a square; their sum, at one point, reaches each mode's r by the lag between them.
 """
@@ -374,7 +374,7 @@ def shared_coupling(coupling: Tensor, squares: Tensor) -> tuple[Tensor, Tensor, 
 
 
 def _gates(modes: StringModes) -> tuple[Tensor, Tensor]:
-    """What r is told for cosine and sine, (2, modes) each: biases, and slopes per radian that a mode turns farther.
+    """The inputs of r for cosine and sine, (2, modes) each: biases, and slopes per radian that a mode turns farther.
 
     Least squares over drifts, of which larger ones are rarer.
     """

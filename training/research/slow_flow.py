@@ -16,7 +16,7 @@ With k_n = c η_n² the motion of `engine.resonators.base` without damping has t
    count by what every other mode's energy adds to τ (`third_order_triad`), and it has resonances of four,
    j + k = l + m and j + k + l = m (`weigh_quartet`), of which those of the loudest modes are kept.
 6. Flow: ż_n = i ∂K/∂z̄_n - σ_n z_n. K₁ and K₂ are differentiated through S̄, too, K₃ and triads nearly so: as if all
-   frequencies rose alike, which they do but for the stiffness.
+   frequencies rose alike, which they do except for the stiffness.
 7. Back: (I, θ') is the averaged one moved by χ = (c/4) Σ_{m≠n} Ω_m V_mn Y_m X_n + (c/16) Σ X_n Y_n/Ω_n, where
    X_n = a_n cos 2θ_n and Y_n = a_n sin 2θ_n: θ + ∂χ/∂I, I - ∂χ/∂θ. A start, which decides all later phases, is moved
    in second order; frames in first, which is most of what is wrong with the first periods of a hard pluck.
@@ -46,7 +46,7 @@ SILENCE = 1e-6  # share of the amplitude of all together below which the highest
 NEGLIGIBLE = 1e-7  # share of the amplitude of all together; what a triad does that stays below it is left out
 RESONANT = 1 - 1e-9  # largest detuning of a triad in units of ω_1: (n, 1, n), which is none, stays outside
 LEAST_GAP = 1e-2  # between the frequencies of two modes, in units of ω_1: closer ones resonate in first order
-SETTLED = 1e-13  # share by which the averaged start changes in the last of its steps
+SETTLED = 1e-13  # relative change of the averaged start in the last of its steps
 MOST_STEPS = 300  # of them
 
 

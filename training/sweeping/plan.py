@@ -42,7 +42,7 @@ class Block:
                 raise ValueError(f"{name} is empty; name at least one, or remove the block")
         if self.count > bounds.MOST_RUNS:
             raise ValueError(f"a block of {self.count} cells is too large, at most {bounds.MOST_RUNS} may be")
-        list(self.cells())  # a cell that cannot be is told here
+        list(self.cells())  # a cell that cannot be is reported here
 
     @property
     def count(self) -> int:

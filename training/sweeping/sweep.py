@@ -1,6 +1,6 @@
 """A sweep: the runs of a plan on workers, their rows in the results file.
 
-Only this process writes the file, a row as soon as its run has ended. The same call goes on after an interruption:
+Only this process writes the file, a row as soon as its run has ended. The same call continues after an interruption:
 finished runs are skipped, failed ones tried again, unfinished ones continued from their checkpoints.
 """
 
@@ -56,7 +56,7 @@ class Options:
 
 
 class Watch(Protocol):
-    """Is told what happens in a sweep."""
+    """Receives what happens in a sweep."""
 
     def started(self, run: Run) -> None:
         """A run was handed to the workers."""
@@ -72,12 +72,19 @@ class Watch(Protocol):
 
 
 class Unwatched:
-    """A `Watch` that says nothing."""
+    """Shows nothing."""
 
-    def started(self, run: Run) -> None: ...
-    def progressed(self, event: Progressed) -> None: ...
-    def noted(self, event: Noted) -> None: ...
-    def finished(self, row: Row) -> None: ...
+    def started(self, run: Run) -> None:
+        pass
+
+    def progressed(self, event: Progressed) -> None:
+        pass
+
+    def noted(self, event: Noted) -> None:
+        pass
+
+    def finished(self, row: Row) -> None:
+        pass
 
 
 def group_of(plan: Plan) -> str:
@@ -114,7 +121,7 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch | None = 
     """
     watch = watch or Unwatched()
     file = options.results or results_of(plan, options.runs)
-    rows = {row.digest: row for row in add_rows(file, ())}  # a file that cannot be written is told before the work
+    rows = {row.digest: row for row in add_rows(file, ())}  # fails before the work where it cannot be written
     waiting = deque(unfinished(plan, rows.values()))
     running: dict[str, Run] = {}
     failures: Counter[str] = Counter()

@@ -1,7 +1,8 @@
-"""The paper's tables with our results beside them.
+"""The paper's tables with our results.
 
 `paper`     what stands where, the paper's figures, and how one of ours compares
 `sections`  our figures, from the rows of the results file
-`markdown`  both, to be read
+`compact`   both in one table per horizon, for RESULTS.md
+`markdown`  both in full, with deviations and the test split
 `tidy_csv`  both, to be computed with
 """

@@ -1,8 +1,7 @@
-"""The tables as Markdown, to be read: our figures beside the paper's, and which runs made them."""
+"""The tables in full as Markdown: means, deviations and test split, with the paper's figures."""
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
@@ -22,7 +21,7 @@ below each is of the same models on the test set, which chose nothing. **The pap
 printed (5 seeds, validation; DMD's deviations are over the errors of single trajectories).
 
 - **deviation**, of ours: √(s² + b²). s is the standard deviation over seeds, where there is more than one. b is the
-  standard error by which strings are in the split, the bootstrap over its 100 trajectories (as many drawn with
+  standard error over the strings of the split, the bootstrap over its 100 trajectories (as many drawn with
   replacement, {RESAMPLES} times; of several seeds the root of the mean square). **No brackets**: one seed, and b is
   not known, because its preset was not kept; the words beside it know the paper's deviation alone.
 - **better**, **worse**: than the paper's figure of the same model, by more than √(our deviation² + the paper's²), at
@@ -32,7 +31,7 @@ printed (5 seeds, validation; DMD's deviations are over the errors of single tra
 - **prior knowledge**: training started from what is known of the string (its modes and eigenvalues, or averaged
   equations), which the paper's models do not have. Lines without these words are black boxes as in the paper.
 - **§**: hints. Training used that a string may be mirrored and its sign turned; by the recipe `hinted` the integrated
-  phase was told how many modes there are, too. The recipe `blind` has neither.
+  phase was given the number of modes, too. The recipe `blind` has neither.
 - **our best**: the lowest validation error of our learned models (DMD is fitted, not learned) as a multiple of the
   paper's best in that column, of any model. `> ×` where the paper's best is printed as 0.0000, and thus below
   {PRINTED:g}."""
@@ -41,23 +40,20 @@ SHORT_LEGEND = """\
   on 400 frames, as the paper's."""
 
 
-def as_markdown(rows: Sequence[Row], recipe: RecipeChoice = "all", listing: bool = False) -> str:
-    """All tables, with what their words mean; `listing` adds the runs behind them."""
+def as_markdown(rows: Sequence[Row], recipe: RecipeChoice = "all") -> str:
+    """All tables with their legend."""
     found = sections(rows, recipe)
     parts = [LEGEND + "\n" + SHORT_LEGEND]
     for section in found:
         if section.horizon == HORIZONS[0]:
             parts.append(f"## {TITLES[section.string]}")
         parts.append(f"### {section.horizon} frames")
-        parts.append(_markdown_table(*_table(section)))
-    used = rows_of(found)
-    if out := len(rows) - len(used):
+        parts.append(markdown_table(*_table(section)))
+    if out := len(rows) - len(rows_of(found)):
         parts.append(
             f"{out} of {len(rows)} rows of the results file are not shown: of other data, another horizon or recipe, "
             "a trial, or made by a recipe that has changed since."
         )
-    if listing:
-        parts += ["## Runs", _markdown_table(*_listing(used)), *_remarks(used)]
     return "\n\n".join(parts) + "\n"
 
 
@@ -141,37 +137,8 @@ def _best(section: Section, structured: bool, column: Column, metric: str) -> st
     return f"**{factor(figure, section.paper_best(column, metric)[1])}** {MODEL_NAMES[line.model]}{recipe}"
 
 
-def _listing(rows: Sequence[Row]) -> tuple[list[str], list[list[str]]]:
-    head = ["run", "seed", "status", "rel. MSE", "rel. MAE", "test MSE", "test MAE"]
-    head += ["digest", "commit", "hardware", "seconds", "repeated by"]
-    return head, [
-        [
-            row.name,
-            str(row.seed),
-            row.status,
-            *(
-                NONE if value is None else f"{value:.8g}"
-                for value in (row.rel_mse, row.rel_mae, row.test_rel_mse, row.test_rel_mae)
-            ),
-            row.digest,
-            row.commit or NONE,
-            row.hardware or NONE,
-            NONE if row.seconds is None else f"{row.seconds:.0f}",
-            f"`learned-strings train {row.name}`",
-        ]
-        for row in rows
-    ]
-
-
-def _remarks(rows: Sequence[Row]) -> list[str]:
-    """What rows that are done say of themselves, by their commit."""
-    said = Counter((row.commit or NONE, row.message) for row in rows if row.status == "done" and row.message)
-    lines = [f"- {commit} ({count} runs): {message}." for (commit, message), count in said.items()]
-    return ["\n".join(lines)] if lines else []
-
-
-def _markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Cells padded to their column's width: a table that can be read as text, too."""
+def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table whose cells are padded to the width of their column."""
     table = [[cell.replace("|", "\\|") for cell in row] for row in (head, *rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     lines = ["| " + " | ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) + " |" for row in table]

@@ -45,7 +45,7 @@ class Figure(NamedTuple):
 
     Attributes:
         deviation: standard deviation over seeds, None where a single run has none; of the paper's as printed.
-        split: standard error by which trajectories are in the split, None where it was not measured.
+        split: standard error over the trajectories of the split, None where it was not measured.
     """
 
     mean: float

@@ -9,8 +9,7 @@ from statistics import fmean, stdev
 from typing import Literal
 
 from engine.schema import SchemaError
-from training.by_name import load
-from training.cell import HORIZON
+from training.cell import HORIZON, load
 from training.configuration import TrainingConfiguration
 from training.results import SHORT_HORIZON, Row
 from training.start import hints_of

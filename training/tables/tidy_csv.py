@@ -38,7 +38,7 @@ def _record(section: Section, model: str, line: Line | None, column: Column) -> 
 
     trained: see `Line`. seeds: runs behind the figures; 0 where nothing was run. mse_mark …: of the validation figure
     against the paper's; test_… of the test split's. runs: their names, separated by spaces, with those that diverged
-    or failed. rel_mse_std …: over seeds; rel_mse_se …: by which trajectories are in the split; see `Figure`.
+    or failed. rel_mse_std …: over seeds; rel_mse_se …: over the trajectories of the split; see `Figure`.
     """
     found = (section.lines[line].get(column) if line else None) or Entry(None, None)
     marks: dict[str, Any] = {}

@@ -34,7 +34,7 @@ class Candidate(BaseModel):
     Attributes:
         label: its name for people.
         preset, preset_sha256: the preset that made it; for the truth, the one whose string it is.
-        gain_db: by which it was turned down.
+        gain_db: its attenuation.
     """
 
     model_config = ConfigDict(frozen=True)

@@ -46,4 +46,4 @@ class SampledExport:
         kept = kept_samples(self.plan, self.out)
         if not kept:
             return "nothing was written."
-        return f"{kept} of {len(self.plan.zones)} samples are kept; export again to go on from there."
+        return f"{kept} of {len(self.plan.zones)} samples are kept; export again to continue from there."

@@ -1,6 +1,6 @@
 """The export of a patch as SFZ or SoundFont 2: samples rendered or kept, then the file that plays them.
 
-An export that was stopped goes on with the same call: whole samples are kept, unless what they sound of has changed.
+A stopped export continues with the same call: whole samples are kept, unless what they sound of has changed.
 """
 
 from __future__ import annotations

@@ -119,7 +119,7 @@ def write_sf2(
 def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, int]:
     """By how many cB a velocity of 0 would be softer than one of 128, by zone.
 
-    So the level goes on within a layer as it does from layer to layer; less where a soft layer, which has to be
+    So the level continues within a layer as it does from layer to layer; less where a soft layer, which has to be
     raised for it, would be much louder than the hardest.
     """
     found = {}

@@ -1,6 +1,6 @@
-"""SFZ: the text that tells a player which sample sounds for which key and velocity, and how.
+"""SFZ: the text that assigns samples to keys and velocities for a player.
 
-Opcodes of SFZ 1, understood by every player, but for `default_path`, `note_polyphony` and `note_selfmask` of SFZ 2.
+Opcodes of SFZ 1, understood by every player, except `default_path`, `note_polyphony` and `note_selfmask` of SFZ 2.
 Source: https://sfzformat.com
 """
 

@@ -59,7 +59,7 @@ def notes(plan: SampledPlan, report: SampledReport, dry: str) -> list[str]:
     """What a musician should know of what was written. `dry`: what takes the room out, as in "--dry leaves"."""
     told = []
     if plan.patch.room.mix > 0 and not plan.patch.damping.let_ring:
-        told.append(f"a key that is let go ends the room's tail as well; {dry} the room to the sampler")
+        told.append(f"a released key ends the room's tail as well; {dry} the room to the sampler")
     if report.cut:
         rang = f"{number_of(report.cut, 'sample')} still rang after {plan.seconds:g} s and "
         told.append(rang + ("was faded out" if report.cut == 1 else "were faded out"))

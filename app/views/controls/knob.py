@@ -83,7 +83,7 @@ class Knob(QWidget):
     def show_figure(self, figure: str) -> None:
         """Shows what the value amounts to, with its unit, in its place; "" shows the value again.
 
-        The value itself is in the tooltip, and `figure_asked` tells of a number that is typed.
+        The value itself is in the tooltip, and `figure_asked` reports a typed number.
         """
         if figure != self._figure:
             self._figure = figure

@@ -10,7 +10,7 @@ from app.playing.keyboard import KeyPress, place_of, semitone_of
 from app.views.controls.browser import open_browser
 
 X11 = "xcb"  # Qt's name: there a held key is repeated by releases and presses, most of which Qt does not mark so
-LEAVE_MS = 2  # by which `released` is delayed there: by then the press of a repetition has arrived
+LEAVE_MS = 2  # delay of `released` there: by then the press of a repetition has arrived
 REPEAT_MS = 5  # between such a release and its press on the server's clock, at most
 _WRITING = (QLineEdit, QAbstractSpinBox, QPlainTextEdit, QTextEdit)
 _HELD = (

@@ -1,22 +1,40 @@
-"""The box that chooses the shape of a pluck, and why a triangle leaves the knobs of the width grey."""
+"""The boxes that choose the shape of a pluck and the pick-up, and why a triangle leaves its width grey."""
 
 from __future__ import annotations
 
 from PySide6.QtWidgets import QComboBox
 
+from app.shared.vocabulary import PICKUP_TITLES
 from app.views.controls.parts import combo_box
 from engine.pluck import SHAPES, Shape
 
 NO_WIDTH = "A triangle has no width: choose another shape to turn it"
-_NAMES: dict[Shape, str] = {"gaussian": "Gaussian", "triangular": "Triangle", "raised_cosine": "Raised cosine"}
-_WIDTH = 106  # pixels: the longest name, with the padding of _TIGHT
-_TIGHT = "QComboBox { padding: 5px 0 5px 6px; } QComboBox::drop-down { border: none; width: 17px; }"
+_NAMES: dict[Shape, str] = {
+    "gaussian": "Gaussian",
+    "triangular": "Triangle",
+    "raised_cosine": "Raised cosine",
+    "rounded": "Round triangle",
+}
+_WIDTH, _PICKUP_WIDTH = 106, 64  # pixels: the longest name, with the padding of _TIGHT
+_TIGHT = "QComboBox {{ padding: 5px 0 5px 6px; }} QComboBox::drop-down {{ border: none; width: {}px; }}"
+_ARROW, _PICKUP_ARROW = 17, 9  # pixels
 
 
 def shape_box() -> QComboBox:
     """A narrow combo box of the names in words; its rows are SHAPES, and so is its data."""
     box = combo_box("Pluck shape", [(_NAMES[shape], shape) for shape in SHAPES])
     box.setToolTip("The shape of the pluck")
-    box.setStyleSheet(_TIGHT)
-    box.setFixedWidth(_WIDTH)
+    return _tight(box, _WIDTH, _ARROW)
+
+
+def pickup_box() -> QComboBox:
+    """A narrow combo box of the pick-ups; its data is that of `Choices.pickup`."""
+    return _tight(
+        combo_box("Pick-up", [(title, kind) for kind, title in PICKUP_TITLES.items()]), _PICKUP_WIDTH, _PICKUP_ARROW
+    )
+
+
+def _tight(box: QComboBox, width: int, arrow: int) -> QComboBox:
+    box.setStyleSheet(_TIGHT.format(arrow))
+    box.setFixedWidth(width)
     return box

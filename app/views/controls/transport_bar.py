@@ -18,11 +18,12 @@ from app.views.controls.knob import Knob
 from app.views.controls.meter import Meter
 from app.views.controls.parts import tool_button, vertical_rule
 from app.views.controls.plain import Label
-from app.views.controls.shape_box import NO_WIDTH, shape_box
+from app.views.controls.shape_box import NO_WIDTH, pickup_box, shape_box
 from app.views.controls.slot_buttons import SlotButtons
 from engine.pluck import (
     FULL_SCALE_M,
     FULL_SCALE_M_S,
+    FULL_SCALE_N,
     SHAPES,
 )
 
@@ -81,7 +82,7 @@ class TransportBar(QFrame):
             knob.set_narrow(compact)
         self.slots.set_narrow(compact)
         self._export.setText("Export …" if compact else "Export WAV …")
-        for button in (self._play, self._loop, self._stereo, self._velocity, self._export):
+        for button in (self._play, self._loop, self._stereo, self._export):
             button.setProperty("compact", compact)
             button.style().unpolish(button)
             button.style().polish(button)
@@ -94,9 +95,9 @@ class TransportBar(QFrame):
             self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
         self.knobs["listen_right"].setEnabled(choices.stereo)  # not hidden, which would move the controls beside it
-        with QSignalBlocker(self._stereo), QSignalBlocker(self._velocity):
+        with QSignalBlocker(self._stereo), QSignalBlocker(self._pickup):
             self._stereo.setChecked(choices.stereo)
-            self._velocity.setChecked(choices.pickup == "velocity")
+            self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup))
         self.slots.show_choices(choices)
 
     def show_playing(self, playing: bool) -> None:
@@ -133,20 +134,17 @@ class TransportBar(QFrame):
         )
         self._stereo.setCheckable(True)
         self._stereo.toggled.connect(lambda on: self.change_asked.emit("stereo", on))
-        self._velocity = tool_button(
-            "Velocity",
-            "Velocity pick-up",
-            f"Hear the string's velocity, as from a magnetic pick-up: brighter (full scale {FULL_SCALE_M_S:g} m/s).\n"
-            f"Otherwise its displacement (full scale {1000 * FULL_SCALE_M:g} mm)\n{OF_THE_PATCH}",
+        self._pickup = pickup_box()
+        self._pickup.setToolTip(
+            f"Point: displacement of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
+            f"Velocity: of that point, as from a magnetic pick-up: brighter (full scale {FULL_SCALE_M_S:g} m/s)\n"
+            f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n{OF_THE_PATCH}"
         )
-        self._velocity.setCheckable(True)
-        self._velocity.toggled.connect(
-            lambda on: self.change_asked.emit("pickup", "velocity" if on else "displacement")
-        )
+        self._pickup.activated.connect(lambda row: self.change_asked.emit("pickup", self._pickup.itemData(row)))
+        self._stereo.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         column = QVBoxLayout()
-        for button in (self._stereo, self._velocity):
-            button.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-            column.addWidget(button)
+        column.addWidget(self._stereo)
+        column.addWidget(self._pickup)
         return column
 
     def _build_shape(self) -> QVBoxLayout:

@@ -57,7 +57,7 @@ BITS_NAMES: dict[Bits, str] = {"16": "16-bit PCM, dithered", "24": "24-bit PCM",
 FORM_NAMES = (("SFZ with FLAC samples", "flac"), ("SFZ with WAV samples", "wav"), ("SoundFont 2", "sf2"))
 RECIPE_NOTE = "Each file stores its settings: drop it on the window to restore its preset and pluck."
 MIDI_NOTE = "What was played is written beside it, as a MIDI file."
-RESUMES = "A cancelled export keeps its samples, and goes on from there the next time."
+RESUMES = "A cancelled export keeps its samples, and continues from there the next time."
 
 
 @dataclass(frozen=True)
@@ -304,7 +304,7 @@ class SamplerPage(ExportPage):
         self.source = combo_box("Source", [("Model", "model"), ("Truth", "truth")], choices.source)
         self.source.setToolTip("What plays the patch")
         self.dry = QCheckBox("Dry: the room is left to the sampler")
-        self.dry.setToolTip("A room in the samples ends with each key that is let go")
+        self.dry.setToolTip("A room in the samples ends with each released key")
         self.dry.setMinimumHeight(28)
         self.dry.setChecked(choices.dry)
         self.file = FilePicker(choices.folder, "Where the instrument is written")
@@ -336,7 +336,7 @@ class SamplerPage(ExportPage):
         if before is None or before.preset != preset or not self._digest:
             try:
                 self._digest = preset_digest(preset.path)
-            except (OSError, PresetError):  # told when it is to be played
+            except (OSError, PresetError):  # reported when it is to be played
                 self._digest = ""
         low, high = patch.range
         chosen = keys if keys and low <= keys[0] <= keys[1] <= high else patch.range

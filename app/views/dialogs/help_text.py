@@ -6,7 +6,7 @@ TOUR = (
     (
         "Play",
         "Press A S D F … as on a piano, black keys above, or click the keys at the bottom. Hold a key and the string "
-        "rings, let go and it is damped. Z and X change the octave. You hear the model.",
+        "rings, release to damp it. Z and X change the octave. You hear the model.",
     ),
     (
         "Choose an instrument",
@@ -17,7 +17,7 @@ TOUR = (
     ),
     (
         "Pluck",
-        "Drag on the string in the picture and let go. The white handle shows the pluck's position and amplitude.",
+        "Drag on the string in the picture and release. The white handle shows the pluck's position and amplitude.",
     ),
     (
         "Compare",
@@ -137,7 +137,7 @@ MODELS = (
 )
 
 ERRORS = (
-    "An unexpected error is shown in a dialog, whose text can be copied into a bug report. The program goes on where "
+    "A dialog shows an unexpected error; its text can be copied into a bug report. The program continues where "
     "it can; your settings are kept.",
     "The same text is in the log, with the version and the system. If the program crashed, a file beside the log "
     "that ends in .crash says where each thread was. Please send both. The log is here:",

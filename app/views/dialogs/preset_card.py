@@ -21,7 +21,7 @@ from app.views.controls.browser import Browser
 from app.views.controls.browser_rows import Column, Row
 from engine.plain_text import duration
 from engine.schema import SchemaError
-from training.by_name import load
+from training.cell import load
 from training.heard_words import HEARD_TIP, heard_sentence, heard_word
 
 HEADINGS = {True: "STUDIO PRESETS", False: "RESEARCH PRESETS"}

@@ -27,7 +27,7 @@ LOWEST, HEIGHT = 72, 104  # of a surface in a low window, and otherwise, in pixe
 SOFTEST, HARDEST = 16, 127  # velocities of a click at the top and at the bottom of a place
 TIP_MS = 5_000  # the tooltip covers keys
 TYPED = 96  # velocity of the Enter key
-LEVEL_STEPS = 24  # that can be told apart; finer changes are not painted
+LEVEL_STEPS = 24  # that can be distinguished; finer changes are not painted
 _MOVES = {Qt.Key.Key_Right: 1, Qt.Key.Key_Left: -1, Qt.Key.Key_Up: 12, Qt.Key.Key_Down: -12}
 
 

@@ -1,6 +1,6 @@
 """Perceptually uniform colour maps (P. Kovesi's, from pyqtgraph) whose neutral colour is that of the panels.
 
-They depend on the theme: a view takes its map anew when the theme changes.
+They depend on the theme: a view takes its map again when the theme changes.
 """
 
 from __future__ import annotations

@@ -105,7 +105,7 @@ def _paint_band(painter: QPainter, axes: StringAxes, band: Band, name: str, stre
 
 
 def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
-    """The string as it is pulled, before it is let go."""
+    """The string as it is pulled, before its release."""
     curve = axes.curve(pluck.shape_mm)
     area = QPolygonF(curve)
     area.append(axes.at(1, 0))

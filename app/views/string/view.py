@@ -356,7 +356,7 @@ class StringView(QWidget):
         else:
             paint_motion(painter, axes, self._frame, self._heard)
         paint_ends(painter, axes)
-        below = event.rect().bottom() > axes.bottom  # what lies there is painted anew
+        below = event.rect().bottom() > axes.bottom  # what lies there is painted again
         for side, position in self._listening.items():
             grabbed = side in (self._drag, self._hovered)
             paint_listening_line(painter, axes, position, grabbed)
@@ -375,7 +375,7 @@ class StringView(QWidget):
         return next((source.source for source in self._sources if source.heard), "")
 
     def _behind(self, axes: StringAxes) -> QPixmap:
-        """The ground, and the envelopes of a motion, painted anew only when one of them changes."""
+        """The ground, and the envelopes of a motion, painted again only when one of them changes."""
         ground = self._ground(axes)
         if self._frame is None or self._shows_pluck or not self._frame.envelopes:
             return ground
@@ -393,7 +393,7 @@ class StringView(QWidget):
         return self._backdrop[2]
 
     def _ground(self, axes: StringAxes) -> QPixmap:
-        """The picture behind the string, painted anew only when something in it changes."""
+        """The picture behind the string, painted again only when something in it changes."""
         # on which side words would be in the way of the pluck, with the words at its handle
         pluck = int(self._pluck.position > 0.4) if self._shows_pluck else None
         chosen = (self._trained, pluck, self._sources, self._warning)

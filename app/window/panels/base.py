@@ -37,7 +37,7 @@ class Moment:
 
     Attributes:
         take: the motion, or None before the first.
-        position_s: the playhead, from the pluck on: what is heard now.
+        position_s: the playhead, from the pluck on: the time that sounds now.
         playing: whether the playhead moves.
         elapsed_s: since the last call of `show_moment`, by the clock.
     """

@@ -27,7 +27,7 @@ from app.views.plots.pointed_plot import PointedPlot
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
 
 NEAR_PIXELS = 16  # within which a point is pointed at
-CLOSER_PIXELS = 3  # by which a point of the string must be nearer than a learned one
+CLOSER_PIXELS = 3  # that a point of the string must be nearer than a learned one
 SHORTEST_S, LONGEST_S = 1e-3, 100.0  # of the axis of decay times
 _LABELLED_S = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100)
 AXES = {"musical": "Frequency and decay", "complex": "Complex plane"}

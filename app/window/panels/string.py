@@ -107,7 +107,7 @@ class StringPanel(Panel):
         self.view.show_frame(frame)
 
     def _judge(self) -> None:
-        """Sets the warning anew once the signals are complete: only then is a silent difference known."""
+        """Sets the warning again once the signals are complete: only then is a silent difference known."""
         take = self._take
         if take is not None and take.listened is not self._judged and take.listened.complete:
             self._judged = take.listened

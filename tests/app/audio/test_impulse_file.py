@@ -1,4 +1,4 @@
-"""Impulse responses from files: what is read, and how what is not is told."""
+"""Impulse responses from files: what is read, and the errors for the rest."""
 
 from __future__ import annotations
 

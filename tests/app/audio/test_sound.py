@@ -190,7 +190,7 @@ def test_asking_for_what_there_is_changes_nothing(sound: Sound, desk: Desk, head
 
 
 def test_a_look_for_devices_interrupts_and_takes_the_same_again(sound: Sound, desk: Desk) -> None:
-    """Also the second time, when nothing else is new. PortAudio must never start anew under an open stream."""
+    """Also the second time, when nothing else is new. PortAudio must never start again under an open stream."""
     for _ in range(3):
         opened(sound, rescan=True)
         wait_for(lambda: sound.status().device is not None)

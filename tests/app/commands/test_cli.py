@@ -29,6 +29,7 @@ COMMANDS = [
     "dataset",
     "train",
     "evaluate",
+    "instruments",
 ]
 
 
@@ -47,7 +48,7 @@ def test_help_is_there_without_the_heavy_imports() -> None:
         assert f"\n  {name} " in done.stdout
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="GNU's OpenMP tells its settings")
+@pytest.mark.skipif(sys.platform != "linux", reason="GNU's OpenMP prints its settings")
 @pytest.mark.parametrize(("chosen", "turns"), [({}, "0"), ({"GOMP_SPINCOUNT": "123"}, "123")])
 def test_threads_of_a_command_sleep_while_they_wait(chosen: dict[str, str], turns: str) -> None:
     """They spin for so many turns, by torch's own OpenMP, unless the user wants otherwise."""

@@ -98,7 +98,7 @@ def test_fresh_plucks_that_nobody_trained_on(run, preset: Path, cache: list[Any]
 
 
 def test_the_errors_by_how_far_a_pluck_raises_the_tension(run, preset: Path, folder: Path) -> None:
-    """Played on the tension-modulated string, a linear model errs most where it is plucked hardest."""
+    """Played on the tension-modulated string, a linear model has its largest error where it is plucked hardest."""
     loaded = load_preset(preset)
     data = {**loaded.info.training["data"], "tension_modulated": True}
     info = replace(loaded.info, tension_modulated=True, training={**loaded.info.training, "data": data})
@@ -128,7 +128,7 @@ def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) ->
     # the first mode is left, and exp(-0.1 σt) of it: so much is known of the error
     sigma, middle_s = float(DATA.string.decay_rates(1)), 2.375
     assert late[2]["rel_mse"] == pytest.approx((1 - math.exp(-0.1 * sigma * middle_s)) ** 2, rel=0.1)
-    # damped a tenth less, it errs more and more: the last second's figure lies between those of its windows
+    # damped a tenth less, its error grows: the last second's figure lies between those of its windows
     assert late[1]["rel_mse"] < found["last_second"]["rel_mse"] < late[2]["rel_mse"]
     assert found["first_second"]["rel_mse"] < late[0]["rel_mse"]
     times = found["last_second"]["rel_mse"] / found["first_second"]["rel_mse"]

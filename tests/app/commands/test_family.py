@@ -31,6 +31,7 @@ def test_evaluate_tells_the_map_and_draws_it(run, folder: Path) -> None:
     assert all(0 < cell["geometric_mean"] <= 1.001 * cell["worst"] for cell in facts["map"])
     drawn = picture.read_text()
     assert "studio_any_string: 4 strings" in drawn
+    assert "beyond the family" in drawn
     shown = run(*words)
     assert "rise of tension and inharmonicity B" in shown.out
     assert picture.read_text() == drawn

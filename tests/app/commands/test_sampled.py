@@ -75,7 +75,7 @@ def test_a_dry_one_has_no_room(run, notes: list[tuple], folder: Path, monkeypatc
         "render_note",
         lambda patch, *words: rooms.append(patch.room.mix) or whole(patch, *words),
     )
-    told = "a key that is let go ends the room's tail as well; --dry leaves the room to the sampler"
+    told = "a released key ends the room's tail as well; --dry leaves the room to the sampler"
     assert told in run("sampled", PATCH, folder / "a.sfz", *SMALL).err
     assert told not in run("sampled", PATCH, folder / "a.sfz", *SMALL, "--dry").err
     assert rooms == [find_patch(PATCH).patch.room.mix] * 6 + [0.0] * 6

@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import errno
-import io
 import json
 import shutil
 from collections.abc import Callable, Iterator
@@ -18,8 +17,8 @@ from engine.presets import find_preset
 from engine.result_file import REMEDIES
 from tests.app.commands.conftest import FullDisk
 from training.cell import Cell, configuration_of
-from training.cli import sweep as command
-from training.cli.sweep import Board
+from training.cli import console
+from training.cli.sweep import Shown
 from training.fitting.fit import Progress
 from training.results import Row, add_rows, read_results
 from training.run import run_row
@@ -143,7 +142,7 @@ def test_an_interrupted_sweep_goes_on(run, words: list[Any], tmp_path: Path, scr
     script(interrupted)
     found = run(*words)
     assert found.status == 130
-    assert "stopped; the same command goes on" in found.err
+    assert "stopped; the same command continues" in found.err
     begun = []
     script(lambda name: begun.append(name) or row_of(name))
     assert run(*words).status == 0
@@ -263,45 +262,46 @@ def test_presets_without_a_row_do_not_hinder_the_others(run, tmp_path: Path, mon
 
 
 def test_the_time_left_follows_what_is_known() -> None:
-    board = Board(5)
-    assert board.summary(2) == "0 done, 0 running, 5 waiting"
+    ended: list[str] = []
+
+    def begin(what: str) -> Any:
+        return lambda share, *told: ended.append(what) if share == 1 else None
+
+    shown = Shown(begin, 5, 2)
+    assert shown.summary() == "0 done, 0 running, 5 waiting"
     for name in ("a", "b"):
-        board.started(SimpleNamespace(name=name))
-    assert board.seconds_left(2) is None
-    board.progressed(progress_of("a", 10, 30))
-    assert board.seconds_left(2) == (30 + 4 * 40) / 2
-    board.finished(row_of("a", seconds=20.0))
-    assert board.seconds_left(2) == 4 * 20 / 2
-    board.finished(row_of("b", status="diverged", seconds=None))
-    assert board.summary(2) == "1 done, 1 diverged, 0 running, 3 waiting; about 30.0 s left"
-    board.progressed(progress_of("a", 1, 1))  # that came late
-    assert board.running == {}
+        shown.started(SimpleNamespace(name=name))
+    assert shown.seconds_left() is None
+    shown.progressed(progress_of("a", 10, 30))
+    assert shown.seconds_left() == (30 + 4 * 40) / 2
+    shown.finished(row_of("a", seconds=20.0))
+    assert shown.seconds_left() == 4 * 20 / 2
+    shown.finished(row_of("b", status="diverged", seconds=None))
+    assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30.0 s left"
+    shown.progressed(progress_of("a", 1, 1))  # that came late
+    assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30.0 s left"
+    assert ended == ["a", "b"]
 
 
-def test_the_picture_shows_what_runs() -> None:
-    from rich.console import Console
-
-    watch = command._Live(Board(3), 2)
-    for name in ("a", "b"):
-        watch.started(SimpleNamespace(name=name))
-    watch.progressed(progress_of("b", 10, 30, RelativeError(0.25, 0.125)))
-    watch.progressed(progress_of("b", 20, 20))
-    shown = io.StringIO()
-    Console(width=100, file=shown).print(watch.picture())
-    lines = [line.split() for line in shown.getvalue().splitlines()]
-    assert [line for line in lines if line and line[0] in "ab"] == [
-        ["a", "-", "-", "-", "-", "-"],
-        ["b", "1/4", "60", "0.5", "0.125", "20.0", "s"],
-    ]
-    assert "2 running, 1 waiting" in shown.getvalue()
+def test_a_terminal_shows_each_run_that_is_under_way(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    monkeypatch.setenv("COLUMNS", "150")
+    with console.bars() as begin:
+        shown = Shown(begin, 3, 2)
+        for name in ("first", "second"):
+            shown.started(SimpleNamespace(name=name))
+        shown.progressed(progress_of("second", 10, 30, RelativeError(0.25, 0.125)))
+        shown.progressed(progress_of("second", 20, 20))
+    told = capsys.readouterr().err
+    assert "first" in told
+    assert "20.0 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125" in told
 
 
-def test_a_log_tells_of_a_long_run_now_and_then(capsys, monkeypatch: pytest.MonkeyPatch) -> None:
-    watch = command._Lines(Board(1), 1)
-    watch.started(SimpleNamespace(name="a"))
-    watch.progressed(progress_of("a", 1, 3))
-    assert capsys.readouterr().err == ""
-    monkeypatch.setattr(command, "LINE_EVERY_S", 0)
-    watch.progressed(progress_of("a", 1, 3, RelativeError(0.25, 0.125)))
-    told = "learned-strings: a: epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125, 3.0 s left\n"
+def test_a_log_tells_of_a_long_run_now_and_then(capsys) -> None:
+    for every_s in (60.0, 0.0):
+        with console.bars(every_s) as begin:
+            shown = Shown(begin, 1, 1)
+            shown.started(SimpleNamespace(name="a"))
+            shown.progressed(progress_of("a", 1, 3, RelativeError(0.25, 0.125)))
+    told = "learned-strings: a: 25%, 3.0 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125\n"
     assert capsys.readouterr().err == told

@@ -56,13 +56,15 @@ def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_tables_are_printed_or_written(run, results: Path, folder: Path) -> None:
-    printed = run("table", "--results", results)
+    printed = run("table", "--results", results, "--format", "full")
     assert (printed.status, printed.err) == (0, "")
     assert "0.015 (0.0071) **better**, 2 seeds" in printed.out
     assert printed.out.count("### 400 frames") == 2
-    assert "## Runs" not in printed.out
+    compact = run("table", "--results", results, "--metric", "mae").out
+    assert "**0.015 (0.1023) ×0.15**" in compact
+    assert compact.count("### 400 frames, relative MAE") == 1
     path = folder / "tables.md"
-    assert run("table", "--results", results, "--output", path).out == f"{path}\n"
+    assert run("table", "--results", results, "--format", "full", "--output", path).out == f"{path}\n"
     assert path.read_text(encoding="utf-8") == printed.out
     assert list(folder.iterdir()) == [path]
 
@@ -70,7 +72,7 @@ def test_the_tables_are_printed_or_written(run, results: Path, folder: Path) -> 
 def test_the_tables_of_a_document_are_made_anew_in_place(run, results: Path, folder: Path) -> None:
     document = folder / "RESULTS.md"
     document.write_text("# Results\n\nWords.\n\n<!-- tables -->\nan older table\n", encoding="utf-8")
-    words = ["table", "--results", results, "--rows"]
+    words = ["table", "--results", results]
     assert run(*words, "--into", document).out == f"{document}\n"
     made = document.read_text(encoding="utf-8")
     assert made == f"# Results\n\nWords.\n\n<!-- tables -->\n\n{run(*words).out}"
@@ -84,8 +86,7 @@ def test_the_tables_of_a_document_are_made_anew_in_place(run, results: Path, fol
     assert "--into" in run(*words, "--into", document, "--output", folder / "other.md").usage
 
 
-def test_rows_are_listed_and_recipes_chosen(run, results: Path) -> None:
-    assert "| nylon_linear_noise_4k_s5_paper_seed1 " in run("table", "--results", results, "--rows").out
+def test_a_recipe_is_chosen(run, results: Path) -> None:
     assert (
         "2 of 2 rows of the results file are not shown" in run("table", "--results", results, "--recipe", "ours").out
     )
@@ -96,13 +97,14 @@ def test_csv_is_read_back(run, results: Path) -> None:
     assert [entry["runs"] for entry in lines if entry["seeds"] == "2"] == [
         "nylon_linear_noise_4k_s5_paper_seed1 nylon_linear_noise_4k_s5_paper_seed2"
     ]
-    assert "--rows" in run("table", "--results", results, "--format", "csv", "--rows").usage
+    assert "--into" in run("table", "--results", results, "--format", "csv", "--into", results).usage
 
 
 def test_no_results_are_told_and_the_papers_tables_are_there(run, folder: Path) -> None:
     found = run("table", "--results", folder / "none.csv")
     assert "none.csv has no rows" in found.err
-    assert "0.0113 (0.0061)" in found.out
+    assert "not run (0.0113)" in found.out
+    assert "0.0113 (0.0061)" in run("table", "--results", folder / "none.csv", "--format", "full").out
 
 
 def test_a_file_that_is_no_results_file_is_told(run, folder: Path) -> None:
@@ -110,17 +112,16 @@ def test_a_file_that_is_no_results_file_is_told(run, folder: Path) -> None:
     assert "not a results file" in run("table", "--results", folder / "other.csv").failure
 
 
-@pytest.mark.parametrize("kind", ["evolution", "extrapolation", "error", "eigenvalues"])
-def test_every_figure_is_drawn(run, tiny: Path, folder: Path, kind: str) -> None:
+def test_the_figure_is_drawn(run, tiny: Path, folder: Path) -> None:
     path = folder / "figure.png"
-    found = run("figure", kind, tiny, "--output", path)
+    found = run("figure", "extrapolation", tiny, "--output", path)
     assert (found.status, found.err, found.out) == (0, "", f"{path}\n")
     height, width, _ = imread(path).shape
     assert min(height, width) > 1000
     assert list(folder.iterdir()) == [path]
 
 
-@pytest.mark.parametrize("group", ["figure", "results"])
+@pytest.mark.parametrize("group", ["family", "results"])
 def test_a_list_of_commands_cuts_no_summary(run, group: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     listed = run(group, "--help").out.partition("Commands:")[2].strip().splitlines()
@@ -128,19 +129,34 @@ def test_a_list_of_commands_cuts_no_summary(run, group: str, monkeypatch: pytest
     assert all(line.endswith(".") and not line.endswith("...") for line in listed)
 
 
+def test_the_map_of_ratios_is_drawn_from_the_rows(run, results: Path, folder: Path) -> None:
+    nonlinear = Cell("s5", True, "noise", 4000, recipe="paper")
+    facts: dict[str, Any] = {"model": "s5", "string": "nonlinear", "initial": "noise", "rate_hz": 4000}
+    figures: dict[str, Any] = {"horizon": 4000, "recipe": "paper", "seed": 0, "initialisation": "paper"}
+    digest = configuration_of(nonlinear).digest
+    add_rows(results, [Row(digest, nonlinear.name, "done", **facts, **figures, rel_mse=0.001, rel_mae=0.01)])
+    path = folder / "ratios.svg"
+    assert run("figure", "ratios", "--results", results, "--output", path).out == f"{path}\n"
+    drawn = path.read_text(encoding="utf-8")
+    assert drawn.count(">0.052<") == 1  # 0.01 over the paper's 0.1916
+    assert drawn.count(">–<") == 6 * 8 - 1
+    assert "suffixes" in run("figure", "ratios", "--results", results, "--output", folder / "a.bmp").usage
+
+
 def test_a_figure_stands_here_by_default(run, tiny: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(folder)
-    assert run("figure", "eigenvalues", tiny, tiny).out == "eigenvalues.png\n"
-    assert (folder / "eigenvalues.png").exists()
+    assert run("figure", "extrapolation", tiny).out == "extrapolation.png\n"
+    assert (folder / "extrapolation.png").exists()
 
 
 def test_bad_usage_of_figures_is_told(run, tiny: Path, small_preset: Path, folder: Path) -> None:
-    assert "suffixes" in run("figure", "error", tiny, "--output", folder / "figure.bmp").usage
-    assert "--seconds" in run("figure", "evolution", tiny, "--seconds", 1e6).usage
-    assert "--listen" in run("figure", "extrapolation", tiny, "--listen", 2).usage
+    draw = ("figure", "extrapolation")
+    assert "suffixes" in run(*draw, tiny, "--output", folder / "figure.bmp").usage
+    assert "--seconds" in run(*draw, tiny, "--seconds", 1e6).usage
+    assert "--listen" in run(*draw, tiny, "--listen", 2).usage
     path = folder / "figure.svg"
-    assert "there is no trajectory 9" in run("figure", "evolution", tiny, "--trajectory", 9, "--output", path).failure
-    assert "metadata.training" in run("figure", "error", small_preset, "--output", path).failure
-    assert "no preset 'nothing'" in run("figure", "error", "nothing", "--output", path).failure
-    assert "make the folder first" in run("figure", "eigenvalues", tiny, "--output", folder / "a" / "b.png").failure
+    assert "there is no trajectory 9" in run(*draw, tiny, "--trajectory", 9, "--output", path).failure
+    assert "metadata.training" in run(*draw, small_preset, "--output", path).failure
+    assert "no preset 'nothing'" in run(*draw, "nothing", "--output", path).failure
+    assert "make the folder first" in run(*draw, tiny, "--output", folder / "a" / "b.png").failure
     assert not list(folder.iterdir())

@@ -99,7 +99,7 @@ def test_a_killed_run_goes_on_to_the_same_weights(run, place: Place, monkeypatch
         patched.setattr(Checkpoint, "save", save_and_kill)
         killed = run(*place.train("cut"))
     assert killed.status == 130
-    assert "the same command goes on with" in killed.err
+    assert "the same command continues with" in killed.err
     assert not (place.folder / "cut.safetensors").exists()
 
     assert run(*place.train("cut")).status == 0

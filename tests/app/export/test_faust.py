@@ -43,7 +43,7 @@ def preset() -> Preset:
 
 def compiled(patch: Patch, preset: Preset, folder: Path) -> Path:
     source, cpp, program = (folder / f"string.{ending}" for ending in ("dsp", "cpp", "out"))
-    write_faust(source, patch, preset.info.grid_points)
+    write_faust(source, patch, preset.info)
     subprocess.run(["faust", "-lang", "cpp", "-a", str(DRIVER), str(source), "-o", str(cpp)], check=True)
     subprocess.run(["g++", "-w", str(cpp), "-o", str(program)], check=True)
     return program
@@ -57,7 +57,7 @@ def played(program: Path, freq_hz: float, channels: int) -> NDArray[np.float64]:
 
 def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
     patch = quiet("classical_guitar")
-    keys = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info.grid_points)
+    keys = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info)
     key = keys.of_key(60)
     assert key is not None
     t, b, c, d, loud = (np.array(column) for column in key_tables([key, None]))
@@ -65,10 +65,14 @@ def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
     np.testing.assert_allclose(mu2 * (t[0] + b[0] * mu2), key.resonator.omega.numpy() ** 2, rtol=1e-12)
     np.testing.assert_allclose(c[0] + d[0] * mu2, key.resonator.sigma.numpy(), rtol=1e-12)
     assert (t[1], loud[1]) == (t[0], 0)  # a silent key has a neighbour's string
+    at_bridge = key_tables([key], bridge=True)[4][0] * mu2 * (t[0] + b[0] * mu2) / np.sqrt(mu2)
+    assert key.resonator.end_force is not None
+    expected = key.gain * key.string.shortened * key.resonator.end_force.numpy()
+    np.testing.assert_allclose(at_bridge, expected, rtol=1e-12)
 
 
 def test_the_program_says_what_it_is(preset: Preset) -> None:
-    text, modes = faust_program(quiet("classical_guitar", author='A "b" c'), preset.info.grid_points, 12)
+    text, modes = faust_program(quiet("classical_guitar", author='A "b" c'), preset.info, 12)
     assert modes == 12
     assert "its quiet string, 12 modes" in text.splitlines()[0]
     assert 'declare author "A b c";' in text
@@ -79,7 +83,7 @@ def test_the_program_says_what_it_is(preset: Preset) -> None:
 def test_a_patch_without_a_string_is_told(preset: Preset) -> None:
     patch = quiet("classical_guitar", range=(127, 127), tuning=TuningChoice(transpose=48))
     with pytest.raises(ValueError, match="none of its keys"):
-        faust_program(patch, preset.info.grid_points)
+        faust_program(patch, preset.info)
 
 
 @needs_faust
@@ -96,6 +100,7 @@ def test_a_patch_without_a_string_is_told(preset: Preset) -> None:
                 "tuning": TuningChoice(a4_hz=415.0),
             },
         ),
+        ((45, 69), {"pickup": Pickup(kind="bridge")}),
     ],
 )
 def test_it_sounds_as_our_quiet_pluck(

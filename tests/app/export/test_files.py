@@ -210,7 +210,7 @@ def test_samples_that_are_not_finite_are_refused(
         ({"source": "all"}, "model, truth, difference, both"),
         ({"source": "both", "listen_right": 0.5}, "choose two files, or mono"),
         ({"listen_right": -0.1}, "right listening point must lie in 0 … 1"),
-        ({"pickup": "magnet"}, "displacement, velocity"),
+        ({"pickup": "magnet"}, "displacement, velocity, bridge"),
         ({"decay_db": 5.0}, "decay_db must lie in 10 … 120, not 5"),
         ({"difference_gain_db": 99.0}, "difference_gain_db must lie in 0 … 80, not 99"),
     ],

@@ -1,4 +1,4 @@
-"""What lies outside the training is told of the string as the knobs have it."""
+"""What lies outside the training is reported of the string as the knobs have it."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.instrument import events
 from app.instrument.compiled import InstrumentPlayer, event_of, record_of
-from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.player import Player, Struck
 from app.instrument.strings import pitch_hz_of
 from app.instrument.table import VALUES
@@ -20,6 +21,7 @@ from app.patches.patch import Patch, TuningChoice
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.layout import QUANTUM
+from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.voices import Ear, Mixer, Voice, plain_program
 
@@ -253,6 +255,23 @@ def test_more_events_than_the_ring_holds_are_played_later(shipped: dict[str, Pat
     assert stage.player.compiled.channel(0).bend == (count - 1) / count
 
 
+def test_threads_may_give_events_while_the_mixer_plays(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["koto"], preset)
+    count = 1500
+
+    def give(channel: int) -> None:
+        for number in range(count):
+            stage.player.handle(Bend((number + 1) / count, channel))
+
+    threads = [threading.Thread(target=give, args=(channel,)) for channel in range(4)]
+    for thread in threads:
+        thread.start()
+    while any(thread.is_alive() for thread in threads) or stage.player.compiled.waiting:
+        quantum(stage.mixer)
+    assert [stage.player.compiled.channel(channel).bend for channel in range(5)] == [1, 1, 1, 1, 0]
+    assert int(stage.player.compiled.memory.view(np.int64)[of.PLAYER_TAKEN]) == 4 * count + 1
+
+
 def test_the_same_events_give_the_same_samples(shipped: dict[str, Patch], preset: Preset) -> None:
     patch = shipped["oud"]
     played = drawn(patch, shipped["kora"], 5, 0.2)
@@ -373,7 +392,7 @@ def test_wheels_and_pedals_can_be_read(shipped: dict[str, Patch], preset: Preset
             reference.handle(event, 0)
             stage.handle(event, 0)
     stage.player.compiled.catch_up(stage.mixer)
-    assert stage.player.controllers == reference.player.at_hand != []
+    assert stage.player.at_hand == reference.player.at_hand != []
     assert stage.player.heard_through == reference.player.heard_through
 
 
@@ -433,6 +452,13 @@ def test_a_key_without_a_string_is_an_error_and_one_out_of_range_is_silent(
     impossible = changed(shipped["koto"], range=(0, 127), tuning=TuningChoice(a4_hz=880, transpose=48))
     with pytest.raises(ValueError, match="key 127"):
         Compiled(impossible, preset).player.handle(NoteOn(127, 90))
+
+
+def test_a_pluck_at_a_place_is_none_of_a_key(shipped: dict[str, Patch], preset: Preset) -> None:
+    stage = Compiled(shipped["koto"], preset)
+    assert stage.player.handle(PluckAt(Pluck())) == 0
+    rendered(stage, (), 1)
+    assert stage.player.reports() == [] and not stage.mixer.active
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ def hand(patch: Patch, preset: Preset) -> Hand:
 
 @pytest.fixture
 def strung(guitar: Patch) -> Patch:
-    """Six strings that can be told apart by their thickness."""
+    """Six strings that differ in thickness."""
     areas = [5e-7 * 1.1**number for number in range(6)]
     strings = [
         OpenString(note=note, string=physical(replace(STEEL, area_m2=area)))

@@ -1,4 +1,4 @@
-"""What is heard of a player's hands: everything is measured on rendered sound."""
+"""The sound of a player's gestures: everything is measured on rendered sound."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_a_harder_key_is_narrower_and_brighter_however_far_it_pulls(
     player = Player(shaped, preset, RATE_HZ, struck.append, (source,))
     for velocity in (1, 64, 127):
         player.handle(NoteOn(45, velocity))
-    assert [each.pluck.width for each in struck] == pytest.approx([wide, (wide + narrow) / 2, narrow])
+    assert [each.pluck.width for each in struck] == pytest.approx([wide, (wide * narrow) ** 0.5, narrow])
     heard_hz = [brightness_hz(play(shaped, preset, 0.3, (0.0, NoteOn(45, v)), source=source)) for v in (1, 64, 127)]
     assert heard_hz[0] < heard_hz[1] < heard_hz[2]
     assert heard_hz[2] > 1.3 * heard_hz[0]
@@ -394,7 +394,7 @@ def test_the_wheel_turns_what_the_patch_says(patch: Patch, preset: Preset) -> No
 
 @pytest.mark.parametrize("field", WHEEL)
 def test_the_wheel_turns_whatever_it_may(patch: Patch, preset: Preset, field: str) -> None:
-    """Softly and hard, held and let go: something of the next note, or of what it is heard through, is another."""
+    """Softly and hard, held and released: something of the next note, or of what it is heard through, is another."""
 
     def heard(value: int) -> object:
         struck: list[Struck] = []

@@ -116,7 +116,7 @@ def test_a_slow_model_begins_when_the_rest_will_be_ready_in_time(
     voice, told = make(seconds=1.0)
     ahead.render(voice)
     wait(lambda: voice.waits_s > 0)
-    wait(lambda: told.begun_s != [])  # it is `begun` a moment before that is told
+    wait(lambda: told.begun_s != [])  # it is `begun` a moment before that is reported
     (begun_s,) = told.begun_s
     assert 1 - CARE * 0.8 <= begun_s < 1.0, "some of it is rendered while it is heard"
     assert voice.waits_s == 0

@@ -47,7 +47,7 @@ def test_keys_of_a_single_string_are_places_and_velocity_is_amplitude() -> None:
         ("linux", KeyPress("A", 24), None),
         ("linux", KeyPress("", 47), 9),  # ö
         ("win32", KeyPress("Q", 0x1E), 0),
-        ("darwin", KeyPress("d", 2), 2),  # its codes are not told: the letter counts
+        ("darwin", KeyPress("d", 2), 2),  # its codes are not reported: the letter counts
         ("linux", KeyPress("q"), None),
         ("linux", KeyPress(""), None),
     ],

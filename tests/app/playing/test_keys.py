@@ -338,7 +338,7 @@ def test_the_pick_up_through_which_it_is_heard_is_recorded(played: Notes, patch:
 
 
 class TurnedClock:
-    """Frames are taken by whoever looks at it: by the playback, in its thread."""
+    """Frames are taken by each reader: by the playback, in its thread."""
 
     def __init__(self, sound: Any) -> None:
         self._sound, self.buffer_s, self.heard = sound, 0.0, list[np.ndarray]()

@@ -191,7 +191,7 @@ def test_a_key_that_is_let_go_is_damped_and_another_rings_on(instrument: Instrum
     assert falls_db(instrument.hear(0.15)) == pytest.approx(RELEASED_DB, abs=2.0)
     instrument.send(0x90, KEY, 90)
     assert falls_db(instrument.hear(0.15)) < 6
-    instrument.send(0x90, KEY, 0)  # as many keyboards let go
+    instrument.send(0x90, KEY, 0)  # as many keyboards release
     assert falls_db(instrument.hear(0.15)) == pytest.approx(RELEASED_DB, abs=2.0)
     instrument.hear(0.5)
     assert level_db(instrument.hear(0.1)) < -90

@@ -1,4 +1,4 @@
-"""Notes: struck, switched, listened to, matched, ended; and told to no device, but to a mixer that the test turns."""
+"""Notes: struck, switched, listened to, matched, ended; and sent to no device, but to a mixer that the test turns."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def test_a_switch_is_a_cross_fade_in_step(mixer: Mixer, pair: Pair) -> None:
     pair.play()
     mixer.render(1_920)
     pair.select("B")
-    pair.play()  # goes on
+    pair.play()  # continues
     out = mixer.render(FRAMES)[:, 0]
     np.testing.assert_allclose(out[2_000:], wave(200, 3_920, FRAMES - 2_000), atol=1e-6)
     steepest = 0.2 * 2 * np.pi * 200 / RATE_HZ

@@ -19,7 +19,7 @@ Wait = Callable[[Callable[[], bool]], None]
 
 
 class TurnedClock:
-    """Frames are taken by whoever looks at it, a block at each look: no other thread is waited for."""
+    """Frames are taken by each reader, a block at each look: no other thread is waited for."""
 
     def __init__(self, block: int = 480, buffer_s: float = 0.0) -> None:
         self.standing, self.block, self.buffer_s = Mixer(RATE_HZ), block, buffer_s

@@ -60,7 +60,7 @@ def test_a_refresh_tells_only_when_there_are_others(library: Library, small_pres
     shutil.copy(small_preset, own / "first.safetensors")
     (problem,) = library.refresh()
     assert "first.safetensors: a preset of this name exists already" in problem
-    assert library.refresh() == []  # it has been told
+    assert library.refresh() == []  # it has been reported
     assert (library.names, len(seen)) == (["first", "mine", "second"], 1)
     mine = library.find("mine")
     assert mine is not None

@@ -110,7 +110,7 @@ def test_pictures_and_flashes_are_frames_of_the_motion(preset: Any, job: Render,
 def test_a_signal_is_what_is_heard_of_the_motion(
     preset: Any, ear: Ear, job: Render, sources: Sources, derivative: Callable[..., np.ndarray]
 ) -> None:
-    """From the first frame to the last but for the truth's voice, which leaves out what is 108 dB below the rest."""
+    """From the first frame to the last, except the truth's voice, which leaves out what is 108 dB below the rest."""
     take, loaded = finished(job(preset, ear=ear)), sources.load(preset)
     rate_hz = take.info.rate_hz
     for name, source in (("model", loaded.model), ("truth", loaded.truth)):
@@ -119,7 +119,7 @@ def test_a_signal_is_what_is_heard_of_the_motion(
             expected = derivative(expected, rate_hz)
         found = take.listened.signals[name].read()
         assert found.shape == expected.shape
-        # frame 0 of a model is what it makes of the displacement; beyond the end a voice goes on
+        # frame 0 of a model is what it makes of the displacement; beyond the end a voice continues
         inner = slice(40, len(expected) - 40) if ear.pickup == "velocity" else slice(1, None)
         error = np.square(found[inner] - expected[inner]).mean() / np.square(expected[inner]).mean()
         assert np.sqrt(error) < 4e-5

@@ -1,4 +1,4 @@
-"""The render worker: complete motions, the latest request wins, what is beside it comes and goes, faults are told."""
+"""The render worker: complete motions, the latest request wins, others come and go, faults are reported."""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ def test_the_error_that_is_told_is_that_of_the_take(small_preset: Path, worker: 
 def test_another_presets_model_moves_beside_it(
     small_preset: Path, tmp_path: Path, worker: RenderWorker, heard: Heard
 ) -> None:
-    """It may come later: the motion is not rendered again. One that is damaged is told, and at rest."""
+    """It may come later: the motion is not rendered again. One that is damaged is reported, and at rest."""
     other = tmp_path / "other.safetensors"
     shutil.copy(small_preset, other)
     broken = tmp_path / "broken.safetensors"

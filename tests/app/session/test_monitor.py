@@ -1,4 +1,4 @@
-"""What is heard of two slots, and how loud."""
+"""The sound of two slots, and its level."""
 
 from __future__ import annotations
 

@@ -38,6 +38,7 @@ def test_what_both_slots_hold_is_shown_once(library: Library) -> None:
 
 def test_the_axis_says_what_is_picked_up() -> None:
     assert part_words(Choices()) == ""
+    assert full_scale_words(Choices(pickup="bridge")) == "20 N"
     choices = Choices(pickup="velocity", solo=3, stereo=True)
     assert part_words(choices) == "mode 3, left"
     assert (full_scale_words(Choices()), full_scale_words(choices)) == ("10 mm", "30 m/s")
@@ -51,6 +52,7 @@ def test_the_axis_says_what_is_picked_up() -> None:
         (3e-5, "displacement", 1e6, "µm"),
         (0.0, "displacement", 1e3, "mm"),
         (6.0, "velocity", 1.0, "m/s"),
+        (0.02, "bridge", 1e3, "mN"),
         (0.02, "velocity", 1e3, "mm/s"),
         (0.0, "velocity", 1.0, "m/s"),
         (1e-12, "velocity", 1e9, "nm/s"),

@@ -1,4 +1,4 @@
-"""What becomes of a choice of output: opened, refused, saved, told."""
+"""What becomes of a choice of output: opened, refused, saved, reported."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The window as a whole, both directions: gestures change the session, the session changes what is seen."""
+"""The window as a whole, both directions: gestures change the session, the session changes the view."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def view(controller: Controller, key: str) -> Any:
 
 
 def notes(controller: Controller) -> list[Note]:
-    """Those that are heard and have not been told to end, the oldest first."""
+    """Those that are heard and have not been asked to end, the oldest first."""
     return [note for note in controller.performance.notes._notes if not note.over and not note.released]
 
 
@@ -518,7 +518,7 @@ def test_stereo_and_pickup_ask_and_show(qtbot: QtBot, controller: Controller) ->
     assert not transport.knobs["listen_right"].isEnabled()
     places = [knob.pos() for knob in transport.knobs.values()]
     transport._stereo.click()
-    transport._velocity.click()
+    transport._pickup.activated.emit(transport._pickup.findData("velocity"))
     assert session.choices.stereo
     assert session.choices.pickup == "velocity"
     assert transport.knobs["listen_right"].isEnabled()
@@ -533,4 +533,4 @@ def test_stereo_and_pickup_ask_and_show(qtbot: QtBot, controller: Controller) ->
     left, right = session.choices.listen, session.choices.listen_right
     assert ears == [Ear((left, right), "velocity"), Ear((left,))]
     assert not transport._stereo.isChecked()
-    assert not transport._velocity.isChecked()
+    assert transport._pickup.currentData() == "displacement"

@@ -1,4 +1,4 @@
-"""What nobody expected is written down, told in one dialog, and a window without an engine stays to say so."""
+"""An unexpected fault is written down, shown in one dialog, and a window without an engine stays to say so."""
 
 from __future__ import annotations
 
@@ -64,9 +64,9 @@ def test_without_a_place_for_the_log_it_is_done_without(tmp_path: Path, monkeypa
     monkeypatch.setenv(FILE_VARIABLE, "/dev/null/there/here.log")
     before, told = sys.excepthook, []
     with faults_logged(told.append):
-        error = ValueError("told all the same")
+        error = ValueError("shown all the same")
         sys.excepthook(ValueError, error, None)
-    assert "told all the same" in told[0] and sys.excepthook is before
+    assert "shown all the same" in told[0] and sys.excepthook is before
     assert log_file() == Path("/dev/null/there/here.log")
 
 

@@ -41,6 +41,7 @@ def test_a_pluck_after_a_preset_that_midi_has_selected_is_of_that_preset(
     instruments._play_note(NoteOn(LOWEST_PLACE + played.library.names.index("second"), 100), "preset")
     if known:
         qtbot.waitUntil(lambda: session.choices.preset == "second")
+    session.update(volume_db=-3.0)  # another choice takes nothing back
     instruments.play(PluckAt(Pluck(0.6, 2.5)))
     note = played.performance.notes._notes[-1]
     assert path_of(note.request.preset).stem == "second"

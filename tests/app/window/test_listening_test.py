@@ -1,4 +1,4 @@
-"""The listening test in the window: it has the sound for itself, nothing behind it tells, and all is restored."""
+"""The listening test in the window: it has the sound for itself, nothing gives it away, and all is restored."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ def test_a_pedal_that_is_lifted_meanwhile_is_up_afterwards(
 
 
 def test_the_volume_of_a_test_stays_what_it_was_begun_with(qtbot: QtBot, heard: Controller) -> None:
-    """A fader that was taught to it moves what is heard afterwards."""
+    """A fader that was taught to it moves the sound afterwards."""
     from engine.kernels import layout as at
 
     heard.session.update(volume_db=-6.0)

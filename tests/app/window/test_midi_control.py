@@ -118,7 +118,7 @@ def test_a_note_is_played_at_once_in_the_thread_that_brings_it(
         ((event, mode, thread),) = played
         assert (event, mode) == (NoteOn(96, 127), "position")
         assert thread is not threading.main_thread()
-        backend.send("note_on", note=96, velocity=0, channel=0)  # a key is let go
+        backend.send("note_on", note=96, velocity=0, channel=0)  # a key is released
         backend.send("note_off", note=96, velocity=64, channel=0)
     assert len(played) == 1
 

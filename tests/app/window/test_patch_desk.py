@@ -122,7 +122,7 @@ def test_keys_on_the_screen_and_of_the_computer_sound_together_on_a_guitars_patc
 def test_a_files_drums_are_left_out_and_told(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
     song = tmp_path / "song.mid"
     notes = [TimedEvent(0.0, NoteOn(40, 90, 9)), TimedEvent(0.0, NoteOn(52, 90)), TimedEvent(30.0, NoteOff(52))]
-    song.write_bytes(midi_bytes(notes))  # at the end of a file all is let go: it must not end before it is seen
+    song.write_bytes(midi_bytes(notes))  # at the end of a file all is released: it must not end before it is seen
     informed: list[str] = []
     played.patches.informed.connect(informed.append)
     played.take_file(song)
@@ -334,19 +334,19 @@ def test_what_is_beyond_training_is_told_and_follows_the_knobs(qtbot: QtBot, pla
 
 def test_the_transport_changes_where_the_patch_is_heard(played: Controller) -> None:
     transport, before = played.window.transport, played.session.choices
-    transport._velocity.click()
+    transport._pickup.activated.emit(transport._pickup.findData("bridge"))
     transport._stereo.setChecked(not before.stereo)
     played.session.move_listening_point(0.21)
     patch = played.session.choices.patch
     assert patch is not None
-    assert patch.pickup.kind == "velocity"
+    assert patch.pickup.kind == "bridge"
     assert (len(patch.pickup.points) == 2) is not before.stereo
     assert patch.pickup.points[0] == 0.21
     assert played.window.instrument.bar.save.isEnabled()
     assert heard(played) == patch
     played.patches.choose("concert_harp")
     harp = read_patch(PATCHES / "concert_harp.json")
-    assert transport._velocity.isChecked() == (harp.pickup.kind == "velocity")
+    assert transport._pickup.currentData() == harp.pickup.kind
     assert transport._stereo.isChecked() == (len(harp.pickup.points) == 2)
 
 
@@ -504,7 +504,7 @@ def test_the_saved_patch_is_heard_while_it_is_compared(qtbot: QtBot, played: Con
     button.click()
     assert (button.isChecked(), heard(played)) == (False, mine)
     button.click()
-    played.patches.change("knobs.decay", 2.0)  # of what is chosen, not of what is heard
+    played.patches.change("knobs.decay", 2.0)  # of the choice, not of the sound
     changed = played.session.choices.patch
     assert changed is not None
     assert (changed.knobs.stiffness, changed.knobs.decay) == (4.0, 2.0)

@@ -89,7 +89,7 @@ def test_the_position_is_that_of_the_note(qtbot: QtBot, window: Controller, perf
     assert performance.playing
     assert performance.moving or note.seconds >= 1.0
     for _ in range(5):
-        late_s = window.sound.mixer.output_latency_s  # what is shown is what is heard by now
+        late_s = window.sound.mixer.output_latency_s  # the picture is of the sound by now
         before_s, shown_s, after_s = note.seconds, performance.position_s, note.seconds
         assert min(max(before_s - late_s, 0.0), 1.0) <= shown_s <= max(after_s - late_s, 0.0)
         qtbot.wait(20)

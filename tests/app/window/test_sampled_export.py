@@ -1,4 +1,4 @@
-"""The patch exported from the window, which goes on playing."""
+"""The patch exported from the window, which continues playing."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ def test_closing_the_window_ends_it(qtbot: QtBot, patched: Controller, monkeypat
                 time.sleep(0.01)
         except Cancelled:
             ended.set()
-            raise ValueError("told to nobody") from None
+            raise ValueError("shown to nobody") from None
 
     monkeypatch.setattr("app.export.sampled.export.export_sampled", export)
     dialog = open_dialog(qtbot, patched)

@@ -1,8 +1,8 @@
 """How much of the latency is the sound server's and the recorder's, measured with clicks whose times are known.
 
 A program's latency is given twice: until its sound is in the recording, and less the time that the device's buffer
-and the way to the recorder take. That time is found from outside the program: the server tells how much of its sound
-it has buffered, and clicks at several buffer lengths tell how long a sound then takes into the recording.
+and the way to the recorder take. That time is found from outside the program: the server reports how much sound it
+has buffered, and clicks at several buffer lengths tell how long a sound then takes into the recording.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ DAMPER_S = 0.03  # from the release of a key until its damper is down
 FALL_DB = 40.0  # over which a release is measured
 LONGEST_RELEASE_S = 0.4
 AUDIBLE_DB = -90.0  # relative to full scale
-TONE_DB = 20.0  # by which a tone of a chord must exceed the spectrum a quarter tone beside it
+TONE_DB = 20.0  # that a tone of a chord must exceed the spectrum a quarter tone beside it
 STRIKE_S = 0.03  # of sound before and after a strike, whose levels are compared
 STRUCK_S = (0.015, 0.115)  # after a strike that stops its string: the sound whose level is that of the strike
 

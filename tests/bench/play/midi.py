@@ -1,7 +1,7 @@
 """A private MIDI cable: messages go through a real port from this process into the app's own MIDI input.
 
 It is carried by a JACK server with the dummy driver, which needs neither a device nor the kernel's sequencer. This
-process receives the messages too, which tells how long the cable itself takes and what it loses.
+process receives the messages too, which shows how long the cable itself takes and what it loses.
 """
 
 from __future__ import annotations

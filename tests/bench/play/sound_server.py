@@ -61,7 +61,7 @@ class SoundServer:
         self._processes.close()
 
     def take_card_away(self) -> None:
-        """The server goes on without it: all who play are cut off."""
+        """The server continues without it: all who play are cut off."""
         self._control("unload-module", _CARD[0])
 
     def give_card_back(self) -> None:

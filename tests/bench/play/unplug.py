@@ -46,7 +46,7 @@ class Loss:
         kind: what was taken away, of `KINDS`.
         gone_s: for how long.
         back_s: from the device's return to the first sound of the app in it; None: there was none.
-        loudest: sample in what is heard then.
+        loudest: sample in the sound then.
         holes: silences of a millisecond or more in it.
     """
 

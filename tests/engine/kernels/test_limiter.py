@@ -57,7 +57,7 @@ LOUD = {
 
 
 def gain_of(found: Sound, sound: Sound) -> NDArray[np.float64]:
-    """By which it was multiplied, frame by frame, where it is loud enough to tell."""
+    """Its factor, frame by frame, where it is loud enough to tell."""
     rows = np.arange(len(sound))
     side = np.abs(sound).argmax(axis=1)
     given = sound.astype(float)[rows, side]

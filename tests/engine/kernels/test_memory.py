@@ -55,7 +55,7 @@ def string_voice() -> Voice:
 
 
 def test_samples_and_voices_are_published_when_they_are_there(published: Published) -> None:
-    """The numbers by which the device's thread finds them change in no other way."""
+    """The numbers that show them to the device's thread change in no other way."""
     samples = np.full((100, 1), 0.25, np.float32)
     rendered = Voice(plain_program(RATE_HZ), torch.full((3,), FULL_SCALE_M), Ear((0.5,)), 1.0, 1.0, RATE_HZ)
     rendered.append(samples)

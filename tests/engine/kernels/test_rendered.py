@@ -64,7 +64,7 @@ def test_other_rates_are_what_soxr_makes_of_them(
 
 
 def test_before_the_pluck_lies_its_mirror(small_info: Info, rung: Rung) -> None:
-    """A string let go from rest: so the converter needs no run-up, and is right from the first sample on."""
+    """A string released from rest: so the converter needs no run-up, and is right from the first sample on."""
     voice = waiting(rendered_program(small_info(True), RATE_HZ), 0.5, 4000)
     voice.append(band_limited(4000, 0.5))
     found = rung(RATE_HZ // 4, voice, attack=False)[:, 0]

@@ -13,11 +13,12 @@ from torch import Tensor
 from engine.kernels import layout, tension
 from engine.kernels.modes import row
 from engine.models.koopman_tension import KoopmanTension
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.pluck import FULL_SCALE_M, FULL_SCALE_N, Pluck
 from engine.presets import Preset, PresetInfo, of_string
 from engine.sources import ModelSource, TruthSource
 from engine.truth import ModalState, SplittingSolver
 from engine.voices import Ear, Mixer, Voice, bank_program
+from engine.voices.programs import truth_program
 
 STEREO = Ear((0.37, 0.8))
 Rung = Callable[..., NDArray[np.float64]]
@@ -50,6 +51,23 @@ def test_a_voice_is_the_model_and_the_string(
         expected = torch.cat([(let_go_m @ weights)[None], frames_m[0].double()]).numpy() / FULL_SCALE_M
         hard = nodes > 2 and isinstance(source, TruthSource)
         assert relative(found, expected) < (1e-3 if hard else 1e-5)
+
+
+@pytest.mark.parametrize("source", ["model", "truth"])
+def test_the_force_at_the_bridge_is_that_of_the_solvers_modes(
+    source: str, shipped: Callable[[str], Preset], initial_m: Initial, rung: Rung
+) -> None:
+    preset = of_string(shipped("studio_any_string"), rate_hz=48_000)
+    info, bridge = preset.info, Ear((0.5,), "bridge")
+    let_go_m = initial_m(info, Pluck(0.12, 4.0, "triangular"))
+    model = bank_program(preset.model, info, 48_000)
+    program = model if source == "model" else truth_program(info, 48_000)
+    assert program is not None and info.resonator.end_force is not None
+    found = rung(24_000, Voice(program, let_go_m, bridge), attack=False)
+    q = info.resonator.to_modes(let_go_m)[None]
+    amplitudes, _ = SplittingSolver(info.resonator, 48_000).advance(ModalState.at_rest(q), len(found) - 1)
+    expected = torch.cat([q, amplitudes[0]]) @ info.resonator.end_force / FULL_SCALE_N
+    assert relative(found, expected[:, None].numpy()) < 1e-4
 
 
 def ringing(info: PresetInfo, frames: int) -> tuple[Tensor, Tensor]:

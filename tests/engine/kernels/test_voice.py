@@ -44,7 +44,7 @@ def struck(strike: Strike, small_info: Callable[[bool], PresetInfo], initial_m: 
 
 
 def constant(frames: int = 48_000, level: float = 0.5) -> Voice:
-    """By which every change of gain can be seen."""
+    """It shows every change of gain."""
     voice = Voice.of_samples(plain_program(RATE_HZ), np.full((frames, 1), level, np.float32))
     voice.memory.view(np.int64)[at.ATTACK] = 0
     return voice
@@ -211,7 +211,7 @@ def test_release_fades_and_ends() -> None:
     mixer.add(voice)
     mixer.render(640)
     voice.release(0.01)
-    voice.release(1.0)  # the one under way goes on
+    voice.release(1.0)  # the one under way continues
     found = mixer.render(1280)[:, 0]
     np.testing.assert_allclose(found[:480], 0.5 * (1 - np.arange(1, 481) / 480), atol=1e-7)
     assert not found[480:].any()
@@ -375,7 +375,7 @@ def test_a_runaway_never_reaches_the_mix(
     believed = 20 * float(initial.abs().max()) / FULL_SCALE_M + 1
     assert np.abs(np.concatenate(parts)).max() <= believed
     expected = rung(len(parts) * 64 + 640, strike(STEEL))
-    np.testing.assert_allclose(mixer.render(640), expected[-640:], atol=1e-6)  # the other voice goes on
+    np.testing.assert_allclose(mixer.render(640), expected[-640:], atol=1e-6)  # the other voice continues
     np.testing.assert_allclose(parts[-1], expected[-704:-640], atol=1e-6)
 
 

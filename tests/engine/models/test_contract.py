@@ -60,7 +60,7 @@ def test_any_splitting_into_blocks_is_the_same_motion(named_model: tuple[str, St
 
 @torch.inference_mode()
 def test_some_frames_are_those_of_all(named_model: tuple[str, StringModel[Any]]) -> None:
-    """From any state, of any of the next frames, none among them, and the state after them goes on the same."""
+    """From any state, of any of the next frames, none among them, and the state after them continues the same."""
     _, model = named_model
     if not isinstance(model, AnyFrameModel):
         pytest.skip("it steps through every frame")

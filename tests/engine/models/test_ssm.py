@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import copy
-
 import pytest
 import torch
 
@@ -198,7 +196,8 @@ def test_what_was_folded_for_rendering_follows_the_weights(name: str, how: str) 
 
 @pytest.mark.parametrize("name", NAMES)
 @torch.no_grad()
-def test_blocks_are_folded_once_and_a_copy_folds_its_own(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_blocks_are_folded_once_for_a_motion(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And nothing of it stays in the model."""
     model, folds = small_model(name), []
     fold = Block.fold
     monkeypatch.setattr(Block, "fold", lambda block: folds.append(block) or fold(block))
@@ -207,6 +206,7 @@ def test_blocks_are_folded_once_and_a_copy_folds_its_own(name: str, monkeypatch:
     state = model.encode(initial())
     for _ in range(3):
         _, state = model.advance(state, 7)
-    assert len(folds) == len(model.layers)
-    assert torch.equal(copy.deepcopy(model)(initial(), 40), first)
     assert len(folds) == 2 * len(model.layers)
+    changed_by(model, "in place")
+    kept, _ = model.advance(state, 19)  # by the weights with which it began
+    torch.testing.assert_close(kept, first[:, 21:], rtol=0, atol=1e-5 * float(first.abs().max()))

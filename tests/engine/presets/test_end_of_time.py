@@ -27,7 +27,7 @@ def test_silence_at_the_end_of_time(path: Path) -> None:
         state = replace(state, inner=replace(state.inner, time=frame), frame=frame)
     elif hasattr(state.inner, "step"):
         state = replace(state, inner=replace(state.inner, step=frame), frame=frame)
-    else:  # a recurrence cannot jump: finite, or told
+    else:  # a recurrence cannot jump: finite, or reported
         try:
             frames, _ = source.advance(state, 300)
         except Runaway:

@@ -201,7 +201,7 @@ def test_shipped_presets_load_and_are_better_than_the_paper() -> None:
 
 
 def test_loading_presets_does_not_load_torchs_compiler() -> None:
-    """It takes a second and more, and whoever starts the app would wait for it; an operation on a meta tensor may."""
+    """It takes a second and more, and a start of the app would wait for it; an operation on a meta tensor may."""
     script = (
         "import sys; from engine.presets import load_preset, preset_files;"
         "[load_preset(path) for path in preset_files()]; print(len(preset_files()), 'torch._dynamo' in sys.modules)"

@@ -63,7 +63,7 @@ def test_the_chain_is_whole() -> None:
 def test_version_1_is_told_what_its_start_knew(model: str, initialisation: str, knows: str) -> None:
     old = {"format_version": 1, "model": model, "initialisation": initialisation, "title": "as it was"}
     assert migrated(old) == {**old, "format_version": FORMAT_VERSION, "knows": knows}
-    assert old["format_version"] == 1  # what is given stays as it is
+    assert old["format_version"] == 1  # the input stays as it is
 
 
 def test_the_input_of_version_3_is_what_every_model_sets_out_from() -> None:
@@ -96,7 +96,7 @@ def test_version_4_states_widths_by_shape_and_no_peak_of_a_family(
     found = migrated(old)
     assert found["format_version"] == FORMAT_VERSION
     assert found["trained_range"] == {**of_plucks, "width": expected, "peak_m": None if family else peak_m}
-    assert old["trained_range"] is of_plucks  # what is given stays as it is
+    assert old["trained_range"] is of_plucks  # the input stays as it is
     assert of_plucks["width"] == width
 
 

@@ -158,7 +158,7 @@ NAMES = sorted(path.stem for path in STRINGS.glob("*.toml"))
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_shipped_string_is_a_preset_with_what_was_learned(name: str) -> None:
-    """Inside the family, but for those whose files say what is beyond."""
+    """Inside the family, except those whose files say what is beyond."""
     many = load_preset(find_preset("studio_any_string"))
     string = read_string(find_string(name))
     assert many.info.family is not None

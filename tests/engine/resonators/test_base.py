@@ -45,7 +45,7 @@ def membrane(stiffening: float = 0.0) -> Resonator:
 
 
 def struck(drum: Resonator) -> ModalState:
-    """Pulled off its middle, a millimetre high, and let go."""
+    """Pulled off its middle, a millimetre high, and released."""
     x, y = (torch.linspace(0, 1, points, dtype=torch.float64) for points in POINTS)
     bump = torch.exp(-40 * ((x - 0.4)[:, None] ** 2 + (y - 0.3) ** 2)).flatten()
     return ModalState.at_rest(1e-3 * drum.to_modes(bump)[None])

@@ -56,7 +56,7 @@ def struck(of: Program, pluck: Pluck = PLUCK, ear: Ear = EAR) -> Voice:
 
 
 def sound(of: Program, changes: Changes, quanta: int = 300, ear: Ear = EAR) -> NDArray[np.float64]:
-    """What is heard, (frames,), of a string that is plucked and then changed."""
+    """The sound, (frames,), of a string that is plucked and then changed."""
     mixer, voice, blocks, done = Mixer(RATE_HZ, limited=False), struck(of, ear=ear), [], 0
     mixer.add(voice)
     for quantum, change, seconds in [*changes, (quanta, PLUCK, 0.0)]:
@@ -184,7 +184,7 @@ def test_a_pluck_of_a_string_that_has_ended_is_a_fresh_one() -> None:
 @pytest.mark.parametrize("kind", ["model", "truth"])
 @pytest.mark.parametrize("pickup", ["displacement", "velocity"])
 def test_a_second_pluck_of_next_to_nothing_changes_nothing(kind: str, pickup: str) -> None:
-    """Sample by sample: the motion goes on in its own time, however far ahead a voice was generated."""
+    """Sample by sample: the motion continues in its own time, however far ahead a voice was generated."""
     of, ear = program(kind), Ear((0.37, 0.6), pickup)  # type: ignore[arg-type]
     faint = Pluck(0.3, 1e-4, "raised_cosine", 0.2)
     touched, alone = sound(of, [(100, faint, 0.0), (140, faint, 0.0)], ear=ear), sound(of, [], ear=ear)

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 import torch
 
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
+from engine.excitation import triangular
+from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, RUNAWAY_FACTOR, Pluck
 from engine.resonators.sine_transform import listening_weights, to_grid
+from engine.resonators.string import StringParameters
+from engine.truth import ModalState, solve_linear
 from engine.voices import Ear
 
 POINTS = 101
@@ -39,3 +42,61 @@ def test_nodes_are_known() -> None:
 def test_each_pick_up_has_its_full_scale() -> None:
     assert Ear((0.5,)).full_scale == FULL_SCALE_M
     assert Ear((0.5,), "velocity").full_scale == FULL_SCALE_M_S
+
+
+STIFF = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
+BRIDGE = Ear((0.37, 0.61), "bridge")
+
+
+def newtons(displacement_m: torch.Tensor, ear: Ear = BRIDGE, modes: int = POINTS - 2) -> torch.Tensor:
+    force = STIFF.resonator(modes, grid_points=POINTS).force_weights
+    return displacement_m @ ear.weights(POINTS, force) * (FULL_SCALE_N / FULL_SCALE_M)
+
+
+def test_the_force_of_a_mode_is_that_of_tension_and_stiffness_at_the_end() -> None:
+    """T ∂y/∂x - EI ∂³y/∂x³ at x = 0, by finite differences of one mode."""
+    mode, step = 7, 1e-4 * STIFF.length_m
+    x = step * torch.arange(5, dtype=torch.float64)
+    y = 1e-3 * torch.sin(mode * torch.pi * x / STIFF.length_m)
+    slope = float(-25 * y[0] + 48 * y[1] - 36 * y[2] + 16 * y[3] - 3 * y[4]) / (12 * step)
+    third = float(-5 * y[0] + 18 * y[1] - 24 * y[2] + 14 * y[3] - 3 * y[4]) / (2 * step**3)
+    bending = STIFF.youngs_modulus_pa * STIFF.second_moment_m4
+    amplitudes = torch.zeros(20, dtype=torch.float64)
+    amplitudes[mode - 1] = 1e-3
+    heard = newtons(to_grid(amplitudes, POINTS))
+    expected = STIFF.tension_n * slope - bending * third
+    assert heard.tolist() == pytest.approx([expected, expected], rel=1e-4)
+    assert float(newtons(to_grid(amplitudes, POINTS), Ear((0.5,), "bridge", mode))) == pytest.approx(
+        expected, rel=1e-4
+    )
+    assert float(newtons(to_grid(amplitudes, POINTS), Ear((0.5,), "bridge", mode + 1))) == pytest.approx(0, abs=1e-9)
+    assert not newtons(to_grid(amplitudes, POINTS), Ear((0.5,), "bridge", POINTS)).any()
+
+
+def test_the_bridge_bears_the_tension_times_the_slope_of_a_pull() -> None:
+    flexible = StringParameters(0.65, 5e-7, 0.0, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
+    force = flexible.resonator(POINTS - 2, grid_points=POINTS).force_weights
+    pulled = Pluck(0.4, 3.0, "raised_cosine", 0.4).displacement(POINTS)  # it lies flat at the bridge
+    wide = triangular(0.5, 3e-3, POINTS)
+    weights = BRIDGE.weights(POINTS, force)[:, 0] * (FULL_SCALE_N / FULL_SCALE_M)
+    assert float(wide @ weights) == pytest.approx(75.0 * 3e-3 / (0.5 * 0.65), rel=0.02)
+    assert abs(float(pulled @ weights)) < 0.02
+
+
+@pytest.mark.parametrize("pluck", [Pluck(0.1, 3.0, "triangular"), Pluck(0.5, 3.0, width=0.03), Pluck(0.03, 3.0)])
+def test_no_motion_passes_the_bound_by_much(pluck: Pluck) -> None:
+    resonator = STIFF.resonator(60, grid_points=POINTS, tension_modulated=False)
+    shape = resonator.to_grid(resonator.to_modes(pluck.displacement(POINTS)))
+    times = torch.arange(2000, dtype=torch.float64) / 48_000
+    assert resonator.end_force is not None
+    moved = solve_linear(resonator, ModalState.at_rest(resonator.to_modes(shape)[None]), times)
+    heard = moved[0] @ resonator.end_force
+    bound = BRIDGE.largest(shape, resonator.force_weights) * (FULL_SCALE_N / FULL_SCALE_M)
+    assert 0.2 * bound < float(heard.abs().max()) < 0.2 * RUNAWAY_FACTOR * bound
+
+
+def test_a_bridge_is_no_place_on_the_string_and_needs_a_string() -> None:
+    assert not Ear((0.0,), "bridge").is_on_node(0.0)
+    assert BRIDGE.full_scale == FULL_SCALE_N
+    with pytest.raises(ValueError, match="another pick-up"):
+        BRIDGE.weights(POINTS)

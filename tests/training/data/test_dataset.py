@@ -5,6 +5,7 @@ import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import torch
 
 from engine.truth import ModalState, SplittingSolver
 from training.cell import Cell, configuration_of
-from training.configuration import DatasetConfiguration
+from training.configuration import DATA_VERSION, DatasetConfiguration
 from training.data.dataset import Dataset, dataset_folder, draw_initial, load_dataset, split_rows
 
 TINY = DatasetConfiguration("noise", 4000, 4, steps=30, count=10)
@@ -62,6 +63,24 @@ def test_another_version_of_the_data_is_other_data(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr("training.configuration.DATA_VERSION", 99)
     after = dataset_folder(TINY, tmp_path), configuration_of(Cell("lru", True, "noise", 4000)).digest
     assert before[0] != after[0] and before[1] != after[1]
+
+
+@pytest.mark.parametrize(
+    ("initial", "amplitudes_mm", "scale_mm"),
+    [
+        ("gaussian", [0.09838905, 1.152356, -0.004192985], 0.6827188),
+        ("noise", [0.2198603, -0.1396777, -0.1671215], 2.358021),
+        ("pluck", [0.03438805, 0.6412062, -0.1626634], 0.8337261),
+    ],
+)
+def test_what_a_version_of_the_data_holds_is_for_good(
+    tmp_path: Path, initial: Literal["gaussian", "noise", "pluck"], amplitudes_mm: list[float], scale_mm: float
+) -> None:
+    """Where this fails, the solver or a draw has changed: raise DATA_VERSION, and set the new figures here."""
+    found = load_dataset(replace(TINY, initial=initial), tmp_path)
+    assert (1000 * found.amplitudes[3, 20, :3]).tolist() == pytest.approx(amplitudes_mm, rel=1e-4)
+    assert 1000 * found.scale_m == pytest.approx(scale_mm, rel=1e-5)
+    assert DATA_VERSION == 3
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files as POSIX does")

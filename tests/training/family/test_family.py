@@ -15,7 +15,7 @@ from engine.resonators.family import inharmonicity
 from training.family import errors as family_errors
 from training.family.errors import FamilyErrors, StringError
 from training.family.fit import Case, errors, fit_curves, geometric_mean
-from training.family.motions import solve, true_motion
+from training.family.motions import solve
 from training.family.preset import FamilyConfiguration, read_configuration, train_preset
 from training.family.strings import COLUMNS, FAMILY, Column, draw_string, string_of
 from training.research import players as players_of_physics
@@ -89,7 +89,7 @@ def test_a_preset_of_many_strings_is_whole(tmp_path: Path) -> None:
     c = FamilyConfiguration(
         "Two", "", 25, strings=2, validation_strings=1, test_strings=1, seconds=0.02, steps=1, first_s=0.01
     )
-    info = train_preset(c, tmp_path / "two.safetensors", cache=tmp_path / "cache")
+    info = train_preset(c, tmp_path / "two.safetensors")
     loaded = load_preset(tmp_path / "two.safetensors")
     assert loaded.info == info
     assert loaded.info.family == FAMILY["inside"]
@@ -99,16 +99,6 @@ def test_a_preset_of_many_strings_is_whole(tmp_path: Path) -> None:
 
 def test_its_configuration_is_committed() -> None:
     assert read_configuration().initialisation == "kicks"
-
-
-def test_a_motion_is_kept_and_a_damaged_one_named(tmp_path: Path) -> None:
-    plucked = draw_string("inside", "train", 0)
-    first = true_motion(plucked, RATE_HZ, 50, tmp_path)
-    (file,) = (tmp_path / "motions").iterdir()
-    assert torch.equal(first, true_motion(plucked, RATE_HZ, 50, tmp_path))
-    file.write_bytes(b"nothing")
-    with pytest.raises(ValueError, match=file.name):
-        true_motion(plucked, RATE_HZ, 50, tmp_path)
 
 
 def test_players_are_as_good_as_they_should_be() -> None:
@@ -130,8 +120,8 @@ def test_a_column_tells_its_worst() -> None:
     assert told.worst.tension_rise == 0.4
     assert told.share_large == 0.5
     assert math.isclose(told.geometric_mean, math.sqrt(1e-7))
-    parts = family_errors.by_rise(strings, (0, 0.2, 0.3, 0.5))
-    assert [(edges, len(part.strings)) for edges, part in parts] == [((0, 0.2), 1), ((0.3, 0.5), 1)]
+    parts = family_errors.in_ranges(strings, tension_rise=(0, 0.2, 0.3, 0.5))
+    assert [(edges, len(part.strings)) for edges, part in parts] == [(((0, 0.2),), 1), (((0.3, 0.5),), 1)]
 
 
 def test_a_map_has_every_string_once() -> None:
@@ -140,8 +130,8 @@ def test_a_map_has_every_string_once() -> None:
         for inharmonicity in (1e-5, 1e-4, 1e-3)
         for rise in (0.02, 0.1, 0.5)
     )
-    cells = family_errors.by_cell(strings, (0.02, 0.1, 0.5), (1e-5, 1e-4, 1e-3))
-    assert {(rises, edges): len(part.strings) for rises, edges, part in cells} == {
+    cells = family_errors.in_ranges(strings, tension_rise=(0.02, 0.1, 0.5), inharmonicity=(1e-5, 1e-4, 1e-3))
+    assert {ranges: len(part.strings) for ranges, part in cells} == {
         ((0.02, 0.1), (1e-5, 1e-4)): 1,
         ((0.02, 0.1), (1e-4, 1e-3)): 2,
         ((0.1, 0.5), (1e-5, 1e-4)): 2,
@@ -150,7 +140,7 @@ def test_a_map_has_every_string_once() -> None:
 
 
 def test_a_string_that_has_fallen_silent_says_so() -> None:
-    """Of a geometric mean over strings in their tenth second, zeros of silent ones would be all that is told."""
+    """Of a geometric mean over strings in their tenth second, zeros of silent ones would be all there is."""
     players = {"linear": players_of_physics.linear_string}
     early, late = (
         family_errors.measure(players, "inside", "test", 3, 8_000, seconds)["linear"].strings

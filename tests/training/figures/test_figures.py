@@ -21,11 +21,11 @@ from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.schema import write
 from engine.truth import ModalState, SplittingSolver
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
-from training.data.dataset import draw_initial
-from training.figures import evolution, extrapolation, motions, spectrum, style
-from training.figures.eigenvalues import eigenvalues
-from training.figures.error import error, smoothed
-from training.figures.run_plot import plot_run, read_log, run_figure
+from training.data.dataset import Dataset, draw_initial
+from training.evaluate import evaluate_past_horizon
+from training.figures import extrapolation, style
+from training.figures.run_plot import plot_run, run_figure
+from training.fitting.log import read_log
 
 HORIZON = 40
 SIZES: dict[str, dict[str, Any]] = {
@@ -69,7 +69,7 @@ def preset(model: str = "koopman_var", name: str = "", horizon: int = HORIZON, *
 
 def truth_and_model(one: Preset, rows: slice, steps: int) -> tuple[torch.Tensor, torch.Tensor]:
     """Frames 0 … steps in m, by the solver and the model themselves."""
-    data = motions.data_of([one])
+    data = extrapolation.common_data([one])
     solver = SplittingSolver(data.resonator, data.rate_hz)
     truth = to_grid(solver.solve(ModalState.at_rest(draw_initial(data)[rows]), steps), data.grid_points)
     with torch.no_grad():
@@ -87,35 +87,29 @@ def titled(figure: Figure, words: str) -> Axes:
     return found
 
 
-def image(axes: Axes) -> np.ndarray:
-    return np.asarray(axes.images[0].get_array())
+# ---- what is compared ----
 
 
-# ---- motions ----
-
-
-def test_the_truth_of_a_figure_is_that_of_the_validation_set() -> None:
+def test_sounds_are_those_of_the_validation_set() -> None:
     one = preset()
-    data = motions.data_of([one])
-    starts = motions.validation_starts(data)
-    assert starts.shape == (3, 101)
-    truth, model = truth_and_model(one, slice(24, 27), 60)
-    blocks = list(motions.motions([one], starts, 60))
-    torch.testing.assert_close(torch.cat([b.truth for b in blocks], 1), truth[:, 1:])
-    torch.testing.assert_close(torch.cat([b.models[0] for b in blocks], 1), model[:, 1:], atol=1e-8, rtol=1e-4)
-
-
-def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
-    one = preset()
-    starts = motions.validation_starts(motions.data_of([one]))
-    whole = motions.errors([one], starts, 50)[0]
-    monkeypatch.setattr(motions, "FRAMES_AT_ONCE", 7)
-    monkeypatch.setattr(motions, "TRAJECTORIES_AT_ONCE", 2)
+    data = Dataset(extrapolation.common_data([one]), torch.empty(0), 1e-3)
+    truth, model = truth_and_model(one, slice(25, 27), 60)
+    weights = listening_weights(torch.tensor([0.2]), 101)
     shares: list[float] = []
-    parts = motions.errors([one], starts, 50, shares.append)[0]
-    for a, b in zip(whole.per_frame(), parts.per_frame(), strict=True):
-        np.testing.assert_allclose(a, b, rtol=1e-4)
-    assert shares == sorted(shares)
+    for frames in (1000, 7):  # blocks do not show
+        found = evaluate_past_horizon(
+            one.model,
+            data,
+            "validation",
+            0.015,
+            horizon=0,
+            trajectories=slice(1, 3),
+            listen=0.2,
+            frames_at_once=frames,
+            report=shares.append,
+        )
+        expected = torch.stack([model, truth]) @ weights[:, 0] / 1e-3
+        torch.testing.assert_close(found.sounds, expected.float(), atol=1e-5, rtol=1e-4)
     assert shares[-1] == 1
 
 
@@ -132,13 +126,15 @@ def test_blocks_do_not_show(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 def test_presets_of_different_data_are_refused(field: str, other: Any) -> None:
     pair = [preset(name="one"), preset(name="two", **{field: other})]
-    for draw in (evolution.evolution, extrapolation.extrapolation, error):
-        with pytest.raises(PresetError, match=f"one and two were trained on different data \\({field}: "):
-            draw(pair)  # type: ignore[operator]
+    with pytest.raises(PresetError, match=f"one and two were trained on different data \\({field}: "):
+        extrapolation.extrapolation(pair)
 
 
 def test_the_starts_of_a_data_set_are_named() -> None:
-    told = [motions.describe(motions.data_of([preset(initial=kind)])) for kind in ("gaussian", "noise", "pluck")]
+    told = [
+        extrapolation.describe(extrapolation.common_data([preset(initial=kind)]))
+        for kind in ("gaussian", "noise", "pluck")
+    ]
     assert [words.split(", ")[1] for words in told] == [
         "Gaussian plucks",
         "noise-like starts",
@@ -148,86 +144,36 @@ def test_the_starts_of_a_data_set_are_named() -> None:
 
 def test_what_a_figure_cannot_be_made_of_is_told() -> None:
     with pytest.raises(PresetError, match="needs at least one"):
-        motions.data_of([])
+        extrapolation.common_data([])
     with pytest.raises(ValueError, match="there is no trajectory 3: the validation set has 0 … 2"):
-        evolution.evolution([preset()], trajectory=3)
-    with pytest.raises(ValueError, match="choose at least 16"):
-        evolution.evolution([preset()], seconds=0.001)
+        extrapolation.extrapolation([preset()], trajectory=3)
+    with pytest.raises(ValueError, match="choose at least 64"):
+        extrapolation.extrapolation([preset()], seconds=0.001)
     silent = preset()
     with pytest.raises(PresetError, match=r"metadata\.training: field 'title' is missing"):
-        error([replace(silent, info=replace(silent.info, training={}))])
+        extrapolation.extrapolation([replace(silent, info=replace(silent.info, training={}))])
 
 
 def test_labels_differ() -> None:
     names = ("nylon_koopman_var", "nylon_koopman_var_paper_seed1", "nylon_lru")
     found = [preset(name.split("_", 1)[1].removesuffix("_paper_seed1"), name) for name in names]
-    assert motions.labels(found) == ["Koopman_var", "Koopman_var (paper seed1)", "LRU"]
-    assert motions.labels([preset(name="a"), preset(name="b")]) == ["a", "b"]
-    assert motions.horizons(found) == [("end of training", 0.01)]
-    apart = motions.horizons([preset(), preset("lru", horizon=80)])
+    assert extrapolation.labels(found) == ["Koopman_var", "Koopman_var (paper seed1)", "LRU"]
+    assert extrapolation.labels([preset(name="a"), preset(name="b")]) == ["a", "b"]
+    assert extrapolation.horizons(found) == [("end of training", 0.01)]
+    apart = extrapolation.horizons([preset(), preset("lru", horizon=80)])
     assert apart == [("end of training\nKoopman_var", 0.01), ("end of training\nLRU", 0.02)]
 
 
 # ---- figures ----
 
 
-def test_evolution_shows_truth_model_and_magnified_error() -> None:
-    one = preset()
-    figure = evolution.evolution([one], trajectory=1, seconds=0.03)
-    truth, model = (frames[0, 1:].numpy() for frames in truth_and_model(one, slice(25, 26), 120))
-    np.testing.assert_allclose(image(titled(figure, "truth")), 1000 * truth.T, atol=1e-9)
-    np.testing.assert_allclose(image(titled(figure, "Koopman_var")), 1000 * model.T, atol=1e-4)
-    below = titled(figure, "error")
-    shown = below.get_title()
-    factor = int(shown.partition("×")[2].split()[0]) if "×" in shown else 1
-    np.testing.assert_allclose(image(below), factor * 1000 * (model - truth).T, atol=1e-3)
-    limits = {axes.images[0].get_clim() for axes in figure.axes if axes.images}
-    assert len(limits) == 1  # one colour scale
-
-    weights = listening_weights(torch.tensor([0.37]), 101)[:, 0].numpy()
-    (spectra,) = (axes for axes in figure.axes if axes.get_legend() is not None)
-    for place, frames in ((0, truth), (1, model)):
-        khz, levels = line(spectra, place)
-        expected = spectrum.levels_db(frames @ weights, truth @ weights)[: len(levels)]
-        np.testing.assert_allclose(levels, expected, atol=0.05)
-        assert khz[1] == pytest.approx(4 / 120)
-
-
-@pytest.mark.parametrize(("largest", "factor"), [(2.0, 1), (0.21, 1), (0.19, 10), (0.002, 1000), (0.0, 1)])
-def test_an_error_is_magnified_by_powers_of_ten_within_the_scale(largest: float, factor: int) -> None:
-    assert evolution.magnification(largest, 2.0) == factor
-
-
 def test_a_spectrum_has_its_peak_where_the_tone_is() -> None:
     time_s = np.arange(1000) / 4000
     tone, weaker = np.sin(2 * np.pi * 500 * time_s), 0.1 * np.sin(2 * np.pi * 500 * time_s)
-    levels = spectrum.levels_db(weaker, tone)
-    assert spectrum.frequencies_hz(1000, 4000)[levels.argmax()] == 500
+    levels = extrapolation.levels_db(weaker, tone)
+    assert levels.argmax() == 500 * 1000 // 4000
     assert levels.max() == pytest.approx(-20)
-    assert spectrum.levels_db(np.zeros(64), np.zeros(64)).max() == spectrum.FLOOR_DB
-
-
-def test_error_curves_are_those_of_the_metrics() -> None:
-    one = preset()
-    figure = error([one, preset("lru")], seconds=0.015)
-    truth, model = truth_and_model(one, slice(24, 27), 60)
-    difference = (model - truth)[:, 1:]
-    mae = (difference.abs().sum((0, 2)) / truth[:, 1:].abs().sum((0, 2))).numpy()
-    mse = (difference.square().sum((0, 2)) / truth[:, 1:].square().sum((0, 2))).numpy()
-    for axes, expected in zip(figure.axes, (mae, mse), strict=True):
-        time_s, values = line(axes, 0)
-        np.testing.assert_allclose(values, expected, rtol=2e-3)
-        np.testing.assert_allclose(time_s, np.arange(1, 61) / 4000)
-        np.testing.assert_allclose(line(axes, 1)[1], smoothed(expected, 4000, 0.01), rtol=2e-3)
-        marks = [entry.get_xdata()[0] for entry in axes.lines if len(entry.get_xdata()) == 2]  # type: ignore[arg-type,index]
-        assert marks == [HORIZON / 4000]
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["Koopman_var", "LRU"]
-
-
-def test_smoothing_keeps_what_is_constant() -> None:
-    np.testing.assert_allclose(smoothed(np.full(9, 0.3), 1000, 0.005), 0.3)
-    np.testing.assert_allclose(smoothed(np.arange(9.0), 1000, 0.003)[1:-1], np.arange(1, 8))
-    np.testing.assert_allclose(smoothed(np.arange(3.0), 1000, 1.0)[1], 1)
+    assert extrapolation.levels_db(np.zeros(64), np.zeros(64)).max() == extrapolation.FLOOR_DB
 
 
 def test_extrapolation_goes_past_training() -> None:
@@ -258,27 +204,9 @@ def test_a_model_that_runs_away_is_drawn_as_far_as_it_is_finite() -> None:
     one = preset("dmd")
     with torch.no_grad():
         one.model.magnitude_log.fill_(2.0)  # type: ignore[operator,union-attr]
-    for figure in (evolution.evolution([one], seconds=0.1), extrapolation.extrapolation([one]), error([one])):
-        figure.draw_without_rendering()
-        assert all(math.isfinite(limit) for axes in figure.axes for limit in (*axes.get_xlim(), *axes.get_ylim()))
-
-
-def test_eigenvalues_are_those_of_the_parameters() -> None:
-    one, lru = preset(), preset("lru")
-    figure = eigenvalues([one, lru])
-    circle, other, decay, _ = figure.axes
-    nu_log, theta_log = (getattr(one.model, name).detach().double().numpy() for name in ("nu_log", "theta_log"))
-    learned = np.exp(-np.exp(nu_log) + 1j * np.exp(theta_log))
-    x, y = line(circle, 1)
-    np.testing.assert_allclose(x + 1j * y, learned)
-    x, y = line(circle, 2)  # the linear string, both of each pair
-    linear = np.exp(one.info.string.resonator(5).eigenvalues().numpy() / 4000)
-    np.testing.assert_allclose(x + 1j * y, np.concatenate([linear, linear.conj()]))
-    khz, rates = line(decay, 1)
-    np.testing.assert_allclose(rates, one.info.string.decay_rates(5).numpy())
-    np.testing.assert_allclose(khz, one.info.string.resonator(5).eigenvalues().imag.numpy() / (2000 * np.pi))
-    assert len(other.lines) == 4  # circle, block, first layer, string
-    np.testing.assert_allclose(line(other, 2)[0], lru.model.first_layer.log_eigenvalues().exp().real.tolist())  # type: ignore[operator,union-attr]
+    figure = extrapolation.extrapolation([one])
+    figure.draw_without_rendering()
+    assert all(math.isfinite(limit) for axes in figure.axes for limit in (*axes.get_xlim(), *axes.get_ylim()))
 
 
 @pytest.mark.parametrize(
@@ -291,21 +219,6 @@ def test_every_model_with_linear_dynamics_has_eigenvalues(model: str, layers: in
     linear = one.info.string.resonator(5).eigenvalues() / 4000
     nearest = (found[0].exp()[:, None] - linear.exp()).abs().amin(0)
     assert float(nearest.max()) < 1e-5  # all of them started from the string's
-    assert eigenvalues([one]).axes
-
-
-def test_growing_modes_are_counted_where_they_cannot_be_drawn() -> None:
-    one = preset("dmd")
-    with torch.no_grad():
-        one.model.magnitude_log[:2] = 0.1  # type: ignore[operator,union-attr,index]
-    decay = eigenvalues([one]).axes[1]
-    assert [text.get_text() for text in decay.texts] == ["2 with |λ| ≥ 1: not shown here"]
-    assert len(line(decay, 0)[0]) == 8  # of 12, two are unused
-
-
-def test_a_model_without_eigenvalues_is_told() -> None:
-    with pytest.raises(PresetError, match=r"frnn\.safetensors: a frnn has no eigenvalues"):
-        eigenvalues([preset("frnn")])
 
 
 # ---- files ----
@@ -327,7 +240,7 @@ def test_files_are_of_their_format_and_repeat(tmp_path: Path, suffix: str, start
 
 
 def test_a_picture_has_the_size_of_its_figure() -> None:
-    figure = error([preset()])
+    figure = extrapolation.extrapolation([preset()])
     width, height = figure.get_size_inches()
     found = imread(io.BytesIO(style.figure_bytes(figure, ".png")))
     assert found.shape[:2] == (round(height * style.DPI), round(width * style.DPI))
@@ -353,7 +266,7 @@ def log(tmp_path: Path, text: str) -> Path:
 
 
 def test_a_runs_plot_has_its_numbers(tmp_path: Path) -> None:
-    text = HEAD + "1,150,0.001,0.5,,,1\n2,200,0.003,0.25,0.1,0.3,2\n3,400,0.002,nan,0.05,0.2,3\n4,40"
+    text = HEAD + "1,150,0.001,0.5,,,1\n2,200,0.003,0.25,0.1,0.3,2\n3,400,0.002,,0.05,0.2,3\n4,40"
     path = log(tmp_path, text)
     errors, rates, horizon = run_figure(path).axes
     drawn = {entry.get_label(): tuple(map(list, entry.get_data())) for entry in errors.lines}
@@ -375,7 +288,7 @@ def test_a_log_may_be_short_without_validation_or_negative(tmp_path: Path, lines
     path = log(tmp_path, HEAD + lines)
     plot_run(path, path.with_suffix(".svg"))
     assert path.with_suffix(".svg").exists()
-    assert len(read_log(path)["epoch"]) == lines.count("\n")
+    assert len(read_log(path)) == lines.count("\n")
 
 
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n"])

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from engine.models import Koopman, KoopmanConfiguration, KoopmanIntegrated, StringModel, build_model
+from engine.models import KoopmanIntegrated, StringModel, build_model
 from engine.models.integrated_phase import IntegratedPhaseConfiguration
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
@@ -18,7 +18,7 @@ from training.evaluate import evaluate_model
 from training.fitting.fit import fit
 from training.fitting.modes import Modes, found_modes
 from training.fitting.phases import _Motion, _upright, fit_phases, mean_motions, start_from_phases
-from training.start import COUNT, PHASES, SYMMETRIES, initialisation_of, knowledge_of
+from training.start import BLIND_PURSUIT, COUNT, PHASES, PURSUIT, SYMMETRIES, begin, knowledge_of
 
 STEPS = 450
 
@@ -101,41 +101,52 @@ def test_it_predicts_strings_that_the_fit_has_not_seen(
 
 
 def test_a_run_starts_there(small_dataset: Dataset, runs: Path) -> None:
-    recipe = Recipe(epochs=1, blind=True, peak_learning_rate=1e-9, first_horizon=STEPS, consistency_weight=0.0)
+    recipe = Recipe(epochs=1, start=PHASES, peak_learning_rate=1e-9, first_horizon=STEPS, consistency_weight=0.0)
     sizes = {"state_size": 5, "modulation": True, "physical_units": True}
     configuration = TrainingConfiguration(
         "A test", "koopman_integrated", small_dataset.configuration, recipe, model_configuration=sizes
     )
-    assert initialisation_of(configuration) == PHASES
+    assert configuration.start == PHASES
     untrained = integrated_phase()
     start_from_phases(untrained, found_modes(small_dataset, STEPS), recipe.seed)
     expected = evaluate_model(untrained, small_dataset, "validation", STEPS).total()
-    assert fit(configuration, small_dataset, runs).validation.rel_mae == pytest.approx(expected.rel_mae, rel=1e-2)
+    assert fit(configuration, small_dataset, runs).validation.total().rel_mae == pytest.approx(
+        expected.rel_mae, rel=1e-2
+    )
 
 
 def test_what_cannot_start_so_is_refused(small_dataset: Dataset) -> None:
     with pytest.raises(ValueError, match="state_size must be at least 5, the modes that the data show, not 4"):
         start_from_phases(integrated_phase(4), found_modes(small_dataset, STEPS), seed=0)
-    with pytest.raises(ValueError, match="needs one of the models koopman_integrated, fgru, frnn"):
-        start_from_phases(Koopman(KoopmanConfiguration()), found_modes(small_dataset, STEPS), seed=0)
     strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
     with pytest.raises(ValueError, match="stride must be 1, not 2"):
         found_modes(strided, STEPS)
-    data = DatasetConfiguration("gaussian", 4000, 5, steps=450, count=20)
-    with pytest.raises(ValueError, match="or one of koopman_integrated, fgru, frnn, not 's5'"):
-        TrainingConfiguration("A test", "s5", data, Recipe(epochs=1, blind=True))
 
 
-def test_latents_follow_the_modes_of_a_blind_integrated_phase_alone() -> None:
+def test_a_start_is_one_of_the_models() -> None:
     data = DatasetConfiguration("gaussian", 4000, 5, steps=450, count=20)
-    with pytest.raises(ValueError, match="and the model 'koopman_integrated', not 'fgru'"):
-        TrainingConfiguration("A test", "fgru", data, Recipe(epochs=1, blind=True, latents_per_mode=1))
-    with pytest.raises(ValueError, match="latents_per_mode needs blind"):
-        TrainingConfiguration("A test", "koopman_integrated", data, Recipe(epochs=1, latents_per_mode=1))
-    recipe = Recipe(epochs=1, blind=True, latents_per_mode=2)
-    with pytest.raises(ValueError, match="state_size follows latents_per_mode"):
-        sizes = {"state_size": 10}
-        TrainingConfiguration("A test", "koopman_integrated", data, recipe, model_configuration=sizes)
+    with pytest.raises(ValueError, match="start 'phases of the displacement' is not one of paper, physics"):
+        TrainingConfiguration("A test", "s5", data, Recipe(epochs=1, start=PHASES))
+    for start, latent_epochs in ((PURSUIT, 0), (BLIND_PURSUIT, 0), ("paper", 1)):
+        with pytest.raises(ValueError, match="a pursuit needs some, any other start none"):
+            recipe = Recipe(epochs=1, start=start, latent_epochs=latent_epochs)
+            TrainingConfiguration("A test", "koopman", data, recipe)
+
+
+@pytest.mark.parametrize("sizes", [{}, {"state_size": 7}])
+def test_an_integrated_phase_without_a_size_has_a_latent_for_each_mode_that_is_found(
+    small_dataset: Dataset, sizes: dict[str, int]
+) -> None:
+    sizes = {"modulation": True, "physical_units": True, **sizes}
+    configuration = TrainingConfiguration(
+        "A test",
+        "koopman_integrated",
+        small_dataset.configuration,
+        Recipe(epochs=1, start=PHASES),
+        model_configuration=sizes,
+    )
+    model, latents = begin(configuration, small_dataset)
+    assert (model.configuration.state_size, latents) == (sizes.get("state_size", 5), None)
 
 
 BLIND_CELLS = [

@@ -69,7 +69,7 @@ def test_a_gradient_of_zero_is_no_step() -> None:
 
 
 def test_a_gradient_that_is_no_number_at_first_changes_nothing() -> None:
-    """The loss tells it; eigenvectors of it there are none."""
+    """The loss has it; eigenvectors of it there are none."""
     weights = torch.ones(3, 3, requires_grad=True)
     optimiser = SOAP([{"params": [weights]}], lr=0.1)
     weights.grad = torch.full((3, 3), float("nan"))

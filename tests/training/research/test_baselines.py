@@ -1,4 +1,4 @@
-"""Baselines: what they begin as, the units that they work in, and a training that goes on where it was."""
+"""Baselines: what they begin as, the units that they work in, and a training that continues where it was."""
 
 from __future__ import annotations
 

@@ -59,7 +59,7 @@ def test_an_frnn_is_a_linear_string(count: int) -> None:
 
 
 def test_an_fgru_is_a_linear_string() -> None:
-    """But for its first frame, which it has no state for yet."""
+    """Except its first frame, which it has no state for yet."""
     assert relative_error(fgru(modes()), modes(), 300, skipped=1) < 1e-4
     assert relative_error(fgru(modes()), modes(), 10) < 1e-2
 

@@ -13,7 +13,7 @@ import pytest
 
 from engine.schema import SchemaError, write
 from training.results import RESULTS, Row, add_rows, read_results
-from training.sweeping.sweep import Options, Unwatched, is_finished, results_of, sweep, unfinished
+from training.sweeping.sweep import Options, Watch, is_finished, results_of, sweep, unfinished
 from training.sweeping.workers import Layout, cluster_workers, fitted, local_workers
 from training.sweeping.workers.base import Ended, Event, Noted, Progressed, Task
 from training.sweeping.workers.performing import end_of, perform
@@ -21,8 +21,8 @@ from training.sweeping.workers.performing import end_of, perform
 MEASURED = [name for name in Row.__dataclass_fields__ if name not in ("seconds", "finished", "commit")]
 
 
-class Watch(Unwatched):
-    """Keeps what it is told."""
+class Record(Watch):
+    """Keeps what is reported."""
 
     def __init__(self) -> None:
         self.names: list[str] = []
@@ -75,7 +75,7 @@ def row_of(task: Task, **changes: Any) -> Row:
 
 def test_runs_begin_in_the_plans_order_and_no_more_than_there_are_workers(plan, options: Options) -> None:
     made = plan()
-    workers, watch = Script(lambda task, tries: row_of(task)), Watch()
+    workers, watch = Script(lambda task, tries: row_of(task)), Record()
     rows = sweep(made, workers, options, watch)
     assert workers.started == watch.names == [run.name for run in made.runs]
     assert workers.most == 3
@@ -92,7 +92,7 @@ def test_what_failed_is_tried_again_then_recorded_and_tried_by_the_next_sweep(pl
             return f"OSError: try {tries}"
         return row_of(task)
 
-    workers, watch = Script(outcome), Watch()
+    workers, watch = Script(outcome), Record()
     rows = sweep(made, workers, options, watch)
     assert (workers.started.count(worst), workers.started.count(unlucky)) == (2, 2)
     assert {(row.name, row.status, row.message) for row in rows if row.status != "done"} == {
@@ -190,14 +190,14 @@ def wait_until(reached: Callable[[], bool]) -> None:
         assert time.monotonic() < end
 
 
-class Killer(Watch):
+class Killer(Record):
     """Kills the process that is the first to tell of its progress, some epochs into its run."""
 
     def __init__(self, runs: Path) -> None:
         super().__init__()
         self._runs = runs
         self.victim = ""
-        self.resumed_at = 0  # the first epoch that is told after that
+        self.resumed_at = 0  # the first epoch that is reported after that
         self._pid = 0
 
     def progressed(self, event: Progressed) -> None:
@@ -270,7 +270,7 @@ def test_a_sweep_here_listens_to_nobody(plan, options: Options) -> None:
     made = replace(made, runs=made.runs[:1])
     seen: list[Any] = []
 
-    class Look(Watch):
+    class Look(Record):
         def progressed(self, event: Progressed) -> None:
             for one in [psutil.Process(), *psutil.Process().children(recursive=True)]:
                 with suppress(psutil.NoSuchProcess):  # `git`, which a worker asks for its commit, ends by itself

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from training.cell import Cell, configuration_of
 from training.results import Row
 from training.start import PHASES
+from training.tables.compact import as_compact
 from training.tables.markdown import as_markdown
 from training.tables.paper import COLUMNS, Column, Figure
 from training.tables.sections import sections
@@ -218,20 +220,52 @@ def test_of_two_runs_of_a_seed_the_later_counts_and_the_rest_is_said_to_be_left_
     assert "2 of 3 rows of the results file are not shown" in as_markdown(rows)
 
 
-def test_the_listing_traces_every_run() -> None:
-    known = row(seconds=61.4, commit="abc1234", hardware="a processor", mse=0.0123456)
-    cells = as_markdown([known], listing=True).partition("## Runs\n\n")[2].splitlines()
-    (told,) = (entry for entry in cells if f"| {known.name} " in entry)
-    for fact in ("0.0123456", known.digest, "abc1234", "a processor", "61", f"`learned-strings train {known.name}`"):
-        assert f" {fact} " in told
-    assert "## Runs" not in as_markdown([known])
+def compact_lines(text: str, horizon: int, string: str, model: str) -> list[list[str]]:
+    """What follows string and model in a compact table's lines of them."""
+    part = text.partition(f"### {horizon} frames")[2].partition("\n\n")[2].partition("\n\n")[0]
+    cells = [[cell.strip() for cell in entry.strip("|").split(" | ")] for entry in part.splitlines()]
+    return [entry[2:] for entry in cells if entry[:2] == [string, model]]
 
 
-def test_the_listing_ends_with_what_rows_say_of_themselves() -> None:
-    said = [row(cell, mse=0.1, commit="abc1234", message="of unpublished code") for cell in seeds(2)]
-    assert as_markdown(said, listing=True).endswith("\n\n- abc1234 (2 runs): of unpublished code.\n")
-    assert "unpublished" not in as_markdown(said)
-    assert as_markdown([row(mse=0.1)], listing=True).endswith("|\n")
+def test_a_compact_line_has_start_seeds_figures_and_ratio() -> None:
+    first, second = seeds(2)
+    found = as_compact([row(first, 0.010, 0.10), row(second, 0.012, 0.16)])
+    (ours,) = compact_lines(found, 4000, "nonlinear", "LRU")
+    assert ours == ["random weights", "2", "**0.011 (0.0260) ×0.42**", *["not run"] * 3]
+    by_mae = as_compact([row(first, 0.010, 0.10), row(second, 0.012, 0.16)], metric="rel_mae")
+    assert compact_lines(by_mae, 4000, "nonlinear", "LRU")[0][2] == "0.13 (0.1571) ×0.83"  # equal: not bold
+    assert compact_lines(as_compact([row(mse=1.5)]), 4000, "nonlinear", "LRU")[0][2] == "*1.5 (0.0260) ×58*"
+
+
+def test_compact_lines_name_what_the_start_was_given() -> None:
+    def given(initialisation: str, **cell: Any) -> str:
+        run = row(Cell(**({"tension_modulated": True, "initial": "gaussian", "rate_hz": 4000} | cell)))
+        run = replace(run, initialisation=initialisation)
+        name = {"koopman_integrated": "integrated phase", "dmd": "DMD", "koopman": "Koopman"}[cell["model"]]
+        ((start, *_),) = compact_lines(as_compact([run]), 4000, "nonlinear", name)
+        return start
+
+    assert given("averaging", model="koopman_integrated") == "averaged equations"
+    assert given(PHASES, model="koopman_integrated", recipe="blind") == "displacement only"
+    assert given(PHASES, model="koopman_integrated", recipe="hinted") == "displacement only §"
+    assert given("least squares", model="dmd") == "fitted"
+    assert given("paper", model="koopman", recipe="paper") == "random weights, paper's recipe"
+
+
+def test_compact_tables_list_what_is_missing_and_what_went_wrong() -> None:
+    a, b = seeds(2)
+    found = as_compact([row(a), row(b, None, None, status="diverged")])
+    assert compact_lines(found, 4000, "nonlinear", "LRU")[0][2].endswith("; 1 diverged")
+    assert "- LRU, nonlinear string, 4000 frames: not Gaussian 16 kHz, Noise 4 kHz, Noise 16 kHz.\n" in found
+    assert "- FRNN, linear string, 400 frames: no cell.\n" in found
+    assert "FRNN, linear string, 4000" not in found  # as in the paper
+
+
+def test_compact_tables_leave_out_long_runs_measured_over_400_frames() -> None:
+    long = row(Cell("lru", True, "gaussian", 4000), rel_mse_400=0.0002, rel_mae_400=0.01)
+    assert compact_lines(as_compact([long]), 4000, "nonlinear", "LRU")
+    (none,) = compact_lines(as_compact([long]), 400, "nonlinear", "LRU")
+    assert none == ["—", "0", "not run (0.0008)", "not run (0.0013)", "not run (0.0008)", "not run (0.0259)"]
 
 
 def test_rows_of_a_trial_or_of_an_older_recipe_are_no_figures() -> None:

@@ -1,9 +1,9 @@
 """The processes that train: plain ones here, or those of a Dask cluster.
 
-A worker is given a `Task`, tells how far it is, and ends it with a row or with what went wrong. A process that dies
-is replaced, and its task goes on from the last checkpoint; a task that kills one process after another is given up.
+A worker is given a `Task`, reports its progress, and ends it with a row or with what went wrong. A process that dies
+is replaced, and its task continues from the last checkpoint; a task that kills one process after another is given up.
 
-`base`       tasks, what is told of them, and the contract of all workers
+`base`       tasks, the reports on them, and the contract of all workers
 `layout`     how many workers fit a machine
 `performing` what a worker does with a task
 `on_dask`    workers of a Dask cluster

@@ -43,7 +43,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Progressed:
-    """An epoch of a run is over; told now and then. `host` and `pid` are of the process that trains it."""
+    """An epoch of a run is over; reported now and then. `host` and `pid` are of the process that trains it."""
 
     name: str
     progress: Progress

@@ -60,7 +60,7 @@ def fitted(
 
 
 def _memory_bytes() -> int:
-    """Of this machine; without bound where it cannot be told."""
+    """Of this machine; without bound where it is unknown."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):

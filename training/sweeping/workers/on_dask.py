@@ -1,6 +1,6 @@
 """Workers of a Dask cluster.
 
-Whoever reaches a scheduler can run code on its workers: with tls:// only those who hold its certificates can, with
+Anyone who reaches a scheduler can run code on its workers: with tls:// only those who hold its certificates can, with
 tcp:// anybody. Certificates are named in Dask's own configuration (`distributed.comm.tls`).
 """
 

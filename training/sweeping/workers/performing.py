@@ -1,4 +1,4 @@
-"""What a worker does with a task, in its own process, and how the sweep's process understands what it told."""
+"""What a worker does with a task, in its own process, and how the sweep's process reads its report."""
 
 from __future__ import annotations
 
@@ -106,7 +106,7 @@ def _leave_if_broken(device: str) -> None:
 
 
 def event_of(told: Mapping[str, Any]) -> Event | None:
-    """What a worker told; None where it is not understood, for example a loss that is not finite."""
+    """A worker's report; None where it is not understood, for example a loss that is not finite."""
     from training.fitting.fit import Progress
 
     if "text" in told:

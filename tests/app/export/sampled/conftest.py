@@ -80,7 +80,7 @@ def level_db() -> Callable[[NDArray[np.floating]], float]:
 
 
 def midi(events: list[tuple[float, int, int]], seconds: float) -> bytes:
-    """A file of one track at a tick a millisecond: (time in s, key, velocity; 0 lets go), at full volume."""
+    """A file of one track at a tick a millisecond: (time in s, key, velocity; 0 releases), at full volume."""
 
     def count(ticks: int) -> bytes:
         return bytes([ticks >> 14 | 0x80, ticks >> 7 & 0x7F | 0x80, ticks & 0x7F])

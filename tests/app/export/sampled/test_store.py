@@ -62,7 +62,7 @@ def cancelled(when: Callable[[], bool]) -> Callable[..., None]:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    """Of all files below, but for locks."""
+    """Of all files below, except for locks."""
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in sorted(folder.rglob("*"))

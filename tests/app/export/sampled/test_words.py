@@ -1,4 +1,4 @@
-"""What is told of the size before is what is written, at most."""
+"""The size that is reported before is written, at most."""
 
 from __future__ import annotations
 

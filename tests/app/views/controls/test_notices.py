@@ -1,4 +1,4 @@
-"""A fault is told once, counted when it comes again, and found later."""
+"""A fault is reported once, counted when it comes again, and found later."""
 
 from __future__ import annotations
 

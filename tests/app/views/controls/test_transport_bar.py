@@ -1,4 +1,4 @@
-"""The button that plays: it says what a click does, whoever began or ended the sound."""
+"""The button that plays: it says what a click does, whatever began or ended the sound."""
 
 from __future__ import annotations
 

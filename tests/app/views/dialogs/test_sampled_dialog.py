@@ -231,13 +231,13 @@ def test_a_cancelled_export_goes_on_where_it_was(qtbot: QtBot, made, notes: Note
     dialog.close()  # as its cross does: it stays, to tell what was kept
     assert dialog.isVisible()
     notes.gate.set()
-    told = f"of {MADE} samples are kept; export again to go on from there"
+    told = f"of {MADE} samples are kept; export again to continue from there"
     qtbot.waitUntil(lambda: told in dialog.state.text())
     kept = int(dialog.state.text().removeprefix("Cancelled; ").split()[0])
     assert kept == len(notes.rendered) < MADE
     assert not dialog.sampler.file.path.exists()
     assert dialog.save.text() == "Continue"
-    again = made(form=form)  # the window was started anew
+    again = made(form=form)  # the window was started again
     assert f"{kept} of {MADE} samples are there already, and are kept" in again.state.text()
     run(qtbot, again, f"{MADE - kept} samples rendered, {kept} kept")
     assert len(notes.rendered) == MADE
@@ -253,7 +253,7 @@ def test_cancelled_where_the_index_is_gone_bad_it_says_so(
     qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     dialog.close_button.click()
     notes.gate.set()
-    dialog._background._worker.close(None)  # what it tells has not arrived
+    dialog._background._worker.close(None)  # its report has not arrived
     (folder / "Classical_guitar_samples" / "index.json").write_text("{}")
     qtbot.waitUntil(lambda: "no index of samples" in dialog.state.text())
     assert dialog.state.objectName() == "warning"

@@ -94,7 +94,7 @@ def test_a_drag_is_a_glissando(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> N
     qtbot.mousePress(keys, LEFT, pos=spot(keys, 60))
     for key in (60, 62, 64):
         qtbot.mouseMove(keys, spot(keys, key))
-    qtbot.mouseMove(keys, QPoint(keys.width() + 50, 50))  # beside the keys: the last one goes on
+    qtbot.mouseMove(keys, QPoint(keys.width() + 50, 50))  # beside the keys: the last one continues
     qtbot.mouseRelease(keys, LEFT, pos=spot(keys, 64))
     assert heard.notes == [("on", 60), ("off", 60), ("on", 62), ("off", 62), ("on", 64), ("off", 64)]
 

@@ -69,7 +69,7 @@ def test_the_keyboard_seeks_and_zooms(qtbot: QtBot, plot: TimePlot) -> None:
     assert plot.times_s == pytest.approx((0, 4), abs=1e-6)
     plot.show_times(1.0, 1.02)
     qtbot.keyClick(plot, Key.Key_Right)
-    assert asked[-1] == pytest.approx(1.001)  # no more than a little of what is seen
+    assert asked[-1] == pytest.approx(1.001)  # no more than a little of the view
     qtbot.keyClick(plot, Key.Key_0)
     assert plot.times_s == pytest.approx((0, 4))
 

@@ -1,4 +1,4 @@
-"""Gestures on the string, and that what is given to it is seen."""
+"""Gestures on the string, and that its input is shown."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_the_handle_is_dragged_without_a_jump_and_shift_is_finer(qtbot: QtBot, v
 
 
 def test_a_click_plucks_there_as_far_as_the_last_time(qtbot: QtBot, view: StringView) -> None:
-    """On the string's own line too, where the pointer tells next to no amplitude; and a hand is not still."""
+    """On the string's own line too, where the pointer gives next to no amplitude; and a hand is not still."""
     axes, released = view._axes(), recorded(view.pluck_released)
     for mm in (4.0, 0.2):  # the latter is the knob's doing
         view.pluck_drawn.emit(0.5, mm)

@@ -1,4 +1,4 @@
-"""Eigenvalues and partials in the window: what is seen of a preset and of a take, and which mode is heard alone."""
+"""Eigenvalues and partials in the window: the views of a preset and of a take, and which mode is heard alone."""
 
 from __future__ import annotations
 

@@ -1,0 +1,69 @@
+"""Recordings of notes, read from sound files of any kind, with all that can be wrong with them in words."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import soundfile
+from numpy.typing import NDArray
+
+from engine.plain_text import one_line
+
+RATES_HZ = (8_000, 384_000)
+LONGEST_S = 60.0
+MOST_CHANNELS = 8
+LARGEST_BYTES = 512 * 2**20
+
+
+class NoteFileError(Exception):
+    """A file cannot be read as a recording. The message, one line, names it, what is wrong and the remedy."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(one_line(message))
+
+
+@dataclass(frozen=True)
+class NoteFile:
+    """A recording: samples (frames, channels) with ±1 as full scale, and the SHA-256 of its file."""
+
+    path: Path
+    samples: NDArray[np.float64]
+    rate_hz: int
+    digest: str
+
+
+def read_note(path: Path) -> NoteFile:
+    """The sound of a file: WAV, FLAC, AIFF and more, 8 bits to floating point, any number of channels up to 8.
+
+    Raises:
+        NoteFileError: it cannot be read, or is too long, too large or empty.
+    """
+    try:
+        if not path.is_file():  # opening a pipe would block
+            raise NoteFileError(f"{path}: no file; check the name")
+        if path.stat().st_size > LARGEST_BYTES:
+            raise NoteFileError(f"{path}: larger than {LARGEST_BYTES // 2**20} MiB; cut out one note")
+        with soundfile.SoundFile(path) as file:
+            low, high = RATES_HZ
+            if not low <= file.samplerate <= high:
+                raise NoteFileError(
+                    f"{path}: its rate, {file.samplerate} Hz, is not in {low} … {high}; export it again"
+                )
+            if file.channels > MOST_CHANNELS:
+                raise NoteFileError(f"{path}: has {file.channels} channels; export one or two")
+            seconds = file.frames / file.samplerate
+            if seconds > LONGEST_S:
+                raise NoteFileError(f"{path}: lasts {seconds:.0f} s; cut out one note, at most {LONGEST_S:.0f} s")
+            samples = file.read(dtype="float64", always_2d=True)
+            rate_hz = file.samplerate
+        if len(samples) == 0:
+            raise NoteFileError(f"{path}: holds no samples; export it again")
+        with path.open("rb") as data:
+            digest = hashlib.file_digest(data, "sha256").hexdigest()
+    except (OSError, soundfile.SoundFileError) as error:
+        words = error.strerror if isinstance(error, OSError) else str(error).rpartition(":")[2].strip(" .")
+        raise NoteFileError(f"{path}: no sound file that can be read ({words}); give a WAV or FLAC") from error
+    return NoteFile(path, samples, rate_hz, digest)

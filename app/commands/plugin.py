@@ -1,0 +1,70 @@
+"""plugin: instruments as a native plug-in for a DAW."""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from engine.plain_text import one_line
+from training.cli.console import Failure, say
+
+ALL = "all"
+BANK = "Learned Strings"
+
+
+def plugin(
+    instruments: Annotated[
+        list[str],
+        typer.Argument(metavar="INSTRUMENT...", help="Names or paths of files; all: every factory instrument."),
+    ],
+    form: Annotated[Literal["clap", "lv2", "all"], typer.Option("--format", help="The kind of plug-in.")] = "clap",
+    target: Annotated[
+        Literal["this", "linux-x64", "linux-arm64", "windows-x64", "macos-x64", "macos-arm64", "all"],
+        typer.Option("--for", help="The system that it is for."),
+    ] = "this",
+    out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Default: this folder.")] = None,
+    install: Annotated[bool, typer.Option("--install", help="Put it where this user's hosts look for it.")] = False,
+) -> None:
+    """Build a plug-in that plays instruments in a DAW, without Python inside.
+
+    Several instruments make one bank. The first build takes up to a minute, later ones some seconds. It needs the
+    extra learned-strings[plugin].
+    """
+    from app.export.plugin.build import FORMATS, build_plugin, install_folder, this_target
+    from app.export.plugin.image import image_of
+    from app.export.plugin.objects import TARGETS
+    from app.patches.library import SHIPPED, find_patch, list_patches
+    from engine.kernels import cache
+    from training.cli.arguments import open_preset
+
+    if install and (out is not None or target != "this"):
+        raise typer.BadParameter("leave out --out and --for: --install puts the plug-in of this system in its place")
+    try:
+        if instruments == [ALL]:
+            chosen = [entry.patch for entry in list_patches(SHIPPED)[0]]
+        else:
+            chosen = [find_patch(name).patch for name in instruments]
+        images = []
+        for patch in chosen:
+            images.append(image_of(patch, open_preset(patch.preset)))
+            if images[-1].left_out:
+                say(f"note: {patch.name}: macros do not move {', '.join(images[-1].left_out)} in the plug-in")
+        kept = cache.folder() or Path(tempfile.gettempdir())
+        targets = tuple(TARGETS) if target == ALL else (this_target() if target == "this" else target,)
+        name = chosen[0].name if len(chosen) == 1 else BANK
+        for each in targets:
+            for kind in FORMATS if form == ALL else (form,):
+                folder = install_folder(kind, each) if install else (out or Path()) / (each if target == ALL else "")
+                began_s = time.monotonic()
+                path = build_plugin(images, kind, each, folder / name, kept, say)
+                print(f"{one_line(str(path))}: {_size(path) / 1e6:.1f} MB, {time.monotonic() - began_s:.1f} s")
+    except (ValueError, OSError) as error:
+        raise Failure(str(error)) from error
+
+
+def _size(path: Path) -> int:
+    return sum(each.stat().st_size for each in path.rglob("*")) if path.is_dir() else path.stat().st_size

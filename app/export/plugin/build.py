@@ -1,0 +1,231 @@
+"""The files of a plug-in: written beside each other, linked by a C compiler that pip installs, put into place."""
+
+from __future__ import annotations
+
+import platform
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from importlib.util import find_spec
+from pathlib import Path
+
+from app.export.plugin.image import MAKER, Image, layout_header
+from app.export.plugin.objects import STUBS, TARGETS, object_of
+from app.shared.version import program_version
+from engine.whole_file import whole_file
+
+EXTRA = "learned-strings[plugin]"
+COMMON = ("instrument.c",)
+LIBRARY_ENDINGS = {"linux": ".so", "windows": ".dll", "macos": ".dylib"}
+_HERE = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}
+_MACHINES = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64", "aarch64": "arm64"}
+
+
+class PluginError(ValueError):
+    """A plug-in cannot be built; the message names what is missing and the remedy."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of plug-in.
+
+    Attributes:
+        sources: of the shell, beside those that all have.
+        ending: of the file or the folder.
+        folders: by system, where hosts of one user look for it, below the home folder.
+    """
+
+    sources: tuple[str, ...]
+    ending: str
+    folders: Mapping[str, str]
+
+
+FORMATS: Mapping[str, Format] = {
+    "clap": Format(
+        ("clap.c",),
+        ".clap",
+        {
+            "linux": ".clap",
+            "windows": "AppData/Local/Programs/Common/CLAP",
+            "macos": "Library/Audio/Plug-Ins/CLAP",
+        },
+    ),
+    "lv2": Format(
+        ("lv2.c",),
+        ".lv2",
+        {"linux": ".lv2", "windows": "AppData/Roaming/LV2", "macos": "Library/Audio/Plug-Ins/LV2"},
+    ),
+}
+
+
+def this_target() -> str:
+    """The target of this computer. Raises PluginError: it is none of `TARGETS`."""
+    found = f"{_HERE.get(platform.system(), '')}-{_MACHINES.get(platform.machine().lower(), '')}"
+    if found not in TARGETS:
+        raise PluginError(f"no plug-ins are built for this system; choose one of {', '.join(TARGETS)}")
+    return found
+
+
+def install_folder(form: str, target: str) -> Path:
+    """Where the hosts of this user look for plug-ins of a format."""
+    return Path.home() / FORMATS[form].folders[target.partition("-")[0]]
+
+
+def build_plugin(
+    images: Sequence[Image],
+    form: str,
+    target: str,
+    path: Path,
+    cache: Path,
+    advanced: Callable[[str], None] = lambda step: None,
+) -> Path:
+    """Builds a plug-in that holds these instruments: the file, or the folder of the bundle.
+
+    Args:
+        form: one of FORMATS.
+        path: without an ending it gets that of the format.
+        cache: a folder that keeps object files for the next build.
+        advanced: is called with the name of each step.
+
+    Raises:
+        PluginError: the compiler is not installed, or linking failed.
+        ObjectError: the kernels cannot be compiled for the target.
+    """
+    if find_spec("ziglang") is None:
+        raise PluginError(f"building a plug-in needs a C compiler: pip install '{EXTRA}' brings one")
+    own = FORMATS[form]
+    path = path if path.suffix == own.ending else path.with_name(path.name + own.ending)
+    advanced("compiling the kernels")
+    kernels = object_of(target, cache)
+    advanced("linking")
+    with tempfile.TemporaryDirectory(prefix="learned-strings-plugin-") as name:
+        folder = Path(name)
+        for source in files("app.export.plugin").joinpath("shell").iterdir():
+            (folder / source.name).write_bytes(source.read_bytes())
+        (folder / "layout.h").write_text(layout_header(program_version()), encoding="utf-8")
+        (folder / "stubs.c").write_text(_stubs(), encoding="utf-8")
+        (folder / "images.c").write_text(_images(images, folder), encoding="utf-8")
+        library = folder / "library"
+        _link(folder, (*COMMON, *own.sources, "images.c", "stubs.c"), kernels, target, library)
+        return _placed(library, images, form, target, path)
+
+
+def _placed(library: Path, images: Sequence[Image], form: str, target: str, path: Path) -> Path:
+    """Puts the linked library where hosts look for it within what is built."""
+    system = target.partition("-")[0]
+    inside: dict[str, Path | str] = {}
+    if form == "lv2":
+        binary = f"{path.stem}{LIBRARY_ENDINGS[system]}"
+        inside = {binary: library, **_turtle(images, binary)}
+    elif system == "macos":
+        inside = {f"Contents/MacOS/{path.stem}": library, "Contents/Info.plist": _PLIST.format(name=path.stem)}
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if not inside:
+        with whole_file(path) as part:
+            shutil.copyfile(library, part)
+        return path
+    for name, content in inside.items():
+        place = path / name
+        place.parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(place) as part:
+            if isinstance(content, Path):
+                shutil.copyfile(content, part)
+            else:
+                part.write_text(content, encoding="utf-8")
+    return path
+
+
+def _images(images: Sequence[Image], folder: Path) -> str:
+    """A C source that holds the images' bytes."""
+    lines = ["#include <stdint.h>", '#include "instrument.h"']
+    for number, image in enumerate(images):
+        (folder / f"image{number}.bin").write_bytes(image.content)
+        lines.append(f"_Alignas(64) static const unsigned char image{number}[] = {{")
+        lines += [f'#embed "image{number}.bin"', "};"]
+    entries = ", ".join(f"(const image *)image{number}" for number in range(len(images)))
+    lines += [f"const image *const images[] = {{{entries}}};", f"const int32_t image_count = {len(images)};"]
+    return "\n".join(lines) + "\n"
+
+
+def _stubs() -> str:
+    """What error paths of compiled code refer to, and what no plug-in has: they return nothing."""
+    lines = ["void *PyExc_RuntimeError = 0;"]
+    lines += [f"void *{name}(void) {{ return 0; }}" for name in sorted(STUBS - {"PyExc_RuntimeError"})]
+    return "\n".join(lines) + "\n"
+
+
+def _link(folder: Path, sources: Sequence[str], kernels: Path, target: str, library: Path) -> None:
+    command = [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].linker, "-shared", "-O2", "-std=c23"]
+    command += ["-fvisibility=hidden", "-fno-sanitize=all", "-s", "-fPIC", "-o", str(library)]
+    command += [*(str(folder / name) for name in sources), str(kernels), "-lm"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        raise PluginError(f"linking for {target} failed: {done.stderr.strip()[-600:]}")
+
+
+def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
+    """The descriptions of an LV2 bundle, by file name."""
+    prefixes = "".join(f"@prefix {name}: <{uri}> .\n" for name, uri in _PREFIXES.items())
+    listed, described = [prefixes], [prefixes]
+    for image in images:
+        head = f"<urn:{image.id}> a lv2:Plugin, lv2:InstrumentPlugin ;"
+        listed.append(f"{head}\n  lv2:binary <{binary}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
+        ports = [
+            "a lv2:InputPort, atom:AtomPort ; atom:bufferType atom:Sequence ; atom:supports midi:MidiEvent ;\n"
+            '    lv2:designation lv2:control ; lv2:index 0 ; lv2:symbol "events" ; lv2:name "Events"',
+            'a lv2:OutputPort, lv2:AudioPort ; lv2:index 1 ; lv2:symbol "left" ; lv2:name "Left"',
+            'a lv2:OutputPort, lv2:AudioPort ; lv2:index 2 ; lv2:symbol "right" ; lv2:name "Right"',
+            'a lv2:OutputPort, lv2:ControlPort ; lv2:index 3 ; lv2:symbol "latency" ; lv2:name "Latency" ;\n'
+            "    lv2:designation lv2:latency ; lv2:portProperty lv2:reportsLatency, lv2:integer ;\n"
+            "    lv2:minimum 0.0 ; lv2:maximum 192000.0",
+        ]
+        for number, each in enumerate(image.parameters):
+            symbol = "".join(c if c.isalnum() else "_" for c in each.id)
+            stepped = " lv2:portProperty lv2:integer, lv2:enumeration ;" if each.steps else ""
+            points = "".join(
+                f' lv2:scalePoint [ rdfs:label "{word}" ; rdf:value {value} ] ;'
+                for value, word in enumerate(each.steps)
+            )
+            ports.append(
+                f'a lv2:InputPort, lv2:ControlPort ; lv2:index {4 + number} ; lv2:symbol "{symbol}" ;\n'
+                f'    lv2:name "{_quoted(each.name)}" ;{stepped}{points}\n'
+                f"    lv2:minimum {each.low:.9f} ; lv2:maximum {each.high:.9f} ; lv2:default {each.standard:.9f}"
+            )
+        described.append(
+            f'{head}\n  doap:name "{_quoted(image.name)}" ;\n  doap:maintainer [ foaf:name "{MAKER}" ] ;\n'
+            "  doap:license <https://opensource.org/license/mit> ;\n"
+            "  lv2:requiredFeature urid:map ;\n  lv2:optionalFeature lv2:hardRTCapable ;\n  lv2:port "
+            + " ,\n  ".join(f"[\n    {port} ;\n  ]" for port in ports)
+            + " .\n"
+        )
+    return {"manifest.ttl": "\n".join(listed), "instruments.ttl": "\n".join(described)}
+
+
+def _quoted(text: str) -> str:
+    return text.replace("\\", "\\\\").replace('"', '\\"')
+
+
+_PREFIXES = {
+    "lv2": "http://lv2plug.in/ns/lv2core#",
+    "atom": "http://lv2plug.in/ns/ext/atom#",
+    "midi": "http://lv2plug.in/ns/ext/midi#",
+    "urid": "http://lv2plug.in/ns/ext/urid#",
+    "rdf": "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
+    "rdfs": "http://www.w3.org/2000/01/rdf-schema#",
+    "doap": "http://usefulinc.com/ns/doap#",
+    "foaf": "http://xmlns.com/foaf/0.1/",
+}
+_PLIST = """<?xml version="1.0" encoding="UTF-8"?>
+<!DOCTYPE plist PUBLIC "-//Apple//DTD PLIST 1.0//EN" "http://www.apple.com/DTDs/PropertyList-1.0.dtd">
+<plist version="1.0"><dict>
+<key>CFBundleExecutable</key><string>{name}</string>
+<key>CFBundleIdentifier</key><string>org.learned-strings.{name}</string>
+<key>CFBundleName</key><string>{name}</string>
+<key>CFBundlePackageType</key><string>BNDL</string>
+<key>CFBundleVersion</key><string>1</string>
+</dict></plist>
+"""

@@ -1,0 +1,182 @@
+"""Compiled kernels as object files of other systems: Numba's LLVM code, optimised and emitted for each target.
+
+The code of `engine.kernels.plugin` is taken as text from a Numba that optimises nothing, for a generic processor.
+Text and objects are kept by the digest of the kernels and of the compilers' versions.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Mapping
+from contextlib import ExitStack
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+
+from engine.whole_file import whole_file
+
+ENTRIES = ("render", "begin", "partition")
+PREFIX = "ls_"
+# What the code may ask of the shell and of the C library; all else would be a reference to Python.
+_LIBRARY = """
+cos sin sincos sincosf exp exp2 log log10 log1p log2 pow ceil floor rint round sqrt fmod tan atan atan2
+memcpy memset memmove bzero __sincos_stret __exp10 numba_attempt_nocopy_reshape
+"""
+_ERROR_PATHS = """
+NRT_Allocate NRT_Free NRT_MemInfo_alloc NRT_MemInfo_alloc_aligned NRT_MemInfo_call_dtor
+NRT_MemInfo_new_varsize_dtor NRT_MemInfo_varsize_realloc NRT_MemInfo_varsize_free NRT_MemInfo_varsize_alloc
+PyErr_SetString PyErr_SetNone PyErr_Clear PyErr_WriteUnraisable PyExc_RuntimeError PyUnicode_FromString
+PyUnicode_FromKindAndData PyBytes_FromStringAndSize PyObject_Hash PyTuple_Pack Py_DecRef Py_IncRef
+numba_do_raise numba_gil_ensure numba_gil_release
+numba_runtime_build_excinfo_struct numba_unpickle numba_unpickle_no_gil
+"""
+ALLOWED, STUBS = frozenset(_LIBRARY.split()), frozenset(_ERROR_PATHS.split())  # the shell answers with stubs
+
+
+@dataclass(frozen=True)
+class Target:
+    """A system that plug-ins are built for.
+
+    Attributes:
+        triple: of LLVM; `linker`: of the linker, where it has another name for it.
+        cpu: the oldest processor that is served.
+    """
+
+    triple: str
+    cpu: str
+    linker: str
+
+
+TARGETS: Mapping[str, Target] = {
+    "linux-x64": Target("x86_64-unknown-linux-gnu", "x86-64-v2", "x86_64-linux-gnu.2.17"),
+    "linux-arm64": Target("aarch64-unknown-linux-gnu", "generic", "aarch64-linux-gnu.2.17"),
+    "windows-x64": Target("x86_64-w64-windows-gnu", "x86-64-v2", "x86_64-windows-gnu"),
+    "macos-x64": Target("x86_64-apple-macosx11.0.0", "x86-64-v2", "x86_64-macos.11.0"),
+    "macos-arm64": Target("arm64-apple-macosx11.0.0", "apple-m1", "aarch64-macos.11.0"),
+}
+
+_TEXTS = """
+import sys
+from pathlib import Path
+from numba import njit
+from engine.kernels import compiled
+compiled.COMPILED["cache"] = False
+from engine.kernels import plugin
+for argument in sys.argv[1:]:
+    name, _, path = argument.partition("=")
+    entry = njit(getattr(plugin, name.upper()), **compiled.COMPILED)(getattr(plugin, name).py_func)
+    overload = entry.overloads[entry.signatures[0]]
+    text = overload.library.get_llvm_str()
+    Path(path).write_text(f"; entry {overload.fndesc.llvm_func_name}\\n{text}", encoding="utf-8")
+"""
+
+
+class ObjectError(ValueError):
+    """The kernels cannot be compiled for a target; the message names it and what is in the way."""
+
+
+def digest() -> str:
+    """Of the kernels and of what compiles them: it changes with either."""
+    kernels = Path(sys.modules["engine"].__file__ or "").parent / "kernels"
+    found = hashlib.sha256()
+    for source in (*sorted(kernels.glob("*.py")), Path(__file__)):
+        found.update(source.read_bytes())
+    for package in ("numba", "llvmlite"):
+        found.update(version(package).encode())
+    return found.hexdigest()[:16]
+
+
+def object_of(target: str, folder: Path) -> Path:
+    """The object file of the kernels for a target, from `folder` or compiled into it (half a minute the first time).
+
+    Raises:
+        ObjectError: an unknown target, or the code needs what no plug-in has.
+    """
+    if target not in TARGETS:
+        raise ObjectError(f"target {target!r} is unknown; try {', '.join(TARGETS)}")
+    path = folder / f"kernels-{digest()}-{target}.o"
+    if not path.exists():
+        folder.mkdir(parents=True, exist_ok=True)
+        compiled = _compiled(_texts(folder), TARGETS[target])
+        with whole_file(path) as part:
+            part.write_bytes(compiled)
+    return path
+
+
+def _texts(folder: Path) -> dict[str, str]:
+    """LLVM code of the entries, compiled by a process of its own, for Numba's options hold for a whole process."""
+    paths = {name: folder / f"kernels-{digest()}-{name}.ll" for name in ENTRIES}
+    if not all(path.exists() for path in paths.values()):
+        with ExitStack() as whole:
+            parts = [f"{name}={whole.enter_context(whole_file(path))}" for name, path in paths.items()]
+            command = [sys.executable, "-c", _TEXTS, *parts]
+            done = subprocess.run(command, env=_environment(), capture_output=True, text=True, check=False)
+            if done.returncode:
+                raise ObjectError(f"the kernels cannot be compiled: {done.stderr.strip()[-400:]}")
+    return {name: path.read_text(encoding="utf-8") for name, path in paths.items()}
+
+
+def _environment() -> dict[str, str]:
+    root = str(Path(sys.modules["engine"].__file__ or "").parents[1])
+    kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    return {**kept, "NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "PYTHONPATH": root}
+
+
+def _compiled(texts: Mapping[str, str], target: Target) -> bytes:
+    """The object file: entries by their names with `PREFIX`, all else internal, nothing left of Python."""
+    import llvmlite.binding as llvm
+
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+    machine = llvm.Target.from_triple(target.triple).create_target_machine(
+        cpu=target.cpu, opt=3, reloc="pic", codemodel="default"
+    )
+    whole = None
+    for name, text in texts.items():
+        entry = text[: text.index("\n")].removeprefix("; entry ")
+        text = text.replace(f"@{entry}(", f"@{PREFIX}{name}(")
+        text = re.sub(r"^target datalayout = .*$", f'target datalayout = "{machine.target_data}"', text, flags=re.M)
+        text = re.sub(r"^target triple = .*$", f'target triple = "{target.triple}"', text, flags=re.M)
+        module = llvm.parse_assembly(_without_counts(text))
+        if whole is None:
+            whole = module
+        else:
+            whole.link_in(module)
+    assert whole is not None
+    kept = {f"{PREFIX}{name}" for name in texts}
+    for function in whole.functions:
+        if not function.is_declaration and function.name not in kept:
+            function.linkage = llvm.Linkage.internal
+    for variable in whole.global_variables:
+        if not variable.is_declaration:
+            variable.linkage = llvm.Linkage.internal
+    options = llvm.create_pipeline_tuning_options(speed_level=3)
+    options.loop_vectorization = options.slp_vectorization = True
+    builder = llvm.create_pass_builder(machine, options)
+    builder.getModulePassManager().run(whole, builder)
+    _check_names(whole, kept)
+    emitted: bytes = machine.emit_object(whole)
+    return emitted
+
+
+def _without_counts(text: str) -> str:
+    """The code without the counting of references: no array of a plug-in's memory has an owner."""
+    return re.sub(
+        r"^define linkonce_odr void @NRT_(incref|decref)\(ptr (%\S+)\)[^{]*\{.*?^\}",
+        r"define linkonce_odr void @NRT_\1(ptr \2) {\n  ret void\n}",
+        text,
+        flags=re.M | re.S,
+    )
+
+
+def _check_names(module: object, kept: set[str]) -> None:
+    """Raises ObjectError where the code refers to anything that the shell or the C library does not give."""
+    functions = module.functions  # type: ignore[attr-defined]
+    asked = {each.name for each in functions if each.is_declaration and not each.name.startswith("llvm.")}
+    unknown = asked - ALLOWED - STUBS - kept
+    if unknown:
+        raise ObjectError(f"the kernels refer to {', '.join(sorted(unknown))}, which no plug-in has")

@@ -1,0 +1,351 @@
+/* The instrument as a CLAP plug-in. */
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "clap_abi.h"
+#include "instrument.h"
+#include "layout.h"
+
+extern const image *const images[];
+extern const int32_t image_count;
+
+typedef struct {
+  clap_plugin plugin;
+  const clap_host *host;
+  instrument own;
+  bool active, loaded;
+  float *spare; /* where the host gives one channel, or none */
+} shell;
+
+static shell *shell_of(const clap_plugin *plugin) { return plugin->data; }
+
+/* Ports */
+
+static uint32_t audio_count(const clap_plugin *plugin, bool is_input) {
+  (void)plugin;
+  return is_input ? 0 : 1;
+}
+
+static bool audio_get(const clap_plugin *plugin, uint32_t index, bool is_input, clap_audio_port *port) {
+  (void)plugin;
+  if (is_input || index) return false;
+  memset(port, 0, sizeof *port);
+  snprintf(port->name, sizeof port->name, "Output");
+  port->flags = CLAP_PORT_IS_MAIN;
+  port->channels = 2;
+  port->type = "stereo";
+  port->in_place = UINT32_MAX;
+  return true;
+}
+
+static uint32_t note_count(const clap_plugin *plugin, bool is_input) {
+  (void)plugin;
+  return is_input ? 1 : 0;
+}
+
+static bool note_get(const clap_plugin *plugin, uint32_t index, bool is_input, clap_note_port *port) {
+  (void)plugin;
+  if (!is_input || index) return false;
+  memset(port, 0, sizeof *port);
+  snprintf(port->name, sizeof port->name, "Notes");
+  port->dialects = CLAP_DIALECT_CLAP | CLAP_DIALECT_MIDI | CLAP_DIALECT_MPE;
+  port->preferred = CLAP_DIALECT_CLAP;
+  return true;
+}
+
+static const clap_audio_ports audio_ports = {audio_count, audio_get};
+static const clap_note_ports note_ports = {note_count, note_get};
+
+/* Parameters */
+
+static uint32_t param_count(const clap_plugin *plugin) { return (uint32_t)shell_of(plugin)->own.of->parameter_count; }
+
+static bool param_info(const clap_plugin *plugin, uint32_t index, clap_param *info) {
+  const image *of = shell_of(plugin)->own.of;
+  if (index >= (uint32_t)of->parameter_count) return false;
+  const parameter *own = &parameters_of(of)[index];
+  memset(info, 0, sizeof *info);
+  info->id = own->id;
+  info->flags = CLAP_PARAM_AUTOMATABLE | (own->stepped ? CLAP_PARAM_STEPPED | CLAP_PARAM_ENUM : 0);
+  snprintf(info->name, sizeof info->name, "%s", own->name);
+  snprintf(info->module, sizeof info->module, "%s", own->module);
+  info->low = own->low;
+  info->high = own->high;
+  info->standard = own->standard;
+  return true;
+}
+
+static bool param_value(const clap_plugin *plugin, uint32_t id, double *value) {
+  const instrument *own = &shell_of(plugin)->own;
+  int32_t place = parameter_with_id(own->of, id);
+  if (place < 0) return false;
+  *value = own->values[place];
+  return true;
+}
+
+static const char *const SOURCE_WORDS[] = {"model", "truth", "difference"};
+
+static bool param_to_text(const clap_plugin *plugin, uint32_t id, double value, char *text, uint32_t room) {
+  const image *of = shell_of(plugin)->own.of;
+  int32_t place = parameter_with_id(of, id);
+  if (place < 0) return false;
+  const parameter *own = &parameters_of(of)[place];
+  if (own->kind == KIND_SOURCE) snprintf(text, room, "%s", SOURCE_WORDS[value < 0.5 ? 0 : value < 1.5 ? 1 : 2]);
+  else snprintf(text, room, "%.4g%s%s", value, own->unit[0] ? " " : "", own->unit);
+  return true;
+}
+
+static bool param_from_text(const clap_plugin *plugin, uint32_t id, const char *text, double *value) {
+  const image *of = shell_of(plugin)->own.of;
+  int32_t place = parameter_with_id(of, id);
+  if (place < 0) return false;
+  if (parameters_of(of)[place].kind == KIND_SOURCE)
+    for (int word = 0; word < 3; word++)
+      if (!strcmp(text, SOURCE_WORDS[word])) return *value = word, true;
+  char *end;
+  *value = strtod(text, &end);
+  return end != text;
+}
+
+/* `at`: the frame of what is rendered next, at which the event counts. */
+static void take_event(shell *own, const clap_event *event, uint32_t at) {
+  instrument *to = &own->own;
+  if (event->space) return;
+  if (event->type == CLAP_PARAM_VALUE) {
+    const clap_event_param *each = (const clap_event_param *)event;
+    int32_t place = parameter_with_id(to->of, each->param);
+    if (place < 0) return;
+    if (own->active) instrument_change(to, at, place, each->value);
+    else instrument_set(to, place, each->value);
+    return;
+  }
+  if (!own->active) return;
+  if (event->type == CLAP_NOTE_ON) {
+    const clap_event_note *note = (const clap_event_note *)event;
+    double velocity = 127 * note->velocity;
+    instrument_note_on(to, at, note->note_id >= 0 ? note->note_id + 1 : 0, note->channel < 0 ? 0 : note->channel, note->key,
+                       velocity < 1 ? 1 : velocity);
+  } else if (event->type == CLAP_NOTE_OFF || event->type == CLAP_NOTE_CHOKE) {
+    const clap_event_note *note = (const clap_event_note *)event;
+    int32_t channel = note->channel < 0 ? 0 : note->channel;
+    if (note->key >= 0) instrument_note_off(to, at, channel, note->key);
+    else instrument_controller(to, at, channel, event->type == CLAP_NOTE_OFF ? 123 : 120, 0);
+  } else if (event->type == CLAP_NOTE_EXPRESSION) {
+    const clap_event_expression *each = (const clap_event_expression *)event;
+    int32_t channel = each->channel < 0 ? 0 : each->channel;
+    if (each->id == CLAP_EXPRESSION_TUNING) instrument_tune(to, at, channel, each->value);
+    else if (each->id == CLAP_EXPRESSION_BRIGHTNESS) instrument_controller(to, at, channel, 74, (int32_t)(127 * each->value));
+  } else if (event->type == CLAP_MIDI) {
+    instrument_midi(to, at, ((const clap_event_midi *)event)->data);
+  }
+}
+
+static void param_flush(const clap_plugin *plugin, const clap_in_events *in, const clap_out_events *out) {
+  (void)out;
+  for (uint32_t place = 0; in && place < in->size(in); place++) take_event(shell_of(plugin), in->get(in, place), 0);
+}
+
+static const clap_params params = {param_count, param_info, param_value, param_to_text, param_from_text, param_flush};
+
+/* State, latency, tail */
+
+static bool state_save(const clap_plugin *plugin, const clap_ostream *stream) {
+  uint8_t bytes[8 + 12 * MOST_PARAMETERS];
+  int64_t size = instrument_save(&shell_of(plugin)->own, bytes, sizeof bytes), done = 0;
+  while (done < size) {
+    int64_t count = stream->write(stream, bytes + done, (uint64_t)(size - done));
+    if (count <= 0) return false;
+    done += count;
+  }
+  return size > 0;
+}
+
+static bool state_load(const clap_plugin *plugin, const clap_istream *stream) {
+  uint8_t bytes[8 + 12 * 4096];
+  int64_t size = 0, count;
+  while (size < (int64_t)sizeof bytes && (count = stream->read(stream, bytes + size, sizeof bytes - (uint64_t)size)) > 0) size += count;
+  shell *own = shell_of(plugin);
+  if (!instrument_load(&own->own, bytes, (int32_t)size)) return false;
+  own->loaded = true; /* taken up with the next block */
+  return true;
+}
+
+static uint32_t latency_get(const clap_plugin *plugin) {
+  (void)plugin;
+  return instrument_latency();
+}
+
+static uint32_t tail_get(const clap_plugin *plugin) { return instrument_tail(&shell_of(plugin)->own); }
+
+static bool no_requirement(const clap_plugin *plugin) {
+  (void)plugin;
+  return false;
+}
+
+static bool any_mode(const clap_plugin *plugin, int32_t mode) {
+  (void)plugin;
+  (void)mode;
+  return true;
+}
+
+static const clap_state state = {state_save, state_load};
+static const clap_latency latency = {latency_get};
+static const clap_tail tail = {tail_get};
+static const clap_render render = {no_requirement, any_mode};
+
+/* The plug-in */
+
+static bool shell_init(const clap_plugin *plugin) {
+  (void)plugin;
+  return true;
+}
+
+static void shell_deactivate(const clap_plugin *plugin) {
+  shell *own = shell_of(plugin);
+  instrument_end(&own->own);
+  free(own->spare);
+  own->spare = NULL;
+  own->active = false;
+}
+
+static bool shell_activate(const clap_plugin *plugin, double rate_hz, uint32_t least, uint32_t most) {
+  (void)least;
+  shell *own = shell_of(plugin);
+  shell_deactivate(plugin);
+  own->spare = calloc(most ? most : 1, sizeof(float));
+  own->active = own->spare && rate_hz >= 1000 && rate_hz <= 1e6 && instrument_begin(&own->own, rate_hz);
+  own->loaded = false;
+  return own->active;
+}
+
+static void shell_destroy(const clap_plugin *plugin) {
+  shell_deactivate(plugin);
+  free(shell_of(plugin));
+}
+
+static bool start_processing(const clap_plugin *plugin) { return shell_of(plugin)->active; }
+
+static void stop_processing(const clap_plugin *plugin) { (void)plugin; }
+
+static void shell_reset(const clap_plugin *plugin) {
+  shell *own = shell_of(plugin);
+  if (own->active) instrument_controller(&own->own, 0, 0, 120, 0);
+}
+
+typedef struct { const clap_out_events *out; uint32_t last; } ends;
+
+static void push_end(void *context, int64_t id, int32_t channel, int32_t key, uint32_t offset) {
+  (void)offset;
+  const ends *to = context;
+  clap_event_note note = {{sizeof note, to->last, 0, CLAP_NOTE_END, 0}, (int32_t)(id - 1), 0, (int16_t)channel, (int16_t)key, 0};
+  if (to->out) to->out->try_push(to->out, &note.header);
+}
+
+static int32_t shell_process(const clap_plugin *plugin, const clap_process *process) {
+  shell *own = shell_of(plugin);
+  if (!own->active || !process->outputs_count || !process->outputs[0].data32) return CLAP_ERROR;
+  if (own->loaded) {
+    own->loaded = false;
+    for (int32_t place = 0; place < own->own.of->parameter_count; place++)
+      if (parameters_of(own->own.of)[place].kind != KIND_MACRO) instrument_change(&own->own, 0, place, own->own.values[place]);
+  }
+  clap_audio *output = &process->outputs[0];
+  float *left = output->data32[0], *right = output->channels > 1 ? output->data32[1] : NULL;
+  const clap_in_events *in = process->in_events;
+  uint32_t count = in ? in->size(in) : 0, next = 0;
+  for (uint32_t done = 0; done < process->frames;) {
+    uint32_t end = done + QUANTUM < process->frames ? done + QUANTUM : process->frames;
+    for (; next < count; next++) {
+      const clap_event *event = in->get(in, next);
+      if (event->time >= end) break;
+      take_event(own, event, event->time < done ? 0 : event->time - done);
+    }
+    instrument_render(&own->own, end - done, left + done, right ? right + done : NULL);
+    done = end;
+  }
+  for (uint32_t channel = 2; channel < output->channels; channel++)
+    memset(output->data32[channel], 0, process->frames * sizeof(float));
+  output->constant_mask = 0;
+  ends to = {process->out_events, process->frames ? process->frames - 1 : 0};
+  instrument_report_ends(&own->own, push_end, &to);
+  if (own->own.moved && own->host && own->host->request_callback) {
+    own->own.moved = false;
+    own->host->request_callback(own->host);
+  }
+  return instrument_silent(&own->own) ? CLAP_SLEEP : CLAP_CONTINUE;
+}
+
+static const void *shell_extension(const clap_plugin *plugin, const char *id) {
+  (void)plugin;
+  static const struct { const char *id; const void *extension; } all[] = {
+      {"clap.audio-ports", &audio_ports}, {"clap.note-ports", &note_ports}, {"clap.params", &params}, {"clap.state", &state},
+      {"clap.latency", &latency},         {"clap.tail", &tail},             {"clap.render", &render},
+  };
+  for (size_t place = 0; place < sizeof all / sizeof *all; place++)
+    if (!strcmp(id, all[place].id)) return all[place].extension;
+  return NULL;
+}
+
+static void on_main_thread(const clap_plugin *plugin) {
+  const clap_host *host = shell_of(plugin)->host;
+  typedef struct { void (*rescan)(const clap_host *, uint32_t); } host_params;
+  const host_params *found = host && host->get_extension ? host->get_extension(host, "clap.params") : NULL;
+  if (found && found->rescan) found->rescan(host, 1); /* values */
+}
+
+/* The factory */
+
+enum { MOST_IMAGES = 128, MOST_FEATURES = 8 };
+static clap_descriptor descriptors[MOST_IMAGES];
+static char feature_words[MOST_IMAGES][128];
+static const char *features[MOST_IMAGES][MOST_FEATURES + 1];
+
+static bool entry_init(const char *path) {
+  (void)path;
+  for (int32_t each = 0; each < image_count; each++) {
+    const image *of = images[each];
+    memcpy(feature_words[each], of->features, sizeof of->features);
+    int32_t count = 0;
+    for (char *word = strtok(feature_words[each], " "); word && count < MOST_FEATURES; word = strtok(NULL, " "))
+      features[each][count++] = word;
+    features[each][count] = NULL;
+    descriptors[each] = (clap_descriptor){CLAP_VERSION_USED, of->id, of->name, of->maker, "", "", "", LS_VERSION, of->description, features[each]};
+  }
+  return true;
+}
+
+static void entry_deinit(void) {}
+
+static uint32_t factory_count(const clap_factory *factory) {
+  (void)factory;
+  return (uint32_t)image_count;
+}
+
+static const clap_descriptor *factory_descriptor(const clap_factory *factory, uint32_t index) {
+  (void)factory;
+  return index < (uint32_t)image_count ? &descriptors[index] : NULL;
+}
+
+static const clap_plugin *factory_create(const clap_factory *factory, const clap_host *host, const char *id) {
+  (void)factory;
+  for (int32_t each = 0; each < image_count; each++) {
+    if (strcmp(id, images[each]->id)) continue;
+    shell *own = calloc(1, sizeof *own);
+    if (!own) return NULL;
+    own->host = host;
+    own->own.of = images[each];
+    instrument_reset_values(&own->own);
+    own->plugin = (clap_plugin){&descriptors[each], own, shell_init, shell_destroy, shell_activate, shell_deactivate,
+                                start_processing, stop_processing, shell_reset, shell_process, shell_extension, on_main_thread};
+    return &own->plugin;
+  }
+  return NULL;
+}
+
+static const clap_factory factory = {factory_count, factory_descriptor, factory_create};
+
+static const void *get_factory(const char *id) { return strcmp(id, "clap.plugin-factory") ? NULL : &factory; }
+
+LS_EXPORT const clap_entry_t clap_entry = {CLAP_VERSION_USED, entry_init, entry_deinit, get_factory};

@@ -1,0 +1,388 @@
+/* See instrument.h. Nothing is allocated but in instrument_begin. */
+
+#include "instrument.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "layout.h"
+
+#if defined(__x86_64__)
+#include <xmmintrin.h>
+#endif
+
+int32_t ls_render(void *result, void **error, int64_t mixer, int64_t frames, int64_t out);
+int32_t ls_begin(void *result, void **error, int64_t player);
+int32_t ls_partition(void *result, void **error, int64_t response, int64_t frames, int64_t channels, int64_t memory,
+                     int64_t convolver);
+
+/* Of Numba's library: other strides for the same contiguous memory, rows last, as all of the kernels' is. */
+int numba_attempt_nocopy_reshape(int64_t dimensions, const int64_t *sizes, const int64_t *strides, int64_t new_dimensions,
+                                 const int64_t *new_sizes, int64_t *new_strides, int64_t bytes, int columns_last) {
+  (void)dimensions, (void)sizes, (void)strides, (void)columns_last;
+  for (int64_t place = new_dimensions - 1; place >= 0; place--) {
+    new_strides[place] = bytes;
+    bytes *= new_sizes[place];
+  }
+  return 1;
+}
+
+static void *address(slot *memory) { return memory; }
+static int64_t number_of(const void *pointer) { return (int64_t)(intptr_t)pointer; }
+
+const parameter *parameters_of(const image *of) { return (const parameter *)((const char *)of + of->parameters); }
+
+static const macro *macros_of(const image *of) { return (const macro *)((const char *)of + of->macros); }
+
+int32_t parameter_with_id(const image *of, uint32_t id) {
+  for (int32_t place = 0; place < of->parameter_count; place++)
+    if (parameters_of(of)[place].id == id) return place;
+  return -1;
+}
+
+void instrument_reset_values(instrument *own) {
+  for (int32_t place = 0; place < own->of->parameter_count; place++)
+    own->values[place] = parameters_of(own->of)[place].standard;
+}
+
+uint32_t instrument_latency(void) { return QUANTUM + AHEAD; }
+
+uint32_t instrument_tail(const instrument *own) { return (uint32_t)(own->of->longest_s * own->rate_hz); }
+
+static slot *copied(const image *of, int64_t first, int64_t count) {
+  slot *memory = calloc((size_t)count, sizeof(slot));
+  if (memory) memcpy(memory, (const slot *)of + first, (size_t)count * sizeof(slot));
+  return memory;
+}
+
+/* The response of the nearest rate, converted by cubic interpolation where it is another. */
+static bool begin_response(instrument *own) {
+  const image *of = own->of;
+  if (!of->response_count) return true;
+  const response *found = (const response *)((const char *)of + of->responses);
+  const response *chosen = found;
+  for (int64_t place = 1; place < of->response_count; place++)
+    if (fabs(found[place].rate_hz - own->rate_hz) < fabs(chosen->rate_hz - own->rate_hz)) chosen = &found[place];
+  const int32_t *stored = (const int32_t *)of + chosen->first;
+  int64_t channels = chosen->channels;
+  double step = chosen->rate_hz / own->rate_hz;
+  bool same = fabs(step - 1) < 1e-9;
+  int64_t frames = same ? chosen->frames : (int64_t)(chosen->frames / step);
+  double *samples = malloc((size_t)(frames * channels) * sizeof(double));
+  if (!samples) return false;
+  for (int64_t frame = 0; frame < frames; frame++) {
+    double place = same ? (double)frame : (double)frame * step;
+    int64_t left = (int64_t)place;
+    double t = place - (double)left;
+    for (int64_t channel = 0; channel < channels; channel++) {
+      double y[4];
+      for (int64_t k = 0; k < 4; k++) {
+        int64_t at = left + k - 1;
+        y[k] = at < 0 || at >= chosen->frames ? 0 : chosen->unit * stored[at * channels + channel];
+      }
+      double value = y[1] + 0.5 * t * (y[2] - y[0] + t * (2 * y[0] - 5 * y[1] + 4 * y[2] - y[3] +
+                                                         t * (3 * (y[1] - y[2]) + y[3] - y[0])));
+      samples[frame * channels + channel] = same ? value : value * step;
+    }
+  }
+  int64_t early_frames = frames < EARLY * QUANTUM ? frames : EARLY * QUANTUM;
+  int64_t early = (early_frames + QUANTUM - 1) / QUANTUM, late = (frames - early_frames + WINDOW - 1) / WINDOW;
+  own->response = calloc((size_t)(I_HEADER + channels * 2 * (early * (QUANTUM + 1) + late * (WINDOW + 1))), sizeof(slot));
+  own->convolver = calloc((size_t)(C_LATE + (late + 1) * 4 * (WINDOW + 1)), sizeof(slot));
+  if (own->response && own->convolver) {
+    slot *c = own->convolver;
+    c[C_CAPACITY].whole = late + 1;
+    c[C_FADE_WINDOWS].whole = (int64_t)ceil(CONVOLVER_FADE_S * own->rate_hz / WINDOW);
+    c[C_STEP].whole = -1;
+    for (int64_t k = 0; k < 2 * WINDOW; k++) {
+      double turn = 2 * 3.14159265358979323846 * (double)k / (2 * WINDOW);
+      c[C_COSINES + k].real = cos(turn);
+      c[C_SINES + k].real = sin(turn);
+    }
+    void *error = NULL, *result = NULL;
+    ls_partition(&result, &error, number_of(samples), frames, channels, number_of(own->response), number_of(c));
+    memset(c + C_WORK, 0, 8 * WINDOW * sizeof(slot));
+    own->mixer[M_CONVOLVER].whole = number_of(c);
+    own->mixer[M_EFFECTS].whole = number_of(own->response);
+  }
+  free(samples);
+  return own->response && own->convolver;
+}
+
+static slot *pushed(instrument *own, int64_t frame, int64_t kind, int32_t channel, int32_t key, double value) {
+  slot *player = own->player;
+  if (player[PLAYER_PUSHED].whole - player[PLAYER_TAKEN].whole >= EVENTS) {
+    own->lost++;
+    return NULL;
+  }
+  slot *event = player + PLAYER_EVENTS + player[PLAYER_PUSHED].whole % EVENTS * EVENT_SLOTS;
+  memset(event, 0, EVENT_SLOTS * sizeof(slot));
+  event[EVENT_FRAME].whole = frame;
+  event[EVENT_KIND].whole = kind;
+  event[EVENT_CHANNEL].whole = channel;
+  event[EVENT_KEY].whole = key;
+  event[EVENT_VALUE].real = value;
+  event[EVENT_POSITION].real = event[EVENT_PITCH_HZ].real = NAN;
+  player[PLAYER_PUSHED].whole++;
+  return event;
+}
+
+/* Events count a quantum late, so that each is known before the quantum that holds its frame. */
+static int64_t frame_of(const instrument *own, uint32_t at) { return own->mixer[M_FRAMES].whole + at + QUANTUM; }
+
+static void apply(instrument *own, int32_t place, double value, int64_t frame) {
+  const parameter *of = &parameters_of(own->of)[place];
+  if (of->kind == KIND_VALUE) {
+    pushed(own, frame, PARAMETER, 0, of->index, value);
+  } else if (of->kind == KIND_POINT) {
+    own->table[TABLE_POINT + of->index].real = value;
+  } else if (of->kind == KIND_VOLUME) {
+    own->mixer[M_WANTED_VOLUME].real = pow(10, value / 20);
+  } else if (of->kind == KIND_SOURCE) {
+    int source = (int)(value + 0.5);
+    own->table[TABLE_SOURCES].whole = source == SOURCE_MODEL ? 1 : 2;
+    own->player[PLAYER_SOURCE_GAINS].real = source != SOURCE_TRUTH;
+    own->player[PLAYER_SOURCE_GAINS + 1].real = source == SOURCE_MODEL ? 0 : source == SOURCE_TRUTH ? 1 : -1;
+  }
+}
+
+bool instrument_begin(instrument *own, double rate_hz) {
+  const image *of = own->of;
+  instrument_end(own);
+  own->rate_hz = rate_hz;
+  own->mixer = calloc(MIXER_SLOTS, sizeof(slot));
+  own->player = calloc((size_t)(PLAYER_VOICES + MOST_NOTES * MOST_SOURCES * (VOICE_SLOTS_FIXED + of->modes * VOICE_SLOTS_A_MODE)),
+                       sizeof(slot));
+  own->scratch = calloc(QUANTUM, sizeof(slot));
+  own->table = copied(of, of->table, of->table_slots);
+  own->model = copied(of, of->model, of->model_slots);
+  own->truth = copied(of, of->truth, of->truth_slots);
+  if (!own->mixer || !own->player || !own->scratch || !own->table || !own->model || !own->truth) {
+    instrument_end(own);
+    return false;
+  }
+  slot *mixer = own->mixer, *player = own->player;
+  mixer[M_RATE].real = rate_hz;
+  mixer[M_CHANNELS].whole = 2;
+  mixer[M_LIMITING].whole = 1;
+  mixer[M_WANTED_VOLUME].real = mixer[M_VOLUME].real = mixer[M_REDUCTION].real = 1;
+  for (int frame = 0; frame < AHEAD; frame++) mixer[M_GAINS + frame].real = 1;
+  mixer[M_RELEASE].real = exp(-1 / (LIMITER_RELEASE_S * rate_hz));
+  mixer[M_SMOOTHING].real = exp(-1 / (VOLUME_SMOOTHING_S * rate_hz));
+  const double *taps = (const double *)of + of->taps;
+  for (int tap = 0; tap < 2 * REACH + 1; tap++) mixer[M_TAPS + tap].real = taps[tap] * rate_hz;
+  mixer[M_HERE].whole = number_of(mixer);
+  mixer[M_PLAYER].whole = number_of(player);
+  own->model[S_RATE].real = own->truth[T_RATE].real = rate_hz;
+  own->table[TABLE_PROGRAMS].whole = number_of(own->model);
+  own->table[TABLE_PROGRAMS + 1].whole = number_of(own->truth);
+  player[PLAYER_RATE].real = rate_hz;
+  player[PLAYER_MODES].whole = of->modes;
+  player[PLAYER_MOST].whole = of->most_notes;
+  void *error = NULL, *result = NULL;
+  ls_begin(&result, &error, number_of(player));
+  if (!begin_response(own)) {
+    instrument_end(own);
+    return false;
+  }
+  own->waiting = 0;
+  own->read = 0;
+  slot *event = pushed(own, 0, TABLE, 0, 0, 0);
+  event[EVENT_TABLE].whole = number_of(own->table);
+  for (int32_t place = 0; place < of->parameter_count; place++) {
+    const parameter *each = &parameters_of(of)[place];
+    bool always = each->kind == KIND_SOURCE || each->kind == KIND_VOLUME;
+    if (always || own->values[place] != each->standard) apply(own, place, own->values[place], 0);
+  }
+  mixer[M_VOLUME].real = mixer[M_WANTED_VOLUME].real;
+  return true;
+}
+
+void instrument_end(instrument *own) {
+  slot **all[] = {&own->mixer, &own->player, &own->table, &own->model, &own->truth, &own->convolver, &own->response, &own->scratch};
+  for (size_t place = 0; place < sizeof(all) / sizeof(*all); place++) {
+    free(address(*all[place]));
+    *all[place] = NULL;
+  }
+}
+
+/* Events */
+
+static bool plausible(int32_t channel, int32_t key) { return channel >= 0 && channel < CHANNELS && key >= 0 && key < KEYS; }
+
+void instrument_note_on(instrument *own, uint32_t at, int64_t id, int32_t channel, int32_t key, double velocity) {
+  if (!plausible(channel, key)) return;
+  slot *event = pushed(own, frame_of(own, at), NOTE_ON, channel, key, velocity);
+  if (event) event[EVENT_ID].whole = id;
+}
+
+void instrument_note_off(instrument *own, uint32_t at, int32_t channel, int32_t key) {
+  if (plausible(channel, key)) pushed(own, frame_of(own, at), NOTE_OFF, channel, key, 0);
+}
+
+void instrument_bend(instrument *own, uint32_t at, int32_t channel, double value) {
+  if (plausible(channel, 0)) pushed(own, frame_of(own, at), BEND, channel, 0, value);
+}
+
+void instrument_controller(instrument *own, uint32_t at, int32_t channel, int32_t number, int32_t value) {
+  if (plausible(channel, number)) pushed(own, frame_of(own, at), CONTROLLER, channel, number, value);
+}
+
+void instrument_tune(instrument *own, uint32_t at, int32_t channel, double semitones) {
+  if (!plausible(channel, 0)) return;
+  double range = own->player[PLAYER_CHANNELS + channel * CHANNEL_SLOTS + CHANNEL_RANGE].real;
+  if (range < 0) range = own->player[PLAYER_VALUES + BEND_SEMITONES].real;
+  if (own->table[TABLE_MODE].whole == MPE && channel > 0) range = MPE_BEND_SEMITONES;
+  if (range > 0) instrument_bend(own, at, channel, semitones / range);
+}
+
+void instrument_midi(instrument *own, uint32_t at, const uint8_t *bytes) {
+  int32_t channel = bytes[0] & 15, one = bytes[1] & 127, two = bytes[2] & 127;
+  switch (bytes[0] >> 4) {
+    case 8: instrument_note_off(own, at, channel, one); break;
+    case 9:
+      if (two) instrument_note_on(own, at, 0, channel, one, two);
+      else instrument_note_off(own, at, channel, one);
+      break;
+    case 11: instrument_controller(own, at, channel, one, two); break;
+    case 14: {
+      int32_t wheel = one + 128 * two - 8192;
+      instrument_bend(own, at, channel, wheel < 0 ? wheel / 8192.0 : wheel / 8191.0);
+      break;
+    }
+    default: break;
+  }
+}
+
+static double bounded(const parameter *of, double value) {
+  if (!(value >= of->low)) return of->low;
+  return value > of->high ? of->high : value;
+}
+
+void instrument_set(instrument *own, int32_t place, double value) {
+  own->values[place] = bounded(&parameters_of(own->of)[place], value);
+  const parameter *of = &parameters_of(own->of)[place];
+  if (of->kind != KIND_MACRO) return;
+  const macro *chosen = &macros_of(own->of)[of->index];
+  for (int32_t each = 0; each < chosen->count; each++) {
+    int32_t target = chosen->targets[each].parameter;
+    double low = chosen->targets[each].low, high = chosen->targets[each].high;
+    own->values[target] = bounded(&parameters_of(own->of)[target], low + own->values[place] * (high - low));
+  }
+  own->moved = true;
+}
+
+static void wait_for(instrument *own, int64_t frame, int32_t place) {
+  if (own->waiting == MOST_CHANGES) {
+    own->lost++;
+    return;
+  }
+  own->changes[own->waiting++] = (change){frame, place, own->values[place]};
+}
+
+void instrument_change(instrument *own, uint32_t at, int32_t place, double value) {
+  const image *of = own->of;
+  int64_t frame = frame_of(own, at);
+  instrument_set(own, place, value);
+  if (parameters_of(of)[place].kind != KIND_MACRO) {
+    wait_for(own, frame, place);
+    return;
+  }
+  const macro *chosen = &macros_of(of)[parameters_of(of)[place].index];
+  for (int32_t each = 0; each < chosen->count; each++) wait_for(own, frame, chosen->targets[each].parameter);
+}
+
+/* Sound */
+
+static void apply_due(instrument *own) {
+  int64_t end = own->mixer[M_FRAMES].whole + QUANTUM;
+  int32_t done = 0;
+  while (done < own->waiting && own->changes[done].frame < end) {
+    apply(own, own->changes[done].parameter, own->changes[done].value, own->changes[done].frame);
+    done++;
+  }
+  if (!done) return;
+  own->waiting -= done;
+  memmove(own->changes, own->changes + done, (size_t)own->waiting * sizeof(change));
+}
+
+void instrument_render(instrument *own, uint32_t frames, float *left, float *right) {
+#if defined(__x86_64__)
+  unsigned int before = _mm_getcsr();
+  _mm_setcsr(before | 0x8040); /* denormal numbers are zero */
+#endif
+  own->mixer[M_PEAK].real = 0; /* of what is rendered now */
+  float *block = (float *)own->scratch;
+  for (uint32_t done = 0; done < frames;) {
+    int64_t rendered = own->mixer[M_LEFT].whole, left_over = frames - done;
+    if (!rendered) {
+      apply_due(own);
+      rendered = QUANTUM;
+    }
+    int64_t count = rendered < left_over ? rendered : left_over;
+    void *error = NULL, *result = NULL;
+    if (ls_render(&result, &error, number_of(own->mixer), count, number_of(block))) memset(block, 0, 2 * QUANTUM * sizeof(float));
+    for (int64_t frame = 0; frame < count; frame++) {
+      left[done + frame] = right ? block[2 * frame] : 0.5f * (block[2 * frame] + block[2 * frame + 1]);
+      if (right) right[done + frame] = block[2 * frame + 1];
+    }
+    done += (uint32_t)count;
+  }
+#if defined(__x86_64__)
+  _mm_setcsr(before);
+#endif
+}
+
+void instrument_report_ends(instrument *own, note_ended ended, void *context) {
+  const slot *player = own->player;
+  int64_t total = player[PLAYER_REPORTED].whole;
+  if (total - own->read > REPORTS) own->read = total - REPORTS;
+  for (; own->read < total; own->read++) {
+    const slot *report = player + PLAYER_REPORTS + own->read % REPORTS * REPORT_SLOTS;
+    if (report[REPORT_KIND].whole != BEGAN && report[REPORT_ID].whole)
+      ended(context, report[REPORT_ID].whole, (int32_t)report[REPORT_CHANNEL].whole, (int32_t)report[REPORT_KEY].whole, 0);
+  }
+}
+
+bool instrument_silent(const instrument *own) {
+  const slot *player = own->player;
+  bool events = player[PLAYER_PUSHED].whole != player[PLAYER_TAKEN].whole || player[PLAYER_QUEUED].whole;
+  bool echo = own->convolver && own->convolver[C_AWAKE].whole;
+  return !events && !echo && !own->waiting && !own->mixer[M_ACTIVE].whole && own->mixer[M_PEAK].real < 1e-9;
+}
+
+/* State */
+
+static const uint32_t STATE_VERSION = 1;
+
+int32_t instrument_save(const instrument *own, uint8_t *bytes, int32_t room) {
+  int32_t count = (int32_t)own->of->parameter_count, size = 8 + 12 * count;
+  if (size > room) return -1;
+  memcpy(bytes, &STATE_VERSION, 4);
+  memcpy(bytes + 4, &count, 4);
+  for (int32_t place = 0; place < count; place++) {
+    memcpy(bytes + 8 + 12 * place, &parameters_of(own->of)[place].id, 4);
+    memcpy(bytes + 12 + 12 * place, &own->values[place], 8);
+  }
+  return size;
+}
+
+bool instrument_load(instrument *own, const uint8_t *bytes, int32_t size) {
+  uint32_t version;
+  int32_t count;
+  if (size < 8) return false;
+  memcpy(&version, bytes, 4);
+  memcpy(&count, bytes + 4, 4);
+  if (version != STATE_VERSION || count < 0 || count > 4096 || size < 8 + 12 * count) return false;
+  instrument_reset_values(own);
+  for (int32_t each = 0; each < count; each++) {
+    uint32_t id;
+    double value;
+    memcpy(&id, bytes + 8 + 12 * each, 4);
+    memcpy(&value, bytes + 12 + 12 * each, 8);
+    int32_t place = parameter_with_id(own->of, id);
+    if (place >= 0) own->values[place] = bounded(&parameters_of(own->of)[place], value);
+  }
+  return true;
+}

@@ -1,0 +1,82 @@
+/* An instrument as the plug-in holds it: its image, its memory, its parameters, and events that come to it.
+
+   The image is written by image.py, which also writes layout.h: where things lie in the kernels' memory. */
+
+#ifndef LS_INSTRUMENT_H
+#define LS_INSTRUMENT_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+typedef union { double real; int64_t whole; } slot;
+
+enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_POINT, KIND_MACRO };
+enum { SOURCE_MODEL, SOURCE_TRUTH, SOURCE_DIFFERENCE };
+enum { MOST_PARAMETERS = 64, MOST_MACRO_TARGETS = 8, MOST_CHANGES = 512 };
+
+typedef struct {
+  uint32_t id;
+  int32_t kind, index, stepped;
+  double low, high, standard;
+  char name[64], module[64], unit[16];
+} parameter;
+
+typedef struct { int32_t count, spare; struct { int32_t parameter, spare; double low, high; } targets[MOST_MACRO_TARGETS]; } macro;
+typedef struct {
+  int64_t rate_hz, frames, channels, first; /* `first`: of its samples, 32-bit whole numbers of the image */
+  double unit;                              /* of a sample of 1 */
+} response;
+
+typedef struct {
+  char magic[8];
+  int64_t version, bytes;
+  int64_t table, table_slots, model, model_slots, truth, truth_slots; /* in slots from the beginning */
+  int64_t parameters, parameter_count, macros, macro_count;           /* in bytes */
+  int64_t taps, responses, response_count;
+  int64_t modes, most_notes;
+  double longest_s;
+  char id[128], name[64], description[512], maker[64], features[128], digest[32];
+} image;
+
+typedef struct { int64_t frame; int32_t parameter; double value; } change;
+
+typedef struct {
+  const image *of;
+  double rate_hz;
+  slot *mixer, *player, *table, *model, *truth, *convolver, *response, *scratch;
+  double values[MOST_PARAMETERS];
+  change changes[MOST_CHANGES];
+  int32_t waiting;
+  int64_t read;       /* reports */
+  int64_t lost;       /* events for which there was no room */
+  bool moved;         /* a macro has moved other parameters since the host was told */
+} instrument;
+
+typedef void (*note_ended)(void *context, int64_t id, int32_t channel, int32_t key, uint32_t offset);
+
+const parameter *parameters_of(const image *);
+int32_t parameter_with_id(const image *, uint32_t id);
+void instrument_reset_values(instrument *);
+bool instrument_begin(instrument *, double rate_hz);   /* allocates; false where there is no memory */
+void instrument_end(instrument *);
+uint32_t instrument_latency(void);
+uint32_t instrument_tail(const instrument *);
+
+/* Frames are those of the block that is rendered next: 0 its first. */
+void instrument_note_on(instrument *, uint32_t at, int64_t id, int32_t channel, int32_t key, double velocity);
+void instrument_note_off(instrument *, uint32_t at, int32_t channel, int32_t key);
+void instrument_bend(instrument *, uint32_t at, int32_t channel, double value);
+void instrument_controller(instrument *, uint32_t at, int32_t channel, int32_t number, int32_t value);
+void instrument_midi(instrument *, uint32_t at, const uint8_t *bytes);
+void instrument_tune(instrument *, uint32_t at, int32_t channel, double semitones);
+void instrument_change(instrument *, uint32_t at, int32_t parameter, double value);
+void instrument_set(instrument *, int32_t parameter, double value); /* while nothing is rendered */
+void instrument_render(instrument *, uint32_t frames, float *left, float *right);
+void instrument_report_ends(instrument *, note_ended, void *context);
+bool instrument_silent(const instrument *);
+
+/* State: a version, then ids and values. */
+int32_t instrument_save(const instrument *, uint8_t *bytes, int32_t room);
+bool instrument_load(instrument *, const uint8_t *bytes, int32_t count);
+
+#endif

@@ -1,0 +1,157 @@
+"""From recordings to an instrument: preset, body and patch in the user's folders.
+
+`learn_files` and `keep` are what the command calls, and what a dialog of the window calls in a worker's thread.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import soundfile
+
+from app.audio.note_file import NoteFileError, read_note
+from app.instrument.bodies import own_bodies
+from app.patches.library import PatchError, file_stem, own_patches, save_patch
+from app.patches.patch import Body, Category, Fretted, Patch, PhysicalString, Pickup, PluckChoices, explained
+from engine.folders import usable_files, user_folder
+from engine.result_file import WriteError, explain, whole_file
+from training.recording.fit import FREE_POLES
+from training.recording.joint import combined
+from training.recording.learn import Learned, learn
+from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, RecordingError
+from training.recording.physics import Kind
+from training.recording.preset import Source, body_response, listening_point, write_preset
+from training.recording.table import as_data
+
+CATEGORIES: dict[Kind, Category] = {"guitar": "guitar", "bass": "bass", "harp": "harp", "piano": "keys"}
+REACH_KEYS = 12  # an octave to both sides of the recorded note
+BODY_RATE_HZ = 48_000
+HARDEST = 1.5  # of the recorded pluck's amplitude
+RECORDED_VELOCITY = 100
+
+
+@dataclass(frozen=True)
+class Kept:
+    """The files of a learned instrument."""
+
+    preset: Path
+    patch: Path
+    body: Path
+    report: Path
+
+
+def learn_files(
+    paths: Sequence[Path],
+    *,
+    kind: Kind = "guitar",
+    length_m: float | None = None,
+    gauge_mm: float | None = None,
+    anyway: bool = False,
+    progress: Callable[[float], None] = lambda share: None,
+) -> list[Learned]:
+    """Learns recordings one after the other; the first is the note that gives the string.
+
+    Args:
+        progress: is called with the share that is done; may raise, to cancel: nothing has been written then.
+
+    Raises:
+        NoteFileError, RecordingError: a file cannot be learned from; the message names it and the remedy.
+    """
+    found = []
+    for number, path in enumerate(paths):
+        file = read_note(path)
+        source = Source(path.name, file.digest, file.rate_hz, len(file.samples))
+        try:
+            found.append(
+                learn(
+                    file.samples,
+                    file.rate_hz,
+                    source,
+                    kind=kind,
+                    length_m=length_m,
+                    gauge_mm=gauge_mm,
+                    anyway=anyway,
+                    progress=lambda share, done=number: progress((done + share) / len(paths)),  # type: ignore[misc]
+                )
+            )
+        except RecordingError as error:
+            raise RecordingError(f"{path}: {error}") from error
+    return found
+
+
+def check_name(name: str) -> str:
+    """The stem of an instrument's files. Raises PatchError where one of them is there already."""
+    stem = file_stem(name)
+    if stem in {path.stem for path in usable_files()}:
+        raise PatchError(f"{name}: a preset of this name exists already; choose another")
+    for path in (own_patches() / f"{stem}.json", own_bodies() / f"{stem}.wav"):
+        if path.exists():
+            raise PatchError(f"{path}: exists already; choose another name, or remove it")
+    return stem
+
+
+def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
+    """Writes preset, body, patch and report of an instrument.
+
+    Raises:
+        PatchError: the name is taken or impossible.
+        WriteError, OSError: a file cannot be written.
+    """
+    stem, first = check_name(name), learned[0]
+    settings: dict[str, Any] = {
+        "free_poles": FREE_POLES,
+        "begins_s": FIT_BEGINS_S,
+        "seconds": FIT_LASTS_S,
+        "recordings": [each.source.digest for each in learned],
+    }
+    recorded = combined(learned, settings)
+    patch = _patch(name, stem, first, len(recorded.cents), kind)
+    body = own_bodies() / f"{stem}.wav"
+    preset = user_folder() / f"{stem}.safetensors"
+    report = user_folder() / f"{stem}.report.json"
+    try:
+        body.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise WriteError(explain(body.parent, error)) from error
+    write_preset(preset, name, first.strung, recorded)
+    response = body_response(first.physics, first.strung, len(recorded.cents), BODY_RATE_HZ)
+    with whole_file(body) as file:
+        soundfile.write(file, 0.9 * response, BODY_RATE_HZ, subtype="PCM_24", format="WAV")
+    with whole_file(report) as file:
+        file.write(json.dumps([as_data(each) for each in learned], indent=2).encode())
+    return Kept(preset, save_patch(patch).path, body, report)
+
+
+def _patch(name: str, stem: str, learned: Learned, partials: int, kind: Kind) -> Patch:
+    key = round(69 + 12 * math.log2(learned.physics.f0_hz / 440))
+    amplitude_mm = 1000 * learned.strung.amplitude_m
+    hardest_mm = min(10.0, HARDEST * amplitude_mm)
+    share = (RECORDED_VELOCITY - 1) / 126
+    softest_mm = (amplitude_mm / hardest_mm**share) ** (1 / (1 - share))
+    try:
+        return Patch(
+            name=name,
+            category=CATEGORIES[kind],
+            description=f"Learned from a recording of {learned.physics.f0_hz:.1f} Hz.",
+            preset=stem,
+            strings=Fretted(string=PhysicalString(**asdict(learned.strung.string))),
+            range=(max(0, key - REACH_KEYS), min(127, key + REACH_KEYS)),
+            pluck=PluckChoices(
+                shape="triangular",
+                position=learned.strung.position,
+                softest_mm=max(0.01, softest_mm),
+                hardest_mm=hardest_mm,
+            ),
+            pickup=Pickup(points=(listening_point(partials),)),
+            body=Body(name=stem, mix=1.0, size=1.0),
+        )
+    except ValueError as error:
+        raise PatchError(f"{name}: {explained(error)}") from error
+
+
+__all__ = ["Kept", "NoteFileError", "RecordingError", "check_name", "keep", "learn_files"]

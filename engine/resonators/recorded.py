@@ -1,0 +1,197 @@
+"""A string learned from a recording: what its partials add to the string's law, and the recorded note itself.
+
+The law (`StringParameters`) gives pitch, stiffness and damping by two numbers. A recorded string departs from it.
+Its damping over frequency has a shape of its own. Each partial lies some cents from the law, and decays faster or
+slower than its neighbours. It moves in two directions across its length, with two frequencies and decays each.
+
+The damping over frequency belongs to string and instrument and is carried to every key. What single partials add
+belongs to the note, through the resonances of the instrument at their frequencies. It fades with the distance of a
+key in pitch.
+
+Each partial has two modes of one shape, of the first and of the second polarisation. They share the tension.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from engine import bounds
+from engine.resonators.base import Resonator
+from engine.resonators.string import StringParameters
+
+Array = NDArray[np.float64]
+
+FADES_SEMITONES = 3.0  # a note's own corrections fall as a Gaussian of this width
+MOST_CENTS = 60.0
+RATIOS = (0.05, 20.0)
+OF_PARTIALS = ("cents", "ratio", "second_cents", "second_ratio", "second_share")
+
+
+@dataclass(frozen=True)
+class RecordedNote:
+    """The note as it was recorded: Re Σ a exp(s τ(t)), t in s after `begins`, free poles in t instead of τ.
+
+    Attributes:
+        frames, onset, begins: of the recording, in its frames; what comes before the onset is silent.
+        glide_s, glide: dτ/dt = 1 + Σ glide exp(-t/glide_s).
+        hz, decay, real, imaginary: of each pole: ω/2π, σ in 1/s, a.
+        partial: its number; 0: free.
+    """
+
+    rate_hz: int
+    frames: int
+    onset: int
+    begins: int
+    glide_s: tuple[float, ...]
+    glide: tuple[float, ...]
+    hz: tuple[float, ...]
+    decay: tuple[float, ...]
+    real: tuple[float, ...]
+    imaginary: tuple[float, ...]
+    partial: tuple[int, ...]
+
+    def __post_init__(self) -> None:
+        bounds.check("rate_hz", self.rate_hz, (1, bounds.HIGHEST_RATE_HZ), "Hz")
+        bounds.check("frames", self.frames, (1, 60 * self.rate_hz))
+        if not 0 <= self.onset <= self.begins <= self.frames:
+            raise ValueError("onset and begins must lie in the recording, in this order")
+        if len({len(getattr(self, name)) for name in ("hz", "decay", "real", "imaginary", "partial")}) != 1:
+            raise ValueError("hz, decay, real, imaginary and partial must be of one length")
+        if len(self.glide) != len(self.glide_s) or any(time <= 0 for time in self.glide_s):
+            raise ValueError("glide and glide_s must be of one length, times above 0")
+        if any(decay < 0 for decay in self.decay):
+            raise ValueError("decay must not be below 0")
+
+    def tau(self, t: Array) -> Array:
+        """The time in which the string does not glide."""
+        tau = t.copy()
+        for time, share in zip(self.glide_s, self.glide, strict=True):
+            tau -= share * time * np.expm1(-t / time)
+        return tau
+
+    def sound(self, rate_hz: int | None = None) -> Array:
+        """The samples of the whole recording, ±1 being full scale, float64."""
+        rate = rate_hz or self.rate_hz
+        count = round(self.frames * rate / self.rate_hz)
+        first = math.ceil(self.onset * rate / self.rate_hz)
+        total = np.zeros(count)
+        # poles are known from `begins` on; between the onset and there they rise evenly
+        t = (np.arange(first, count) / rate) - self.begins / self.rate_hz
+        rise_s = max((self.begins - self.onset) / self.rate_hz, 1 / rate)
+        fade = np.clip(1 + t / rise_s, 0.0, 1.0)
+        held = np.maximum(t, -rise_s)
+        tau = self.tau(held)
+        for hz, decay, real, imaginary, partial in zip(
+            self.hz, self.decay, self.real, self.imaginary, self.partial, strict=True
+        ):
+            if 2 * hz >= rate:
+                continue
+            time = tau if partial else held
+            s = complex(-decay, 2 * math.pi * hz)
+            total[first:] += (complex(real, imaginary) * np.exp(s * time)).real
+        total[first:] *= fade
+        return total
+
+
+@dataclass(frozen=True)
+class RecordedString:
+    """What a recording adds to a string's law.
+
+    Attributes:
+        pitch_hz: of the recorded note.
+        smooth_hz, smooth_ratio: decay over that of the law at frequencies, carried to all keys.
+        cents, ratio: of each partial of the note, beside the law and beside the smooth decay.
+        second_cents, second_ratio: of the second polarisation, the higher one, beside the first.
+        second_share: of the amplitude that the second polarisation has.
+        note: the recorded note itself.
+        digest: SHA-256 of the recording's file.
+        assumed: what the recording cannot give, in words.
+        settings: of the fit.
+        errors: against the recording, and other figures of the report.
+    """
+
+    pitch_hz: float
+    smooth_hz: tuple[float, ...]
+    smooth_ratio: tuple[float, ...]
+    cents: tuple[float, ...]
+    ratio: tuple[float, ...]
+    second_cents: tuple[float, ...]
+    second_ratio: tuple[float, ...]
+    second_share: tuple[float, ...]
+    note: RecordedNote
+    file: str
+    digest: str
+    assumed: tuple[str, ...] = ()
+    settings: dict[str, Any] = field(default_factory=dict)
+    errors: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        bounds.check("pitch_hz", self.pitch_hz, (1.0, 20_000.0), "Hz")
+        if len(self.smooth_hz) != len(self.smooth_ratio) or not self.smooth_hz:
+            raise ValueError("smooth_hz and smooth_ratio must be of one length, above 0")
+        if any(low >= high for low, high in pairwise(self.smooth_hz)):
+            raise ValueError("smooth_hz must rise")
+        if len({len(getattr(self, name)) for name in OF_PARTIALS}) != 1 or not self.cents:
+            raise ValueError(f"{', '.join(OF_PARTIALS)} must be of one length, above 0")
+        for name, least in (("cents", -MOST_CENTS), ("second_cents", 0.0)):
+            for value in getattr(self, name):
+                bounds.check(name, value, (least, MOST_CENTS), "cents")
+        for name in ("smooth_ratio", "ratio", "second_ratio"):
+            for value in getattr(self, name):
+                bounds.check(name, value, RATIOS)
+        for value in self.second_share:
+            bounds.check("second_share", value, (0.0, 1.0))
+
+    def resonator(
+        self, string: StringParameters, modes: int, *, tension_modulated: bool = True, grid_points: int = 101
+    ) -> Resonator:
+        """The modes of a string of any pitch: two for each partial, the first `modes` of them by frequency.
+
+        Raises:
+            ValueError: the grid does not hold so many modes.
+        """
+        partials = (modes + 1) // 2
+        law = string.resonator(partials, tension_modulated=tension_modulated, grid_points=grid_points)
+        omega, sigma = law.omega.numpy(), law.sigma.numpy()
+        hz = omega / (2 * math.pi)
+        fade = math.exp(-((12 * math.log2(hz[0] / self.pitch_hz) / FADES_SEMITONES) ** 2))
+        own = {name: self._faded(name, partials, fade) for name in OF_PARTIALS}
+        smooth = np.exp(np.interp(np.log(hz), np.log(self.smooth_hz), np.log(self.smooth_ratio)))
+        first = omega * 2 ** (own["cents"] / 1200)
+        sigma = np.minimum(sigma * smooth * own["ratio"], 0.5 * first)
+        second = first * 2 ** (own["second_cents"] / 1200)
+        # pairs in the order of partials: a key that is bent keeps the order of its modes
+        omegas = np.maximum.accumulate(np.stack([first, second], 1).ravel())[:modes]
+        sigmas = np.stack([sigma, np.minimum(sigma * own["second_ratio"], 0.5 * second)], 1).ravel()[:modes]
+        shares = np.stack([1 - own["second_share"], own["second_share"]], 1).ravel()[:modes]
+        partial = torch.arange(modes) // 2
+        return Resonator(
+            omega=torch.from_numpy(omegas),
+            sigma=torch.from_numpy(sigmas.copy()),
+            coupling=law.coupling[partial],
+            stretch=law.stretch[partial],
+            tension_rise=law.tension_rise,
+            shapes=law.shapes[partial],
+            analysis=law.analysis[:, partial] * torch.from_numpy(shares.copy()),
+            mirror=None if law.mirror is None else law.mirror[partial],
+        )
+
+    def _faded(self, name: str, partials: int, fade: float) -> Array:
+        """The note's own values for so many partials, faded to the value that all of its partials share."""
+        known = np.asarray(getattr(self, name), float)[:partials]
+        shared = _SHARED.get(name)
+        rest = float(np.median(np.asarray(getattr(self, name)))) if shared is None else shared
+        padded = np.concatenate([known, np.full(partials - len(known), rest)])
+        if name.endswith("ratio"):
+            return np.exp(fade * np.log(padded) + (1 - fade) * math.log(rest))
+        return fade * padded + (1 - fade) * rest
+
+
+_SHARED = {"cents": 0.0, "ratio": 1.0}  # the others fade to the median of the note's partials

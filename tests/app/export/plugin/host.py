@@ -1,0 +1,351 @@
+"""A CLAP host: loads a plug-in, sends events, takes sound. Structures are written from CLAP's documents."""
+
+from __future__ import annotations
+
+import ctypes as c
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+NOTE_ON, NOTE_OFF, NOTE_CHOKE, NOTE_END, EXPRESSION, PARAM, MIDI = 0, 1, 2, 3, 4, 5, 10
+
+
+class Version(c.Structure):
+    _fields_ = (("major", c.c_uint32), ("minor", c.c_uint32), ("revision", c.c_uint32))
+
+
+class Header(c.Structure):
+    _fields_ = (
+        ("size", c.c_uint32),
+        ("time", c.c_uint32),
+        ("space", c.c_uint16),
+        ("type", c.c_uint16),
+        ("flags", c.c_uint32),
+    )
+
+
+_PLACE = (("note_id", c.c_int32), ("port", c.c_int16), ("channel", c.c_int16), ("key", c.c_int16))
+
+
+class NoteEvent(c.Structure):
+    _fields_ = (("header", Header), *_PLACE, ("velocity", c.c_double))
+
+
+class ExpressionEvent(c.Structure):
+    _fields_ = (("header", Header), ("id", c.c_int32), *_PLACE, ("value", c.c_double))
+
+
+class ParamEvent(c.Structure):
+    _fields_ = (("header", Header), ("id", c.c_uint32), ("cookie", c.c_void_p), *_PLACE, ("value", c.c_double))
+
+
+class MidiEvent(c.Structure):
+    _fields_ = (("header", Header), ("port", c.c_uint16), ("data", c.c_uint8 * 3))
+
+
+SIZE_FN = c.CFUNCTYPE(c.c_uint32, c.c_void_p)
+GET_FN = c.CFUNCTYPE(c.c_void_p, c.c_void_p, c.c_uint32)
+PUSH_FN = c.CFUNCTYPE(c.c_bool, c.c_void_p, c.c_void_p)
+
+
+class InEvents(c.Structure):
+    _fields_ = (("context", c.c_void_p), ("size", SIZE_FN), ("get", GET_FN))
+
+
+class OutEvents(c.Structure):
+    _fields_ = (("context", c.c_void_p), ("push", PUSH_FN))
+
+
+class Audio(c.Structure):
+    _fields_ = (
+        ("data32", c.POINTER(c.POINTER(c.c_float))),
+        ("data64", c.c_void_p),
+        ("channels", c.c_uint32),
+        ("latency", c.c_uint32),
+        ("constant", c.c_uint64),
+    )
+
+
+class Process(c.Structure):
+    _fields_ = (
+        ("steady", c.c_int64),
+        ("frames", c.c_uint32),
+        ("transport", c.c_void_p),
+        ("inputs", c.c_void_p),
+        ("outputs", c.POINTER(Audio)),
+        ("inputs_count", c.c_uint32),
+        ("outputs_count", c.c_uint32),
+        ("in_events", c.POINTER(InEvents)),
+        ("out_events", c.POINTER(OutEvents)),
+    )
+
+
+P = c.c_void_p
+
+
+class Plugin(c.Structure):
+    _fields_ = (
+        ("descriptor", P),
+        ("data", P),
+        ("init", c.CFUNCTYPE(c.c_bool, P)),
+        ("destroy", c.CFUNCTYPE(None, P)),
+        ("activate", c.CFUNCTYPE(c.c_bool, P, c.c_double, c.c_uint32, c.c_uint32)),
+        ("deactivate", c.CFUNCTYPE(None, P)),
+        ("start_processing", c.CFUNCTYPE(c.c_bool, P)),
+        ("stop_processing", c.CFUNCTYPE(None, P)),
+        ("reset", c.CFUNCTYPE(None, P)),
+        ("process", c.CFUNCTYPE(c.c_int32, P, c.POINTER(Process))),
+        ("get_extension", c.CFUNCTYPE(P, P, c.c_char_p)),
+        ("on_main_thread", c.CFUNCTYPE(None, P)),
+    )
+
+
+class HostStructure(c.Structure):
+    _fields_ = (
+        ("version", Version),
+        ("data", P),
+        ("name", c.c_char_p),
+        ("vendor", c.c_char_p),
+        ("url", c.c_char_p),
+        ("host_version", c.c_char_p),
+        ("get_extension", c.CFUNCTYPE(P, P, c.c_char_p)),
+        ("request_restart", c.CFUNCTYPE(None, P)),
+        ("request_process", c.CFUNCTYPE(None, P)),
+        ("request_callback", c.CFUNCTYPE(None, P)),
+    )
+
+
+class Descriptor(c.Structure):
+    _fields_ = (("version", Version), *((n, c.c_char_p) for n in ("id", "name", "vendor")))
+
+
+class Factory(c.Structure):
+    _fields_ = (
+        ("count", c.CFUNCTYPE(c.c_uint32, P)),
+        ("descriptor", c.CFUNCTYPE(c.POINTER(Descriptor), P, c.c_uint32)),
+        ("create", c.CFUNCTYPE(c.POINTER(Plugin), P, P, c.c_char_p)),
+    )
+
+
+class Entry(c.Structure):
+    _fields_ = (
+        ("version", Version),
+        ("init", c.CFUNCTYPE(c.c_bool, c.c_char_p)),
+        ("deinit", c.CFUNCTYPE(None)),
+        ("get_factory", c.CFUNCTYPE(P, c.c_char_p)),
+    )
+
+
+class ParamInfo(c.Structure):
+    _fields_ = (
+        ("id", c.c_uint32),
+        ("flags", c.c_uint32),
+        ("cookie", P),
+        ("name", c.c_char * 256),
+        ("module", c.c_char * 1024),
+        ("low", c.c_double),
+        ("high", c.c_double),
+        ("standard", c.c_double),
+    )
+
+
+class Params(c.Structure):
+    _fields_ = (
+        ("count", c.CFUNCTYPE(c.c_uint32, P)),
+        ("info", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.POINTER(ParamInfo))),
+        ("value", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.POINTER(c.c_double))),
+        ("to_text", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.c_double, c.c_char_p, c.c_uint32)),
+    )
+
+
+WRITE_FN = c.CFUNCTYPE(c.c_int64, P, P, c.c_uint64)
+
+
+class Stream(c.Structure):
+    _fields_ = (("context", P), ("move", WRITE_FN))
+
+
+class State(c.Structure):
+    _fields_ = tuple((n, c.CFUNCTYPE(c.c_bool, P, c.POINTER(Stream))) for n in ("save", "load"))
+
+
+class Frames(c.Structure):
+    _fields_ = (("get", c.CFUNCTYPE(c.c_uint32, P)),)
+
+
+@dataclass(frozen=True)
+class Event:
+    """An event at a frame of the whole piece; `content` is one of the structures above."""
+
+    frame: int
+    content: c.Structure
+
+
+def note_on(frame: int, key: int, velocity: float, channel: int = 0, note_id: int = -1) -> Event:
+    return Event(frame, NoteEvent(Header(40, 0, 0, NOTE_ON, 0), note_id, 0, channel, key, velocity / 127))
+
+
+def note_off(frame: int, key: int, channel: int = 0) -> Event:
+    return Event(frame, NoteEvent(Header(40, 0, 0, NOTE_OFF, 0), -1, 0, channel, key, 0.0))
+
+
+def midi(frame: int, *data: int) -> Event:
+    return Event(frame, MidiEvent(Header(24, 0, 0, MIDI, 0), 0, (c.c_uint8 * 3)(*data)))
+
+
+def param(frame: int, id: int, value: float) -> Event:
+    return Event(frame, ParamEvent(Header(56, 0, 0, PARAM, 0), id, None, -1, -1, -1, -1, value))
+
+
+class Library:
+    """A plug-in file."""
+
+    def __init__(self, path: Path) -> None:
+        self._library = c.CDLL(str(path))
+        self.entry = Entry.in_dll(self._library, "clap_entry")
+        assert self.entry.init(str(path).encode())
+        self.factory = c.cast(self.entry.get_factory(b"clap.plugin-factory"), c.POINTER(Factory)).contents
+        self._factory_at = c.addressof(self.factory)
+
+    @property
+    def plugins(self) -> dict[str, str]:
+        """Names by id."""
+        found = {}
+        for index in range(self.factory.count(self._factory_at)):
+            each = self.factory.descriptor(self._factory_at, index).contents
+            found[each.id.decode()] = each.name.decode()
+        return found
+
+    def create(self, id: str) -> Instance:
+        return Instance(self, id)
+
+
+class Instance:
+    """A plug-in of a library."""
+
+    def __init__(self, library: Library, id: str) -> None:
+        self.callbacks = 0
+        self.ended: list[int] = []
+
+        def count(_host: int) -> None:
+            self.callbacks += 1
+
+        none = HostStructure._fields_[7][1](lambda host: None)  # type: ignore[misc]
+        self._host = HostStructure(
+            Version(1, 2, 0),
+            None,
+            b"tests",
+            b"",
+            b"",
+            b"1",
+            HostStructure._fields_[6][1](lambda host, id: None),
+            none,
+            none,  # type: ignore[misc]
+            HostStructure._fields_[9][1](count),  # type: ignore[misc]
+        )
+        found = library.factory.create(library._factory_at, c.addressof(self._host), id.encode())
+        assert found, f"{id} is not in the library"
+        self.at = c.addressof(found.contents)
+        self._own = found.contents
+        assert self._own.init(self.at)
+        self.frame = 0
+
+    def extension(self, id: str, kind: type[c.Structure]) -> c.Structure:
+        at = self._own.get_extension(self.at, id.encode())
+        assert at, f"no extension {id}"
+        return c.cast(at, c.POINTER(kind)).contents
+
+    @property
+    def parameters(self) -> dict[str, ParamInfo]:
+        """By name."""
+        params = self.extension("clap.params", Params)
+        found = {}
+        for index in range(params.count(self.at)):  # type: ignore[attr-defined]
+            info = ParamInfo()
+            assert params.info(self.at, index, info)  # type: ignore[attr-defined]
+            found[info.name.decode()] = info
+        return found
+
+    def value(self, id: int) -> float:
+        found = c.c_double()
+        assert self.extension("clap.params", Params).value(self.at, id, found)  # type: ignore[attr-defined]
+        return found.value
+
+    @property
+    def latency(self) -> int:
+        return int(self.extension("clap.latency", Frames).get(self.at))  # type: ignore[attr-defined]
+
+    def activate(self, rate_hz: float, most: int = 4096) -> None:
+        assert self._own.activate(self.at, rate_hz, 1, most)
+        assert self._own.start_processing(self.at)
+        self.frame = 0
+
+    def deactivate(self) -> None:
+        self._own.stop_processing(self.at)
+        self._own.deactivate(self.at)
+
+    def reset(self) -> None:
+        self._own.reset(self.at)
+
+    def destroy(self) -> None:
+        self._own.destroy(self.at)
+
+    def save(self) -> bytes:
+        kept = bytearray()
+
+        def write(_stream: int, data: int, size: int) -> int:
+            kept.extend(c.string_at(data, size))
+            return size
+
+        assert self.extension("clap.state", State).save(self.at, Stream(None, WRITE_FN(write)))  # type: ignore[attr-defined]
+        return bytes(kept)
+
+    def load(self, content: bytes) -> bool:
+        left = [content]
+
+        def read(_stream: int, data: int, size: int) -> int:
+            part, left[0] = left[0][: min(size, 7)], left[0][min(size, 7) :]  # in small pieces, as hosts may
+            c.memmove(data, part, len(part))
+            return len(part)
+
+        return bool(self.extension("clap.state", State).load(self.at, Stream(None, WRITE_FN(read))))  # type: ignore[attr-defined]
+
+    def block(self, frames: int, events: Sequence[Event]) -> NDArray[np.float32]:
+        """The next frames, (frames, 2); events are of frames of the whole piece."""
+        out = np.zeros((2, frames), np.float32)
+        rows = (c.POINTER(c.c_float) * 2)(*(row.ctypes.data_as(c.POINTER(c.c_float)) for row in out))
+        for event in events:
+            event.content.header.time = event.frame - self.frame  # type: ignore[attr-defined]
+        kept = [event.content for event in events]
+        incoming = InEvents(
+            None, SIZE_FN(lambda _list: len(kept)), GET_FN(lambda _list, index: c.addressof(kept[index]))
+        )
+
+        def push(_list: int, event: int) -> bool:
+            note = c.cast(event, c.POINTER(NoteEvent)).contents
+            if note.header.type == NOTE_END:
+                self.ended.append(note.note_id)
+            return True
+
+        outgoing = OutEvents(None, PUSH_FN(push))
+        audio = Audio(rows, None, 2, 0, 0)
+        process = Process(
+            self.frame, frames, None, None, c.pointer(audio), 0, 1, c.pointer(incoming), c.pointer(outgoing)
+        )
+        self.status = self._own.process(self.at, process)
+        assert self.status != 0
+        self.frame += frames
+        return out.T.copy()
+
+    def render(self, frames: int, events: Sequence[Event], block: int = 512) -> NDArray[np.float32]:
+        """A piece, (frames, 2), in blocks; frames of events count from its beginning, which is now."""
+        first, blocks = self.frame, []
+        ordered = sorted((Event(first + each.frame, each.content) for each in events), key=lambda event: event.frame)
+        while self.frame < first + frames:
+            count = min(block, first + frames - self.frame)
+            due = [event for event in ordered if self.frame <= event.frame < self.frame + count]
+            blocks.append(self.block(count, due))
+        return np.concatenate(blocks)

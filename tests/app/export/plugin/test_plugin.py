@@ -1,0 +1,264 @@
+"""Plug-ins in a host: they sound as the app renders, in blocks of any size, and survive what hosts do."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from app.export.plugin.build import build_plugin, this_target
+from app.export.plugin.image import Image, image_of
+from app.export.plugin.objects import TARGETS, object_of
+from app.instrument.events import Bend, Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.offline import render_events
+from app.patches.library import SHIPPED as INSTRUMENTS
+from app.patches.library import read_patch
+from app.patches.patch import Patch
+from engine.kernels import cache
+from engine.presets import SHIPPED, load_preset
+from tests.app.export.plugin import host
+from tests.app.export.plugin.host import Event, Instance, Library, midi, note_off, note_on, param
+
+NAMES = ("concert_harp", "classical_guitar", "electric_bass", "cimbalom")
+SECONDS = 1.6
+EQUAL_DB = -140.0
+
+pytestmark = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang, the extra [plugin]")
+
+
+def patch_of(name: str) -> Patch:
+    return read_patch(INSTRUMENTS / f"{name}.json")
+
+
+def piece(patch: Patch) -> list[tuple[float, NoteOn | NoteOff | Bend | Controller]]:
+    low = max(patch.range[0], min(52, patch.range[1] - 20))
+    half = 4096 / 8191  # as 14 bits have it
+    return [
+        (0.0, NoteOn(low, 100)),
+        (0.013, NoteOn(low + 4, 80)),
+        (0.1, NoteOn(low + 7, 120)),
+        (0.3, Bend(half)),
+        (0.45, NoteOn(low, 60)),
+        (0.5, Bend(0.0)),
+        (0.55, Controller(64, 127)),
+        (0.6, NoteOn(low + 12, 127)),
+        (0.65, NoteOff(low + 12)),
+        (0.7, NoteOff(low)),
+        (1.0, Controller(64, 0)),
+        (1.1, NoteOff(low + 4)),
+    ]
+
+
+def to_host(event: NoteOn | NoteOff | Bend | Controller, frame: int) -> Event:
+    if isinstance(event, NoteOn):
+        return note_on(frame, event.key, event.velocity, event.channel)
+    if isinstance(event, NoteOff):
+        return note_off(frame, event.key, event.channel)
+    if isinstance(event, Bend):
+        wheel = 8192 + round(event.value * (8191 if event.value > 0 else 8192))
+        return midi(frame, 0xE0 | event.channel, wheel & 127, wheel >> 7)
+    return midi(frame, 0xB0 | event.channel, event.number, event.value)
+
+
+def played(instance: Instance, patch: Patch, rate_hz: int, block: int = 512) -> NDArray[np.float32]:
+    """The piece, without the latency."""
+    events = [to_host(event, round(time_s * rate_hz)) for time_s, event in piece(patch)]
+    latency = instance.latency
+    return instance.render(round(SECONDS * rate_hz) + latency, events, block)[latency:]
+
+
+def rendered(patch: Patch, rate_hz: int, source: str = "model", gain_db: float = 0.0) -> NDArray[np.float32]:
+    preset = load_preset(SHIPPED / f"{patch.preset}.safetensors")
+    timed = [TimedEvent(time_s, event) for time_s, event in piece(patch)]
+    sound = render_events(patch, preset, timed, rate_hz, source, SECONDS, difference_gain_db=gain_db)
+    return np.broadcast_to(np.concatenate(list(sound)), (round(SECONDS * rate_hz), 2))
+
+
+def difference_db(sound: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+    assert len(sound) == len(other)
+    peak = float(np.abs(other).max())
+    assert peak > 0.01
+    return 20 * float(np.log10(max(float(np.abs(sound - other).max()), 1e-30) / peak))
+
+
+@pytest.fixture(scope="module")
+def images() -> list[Image]:
+    return [image_of(patch, load_preset(SHIPPED / f"{patch.preset}.safetensors")) for patch in map(patch_of, NAMES)]
+
+
+@pytest.fixture(scope="module")
+def objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where object files are kept."""
+    return cache.folder() or tmp_path_factory.mktemp("objects")
+
+
+@pytest.fixture(scope="module")
+def bank(images: list[Image], objects: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
+    path = build_plugin(images, "clap", this_target(), tmp_path_factory.mktemp("clap") / "bank", objects)
+    assert path.suffix == ".clap"
+    return Library(path)
+
+
+def instance_of(bank: Library, name: str, rate_hz: int = 48_000) -> Instance:
+    id = next(id for id, shown in bank.plugins.items() if shown == patch_of(name).name)
+    instance = bank.create(id)
+    instance.activate(rate_hz)
+    return instance
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_it_sounds_as_the_app_renders(bank: Library, name: str) -> None:
+    patch = patch_of(name)
+    instance = instance_of(bank, name)
+    assert difference_db(played(instance, patch, 48_000), rendered(patch, 48_000)) < EQUAL_DB
+    instance.deactivate()
+    instance.destroy()
+
+
+@pytest.mark.parametrize("rate_hz", (44_100, 96_000))
+def test_it_sounds_so_at_other_rates(bank: Library, rate_hz: int) -> None:
+    patch = patch_of("concert_harp")
+    sound = played(instance_of(bank, "concert_harp", rate_hz), patch, rate_hz)
+    assert difference_db(sound, rendered(patch, rate_hz)) < EQUAL_DB
+
+
+def test_a_rate_without_a_response_of_its_own_is_converted(bank: Library) -> None:
+    sound = played(instance_of(bank, "concert_harp", 88_200), patch_of("concert_harp"), 88_200)
+    assert -60 < difference_db(sound, rendered(patch_of("concert_harp"), 88_200)) < -20
+
+
+def test_the_source_may_be_the_truth_or_the_difference(bank: Library) -> None:
+    patch = patch_of("electric_bass")
+    for value, source in ((1, "truth"), (2, "difference")):
+        instance = instance_of(bank, "electric_bass")
+        id = instance.parameters["Source"].id
+        instance.block(512, [param(0, id, value)])
+        instance.deactivate()
+        instance.activate(48_000)
+        sound = played(instance, patch, 48_000)
+        other = rendered(patch, 48_000, source)
+        if source == "difference":  # model and truth differ less than any ear can find
+            assert float(np.abs(sound).max()) < 1e-3
+        else:
+            assert difference_db(sound, other) < EQUAL_DB
+
+
+def test_blocks_of_any_size_and_neighbours_change_nothing(bank: Library) -> None:
+    patch = patch_of("cimbalom")
+    whole = played(instance_of(bank, "cimbalom"), patch, 48_000)
+    for block in (1, 17, 64, 480, 4096):
+        if block == 1:  # the first tenth alone: each block is a call from Python
+            instance = instance_of(bank, "cimbalom")
+            events = [to_host(event, round(time_s * 48_000)) for time_s, event in piece(patch)]
+            sound = instance.render(4_800, events, 1)[instance.latency :]
+            assert np.array_equal(sound, whole[: len(sound)])
+        else:
+            assert np.array_equal(played(instance_of(bank, "cimbalom"), patch, 48_000, block), whole)
+    one, other = instance_of(bank, "cimbalom"), instance_of(bank, "concert_harp")
+    parts = []
+    events = [to_host(event, round(time_s * 48_000)) for time_s, event in piece(patch)]
+    while one.frame < len(whole) + one.latency:
+        count = min(480, len(whole) + one.latency - one.frame)
+        parts.append(one.block(count, [each for each in events if one.frame <= each.frame < one.frame + count]))
+        other.block(480, [note_on(other.frame, 60, 100)])
+    assert np.array_equal(np.concatenate(parts)[one.latency :], whole)
+
+
+def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank: Library) -> None:
+    patch = patch_of("classical_guitar")
+    instance = instance_of(bank, "classical_guitar")
+    macro = patch.macros[0]
+    control = instance.parameters[macro.name]
+    assert (control.low, control.high, control.standard) == (0.0, 1.0, macro.value)
+    before = {name: instance.value(each.id) for name, each in instance.parameters.items()}
+    instance.block(512, [param(100, control.id, 1.0)])
+    moved = {name for name, each in instance.parameters.items() if instance.value(each.id) != before[name]}
+    assert macro.name in moved
+    assert len(moved) > 1
+    assert instance.callbacks == 1  # the host must read the other parameters again
+    state, sound = instance.save(), played(instance, patch, 48_000)
+    for reload in (False, True):  # before it is activated, and while it plays
+        other = bank.create(next(id for id, name in bank.plugins.items() if name == patch.name))
+        if reload:
+            other.activate(48_000)
+        assert other.load(state)
+        if not reload:
+            other.activate(48_000)
+        assert other.save() == state
+        again = played(other, patch, 48_000)
+        assert difference_db(again, sound) < -80  # a knob glides to where it was set; the state is there at once
+    assert not other.load(b"\x07" + state[1:])
+    assert not other.load(state[:5])
+    assert other.save() == state
+
+
+def test_ends_of_notes_are_reported(bank: Library) -> None:
+    instance = instance_of(bank, "electric_bass")
+    instance.block(4_096, [note_on(0, 40, 100, note_id=7)])
+    instance.block(512, [note_off(4_096, 40)])
+    for _ in range(300):
+        instance.block(1_024, [])
+    assert instance.ended == [7]
+    assert instance.status == 4  # it may sleep
+
+
+def test_random_events_do_no_harm(bank: Library) -> None:
+    random = np.random.default_rng(7)
+    instance = instance_of(bank, "classical_guitar")
+    ids = [each.id for each in instance.parameters.values()]
+    for number in range(400):
+        count = int(random.integers(1, 600))
+        events: list[Event] = []
+        for _ in range(int(random.integers(0, 12))):
+            frame = instance.frame + int(random.integers(count))
+            choice = int(random.integers(5))
+            if choice == 0:
+                events.append(note_on(frame, int(random.integers(-2, 130)), float(random.uniform(0, 127)), 3))
+            elif choice == 1:
+                events.append(note_off(frame, int(random.integers(-2, 130)), int(random.integers(-1, 16))))
+            elif choice == 2:
+                events.append(midi(frame, *(int(each) for each in random.integers(0, 256, 3))))
+            elif choice == 3:
+                wild = float(random.choice([np.nan, np.inf, -1e9, random.normal()]))
+                events.append(param(frame, int(random.choice(ids)), wild))
+            else:
+                events.append(param(frame, int(random.integers(2**31)), 0.5))
+        sound = instance.block(count, sorted(events, key=lambda event: event.frame))
+        assert np.isfinite(sound).all()
+        assert float(np.abs(sound).max()) <= 1.0
+        if number % 100 == 50:
+            instance.reset()
+        if number % 150 == 100:
+            instance.deactivate()
+            instance.activate(float(random.choice([44_100, 48_000, 192_000])))
+            instance.activate(48_000)
+    instance.deactivate()
+    instance.destroy()
+
+
+def test_process_calls_nothing_but_arithmetic(objects: Path) -> None:
+    path = object_of("linux-x64", objects)
+    if shutil.which("nm") is None:
+        pytest.skip("needs nm")
+    listed = subprocess.run(["nm", "-u", path], capture_output=True, text=True, check=True).stdout.split()
+    assert not {"malloc", "free", "calloc", "fopen", "pthread_mutex_lock"} & set(listed)
+
+
+def test_an_lv2_bundle_is_valid(images: list[Image], objects: Path, tmp_path: Path) -> None:
+    path = build_plugin(images[:1], "lv2", this_target(), tmp_path / "harp", objects)
+    assert {each.name for each in path.iterdir()} >= {"manifest.ttl", "instruments.ttl"}
+    if shutil.which("lv2_validate"):
+        done = subprocess.run(["lv2_validate", *path.glob("*.ttl")], capture_output=True, text=True, check=False)
+        assert done.returncode == 0, done.stderr
+
+
+def test_targets_are_known_and_an_unknown_one_is_refused(objects: Path) -> None:
+    with pytest.raises(ValueError, match="linux-x64, linux-arm64, windows-x64"):
+        object_of("amiga", objects)
+    assert set(TARGETS) == {"linux-x64", "linux-arm64", "windows-x64", "macos-x64", "macos-arm64"}
+    assert host.NOTE_ON == 0

@@ -1,0 +1,81 @@
+"""A recorded string's modes: its own at its pitch, the law and the smooth decay far from it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from engine.resonators.recorded import RecordedNote, RecordedString
+from engine.resonators.string import StringParameters
+from engine.schema import SchemaError, read, write
+
+STRING = StringParameters()
+NOTE = RecordedNote(44_100, 44_100, 100, 453, (0.1,), (0.01,), (246.9,), (2.0,), (0.1,), (0.0,), (1,))
+
+
+def recorded() -> RecordedString:
+    return RecordedString(
+        pitch_hz=STRING.undamped_frequency(1) / (2 * np.pi),
+        smooth_hz=(200.0, 5_000.0),
+        smooth_ratio=(2.0, 2.0),
+        cents=(5.0, -3.0, 2.0),
+        ratio=(0.5, 2.0, 1.0),
+        second_cents=(1.0, 2.0, 3.0),
+        second_ratio=(2.0, 1.0, 0.5),
+        second_share=(0.2, 0.0, 0.5),
+        note=NOTE,
+        file="note.wav",
+        digest="0" * 64,
+    )
+
+
+def test_at_its_pitch_the_notes_own_modes() -> None:
+    resonator, law = recorded().resonator(STRING, 6), STRING.resonator(3)
+    cents = 1200 * np.log2(resonator.omega.numpy() / np.repeat(law.omega.numpy(), 2))
+    assert np.allclose(cents, [5, 6, -3, -1, 2, 5], atol=1e-6)
+    assert np.allclose(resonator.sigma.numpy() / np.repeat(law.sigma.numpy(), 2), [1, 2, 4, 4, 2, 1])
+
+
+def test_two_octaves_away_the_smooth_decay_alone() -> None:
+    far = replace(STRING, length_m=STRING.length_m / 4)
+    resonator, law = recorded().resonator(far, 6), far.resonator(3)
+    first = slice(0, None, 2)
+    assert np.allclose(resonator.omega.numpy()[first], law.omega.numpy(), rtol=1e-9)
+    assert np.allclose(resonator.sigma.numpy()[first], 2 * law.sigma.numpy(), rtol=1e-6)
+
+
+def test_a_displacement_is_shared_by_both_polarisations() -> None:
+    resonator = recorded().resonator(STRING, 6)
+    shape = resonator.shapes[0]
+    amplitudes = resonator.to_modes(shape)
+    assert np.allclose(amplitudes.numpy(), [0.8, 0.2, 0, 0, 0, 0], atol=1e-9)
+    assert np.allclose(resonator.to_grid(amplitudes).numpy(), shape.numpy(), atol=1e-9)
+
+
+def test_the_recorded_note_glides_to_its_pitch() -> None:
+    sound = NOTE.sound()
+    assert len(sound) == NOTE.frames and not sound[: NOTE.onset].any()
+    assert np.isfinite(sound).all()
+
+    def hz(first: int, last: int) -> float:
+        crossings = np.flatnonzero(np.diff(np.signbit(sound[first:last])))
+        return (len(crossings) - 1) / 2 / (crossings[-1] - crossings[0]) * NOTE.rate_hz
+
+    assert hz(500, 3_000) > hz(30_000, 44_000) + 0.5
+    assert hz(30_000, 44_000) == pytest.approx(246.9, abs=0.2)
+
+
+def test_it_is_written_and_read_and_checked() -> None:
+    assert read(RecordedString, write(recorded()), "metadata") == recorded()
+    for field, value in (
+        ("pitch_hz", -1.0),
+        ("cents", (1.0,)),
+        ("smooth_hz", (5_000.0, 200.0)),
+        ("ratio", (1, 1, 99)),
+    ):
+        with pytest.raises(SchemaError):
+            read(RecordedString, write(recorded()) | {field: value}, "metadata")
+    with pytest.raises(SchemaError):
+        read(RecordedNote, write(NOTE) | {"begins": 99_999_999}, "metadata")

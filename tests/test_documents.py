@@ -1,0 +1,139 @@
+"""What the documents show is there: links, commands and their options, tables, examples, notebooks, sizes."""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import pytest
+import torch
+import typer
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
+NOTEBOOKS = sorted(ROOT.glob("docs/notebooks/*.ipynb"))
+GENERATED = {"command-line.md", "presets.md", "api.md"}  # pages of the site, see docs/site_pages.py
+
+
+def text(name: str) -> str:
+    return (ROOT / name).read_text("utf-8")
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+def test_links_lead_somewhere(path: Path) -> None:
+    links = re.findall(r"\]\(([^)#\s]+)", path.read_text("utf-8"))
+    local = [link for link in links if "://" not in link and link not in GENERATED]
+    assert [link for link in local if not (path.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize(
+    ("name", "lines"), [("README.md", 120), ("RESULTS.md", 200), ("CHANGELOG.md", 60), ("docs/many-strings.md", 160)]
+)
+def test_documents_are_short(name: str, lines: int) -> None:
+    assert len(text(name).splitlines()) <= lines
+
+
+def test_sounds_and_pictures_are_small() -> None:
+    sounds, pictures = (ROOT / "docs" / name for name in ("sounds", "images"))
+    assert sum(path.stat().st_size for path in sounds.iterdir() if path.is_file()) < 1.5e6
+    assert all(path.stat().st_size < 6e5 for path in pictures.iterdir() if path.is_file())
+
+
+def commands() -> Iterator[tuple[str, list[str]]]:
+    """The command lines of all documents: where, and their words after the program's name."""
+    for path in DOCUMENTS:
+        for line in path.read_text("utf-8").splitlines():
+            if line.startswith("python3 run.py -- "):
+                yield path.name, shlex.split(line.removeprefix("python3 run.py -- "), comments=True)
+
+
+def test_commands_and_their_options_exist() -> None:
+    from app.commands.cli import cli
+
+    found = list(commands())
+    assert len(found) > 20
+    for where, words in found:
+        command: Any = typer.main.get_command(cli)
+        while words and hasattr(command, "commands"):
+            assert words[0] in command.commands, f"{where}: no command {words[0]!r}"
+            command = command.commands[words.pop(0)]
+        options = {option for each in command.params for option in each.opts} | {"--help"}
+        used = [word for word in words if word.startswith("--")]
+        assert not set(used) - options, f"{where}: {command.name} has no option {set(used) - options}"
+
+
+def test_presets_and_instruments_that_are_named_exist() -> None:
+    shipped = {path.stem for path in (ROOT / "presets").glob("*.safetensors")}
+    for where, words in commands():
+        if words[0] in ("render", "compare", "predict", "figure"):
+            presets = [word for word in words if re.match(r"(nylon|studio)_\w+$", word)]
+            presets = [word for word in presets if not (ROOT / "presets" / "strings" / f"{word}.toml").exists()]
+            assert not set(presets) - shipped, where
+
+
+def test_results_hold_the_tables_of_the_rows() -> None:
+    from training.results import RESULTS, read_results
+    from training.tables.compact import as_compact
+
+    tables = text("RESULTS.md").partition("<!-- tables -->\n\n")[2]
+    assert tables == as_compact(read_results(RESULTS)), "write them again: table --into RESULTS.md"
+
+
+def test_the_table_of_the_readme_is_of_the_results() -> None:
+    results = text("RESULTS.md")
+    rows = re.findall(
+        r"^\| ([\w ]+?)(?: \(ours\))? +\| (400|4000) +\| (.+?) \| (\S+) \| (\S+) \| (\d) \|$", text("README.md"), re.M
+    )
+    assert len(rows) == 8
+    for model, frames, start, paper, ours, seeds in rows:
+        part = results.partition(f"### {frames} frames")[2].partition("\n\n### ")[0]
+        cells = [[cell.strip(" *") for cell in line.split("|")[1:-1]] for line in part.splitlines()]
+        (found,) = (row for row in cells if row[:4] == ["nonlinear", model, start, seeds])
+        assert found[6].startswith(f"{ours} ({paper})"), found  # noise, 4 kHz
+
+
+def test_the_model_of_the_worked_example_is_a_linear_string() -> None:
+    from engine.models.base import Physics
+    from engine.resonators import StringParameters
+
+    (example,) = re.findall(r"```python\n(.*?)```", text("docs/models.md"), re.DOTALL)
+    names: dict[str, Any] = {"__name__": "damped_modes"}
+    exec(compile(example, "docs/models.md", "exec", dont_inherit=True), names)
+    resonator = StringParameters(0.65, 5.188e-07, 1.41e-13, 1140.0, 5.4e9, 8e-05, 1.4e-05, 60.97).resonator(25)
+    model = names["DampedModes"](names["DampedModesConfiguration"]())
+    model.initialise("physics", Physics(resonator, 16_000), torch.Generator().manual_seed(0))
+    start = torch.zeros(1, 101)
+    start[0, 1:-1] = torch.rand(99, generator=torch.Generator().manual_seed(0))
+    whole, last = model.advance(model.encode(start), 300)
+    first, state = model.advance(model.encode(start), 100)
+    second, end = model.advance(state, 200)
+    assert torch.allclose(whole, torch.cat([first, second], dim=1), atol=1e-6)
+    assert torch.allclose(last, end)
+    expected = torch.exp(300 * Physics(resonator, 16_000).log_eigenvalues)
+    assert torch.allclose(last / model.encode(start), expected, atol=1e-9)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_notebooks_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    matplotlib.use("agg")
+    names: dict[str, Any] = {"__name__": "__main__"}
+    for cell in json.loads(path.read_text("utf-8"))["cells"]:
+        if cell["cell_type"] == "code":
+            assert not cell["outputs"] and cell["execution_count"] is None, "clear the outputs before committing"
+            exec(compile("".join(cell["source"]), f"{path.name}:{cell['id']}", "exec", dont_inherit=True), names)
+    assert list(tmp_path.glob("*.png"))
+
+
+def test_the_run_of_the_documents_is_a_configuration(tmp_path: Path) -> None:
+    from training.cell import load
+
+    (example,) = re.findall(r"```toml\n(.*?)```", text("docs/reproduce.md"), re.DOTALL)
+    path = tmp_path / "my_run.toml"
+    path.write_text(example, encoding="utf-8")
+    assert load(str(path)).model == "koopman_var"

@@ -1,0 +1,109 @@
+"""Plain English: a word list over strings, comments and Markdown, the length of sentences, and commit subjects."""
+
+from __future__ import annotations
+
+import io
+import re
+import subprocess
+import tokenize
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PROSE = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
+CODE = sorted(
+    [
+        *(path for name in ("app", "engine", "training", "docs", "tests") for path in ROOT.glob(f"{name}/**/*.py")),
+        ROOT / "run.py",
+    ]
+)
+AVOIDED = {
+    r"told|tells": "report, show, state",
+    r"anew": "again",
+    r"whoever": "a noun",
+    r"errs?": "is off by, has an error of",
+    r"but for": "except",
+    r"go(es)? on": "continues",
+    r"lets? go": "release",
+    r"of before": "earlier, previous",
+    r"what is (heard|seen|given)": "a noun",
+    r"by which": "a noun, or a verb",
+    r"what hands do": "gestures",
+    # in the sense of compared with; a place is beside another
+    r"beside (the|its|our|their) (truth|paper\S*|physics|figures?)|(our|results|model) beside": "compared with",
+}
+WORDS = re.compile("|".join(rf"\b({words})\b" for words in AVOIDED), re.IGNORECASE)
+LONGEST = 30  # words of a sentence
+LONGEST_SUBJECT = 72
+SINCE = "5d41648"  # the last commit before subjects were checked
+SUBJECT = re.compile(r"[a-z][\w./, -]*: \S.*[^.]$")
+
+
+def written(path: Path) -> Iterator[tuple[int, str]]:
+    """The strings and comments of a Python file, with the line each starts in."""
+    for token in tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline):
+        if token.type in (tokenize.COMMENT, tokenize.STRING) or tokenize.tok_name[token.type] == "FSTRING_MIDDLE":
+            text = re.sub(r"``?[^`\n]*``?", "`code`", token.string)  # names in docstrings
+            if re.match(r"[rb]*f", text, re.IGNORECASE):
+                text = re.sub(r"\{[^{}]*\}", "{}", text)  # names in f-strings
+            if not re.fullmatch(r"\W*\w+\W*", text):  # one word names an argument or a field
+                yield token.start[0], text
+
+
+def prose(path: Path) -> Iterator[tuple[int, str]]:
+    """The lines of a Markdown file outside code."""
+    fenced = False
+    for number, line in enumerate(path.read_text("utf-8").splitlines(), 1):
+        fenced ^= line.lstrip().startswith("```")
+        if not fenced and not line.startswith("    "):
+            yield number, re.sub(r"\]\([^)]*\)", "]", re.sub(r"`[^`]*`", "`code`", line))
+
+
+def test_no_word_of_the_list_is_used() -> None:
+    found = []
+    for path in {*PROSE, *CODE} - {Path(__file__)}:
+        for first, text in prose(path) if path.suffix == ".md" else written(path):
+            for number, line in enumerate(text.splitlines(), first):
+                for hit in WORDS.finditer(line):
+                    remedy = next(
+                        plain for words, plain in AVOIDED.items() if re.fullmatch(words, hit[0], re.IGNORECASE)
+                    )
+                    found.append(f"{path.relative_to(ROOT)}:{number}: {hit[0]!r} (write: {remedy})")
+    assert not found, "\n" + "\n".join(found)
+
+
+def sentences(path: Path) -> Iterator[tuple[int, str]]:
+    """Sentences of a Markdown file's paragraphs and list items, with their line; no tables, no headings."""
+    number, words = 1, ""
+    for line_number, line in [*prose(path), (0, "")]:
+        if (
+            not line.strip()
+            or line.lstrip().startswith(("#", "|", "-", "*", "!", "```", "<!--"))
+            or re.match(r"\s*\d+\. ", line)
+        ):
+            yield from ((number, each) for each in re.split(r"(?<=[.!?:;])[*_)]*\s+", words) if each)
+            number, words = line_number, ""
+            if line.lstrip().startswith(("#", "|", "!", "```", "<!--")):
+                continue
+        words += " " + line.strip()
+
+
+@pytest.mark.parametrize("path", PROSE, ids=lambda path: path.name)
+def test_sentences_are_short(path: Path) -> None:
+    long = [(number, each) for number, each in sentences(path) if len(re.findall(r"\w[\w'’-]*", each)) > LONGEST]
+    assert not long, "\n" + "\n".join(f"{path.name}:{number}: {each}" for number, each in long)
+
+
+def test_commit_subjects_name_their_area_and_are_short() -> None:
+    done = subprocess.run(
+        ["git", "log", "--no-merges", "--format=%h %s", f"{SINCE}..HEAD"], cwd=ROOT, capture_output=True, text=True
+    )
+    if done.returncode:
+        pytest.skip("the history of commits is not here")
+    subjects = [line.partition(" ") for line in done.stdout.splitlines()]
+    wrong = [
+        f"{commit} {text}" for commit, _, text in subjects if len(text) > LONGEST_SUBJECT or not SUBJECT.match(text)
+    ]
+    assert not wrong, f"\nwrite 'area: imperative', at most {LONGEST_SUBJECT} characters:\n" + "\n".join(wrong)

@@ -1,0 +1,22 @@
+"""Synthetic notes, made once: the solver's string with a body, noise and a second polarisation."""
+
+from __future__ import annotations
+
+import pytest
+
+from training.recording.learn import Learned, learn
+from training.recording.preset import Source
+from training.recording.synthetic import SyntheticNote, synthetic_note
+
+SEED = 2  # 95 Hz
+
+
+@pytest.fixture(scope="session")
+def synthetic() -> SyntheticNote:
+    return synthetic_note(SEED)
+
+
+@pytest.fixture(scope="session")
+def learned(synthetic: SyntheticNote) -> Learned:
+    source = Source("note.wav", "0" * 64, synthetic.rate_hz, len(synthetic.samples))
+    return learn(synthetic.samples, synthetic.rate_hz, source, kind="guitar", length_m=0.65)

@@ -1,0 +1,117 @@
+"""What is learned of a note against its truth, its baselines, and its recording."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engine.presets import load_preset
+from training.recording.coverage import coverage
+from training.recording.fit import fit_note
+from training.recording.learn import Learned, learn
+from training.recording.numbering import number_note
+from training.recording.preset import Source, body_response, recorded_note, recorded_string, write_preset
+from training.recording.report import errors_of, figures
+from training.recording.synthetic import SyntheticNote
+from training.recording.table import as_data, as_text
+
+RECORDINGS = Path(__file__).parents[4] / "shared" / "recordings"
+
+
+def recorded_of(learned: Learned):  # type: ignore[no-untyped-def]
+    note = recorded_note(learned.note, learned.fitted, learned.source)
+    return recorded_string(note, learned.physics, learned.strung, learned.source, {}, figures(learned.report))
+
+
+def test_the_own_note_is_met_far_better_than_by_linear_poles(learned: Learned) -> None:
+    note, errors = learned.note, learned.report.errors
+    assert errors.esr < 2e-3
+    assert errors.distance_db < 4
+    series, _ = number_note(note)
+    linear = fit_note(note, series, free=0, glides=False)
+    truth = note.fitted()
+    found = linear.render(np.arange(len(truth)) / note.rate_hz)
+    assert errors.esr < 0.5 * errors_of(truth, found, note.rate_hz).esr
+
+
+def test_pitch_and_stiffness_are_the_strings(learned: Learned, synthetic: SyntheticNote) -> None:
+    assert abs(1200 * math.log2(learned.physics.f0_hz / synthetic.f0_hz)) < 3
+    assert learned.physics.stiffness == pytest.approx(synthetic.stiffness, rel=0.1)
+
+
+def test_intervals_hold_the_truth() -> None:
+    found = coverage((11, 12))  # `judge --synthetic 200` is the whole of it
+    assert found["misnumbered"] == 0 and found["partials"] > 20
+    assert min(found["hz"], found["decay"], found["level_db"]) > 0.85
+
+
+def test_a_note_survives_its_preset(learned: Learned, tmp_path: Path) -> None:
+    recorded = recorded_of(learned)
+    write_preset(tmp_path / "own.safetensors", "Own", learned.strung, recorded)
+    info = load_preset(tmp_path / "own.safetensors").info
+    assert info.recorded == recorded
+    assert info.recorded.digest == "0" * 64
+    sound = info.recorded.note.sound()
+    samples = learned.note.samples
+    assert len(sound) == len(samples)
+    begin = learned.note.onset + round(0.008 * learned.note.rate_hz)
+    truth, found = samples[begin : begin + 100_000], sound[begin : begin + 100_000]
+    assert float(np.sum((truth - found) ** 2) / np.sum(truth**2)) == pytest.approx(learned.report.errors.esr, rel=0.3)
+
+
+def test_modes_of_the_recorded_pitch_are_the_notes(learned: Learned) -> None:
+    recorded = recorded_of(learned)
+    resonator = recorded.resonator(learned.strung.string, 2 * len(recorded.cents))
+    hz = resonator.omega.numpy() / (2 * math.pi)
+    for each in learned.physics.partials[:6]:
+        lower = each.poles[0]
+        assert abs(1200 * math.log2(hz[2 * (each.number - 1)] / lower.hz)) < 0.5
+
+
+def test_a_body_is_finite_and_begins_at_once(learned: Learned) -> None:
+    response = body_response(learned.physics, learned.strung, 30, 48_000)
+    assert np.isfinite(response).all() and int(np.argmax(np.abs(response))) < 100
+
+
+def test_reports_are_plain(learned: Learned) -> None:
+    data = as_data(learned)
+    assert data["errors"]["esr"] == learned.report.errors.esr
+    assert any("density" in words for words in data["assumed"])
+    assert "error-to-signal ratio" in "\n".join(as_text(learned))
+
+
+def test_progress_may_cancel(synthetic: SyntheticNote) -> None:
+    class Cancelled(Exception):
+        pass
+
+    def stop(share: float) -> None:
+        if share > 0.2:
+            raise Cancelled
+
+    with pytest.raises(Cancelled):
+        learn(synthetic.samples, synthetic.rate_hz, Source("a", "0", 44_100, 1), progress=stop)
+
+
+def test_errors_ignore_one_gain_and_one_delay(synthetic: SyntheticNote) -> None:
+    sound = synthetic.samples[5_000:80_000]
+    moved = 0.5 * np.roll(sound, 20)
+    moved[:20] = 0
+    errors = errors_of(sound, moved, synthetic.rate_hz)
+    assert errors.esr < 1e-3
+    assert errors.delay_s == pytest.approx(-20 / synthetic.rate_hz, abs=1e-6)
+    assert errors_of(sound, sound, synthetic.rate_hz).distance_db == 0
+
+
+@pytest.mark.parametrize("name", ["bass_d2_fa", "guitar_wood_d4"])
+def test_real_notes(name: str) -> None:
+    path = RECORDINGS / f"{name}.flac"
+    if not path.is_file():
+        pytest.skip("the shared recordings are not here")
+    soundfile = pytest.importorskip("soundfile")
+    samples, rate_hz = soundfile.read(path)
+    learned = learn(samples, rate_hz, Source(path.name, "0" * 64, rate_hz, len(samples)))
+    assert learned.report.errors.esr < 0.05
+    assert learned.report.errors.distance_db < 5

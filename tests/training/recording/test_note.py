@@ -1,0 +1,37 @@
+"""What is no recording of a note is refused with the reason and the remedy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from training.recording.note import RecordingError, note_of
+from training.recording.synthetic import SyntheticNote
+
+
+@pytest.mark.parametrize(
+    ("samples", "rate_hz", "words"),
+    [
+        (np.zeros(44_100), 44_100, "silent"),
+        (np.full(44_100, np.nan), 44_100, "NaN"),
+        (np.ones(8_000 * 600), 8_000, "cut out one note"),
+        (np.ones(1_000), 44_100, "let the note ring"),
+        (np.ones(44_100), 4_000, "record at 44100"),
+    ],
+)
+def test_reasons_are_given(samples: np.ndarray, rate_hz: int, words: str) -> None:
+    with pytest.raises(RecordingError, match=words):
+        note_of(samples, rate_hz)
+
+
+def test_high_rates_are_converted_and_channels_combined(synthetic: SyntheticNote) -> None:
+    twice = np.repeat(synthetic.samples, 4)  # a crude 176.4 kHz
+    note = note_of(np.stack([twice, twice], 1), 4 * synthetic.rate_hz)
+    assert note.rate_hz == synthetic.rate_hz
+    assert note.onset == pytest.approx(0.1 * note.rate_hz, abs=0.005 * note.rate_hz)
+
+
+def test_the_louder_of_two_unlike_channels_is_taken(synthetic: SyntheticNote) -> None:
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(len(synthetic.samples))
+    note = note_of(np.stack([noise, synthetic.samples], 1), synthetic.rate_hz)
+    assert np.allclose(note.samples, synthetic.samples - synthetic.samples.mean())

@@ -1,0 +1,59 @@
+"""The same run twice gives the same weights, bit for bit: a run of each kind of start, loss and optimiser."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+import torch
+
+from engine.presets import load_preset
+from training.cell import Cell, configuration_of
+from training.data.dataset import Dataset
+from training.family.preset import FamilyConfiguration, train_preset
+from training.fitting.fit import fit
+
+DATA = {"count": 20, "steps": 450, "modes": 5}
+KINDS = {
+    "dmd_400": {},
+    "koopman_400": {"latent_epochs": 1},
+    "koopman_400_blind": {"latent_epochs": 1, "latent_polish": 1},
+    "koopman_400_paper": {},
+    "koopman_var_400": {},
+    "koopman_integrated_400": {},
+    "koopman_integrated_400_blind": {},
+    "lru_400": {},
+    "frnn_100": {"epochs": 1},
+    "fgru_20_paper": {"epochs": 1},
+}
+
+
+def digest(model: torch.nn.Module) -> str:
+    found = hashlib.sha256()
+    for name, weight in sorted(model.state_dict().items()):
+        found.update(name.encode() + weight.contiguous().numpy().tobytes())
+    return found.hexdigest()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_run_repeats_bit_for_bit(
+    kind: str, small_dataset: Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("training.fitting.pursuit.POLISH_ITERATIONS", 5)
+    cell = Cell.parse(f"nylon_nonlinear_gaussian_4k_{kind}")
+    assert cell is not None
+    made = configuration_of(cell, DATA, {"epochs": 2, **KINDS[kind]})
+    first, second = (digest(fit(made, small_dataset, tmp_path / folder).model) for folder in ("first", "second"))
+    assert first == second
+
+
+def test_a_model_of_many_strings_repeats_bit_for_bit(tmp_path: Path) -> None:
+    made = FamilyConfiguration(
+        "Two", "", 25, strings=2, validation_strings=1, test_strings=1, seconds=0.02, steps=1, first_s=0.01
+    )
+    digests = set()
+    for name in ("first", "second"):
+        train_preset(made, tmp_path / f"{name}.safetensors")
+        digests.add(digest(load_preset(tmp_path / f"{name}.safetensors").model))
+    assert len(digests) == 1

@@ -1,0 +1,69 @@
+"""The log of a run: a line for each epoch, also across interruptions."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+from engine.schema import SchemaError
+from engine.table import append_record, read_table, write_table
+from training.fitting.fit import Progress
+
+LARGEST_BYTES = 2**24
+DIGITS = 6  # of a figure in the log
+
+
+@dataclass(frozen=True)
+class Epoch:
+    """A line of the log; the errors are those of validation, where it was measured."""
+
+    epoch: int
+    horizon: int
+    learning_rate: float
+    loss: float | None = None
+    rel_mse: float | None = None
+    rel_mae: float | None = None
+    seconds: float = 0.0
+
+
+def read_log(path: Path) -> list[Epoch]:
+    """The epochs of a log; a line that is not whole, or holds a figure that is not finite, is left out.
+
+    Raises:
+        SchemaError: it is not a log.
+        OSError: it cannot be read.
+    """
+    lines = read_table(Epoch, path, "training log", LARGEST_BYTES, lines_apart=True)
+    return [line for line in lines if not isinstance(line, SchemaError)]
+
+
+class TrainingLog:
+    """A log that is written epoch by epoch. A run continues from its checkpoint, which may be older than its log."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._trimmed = False
+
+    def add(self, progress: Progress) -> None:
+        """Adds the epoch that has ended; later ones of an earlier run are dropped."""
+        validation = progress.validation
+        ended = Epoch(
+            progress.epoch,
+            progress.horizon,
+            _rounded(progress.learning_rate) or 0.0,
+            _rounded(progress.loss),
+            _rounded(validation.rel_mse) if validation else None,
+            _rounded(validation.rel_mae) if validation else None,
+            round(progress.seconds, 2),
+        )
+        if not self._trimmed:
+            kept = [line for line in read_log(self.path) if line.epoch < ended.epoch] if self.path.exists() else []
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            write_table(self.path, Epoch, kept)
+            self._trimmed = True
+        append_record(self.path, ended)
+
+
+def _rounded(value: float) -> float | None:
+    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else None

@@ -1,0 +1,189 @@
+"""The errors of many recordings in one table, with baselines; what is printed says how many recordings it is of.
+
+Each recording is learned alone. The baselines are linear: one and two poles a partial, of the same series, without
+glide and without free poles. The unseen half is the part from 1.25 s to the end of the fit, after a fit of the first
+1.25 s. A held-out take is played by another take's poles and glide, at one gain, one delay and one pitch.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import interpolate, optimize, signal
+
+from training.recording.fit import LearnedNote, fit_note
+from training.recording.gate import examine
+from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, Note, RecordingError, note_of
+from training.recording.numbering import number_note
+from training.recording.report import aligned, errors_of
+
+Array = NDArray[np.float64]
+Recordings = Mapping[str, tuple[Array, int]]
+
+HALF_S = 1.25
+COARSE_HZ = 8_000  # takes are compared below 4 kHz
+MOST_PITCH = 0.006  # that another take may be higher or lower, as a share
+MOST_DELAY_S = 0.012
+
+
+def evaluate(
+    recordings: Recordings, *, quick: bool = False, progress: Callable[[float], None] = lambda share: None
+) -> dict[str, Any]:
+    """Rows per recording and the figures' values, as plain data.
+
+    Args:
+        recordings: samples and rate by name.
+        quick: leaves out baselines, halves and takes.
+    """
+    rows: list[list[Any]] = []
+    values: dict[str, list[float]] = {}
+    notes: dict[str, tuple[Note, LearnedNote]] = {}
+    for number, (name, (samples, rate)) in enumerate(recordings.items()):
+        progress(number / len(recordings))
+        try:
+            row, note, learned = _row(name, samples, rate, values, quick)
+            notes[name] = note, learned
+        except RecordingError as error:
+            row = [name, str(error), *[None] * 7]
+        rows.append(row)
+    if not quick:
+        for first, second in itertools.permutations(notes, 2):
+            if first[:-1] == second[:-1]:
+                _takes(notes[first], notes[second], values)
+    progress(1.0)
+    return {"rows": rows, "values": values, "recordings": len(recordings)}
+
+
+def _row(
+    name: str, samples: Array, rate: int, values: dict[str, list[float]], quick: bool
+) -> tuple[list[Any], Note, LearnedNote]:
+    note = note_of(samples, rate)
+    series, peaks = number_note(note)
+    findings = examine(samples, note, series, peaks)
+    kinds = ", ".join(each.kind for each in findings) or "one note"
+    if series is None or not series.present or (findings and findings[-1].kind == "no_series"):
+        raise RecordingError(f"refused: {kinds}")
+    truth = note.fitted()
+    t = np.arange(len(truth)) / note.rate_hz
+
+    def error(learned: LearnedNote, begin_s: float = 0.0) -> float:
+        first = round(begin_s * note.rate_hz)
+        wrong = truth[first:] - learned.render(t[first:])
+        return float(wrong @ wrong / max(float(truth[first:] @ truth[first:]), 1e-30))
+
+    learned = fit_note(note, series)
+    errors = errors_of(truth, learned.render(t), note.rate_hz, note.noise_power)
+    found: dict[str, float | None] = {
+        "own note, ESR": errors.esr,
+        "own note from 50 ms, ESR": errors.late_esr,
+        "own note, log spectral distance in dB": errors.distance_db,
+        "linear, 1 pole a partial, ESR": None,
+        "linear, 2 poles a partial, ESR": None,
+        "unseen half, ESR": None,
+        "unseen half, linear, 2 poles, ESR": None,
+    }
+    if not quick:
+        linear = [fit_note(note, series, poles_a_partial=count, free=0, glides=False) for count in (1, 2)]
+        found["linear, 1 pole a partial, ESR"], found["linear, 2 poles a partial, ESR"] = map(error, linear)
+        if len(truth) > 1.3 * HALF_S * note.rate_hz:
+            half = fit_note(note, series, seconds=HALF_S)
+            linear_half = fit_note(note, series, seconds=HALF_S, poles_a_partial=2, free=0, glides=False)
+            found["unseen half, ESR"] = error(half, HALF_S)
+            found["unseen half, linear, 2 poles, ESR"] = error(linear_half, HALF_S)
+            _append(
+                values, "unseen half below linear, 2 poles", float(error(half, HALF_S) < error(linear_half, HALF_S))
+            )
+    for figure, value in found.items():
+        if value is not None:
+            _append(values, figure, value)
+    return [name, kinds, *found.values()], note, learned
+
+
+def _takes(first: tuple[Note, LearnedNote], second: tuple[Note, LearnedNote], values: dict[str, list[float]]) -> None:
+    """One take against another: the recordings, the poles with their amplitudes, and with amplitudes fitted again."""
+    (note, learned), (other, _) = first, second
+    if note.rate_hz != other.rate_hz:
+        return
+    truth, own = other.fitted(), note.fitted()
+    truth = truth[: len(own)]
+    step = max(1, note.rate_hz // COARSE_HZ)
+    rate = note.rate_hz / step
+    begins = note.onset / note.rate_hz + FIT_BEGINS_S
+    truth, samples = (
+        signal.decimate(each, step, ftype="fir") if step > 1 else each for each in (truth, note.samples)
+    )
+    t, whole = np.arange(len(truth)) / rate, np.arange(len(samples)) / rate - begins
+    take = interpolate.CubicSpline(whole, samples)
+    _append(values, "take against take, ESR", _held_out(truth, take, t, rate))
+    _append(values, "held-out take, ESR", _held_out(truth, learned.render, t, rate))
+    _append(values, "held-out take, amplitudes refitted, ESR", _refitted(truth, learned, t))
+
+
+def _held_out(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: float) -> float:
+    """The least ESR over one pitch, one gain and one delay."""
+
+    def left(pitch: float) -> float:
+        best, delay = np.inf, 0.0
+        for _ in range(3):
+            moved, _, more = aligned(truth, sound(np.maximum(t - delay, -0.008) * (1 + pitch)), rate_hz)
+            wrong = truth - moved
+            best = min(best, float(wrong @ wrong))
+            if abs(more) < 1e-5 or abs(delay + more) > MOST_DELAY_S:
+                break
+            delay += more
+        return best
+
+    grid = np.linspace(-MOST_PITCH, MOST_PITCH, 21)
+    place = min(grid, key=left)
+    step = float(grid[1] - grid[0])
+    found = optimize.minimize_scalar(
+        left, bounds=(place - step, place + step), method="bounded", options={"xatol": 2e-6}
+    )
+    return float(min(found.fun, left(place)) / max(float(truth @ truth), 1e-30))
+
+
+def _refitted(truth: Array, learned: LearnedNote, t: Array) -> float:
+    """The least ESR over one pitch and all amplitudes: poles alone carry over."""
+
+    def left(pitch: float) -> float:
+        tau = learned.glide.tau(t)
+        columns = []
+        for pole in learned.poles:
+            if pole.hz < 0.4 / (t[1] - t[0]):
+                shape = np.exp(pole.s * (1 + pitch) * tau if pole.partial else pole.s * t)
+                columns += [shape.real, -shape.imag]
+        matrix = np.stack(columns, 1)
+        square = matrix.T @ matrix
+        square[np.diag_indices_from(square)] *= 1 + 1e-6
+        right = matrix.T @ truth
+        return float(truth @ truth - right @ np.linalg.solve(square, right))
+
+    grid = np.linspace(-0.003, 0.003, 7)
+    place = min(grid, key=left)
+    step = float(grid[1] - grid[0])
+    found = optimize.minimize_scalar(
+        left, bounds=(place - step, place + step), method="bounded", options={"xatol": 1e-5, "maxiter": 8}
+    )
+    return float(max(0.0, min(found.fun, left(place))) / max(float(truth @ truth), 1e-30))
+
+
+def _append(values: dict[str, list[float]], name: str, value: float) -> None:
+    values.setdefault(name, []).append(value)
+
+
+def table(results: Mapping[str, Any]) -> list[Sequence[Any]]:
+    """Figure, median, 90th percentile, N."""
+    rows: list[Sequence[Any]] = []
+    for name, found in results["values"].items():
+        if name.startswith("unseen half below"):
+            rows.append((f"{name}, share", float(np.mean(found)), None, len(found)))
+        else:
+            rows.append((name, float(np.median(found)), float(np.percentile(found, 90)), len(found)))
+    return rows
+
+
+__all__ = ["FIT_LASTS_S", "evaluate", "table"]

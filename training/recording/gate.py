@@ -1,0 +1,223 @@
+"""Whether a recording is one note of a string, with reasons in words and what to do.
+
+Each check is one function of the sound; all are made, so that a musician reads every reason at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, signal
+
+from training.recording.note import Note, envelope
+from training.recording.numbering import Peaks, Series, chance, distances, number, tolerance
+
+Array = NDArray[np.float64]
+
+CLIPPED_RUNS = 3  # of so many equal samples at the peak
+CLIPPED_SAMPLES = 4
+SHORTEST_RINGING_S = 0.4
+LEAST_SNR_DB = 18.0
+ONSET_RISE_DB = 6.0
+LEAST_PARTIALS = 4
+LEAST_EXPLAINED = 0.3
+MOST_MISSING = 0.45
+SECOND_SERIES = 0.28  # see `second_series`
+LOUD_DB = -30.0  # of a second note's three loudest partials, below the loudest peak
+SLOWEST_ATTACK_S = 0.12
+LEAST_FILLED_DB = 20.0  # between partials, below them, half a second after the attack
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One reason against a recording, and the remedy; `kind` is a short name for tables."""
+
+    kind: str
+    reason: str
+    remedy: str
+
+
+def examine(samples: Array, note: Note, series: Series | None, peaks: Peaks) -> tuple[Finding, ...]:
+    """All reasons against a recording; empty: it is one note of a string."""
+    found = [
+        clipped(samples),
+        already_playing(note),
+        slow_attack(note),
+        reverberant(note, series),
+        too_short(note),
+        looped(note),
+        more_onsets(note, series),
+        no_series(series, peaks),
+    ]
+    if not any(found) and series is not None:
+        found.append(second_series(note, series, peaks))
+    return tuple(each for each in found if each is not None)
+
+
+def clipped(samples: Array) -> Finding | None:
+    """Runs of equal samples at the peak, as of a converter that is full."""
+    sound = np.asarray(samples, float)
+    sound = sound if sound.ndim == 1 else sound[:, int(np.argmax(np.nanmax(np.abs(sound), axis=0)))]
+    peak = float(np.nanmax(np.abs(sound)))
+    runs = 0
+    for sign in (1, -1):
+        full = sign * sound >= peak * (1 - 1e-4)
+        lengths = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], full.astype(int), [0]]))))[::2]
+        runs += int(np.sum(lengths[lengths >= CLIPPED_RUNS]))
+    if runs < CLIPPED_SAMPLES:
+        return None
+    return Finding(
+        "clipped", f"it is clipped ({runs} samples at the limit)", "lower the input gain and record it again"
+    )
+
+
+def already_playing(note: Note) -> Finding | None:
+    """Whether the waveform does not start from rest."""
+    if note.onset > round(0.01 * note.rate_hz):
+        return None
+    loudest = float(np.abs(note.samples[: round(0.3 * note.rate_hz)]).max())
+    if float(np.abs(note.samples[:3]).max()) < 0.2 * loudest:
+        return None
+    return Finding(
+        "playing", "the note is already playing where the file begins", "keep the silence before the attack"
+    )
+
+
+def slow_attack(note: Note) -> Finding | None:
+    """A level that rises for longer than any pluck: reversed, faded in, or bowed."""
+    level = envelope(note.samples, note.rate_hz, 0.02)
+    peak = int(np.argmax(level))
+    quiet = np.flatnonzero(level[:peak] < 0.3 * level[peak])
+    rise_s = (peak - (int(quiet[-1]) if len(quiet) else 0)) / note.rate_hz
+    if rise_s < SLOWEST_ATTACK_S:
+        return None
+    return Finding(
+        "edited",
+        f"its level rises for {rise_s:.2f} s: reversed, faded in or bowed",
+        "give a plucked note as it was recorded",
+    )
+
+
+def reverberant(note: Note, series: Series | None) -> Finding | None:
+    """Sound between the partials half a second after the attack, well above the noise: the room's."""
+    if series is None or note.seconds < 0.9 or len(series.present) < LEAST_PARTIALS:
+        return None
+    part = note.part(0.3, 0.9)
+    power = np.abs(np.fft.rfft(part * np.hanning(len(part)))) ** 2
+    hz = np.fft.rfftfreq(len(part), 1 / note.rate_hz)
+    noise = note.noise_power * float(np.sum(np.hanning(len(part)) ** 2))
+    partials = series.partials_hz(max(series.present))
+    ratios = []
+    for low, high in pairwise(partials[:12]):
+        quarter = 0.25 * (high - low)
+        between = float(np.median(power[(hz > low + quarter) & (hz < high - quarter)]))
+        peak = float(power[(hz > low - quarter) & (hz < low + quarter)].max())
+        if peak > 100 * noise:
+            ratios.append(10 * np.log10(peak / max(between - noise, 1e-30)))
+    if len(ratios) < 3 or float(np.median(ratios)) > LEAST_FILLED_DB:
+        return None
+    return Finding("reverberant", "a room rings between its partials", "record closer, or in a drier room")
+
+
+def too_short(note: Note) -> Finding | None:
+    """How long it stands out of its noise, and by how much."""
+    if note.seconds < SHORTEST_RINGING_S:
+        return Finding("short", f"it lasts only {note.seconds:.2f} s", "let the note ring for two seconds or more")
+    level = envelope(note.samples[note.onset :], note.rate_hz, 0.03)
+    noise = np.sqrt(note.noise_power)
+    snr_db = 20 * np.log10(float(level.max()) / max(noise, 1e-12))
+    if snr_db < LEAST_SNR_DB:
+        return Finding("noisy", f"it stands only {snr_db:.0f} dB above its noise", "record it closer, or louder")
+    above = np.flatnonzero(level > max(2 * noise, 1e-3 * float(level.max())))
+    seconds = float(above[-1]) / note.rate_hz if len(above) else 0.0
+    if seconds < SHORTEST_RINGING_S:
+        return Finding("short", f"it rings for only {seconds:.2f} s", "let the note ring for two seconds or more")
+    return None
+
+
+def looped(note: Note) -> Finding | None:
+    """Stretches that come back sample by sample, as a sampler's loop does."""
+    sound = note.samples[note.onset :]
+    block = round(0.08 * note.rate_hz)
+    if len(sound) < 6 * block:
+        return None
+    last = sound[-2 * block : -block] if not np.any(sound[-block:]) else sound[-block:]
+    energy = float(last @ last)
+    if energy <= 1e-12 * len(last):
+        return None
+    earlier = sound[: len(sound) - 2 * block]
+    if len(earlier) < block:
+        return None
+    products = signal.fftconvolve(earlier, last[::-1], mode="valid")
+    squares = signal.fftconvolve(earlier**2, np.ones(block), mode="valid")
+    # of a loop, the level is the same too; a decaying note's is lower by then
+    equal = 1 - (squares + energy - 2 * products) / energy
+    if float(equal.max()) < 0.999:
+        return None
+    return Finding(
+        "looped", "a stretch of it comes back sample by sample", "give the recording itself, not a sample loop"
+    )
+
+
+def more_onsets(note: Note, series: Series | None) -> Finding | None:
+    """A rise of level after the first attack, in any of four bands that together hold the note."""
+    rate = note.rate_hz
+    sound = note.samples[note.onset : note.onset + round(6 * rate)]
+    period = 1 / series.f0_hz if series is not None else 0.02
+    window = max(0.02, 2.5 * period)
+    noise = np.sqrt(note.noise_power)
+    rises = []
+    for low, high in ((60.0, 500.0), (500.0, 2_000.0), (2_000.0, 8_000.0)):
+        if high > 0.45 * rate:
+            continue
+        sections = signal.butter(2, (low, high), "bandpass", fs=rate, output="sos")
+        level = envelope(signal.sosfilt(sections, sound), rate, window)
+        step = max(1, round(0.005 * rate))
+        db = 20 * np.log10(level[::step] + 2 * noise + 1e-4 * float(level.max()))
+        apart = max(1, round(0.04 / 0.005))
+        rise = db[apart:] - db[:-apart]
+        begin = round(0.09 / 0.005)
+        before = ndimage.maximum_filter1d(rise[begin:], 3) if len(rise) > begin else np.zeros(1)
+        rises.append(before)
+    if not rises:
+        return None
+    shortest = min(map(len, rises))
+    # an attack is heard in two bands at once; beats of partials are not
+    together = np.sort(np.stack([each[:shortest] for each in rises]), axis=0)[-2]
+    if float(together.max()) < ONSET_RISE_DB:
+        return None
+    at = 0.09 + 0.005 * int(np.argmax(together))
+    return Finding("onsets", f"another attack begins {at:.2f} s after the first", "cut out a single note")
+
+
+def no_series(series: Series | None, peaks: Peaks) -> Finding | None:
+    """Whether its peaks are the partials of one stiff string."""
+    words = "its peaks are not the partials of one string"
+    remedy = "give one plucked note; drums, slaps and strums are no strings"
+    if series is None or len(series.present) < LEAST_PARTIALS:
+        return Finding("no_series", words, remedy)
+    if series.explained < LEAST_EXPLAINED or series.missing > MOST_MISSING:
+        return Finding(
+            "no_series", f"{words} ({series.explained:.0%} belong to a series at {series.f0_hz:.1f} Hz)", remedy
+        )
+    return None
+
+
+def second_series(note: Note, series: Series, peaks: Peaks) -> Finding | None:
+    """Whether what the first series leaves is a second one, or the series is the common sub-octave of two."""
+    rest = peaks.without(series)
+    other = number(rest) if len(rest.hz) >= 4 else None
+    if other is None:
+        return None
+    near = np.abs(distances(rest.hz, other.f0_hz, other.stiffness)) < tolerance(rest.hz, other.f0_hz, rest.width_hz)
+    if near.sum() < 3:
+        return None
+    loud_db = float(np.sort(rest.level_db[near])[-3:].mean() - peaks.level_db.max())
+    # what it explains more than any series of its spacing would, and how loud it is
+    if other.explained - chance(rest, other) + 0.02 * (loud_db - LOUD_DB) < SECOND_SERIES:
+        return None
+    words = f"a second note sounds at {other.f0_hz:.1f} Hz beside {series.f0_hz:.1f} Hz"
+    return Finding("chord", words, "record one note alone")

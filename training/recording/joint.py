@@ -1,0 +1,54 @@
+"""Several recordings of one instrument: what they share, and what each adds.
+
+The first gives the string and the recorded note. Takes of its pitch share their partials' corrections, by medians.
+Notes of every pitch share the smooth decay. So one take's accident does not become the instrument's.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from engine.resonators.recorded import OF_PARTIALS, RecordedString
+from engine.resonators.string import StringParameters
+from training.recording.learn import Learned
+from training.recording.physics import corrections
+from training.recording.preset import recorded_note, recorded_string
+from training.recording.report import figures
+
+SAME_PITCH_CENTS = 60.0
+
+
+def combined(learned: Sequence[Learned], settings: dict[str, Any]) -> RecordedString:
+    """What recordings add to the string of the first."""
+    first = learned[0]
+    note = recorded_note(first.note, first.fitted, first.source)
+    own = recorded_string(note, first.physics, first.strung, first.source, settings, figures(first.report))
+    others = [corrections(each.physics, _of_pitch(first.strung.string, first, each)) for each in learned[1:]]
+    if not others:
+        return own
+    hz = np.log(own.smooth_hz)
+    smooth = [np.log(own.smooth_ratio)]
+    smooth += [np.interp(hz, np.log(each["smooth_hz"]), np.log(each["smooth_ratio"])) for each in others]
+    same = [each for each, one in zip(others, learned[1:], strict=True) if abs(_cents(first, one)) < SAME_PITCH_CENTS]
+    shared: dict[str, Any] = {
+        name: tuple(
+            float(np.median([own_value, *(each[name][place] for each in same if place < len(each[name]))]))
+            for place, own_value in enumerate(getattr(own, name))
+        )
+        for name in OF_PARTIALS
+    }
+    return replace(own, smooth_ratio=tuple(np.exp(np.mean(smooth, axis=0)).tolist()), **shared)
+
+
+def _cents(first: Learned, other: Learned) -> float:
+    return 1200 * math.log2(other.physics.f0_hz / first.physics.f0_hz)
+
+
+def _of_pitch(string: StringParameters, first: Learned, other: Learned) -> StringParameters:
+    """The string, shortened to another note's pitch."""
+    return replace(string, length_m=string.length_m * first.physics.f0_hz / other.physics.f0_hz)

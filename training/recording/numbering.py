@@ -1,0 +1,245 @@
+"""Which peaks of a spectrum are the partials of one stiff string: f_k = k f0 √(1 + B k²).
+
+A global search over f0 and B, blind from 27 Hz to 4 kHz. Each candidate is scored by the peaks that it explains,
+and pays for partials that it predicts and the spectrum lacks; so neither an octave above nor one below wins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, signal
+
+from training.recording.note import Note
+
+Array = NDArray[np.float64]
+
+F0_RANGE_HZ = (26.0, 4_300.0)
+STIFFNESSES = np.concatenate([[0.0], np.geomspace(5e-6, 2.5e-3, 22)])
+COARSE = (0.0, 4e-5, 3e-4)  # of B, for the choice of f0 that are looked at closely
+MOST_PARTIALS = 80
+PRESENT_DB = 9.0  # above the local floor, for a peak that counts
+FULL_DB = 40.0  # above it a peak counts no more than at it
+MISSING = 0.55  # what a predicted partial costs that is not there, of a strong one
+SPECTRUM_S = 0.7
+LARGEST_STIFF_SHARE = 0.35  # of the last partial's rise over its harmonic
+
+
+@dataclass(frozen=True)
+class Series:
+    """The partials of a string.
+
+    Attributes:
+        f0_hz: of the ideal string without stiffness.
+        stiffness: B.
+        present: numbers of partials that stand out of the floor, ascending.
+        explained: share of the spectrum's peaks, weighted by their strength, that belong to it.
+        missing: share of the partials up to the last present one that do not stand out.
+        score: what the search maximised.
+    """
+
+    f0_hz: float
+    stiffness: float
+    present: tuple[int, ...]
+    explained: float
+    missing: float
+    score: float
+
+    def partials_hz(self, count: int) -> Array:
+        """The first partials' frequencies, (count,)."""
+        return partials_hz(self.f0_hz, self.stiffness, count)
+
+
+def partials_hz(f0_hz: float, stiffness: float, count: int) -> Array:
+    k = np.arange(1, count + 1)
+    return k * f0_hz * np.sqrt(1 + stiffness * k**2)
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """Peaks of a spectrum: frequencies, and dB above the local floor."""
+
+    hz: Array
+    above_db: Array
+    level_db: Array
+    width_hz: float
+    highest_hz: float
+    hidden_hz: Array = field(default_factory=lambda: np.zeros(0))  # where a peak would not be seen
+
+    @property
+    def strength(self) -> Array:
+        """From 0 for one that barely stands out to 1."""
+        return np.clip((self.above_db - PRESENT_DB / 2) / (FULL_DB - PRESENT_DB / 2), 0.0, 1.0)
+
+    def without(self, series: Series) -> Peaks:
+        """The peaks that a series does not explain."""
+        distance = distances(self.hz, series.f0_hz, series.stiffness)
+        kept = np.abs(distance) > tolerance(self.hz, series.f0_hz, self.width_hz)
+        hidden = series.partials_hz(MOST_PARTIALS)
+        return Peaks(self.hz[kept], self.above_db[kept], self.level_db[kept], self.width_hz, self.highest_hz, hidden)
+
+
+def distances(hz: Array, f0_hz: float, stiffness: float) -> Array:
+    """From each frequency to the nearest partial, in Hz."""
+    k = np.maximum(1, np.round(_number(hz, f0_hz, stiffness)))
+    return hz - k * f0_hz * np.sqrt(1 + stiffness * k**2)
+
+
+def _number(hz: Array, f0_hz: float, stiffness: float) -> Array:
+    """k as a real number with f_k = hz."""
+    ratio = (hz / f0_hz) ** 2
+    if stiffness < 1e-12:
+        return np.sqrt(ratio)
+    return np.sqrt((np.sqrt(1 + 4 * stiffness * ratio) - 1) / (2 * stiffness))
+
+
+def tolerance(hz: Array, f0_hz: float, width_hz: float) -> Array:
+    """How far a peak may lie from its partial: the resolution, and a share of the frequency, below the spacing."""
+    return np.minimum(np.maximum(1.2 * width_hz, 0.006 * hz), 0.2 * f0_hz)
+
+
+def peaks_of(samples: Array, rate_hz: int, noise_power: float = 0.0) -> Peaks:
+    """The peaks of a whole stretch of sound through a Hann window."""
+    window = np.hanning(len(samples) + 2)[1:-1]
+    size = 1 << (2 * len(samples) - 1).bit_length()
+    spectrum = np.abs(np.fft.rfft(samples * window, size)) ** 2
+    step = rate_hz / size
+    floor_power = noise_power * float(np.sum(window**2)) + 1e-13 * spectrum.max()
+    level = 10 * np.log10(spectrum + floor_power)
+    width_hz = 2 * rate_hz / len(samples)
+    highest_hz = min(0.45 * rate_hz, 10_000.0)
+    level = level[: int(highest_hz / step)]
+    # the floor: a low quantile over a stretch of at least 150 Hz, of a thinned spectrum
+    thin = max(1, round(width_hz / 4 / step))
+    thinned = level[: len(level) // thin * thin].reshape(-1, thin).max(1)
+    span = max(9, round(160.0 / (thin * step)))
+    floor = ndimage.percentile_filter(thinned, 35, size=span, mode="nearest")
+    floor = np.interp(
+        np.arange(len(level)), (np.arange(len(thinned)) + 0.5) * thin, ndimage.uniform_filter1d(floor, span)
+    )
+    found, _ = signal.find_peaks(level, distance=max(1, round(width_hz / 2 / step)))
+    found = found[(found > 1) & (found < len(level) - 2) & (found * step > 20.0)]
+    above = level[found] - floor[found]
+    found = found[(above > PRESENT_DB) & (level[found] > level.max() - 75)]
+    before, at, after = level[found - 1], level[found], level[found + 1]
+    shift = 0.5 * (before - after) / np.minimum(before - 2 * at + after, -1e-9)
+    return Peaks((found + shift) * step, at - floor[found], at, width_hz, highest_hz)
+
+
+def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Series | None:
+    """The series that explains most; None where there are no peaks."""
+    if len(peaks.hz) == 0:
+        return None
+    candidates = _candidates(peaks, f0_range_hz)
+    scored = sorted(((max(_score(peaks, f0, b)[0] for b in COARSE), f0) for f0 in candidates), reverse=True)
+    best: Series | None = None
+    for _, f0 in scored[:40]:
+        for stiffness in STIFFNESSES:
+            tried = series_at(peaks, f0, float(stiffness))
+            if best is None or tried.score > best.score:
+                best = tried
+    if best is None:
+        return None
+    for _ in range(3):
+        best = max((_refined(peaks, best), best), key=lambda each: each.score)
+    return best
+
+
+def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> Series:
+    """A series of given f0 and B with its score."""
+    score, explained, missing, present = _score(peaks, f0_hz, stiffness)
+    return Series(f0_hz, stiffness, present, explained, missing, score)
+
+
+def _candidates(peaks: Peaks, f0_range_hz: tuple[float, float]) -> Array:
+    order = np.argsort(-peaks.strength * (1 + 0.02 * peaks.level_db))[:12]
+    loud = np.argsort(-peaks.level_db)[:12]
+    chosen = np.unique(np.concatenate([order, loud]))
+    by_peak = (peaks.hz[chosen][:, None] / np.arange(1, 25)).ravel()
+    strong = np.sort(peaks.hz[np.argsort(-peaks.strength)[:25]])
+    apart = (strong[:, None] - strong[None]).ravel()
+    every = np.concatenate([by_peak, apart])
+    low, high = f0_range_hz
+    every = np.sort(every[(every >= low) & (every <= high)])
+    if len(every) == 0:
+        return every
+    kept = [every[0]]
+    for each in every[1:]:
+        if each > kept[-1] * 1.002:
+            kept.append(each)
+    return np.array(kept)
+
+
+def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, float, tuple[int, ...]]:
+    k_of = np.maximum(1, np.round(_number(peaks.hz, f0_hz, stiffness))).astype(int)
+    target = k_of * f0_hz * np.sqrt(1 + stiffness * k_of**2)
+    allowed = tolerance(peaks.hz, f0_hz, peaks.width_hz)
+    near = np.clip(1.5 * (1 - np.abs(peaks.hz - target) / allowed), 0.0, 1.0)
+    inside = (near > 0) & (k_of <= MOST_PARTIALS)
+    strength = peaks.strength
+    loudness = np.clip((peaks.level_db - peaks.level_db.max() + 60) / 60, 0.0, 1.0)
+    weight = strength * (0.3 + 0.7 * loudness)
+    best = np.zeros(MOST_PARTIALS + 1)
+    np.maximum.at(best, k_of[inside], (near * weight)[inside])
+    explained = float(best.sum() / max(weight.sum(), 1e-12))
+    present = np.flatnonzero(best > 0.02)
+    if len(present) == 0:
+        return -1.0, 0.0, 1.0, ()
+    # predicted ones that are not there, up to where most of the series' strength lies
+    share = np.cumsum(best) / best.sum()
+    last = int(np.searchsorted(share, 0.93))
+    count = max(last, 1)
+    absent = best[1 : count + 1] <= 0.02
+    if len(peaks.hidden_hz):
+        # near a partial of the other series nothing would be seen
+        expected = partials_hz(f0_hz, stiffness, count)
+        nearest = np.abs(expected[:, None] - peaks.hidden_hz[None]).min(1)
+        absent &= nearest > 1.5 * tolerance(expected, f0_hz, peaks.width_hz)
+    missing = float(absent.sum() / count)
+    first = 0.12 * float(absent[0])
+    score = explained - MISSING * missing - first - 0.04 * (len(present) < 3)
+    return score, explained, missing, tuple(int(each) for each in present)
+
+
+def _refined(peaks: Peaks, series: Series) -> Series:
+    """f0 and B by least squares on the peaks that it has, weighted by strength, outliers left out."""
+    k = np.maximum(1, np.round(_number(peaks.hz, series.f0_hz, series.stiffness)))
+    off = np.abs(distances(peaks.hz, series.f0_hz, series.stiffness))
+    used = (off < tolerance(peaks.hz, series.f0_hz, peaks.width_hz)) & (k <= MOST_PARTIALS)
+    if used.sum() < 3:
+        return series
+    k, hz, weight = k[used], peaks.hz[used], peaks.strength[used] + 0.05
+    # (f/k)² = f0² + f0² B k²
+    rows = np.stack([np.ones_like(k), k**2], 1)
+    scale = weight * k / hz  # errors in Hz are alike
+    for _ in range(3):
+        (square, slope), *_ = np.linalg.lstsq(rows * scale[:, None], (hz / k) ** 2 * scale, rcond=None)
+        if square <= 0:
+            return series
+        residual = np.abs((hz / k) ** 2 - rows @ np.array([square, slope])) * k / hz
+        scale = weight * k / hz / np.maximum(1.0, residual / (2 * np.median(residual) + 1e-9))
+    return series_at(peaks, float(np.sqrt(square)), float(max(0.0, slope / square)))
+
+
+def chance(peaks: Peaks, series: Series) -> float:
+    """The share of peaks that a series of this spacing would explain wherever they lay."""
+    return (
+        float(np.mean(2 * tolerance(peaks.hz, series.f0_hz, peaks.width_hz) / series.f0_hz)) if len(peaks.hz) else 1.0
+    )
+
+
+def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> tuple[Series | None, Peaks]:
+    """The series of a note, from spectra of two lengths; the shorter serves notes that end soon or glide."""
+    best: tuple[Series | None, Peaks] | None = None
+    for begin, length in ((0.06, SPECTRUM_S), (0.03, 0.25)):
+        length = min(length, 0.9 * (note.seconds - begin))
+        if length < 0.05:
+            continue
+        peaks = peaks_of(note.part(begin, begin + length), note.rate_hz, note.noise_power)
+        series = number(peaks, f0_range_hz)
+        better = series is not None and best is not None and (best[0] is None or series.score > best[0].score + 0.1)
+        if best is None or better:
+            best = series, peaks
+    return best if best is not None else (None, peaks_of(note.samples, note.rate_hz, note.noise_power))

@@ -1,0 +1,300 @@
+"""From a note's poles to its string: f0, B, decay over frequency, one product of glide, two polarisations.
+
+A sound gives these and no more. Length, density and millimetres are a gauge: any of them may be chosen, and tension,
+area, moduli and amplitude follow. They are asked for, else assumed and marked.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+
+from engine.resonators.recorded import MOST_CENTS, RATIOS
+from engine.resonators.string import StringParameters
+from training.recording.fit import LearnedNote
+from training.recording.refine import Pole
+
+Array = NDArray[np.float64]
+Kind = Literal["guitar", "bass", "harp", "piano"]
+
+SMOOTH_OCTAVES = 0.4  # half width of the window in which decays are averaged
+MOST_NODES = 24
+MOST_SPLIT_CENTS = 25.0  # between two polarisations
+MOST_DECAYS_APART = 8.0
+MOST_BESIDE_SMOOTH = 5.0
+LEAST_SHARE = 1e-8  # of the strongest partial's energy, for a partial whose decay counts
+
+
+@dataclass(frozen=True)
+class Build:
+    """What is assumed of a string that is only heard: its length, tension, and material."""
+
+    length_m: float
+    tension_n: float
+    density_kg_m3: float
+    youngs_modulus_pa: float
+
+
+BUILDS: dict[Kind, Build] = {
+    "guitar": Build(0.65, 70.0, 7850.0, 2.0e11),
+    "bass": Build(1.06, 200.0, 7850.0, 2.0e11),
+    "harp": Build(0.5, 120.0, 1140.0, 5.4e9),
+    "piano": Build(0.6, 700.0, 7850.0, 2.0e11),
+}
+
+
+@dataclass(frozen=True)
+class Partial:
+    """One partial of the note.
+
+    Attributes:
+        hz: mean over its energy.
+        decay: σ of the one exponential with the same centre of energy in time.
+        amplitude: |a| of its poles, summed.
+        energy: ∫ |z|².
+        poles: the lower one first; one or two.
+    """
+
+    number: int
+    hz: float
+    decay: float
+    amplitude: float
+    energy: float
+    poles: tuple[Pole, ...]
+
+
+@dataclass(frozen=True)
+class Physics:
+    """What the sound gives.
+
+    Attributes:
+        f0_hz, stiffness: with standard errors.
+        partials: ascending.
+        smooth_hz, smooth_decay: σ over frequency, a curve through all partials.
+        rise: share that the glide adds to all frequencies when the fit begins: the product of the tension's
+            coupling and the squared amplitude, which a sound cannot take apart.
+    """
+
+    f0_hz: float
+    f0_error_hz: float
+    stiffness: float
+    stiffness_error: float
+    partials: tuple[Partial, ...]
+    smooth_hz: tuple[float, ...]
+    smooth_decay: tuple[float, ...]
+    rise: float
+
+
+@dataclass(frozen=True)
+class Strung:
+    """A string with the sound's numbers in a chosen gauge.
+
+    Attributes:
+        amplitude_m: of the recorded pluck's rise of tension, as the peak of a triangle at `position`.
+        assumed: in words.
+    """
+
+    string: StringParameters
+    amplitude_m: float
+    position: float
+    assumed: tuple[str, ...]
+
+
+def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
+    """The partials with their poles; those without energy are left out."""
+    found = []
+    for number in sorted({pole.partial for pole in learned.poles if pole.partial}):
+        poles = _polarisations([pole for pole in learned.poles if pole.partial == number and pole.a])
+        if not poles:
+            continue
+        s, a = np.array([pole.s for pole in poles]), np.array([pole.a for pole in poles])
+        sums = s[:, None] + s[None].conj()
+        pairs = a[:, None] * a[None].conj()
+        energy = float((-pairs / sums).sum().real)
+        moment = float((pairs / sums**2).sum().real)
+        if energy <= 0 or moment <= 0:
+            continue
+        hz = float((-pairs * s[:, None] / sums).sum().imag / energy / (2 * math.pi))
+        found.append(Partial(number, hz, 0.5 * energy / moment, float(np.abs(a).sum()), energy, tuple(poles)))
+    loudest = max((each.energy for each in found), default=0.0)
+    return tuple(each for each in found if each.energy > LEAST_SHARE * loudest)
+
+
+def _polarisations(poles: list[Pole]) -> list[Pole]:
+    """The loudest pole of a partial and the one that may be its other polarisation, the lower one first.
+
+    A pole that is far off, or decays at another rate altogether, is the body's.
+    """
+    if not poles:
+        return []
+    main = max(poles, key=lambda pole: abs(pole.a) ** 2 / pole.decay)
+    kept = [
+        pole
+        for pole in poles
+        if abs(1200 * math.log2(pole.hz / main.hz)) < MOST_SPLIT_CENTS
+        and 1 / MOST_DECAYS_APART < pole.decay / main.decay < MOST_DECAYS_APART
+    ]
+    return sorted(kept, key=lambda pole: pole.hz)
+
+
+def physics_of(learned: LearnedNote) -> Physics:
+    """Fits f0, B and the decay over frequency to a note's partials."""
+    partials = partials_of(learned)
+    k = np.array([each.number for each in partials], float)
+    hz = np.array([each.hz for each in partials])
+    loudest = max(each.energy for each in partials)
+    weight = np.array([(each.energy / loudest) ** 0.15 for each in partials])
+    rows = np.stack([np.ones_like(k), k**2], 1)
+    if len(k) >= 3:
+        scale = weight * k / hz
+        for _ in range(8):
+            solution, *_ = np.linalg.lstsq(rows * scale[:, None], (hz / k) ** 2 * scale, rcond=None)
+            off = np.abs((hz / k) ** 2 - rows @ solution) * k / hz
+            scale = weight * k / hz / np.maximum(1.0, off / (2 * np.median(off) + 1e-9))
+        if solution[1] < 0:
+            solution = np.array([np.average((hz / k) ** 2, weights=scale**2), 0.0])
+        residual = ((hz / k) ** 2 - rows @ solution) * scale
+        covariance = np.linalg.pinv((rows * scale[:, None]).T @ (rows * scale[:, None]))
+        covariance *= float(residual @ residual) / max(1, len(k) - 2)
+        square, slope = solution
+        f0, stiffness = math.sqrt(square), slope / square
+        f0_error, stiffness_error = math.sqrt(covariance[0, 0]) / (2 * f0), math.sqrt(covariance[1, 1]) / square
+    else:
+        f0, stiffness = hz[0] / k[0] / math.sqrt(1 + learned.stiffness * k[0] ** 2), learned.stiffness
+        f0_error, stiffness_error = math.inf, math.inf
+    smooth_hz, smooth = _smooth(hz, np.array([each.decay for each in partials]), weight)
+    rise = float(learned.glide.shares.sum())
+    return Physics(f0, f0_error, stiffness, stiffness_error, partials, smooth_hz, smooth, max(0.0, rise))
+
+
+def _smooth(hz: Array, decay: Array, weight: Array) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Weighted mean of log σ in windows of octaves."""
+    count = min(MOST_NODES, len(hz))
+    nodes = np.geomspace(hz[0], hz[-1], count) if count > 1 else hz[:1]
+    values = []
+    for node in nodes:
+        near = weight * np.exp(-0.5 * (np.log2(hz / node) / SMOOTH_OCTAVES) ** 2) + 1e-12
+        order = np.argsort(decay)
+        share = np.cumsum(near[order]) / near.sum()
+        values.append(float(decay[order][np.searchsorted(share, 0.5)]))  # the weighted median bears outliers
+    return tuple(float(node) for node in nodes), tuple(values)
+
+
+def strung(physics: Physics, kind: Kind, length_m: float | None = None, gauge_mm: float | None = None) -> Strung:
+    """The string in a gauge.
+
+    Args:
+        length_m: of the sounding length; None: assumed.
+        gauge_mm: its diameter; None: assumed through the tension.
+    """
+    build, f0, assumed = BUILDS[kind], physics.f0_hz, []
+    length = length_m or build.length_m
+    if length_m is None:
+        assumed.append(f"length {length:g} m of a {kind}")
+    density = build.density_kg_m3
+    assumed.append(f"density {density:g} kg/m³")
+    if gauge_mm is not None:
+        area = math.pi * (gauge_mm / 2000) ** 2
+    else:
+        area = build.tension_n / (density * (2 * length * f0) ** 2)
+        assumed.append(f"tension {build.tension_n:g} N, and with it the gauge")
+    mass = density * area
+    tension = mass * (2 * length * f0) ** 2
+    modulus = build.youngs_modulus_pa
+    second_moment = max(physics.stiffness, 1e-9) * tension * length**2 / (math.pi**2 * modulus)
+    d1, d3 = _damping(physics, mass, length)
+    position = pluck_place(physics)
+    assumed.append(f"pluck at {position:.2f} or {1 - position:.2f} of the length: both sound alike")
+    # Σ η² q² of a triangle of height 1 at p is 1/(2 p (1 - p)) · 2/ℓ² · ℓ²/... = the mean square slope, twice
+    slope = 2 / (position * (1 - position) * length**2)  # Σ η² q² for a height of 1 m
+    wanted = 4 * physics.rise  # ΔT/T₀ at the height: the mean over a period is half, and of a frequency half of that
+    amplitude = math.sqrt(max(wanted, 1e-9) * 4 * tension / (modulus * area * slope))
+    low, high = 2e-4, 8e-3
+    if not low <= amplitude <= high:
+        chosen = min(max(amplitude, low), high)
+        effective = modulus * (amplitude / chosen) ** 2
+        second_moment *= modulus / effective
+        assumed.append(f"a pluck of {1000 * chosen:.2g} mm; the modulus, {effective:.2g} Pa, follows from the glide")
+        amplitude, modulus = chosen, effective
+    else:
+        assumed.append(f"modulus {modulus:.3g} Pa; the pluck, {1000 * amplitude:.2g} mm, follows from the glide")
+    string = StringParameters(length, area, second_moment, density, modulus, d1, d3, tension)
+    return Strung(string, amplitude, position, tuple(assumed))
+
+
+def _damping(physics: Physics, mass: float, length: float) -> tuple[float, float]:
+    """d₁ and d₃ with σ = (d₁ + d₃ η²)/2ρA, neither below 0, nearest to the smooth decay in its own measure."""
+    hz, sigma = np.array(physics.smooth_hz), np.array(physics.smooth_decay)
+    eta = 2 * math.pi * hz / (2 * length * physics.f0_hz)  # of a flexible string
+    rows = np.stack([np.ones_like(eta), eta**2], 1) / (2 * mass * sigma[:, None])
+    scale = np.linalg.norm(rows, axis=0)
+    found, _ = optimize.nnls(rows / scale, np.ones(len(sigma)))
+    d1, d3 = found / scale
+    least = 2 * mass * 0.02
+    return float(max(d1, least)), float(d3)
+
+
+def pluck_place(physics: Physics) -> float:
+    """Where a triangle was pulled, below one half, by the comb of the partials' amplitudes; it is a guess."""
+    k = np.array([each.number for each in physics.partials], float)
+    level = np.log([each.amplitude for each in physics.partials])
+    if len(k) < 6:
+        return 0.2
+    k, level = k[:40], level[:40]
+    smooth = np.stack([np.ones_like(k), np.log(k), np.log(k) ** 2, k], 1)
+    best = (math.inf, 0.2)
+    for place in np.linspace(0.06, 0.5, 111):
+        comb = np.log(np.maximum(np.abs(np.sin(math.pi * k * place)), 0.08))
+        solution, *_ = np.linalg.lstsq(smooth, level - comb, rcond=None)
+        left = float(np.sum((level - comb - smooth @ solution) ** 2))
+        best = min(best, (left, float(place)))
+    return round(best[1], 3)
+
+
+def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[float, ...]]:
+    """What the note's partials add to the law of its string, as `engine.resonators.recorded` keeps it."""
+    count = max(each.number for each in physics.partials)
+    omega = string.undamped_frequencies(count).numpy()
+    sigma = string.decay_rates(count).numpy()
+    law = np.interp(np.log(physics.smooth_hz), np.log(omega / (2 * math.pi)), np.log(sigma))
+    smooth_ratio = np.clip(np.array(physics.smooth_decay) / np.exp(law), *RATIOS)
+    smooth = sigma * np.exp(
+        np.interp(np.log(omega), np.log(2 * math.pi * np.array(physics.smooth_hz)), np.log(smooth_ratio))
+    )
+    shared = [each for each in physics.partials if len(each.poles) == 2]
+    split = float(np.median([_split(each.poles) for each in shared])) if shared else 0.0
+    slower = float(np.median([each.poles[1].decay / each.poles[0].decay for each in shared])) if shared else 1.0
+    cents, ratio = np.zeros(count), np.ones(count)
+    second_cents, second_ratio, share = np.full(count, split), np.full(count, slower), np.zeros(count)
+    for each in physics.partials:
+        place = each.number - 1
+        first = each.poles[0]
+        cents[place] = 1200 * math.log2(abs(first.s) / omega[place])
+        apart = first.decay / smooth[place]
+        if not 1 / MOST_BESIDE_SMOOTH < apart < MOST_BESIDE_SMOOTH:
+            continue  # of noise or the body, not of the string: it decays as its neighbours do
+        ratio[place] = apart
+        if len(each.poles) == 2:
+            second = each.poles[1]
+            second_cents[place] = _split(each.poles)
+            second_ratio[place] = second.decay / first.decay
+            share[place] = abs(second.a) / (abs(first.a) + abs(second.a))
+    return {
+        "smooth_hz": physics.smooth_hz,
+        "smooth_ratio": tuple(smooth_ratio.tolist()),
+        "cents": tuple(np.clip(cents, -MOST_CENTS, MOST_CENTS).tolist()),
+        "ratio": tuple(np.clip(ratio, *RATIOS).tolist()),
+        "second_cents": tuple(np.clip(second_cents, 0.0, MOST_CENTS).tolist()),
+        "second_ratio": tuple(np.clip(second_ratio, *RATIOS).tolist()),
+        "second_share": tuple(share.tolist()),
+    }
+
+
+def _split(poles: tuple[Pole, ...]) -> float:
+    """Cents between two poles."""
+    return 1200 * math.log2(poles[1].hz / poles[0].hz)

@@ -1,0 +1,327 @@
+"""Poles of a note by variable projection, in the spectrum of warped time.
+
+The spectrum of a decaying exponential over N samples is known in closed form, (1 - q^N)/(1 - q). So a note falls into
+bands, one around each partial, that are fitted each by itself in a few hundred bins; what other bands leak into it is
+subtracted. Amplitudes are linear and eliminated (Golub, Pereyra 1973; Kaufman 1975); steps are Levenberg's and
+Marquardt's. The glide is shared by all bands: its columns border their Jacobians, and a Schur complement eliminates
+all that belongs to one band alone.
+
+Poles that do not glide (body, neighbouring strings) bend in warped time. They are one more block, fitted together;
+their spectra are computed by FFT at a lower rate.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from training.recording.glide import CENTS, PRIOR_CENTS, Glide, basis, warped
+from training.recording.poles import subspace_poles
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+LEAST_DECAY = 0.05  # σ, in 1/s
+MOST_FREE_DECAY = 250.0
+WIDEST = 0.4  # σ of a string's pole, of a band's width in Hz
+RIDGE = 1e-4  # of the bins' squares, on amplitudes: two near poles must not cancel each other
+GLIDE_FIRMNESS = 1000.0  # how many times a residual counts that is correlated from bin to bin
+OVERLAP = 0.5  # of a band's width, that its fit looks into its neighbours
+LEAK_HZ = 4_000.0  # how far the strongest pole is followed into other bands
+COARSE = 8  # times fewer samples for free poles
+MOST_GLIDE = (-0.02, 0.08)  # of each share
+LARGEST_STEP = 60.0  # of ω in rad/s
+SETTLED = 1e-6  # of the energy: a band that gained less is visited less often
+REST = 3  # sweeps, for such a band
+
+
+@dataclass(frozen=True)
+class Pole:
+    """One pole s = -σ + iω in 1/s with its amplitude: Re(a exp(s τ)); partial 0: free, Re(a exp(s t))."""
+
+    s: complex
+    a: complex = 0j
+    partial: int = 0
+
+    @property
+    def hz(self) -> float:
+        return self.s.imag / (2 * math.pi)
+
+    @property
+    def decay(self) -> float:
+        return -self.s.real
+
+
+@dataclass
+class Fit:
+    """A note's poles while they are refined.
+
+    Attributes:
+        samples: that are fitted, (frames,).
+        edges_hz: of the bands, ascending, (partials + 1,).
+        partials_hz: where partials are expected, (partials,).
+        poles: of each band.
+        free: poles that do not glide.
+    """
+
+    samples: Array
+    rate_hz: int
+    edges_hz: Array
+    partials_hz: Array
+    glide: Glide
+    poles: list[list[Pole]] = field(default_factory=list)
+    free: list[Pole] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        bands = len(self.partials_hz)
+        self.poles = self.poles or [[] for _ in range(bands)]
+        self.damping, self.free_damping = np.full(bands, 1e-2), 1e-2
+        self.rests = np.zeros(bands, int)
+        self.width_hz = np.diff(self.edges_hz)
+        self.size = COARSE * fft.next_fast_len(math.ceil((1.04 * len(self.samples) + 64) / COARSE))
+        self.step_hz = self.rate_hz / self.size
+        first = np.floor((self.edges_hz[:-1] - OVERLAP * self.width_hz) / self.step_hz).astype(int)
+        last = np.ceil((self.edges_hz[1:] + OVERLAP * self.width_hz) / self.step_hz).astype(int)
+        self.highest = int(min(last.max(), self.size // 2))
+        self.bands = [slice(max(1, low), min(high, self.highest)) for low, high in zip(first, last, strict=True)]
+        self.omega = 2 * math.pi * self.step_hz * np.arange(self.highest)
+        self.turn = np.exp(-1j * self.omega / self.rate_hz)
+        self._look()
+
+    def _look(self) -> None:
+        data, self.times = warped(self.samples, self.rate_hz, self.glide)
+        self.count = len(data)
+        self.data = fft.rfft(data, self.size)[: self.highest]
+        self.last_turn = np.exp(-1j * self.omega * (self.count / self.rate_hz))
+        self.energy = float(np.sum(data**2)) * self.size / 2
+
+    def set_glide(self, glide: Glide) -> None:
+        self.glide = glide
+        self._look()
+
+    # Spectra
+
+    def spectra(self, pole: Pole, bins: slice, slope: bool = True) -> tuple[Complex, Complex]:
+        """Of exp(sτ) or exp(st), and of its derivative by s; each with that of the conjugate, (2, bins)."""
+        if pole.partial == 0:
+            return self._bent(pole, bins)
+        both = np.array([[pole.s], [pole.s.conjugate()]]) / self.rate_hz
+        q = np.exp(both) * self.turn[bins]
+        last = np.exp(both * self.count) * self.last_turn[bins]
+        below = 1 / (1 - q)
+        value = (1 - last) * below
+        return value, ((q * value - self.count * last) * below / self.rate_hz if slope else value)
+
+    def _bent(self, pole: Pole, bins: slice) -> tuple[Complex, Complex]:
+        """The sum over all samples by the trapezoidal rule over every eighth."""
+        t = self.times[::COARSE]
+        shape = np.exp(pole.s * t)
+        spectrum = COARSE * fft.fft(np.stack([shape, shape * t]), self.size // COARSE)
+        spectrum[0] -= (COARSE - 1) / 2 * shape[0]
+        most = self.size // (2 * COARSE)
+        index = np.arange(bins.start, bins.stop)
+        inside = index < most
+        value, slope = np.zeros((2, len(index)), complex), np.zeros((2, len(index)), complex)
+        value[0, inside], slope[0, inside] = spectrum[:, index[inside]]
+        value[1, inside], slope[1, inside] = spectrum[:, -index[inside]].conj()
+        return value, slope
+
+    def model(self, poles: list[Pole] | None = None, derivative: bool = False) -> Complex:
+        """The spectrum of poles, all by default, as far as they leak; or of their derivative by τ."""
+        chosen = self.every() if poles is None else poles
+        total = np.zeros(self.highest, complex)
+        loudest = max((abs(pole.a) for pole in chosen), default=0.0)
+        for pole in chosen:
+            if pole.a == 0:
+                continue
+            where = self.reach(pole, loudest)
+            value, _ = self.spectra(pole, where, slope=False)
+            a = pole.a * pole.s if derivative else pole.a
+            total[where] += 0.5 * (a * value[0] + a.conjugate() * value[1])
+        return total
+
+    def gliding(self) -> list[Pole]:
+        return [pole for band in self.poles for pole in band]
+
+    def every(self) -> list[Pole]:
+        return self.gliding() + self.free
+
+    def left(self) -> float:
+        """The share of the energy that the poles leave."""
+        residual = self.data - self.model()
+        above = self.energy - float(np.vdot(self.data, self.data).real)
+        return (float(np.vdot(residual, residual).real) + max(0.0, above)) / self.energy
+
+    # Steps
+
+    def start(self, number: int, count: int) -> list[Pole]:
+        """Poles of a band from its complex envelope, without amplitudes."""
+        first, last = (round(self.edges_hz[each] / self.step_hz) for each in (number, number + 1))
+        envelope = fft.ifft(self.data[first:last])
+        step = self.size / ((last - first) * self.rate_hz)
+        usable = int((last - first) * self.count / self.size)
+        found = subspace_poles(envelope[1 : max(2, usable - 1)], count)
+        poles = []
+        for z in found:
+            decay = -math.log(max(abs(z), 1e-9)) / step
+            hz = (first * self.step_hz) + np.mod(np.angle(z), 2 * math.pi) / (2 * math.pi * step)
+            if abs(hz - self.partials_hz[number]) < self._far_hz(number):
+                decay = min(max(decay, 0.3), 0.5 * WIDEST * self.width_hz[number])
+                poles.append(Pole(complex(-decay, 2 * math.pi * hz), partial=number + 1))
+        return poles
+
+    def _far_hz(self, number: int) -> float:
+        return 0.3 * float(self.width_hz[number])
+
+    def solve(self, poles: list[Pole], target: Complex, where: slice) -> tuple[float, list[Pole], Complex]:
+        """Amplitudes by least squares; the energy that they leave, the poles with them, and the residual."""
+        columns, _ = self.columns(poles, where)
+        amplitudes = _basis(columns) @ real_rows(target)
+        pairs = amplitudes.reshape(-1, 2)
+        solved = [replace(pole, a=complex(*pair)) for pole, pair in zip(poles, pairs, strict=True)]
+        residual = target - columns @ amplitudes
+        return float(np.vdot(residual, residual).real), solved, residual
+
+    def columns(self, poles: list[Pole], where: slice) -> tuple[Complex, Complex]:
+        """Of Re a, Im a of each pole, and of log σ, ω: (bins, 2 poles) each."""
+        linear, bent = [], []
+        for pole in poles:
+            value, slope = self.spectra(pole, where)
+            linear += [0.5 * (value[0] + value[1]), 0.5j * (value[0] - value[1])]
+            moved, mirrored = pole.a * slope[0], pole.a.conjugate() * slope[1]
+            bent += [0.5 * pole.s.real * (moved + mirrored), 0.5j * (moved - mirrored)]
+        return np.stack(linear, 1), np.stack(bent, 1)
+
+    def improved(
+        self, poles: list[Pole], target: Complex, where: slice, damping: float, number: int | None, tries: int = 2
+    ) -> tuple[list[Pole], float, float]:
+        """Poles after one step towards a target, the energy that is left, and the next damping."""
+        left, poles, residual = self.solve(poles, target, where)
+        columns, bent = self.columns(poles, where)
+        outside = bent - columns @ (_basis(columns) @ real_rows(bent))
+        jacobian = real_rows(outside)
+        square = jacobian.T @ jacobian
+        slope = jacobian.T @ real_rows(residual)
+        scale = np.diag(np.diag(square) + 1e-9 * np.trace(square) + 1e-300)
+        for _ in range(tries):
+            step: Array = np.asarray(np.linalg.solve(square + damping * scale, slope), np.float64).reshape(-1, 2)
+            moved = [self._moved(pole, each, number) for pole, each in zip(poles, step, strict=True)]
+            after, moved, _ = self.solve(moved, target, where)
+            if after < left:
+                return moved, after, max(1e-4, 0.3 * damping)
+            damping = min(1e4, 6 * damping)
+        return poles, left, damping
+
+    def _moved(self, pole: Pole, step: Array, number: int | None) -> Pole:
+        decay = pole.decay * math.exp(float(np.clip(step[0], -1.0, 1.0)))
+        omega = pole.s.imag + float(np.clip(step[1], -LARGEST_STEP, LARGEST_STEP))
+        if number is not None:
+            decay = min(max(decay, LEAST_DECAY), WIDEST * self.width_hz[number])
+            middle, far = (2 * math.pi * each for each in (self.partials_hz[number], self._far_hz(number)))
+            omega = min(max(omega, middle - far), middle + far)
+        else:
+            decay = min(max(decay, LEAST_DECAY), MOST_FREE_DECAY)
+            omega = min(max(omega, 2 * math.pi * 15.0), 0.8 * math.pi * self.rate_hz / COARSE)
+        return Pole(complex(-decay, omega), pole.a, pole.partial)
+
+    def part(self, poles: list[Pole], where: slice) -> Complex:
+        """The spectrum of poles in some bins."""
+        total = np.zeros(where.stop - where.start, complex)
+        for pole in poles:
+            value, _ = self.spectra(pole, where, slope=False)
+            total += 0.5 * (pole.a * value[0] + pole.a.conjugate() * value[1])
+        return total
+
+    def reach(self, pole: Pole, loudest: float) -> slice:
+        """The bins into which a pole leaks, compared with the loudest one."""
+        reach = 2.5 * float(self.width_hz.max()) + LEAK_HZ * abs(pole.a) / max(loudest, 1e-300) + pole.decay
+        low, high = (round((pole.hz + side * reach) / self.step_hz) for side in (-1, 1))
+        return slice(min(self.highest, max(1, low)), max(1, min(self.highest, high)))
+
+    def sweep(self, steps: int = 1) -> None:
+        """Steps of all bands in turn, each against what all others leave."""
+        residual = self.data - self.model()
+        loudest = max((abs(pole.a) for pole in self.every()), default=0.0)
+        for number, where in enumerate(self.bands):
+            before = self.poles[number]
+            if not before:
+                continue
+            if self.rests[number]:
+                self.rests[number] -= 1
+                continue
+            target = residual[where] + self.part(before, where)
+            had = float(np.vdot(residual[where], residual[where]).real)
+            after = before
+            for _ in range(steps):
+                after, left, self.damping[number] = self.improved(after, target, where, self.damping[number], number)
+            if had - left < SETTLED * self.energy:
+                self.rests[number] = REST
+            self.poles[number] = after
+            for sign, poles in ((1, before), (-1, after)):
+                for pole in poles:
+                    if pole.a:
+                        changed = self.reach(pole, loudest)
+                        residual[changed] += sign * self.part([pole], changed)
+
+    def sweep_free(self, steps: int = 1) -> None:
+        """Steps of all free poles together, against what the string leaves."""
+        if not self.free:
+            return
+        reach = max(pole.hz + 4 * pole.decay + 30 for pole in self.free)
+        where = slice(1, min(self.highest, round(reach / self.step_hz)))
+        target = self.data[where] - self.model(self.gliding())[where]
+        for _ in range(steps):
+            self.free, _, self.free_damping = self.improved(self.free, target, where, self.free_damping, None)
+
+    def step_glide(self) -> Glide:
+        """The glide that leaves less, to first order, when every pole of the string may follow."""
+        square, right, prior, _ = self._border()
+        step = np.linalg.solve(square + np.diag(prior), right - prior * self.glide.shares)
+        return Glide(np.clip(self.glide.shares + step, *MOST_GLIDE))
+
+    def glide_covariance(self) -> Array:
+        """Of the shares, (3, 3)."""
+        square, _, prior, variance = self._border()
+        return np.asarray(variance * np.linalg.inv(square + np.diag(prior)))
+
+    def _border(self) -> tuple[Array, Array, Array, float]:
+        """The glide's normal equations once all poles are eliminated, its prior, and the residual's variance."""
+        residual = self.data - self.model()
+        slope = self.model(self.gliding(), derivative=True)
+        slope = fft.irfft(np.pad(slope, (0, self.size // 2 + 1 - len(slope))), self.size)
+        shifted = basis(self.times).T * slope[: self.count]
+        columns = fft.rfft(shifted, self.size)[:, : self.highest].T
+        square, right = np.zeros((len(shifted), len(shifted))), np.zeros(len(shifted))
+        left, bins = 0.0, 0
+        for number, where in enumerate(self.bands):
+            if not self.poles[number]:
+                continue
+            own = np.concatenate([real_rows(part) for part in self.columns(self.poles[number], where)], 1)
+            own = own / (np.linalg.norm(own, axis=0) + 1e-300)
+            border, rest = real_rows(columns[where]), real_rows(residual[where])
+            inverse = np.linalg.pinv(own.T @ own, rcond=1e-9)
+            border, rest = border - own @ (inverse @ (own.T @ border)), rest - own @ (inverse @ (own.T @ rest))
+            square += border.T @ border
+            right += border.T @ rest
+            left += float(rest @ rest)
+            bins += 2 * (where.stop - where.start)
+        variance = left / max(bins, 1)
+        return square, right, variance * GLIDE_FIRMNESS / (PRIOR_CENTS * CENTS) ** 2, variance
+
+
+def real_rows(columns: Complex) -> Array:
+    """Real parts above imaginary ones."""
+    return np.concatenate([columns.real, columns.imag])
+
+
+def _basis(columns: Complex) -> Array:
+    """(2 poles, 2 bins): from real values to the amplitudes of their projection."""
+    a = real_rows(columns)
+    square = a.T @ a
+    square[np.diag_indices_from(square)] *= 1 + RIDGE
+    square[np.diag_indices_from(square)] += 1e-300
+    return np.asarray(np.linalg.solve(square, a.T), np.float64)

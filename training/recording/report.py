@@ -1,0 +1,226 @@
+"""How near a learned note is to its recording, in numbers that anybody can compute again.
+
+All are of the note as `render NAME out.wav --as-recorded` gives it, without any remainder of the attack.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, signal
+
+from training.recording.fit import LearnedNote
+from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, Note
+from training.recording.physics import Physics
+
+Array = NDArray[np.float64]
+
+LATE_S = 0.05  # after the onset: the second ESR begins here
+MOST_DELAY_S = 0.002
+SPECTRA = 2048  # of the log spectral distance; hop a quarter
+FLOOR_DB = -80.0  # below a recording's loudest bin, or its noise, whichever is higher
+STFT_SIZES = (512, 1024, 2048, 4096)
+BANDS_HZ = (31.5, 63.0, 125.0, 250.0, 500.0, 1_000.0, 2_000.0, 4_000.0, 8_000.0)
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Of one sound against another.
+
+    Attributes:
+        esr, late_esr: error-to-signal ratio after one gain and one delay, from 8 ms and from 50 ms after the onset.
+        distance_db: log spectral distance.
+        stft: multi-resolution STFT: spectral convergence plus mean absolute log magnitude.
+        gain_db, delay_s: that were applied.
+    """
+
+    esr: float
+    late_esr: float
+    distance_db: float
+    stft: float
+    gain_db: float
+    delay_s: float
+
+
+@dataclass(frozen=True)
+class Band:
+    """Decay of an octave: T60 of the recording and of the learned note, in s; nan where it does not decay."""
+
+    hz: float
+    recorded_s: float
+    learned_s: float
+
+
+@dataclass(frozen=True)
+class PartialReport:
+    """One partial: at rest, with 95 % intervals.
+
+    Attributes:
+        cents: from the law of f0 and B.
+        level_db: of its energy, below the loudest partial's.
+        decay: σ in 1/s of the one exponential with the same centre of energy.
+        poles: that it is made of.
+    """
+
+    number: int
+    hz: float
+    hz_interval: tuple[float, float]
+    cents: float
+    level_db: float
+    level_interval_db: tuple[float, float]
+    decay: float
+    decay_interval: tuple[float, float]
+    poles: int
+
+
+@dataclass(frozen=True)
+class Report:
+    """Of one learned note."""
+
+    errors: Errors
+    noise_esr: float
+    bands: tuple[Band, ...]
+    partials: tuple[PartialReport, ...]
+
+
+def report_of(note: Note, learned: LearnedNote, physics: Physics) -> Report:
+    """Compares a note with its recording."""
+    truth = note.fitted()
+    found = learned.render(np.arange(len(truth)) / note.rate_hz)
+    errors = errors_of(truth, found, note.rate_hz, note.noise_power)
+    noise = note.noise_power * len(truth) / max(float(truth @ truth), 1e-30)
+    return Report(
+        errors, noise, bands_of(truth, found, note.rate_hz, note.noise_power), partials_in(learned, physics)
+    )
+
+
+def partials_in(learned: LearnedNote, physics: Physics) -> tuple[PartialReport, ...]:
+    """The partials of a note that have an interval."""
+    spreads = learned.spreads
+    levels = {number: sum(each.level_db) / 2 for number, each in spreads.items()}
+    loudest = max(levels.values(), default=0.0)
+    found = []
+    for number in sorted(spreads):
+        each = spreads[number]
+        law = number * physics.f0_hz * math.sqrt(1 + physics.stiffness * number**2)
+        hz = sum(each.hz) / 2
+        low, high = each.level_db
+        decay = math.sqrt(each.decay[0] * each.decay[1])
+        poles = sum(pole.partial == number for pole in learned.poles)
+        interval = low - loudest, high - loudest
+        cents = 1200 * math.log2(hz / law)
+        found.append(
+            PartialReport(number, hz, each.hz, cents, levels[number] - loudest, interval, decay, each.decay, poles)
+        )
+    return tuple(found)
+
+
+def errors_of(truth: Array, found: Array, rate_hz: int, noise_power: float = 0.0) -> Errors:
+    """Of sounds of one length that begin 8 ms after the onset."""
+    moved, gain, delay = aligned(truth, found, rate_hz)
+    wrong = truth - moved
+    late = round((LATE_S - FIT_BEGINS_S) * rate_hz)
+    return Errors(
+        float(wrong @ wrong / max(float(truth @ truth), 1e-30)),
+        float(wrong[late:] @ wrong[late:] / max(float(truth[late:] @ truth[late:]), 1e-30)),
+        log_spectral_distance(truth, moved, noise_power),
+        multi_resolution(truth, moved),
+        20 * math.log10(max(abs(gain), 1e-9)),
+        delay,
+    )
+
+
+def aligned(truth: Array, found: Array, rate_hz: float) -> tuple[Array, float, float]:
+    """`found` with the gain and the delay, below 2 ms, that leave the least; the gain, and the delay in s."""
+    size = fft.next_fast_len(2 * len(truth), real=True)
+    theirs, ours = fft.rfft(truth, size), fft.rfft(found, size)
+    cross = fft.irfft(theirs * ours.conj(), size)
+    most = round(MOST_DELAY_S * rate_hz)
+    lags = np.arange(-most, most + 1)
+    place = int(np.argmax(cross[lags]))
+    shift = 0.0
+    if 0 < place < len(lags) - 1:
+        before, at, after = cross[lags[place - 1 : place + 2]]
+        shift = 0.5 * (before - after) / min(before - 2 * at + after, -1e-30)
+    delay = float(lags[place] + shift)
+    turn = np.exp(-2j * math.pi * np.arange(len(ours)) * delay / size)
+    moved = fft.irfft(ours * turn, size)[: len(truth)] if abs(delay) > 1e-3 else found
+    gain = float(truth @ moved / max(float(moved @ moved), 1e-30))
+    return gain * moved, gain, delay / rate_hz
+
+
+def _spectra(sound: Array, size: int) -> Array:
+    """Magnitudes through Hann windows, (bins, frames)."""
+    padded = np.pad(sound, (0, max(0, size - len(sound))))
+    frames = np.lib.stride_tricks.sliding_window_view(padded, size)[:: size // 4]
+    return np.abs(fft.rfft(frames * signal.get_window("hann", size), axis=1)).T
+
+
+def log_spectral_distance(truth: Array, found: Array, noise_power: float = 0.0) -> float:
+    """Root mean square over bins of the difference in dB, mean over frames; levels below the floor count as it."""
+    theirs, ours = _spectra(truth, SPECTRA), _spectra(found, SPECTRA)
+    window = signal.get_window("hann", SPECTRA)
+    floor = max(float(theirs.max()) * 10 ** (FLOOR_DB / 20), math.sqrt(noise_power * float(window @ window)), 1e-12)
+    difference = 20 * np.log10(np.maximum(theirs, floor) / np.maximum(ours, floor))
+    heard = (np.maximum(theirs, ours) > floor).any(axis=1)
+    return float(np.sqrt(np.mean(difference[heard] ** 2, axis=0)).mean()) if heard.any() else 0.0
+
+
+def multi_resolution(truth: Array, found: Array) -> float:
+    """Yamamoto, Song, Kim 2020, over four sizes of windows."""
+    total = 0.0
+    for size in STFT_SIZES:
+        theirs, ours = _spectra(truth, size), _spectra(found, size)
+        floor = 1e-4 * float(theirs.max()) + 1e-12
+        total += float(np.linalg.norm(theirs - ours) / max(float(np.linalg.norm(theirs)), 1e-30))
+        total += float(np.abs(np.log(np.maximum(theirs, floor) / np.maximum(ours, floor))).mean())
+    return total / len(STFT_SIZES)
+
+
+def bands_of(truth: Array, found: Array, rate_hz: int, noise_power: float) -> tuple[Band, ...]:
+    """T60 of each octave that the recording decays in by 10 dB or more."""
+    bands = []
+    for hz in BANDS_HZ:
+        if hz * math.sqrt(2) > 0.45 * rate_hz:
+            continue
+        sections = signal.butter(3, (hz / math.sqrt(2), hz * math.sqrt(2)), "bandpass", fs=rate_hz, output="sos")
+        share = 2 * hz / math.sqrt(2) / rate_hz
+        theirs = _t60(signal.sosfilt(sections, truth), rate_hz, noise_power * share)
+        if math.isfinite(theirs):
+            bands.append(Band(hz, theirs, _t60(signal.sosfilt(sections, found), rate_hz, noise_power * share)))
+    return tuple(bands)
+
+
+def _t60(sound: Array, rate_hz: int, noise_power: float) -> float:
+    """From the slope of the backward integral (Schroeder 1965) between -2 and -22 dB, or as far as its noise lets."""
+    power = np.maximum(sound**2 - noise_power, -noise_power)
+    left = np.cumsum(power[::-1])[::-1]
+    if left[0] <= 0 or left[0] < 30 * noise_power * rate_hz * 0.05:
+        return math.nan
+    db = 10 * np.log10(np.maximum(left, 1e-30) / left[0])
+    first = int(np.argmax(db < -2.0))
+    for depth in (22.0, 12.0):
+        last = int(np.argmax(db < -depth))
+        if last > first + rate_hz // 50 and last < 0.95 * len(db):
+            t = np.arange(first, last) / rate_hz
+            slope = float(np.polyfit(t, db[first:last], 1)[0])
+            return -60 / slope if slope < 0 else math.nan
+    return math.nan
+
+
+def figures(report: Report) -> dict[str, float]:
+    """The report's main numbers, by name."""
+    e = report.errors
+    return {
+        "esr": e.esr,
+        "esr_from_50_ms": e.late_esr,
+        "log_spectral_distance_db": e.distance_db,
+        "stft": e.stft,
+        "noise_esr": report.noise_esr,
+        "gain_db": e.gain_db,
+        "delay_s": e.delay_s,
+        "fit_s": FIT_LASTS_S,
+    }

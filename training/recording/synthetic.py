@@ -1,0 +1,107 @@
+"""Synthetic recordings of which all is known: the project's own solver, a body, noise, a second polarisation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+
+from engine.resonators.base import Resonator
+from engine.resonators.string import StringParameters
+from engine.truth.splitting import SplittingSolver
+from engine.truth.state import ModalState
+from training.recording.note import FIT_BEGINS_S
+
+Array = NDArray[np.float64]
+
+RATE_HZ = 44_100
+HIGHEST_HZ = 4_000.0
+LEAD_S = 0.1
+SUBSTEPS = 4
+
+
+@dataclass(frozen=True)
+class TruePartial:
+    """At rest, from 8 ms on: mean frequency over its energy, σ of the same centre of energy, level of it in dB."""
+
+    number: int
+    hz: float
+    decay: float
+    level_db: float
+
+
+@dataclass(frozen=True)
+class SyntheticNote:
+    """A recording and its truth."""
+
+    samples: Array
+    rate_hz: int
+    f0_hz: float
+    stiffness: float
+    partials: tuple[TruePartial, ...]
+
+
+def synthetic_note(seed: int, seconds: float = 2.8, snr_db: float = 50.0, rise_cents: float = 15.0) -> SyntheticNote:
+    """A note drawn by its seed: a string of 60 to 350 Hz, plucked anywhere, two polarisations, six body modes."""
+    random = np.random.default_rng(seed)
+    f0 = float(np.exp(random.uniform(math.log(60), math.log(350))))
+    stiffness = float(10 ** random.uniform(-5, -3.7))
+    count = max(3, min(30, int(HIGHEST_HZ / f0)))
+    length, mass, modulus, area = 0.65, 1e-3, 2e11, 1e-7
+    tension = mass * (2 * length * f0) ** 2
+    d1 = 2 * mass * random.uniform(0.6, 2.0)
+    d3 = 2 * mass * random.uniform(1.0, 4.0) / (math.pi * 1_000 / (f0 * length)) ** 2
+    second = stiffness * tension * length**2 / (math.pi**2 * modulus)
+    string = StringParameters(length, area, second, mass / area, modulus, d1, d3, tension)
+    law = string.resonator(count, grid_points=count + 2)
+    split = 2 ** (random.uniform(0.4, 2.0, count) / 1200)
+    slower = np.exp(random.uniform(-0.7, 0.7, count))  # than the first, or faster
+    pair = torch.arange(2 * count) // 2
+    omega = np.stack([law.omega.numpy(), law.omega.numpy() * split], 1).ravel()
+    sigma = np.stack([law.sigma.numpy(), law.sigma.numpy() * slower], 1).ravel()
+    resonator = Resonator(
+        torch.from_numpy(omega),
+        torch.from_numpy(sigma),
+        law.coupling[pair],
+        law.stretch[pair],
+        law.tension_rise,
+        law.shapes[pair],
+        law.analysis[:, pair],
+    )
+    k = np.arange(1, count + 1)
+    place, listened = random.uniform(0.08, 0.4), random.uniform(0.05, 0.12)
+    shape = np.sin(math.pi * k * place) / k**2
+    share = random.uniform(0.25, 0.75)
+    q = np.stack([share * shape, (1 - share) * shape], 1).ravel()
+    wanted = 4 * (2 ** (rise_cents * random.uniform(0, 1) / 1200) - 1)
+    q *= math.sqrt(max(wanted, 1e-9) / float(resonator.relative_tension_rise(torch.from_numpy(q))))
+    solver = SplittingSolver(resonator, RATE_HZ, substeps=SUBSTEPS, silence=1e-7)
+    state = ModalState(torch.from_numpy(q)[None], torch.zeros(1, 2 * count, dtype=torch.float64))
+    modes = solver.solve(state, round(seconds * RATE_HZ))[0].numpy()
+    heard = np.repeat(k * np.sin(math.pi * k * listened), 2)
+    sound = modes @ heard
+    scale = 0.3 / float(np.abs(sound).max())
+    sound = scale * sound
+    t = np.arange(len(sound)) / RATE_HZ
+    for _ in range(6):
+        hz, quality = math.exp(random.uniform(math.log(90), math.log(900))), random.uniform(10, 40)
+        phase, level = random.uniform(0, 2 * math.pi), 0.3 * 10 ** (random.uniform(-36, -20) / 20)
+        sound += level * np.exp(-math.pi * hz / quality * t) * np.sin(2 * math.pi * hz * t + phase)
+    noise = float(np.sqrt(np.mean(sound[:RATE_HZ] ** 2))) * 10 ** (-snr_db / 20)
+    sound = np.concatenate([np.zeros(round(LEAD_S * RATE_HZ)), sound]) + noise * random.standard_normal(
+        len(sound) + round(LEAD_S * RATE_HZ)
+    )
+    partials = _truth(scale * heard * q, omega, sigma)
+    return SyntheticNote(sound, RATE_HZ, f0, stiffness, partials)
+
+
+def _truth(amplitude: Array, omega: Array, sigma: Array) -> tuple[TruePartial, ...]:
+    from training.recording.intervals import figures_of
+
+    s = -sigma + 1j * np.sqrt(omega**2 - sigma**2)
+    a = amplitude * np.exp(s.real * FIT_BEGINS_S)
+    hz, decay, level = figures_of(a.astype(complex).reshape(-1, 2), -s.real.reshape(-1, 2), s.imag.reshape(-1, 2))
+    return tuple(TruePartial(n + 1, float(hz[n]), float(decay[n]), float(level[n])) for n in range(len(hz)))

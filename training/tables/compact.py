@@ -1,0 +1,115 @@
+"""One table per horizon as Markdown: our error, the paper's, their ratio, and what the start was given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from training.cell import MODEL_NAMES
+from training.results import Row
+from training.tables.markdown import markdown_table
+from training.tables.paper import COLUMNS, HORIZONS, Column, Figure, factor, mark
+from training.tables.sections import NOT_RUN, Line, RecipeChoice, Section, rows_of, sections
+
+NONE = "—"
+METRIC_NAMES = {"rel_mse": "MSE", "rel_mae": "MAE"}
+LEGEND = """\
+Each cell is our relative {metric} on the validation split, the paper's in brackets, and their ratio. The paper's are
+means of five seeds (its Table 3). **Bold** is better and *italic* worse than the paper, by more than both deviations
+together; the others are equal. {none}: the paper has no such model."""
+STARTS = {
+    "physics": "linear string",
+    "matching pursuit": "modes of the string",
+    "averaging": "averaged equations",
+}
+
+
+def as_compact(rows: Sequence[Row], recipe: RecipeChoice = "all", metric: str = "rel_mse") -> str:
+    """The tables of one metric, a line per model and recipe that was trained on the table's own horizon."""
+    found = sections(rows, recipe)
+    parts = [LEGEND.format(metric=METRIC_NAMES[metric], none=NONE)]
+    for horizon in HORIZONS:
+        shown = [section for section in found if section.horizon == horizon]
+        parts.append(f"### {horizon} frames, relative {METRIC_NAMES[metric]}")
+        head = ["string", "model", "start was given", "seeds", *map(str, COLUMNS)]
+        parts.append(markdown_table(head, [line for section in shown for line in _lines(section, metric)]))
+    parts.append("### Missing cells\n\n" + _missing(found))
+    if out := len(rows) - len(rows_of(found)):
+        parts.append(
+            f"{out} of {len(rows)} rows of the results file are not shown: other data, another horizon or recipe, "
+            "a trial, or a recipe that has changed since."
+        )
+    return "\n\n".join(parts) + "\n"
+
+
+def given(line: Line) -> str:
+    """What the start of a line's runs was given of the string, in words."""
+    if line.model == "dmd":
+        return "fitted"
+    words = STARTS.get(line.initialisation, line.initialisation) if line.structured else "displacement only"
+    if line.initialisation == "paper":
+        words = "random weights"
+    if line.recipe == "paper":
+        words += ", paper's recipe"
+    return f"{words} §" if line.hints else words
+
+
+def own_lines(section: Section) -> list[Line]:
+    """The lines of a section that were trained on its own horizon, by model."""
+    own = [line for line in section.lines if line.trained == section.horizon]
+    return [line for model in section.models for line in own if line.model == model]
+
+
+def _lines(section: Section, metric: str) -> list[list[str]]:
+    table = []
+    for model in section.models:
+        name = (section.string, MODEL_NAMES[model])
+        own = [line for line in own_lines(section) if line.model == model]
+        for line in own:
+            cells = (_cell(section, line, column, metric) for column in COLUMNS)
+            table.append([*name, given(line), _seeds(section, line), *cells])
+        if not own:
+            table.append([*name, NONE, "0", *(_not_run(section, model, column, metric) for column in COLUMNS)])
+    return table
+
+
+def _not_run(section: Section, model: str, column: Column, metric: str) -> str:
+    paper = section.paper(model, column, metric)
+    return f"{NOT_RUN} ({paper.mean:.4f})" if paper else NOT_RUN
+
+
+def _seeds(section: Section, line: Line) -> str:
+    counts = sorted({len(entry.done) for entry in section.lines[line].values()})
+    return str(counts[0]) if len(counts) == 1 else f"{counts[0]} to {counts[-1]}"
+
+
+def _cell(section: Section, line: Line, column: Column, metric: str) -> str:
+    entry = section.lines[line].get(column)
+    if entry is None:
+        return NOT_RUN
+    parts, ours = [], entry.figure(metric)
+    if ours is not None:
+        parts.append(_against(ours, section.paper(line.model, column, metric)))
+    for rows, words in ((entry.diverged, "diverged"), (entry.failed, "failed")):
+        if rows:
+            parts.append(f"{len(rows)} {words}")
+    return "; ".join(parts)
+
+
+def _against(ours: Figure, paper: Figure | None) -> str:
+    if paper is None:
+        return f"{ours.mean:.2g} ({NONE})"
+    words = f"{ours.mean:.2g} ({paper.mean:.4f}) {factor(ours, paper)}"
+    return {"better": f"**{words}**", "worse": f"*{words}*", "equal": words}[mark(ours, paper)]
+
+
+def _missing(found: Sequence[Section]) -> str:
+    """The models and data sets without a run on their own horizon."""
+    lines = []
+    for section in found:
+        for model in section.models:
+            own = [line for line in own_lines(section) if line.model == model]
+            ran = {column for line in own for column in section.lines[line]}
+            if left := [str(column) for column in COLUMNS if column not in ran]:
+                where = "no cell" if not ran else "not " + ", ".join(left)
+                lines.append(f"- {MODEL_NAMES[model]}, {section.string} string, {section.horizon} frames: {where}.")
+    return "\n".join(lines) or "None."
