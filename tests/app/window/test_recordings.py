@@ -160,6 +160,7 @@ def test_it_is_recorded_as_it_is_heard(
 ) -> None:
     """Not as the patch was saved."""
     played.patches.change("knobs.decay", 10.0)
+    played.session.update(pickup="displacement")  # at the bridge, all points sound alike
     control = getattr(played.window.transport, button)
     change = control.click if button == "_stereo" else lambda: control.activated.emit(control.findData("velocity"))
     for name, turn in {"before.wav": lambda: None, "after.wav": change}.items():
