@@ -19,7 +19,7 @@ from app.patches.library import read_patch
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
 from engine.sources import project
-from engine.voices import Ear, Mixer, Voice, model_program
+from engine.voices import Ear, Mixer, Voice, model_program, voice_blocks
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 GUITAR = read_patch(PATCHES / "classical_guitar.json")
@@ -66,12 +66,21 @@ def test_the_string_alone_and_a_difference_have_neither_body_nor_room(tmp_path: 
     assert (write(a_note(), tmp_path / "d.wav", source="difference") == np.float32(0.5) * dry).all()
 
 
-def test_a_room_rings_out_after_the_string(tmp_path: Path) -> None:
-    decays = ExportChoices(decay_db=60)
-    room = GUITAR.room.model_copy(update={"mix": 0.5, "t60_s": 3.0})
-    through = Through.of(GUITAR.model_copy(update={"room": room}), 0.5)
-    wet, dry = (write(a_note(through=each), tmp_path / "a.wav", decays) for each in (through, None))
-    assert len(wet) > len(dry) + 24_000
+def test_a_room_rings_out_after_the_string() -> None:
+    preset = load_preset(PRESET)
+    program, effects = model_program(preset.model, preset.info, 48_000), effects_of(GUITAR)
+    assert effects is not None
+    dry, wet = (
+        np.concatenate(
+            list(voice_blocks(program, None, preset.info, Pluck(), Ear((0.37,)), 9.0, until_db=20, effects=each))
+        )
+        for each in (None, effects)
+    )
+    silence = round(0.2 * 48_000)
+    tail = wet[len(dry) - silence :]
+    assert not dry[-silence:].any()
+    assert len(tail) == round(effects.tail_s(48_000) * 48_000) and np.abs(tail[:4_800]).max() > 1e-4
+    assert np.abs(tail[-4_800:]).max() < 0.01 * np.abs(wet).max()
 
 
 def test_a_body_that_has_changed_is_told() -> None:
