@@ -1,4 +1,4 @@
-"""instruments: figures of the instruments beside those of real ones."""
+"""instruments: timbre of the instruments, compared with real ones."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def measure(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Print the timbre of instruments beside ranges of real ones.
+    """Print the timbre of instruments with ranges of real ones.
 
     Each plays E3 (keyboards C4; else the nearest octave in its range) at velocity 100, by the model, without room.
     A figure in its range has a plus, one outside a minus. Distances of six instruments from one another follow.

@@ -83,7 +83,7 @@ class InstrumentPlayer:
     ) -> None:
         if not isinstance(preset.model, KoopmanTension):
             raise ValueError(
-                f"{preset.path}: it knows one string only; choose a preset of many, as studio_any_string"
+                f"{preset.path}: its model learned one string only; choose a preset of many, as studio_any_string"
             )
         if preset.info.recorded is not None:
             raise ValueError(f"{preset.path}: its string was learned from a recording; `Player` plays it")

@@ -140,7 +140,7 @@ class Player:
     ) -> None:
         if not isinstance(preset.model, KoopmanTension):
             raise ValueError(
-                f"{preset.path}: it knows one string only; choose a preset of many, as studio_any_string"
+                f"{preset.path}: its model learned one string only; choose a preset of many, as studio_any_string"
             )
         self._model: KoopmanTension = preset.model
         self._preset, self._rate_hz, self._deliver = preset, rate_hz, deliver

@@ -1,4 +1,4 @@
-"""The files of a plug-in: written beside each other, linked by a C compiler that pip installs, put into place."""
+"""The files of a plug-in: sources, linked by a C compiler that pip installs, in the place where hosts look."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Format:
     """A kind of plug-in.
 
     Attributes:
-        sources: of the shell, beside those that all have.
+        sources: of the shell, added to those of every format.
         ending: of the file or the folder.
         folders: by system, where hosts of one user look for it, below the home folder.
     """

@@ -56,7 +56,7 @@ RATES_HZ = (44_100, 48_000, 96_000)
 BITS_NAMES: dict[Bits, str] = {"16": "16-bit PCM, dithered", "24": "24-bit PCM", "32f": "32-bit floating point"}
 FORM_NAMES = (("SFZ with FLAC samples", "flac"), ("SFZ with WAV samples", "wav"), ("SoundFont 2", "sf2"))
 RECIPE_NOTE = "Each file stores its settings: drop it on the window to restore its preset and pluck."
-MIDI_NOTE = "What was played is written beside it, as a MIDI file."
+MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
 RESUMES = "A cancelled export keeps its samples, and continues from there the next time."
 
 

@@ -450,7 +450,7 @@ def test_a_note_can_be_stopped_while_it_is_rendered(patch: Patch, preset: Preset
 
 
 def test_a_preset_of_one_string_is_refused(patch: Patch) -> None:
-    with pytest.raises(ValueError, match="knows one string only"):
+    with pytest.raises(ValueError, match="learned one string only"):
         Player(patch, load_preset(SHIPPED / "studio_nylon_b3.safetensors"), RATE_HZ, lambda struck: None)
 
 

@@ -1,5 +1,6 @@
 /* The instrument as a CLAP plug-in. */
 
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -15,7 +16,8 @@ typedef struct {
   clap_plugin plugin;
   const clap_host *host;
   instrument own;
-  bool active, loaded;
+  bool active;
+  atomic_bool loaded; /* a state that the next block takes up */
   float *spare; /* where the host gives one channel, or none */
 } shell;
 
@@ -168,7 +170,7 @@ static bool state_load(const clap_plugin *plugin, const clap_istream *stream) {
   while (size < (int64_t)sizeof bytes && (count = stream->read(stream, bytes + size, sizeof bytes - (uint64_t)size)) > 0) size += count;
   shell *own = shell_of(plugin);
   if (!instrument_load(&own->own, bytes, (int32_t)size)) return false;
-  own->loaded = true; /* taken up with the next block */
+  own->loaded = true;
   return true;
 }
 
@@ -231,7 +233,7 @@ static void stop_processing(const clap_plugin *plugin) { (void)plugin; }
 
 static void shell_reset(const clap_plugin *plugin) {
   shell *own = shell_of(plugin);
-  if (own->active) instrument_controller(&own->own, 0, 0, 120, 0);
+  if (own->active) instrument_reset(&own->own);
 }
 
 typedef struct { const clap_out_events *out; uint32_t last; } ends;

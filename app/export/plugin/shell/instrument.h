@@ -49,7 +49,7 @@ typedef struct {
   int32_t waiting;
   int64_t read;       /* reports */
   int64_t lost;       /* events for which there was no room */
-  bool moved;         /* a macro has moved other parameters since the host was told */
+  bool moved;         /* a macro has moved other parameters since the host read them */
 } instrument;
 
 typedef void (*note_ended)(void *context, int64_t id, int32_t channel, int32_t key, uint32_t offset);
@@ -71,6 +71,7 @@ void instrument_midi(instrument *, uint32_t at, const uint8_t *bytes);
 void instrument_tune(instrument *, uint32_t at, int32_t channel, double semitones);
 void instrument_change(instrument *, uint32_t at, int32_t parameter, double value);
 void instrument_set(instrument *, int32_t parameter, double value); /* while nothing is rendered */
+void instrument_reset(instrument *); /* silence, and all wheels and pedals at rest */
 void instrument_render(instrument *, uint32_t frames, float *left, float *right);
 void instrument_report_ends(instrument *, note_ended, void *context);
 bool instrument_silent(const instrument *);

@@ -207,6 +207,17 @@ def test_ends_of_notes_are_reported(bank: Library) -> None:
     assert instance.status == 4  # it may sleep
 
 
+def test_a_reset_leaves_no_note_wheel_or_pedal(bank: Library) -> None:
+    patch = patch_of("electric_bass")
+    plain = played(instance_of(bank, "electric_bass"), patch, 48_000)
+    instance = instance_of(bank, "electric_bass")
+    events = [midi(0, 0xE0, 0, 100), midi(0, 0xB0, 64, 127), note_on(10, 40, 120), note_on(450, 45, 120)]
+    instance.render(512, events)
+    instance.reset()
+    instance.render(48_000, [])
+    assert difference_db(played(instance, patch, 48_000), plain) < -80  # the limiter recovers from the loud note
+
+
 def test_random_events_do_no_harm(bank: Library) -> None:
     random = np.random.default_rng(7)
     instance = instance_of(bank, "classical_guitar")
