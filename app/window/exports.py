@@ -133,7 +133,7 @@ def _words(title: str, choices: Choices) -> str:
     """The pluck and where it is heard."""
     width = "" if choices.shape == "triangular" else f" {choices.width:.3f} wide"
     string = f", a string of {choices.string.first_hz:.1f} Hz" if choices.string else ""
-    pluck = f"{shape_word(choices.shape)}{width}, at {choices.position:.2f}, {choices.amplitude_mm:g} mm"
+    pluck = f"{shape_word(choices.shape)}{width}, at {choices.position:.2f}, {choices.amplitude_mm:.3g} mm"
     heard = f"heard at {choices.listen:.2f}"
     if choices.stereo:
         heard += f" (left) and {choices.listen_right:.2f} (right)"

@@ -18,7 +18,7 @@ from app.views.controls.knob import Knob
 from app.views.controls.meter import Meter
 from app.views.controls.parts import tool_button, vertical_rule
 from app.views.controls.plain import Label
-from app.views.controls.shape_box import NO_WIDTH, pickup_box, shape_box
+from app.views.controls.shape_box import AT_BRIDGE, NO_WIDTH, pickup_box, shape_box
 from app.views.controls.slot_buttons import SlotButtons
 from engine.pluck import (
     FULL_SCALE_M,
@@ -94,7 +94,11 @@ class TransportBar(QFrame):
         with QSignalBlocker(self._shape):
             self._shape.setCurrentIndex(SHAPES.index(choices.shape))
         self._loop.setChecked(choices.loop)
-        self.knobs["listen_right"].setEnabled(choices.stereo)  # not hidden, which would move the controls beside it
+        for field in ("listen", "listen_right"):
+            self.knobs[field].set_barred(AT_BRIDGE if choices.pickup == "bridge" else "")
+        self.knobs["listen_right"].setEnabled(
+            choices.stereo and choices.pickup != "bridge"
+        )  # not hidden, which would move the controls beside it
         with QSignalBlocker(self._stereo), QSignalBlocker(self._pickup):
             self._stereo.setChecked(choices.stereo)
             self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup))

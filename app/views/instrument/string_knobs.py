@@ -14,7 +14,7 @@ from app.views import theme
 from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob
 from app.views.controls.parts import faint, vertical_rule
 from app.views.controls.plain import Label, plain_tip
-from app.views.controls.shape_box import NO_WIDTH, shape_box
+from app.views.controls.shape_box import AT_BRIDGE, NO_WIDTH, shape_box
 from engine.pluck import SHAPES
 
 HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
@@ -163,6 +163,8 @@ def _why_barred(patch: Patch, field: str) -> str:
     """Why a field means nothing in this patch; "" where it does."""
     if field in SHAPED and patch.pluck.shape == "triangular":
         return NO_WIDTH
+    if field.startswith("pickup.points") and patch.pickup.kind == "bridge":
+        return AT_BRIDGE
     if field == "damping.release_t60_s" and patch.damping.let_ring:
         return LETS_RING
     if field == "tuning.a4_hz" and patch.tuning.keymap.strip():

@@ -132,9 +132,10 @@ class StringView(QWidget):
         self.setAccessibleDescription(f"position {pluck.position:.2f}, {pluck.amplitude_mm:.2f} mm, {pluck.label}")
         self.update()
 
-    def set_listening_points(self, left: float, right: float | None = None) -> None:
-        """Where the string is heard; `right` is None in mono."""
-        self._listening = {"left": left} if right is None else {"left": left, "right": right}
+    def set_listening_points(self, left: float | None, right: float | None = None) -> None:
+        """Where the string is heard; `right` is None in mono, both at the bridge, which has no marker."""
+        points = {"left": left, "right": right}
+        self._listening = {side: position for side, position in points.items() if position is not None}
         self.update()
 
     def set_trained(self, trained: TrainedPlucks) -> None:
@@ -308,8 +309,8 @@ class StringView(QWidget):
         axes = self._axes()
         if at.y() > axes.bottom - 6:
             near = {side: abs(at.x() - axes.x(position)) for side, position in self._listening.items()}
-            side = min(near, key=lambda name: near[name])
-            return side if near[side] < GRAB_PIXELS else None
+            side = min(near, key=lambda name: near[name], default=None)
+            return side if side is not None and near[side] < GRAB_PIXELS else None
         handle = self._handle(axes)
         return "pluck" if (at - handle).manhattanLength() < 1.4 * GRAB_PIXELS else None
 
@@ -362,7 +363,7 @@ class StringView(QWidget):
             paint_listening_line(painter, axes, position, grabbed)
             if below:
                 paint_listening_point(painter, axes, position, grabbed)
-        if below:
+        if below and self._listening:
             one = len(self._listening) == 1
             paint_listening_labels(painter, axes, {"listen": self._listening["left"]} if one else self._listening)
         grabbed = "pluck" in (self._drag, self._hovered)

@@ -117,7 +117,8 @@ class StringPanel(Panel):
         choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
         shape_mm = choices.pluck.displacement(SHAPE_POINTS).numpy() * MM
         view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
-        view.set_listening_points(choices.listen, choices.listen_right if choices.stereo else None)
+        left, right = choices.listen, choices.listen_right if choices.stereo else None
+        view.set_listening_points(*((None, None) if choices.pickup == "bridge" else (left, right)))
         view.set_trained(_trained(info_of(choices, entry), choices.pluck) if entry else TrainedPlucks())
         view.set_warning(self._pluck_warning())
 

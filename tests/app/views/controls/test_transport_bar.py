@@ -6,6 +6,7 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
+from app.session.choices import Choices
 from app.views.controls.transport_bar import TransportBar
 
 
@@ -31,3 +32,19 @@ def test_it_tells_what_plays_and_is_left_alone_while_nothing_changes(
     assert not texts
     bar.show_playing(False)
     assert texts == ["▶  Play"]
+
+
+def test_listening_points_are_barred_at_the_bridge(qtbot: QtBot) -> None:
+    bar = TransportBar()
+    qtbot.addWidget(bar)
+    for pickup, stereo, enabled in (
+        ("bridge", True, (False, False)),
+        ("displacement", True, (True, True)),
+        ("bridge", False, (False, False)),
+        ("velocity", False, (True, False)),
+    ):
+        bar.show_choices(Choices(pickup=pickup, stereo=stereo))
+        assert tuple(bar.knobs[field].isEnabled() for field in ("listen", "listen_right")) == enabled
+    assert "bridge" not in bar.knobs["listen"].toolTip()
+    bar.show_choices(Choices(pickup="bridge"))
+    assert "The bridge hears the whole string" in bar.knobs["listen"].toolTip()

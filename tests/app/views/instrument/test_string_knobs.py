@@ -59,7 +59,7 @@ def test_it_is_transposed_by_whole_keys(qtbot: QtBot, knobs: StringKnobs) -> Non
 def test_what_a_patch_does_not_have_cannot_be_turned(knobs: StringKnobs, guitar: Patch) -> None:
     mono = guitar.model_copy(
         update={
-            "pickup": guitar.pickup.model_copy(update={"points": (0.2,)}),
+            "pickup": Pickup(points=(0.2,)),
             "pluck": guitar.pluck.model_copy(update={"shape": "triangular"}),
             "damping": guitar.damping.model_copy(update={"let_ring": True}),
         }
@@ -74,14 +74,17 @@ def test_what_a_patch_does_not_have_cannot_be_turned(knobs: StringKnobs, guitar:
     knobs.show_patch(gaussian)
     assert knobs.knobs["pluck.width"].isEnabled()
     assert "no width" not in knobs.knobs["pluck.width"].toolTip()
+    knobs.show_patch(gaussian.model_copy(update={"pickup": Pickup(points=(0.2,), kind="bridge")}))
+    assert not knobs.knobs["pickup.points.0"].isEnabled()
+    assert "The bridge hears the whole string" in knobs.knobs["pickup.points.0"].toolTip()
 
 
 def test_the_shape_of_the_pluck_is_chosen_in_words(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:
     knobs.show_patch(guitar)
     box = knobs.shape
-    assert box.currentText() == "Round triangle"
+    assert box.currentText() == "Rounded"
     shapes = [box.itemText(row) for row in range(box.count())]
-    assert shapes == ["Gaussian", "Triangle", "Raised cosine", "Round triangle"]
+    assert shapes == ["Gaussian", "Triangle", "Raised cosine", "Rounded"]
     with qtbot.waitSignal(knobs.changed) as told:
         box.activated.emit(box.findText("Triangle"))
     assert told.args == ["pluck.shape", "triangular"]

@@ -212,6 +212,19 @@ def test_two_markers_are_told_apart_and_reset(qtbot: QtBot, view: StringView) ->
     assert resets == [("right",)]
 
 
+def test_the_bridge_has_no_marker(qtbot: QtBot, view: StringView) -> None:
+    view.set_listening_points(None)
+    moved = recorded(view.listening_point_moved)
+    axes = view._axes()
+    at = QPoint(round(axes.x(0.37)), int(axes.bottom) + 8)
+    qtbot.mousePress(view, LEFT, pos=at)
+    qtbot.mouseMove(view, at + QPoint(20, 0))
+    qtbot.mouseRelease(view, LEFT, pos=at)
+    qtbot.keyClick(view, Qt.Key.Key_Left, SHIFT)
+    view.grab()
+    assert moved == []
+
+
 @pytest.mark.parametrize(
     ("key", "held", "signal", "values"),
     [
