@@ -20,6 +20,9 @@ _MODELS = {
 }
 
 
+LEAST_SHARE = 1e-5  # smaller ones are shown as less than this
+
+
 def model_word(model: str) -> str:
     """The name that a model is shown with; its key in `MODELS` where it has no name here."""
     return _MODELS.get(model, (model, ""))[0]
@@ -57,5 +60,7 @@ def error_word(info: PresetInfo) -> str:
 
 
 def percent(share: float) -> str:
-    """A share in percent, with two digits below 10 % and none behind the point from there on."""
+    """A share in percent: two digits below 10 %, whole numbers from there on, and no less than LEAST_SHARE."""
+    if share < LEAST_SHARE:
+        return f"< {100 * LEAST_SHARE:g} %"
     return f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"

@@ -139,6 +139,6 @@ def _words(title: str, choices: Choices) -> str:
         heard += f" (left) and {choices.listen_right:.2f} (right)"
     if choices.pickup == "bridge":
         heard = "heard at the bridge"
-    velocity = ", velocity" if choices.pickup == "velocity" else ""
+    kind = ", magnetic pick-up" if choices.pickup == "velocity" else ""
     modes = f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""
-    return f"{title}{string}: {pluck}, {heard}{velocity}{modes}"
+    return f"{title}{string}: {pluck}, {heard}{kind}{modes}"

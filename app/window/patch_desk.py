@@ -70,6 +70,7 @@ class PatchDesk(QObject):
 
     told = Signal(str)  # an error, for the user
     informed = Signal(str)  # what went well
+    outside_changed = Signal(str)  # what of the latest note lies outside the training; "": nothing
 
     def __init__(
         self,
@@ -442,8 +443,9 @@ class PatchDesk(QObject):
         self._say("; ".join(self._outside()))
 
     def _say(self, outside: str) -> None:
-        """In the bar: what is outside the training, else how pitches are had where there is no patch."""
-        self._panel.bar.show_note(outside or ("" if self.patch is not None else NO_PATCH))
+        """Reports what is outside the training; in the bar, how pitches are had where there is no patch."""
+        self.outside_changed.emit(outside)
+        self._panel.bar.show_note("" if self.patch is not None else NO_PATCH)
 
     def _outside(self) -> list[str]:
         """What of the latest note, with the present knobs, lies outside the training of its model."""

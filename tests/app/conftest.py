@@ -107,7 +107,7 @@ def controller(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[ob
 
     window = MainWindow()
     qtbot.addWidget(window)
-    settings = Settings(choices=Choices(seconds=0.5))
+    settings = Settings(choices=Choices(seconds=0.5, face="lab"))
     made = Controller(window, settings, tmp_path / "settings.json", make_sound)
     with qtbot.waitExposed(window):
         window.show()

@@ -8,7 +8,7 @@ from app.shared.vocabulary import PICKUP_TITLES
 from app.views.controls.parts import combo_box
 from engine.pluck import SHAPES, Shape
 
-AT_BRIDGE = "The bridge hears the whole string: choose Point or Velocity to listen at a place"
+AT_BRIDGE = "The bridge hears the whole string: choose Point or Magnetic to listen at a place"
 NO_WIDTH = "A triangle has no width: choose another shape to turn it"
 _NAMES: dict[Shape, str] = {
     "gaussian": "Gaussian",
@@ -16,7 +16,7 @@ _NAMES: dict[Shape, str] = {
     "raised_cosine": "Raised cosine",
     "rounded": "Rounded",
 }
-_WIDTH, _PICKUP_WIDTH = 106, 64  # pixels: the longest name, with the padding of _TIGHT
+_WIDTH, _PICKUP_WIDTH = 106, 74  # pixels: the longest name, with the padding of _TIGHT
 _TIGHT = "QComboBox {{ padding: 5px 0 5px 6px; }} QComboBox::drop-down {{ border: none; width: {}px; }}"
 _ARROW, _PICKUP_ARROW = 17, 9  # pixels
 

@@ -6,6 +6,7 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
+    QLayout,
     QPushButton,
     QSizePolicy,
     QVBoxLayout,
@@ -20,6 +21,7 @@ from app.views.controls.parts import tool_button, vertical_rule
 from app.views.controls.plain import Label
 from app.views.controls.shape_box import AT_BRIDGE, NO_WIDTH, pickup_box, shape_box
 from app.views.controls.slot_buttons import SlotButtons
+from app.views.faces import Area
 from engine.pluck import (
     FULL_SCALE_M,
     FULL_SCALE_M_S,
@@ -45,30 +47,32 @@ class TransportBar(QFrame):
         for field, knob in self.knobs.items():
             knob.value_asked.connect(lambda value, field=field: self.change_asked.emit(field, value))
         self.meter = Meter()
+        self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)")
+        self._loop.setCheckable(True)
+        self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
         self._compact = False
+        self._groups: list[QHBoxLayout] = []
         self._playing: bool | None = None  # as shown; None after a click, which checks the button by itself
         self._row = row = QHBoxLayout(self)
         row.setContentsMargins(12, 8, 12, 8)
         row.setSpacing(5)
-        row.addLayout(self._build_transport())
-        row.addWidget(vertical_rule())
         self.slots = SlotButtons()
         self.slots.change_asked.connect(self.change_asked)
-        row.addWidget(self.slots)
-        row.addWidget(vertical_rule())
-        row.addLayout(self._build_shape())
-        for field in ("position", "amplitude_mm", "width"):
-            row.addWidget(self.knobs[field])
-        row.addWidget(vertical_rule())
-        for field in ("listen", "listen_right"):
-            row.addWidget(self.knobs[field])
-        row.addLayout(self._build_pickup())
-        row.addWidget(vertical_rule())
-        for field in ("seconds", "speed"):
-            row.addWidget(self.knobs[field])
+        knob = self.knobs
+        pluck = (self._build_shape(), knob["position"], knob["amplitude_mm"], knob["width"])
+        listener = self._group(knob["listen"], knob["listen_right"], self._build_pickup())
+        self.areas: dict[Area, tuple[QWidget, ...]] = {
+            "slots": (self._group(self.slots),),
+            "pluck": (self._group(*pluck),),
+            "time": (self._loop, self._group(knob["seconds"], knob["speed"])),
+        }
+        row.addLayout(self._build_transport())
+        for group in (self.areas["slots"][0], self.areas["pluck"][0], listener, self.areas["time"][1]):
+            row.addWidget(group)
         row.addStretch(1)
         row.addWidget(vertical_rule())
-        row.addWidget(self.knobs["volume_db"])
+        row.addWidget(knob["volume_db"])
         row.addLayout(self._build_output())
 
     def set_compact(self, compact: bool) -> None:
@@ -78,6 +82,8 @@ class TransportBar(QFrame):
         self._compact = compact
         self._row.setContentsMargins(*((4, 8, 4, 8) if compact else (12, 8, 12, 8)))
         self._row.setSpacing(2 if compact else 5)
+        for group in self._groups:
+            group.setSpacing(1 if compact else 5)
         for knob in self.knobs.values():
             knob.set_narrow(compact)
         self.slots.set_narrow(compact)
@@ -121,10 +127,6 @@ class TransportBar(QFrame):
         self._play.setToolTip("Play from the pluck, or stop (Space)")
         self._play.clicked.connect(self._forget_playing)
         self._play.clicked.connect(self.play_asked)
-        self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)")
-        self._loop.setCheckable(True)
-        self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
         column = QVBoxLayout()
         column.addWidget(self._play)
         column.addWidget(self._loop)
@@ -141,7 +143,8 @@ class TransportBar(QFrame):
         self._pickup = pickup_box()
         self._pickup.setToolTip(
             f"Point: displacement of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
-            f"Velocity: of that point, as from a magnetic pick-up: brighter (full scale {FULL_SCALE_M_S:g} m/s)\n"
+            f"Magnetic: velocity of that point, as a magnetic pick-up senses it: brighter "
+            f"(full scale {FULL_SCALE_M_S:g} m/s)\n"
             f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n{OF_THE_PATCH}"
         )
         self._pickup.activated.connect(lambda row: self.change_asked.emit("pickup", self._pickup.itemData(row)))
@@ -172,3 +175,18 @@ class TransportBar(QFrame):
         column.addWidget(self.meter)
         column.addWidget(self._export)
         return column
+
+    def _group(self, *parts: QWidget | QLayout) -> QWidget:
+        """A rule and parts beside each other, which are shown and hidden together."""
+        group = QWidget()
+        row = QHBoxLayout(group)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(5)
+        row.addWidget(vertical_rule())
+        for part in parts:
+            if isinstance(part, QLayout):
+                row.addLayout(part)
+            else:
+                row.addWidget(part)
+        self._groups.append(row)
+        return group

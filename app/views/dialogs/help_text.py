@@ -43,7 +43,7 @@ TOUR = (
     (
         "Listen elsewhere",
         "Drag the green marker beneath the string. At a node of a partial, that partial is not heard; at the ends "
-        "nothing is. Stereo has two listening points; Velocity is the signal of a magnetic pick-up. While keys play "
+        "nothing is. Stereo has two listening points; Magnetic is a magnetic pick-up. While keys play "
         "the patch, all three belong to it, and what you hear is saved, recorded and exported.",
     ),
     (

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPen
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen
 from PySide6.QtWidgets import QWidget
 
 from app.shared.key_names import note_name
@@ -23,6 +23,7 @@ FOOT = 15  # numbers of frets, names of octaves
 SHORTEST = 0.14  # of the fan's height
 THICK, THIN = 2.6, 1.0  # lowest and highest string, in pixels
 LARGEST_DOT = 14.0
+SWING = 0.42  # of a string's row, at full level
 INLAYS = (3, 5, 7, 9, 12, 15, 17, 19, 21, 24)
 TIP = (
     "Click or drag to play: softer at the upper edge of a string's row, harder at the lower.\n"
@@ -197,12 +198,23 @@ class Neck(Playable):
         if level > 0:
             painter.setPen(QPen(lit, 2))
             painter.drawLine(middle, QPointF(self.fret_x(self.frets), middle.y()))
+            self._paint_swing(painter, middle, level)
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(theme.translucent(self.colour.name(), 70))
             painter.drawEllipse(middle, *(2 * [size / 2 + 4 * level]))
         painter.setPen(QPen(QColor(theme.RAISED), 1))
         painter.setBrush(self.colour if level > 0 else QColor(theme.FAINT))
         painter.drawEllipse(middle, *(2 * [size / 2 * (0.6 + 0.4 * level)]))
+
+    def _paint_swing(self, painter: QPainter, stop: QPointF, level: float) -> None:
+        """How far a string swings, from where it is stopped to the bridge."""
+        far, reach = self.fret_x(self.frets), SWING * level * (self.height() - FOOT) / len(self._strings)
+        swing = QPainterPath(stop)
+        for side in (-1, 1):
+            swing.quadTo((stop.x() + far) / 2, stop.y() + 2 * side * reach, far if side < 0 else stop.x(), stop.y())
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(theme.translucent(self.colour.name(), 90))
+        painter.drawPath(swing)
 
     def _paint_column(self, painter: QPainter, key: int, ink: QColor, thicker: float) -> QPointF:
         """A key's string in the fan; gives its end."""

@@ -30,8 +30,8 @@ from app.views.instrument.piano_keys import PianoKeys
 from app.views.instrument.string_knobs import StringKnobs
 
 HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or click the strings"}
-FOLD_TIP = "Show or hide the knobs of the string"
-LOW_TIP = "Show the knobs of the string in place of the keys, or the keys again: the window is too low for both"
+FOLD_TIP = "Show every knob of the string in place of the macros, or the macros again"
+LOW_TIP = "Show every knob of the string in place of macros and keys, or these again"
 ROOMY = 1320  # pixels: in a narrower window the bar is compact
 PLAYS_WIDTH = 164  # pixels: of the longer words, so that the keys beside them stay where they are
 KEYS_PLAY = {  # what the computer's keys play -> (words, tip)
@@ -76,6 +76,7 @@ class InstrumentPanel(QFrame):
         self._hint = Label(HINTS["keys"], self._stack)
         self._hint.setObjectName("hint")
         self._hint.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._patch_area = True
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -141,6 +142,13 @@ class InstrumentPanel(QFrame):
         self._fold.setChecked(unfolded)
         self._share_room()
 
+    def show_patch_area(self, shown: bool) -> None:
+        """Shows the bar and the knobs of the string, or only what is played on."""
+        self._patch_area = shown
+        self._bar_row.setVisible(shown)
+        self._fold.setVisible(shown)
+        self._share_room()
+
     def set_low(self, low: bool) -> None:
         """For a window with little height: the knobs of the string then take the place of the keys."""
         if low != self._low:
@@ -166,8 +174,10 @@ class InstrumentPanel(QFrame):
             self._grid.setContentsMargins(12, 8, 12, 10)
             self._grid.setVerticalSpacing(8)
         self._fold.setToolTip(LOW_TIP if self._low else FOLD_TIP)
-        self._knobs_row.setVisible(self.unfolded)
-        self._stack.setVisible(not (self._low and self.unfolded))
+        unfolded = self.unfolded and self._patch_area
+        self._knobs_row.setVisible(unfolded)
+        self._stack.setVisible(not (self._low and unfolded))
+        self.bar.show_macros(not unfolded)
 
     def set_range(self, low: int, high: int) -> None:
         """The lowest and the highest key that have a string."""

@@ -29,8 +29,8 @@ class TrainedPlucks:
     amplitude_mm: tuple[float, float] | None = None
 
 
-def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int | None) -> None:
-    """Paints the gradient, the grid, the scale and the hatching.
+def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks | None, pluck: int | None) -> None:
+    """Paints the gradient and, unless `trained` is None, the grid, the scale and the hatching.
 
     `pluck`: the end of the string, 0 or 1, that the pluck is nearer to; None while the motion is shown. Only for a
     pluck are amplitudes hatched, which a string in motion all crosses, and words written, which it would cover.
@@ -41,6 +41,8 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pl
     painter.setPen(QPen(QColor(theme.LINE), 1))
     painter.setBrush(gradient)
     painter.drawRoundedRect(QRectF(0.5, 0.5, axes.width - 1, axes.height - 1), 6, 6)
+    if trained is None:
+        return
     paint_grid(painter, axes)
     _paint_scale(painter, axes)
     if trained.position is not None:
@@ -93,6 +95,15 @@ def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: s
         place = QRectF(x, LEGEND_Y - 10, max(0.0, right - x - 8), 20)
         text = painter.fontMetrics().elidedText(warning, Qt.TextElideMode.ElideRight, int(place.width()))
         painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
+
+
+def paint_remark(painter: QPainter, axes: StringAxes, text: str) -> None:
+    """Paints a line in the upper left corner, why nothing is heard."""
+    painter.setPen(QColor(theme.FAINT))
+    painter.setFont(theme.small_font(11))
+    room = axes.width - 2 * MARGIN_X
+    cut = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(room))
+    painter.drawText(QRectF(MARGIN_X, LEGEND_Y - 10, room, 20), Qt.AlignmentFlag.AlignVCenter, cut)
 
 
 def _shade(painter: QPainter, area: QRectF) -> None:
