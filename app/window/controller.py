@@ -130,6 +130,7 @@ class Controller(QObject):
             self.performance,
             self.instruments,
             window.instrument,
+            window.song,
             patch_browser(window),
             settings.patch_favourites,
         )

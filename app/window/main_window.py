@@ -43,6 +43,7 @@ from app.views.controls.plain import Label, plain_tip
 from app.views.controls.preset_bar import PresetBar
 from app.views.controls.segments import Segments
 from app.views.controls.sideways import Sideways
+from app.views.controls.song_strip import SongStrip
 from app.views.controls.transport_bar import TransportBar
 from app.views.faces import FACES, TITLES, Area
 from app.views.instrument.panel import InstrumentPanel
@@ -104,6 +105,7 @@ class MainWindow(QMainWindow):
         self.presets = PresetBar()
         self.left, self.right = Deck("Views on the left"), Deck("Views on the right")
         self.transport = TransportBar()
+        self.song = SongStrip()
         self.instrument = InstrumentPanel()
         self.notices = NoticeBar()
         self.error_label = Label()
@@ -194,6 +196,7 @@ class MainWindow(QMainWindow):
         column.addLayout(head)
         column.addWidget(self._facts)
         column.addWidget(self._stage, 1)
+        column.addWidget(self.song)
         column.addWidget(Sideways(self.transport))
         column.addWidget(self.instrument)
         middle = QWidget()
@@ -221,7 +224,8 @@ class MainWindow(QMainWindow):
         header = (self._menu_button, self.faces, self.presets, self._keys_button, self._test_button)
         header += (self.notices.bell, self._audio_button)
         chain: list[QWidget] = []
-        for part in (*header, self.notices, self._string, self.left, self.right, self.transport, self.instrument):
+        views = (self._string, self.left, self.right)
+        for part in (*header, self.notices, *views, self.song, self.transport, self.instrument):
             inside = [part, *part.findChildren(QWidget)]
             stops = [
                 widget
