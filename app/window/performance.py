@@ -297,7 +297,7 @@ class Performance(QObject):
         windows = errors.windows(take.picture_hz, (0.0, take.info.horizon_s, max(take.seconds, take.info.horizon_s)))
         places = ("in the training range", "beyond")
         parts = [f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, places, strict=False)]
-        self._tell("Error " + ", ".join(parts))
+        self._tell("Error of this pluck: " + ", ".join(parts))
         self._window.show_growth(growth_words([w.rel_mae for w in windows], take.info.rel_mae))
 
     def _other_refused(self, preset: str, message: str) -> None:

@@ -39,7 +39,7 @@ def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, playe
 
     qtbot.waitUntil(shown)
     qtbot.waitUntil(lambda: played.window.instrument.keys.level(48) > 0.1)
-    qtbot.waitUntil(lambda: "error of this pluck" in played.window.error_label.text())
+    qtbot.waitUntil(lambda: "Error of this pluck" in played.window.error_label.text())
     (struck,) = played.performance.notes.keys.player.sounding()  # type: ignore[union-attr]
     assert not struck.damped
     qtbot.keyRelease(played.window, Qt.Key.Key_A)

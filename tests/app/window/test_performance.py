@@ -59,7 +59,7 @@ def window(
         lambda on_problem: Sound(on_problem, look_up=lambda *_: SPEAKERS, open_output=numb_output),
     )
     made.show()
-    qtbot.waitUntil(lambda: "error of this pluck" in made.error_label.text())
+    qtbot.waitUntil(lambda: "Error of this pluck" in made.error_label.text())
     qtbot.waitUntil(lambda: controller.sound.status().device == SPEAKERS)
     yield controller
     made.close()
@@ -336,13 +336,13 @@ def test_how_long_a_model_is_waited_for_is_told_and_then_its_error(
 ) -> None:
     window.session.update(preset="rendered", seconds=0.8)
     label = window.window.error_label
-    qtbot.waitUntil(lambda: performance.ready and performance.settled and "error of this pluck" in label.text())
+    qtbot.waitUntil(lambda: performance.ready and performance.settled and "Error of this pluck" in label.text())
     performance.pluck()
     qtbot.waitUntil(lambda: label.text().startswith("Koopman, variable: buffering, starts in 0."))
     (note,) = ringing(performance)
     assert performance.position_s == 0 or not note.pending
     qtbot.waitUntil(lambda: not note.pending)
-    qtbot.waitUntil(lambda: "error of this pluck" in label.text())
+    qtbot.waitUntil(lambda: "Error of this pluck" in label.text())
 
 
 def test_space_stops_what_has_not_sounded_yet(

@@ -59,7 +59,7 @@ def make(qtbot: QtBot, take: Take) -> Iterator[Make]:
     panels: list[Panel] = []
 
     def made(kind: type[Panel]) -> Panel:
-        panel = kind(Session(), Library([]))
+        panel = kind(Session(Choices(face="lab")), Library([]))
         panels.append(panel)
         panel.choices_changed(frozenset(Choices.model_fields))
         qtbot.addWidget(panel)
