@@ -33,6 +33,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.shared.vocabulary import Face
+from app.views import theme
 from app.views.controls.app_menu import AppMenu, menu_button
 from app.views.controls.deck import Deck
 from app.views.controls.drop_sign import DropSign
@@ -56,7 +57,7 @@ WIDE, HIGH = (
     1100,
     560,
 )  # pixels: a narrower window hides brand, keys and ABX button; a lower the preset's facts
-ROOMY = 1240  # pixels: in a narrower window the controls are compact
+ROOMY, TIGHT = 1240, 900  # pixels: in a narrower window the controls are compact, and more so
 ALL_HIGH = 640  # pixels: a lower window shows the instrument instead of the views
 KNOBS_HIGH = 780  # pixels: in a lower one the string's knobs take the place of the keys, and all stands closer
 FACTS_HEIGHT = 20
@@ -168,7 +169,7 @@ class MainWindow(QMainWindow):
         facts.setContentsMargins(0, 0, 0, 0)
         facts.setSpacing(24)
         for part in (self.presets.card, self._solo):  # of one height, so that the solo button moves nothing
-            part.setFixedHeight(FACTS_HEIGHT)
+            theme.fix_size(part, height=FACTS_HEIGHT)
         facts.addWidget(self.presets.card, 3)
         facts.addWidget(self.outside_label, 2)
         facts.addWidget(self._solo)
@@ -176,7 +177,7 @@ class MainWindow(QMainWindow):
         self._decks = decks = QSplitter(Qt.Orientation.Horizontal)
         decks.addWidget(self.left)
         decks.addWidget(self.right)
-        decks.setSizes([560, 720])
+        decks.setSizes([620, 660])
         self._stage = QSplitter(Qt.Orientation.Vertical)
         self._loading = Label(LOADING if cache.is_whole() else COMPILING)
         self._loading.setObjectName("faint")
@@ -205,6 +206,7 @@ class MainWindow(QMainWindow):
         self.notices.setParent(middle)
         FocusRing(middle)
         self._drop_sign = DropSign(self)
+        theme.changes.theme_changed.connect(self._fit)
 
     def show_string(self, view: QWidget) -> None:
         """Puts the string's view above the decks, gives it the focus and enables the window, which was loading."""
@@ -276,8 +278,8 @@ class MainWindow(QMainWindow):
             self.action[name].setEnabled(face == "lab")
         self._column.setStretchFactor(self.instrument, int(face == "play"))
         self._show_growth()
-        self._share_width()
         self.show_keys(self.shows_keys)
+        self._fit()
 
     def _shows(self, area: Area) -> bool:
         return area in FACES[self.face]
@@ -293,14 +295,23 @@ class MainWindow(QMainWindow):
         self.instrument.setVisible(shown or self.face == "play")
         self._share_height()
 
+    @property
+    def _wide(self) -> float:
+        """The window's width, in pixels at which text has its usual size."""
+        return self.width() / theme.present.scale
+
+    @property
+    def _high(self) -> float:
+        return self.height() / theme.present.scale
+
     def _share_width(self) -> None:
-        self._brand.setVisible(self.width() >= WIDE)
+        self._brand.setVisible(self._wide >= WIDE)
         for button in (self._keys_button, self._test_button):  # the menu has them too
-            button.setVisible(self.width() >= WIDE and self._shows("test"))
+            button.setVisible(self._wide >= WIDE and self._shows("test"))
 
     def _share_height(self) -> None:
         """A low window hides the plots while the keys are shown, a lower one also the preset's facts."""
-        height = self.height()
+        height = self._high
         self.instrument.set_low(height < KNOBS_HIGH)
         views = self._alive and self._shows("views") and (height >= ALL_HIGH or not self.shows_keys)
         self._decks.setVisible(views)
@@ -350,10 +361,13 @@ class MainWindow(QMainWindow):
     def resizeEvent(self, event: QResizeEvent) -> None:
         """A small window has narrower margins, and neither brand nor buttons for keys and listening test."""
         super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
         self._share_width()
         self._share_height()
-        narrow, low = self.width() < ROOMY, self.height() < KNOBS_HIGH
-        self.transport.set_compact(narrow)
+        narrow, low = self._wide < ROOMY, self._high < KNOBS_HIGH
+        self.transport.set_compact(narrow, self._wide < TIGHT and self.face == "lab")
         self._head.setSpacing(6 if narrow else 10)
         aside, above = 8 if narrow else 14, 6 if low else 12
         self._column.setContentsMargins(aside, above, aside, above)

@@ -36,7 +36,7 @@ class InstrumentChoice(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    shown: bool = True
+    shown: bool = False
     surface: Literal["keys", "neck"] = "keys"
     unfolded: bool = False
 

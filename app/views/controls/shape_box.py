@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QComboBox
 
 from app.shared.vocabulary import PICKUP_TITLES
 from app.views.controls.parts import combo_box
+from app.views.theme import fix_size
 from engine.pluck import SHAPES, Shape
 
 AT_BRIDGE = "The bridge hears the whole string: choose Point or Magnetic to listen at a place"
@@ -37,5 +38,5 @@ def pickup_box() -> QComboBox:
 
 def _tight(box: QComboBox, width: int, arrow: int) -> QComboBox:
     box.setStyleSheet(_TIGHT.format(arrow))
-    box.setFixedWidth(width)
+    fix_size(box, width)
     return box

@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
 
 from app.session.choices import Choices
 from app.shared.parameters import OF_CHOICES
+from app.views import theme
 from app.views.controls.knob import Knob
 from app.views.controls.meter import Meter
 from app.views.controls.parts import tool_button, vertical_rule
@@ -51,7 +52,8 @@ class TransportBar(QFrame):
         self._loop.setCheckable(True)
         self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
-        self._compact = False
+        self._fitted = (False, False, 1.0)  # compact, tight, scale of text
+        self._tight = False
         self._groups: list[QHBoxLayout] = []
         self._playing: bool | None = None  # as shown; None after a click, which checks the button by itself
         self._row = row = QHBoxLayout(self)
@@ -75,21 +77,25 @@ class TransportBar(QFrame):
         row.addWidget(knob["volume_db"])
         row.addLayout(self._build_output())
 
-    def set_compact(self, compact: bool) -> None:
-        """Narrower by a fifth, for a window with little room."""
-        if compact == self._compact:
+    def set_compact(self, compact: bool, tight: bool = False) -> None:
+        """Narrower by a fifth, for a window with little room; `tight`: with very little, symbols for words."""
+        if (compact, tight, theme.present.scale) == self._fitted:
             return
-        self._compact = compact
+        self._fitted = compact, tight, theme.present.scale
+        self._tight, self._playing = tight, None
+        self._loop.setText("⟳" if tight else "⟳  Loop")
+        self.show_playing(self._play.isChecked())
         self._row.setContentsMargins(*((4, 8, 4, 8) if compact else (12, 8, 12, 8)))
         self._row.setSpacing(2 if compact else 5)
         for group in self._groups:
             group.setSpacing(1 if compact else 5)
         for knob in self.knobs.values():
             knob.set_narrow(compact)
-        self.slots.set_narrow(compact)
+        self.slots.set_narrow(compact, tight)
         self._export.setText("Export …" if compact else "Export WAV …")
         for button in (self._play, self._loop, self._stereo, self._export):
             button.setProperty("compact", compact)
+            button.setProperty("tight", tight)
             button.style().unpolish(button)
             button.style().polish(button)
 
@@ -115,13 +121,15 @@ class TransportBar(QFrame):
             return
         self._playing = playing
         self._play.setChecked(playing)
-        self._play.setText("■  Stop" if playing else "▶  Play")
+        words = "■  Stop" if playing else "▶  Play"
+        self._play.setText(words[0] if self._tight else words)
 
     def _forget_playing(self) -> None:
         self._playing = None
 
     def _build_transport(self) -> QVBoxLayout:
         self._play = QPushButton("▶  Play")
+        self._play.setAccessibleName("Play or stop")
         self._play.setObjectName("play")
         self._play.setCheckable(True)
         self._play.setToolTip("Play from the pluck, or stop (Space)")

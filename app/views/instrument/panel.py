@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.views import theme
 from app.views.controls.parts import tool_button
 from app.views.controls.plain import Label
 from app.views.controls.segments import Segments
@@ -33,6 +34,7 @@ HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or 
 FOLD_TIP = "Show every knob of the string in place of the macros, or the macros again"
 LOW_TIP = "Show every knob of the string in place of macros and keys, or these again"
 ROOMY = 1320  # pixels: in a narrower window the bar is compact
+TIGHT = 900  # pixels: a narrower one has no button that renames
 PLAYS_WIDTH = 164  # pixels: of the longer words, so that the keys beside them stay where they are
 KEYS_PLAY = {  # what the computer's keys play -> (words, tip)
     "pitch": ("Keys play pitches", "The computer's keys play the patch, as a piano's two rows"),
@@ -161,7 +163,7 @@ class InstrumentPanel(QFrame):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.bar.set_compact(self.width() < ROOMY)
+        self.bar.set_compact(self.width() < theme.px(ROOMY), self.width() < theme.px(TIGHT))
 
     def _share_room(self) -> None:
         self._grid.removeWidget(self._knobs_row)

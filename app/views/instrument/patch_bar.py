@@ -165,7 +165,7 @@ class PatchBar(QFrame):
         for button in (lower, higher):
             button.setObjectName("chip")
         row = QHBoxLayout()
-        row.setSpacing(4)
+        row.setSpacing(8)
         row.addWidget(self.note, 1)
         for widget in (self.scala, lower, self.octave, higher, self.velocity, self.voices, self.record):
             row.addWidget(widget)
@@ -197,8 +197,9 @@ class PatchBar(QFrame):
 
     # What is shown
 
-    def set_compact(self, compact: bool) -> None:
-        """For a window with little room."""
+    def set_compact(self, compact: bool, tight: bool = False) -> None:
+        """For a window with little room; `tight`: with very little, where the browser alone renames."""
+        self.rename.setVisible(not tight)
         if compact != self._compact:
             self._compact = compact
             self._share_width()

@@ -40,7 +40,7 @@ class Facts(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._facts: dict[str, str] = {}
-        self.setFixedHeight(FACTS_HEIGHT)
+        theme.fix_size(self, height=FACTS_HEIGHT)
         self.setAccessibleName("The string under one key, as the knobs make it")
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
@@ -94,12 +94,13 @@ class StringKnobs(QWidget):
         column.setSpacing(SPACING)
         column.addLayout(row)
         column.addWidget(self.facts)
-        self.setFixedHeight(HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)  # or a low window would squeeze it
+        # or a low window would squeeze it
+        theme.fix_size(self, height=HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)
 
     def _group(self, group: str) -> QVBoxLayout:
         head = faint(group)
         head.setObjectName("group")
-        head.setFixedHeight(HEAD_HEIGHT)
+        theme.fix_size(head, height=HEAD_HEIGHT)
         row = QHBoxLayout()
         row.setSpacing(0)
         if group == PLUCK:
@@ -123,7 +124,7 @@ class StringKnobs(QWidget):
     def _shape_column(self) -> QVBoxLayout:
         name = Label("SHAPE")
         name.setObjectName("knob")
-        name.setFixedHeight(14)  # as a knob's name
+        theme.fix_size(name, height=14)  # as a knob's name
         column = QVBoxLayout()
         column.setContentsMargins(0, 0, 4, 0)
         column.setSpacing(4)

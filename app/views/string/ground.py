@@ -128,8 +128,8 @@ def _paint_untrained_positions(
         painter.setFont(theme.small_font(11))
         for row, text in enumerate(lines):
             painter.setPen(theme.translucent(theme.TEXT if row == 0 else theme.FAINT, 190))
-            line = area.adjusted(4, 0, -4, -8 - LINE_HEIGHT * (1 - row))
-            if painter.fontMetrics().horizontalAdvance(text) > line.width() or line.height() < LINE_HEIGHT:
+            line = area.adjusted(4, 0, -4, -8 - theme.px(LINE_HEIGHT) * (1 - row))
+            if painter.fontMetrics().horizontalAdvance(text) > line.width() or line.height() < theme.px(LINE_HEIGHT):
                 continue  # the hatching says it
             painter.drawText(line, Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom, text)
 
@@ -147,7 +147,7 @@ def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: Tr
             continue
         area = QRectF(axes.at(left, top_mm), axes.at(right, bottom_mm))
         _shade(painter, area)
-        if area.height() >= LINE_HEIGHT:
+        if area.height() >= theme.px(LINE_HEIGHT):
             painter.setFont(theme.small_font(11))
             painter.setPen(theme.translucent(theme.TEXT, 190))
             painter.drawText(area.adjusted(8, 0, -8, 0), free | Qt.AlignmentFlag.AlignVCenter, text)

@@ -351,7 +351,7 @@ class StringView(QWidget):
         for button in reversed(self._toggles):
             size = button.sizeHint()
             right -= size.width()
-            button.setGeometry(right, 6, size.width(), 22)
+            button.setGeometry(right, 6, size.width(), theme.px(22))
             right -= 6
 
     def paintEvent(self, event: QPaintEvent) -> None:

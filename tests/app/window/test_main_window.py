@@ -19,6 +19,7 @@ from app.shared.vocabulary import Face
 from app.views import theme
 from app.views.controls.app_menu import ENTRIES
 from app.views.controls.focus_ring import FocusRing
+from app.views.controls.sideways import Sideways
 from app.views.look import Look
 from app.window.appearance import Appearance
 from app.window.controller import Controller
@@ -261,9 +262,17 @@ def test_the_look_is_chosen_in_the_menu(qtbot: QtBot, qapp: QApplication) -> Non
         assert made.look.theme == "light"
         assert theme.present == theme.LIGHT
         assert actions["Light"].isChecked()
+        knob, brand = window.transport.knobs["volume_db"], window._brand
+        small = knob.sizeHint(), brand.sizeHint(), theme.small_font(10).pixelSize()
         actions["150 %"].trigger()
         assert made.look.size_percent == 150
-        assert "restart" in window.notices.text
+        large = knob.sizeHint(), brand.sizeHint(), theme.small_font(10).pixelSize()
+        for before, after in zip(small[:2], large[:2], strict=True):
+            assert after.width() > before.width()
+            assert after.height() == pytest.approx(1.5 * before.height(), rel=0.15)
+        assert large[2] == 1.5 * small[2]
+        actions["100 %"].trigger()
+        assert (knob.sizeHint(), theme.small_font(10).pixelSize()) == (small[0], small[2])
     finally:
         theme.apply_theme(qapp, "dark")
         qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
@@ -403,6 +412,36 @@ def test_files_are_opened_from_the_menu(alive: MainWindow, monkeypatch: pytest.M
     alive.file_dropped.connect(opened.append)
     alive.action["open"].trigger()
     assert opened == ["/tmp/a.mid", "/tmp/b.scl"]
+
+
+@pytest.fixture
+def larger(qapp: QApplication) -> Iterator[None]:
+    """Text of 150 %."""
+    sheet, font = qapp.styleSheet(), qapp.font()
+    theme.apply_theme(qapp, "dark", 150)
+    yield
+    theme.apply_theme(qapp, "dark")
+    qapp.setStyleSheet(sheet)
+    qapp.setFont(font)
+
+
+@pytest.mark.usefixtures("larger")
+@pytest.mark.parametrize("height", [720, 800])
+@pytest.mark.parametrize("face", ["play", "lab"])
+def test_nothing_is_cut_off_with_text_of_150_percent(
+    qtbot: QtBot, played: Controller, face: Face, height: int
+) -> None:
+    window = played.window
+    played.session.update(face=face)
+    window.show_keys(False)
+    window.resize(1280, height)
+    qtbot.waitUntil(lambda: window.centralWidget().minimumSizeHint().height() <= height)
+    assert window.centralWidget().minimumSizeHint().width() <= 1280
+    for area in window.findChildren(Sideways):
+        if area.isVisible():
+            qtbot.waitUntil(lambda area=area: area.widget().minimumSizeHint().width() <= area.width())
+    if face == "lab":
+        assert window.left.isVisible() and window.right.isVisible()
 
 
 LONG = "A fault in words that are long enough for two lines where the window is narrow. " * 2
