@@ -122,18 +122,13 @@ class AudioControl(QObject):
         self._listed = listed
 
     def _show_badge(self, status: SoundStatus, model_rate_hz: int) -> None:
-        label = self._window.rate_label
         rate, fault = rate_word(model_rate_hz), status.device is None
         converted = "" if status.rate_hz == model_rate_hz else f" → {rate_word(status.rate_hz)}"
         text = f"{rate}  ·  no sound" if fault else f"{rate}{converted}"
-        if label.text() != text:
-            label.setText(text)
-            rates = "The model's rate, converted to the sound device's rate" if converted else "The sample rate"
-            label.setToolTip(
-                plain_tip(f"{status.problem or 'No audio output'}\nAudio settings: Ctrl+,") if fault else rates
-            )
-            label.setProperty("fault", fault)
-            label.style().polish(label)
+        tip = "The model's rate, converted to the sound device's rate" if converted else "The sample rate"
+        if fault:
+            tip = f"{status.problem or 'No audio output'}\nAudio settings: Ctrl+,"
+        self._window.show_rate(text, plain_tip(tip), fault)
 
     def _state(self, status: SoundStatus) -> AudioState:
         device, gaps = status.device, status.gaps  # the latest ones: the one that was known may be gone

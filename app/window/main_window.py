@@ -262,7 +262,7 @@ class MainWindow(QMainWindow):
         self.instrument.setEnabled(alive)
         self._share_height()
         self.faces.setEnabled(alive)
-        self.rate_label.setVisible(alive)
+        self._show_rate_label()
 
     # Faces
 
@@ -274,10 +274,10 @@ class MainWindow(QMainWindow):
             for widget in widgets:
                 widget.setVisible(self._shows(area))
         self.instrument.show_patch_area(self._shows("patch"))
-        for name in ("keys", "abx", "switch"):
-            self.action[name].setEnabled(face == "lab")
+        self.action["keys"].setEnabled(face == "lab")
         self._column.setStretchFactor(self.instrument, int(face == "play"))
         self._show_growth()
+        self._show_rate_label()
         self.show_keys(self.shows_keys)
         self._fit()
 
@@ -321,6 +321,21 @@ class MainWindow(QMainWindow):
             shown = not self._solo.isHidden()
             home.insertWidget(place, self._solo)
             self._solo.setVisible(shown)
+
+    def show_rate(self, text: str, tip: str, fault: bool) -> None:
+        """The sample rate, in the Lab; a fault of the sound output, in both faces."""
+        label = self.rate_label
+        if label.text() == text:
+            return
+        label.setText(text)
+        label.setToolTip(tip)
+        label.setProperty("fault", fault)
+        label.style().polish(label)
+        self._show_rate_label()
+
+    def _show_rate_label(self) -> None:
+        fault = bool(self.rate_label.property("fault"))
+        self.rate_label.setVisible(self._alive and (fault or self._shows("test")))
 
     def show_outside(self, text: str) -> None:
         """What of the latest note lies outside the training; "" for nothing."""

@@ -388,6 +388,13 @@ def test_nothing_is_red_in_play_until_the_error_grew_and_then_a_sign_shows(alive
     assert not alive.growth_sign.isVisible()
 
 
+def test_in_play_the_rate_shows_only_with_a_fault(alive: MainWindow) -> None:
+    for face, fault, seen in (("play", False, False), ("lab", False, True), ("play", True, True)):
+        alive.show_face(face)
+        alive.show_rate(f"48 kHz {face}", "", fault)
+        assert alive.rate_label.isVisible() == seen
+
+
 def test_a_sign_shows_while_files_hover_over_the_window(alive: MainWindow) -> None:
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile("/tmp/song.mid"), QUrl.fromLocalFile("/tmp/other.wav")])
