@@ -59,8 +59,11 @@ def error_word(info: PresetInfo) -> str:
     return "–" if info.rel_mae is None else percent(info.rel_mae)
 
 
-def percent(share: float) -> str:
-    """A share in percent: two digits below 10 %, whole numbers from there on, and no less than LEAST_SHARE."""
+def percent(share: float, digits: int = 2) -> str:
+    """A share in percent: so many digits below 10 %, as many decimals as `digits` − 2 from there on.
+
+    Shares below LEAST_SHARE are shown as less than that.
+    """
     if share < LEAST_SHARE:
         return f"< {100 * LEAST_SHARE:g} %"
-    return f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"
+    return f"{100 * share:.{digits}g} %" if share < 0.1 else f"{100 * share:.{max(0, digits - 2)}f} %"

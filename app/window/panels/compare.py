@@ -12,8 +12,8 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton
 
 from app.analysis.comparison import Basis, ComparedRow, compare, same_string
+from app.presets import words
 from app.presets.library import Library, PresetEntry
-from app.presets.words import LEAST_SHARE
 from app.session.choices import PluckedString, Session
 from app.session.slots import other_preset
 from app.views.controls.parts import tool_button, words_label
@@ -28,9 +28,7 @@ def percent(value: float) -> str:
     """A relative error; ∞: the model ran away."""
     if math.isinf(value):
         return "ran away"
-    if value < LEAST_SHARE:
-        return f"< {100 * LEAST_SHARE:g} %"
-    return f"{100 * value:.3g} %" if value < 10 else "> 1000 %"
+    return words.percent(value, 3) if value < 10 else "> 1000 %"
 
 
 def scientific(value: float) -> str:
