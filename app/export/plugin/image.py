@@ -8,6 +8,7 @@ rate but the responses: the shell sets it when the host does.
 from __future__ import annotations
 
 import ctypes
+import uuid
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -108,7 +109,7 @@ class _Header(ctypes.Structure):
         ("description", ctypes.c_char * 512),
         ("maker", ctypes.c_char * 64),
         ("features", ctypes.c_char * 128),
-        ("digest", ctypes.c_char * 32),
+        ("uid", ctypes.c_uint8 * 16),
     )
 
 
@@ -185,6 +186,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     header.longest_s = tail_s + MOST_LOUD_S
     id = f"org.learned-strings.{''.join(c if c.isalnum() else '-' for c in patch.name.lower())}"
     header.id, header.name, header.maker = id.encode()[:127], _bytes(patch.name, 63), MAKER.encode()
+    header.uid[:] = uuid.uuid5(uuid.NAMESPACE_URL, f"urn:{id}").bytes
     header.description = _bytes(patch.description, 511)
     header.features = " ".join(("instrument", "synthesizer", "stereo")).encode()
     header.bytes = len(parts)

@@ -35,7 +35,8 @@ typedef struct {
   int64_t taps, responses, response_count;
   int64_t modes, most_notes;
   double longest_s;
-  char id[128], name[64], description[512], maker[64], features[128], digest[32];
+  char id[128], name[64], description[512], maker[64], features[128];
+  uint8_t uid[16]; /* of VST3 */
 } image;
 
 typedef struct { int64_t frame; int32_t parameter; double value; } change;
