@@ -135,7 +135,11 @@ def _placed(library: Path, images: Sequence[Image], form: str, target: str, path
         inside = {binary: library, **_turtle(images, binary)}
     elif system == "macos":
         plist = _PLIST.format(name=escape(path.stem), id="".join(c if c.isalnum() else "-" for c in path.stem))
-        inside = {f"Contents/MacOS/{path.stem}": library, "Contents/Info.plist": plist, "Contents/PkgInfo": "BNDL????"}
+        inside = {
+            f"Contents/MacOS/{path.stem}": library,
+            "Contents/Info.plist": plist,
+            "Contents/PkgInfo": "BNDL????",
+        }
     elif form == "vst3":
         inside = {f"Contents/{VST3_FOLDERS[target]}/{path.stem}{VST3_ENDINGS[system]}": library}
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -187,7 +191,7 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
     prefixes = "".join(f"@prefix {name}: <{uri}> .\n" for name, uri in _PREFIXES.items())
     listed, described = [prefixes], [prefixes]
     for image in images:
-        head = f"<urn:{image.id}> a lv2:Plugin, lv2:InstrumentPlugin ;"
+        head = f"<urn:{image.id}> a lv2:Plugin, lv2:InstrumentPlugin, doap:Project ;"
         listed.append(f"{head}\n  lv2:binary <{binary}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
         ports = [
             "a lv2:InputPort, atom:AtomPort ; atom:bufferType atom:Sequence ; atom:supports midi:MidiEvent ;\n"

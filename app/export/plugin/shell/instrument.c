@@ -229,12 +229,18 @@ void instrument_controller(instrument *own, uint32_t at, int32_t channel, int32_
   if (plausible(channel, number)) pushed(own, frame_of(own, at), CONTROLLER, channel, number, value);
 }
 
-void instrument_tune(instrument *own, uint32_t at, int32_t channel, double semitones) {
-  if (!plausible(channel, 0)) return;
-  double range = own->player[PLAYER_CHANNELS + channel * CHANNEL_SLOTS + CHANNEL_RANGE].real;
-  if (range < 0) range = own->player[PLAYER_VALUES + BEND_SEMITONES].real;
-  if (own->table[TABLE_MODE].whole == MPE && channel > 0) range = MPE_BEND_SEMITONES;
-  if (range > 0) instrument_bend(own, at, channel, semitones / range);
+/* `id`, `channel` and `key` choose the notes that are meant, as far as they are given: 0, ANY and ANY are not. */
+static void pushed_for(instrument *own, uint32_t at, int64_t kind, int64_t id, int32_t channel, int32_t key, double value) {
+  slot *event = pushed(own, frame_of(own, at), kind, channel < 0 ? ANY : channel, key < 0 ? ANY : key, value);
+  if (event) event[EVENT_ID].whole = id;
+}
+
+void instrument_tune(instrument *own, uint32_t at, int64_t id, int32_t channel, int32_t key, double semitones) {
+  if (isfinite(semitones)) pushed_for(own, at, TUNE, id, channel, key, semitones);
+}
+
+void instrument_choke(instrument *own, uint32_t at, int64_t id, int32_t channel, int32_t key) {
+  pushed_for(own, at, CHOKE, id, channel, key, 0);
 }
 
 void instrument_midi(instrument *own, uint32_t at, const uint8_t *bytes) {

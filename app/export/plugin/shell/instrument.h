@@ -69,7 +69,8 @@ void instrument_note_off(instrument *, uint32_t at, int32_t channel, int32_t key
 void instrument_bend(instrument *, uint32_t at, int32_t channel, double value);
 void instrument_controller(instrument *, uint32_t at, int32_t channel, int32_t number, int32_t value);
 void instrument_midi(instrument *, uint32_t at, const uint8_t *bytes);
-void instrument_tune(instrument *, uint32_t at, int32_t channel, double semitones);
+void instrument_tune(instrument *, uint32_t at, int64_t id, int32_t channel, int32_t key, double semitones);
+void instrument_choke(instrument *, uint32_t at, int64_t id, int32_t channel, int32_t key);
 void instrument_change(instrument *, uint32_t at, int32_t parameter, double value);
 void instrument_set(instrument *, int32_t parameter, double value); /* while nothing is rendered */
 void instrument_reset(instrument *); /* silence, and all wheels and pedals at rest */

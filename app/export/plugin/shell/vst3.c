@@ -320,7 +320,8 @@ static void take_event(shell *own, const vst_event *of) {
     event->note.note_id = of->type == VST_NOTE_ON ? of->on.note : of->off.note;
     event->note.channel = of->on.channel;
     event->note.key = of->on.key;
-    event->note.velocity = on ? of->on.velocity : 0;
+    double velocity = on ? 127.0 * of->on.velocity : 0; /* in single precision: what is a step of MIDI stays one */
+    event->note.velocity = (fabs(velocity - rint(velocity)) < 1e-4 ? rint(velocity) : velocity) / 127;
     if (!on) return;
     own->known[own->known_count++ % MOST_NOTES_KNOWN] = (known_note){of->on.note, of->on.channel, of->on.key};
     if (of->on.cents != 0)

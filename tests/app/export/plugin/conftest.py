@@ -1,0 +1,32 @@
+"""Plug-ins that the tests share: built once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from app.export.plugin.build import build_plugin, this_target
+from app.export.plugin.image import Image, image_of
+from engine.kernels import cache
+from engine.presets import SHIPPED, load_preset
+from tests.app.export.plugin.host import Library
+from tests.app.export.plugin.pieces import NAMES, patch_of
+
+
+@pytest.fixture(scope="package")
+def images() -> list[Image]:
+    return [image_of(patch, load_preset(SHIPPED / f"{patch.preset}.safetensors")) for patch in map(patch_of, NAMES)]
+
+
+@pytest.fixture(scope="package")
+def objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where object files are kept."""
+    return cache.folder() or tmp_path_factory.mktemp("objects")
+
+
+@pytest.fixture(scope="package")
+def bank(images: list[Image], objects: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
+    path = build_plugin(images, "clap", this_target(), tmp_path_factory.mktemp("clap") / "bank", objects)
+    assert path.suffix == ".clap"
+    return Library(path)
