@@ -255,7 +255,7 @@ static int32_t shell_process(const clap_plugin *plugin, const clap_process *proc
   if (own->loaded) {
     own->loaded = false;
     for (int32_t place = 0; place < own->own.of->parameter_count; place++)
-      if (parameters_of(own->own.of)[place].kind != KIND_MACRO) instrument_change(&own->own, 0, place, own->own.values[place]);
+      instrument_follow(&own->own, place);
   }
   clap_audio *output = &process->outputs[0];
   float *left = output->data32[0], *right = output->channels > 1 ? output->data32[1] : NULL;
