@@ -19,8 +19,7 @@ from engine.presets import PresetInfo
 from engine.voices import Ear
 
 MIXES = ("body.mix", "room.mix")
-STEPS = 9  # positions of a macro at which levels are known
-EVERY = 4  # key: those between are as much louder or quieter as their neighbours
+STEPS = 5  # positions of a macro at which levels are known
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,17 +55,18 @@ def parts_of(patch: Patch, rate_hz: int) -> Parts | None:
 
 
 def levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float32]:
-    """Of keys as each macro moves alone, in dB: (macros, STEPS, KEYS); of silent keys, that of their neighbours."""
-    found = np.zeros((len(patch.macros), STEPS, KEYS), np.float32)
+    """How levels of keys change as each macro moves alone, in dB: (macros, STEPS, KEYS)."""
+    found, now = np.zeros((len(patch.macros), STEPS, KEYS), np.float32), _levels(patch, preset)
     for number, macro in enumerate(patch.macros):
         if all(target.field == "room.mix" for target in macro.targets):
             continue  # no level depends on the room
         for step in range(STEPS):
-            found[number, step] = _levels(patch.turned(number, step / (STEPS - 1)), preset)
+            found[number, step] = _levels(patch.turned(number, step / (STEPS - 1)), preset) - now
     return found
 
 
 def _levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float64]:
+    """Of all keys, in dB; of silent ones, that of their neighbours."""
     loud = LoudKeys(patch, Ear(tuple(patch.pickup.points), patch.pickup.kind), preset)
     known = dict(_known(loud, patch))
     keys = sorted(known) or [0]
@@ -75,7 +75,7 @@ def _levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float64]:
 
 def _known(loud: LoudKeys, patch: Patch) -> Iterator[tuple[int, float]]:
     low, high = patch.range
-    for key in (*range(low, high, EVERY), high):
+    for key in range(low, high + 1):
         with contextlib.suppress(ValueError):  # it has no possible string
             if (found := loud.of_key(key)) is not None:
                 yield key, 20 * math.log10(found.gain)

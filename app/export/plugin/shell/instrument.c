@@ -269,11 +269,16 @@ static slot *pushed(instrument *own, int64_t frame, int64_t kind, int32_t channe
 /* Events count a quantum late, so that each is known before the quantum that holds its frame. */
 static int64_t frame_of(const instrument *own, uint32_t at) { return own->mixer[M_FRAMES].whole + at + QUANTUM; }
 
-static double level_db(const image *of, int32_t number, double value, int32_t key) {
+/* A macro's share in the level of a key: known at steps, and 0 where the macro stands in the app. */
+static double level_db(const instrument *own, int32_t number, int32_t key) {
+  const image *of = own->of;
   const float *levels = (const float *)of + of->levels + number * of->level_steps * KEYS + key;
-  double place = value * (double)(of->level_steps - 1);
-  int64_t step = place < (double)(of->level_steps - 2) ? (int64_t)place : of->level_steps - 2;
-  return levels[step * KEYS] + (place - (double)step) * (levels[(step + 1) * KEYS] - levels[step * KEYS]);
+  double last = (double)(of->level_steps - 1), place = own->positions[number] * last, none = own->standards[number] * last;
+  int64_t step = place < last - 1 ? (int64_t)place : of->level_steps - 2;
+  double left = (double)step, right = left + 1, left_db = levels[step * KEYS], right_db = levels[(step + 1) * KEYS];
+  if (left < none && none < right && place < none) right = none, right_db = 0;
+  else if (left < none && none < right) left = none, left_db = 0;
+  return left_db + (place - left) / (right - left) * (right_db - left_db);
 }
 
 /* Keys stay as loud as in the app while macros move: each macro's share is known, and all are added. */
@@ -284,7 +289,7 @@ static void follow_levels(instrument *own, int32_t moved, double value) {
   for (int32_t key = (int32_t)own->table[TABLE_LOW].whole; key <= own->table[TABLE_HIGH].whole && key < KEYS; key++) {
     double change_db = 0;
     for (int32_t each = 0; each < of->macro_count; each++)
-      change_db += level_db(of, each, own->positions[each], key) - level_db(of, each, own->standards[each], key);
+      change_db += level_db(own, each, key);
     double factor = pow(10, change_db / 20);
     for (int32_t place = key * GAINS; place < (key + 1) * GAINS; place++)
       own->table[TABLE_GAINS + place].real = gains[place].real * factor;

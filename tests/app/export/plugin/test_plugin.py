@@ -14,10 +14,12 @@ from numpy.typing import NDArray
 from app.export.plugin.build import build_plugin, this_target
 from app.export.plugin.image import Image
 from app.export.plugin.objects import TARGETS, object_of
+from app.instrument.events import Controller, PatchTurned, TimedEvent
 from tests.app.export.plugin import host
 from tests.app.export.plugin.host import Event, Instance, Library, choke, midi, note_off, note_on, param, tune
 from tests.app.export.plugin.pieces import (
     EQUAL_DB,
+    MOVED,
     NAMES,
     difference_db,
     patch_of,
@@ -121,6 +123,46 @@ def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank: Library) -> No
     assert not other.load(b"\x07" + state[1:])
     assert not other.load(state[:5])
     assert other.save() == state
+
+
+def with_macro(bank: Library, name: str, macro: int, value: float) -> Instance:
+    """It is moved before anything is played."""
+    instance = instance_of(bank, name)
+    instance.block(64, [param(0, instance.parameters[patch_of(name).macros[macro].name].id, value)])
+    instance.deactivate()
+    instance.activate(48_000)
+    return instance
+
+
+def test_macros_move_body_and_room_and_keys_stay_as_loud(bank: Library) -> None:
+    patch = patch_of(MOVED)
+    names = [macro.targets[0].field for macro in patch.macros]
+    room, body, place = (names.index(each) for each in ("room.mix", "body.mix", "pluck.position"))
+    for value, most_db in ((0.0, -60), (0.7, EQUAL_DB)):  # without a room the app averages power at other frequencies
+        wanted = rendered(patch.turned(room, value), 48_000)
+        assert difference_db(played(with_macro(bank, MOVED, room, value), patch, 48_000), wanted) < most_db
+    for macro, value in ((body, 0.0), (body, 0.5), (place, 0.25), (place, 1.0)):
+        wanted = rendered(patch.turned(macro, value), 48_000)
+        assert difference_db(played(with_macro(bank, MOVED, macro, value), patch, 48_000), wanted) < -60
+
+
+def test_body_and_room_follow_macros_and_the_wheel_while_it_plays(bank: Library) -> None:
+    rate_hz, settled_s = 48_000, 0.7
+    after = slice(round(settled_s * rate_hz), None)
+    patch = patch_of(MOVED)
+    room = [macro.targets[0].field for macro in patch.macros].index("room.mix")
+    instance = instance_of(bank, MOVED)
+    moved = param(round(0.3 * rate_hz), instance.parameters[patch.macros[room].name].id, 1.0)
+    sound = played(instance, patch, rate_hz, more=(moved,))
+    wanted = rendered(patch, rate_hz, more=(TimedEvent(0.3, PatchTurned(patch.turned(room, 1.0))),))
+    assert difference_db(sound[after], wanted[after]) < EQUAL_DB
+    harp = patch_of("concert_harp")
+    assert harp.mod_wheel == "room.mix"
+    wheel = Controller(1, 100)
+    sound = played(instance_of(bank, "concert_harp"), harp, rate_hz, more=(to_host(wheel, round(0.3 * rate_hz)),))
+    wanted = rendered(harp, rate_hz, more=(TimedEvent(0.3, wheel),))
+    assert difference_db(sound[after], wanted[after]) < EQUAL_DB
+    assert difference_db(sound, rendered(harp, rate_hz)) > -60
 
 
 def test_ends_of_notes_are_reported(bank: Library) -> None:
