@@ -11,6 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.audio.devices import AudioDevice
@@ -59,6 +62,16 @@ def collected_here() -> Iterator[None]:
     yield
     gc.collect(2 if gc.get_count()[2] >= COLLECT_ALL_EVERY else 1)
     gc.enable()
+
+
+@pytest.fixture(autouse=True)
+def no_button_is_held() -> Iterator[None]:
+    """A double click of the tests ends with a press; a plot follows no pointer while a button is down."""
+    yield
+    for button in (Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton):
+        if QApplication.instance() and QApplication.mouseButtons() & button:
+            QTest.mouseRelease(QWidget(), button)
+    assert not QApplication.instance() or not QApplication.mouseButtons()
 
 
 def no_device(*_: object) -> AudioDevice:
