@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QDialog,
     QFormLayout,
     QHBoxLayout,
+    QLayout,
     QLineEdit,
     QProgressBar,
     QPushButton,
@@ -85,7 +86,7 @@ class LearnDialog(QDialog):
         self.bar = QProgressBar(maximum=1000)
         self.bar.setAccessibleName("Progress")
         self.report = read_only_text("Report")
-        self.heard = {key: QPushButton(text, checkable=True) for key, text in HEARD}
+        self.heard = {key: QPushButton(text) for key, text in HEARD}
         self.start = QPushButton("Continue", default=True)
         self.start.setObjectName("primary")
         self.close_button = QPushButton("Cancel")
@@ -96,7 +97,7 @@ class LearnDialog(QDialog):
 
     def _lay_out(self) -> None:
         question, form = QWidget(), QFormLayout()
-        rows = {
+        rows: dict[str, QWidget | QLayout] = {
             "Name": self.name,
             "Instrument": row_of(self.kind),
             "Length": row_of(self.length_m),
@@ -113,6 +114,7 @@ class LearnDialog(QDialog):
         column.addStretch(1)
         result, sounds = QWidget(), QHBoxLayout()
         for button in self.heard.values():
+            button.setCheckable(True)
             button.setToolTip("Both play on, in a loop; the switch is at the same moment")
             sounds.addWidget(button, 1)
         column = QVBoxLayout(result)
@@ -135,8 +137,8 @@ class LearnDialog(QDialog):
     def _connect(self) -> None:
         self.start.clicked.connect(self._continue)
         self.close_button.clicked.connect(self.reject)
-        for button in (self.string, self.body):
-            button.toggled.connect(self._show_choice)
+        for choice in (self.string, self.body):
+            choice.toggled.connect(self._show_choice)
         for key, button in self.heard.items():
             button.clicked.connect(partial(self._hear, key))
 
