@@ -19,8 +19,9 @@ from scipy.signal import resample_poly
 
 from app.audio.note_file import NoteFileError, read_note
 from app.instrument.bodies import own_bodies
+from app.patches.fields import explained
 from app.patches.library import PatchError, file_stem, own_patches, save_patch
-from app.patches.patch import Body, Category, Fretted, Patch, PhysicalString, Pickup, PluckChoices, explained
+from app.patches.patch import Body, Category, Fretted, Patch, PhysicalString, Pickup, PluckChoices
 from engine.folders import usable_files, user_folder
 from engine.result_file import WriteError, explain, whole_file
 from training.recording.fit import FREE_POLES
