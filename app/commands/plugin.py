@@ -21,7 +21,9 @@ def plugin(
         list[str],
         typer.Argument(metavar="INSTRUMENT...", help="Names or paths of files; all: every factory instrument."),
     ],
-    form: Annotated[Literal["clap", "lv2", "all"], typer.Option("--format", help="The kind of plug-in.")] = "clap",
+    form: Annotated[
+        Literal["clap", "vst3", "lv2", "all"], typer.Option("--format", help="The kind of plug-in.")
+    ] = "clap",
     target: Annotated[
         Literal["this", "linux-x64", "linux-arm64", "windows-x64", "macos-x64", "macos-arm64", "all"],
         typer.Option("--for", help="The system that it is for."),

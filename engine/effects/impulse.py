@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 
@@ -88,8 +89,21 @@ def faded(samples: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def as_loud(samples: NDArray[np.float64], rate_hz: int) -> NDArray[np.float64]:
     """The response times a factor: noise of equal power in each octave keeps it, in the mean of both channels."""
-    spectrum = np.fft.rfft(samples, room_for(max(len(samples), rate_hz // 4)), axis=0)
-    frequency_hz = np.linspace(0.0, rate_hz / 2, len(spectrum))
+    return samples / max(np.sqrt(noise_powers((samples,), rate_hz)[0, 0]), 1e-30)
+
+
+def noise_powers(responses: Sequence[NDArray[np.float64]], rate_hz: int) -> NDArray[np.float64]:
+    """The power of noise through each response, and what each two have in common: (responses, responses).
+
+    Of equal power in each octave; the mean of both channels. A sum of responses has the sum of all.
+    """
+    size = room_for(max(*(len(each) for each in responses), rate_hz // 4))
+    frequency_hz = np.linspace(0.0, rate_hz / 2, size // 2 + 1)
     heard = (frequency_hz >= LOUDNESS_HZ[0]) & (frequency_hz <= LOUDNESS_HZ[1])
-    power = (np.abs(spectrum[heard]) ** 2).mean(1)
-    return samples / max(np.sqrt(np.average(power, weights=1 / frequency_hz[heard])), 1e-30)
+    weights = 1 / frequency_hz[heard]
+    spectra = np.zeros((len(responses), len(weights), 2), complex)
+    for place, each in enumerate(responses):
+        if len(each):
+            spectra[place] = np.fft.rfft(each, size, axis=0)[heard]
+    total: NDArray[np.float64] = np.einsum("ifc,jfc,f->ij", spectra.conj(), spectra, weights, optimize=True).real
+    return total / (2 * weights.sum())

@@ -296,7 +296,8 @@ def _string_now(
     else:
         for place in range(of.STRING):
             out[place] = player[note + of.NOTE_OWN + place]
-    ratio = 2.0 ** (_semitones(player, mode, players[note + of.NOTE_CHANNEL]) / 12)
+    semitones = _semitones(player, mode, players[note + of.NOTE_CHANNEL]) + player[note + of.NOTE_TUNED]
+    ratio = 2.0 ** (semitones / 12)
     if fits and ratio != 1.0:
         if tables[of.TABLE_BEND_BY] == of.BY_LENGTH:
             out[of.LENGTH] = strings.slid(out, ratio)
@@ -852,6 +853,38 @@ def _note_off(
             _damp(player, players, table, tables, number, frame, now)
 
 
+@njit(**COMPILED)
+def _is_meant(players: np.ndarray, event: int, note: int) -> bool:
+    """Whether an event is for a note: of its number, channel and key, as far as they are given."""
+    id, channel, key = players[event + of.EVENT_ID], players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
+    if players[note + of.NOTE_STATE] != of.RINGS or (id != 0 and players[note + of.NOTE_ID] != id):
+        return False
+    return channel in (of.ANY, players[note + of.NOTE_CHANNEL]) and key in (of.ANY, players[note + of.NOTE_KEY])
+
+
+@njit(**COMPILED)
+def _tune(
+    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, event: int, frame: int, now: int
+) -> None:
+    """Bends single notes."""
+    semitones = min(max(player[event + of.EVENT_VALUE], -WIDEST_SEMITONES), WIDEST_SEMITONES)
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        if _is_meant(players, event, note) and _sounds(players, note):
+            player[note + of.NOTE_TUNED] = semitones
+            _retune(player, players, table, tables, number, BEND_S, frame, now)
+
+
+@njit(**COMPILED)
+def _choke(player: np.ndarray, players: np.ndarray, event: int, frame: int) -> None:
+    """Lets single notes fade out fast, though their instrument lets them ring."""
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        if _is_meant(players, event, note):
+            _release_note(player, players, note, STOP_S, frame)
+            players[note + of.NOTE_HAS_PLACE] = 0
+
+
 # Controllers
 
 
@@ -993,6 +1026,12 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
         return
     if kind == of.STOP:
         _stop(player, players, value, frame)
+        return
+    if kind == of.CHOKE:
+        _choke(player, players, event, frame)
+        return
+    if kind == of.TUNE and address != 0:
+        _tune(player, players, _at(address), _whole(address), event, frame, now)
         return
     if not (0 <= channel < of.CHANNELS and 0 <= key < of.KEYS and address != 0):
         if kind == of.NOTE_ON:

@@ -23,14 +23,15 @@ POSITION, WIDTH, WIDTH_HARD, SOFTEST_MM, HARDEST_MM, CURVE, RELEASE_S, BEND_SEMI
 VALUES = KNOBS + 8
 
 # Kinds of events
-NOTE_ON, NOTE_OFF, BEND, CONTROLLER, PRESSURE, PARAMETER, TABLE, CANCEL, STOP = range(9)
+NOTE_ON, NOTE_OFF, BEND, CONTROLLER, TUNE, PARAMETER, TABLE, CANCEL, STOP, CHOKE = range(10)
+ANY = -1  # channel or key of the notes that are tuned or choked
 # Slots of an event (W: whole number, R: real)
 EVENT_FRAME = 0  # W of the mixer, at which it counts; 0: at once
 EVENT_KIND = 1  # W
 EVENT_CHANNEL = 2  # W 0 … 16
 EVENT_KEY = 3  # W of a note; the number of a controller, or of one of the values
-EVENT_VALUE = 4  # R velocity, bend in -1 … 1, value of a controller or a parameter, seconds of a stop
-EVENT_ID = 5  # W which reports of a note carry
+EVENT_VALUE = 4  # R velocity, bend in -1 … 1, value of a controller or a parameter, semitones, seconds of a stop
+EVENT_ID = 5  # W which reports of a note carry; of the notes that are tuned or choked; 0: any
 EVENT_POSITION = 6  # R of the pluck; not a number: the instrument's
 EVENT_PITCH_HZ = 7  # R not a number: the key's
 EVENT_TABLE = 8  # W address of a table
@@ -119,6 +120,7 @@ NOTE_POINT = 17  # R two
 NOTE_SOLO = 19  # W
 NOTE_VOICES = 20  # W four addresses; 0: none
 NOTE_FRAME = 24  # W at which it was to begin; 0: at once
+NOTE_TUNED = 25  # R semitones, beside what wheels bend it
 NOTE_OWN = 32  # R its string as its key had it when it was struck
 NOTE_STRING_NOW = NOTE_OWN + STRING  # R with bends, slides, dampers and knobs
 NOTE_SLOTS = NOTE_STRING_NOW + STRING

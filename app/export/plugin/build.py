@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from importlib.util import find_spec
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 from app.export.plugin.image import MAKER, Image, layout_header
 from app.export.plugin.objects import STUBS, TARGETS, object_of
@@ -21,6 +22,8 @@ from engine.whole_file import whole_file
 EXTRA = "learned-strings[plugin]"
 COMMON = ("instrument.c",)
 LIBRARY_ENDINGS = {"linux": ".so", "windows": ".dll", "macos": ".dylib"}
+VST3_ENDINGS = {"linux": ".so", "windows": ".vst3"}
+VST3_FOLDERS = {"linux-x64": "x86_64-linux", "linux-arm64": "aarch64-linux", "windows-x64": "x86_64-win"}
 _HERE = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}
 _MACHINES = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64", "aarch64": "arm64"}
 
@@ -52,6 +55,15 @@ FORMATS: Mapping[str, Format] = {
             "linux": ".clap",
             "windows": "AppData/Local/Programs/Common/CLAP",
             "macos": "Library/Audio/Plug-Ins/CLAP",
+        },
+    ),
+    "vst3": Format(
+        ("vst3.c", "clap.c"),
+        ".vst3",
+        {
+            "linux": ".vst3",
+            "windows": "AppData/Local/Programs/Common/VST3",
+            "macos": "Library/Audio/Plug-Ins/VST3",
         },
     ),
     "lv2": Format(
@@ -122,7 +134,14 @@ def _placed(library: Path, images: Sequence[Image], form: str, target: str, path
         binary = f"{path.stem}{LIBRARY_ENDINGS[system]}"
         inside = {binary: library, **_turtle(images, binary)}
     elif system == "macos":
-        inside = {f"Contents/MacOS/{path.stem}": library, "Contents/Info.plist": _PLIST.format(name=path.stem)}
+        plist = _PLIST.format(name=escape(path.stem), id="".join(c if c.isalnum() else "-" for c in path.stem))
+        inside = {
+            f"Contents/MacOS/{path.stem}": library,
+            "Contents/Info.plist": plist,
+            "Contents/PkgInfo": "BNDL????",
+        }
+    elif form == "vst3":
+        inside = {f"Contents/{VST3_FOLDERS[target]}/{path.stem}{VST3_ENDINGS[system]}": library}
     path.parent.mkdir(parents=True, exist_ok=True)
     if not inside:
         with whole_file(path) as part:
@@ -172,7 +191,7 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
     prefixes = "".join(f"@prefix {name}: <{uri}> .\n" for name, uri in _PREFIXES.items())
     listed, described = [prefixes], [prefixes]
     for image in images:
-        head = f"<urn:{image.id}> a lv2:Plugin, lv2:InstrumentPlugin ;"
+        head = f"<urn:{image.id}> a lv2:Plugin, lv2:InstrumentPlugin, doap:Project ;"
         listed.append(f"{head}\n  lv2:binary <{binary}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
         ports = [
             "a lv2:InputPort, atom:AtomPort ; atom:bufferType atom:Sequence ; atom:supports midi:MidiEvent ;\n"
@@ -223,7 +242,7 @@ _PLIST = """<?xml version="1.0" encoding="UTF-8"?>
 <!DOCTYPE plist PUBLIC "-//Apple//DTD PLIST 1.0//EN" "http://www.apple.com/DTDs/PropertyList-1.0.dtd">
 <plist version="1.0"><dict>
 <key>CFBundleExecutable</key><string>{name}</string>
-<key>CFBundleIdentifier</key><string>org.learned-strings.{name}</string>
+<key>CFBundleIdentifier</key><string>org.learned-strings.{id}</string>
 <key>CFBundleName</key><string>{name}</string>
 <key>CFBundlePackageType</key><string>BNDL</string>
 <key>CFBundleVersion</key><string>1</string>

@@ -8,6 +8,7 @@ rate but the responses: the shell sets it when the host does.
 from __future__ import annotations
 
 import ctypes
+import uuid
 import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,14 +16,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from app.export.plugin.parts import MIXES, STEPS, levels, mixed, parts_of
 from app.instrument.compiled import InstrumentPlayer
-from app.instrument.effects import effects_of
-from app.instrument.table import VALUES
+from app.instrument.table import VALUES, wheel_goal
 from app.patches.patch import Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
 from engine.effects.partitions import FADE_S
 from engine.kernels import layout as at
-from engine.kernels import player as control
 from engine.kernels import playing_layout as of
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import Preset
@@ -36,7 +36,7 @@ MOST_NOTES = 40
 MOST_PARAMETERS, MOST_TARGETS = 64, 8  # of the shell
 MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
 LARGEST_WHOLE = 2**31 - 1
-SOURCE, VOLUME, VALUE, POINT, MACRO = range(5)  # kinds of the shell's parameters
+SOURCE, VOLUME, VALUE, POINT, MACRO, MIX = range(6)  # kinds of the shell's parameters
 SOURCE_ID = "source"
 SOURCES = ("model", "truth", "difference")
 FEATURES = {"guitar": "guitar", "bass": "guitar", "keys": "piano"}  # of CLAP, by category
@@ -70,10 +70,16 @@ class _Macro(ctypes.Structure):
     _fields_ = (("count", ctypes.c_int32), ("spare", ctypes.c_int32), ("targets", _Target * MOST_TARGETS))
 
 
+class _Part(ctypes.Structure):
+    _fields_ = (*((name, ctypes.c_int64) for name in ("frames", "channels", "first")), ("unit", ctypes.c_double))
+
+
 class _Response(ctypes.Structure):
     _fields_ = (
-        *((name, ctypes.c_int64) for name in ("rate_hz", "frames", "channels", "first")),
-        ("unit", ctypes.c_double),
+        ("rate_hz", ctypes.c_int64),
+        ("body", _Part),
+        ("room", _Part),
+        ("powers", ctypes.c_double * 16),
     )
 
 
@@ -98,17 +104,21 @@ class _Header(ctypes.Structure):
                 "taps",
                 "responses",
                 "response_count",
+                "levels",
+                "level_steps",
+                "wheel_mix",
                 "modes",
                 "most_notes",
             )
         ),
         ("longest_s", ctypes.c_double),
+        ("wheel_goal", ctypes.c_double),
         ("id", ctypes.c_char * 128),
         ("name", ctypes.c_char * 64),
         ("description", ctypes.c_char * 512),
         ("maker", ctypes.c_char * 64),
         ("features", ctypes.c_char * 128),
-        ("digest", ctypes.c_char * 32),
+        ("uid", ctypes.c_uint8 * 16),
     )
 
 
@@ -153,12 +163,12 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     assert table is not None
     header = _Header(magic=b"LSPLUGIN", version=1, modes=min(of.MOST_MODES, player.grid_points - 2))
     header.most_notes = MOST_NOTES
-    parts = bytearray(bytes(header))
+    whole = bytearray(bytes(header))
 
     def put(content: bytes) -> int:
-        parts.extend(b"\0" * (-len(parts) % 8))
-        first = len(parts)
-        parts.extend(content)
+        whole.extend(b"\0" * (-len(whole) % 8))
+        first = len(whole)
+        whole.extend(content)
         return first
 
     memory = table.memory.copy()
@@ -175,25 +185,41 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     ids = tuple(id for id, _ in parameters)
     macros, left_out = _macros(patch, ids)
     header.macros, header.macro_count = put(b"".join(bytes(each) for each in macros)), len(macros)
-    responses, tail_s = _responses(patch)
-    records = []
-    for rate_hz, response in responses:
-        unit = float(np.abs(response).max()) / LARGEST_WHOLE  # finer than single precision where it is loud
-        first = put(np.rint(response / unit).astype(np.int32).tobytes()) // 4
-        records.append(_Response(rate_hz, len(response), response.shape[1], first, unit))
+    heights = levels(patch, preset.info)
+    header.levels, header.level_steps = put(heights.tobytes()) // 4, STEPS
+    header.wheel_mix = MIXES.index(patch.mod_wheel) if patch.mod_wheel in MIXES else -1
+    header.wheel_goal = wheel_goal(patch) or 0.0
+
+    def part(samples: NDArray[np.float64]) -> _Part:
+        unit = (
+            float(np.abs(samples).max(initial=0.0)) / LARGEST_WHOLE or 1.0
+        )  # where it is loud, finer than single precision
+        return _Part(
+            len(samples), samples.shape[1], put(np.rint(samples / unit).astype(np.int32).tobytes()) // 4, unit
+        )
+
+    records, tail_s = [], 0.0
+    for rate_hz in RATES_HZ:
+        parts = parts_of(patch, rate_hz)
+        if parts is not None:
+            record = _Response(rate_hz, part(parts.body), part(parts.room))
+            record.powers[:] = parts.powers.ravel().tolist()
+            records.append(record)
+            tail_s = max(tail_s, (len(parts.body) + len(parts.room)) / rate_hz)
     header.responses, header.response_count = put(b"".join(bytes(each) for each in records)), len(records)
     header.longest_s = tail_s + MOST_LOUD_S
     id = f"org.learned-strings.{''.join(c if c.isalnum() else '-' for c in patch.name.lower())}"
     header.id, header.name, header.maker = id.encode()[:127], _bytes(patch.name, 63), MAKER.encode()
+    header.uid[:] = uuid.uuid5(uuid.NAMESPACE_URL, f"urn:{id}").bytes
     header.description = _bytes(patch.description, 511)
     header.features = " ".join(("instrument", "synthesizer", "stereo")).encode()
-    header.bytes = len(parts)
-    parts[: ctypes.sizeof(_Header)] = bytes(header)
+    header.bytes = len(whole)
+    whole[: ctypes.sizeof(_Header)] = bytes(header)
     controls = (
         Control(id, each.name.decode(), each.low, each.high, each.standard, SOURCES if each.stepped else ())
         for id, each in parameters
     )
-    return Image(id, patch.name, bytes(parts), tuple(controls), left_out)
+    return Image(id, patch.name, bytes(whole), tuple(controls), left_out)
 
 
 def _bytes(text: str, most: int) -> bytes:
@@ -233,6 +259,9 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     for index, id in enumerate(VALUES):
         if id in OF_PATCHES:
             yield _record(id, VALUE, index, patch.value(id), OF_PATCHES[id], OF_PATCHES[id].group.capitalize())
+    for id in mixed(patch):
+        parameter = OF_PATCHES[id]
+        yield _record(id, MIX, MIXES.index(id), patch.value(id), parameter, parameter.group.capitalize())
     points = () if patch.pickup.kind == "bridge" else patch.pickup.points  # at the bridge there is no place to choose
     for index, point in enumerate(points):
         id = f"pickup.points.{index}"
@@ -252,28 +281,20 @@ def _macros(patch: Patch, ids: tuple[str, ...]) -> tuple[list[_Macro], tuple[str
     return found, tuple(dict.fromkeys(left_out))
 
 
-def _responses(patch: Patch) -> tuple[list[tuple[int, NDArray[np.float64]]], float]:
-    """Body and room at each rate, and for how long they ring."""
-    effects = effects_of(patch)
-    if effects is None or effects.neutral:
-        return [], 0.0
-    return [(rate_hz, effects.impulse(rate_hz)) for rate_hz in RATES_HZ], effects.tail_s(PREPARED_HZ)
-
-
 def layout_header(version: str) -> str:
     """The C header with places and constants of the kernels' memory."""
     wanted = {
         at: "QUANTUM AHEAD EARLY WINDOW REACH MIXER_SLOTS M_RATE M_FRAMES M_ACTIVE M_WANTED_VOLUME M_VOLUME "
-        "M_RELEASE M_REDUCTION M_PEAK M_LEFT M_CHANNELS M_SMOOTHING M_LIMITING M_CONVOLVER M_EFFECTS M_PLAYER M_TAPS "
-        "M_GAINS M_HERE I_HEADER C_CAPACITY C_FADE_WINDOWS C_AWAKE C_STEP C_COSINES C_SINES C_WORK "
-        "C_LATE S_RATE T_RATE",
-        of: "NOTE_ON NOTE_OFF BEND CONTROLLER PARAMETER TABLE CANCEL EVENT_FRAME EVENT_KIND EVENT_CHANNEL "
-        "EVENT_KEY EVENT_VALUE EVENT_ID EVENT_POSITION EVENT_PITCH_HZ EVENT_TABLE EVENT_SLOTS EVENTS REPORTS "
-        "MOST_NOTES MOST_SOURCES TABLE_MODE TABLE_POINT TABLE_SOURCES TABLE_PROGRAMS MPE KEYS CHANNELS CHANNEL_SLOTS "
-        "CHANNEL_RANGE BEND_SEMITONES PLAYER_MOST PLAYER_MODES PLAYER_PUSHED PLAYER_TAKEN PLAYER_QUEUED "
-        "PLAYER_REPORTED PLAYER_RATE PLAYER_SOURCE_GAINS PLAYER_VALUES PLAYER_CHANNELS PLAYER_EVENTS PLAYER_REPORTS "
-        "PLAYER_VOICES BEGAN REPORT_KIND REPORT_ID REPORT_CHANNEL REPORT_KEY REPORT_SLOTS",
-        control: "MPE_BEND_SEMITONES",
+        "M_RELEASE M_REDUCTION M_PEAK M_LEFT M_CHANNELS M_SMOOTHING M_LIMITING M_CONVOLVER M_EFFECTS "
+        "M_EFFECTS_NOW M_EFFECTS_NEXT M_PLAYER M_TAPS M_GAINS M_HERE I_HEADER C_CAPACITY C_FADE_WINDOWS "
+        "C_AWAKE C_STEP C_COSINES C_SINES C_WORK C_LATE S_RATE T_RATE",
+        of: "NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CANCEL CHOKE ANY EVENT_FRAME EVENT_KIND "
+        "EVENT_CHANNEL EVENT_KEY EVENT_VALUE EVENT_ID EVENT_POSITION EVENT_PITCH_HZ EVENT_TABLE EVENT_SLOTS "
+        "EVENTS REPORTS MOST_NOTES MOST_SOURCES TABLE_MODE TABLE_POINT TABLE_SOURCES TABLE_PROGRAMS MPE KEYS "
+        "CHANNELS CHANNEL_SLOTS CHANNEL_RANGE BEND_SEMITONES PLAYER_MOST PLAYER_MODES PLAYER_PUSHED "
+        "PLAYER_TAKEN PLAYER_QUEUED PLAYER_REPORTED PLAYER_RATE PLAYER_SOURCE_GAINS PLAYER_VALUES "
+        "PLAYER_CHANNELS PLAYER_EVENTS PLAYER_REPORTS PLAYER_VOICES BEGAN REPORT_KIND REPORT_ID "
+        "REPORT_CHANNEL REPORT_KEY REPORT_SLOTS TABLE_GAINS GAINS TABLE_LOW TABLE_HIGH PLAYER_WHEEL",
     }
     lines = [f'#define LS_VERSION "{version}"']
     for module, names in wanted.items():

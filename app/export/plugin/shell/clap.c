@@ -129,16 +129,20 @@ static void take_event(shell *own, const clap_event *event, uint32_t at) {
     double velocity = 127 * note->velocity;
     instrument_note_on(to, at, note->note_id >= 0 ? note->note_id + 1 : 0, note->channel < 0 ? 0 : note->channel, note->key,
                        velocity < 1 ? 1 : velocity);
-  } else if (event->type == CLAP_NOTE_OFF || event->type == CLAP_NOTE_CHOKE) {
+  } else if (event->type == CLAP_NOTE_OFF) {
     const clap_event_note *note = (const clap_event_note *)event;
     int32_t channel = note->channel < 0 ? 0 : note->channel;
     if (note->key >= 0) instrument_note_off(to, at, channel, note->key);
-    else instrument_controller(to, at, channel, event->type == CLAP_NOTE_OFF ? 123 : 120, 0);
+    else instrument_controller(to, at, channel, 123, 0);
+  } else if (event->type == CLAP_NOTE_CHOKE) {
+    const clap_event_note *note = (const clap_event_note *)event;
+    instrument_choke(to, at, note->note_id >= 0 ? note->note_id + 1 : 0, note->channel, note->key);
   } else if (event->type == CLAP_NOTE_EXPRESSION) {
     const clap_event_expression *each = (const clap_event_expression *)event;
-    int32_t channel = each->channel < 0 ? 0 : each->channel;
-    if (each->id == CLAP_EXPRESSION_TUNING) instrument_tune(to, at, channel, each->value);
-    else if (each->id == CLAP_EXPRESSION_BRIGHTNESS) instrument_controller(to, at, channel, 74, (int32_t)(127 * each->value));
+    if (each->id == CLAP_EXPRESSION_TUNING)
+      instrument_tune(to, at, each->note_id >= 0 ? each->note_id + 1 : 0, each->channel, each->key, each->value);
+    else if (each->id == CLAP_EXPRESSION_BRIGHTNESS)
+      instrument_controller(to, at, each->channel < 0 ? 0 : each->channel, 74, (int32_t)(127 * (each->value > 0 ? each->value < 1 ? each->value : 1 : 0)));
   } else if (event->type == CLAP_MIDI) {
     instrument_midi(to, at, ((const clap_event_midi *)event)->data);
   }
@@ -251,7 +255,7 @@ static int32_t shell_process(const clap_plugin *plugin, const clap_process *proc
   if (own->loaded) {
     own->loaded = false;
     for (int32_t place = 0; place < own->own.of->parameter_count; place++)
-      if (parameters_of(own->own.of)[place].kind != KIND_MACRO) instrument_change(&own->own, 0, place, own->own.values[place]);
+      instrument_follow(&own->own, place);
   }
   clap_audio *output = &process->outputs[0];
   float *left = output->data32[0], *right = output->channels > 1 ? output->data32[1] : NULL;

@@ -56,42 +56,169 @@ static slot *copied(const image *of, int64_t first, int64_t count) {
   return memory;
 }
 
-/* The response of the nearest rate, converted by cubic interpolation where it is another. */
-static bool begin_response(instrument *own) {
-  const image *of = own->of;
-  if (!of->response_count) return true;
-  const response *found = (const response *)((const char *)of + of->responses);
-  const response *chosen = found;
-  for (int64_t place = 1; place < of->response_count; place++)
-    if (fabs(found[place].rate_hz - own->rate_hz) < fabs(chosen->rate_hz - own->rate_hz)) chosen = &found[place];
-  const int32_t *stored = (const int32_t *)of + chosen->first;
-  int64_t channels = chosen->channels;
-  double step = chosen->rate_hz / own->rate_hz;
+/* Body and room: one response for the convolver, mixed of four: nothing, the body, the room, and both in series. */
+
+/* A part's samples (frames, 2), converted by cubic interpolation where its rate is another; the caller frees them. */
+static double *samples_of(const image *of, const part *from, double step, int64_t *frames) {
+  const int32_t *stored = (const int32_t *)of + from->first;
   bool same = fabs(step - 1) < 1e-9;
-  int64_t frames = same ? chosen->frames : (int64_t)(chosen->frames / step);
-  double *samples = malloc((size_t)(frames * channels) * sizeof(double));
-  if (!samples) return false;
-  for (int64_t frame = 0; frame < frames; frame++) {
+  *frames = same ? from->frames : (int64_t)((double)from->frames / step);
+  double *samples = malloc((size_t)(2 * *frames + 1) * sizeof(double));
+  for (int64_t frame = 0; samples && frame < *frames; frame++) {
     double place = same ? (double)frame : (double)frame * step;
     int64_t left = (int64_t)place;
     double t = place - (double)left;
-    for (int64_t channel = 0; channel < channels; channel++) {
+    for (int64_t channel = 0; channel < 2; channel++) {
       double y[4];
       for (int64_t k = 0; k < 4; k++) {
         int64_t at = left + k - 1;
-        y[k] = at < 0 || at >= chosen->frames ? 0 : chosen->unit * stored[at * channels + channel];
+        y[k] = at < 0 || at >= from->frames ? 0 : from->unit * stored[at * from->channels + channel % from->channels];
       }
       double value = y[1] + 0.5 * t * (y[2] - y[0] + t * (2 * y[0] - 5 * y[1] + 4 * y[2] - y[3] +
                                                          t * (3 * (y[1] - y[2]) + y[3] - y[0])));
-      samples[frame * channels + channel] = same ? value : value * step;
+      samples[2 * frame + channel] = same ? value : value * step;
     }
   }
+  return samples;
+}
+
+/* A Fourier transform in place of `size` complex numbers, a power of two. */
+static void transform(double *z, int64_t size, double sign) {
+  for (int64_t place = 1, other = 0; place < size; place++) {
+    int64_t bit = size >> 1;
+    for (; other & bit; bit >>= 1) other ^= bit;
+    other |= bit;
+    for (int64_t k = 0; place < other && k < 2; k++) {
+      double kept = z[2 * place + k];
+      z[2 * place + k] = z[2 * other + k];
+      z[2 * other + k] = kept;
+    }
+  }
+  for (int64_t length = 2; length <= size; length *= 2)
+    for (int64_t k = 0; k < length / 2; k++) {
+      double turn = sign * 2 * 3.14159265358979323846 * (double)k / (double)length, c = cos(turn), d = sin(turn);
+      for (int64_t first = 2 * k; first < 2 * size; first += 2 * length) {
+        double *one = z + first, *two = one + length, re = c * two[0] - d * two[1], im = c * two[1] + d * two[0];
+        two[0] = one[0] - re, two[1] = one[1] - im;
+        one[0] += re, one[1] += im;
+      }
+    }
+}
+
+/* Both in series: left and right as the real and the imaginary part. The caller frees them. */
+static double *in_series(const double *body, int64_t body_frames, const double *room, int64_t room_frames) {
+  int64_t frames = body_frames + room_frames - 1, size = 1;
+  while (size < frames) size *= 2;
+  double *one = calloc((size_t)(2 * size), sizeof(double)), *two = calloc((size_t)(2 * size), sizeof(double));
+  if (one && two) {
+    memcpy(one, body, (size_t)(2 * body_frames) * sizeof(double));
+    memcpy(two, room, (size_t)(2 * room_frames) * sizeof(double));
+    transform(one, size, -1);
+    transform(two, size, -1);
+    for (int64_t k = 0; k <= size / 2; k++) { /* the spectra of both channels, apart, multiplied, together again */
+      int64_t other = (size - k) % size;
+      double *a = one + 2 * k, *b = one + 2 * other, *c = two + 2 * k, *d = two + 2 * other;
+      double left_re = 0.5 * (a[0] + b[0]), left_im = 0.5 * (a[1] - b[1]), right_re = 0.5 * (a[1] + b[1]), right_im = 0.5 * (b[0] - a[0]);
+      double l_re = 0.5 * (c[0] + d[0]), l_im = 0.5 * (c[1] - d[1]), r_re = 0.5 * (c[1] + d[1]), r_im = 0.5 * (d[0] - c[0]);
+      double x_re = left_re * l_re - left_im * l_im, x_im = left_re * l_im + left_im * l_re;
+      double y_re = right_re * r_re - right_im * r_im, y_im = right_re * r_im + right_im * r_re;
+      a[0] = x_re - y_im, a[1] = x_im + y_re;
+      b[0] = x_re + y_im, b[1] = y_re - x_im;
+    }
+    transform(one, size, 1);
+    for (int64_t place = 0; place < 2 * frames; place++) one[place] /= (double)size;
+  } else {
+    free(one);
+    one = NULL;
+  }
+  free(two);
+  return one;
+}
+
+static double mix_wanted(const instrument *own, int32_t which) {
+  const slot *gains = own->player + PLAYER_SOURCE_GAINS;
+  if (gains[0].real != 0 && gains[1].real != 0) return 0; /* a difference is heard as it is */
+  double mix = own->mix[which];
+  double wheel = own->of->wheel_mix == which ? (double)own->player[PLAYER_WHEEL].whole / 127 : 0;
+  return mix + wheel * (own->of->wheel_goal - mix);
+}
+
+static bool begin_mix(instrument *own) {
+  double body = mix_wanted(own, MIX_BODY), room = mix_wanted(own, MIX_ROOM), power = 0;
+  own->mixing[MIX_BODY] = body, own->mixing[MIX_ROOM] = room;
+  if (body == 0 && room == 0) { /* nothing is changed */
+    own->mixer[M_EFFECTS].whole = 0;
+    return false;
+  }
+  double weights[] = {(1 - body) * (1 - room), body * (1 - room), (1 - body) * room, body * room};
+  for (int32_t each = 0; each < 16; each++) power += weights[each / 4] * weights[each % 4] * own->of_rate->powers[each];
+  for (int32_t each = 0; each < 1 + MIX_PARTS; each++) own->weights[each] = weights[each] / fmax(sqrt(power), 1e-30);
+  own->mixing_at = I_HEADER;
+  return true;
+}
+
+/* Goes on mixing; what is ready is handed to the convolver, which fades to it. */
+static void mix_on(instrument *own, int64_t most) {
+  slot *mixer = own->mixer, *to = own->mixes[mixer[M_EFFECTS_NOW].whole == number_of(own->mixes[0])];
+  int64_t first = own->mixing_at, end = first + most < own->mix_slots ? first + most : own->mix_slots;
+  for (int64_t place = first; place < end; place++) to[place].real = 0;
+  for (int32_t which = 0; which < MIX_PARTS; which++)
+    for (int64_t place = first; own->parts[which] && place < end; place++)
+      to[place].real += own->weights[1 + which] * own->parts[which][place].real;
+  for (int32_t channel = 0; channel < 2; channel++) { /* a single sample at the beginning: the same at all frequencies */
+    int64_t begin = I_HEADER + channel * 2 * (QUANTUM + 1), until = begin + QUANTUM + 1;
+    for (int64_t place = begin > first ? begin : first; place < until && place < end; place++)
+      to[place].real += own->weights[0] / (2 * QUANTUM);
+  }
+  own->mixing_at = end < own->mix_slots ? end : -1;
+  if (own->mixing_at < 0) mixer[M_EFFECTS].whole = number_of(to);
+}
+
+enum { MIXED_A_QUANTUM = 16384 }; /* slots: some ten microseconds */
+
+static void follow_mix(instrument *own) {
+  if (!own->convolver) return;
+  const slot *mixer = own->mixer;
+  if (own->mixing_at >= 0) {
+    mix_on(own, MIXED_A_QUANTUM);
+    return;
+  }
+  bool settled = !mixer[M_EFFECTS_NEXT].whole && mixer[M_EFFECTS].whole == mixer[M_EFFECTS_NOW].whole;
+  if (settled && (mix_wanted(own, MIX_BODY) != own->mixing[MIX_BODY] || mix_wanted(own, MIX_ROOM) != own->mixing[MIX_ROOM]))
+    begin_mix(own);
+}
+
+static bool begin_responses(instrument *own) {
+  const image *of = own->of;
+  own->mixing_at = -1;
+  if (!of->response_count) return true;
+  const response *found = (const response *)((const char *)of + of->responses), *chosen = found;
+  for (int64_t place = 1; place < of->response_count; place++)
+    if (fabs((double)found[place].rate_hz - own->rate_hz) < fabs((double)chosen->rate_hz - own->rate_hz)) chosen = &found[place];
+  own->of_rate = chosen;
+  double step = (double)chosen->rate_hz / own->rate_hz, *samples[MIX_PARTS] = {NULL};
+  int64_t counts[MIX_PARTS] = {0}, frames = 1;
+  samples[PART_BODY] = samples_of(of, &chosen->body, step, &counts[PART_BODY]);
+  samples[PART_ROOM] = samples_of(of, &chosen->room, step, &counts[PART_ROOM]);
+  bool made = samples[PART_BODY] && samples[PART_ROOM];
+  if (made && counts[PART_BODY] && counts[PART_ROOM]) {
+    counts[PART_BOTH] = counts[PART_BODY] + counts[PART_ROOM] - 1;
+    samples[PART_BOTH] = in_series(samples[PART_BODY], counts[PART_BODY], samples[PART_ROOM], counts[PART_ROOM]);
+    made = samples[PART_BOTH];
+  }
+  for (int32_t which = 0; which < MIX_PARTS; which++)
+    if (counts[which] > frames) frames = counts[which];
   int64_t early_frames = frames < EARLY * QUANTUM ? frames : EARLY * QUANTUM;
   int64_t early = (early_frames + QUANTUM - 1) / QUANTUM, late = (frames - early_frames + WINDOW - 1) / WINDOW;
-  own->response = calloc((size_t)(I_HEADER + channels * 2 * (early * (QUANTUM + 1) + late * (WINDOW + 1))), sizeof(slot));
+  own->mix_slots = I_HEADER + 2 * 2 * (early * (QUANTUM + 1) + late * (WINDOW + 1));
   own->convolver = calloc((size_t)(C_LATE + (late + 1) * 4 * (WINDOW + 1)), sizeof(slot));
-  if (own->response && own->convolver) {
-    slot *c = own->convolver;
+  for (int32_t each = 0; each < 2; each++) {
+    own->mixes[each] = calloc((size_t)own->mix_slots, sizeof(slot));
+    made = made && own->mixes[each];
+  }
+  made = made && own->convolver;
+  slot *c = own->convolver;
+  if (made) {
     c[C_CAPACITY].whole = late + 1;
     c[C_FADE_WINDOWS].whole = (int64_t)ceil(CONVOLVER_FADE_S * own->rate_hz / WINDOW);
     c[C_STEP].whole = -1;
@@ -100,14 +227,25 @@ static bool begin_response(instrument *own) {
       c[C_COSINES + k].real = cos(turn);
       c[C_SINES + k].real = sin(turn);
     }
-    void *error = NULL, *result = NULL;
-    ls_partition(&result, &error, number_of(samples), frames, channels, number_of(own->response), number_of(c));
-    memset(c + C_WORK, 0, 8 * WINDOW * sizeof(slot));
-    own->mixer[M_CONVOLVER].whole = number_of(c);
-    own->mixer[M_EFFECTS].whole = number_of(own->response);
   }
-  free(samples);
-  return own->response && own->convolver;
+  for (int32_t which = 0; made && which < MIX_PARTS; which++) {
+    if (!counts[which]) continue;
+    double *padded = calloc((size_t)(2 * frames), sizeof(double)); /* all of one length, so that all are laid out alike */
+    own->parts[which] = calloc((size_t)own->mix_slots, sizeof(slot));
+    made = padded && own->parts[which];
+    void *error = NULL, *result = NULL;
+    if (made) {
+      memcpy(padded, samples[which], (size_t)(2 * counts[which]) * sizeof(double));
+      ls_partition(&result, &error, number_of(padded), frames, 2, number_of(own->parts[which]), number_of(c));
+      for (int32_t each = 0; each < 2; each++) memcpy(own->mixes[each], own->parts[which], I_HEADER * sizeof(slot));
+    }
+    free(padded);
+  }
+  for (int32_t which = 0; which < MIX_PARTS; which++) free(samples[which]);
+  if (!made) return false;
+  memset(c + C_WORK, 0, 8 * WINDOW * sizeof(slot));
+  own->mixer[M_CONVOLVER].whole = number_of(c);
+  return true;
 }
 
 static slot *pushed(instrument *own, int64_t frame, int64_t kind, int32_t channel, int32_t key, double value) {
@@ -131,6 +269,33 @@ static slot *pushed(instrument *own, int64_t frame, int64_t kind, int32_t channe
 /* Events count a quantum late, so that each is known before the quantum that holds its frame. */
 static int64_t frame_of(const instrument *own, uint32_t at) { return own->mixer[M_FRAMES].whole + at + QUANTUM; }
 
+/* A macro's share in the level of a key: known at steps, and 0 where the macro stands in the app. */
+static double level_db(const instrument *own, int32_t number, int32_t key) {
+  const image *of = own->of;
+  const float *levels = (const float *)of + of->levels + number * of->level_steps * KEYS + key;
+  double last = (double)(of->level_steps - 1), place = own->positions[number] * last, none = own->standards[number] * last;
+  int64_t step = place < last - 1 ? (int64_t)place : of->level_steps - 2;
+  double left = (double)step, right = left + 1, left_db = levels[step * KEYS], right_db = levels[(step + 1) * KEYS];
+  if (left < none && none < right && place < none) right = none, right_db = 0;
+  else if (left < none && none < right) left = none, left_db = 0;
+  return left_db + (place - left) / (right - left) * (right_db - left_db);
+}
+
+/* Keys stay as loud as in the app while macros move: each macro's share is known, and all are added. */
+static void follow_levels(instrument *own, int32_t moved, double value) {
+  const image *of = own->of;
+  own->positions[moved] = value;
+  const slot *gains = (const slot *)of + of->table + TABLE_GAINS;
+  for (int32_t key = (int32_t)own->table[TABLE_LOW].whole; key <= own->table[TABLE_HIGH].whole && key < KEYS; key++) {
+    double change_db = 0;
+    for (int32_t each = 0; each < of->macro_count; each++)
+      change_db += level_db(own, each, key);
+    double factor = pow(10, change_db / 20);
+    for (int32_t place = key * GAINS; place < (key + 1) * GAINS; place++)
+      own->table[TABLE_GAINS + place].real = gains[place].real * factor;
+  }
+}
+
 static void apply(instrument *own, int32_t place, double value, int64_t frame) {
   const parameter *of = &parameters_of(own->of)[place];
   if (of->kind == KIND_VALUE) {
@@ -144,6 +309,10 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
     own->table[TABLE_SOURCES].whole = source == SOURCE_MODEL ? 1 : 2;
     own->player[PLAYER_SOURCE_GAINS].real = source != SOURCE_TRUTH;
     own->player[PLAYER_SOURCE_GAINS + 1].real = source == SOURCE_MODEL ? 0 : source == SOURCE_TRUTH ? 1 : -1;
+  } else if (of->kind == KIND_MIX) {
+    own->mix[of->index] = value;
+  } else if (of->kind == KIND_MACRO) {
+    follow_levels(own, of->index, value);
   }
 }
 
@@ -182,10 +351,16 @@ bool instrument_begin(instrument *own, double rate_hz) {
   player[PLAYER_MOST].whole = of->most_notes;
   void *error = NULL, *result = NULL;
   ls_begin(&result, &error, number_of(player));
-  if (!begin_response(own)) {
+  for (int32_t place = 0; place < of->parameter_count; place++) {
+    const parameter *each = &parameters_of(of)[place];
+    if (each->kind == KIND_MIX) own->mix[each->index] = own->values[place];
+    if (each->kind == KIND_MACRO) own->positions[each->index] = own->standards[each->index] = each->standard;
+  }
+  if (!begin_responses(own)) {
     instrument_end(own);
     return false;
   }
+  if (own->convolver && begin_mix(own)) mix_on(own, own->mix_slots);
   own->waiting = 0;
   own->read = 0;
   slot *event = pushed(own, 0, TABLE, 0, 0, 0);
@@ -200,7 +375,8 @@ bool instrument_begin(instrument *own, double rate_hz) {
 }
 
 void instrument_end(instrument *own) {
-  slot **all[] = {&own->mixer, &own->player, &own->table, &own->model, &own->truth, &own->convolver, &own->response, &own->scratch};
+  slot **all[] = {&own->mixer, &own->player, &own->table, &own->model, &own->truth, &own->convolver, &own->scratch,
+                  &own->parts[PART_BODY], &own->parts[PART_ROOM], &own->parts[PART_BOTH], &own->mixes[0], &own->mixes[1]};
   for (size_t place = 0; place < sizeof(all) / sizeof(*all); place++) {
     free(address(*all[place]));
     *all[place] = NULL;
@@ -229,12 +405,18 @@ void instrument_controller(instrument *own, uint32_t at, int32_t channel, int32_
   if (plausible(channel, number)) pushed(own, frame_of(own, at), CONTROLLER, channel, number, value);
 }
 
-void instrument_tune(instrument *own, uint32_t at, int32_t channel, double semitones) {
-  if (!plausible(channel, 0)) return;
-  double range = own->player[PLAYER_CHANNELS + channel * CHANNEL_SLOTS + CHANNEL_RANGE].real;
-  if (range < 0) range = own->player[PLAYER_VALUES + BEND_SEMITONES].real;
-  if (own->table[TABLE_MODE].whole == MPE && channel > 0) range = MPE_BEND_SEMITONES;
-  if (range > 0) instrument_bend(own, at, channel, semitones / range);
+/* `id`, `channel` and `key` choose the notes that are meant, as far as they are given: 0, ANY and ANY are not. */
+static void pushed_for(instrument *own, uint32_t at, int64_t kind, int64_t id, int32_t channel, int32_t key, double value) {
+  slot *event = pushed(own, frame_of(own, at), kind, channel < 0 ? ANY : channel, key < 0 ? ANY : key, value);
+  if (event) event[EVENT_ID].whole = id;
+}
+
+void instrument_tune(instrument *own, uint32_t at, int64_t id, int32_t channel, int32_t key, double semitones) {
+  if (isfinite(semitones)) pushed_for(own, at, TUNE, id, channel, key, semitones);
+}
+
+void instrument_choke(instrument *own, uint32_t at, int64_t id, int32_t channel, int32_t key) {
+  pushed_for(own, at, CHOKE, id, channel, key, 0);
 }
 
 void instrument_midi(instrument *own, uint32_t at, const uint8_t *bytes) {
@@ -288,14 +470,14 @@ static void wait_for(instrument *own, int64_t frame, int32_t place) {
   own->changes[own->waiting++] = (change){frame, place, own->values[place]};
 }
 
+void instrument_follow(instrument *own, int32_t place) { wait_for(own, frame_of(own, 0), place); }
+
 void instrument_change(instrument *own, uint32_t at, int32_t place, double value) {
   const image *of = own->of;
   int64_t frame = frame_of(own, at);
   instrument_set(own, place, value);
-  if (parameters_of(of)[place].kind != KIND_MACRO) {
-    wait_for(own, frame, place);
-    return;
-  }
+  wait_for(own, frame, place);
+  if (parameters_of(of)[place].kind != KIND_MACRO) return;
   const macro *chosen = &macros_of(of)[parameters_of(of)[place].index];
   for (int32_t each = 0; each < chosen->count; each++) wait_for(own, frame, chosen->targets[each].parameter);
 }
@@ -325,6 +507,7 @@ void instrument_render(instrument *own, uint32_t frames, float *left, float *rig
     int64_t rendered = own->mixer[M_LEFT].whole, left_over = frames - done;
     if (!rendered) {
       apply_due(own);
+      follow_mix(own);
       rendered = QUANTUM;
     }
     int64_t count = rendered < left_over ? rendered : left_over;

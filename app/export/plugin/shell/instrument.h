@@ -10,7 +10,9 @@
 
 typedef union { double real; int64_t whole; } slot;
 
-enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_POINT, KIND_MACRO };
+enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_POINT, KIND_MACRO, KIND_MIX };
+enum { MIX_BODY, MIX_ROOM };
+enum { PART_BODY, PART_ROOM, PART_BOTH, MIX_PARTS };
 enum { SOURCE_MODEL, SOURCE_TRUTH, SOURCE_DIFFERENCE };
 enum { MOST_PARAMETERS = 64, MOST_MACRO_TARGETS = 8, MOST_CHANGES = 512 };
 
@@ -23,8 +25,13 @@ typedef struct {
 
 typedef struct { int32_t count, spare; struct { int32_t parameter, spare; double low, high; } targets[MOST_MACRO_TARGETS]; } macro;
 typedef struct {
-  int64_t rate_hz, frames, channels, first; /* `first`: of its samples, 32-bit whole numbers of the image */
-  double unit;                              /* of a sample of 1 */
+  int64_t frames, channels, first; /* `first`: of its samples, 32-bit whole numbers of the image */
+  double unit;                     /* of a sample of 1 */
+} part;
+typedef struct {
+  int64_t rate_hz;
+  part body, room;
+  double powers[16]; /* of noise through two of: nothing, body, room, both */
 } response;
 
 typedef struct {
@@ -33,9 +40,12 @@ typedef struct {
   int64_t table, table_slots, model, model_slots, truth, truth_slots; /* in slots from the beginning */
   int64_t parameters, parameter_count, macros, macro_count;           /* in bytes */
   int64_t taps, responses, response_count;
+  int64_t levels, level_steps; /* single precision, dB: of each macro, step and key */
+  int64_t wheel_mix;           /* which mix the modulation wheel moves, -1: none */
   int64_t modes, most_notes;
-  double longest_s;
-  char id[128], name[64], description[512], maker[64], features[128], digest[32];
+  double longest_s, wheel_goal;
+  char id[128], name[64], description[512], maker[64], features[128];
+  uint8_t uid[16]; /* of VST3 */
 } image;
 
 typedef struct { int64_t frame; int32_t parameter; double value; } change;
@@ -43,8 +53,13 @@ typedef struct { int64_t frame; int32_t parameter; double value; } change;
 typedef struct {
   const image *of;
   double rate_hz;
-  slot *mixer, *player, *table, *model, *truth, *convolver, *response, *scratch;
+  slot *mixer, *player, *table, *model, *truth, *convolver, *scratch;
+  slot *parts[MIX_PARTS], *mixes[2]; /* responses as the convolver reads them: of body, room and both; of their mixes */
+  const response *of_rate;
+  int64_t mix_slots, mixing_at;      /* of a response; the next slot of the one that is being mixed, -1: none is */
+  double mix[2], mixing[2], weights[1 + MIX_PARTS]; /* of body and room: the latest, and those of that one */
   double values[MOST_PARAMETERS];
+  double positions[MOST_PARAMETERS], standards[MOST_PARAMETERS]; /* of macros: as levels follow them */
   change changes[MOST_CHANGES];
   int32_t waiting;
   int64_t read;       /* reports */
@@ -68,8 +83,10 @@ void instrument_note_off(instrument *, uint32_t at, int32_t channel, int32_t key
 void instrument_bend(instrument *, uint32_t at, int32_t channel, double value);
 void instrument_controller(instrument *, uint32_t at, int32_t channel, int32_t number, int32_t value);
 void instrument_midi(instrument *, uint32_t at, const uint8_t *bytes);
-void instrument_tune(instrument *, uint32_t at, int32_t channel, double semitones);
+void instrument_tune(instrument *, uint32_t at, int64_t id, int32_t channel, int32_t key, double semitones);
+void instrument_choke(instrument *, uint32_t at, int64_t id, int32_t channel, int32_t key);
 void instrument_change(instrument *, uint32_t at, int32_t parameter, double value);
+void instrument_follow(instrument *, int32_t parameter);            /* its value counts from the next frame on */
 void instrument_set(instrument *, int32_t parameter, double value); /* while nothing is rendered */
 void instrument_reset(instrument *); /* silence, and all wheels and pedals at rest */
 void instrument_render(instrument *, uint32_t frames, float *left, float *right);

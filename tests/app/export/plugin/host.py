@@ -192,6 +192,14 @@ def note_off(frame: int, key: int, channel: int = 0) -> Event:
     return Event(frame, NoteEvent(Header(40, 0, 0, NOTE_OFF, 0), -1, 0, channel, key, 0.0))
 
 
+def choke(frame: int, key: int = -1, note_id: int = -1) -> Event:
+    return Event(frame, NoteEvent(Header(40, 0, 0, NOTE_CHOKE, 0), note_id, 0, -1, key, 0.0))
+
+
+def tune(frame: int, semitones: float, note_id: int) -> Event:
+    return Event(frame, ExpressionEvent(Header(40, 0, 0, EXPRESSION, 0), 3, note_id, 0, -1, -1, semitones))
+
+
 def midi(frame: int, *data: int) -> Event:
     return Event(frame, MidiEvent(Header(24, 0, 0, MIDI, 0), 0, (c.c_uint8 * 3)(*data)))
 

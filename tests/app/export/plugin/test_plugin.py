@@ -12,96 +12,24 @@ import pytest
 from numpy.typing import NDArray
 
 from app.export.plugin.build import build_plugin, this_target
-from app.export.plugin.image import Image, image_of
+from app.export.plugin.image import Image
 from app.export.plugin.objects import TARGETS, object_of
-from app.instrument.events import Bend, Controller, NoteOff, NoteOn, TimedEvent
-from app.instrument.offline import render_events
-from app.patches.library import SHIPPED as INSTRUMENTS
-from app.patches.library import read_patch
-from app.patches.patch import Patch
-from engine.kernels import cache
-from engine.presets import SHIPPED, load_preset
+from app.instrument.events import Controller, PatchTurned, TimedEvent
 from tests.app.export.plugin import host
-from tests.app.export.plugin.host import Event, Instance, Library, midi, note_off, note_on, param
-
-NAMES = ("concert_harp", "classical_guitar", "electric_bass", "cimbalom")
-SECONDS = 1.6
-EQUAL_DB = -140.0
+from tests.app.export.plugin.host import Event, Instance, Library, choke, midi, note_off, note_on, param, tune
+from tests.app.export.plugin.pieces import (
+    EQUAL_DB,
+    MOVED,
+    NAMES,
+    difference_db,
+    patch_of,
+    piece,
+    played,
+    rendered,
+    to_host,
+)
 
 pytestmark = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang, the extra [plugin]")
-
-
-def patch_of(name: str) -> Patch:
-    return read_patch(INSTRUMENTS / f"{name}.json")
-
-
-def piece(patch: Patch) -> list[tuple[float, NoteOn | NoteOff | Bend | Controller]]:
-    low = max(patch.range[0], min(52, patch.range[1] - 20))
-    half = 4096 / 8191  # as 14 bits have it
-    return [
-        (0.0, NoteOn(low, 100)),
-        (0.013, NoteOn(low + 4, 80)),
-        (0.1, NoteOn(low + 7, 120)),
-        (0.3, Bend(half)),
-        (0.45, NoteOn(low, 60)),
-        (0.5, Bend(0.0)),
-        (0.55, Controller(64, 127)),
-        (0.6, NoteOn(low + 12, 127)),
-        (0.65, NoteOff(low + 12)),
-        (0.7, NoteOff(low)),
-        (1.0, Controller(64, 0)),
-        (1.1, NoteOff(low + 4)),
-    ]
-
-
-def to_host(event: NoteOn | NoteOff | Bend | Controller, frame: int) -> Event:
-    if isinstance(event, NoteOn):
-        return note_on(frame, event.key, event.velocity, event.channel)
-    if isinstance(event, NoteOff):
-        return note_off(frame, event.key, event.channel)
-    if isinstance(event, Bend):
-        wheel = 8192 + round(event.value * (8191 if event.value > 0 else 8192))
-        return midi(frame, 0xE0 | event.channel, wheel & 127, wheel >> 7)
-    return midi(frame, 0xB0 | event.channel, event.number, event.value)
-
-
-def played(instance: Instance, patch: Patch, rate_hz: int, block: int = 512) -> NDArray[np.float32]:
-    """The piece, without the latency."""
-    events = [to_host(event, round(time_s * rate_hz)) for time_s, event in piece(patch)]
-    latency = instance.latency
-    return instance.render(round(SECONDS * rate_hz) + latency, events, block)[latency:]
-
-
-def rendered(patch: Patch, rate_hz: int, source: str = "model", gain_db: float = 0.0) -> NDArray[np.float32]:
-    preset = load_preset(SHIPPED / f"{patch.preset}.safetensors")
-    timed = [TimedEvent(time_s, event) for time_s, event in piece(patch)]
-    sound = render_events(patch, preset, timed, rate_hz, source, SECONDS, difference_gain_db=gain_db)
-    return np.broadcast_to(np.concatenate(list(sound)), (round(SECONDS * rate_hz), 2))
-
-
-def difference_db(sound: NDArray[np.float32], other: NDArray[np.float32]) -> float:
-    assert len(sound) == len(other)
-    peak = float(np.abs(other).max())
-    assert peak > 0.01
-    return 20 * float(np.log10(max(float(np.abs(sound - other).max()), 1e-30) / peak))
-
-
-@pytest.fixture(scope="module")
-def images() -> list[Image]:
-    return [image_of(patch, load_preset(SHIPPED / f"{patch.preset}.safetensors")) for patch in map(patch_of, NAMES)]
-
-
-@pytest.fixture(scope="module")
-def objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Where object files are kept."""
-    return cache.folder() or tmp_path_factory.mktemp("objects")
-
-
-@pytest.fixture(scope="module")
-def bank(images: list[Image], objects: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
-    path = build_plugin(images, "clap", this_target(), tmp_path_factory.mktemp("clap") / "bank", objects)
-    assert path.suffix == ".clap"
-    return Library(path)
 
 
 def instance_of(bank: Library, name: str, rate_hz: int = 48_000) -> Instance:
@@ -197,6 +125,46 @@ def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank: Library) -> No
     assert other.save() == state
 
 
+def with_macro(bank: Library, name: str, macro: int, value: float) -> Instance:
+    """It is moved before anything is played."""
+    instance = instance_of(bank, name)
+    instance.block(64, [param(0, instance.parameters[patch_of(name).macros[macro].name].id, value)])
+    instance.deactivate()
+    instance.activate(48_000)
+    return instance
+
+
+def test_macros_move_body_and_room_and_keys_stay_as_loud(bank: Library) -> None:
+    patch = patch_of(MOVED)
+    names = [macro.targets[0].field for macro in patch.macros]
+    room, body, place = (names.index(each) for each in ("room.mix", "body.mix", "pluck.position"))
+    for value, most_db in ((0.0, -60), (0.7, EQUAL_DB)):  # without a room the app averages power at other frequencies
+        wanted = rendered(patch.turned(room, value), 48_000)
+        assert difference_db(played(with_macro(bank, MOVED, room, value), patch, 48_000), wanted) < most_db
+    for macro, value in ((body, 0.0), (body, 0.5), (place, 0.25), (place, 1.0)):
+        wanted = rendered(patch.turned(macro, value), 48_000)
+        assert difference_db(played(with_macro(bank, MOVED, macro, value), patch, 48_000), wanted) < -60
+
+
+def test_body_and_room_follow_macros_and_the_wheel_while_it_plays(bank: Library) -> None:
+    rate_hz, settled_s = 48_000, 0.7
+    after = slice(round(settled_s * rate_hz), None)
+    patch = patch_of(MOVED)
+    room = [macro.targets[0].field for macro in patch.macros].index("room.mix")
+    instance = instance_of(bank, MOVED)
+    moved = param(round(0.3 * rate_hz), instance.parameters[patch.macros[room].name].id, 1.0)
+    sound = played(instance, patch, rate_hz, more=(moved,))
+    wanted = rendered(patch, rate_hz, more=(TimedEvent(0.3, PatchTurned(patch.turned(room, 1.0))),))
+    assert difference_db(sound[after], wanted[after]) < EQUAL_DB
+    harp = patch_of("concert_harp")
+    assert harp.mod_wheel == "room.mix"
+    wheel = Controller(1, 100)
+    sound = played(instance_of(bank, "concert_harp"), harp, rate_hz, more=(to_host(wheel, round(0.3 * rate_hz)),))
+    wanted = rendered(harp, rate_hz, more=(TimedEvent(0.3, wheel),))
+    assert difference_db(sound[after], wanted[after]) < EQUAL_DB
+    assert difference_db(sound, rendered(harp, rate_hz)) > -60
+
+
 def test_ends_of_notes_are_reported(bank: Library) -> None:
     instance = instance_of(bank, "electric_bass")
     instance.block(4_096, [note_on(0, 40, 100, note_id=7)])
@@ -205,6 +173,31 @@ def test_ends_of_notes_are_reported(bank: Library) -> None:
         instance.block(1_024, [])
     assert instance.ended == [7]
     assert instance.status == 4  # it may sleep
+
+
+def test_a_choked_note_is_silent_at_once_and_others_ring_on(bank: Library) -> None:
+    def ringing(*events: Event) -> float:
+        instance = instance_of(bank, "electric_bass")
+        events = (note_on(0, 40, 120, note_id=1), note_on(0, 47, 120, note_id=2), *events)
+        return float(np.abs(instance.render(24_000, list(events))[-4_800:]).max())
+
+    rest, one = ringing(), ringing(choke(4_800, note_id=1))
+    assert ringing(choke(4_800, note_id=1), choke(4_800, key=47)) < 0.01 * rest
+    assert 0.05 * rest < one < 0.99 * rest
+    assert ringing(choke(4_800)) < 0.01 * rest
+
+
+def test_tuning_one_note_leaves_the_others(bank: Library) -> None:
+    def sound(*events: Event) -> NDArray[np.float32]:
+        instance = instance_of(bank, "electric_bass")
+        return instance.render(9_600, [note_on(0, 40, 100, note_id=1), *events])
+
+    other = note_on(0, 47, 100, note_id=2)
+    bent = sound(other, tune(2_000, 2.0, note_id=2))
+    assert np.array_equal(bent[:2_000], sound(other)[:2_000])
+    assert difference_db(bent - sound(), sound(other) - sound()) > -20
+    alone = instance_of(bank, "electric_bass").render(9_600, [other, tune(2_000, 2.0, note_id=2)])
+    assert difference_db(bent - sound(), alone) < -100  # in the sum only single precision is lost
 
 
 def test_a_reset_leaves_no_note_wheel_or_pedal(bank: Library) -> None:

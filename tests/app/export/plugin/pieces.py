@@ -1,0 +1,87 @@
+"""A piece of music, as the app renders it and as events of a host."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.instrument.events import Bend, Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.offline import render_events
+from app.patches.library import SHIPPED as INSTRUMENTS
+from app.patches.library import read_patch
+from app.patches.patch import Patch
+from engine.presets import SHIPPED, load_preset
+from tests.app.export.plugin.host import Event, Instance, midi, note_off, note_on
+
+NAMES = (
+    "concert_harp",  # rings on
+    "damped_harp",
+    "classical_guitar",  # body and room
+    "electric_bass",  # magnetic pick-up
+    "jazz_guitar",  # magnetic pick-up and body
+    "fretless_bass",  # a channel for each string
+    "sitar",
+    "cimbalom",
+)
+MOVED = "classical_guitar"  # the one whose levels follow its macros
+SECONDS = 1.6
+EQUAL_DB = -140.0
+
+
+def patch_of(name: str) -> Patch:
+    return read_patch(INSTRUMENTS / f"{name}.json")
+
+
+def piece(patch: Patch) -> list[tuple[float, NoteOn | NoteOff | Bend | Controller]]:
+    low = max(patch.range[0], min(52, patch.range[1] - 20))
+    half = 4096 / 8191  # as 14 bits have it
+    return [
+        (0.0, NoteOn(low, 100)),
+        (0.013, NoteOn(low + 4, 80)),
+        (0.1, NoteOn(low + 7, 120)),
+        (0.3, Bend(half)),
+        (0.45, NoteOn(low, 60)),
+        (0.5, Bend(0.0)),
+        (0.55, Controller(64, 127)),
+        (0.6, NoteOn(low + 12, 127)),
+        (0.65, NoteOff(low + 12)),
+        (0.7, NoteOff(low)),
+        (1.0, Controller(64, 0)),
+        (1.1, NoteOff(low + 4)),
+    ]
+
+
+def to_host(event: NoteOn | NoteOff | Bend | Controller, frame: int) -> Event:
+    if isinstance(event, NoteOn):
+        return note_on(frame, event.key, event.velocity, event.channel)
+    if isinstance(event, NoteOff):
+        return note_off(frame, event.key, event.channel)
+    if isinstance(event, Bend):
+        wheel = 8192 + round(event.value * (8191 if event.value > 0 else 8192))
+        return midi(frame, 0xE0 | event.channel, wheel & 127, wheel >> 7)
+    return midi(frame, 0xB0 | event.channel, event.number, event.value)
+
+
+def played(
+    instance: Instance, patch: Patch, rate_hz: int, block: int = 512, more: tuple[Event, ...] = ()
+) -> NDArray[np.float32]:
+    """The piece, without the latency."""
+    events = [to_host(event, round(time_s * rate_hz)) for time_s, event in piece(patch)] + list(more)
+    latency = instance.latency
+    return instance.render(round(SECONDS * rate_hz) + latency, events, block)[latency:]
+
+
+def rendered(
+    patch: Patch, rate_hz: int, source: str = "model", gain_db: float = 0.0, more: tuple[TimedEvent, ...] = ()
+) -> NDArray[np.float32]:
+    preset = load_preset(SHIPPED / f"{patch.preset}.safetensors")
+    timed = [TimedEvent(time_s, event) for time_s, event in piece(patch)] + list(more)
+    sound = render_events(patch, preset, timed, rate_hz, source, SECONDS, difference_gain_db=gain_db)
+    return np.broadcast_to(np.concatenate(list(sound)), (round(SECONDS * rate_hz), 2))
+
+
+def difference_db(sound: NDArray[np.float32], other: NDArray[np.float32]) -> float:
+    assert len(sound) == len(other)
+    peak = float(np.abs(other).max())
+    assert peak > 0.01
+    return 20 * float(np.log10(max(float(np.abs(sound - other).max()), 1e-30) / peak))
