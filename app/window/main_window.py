@@ -59,7 +59,10 @@ WIDE, HIGH = (
 )  # pixels: a narrower window hides brand, keys and ABX button; a lower the preset's facts
 ROOMY, TIGHT = 1240, 900  # pixels: in a narrower window the controls are compact, and more so
 ALL_HIGH = 640  # pixels: a lower window shows the instrument instead of the views
-KNOBS_HIGH = 780  # pixels: in a lower one the string's knobs take the place of the keys, and all stands closer
+KNOBS_HIGH, AIRY = (
+    610,
+    780,
+)  # pixels: a lower one shows knobs in place of keys; parts stand closer
 FACTS_HEIGHT = 20
 BRIEFLY_MS = 1_800  # a text over the window
 LONGEST_NAME = 60  # characters of a file
@@ -381,7 +384,7 @@ class MainWindow(QMainWindow):
     def _fit(self) -> None:
         self._share_width()
         self._share_height()
-        narrow, low = self._wide < ROOMY, self._high < KNOBS_HIGH
+        narrow, low = self._wide < ROOMY, self._high < AIRY
         self.transport.set_compact(narrow, self._wide < TIGHT and self.face == "lab")
         self._head.setSpacing(6 if narrow else 10)
         aside, above = 8 if narrow else 14, 6 if low else 12

@@ -15,6 +15,7 @@ class DropSign(Label):
 
     def __init__(self, window: QWidget) -> None:
         super().__init__("", window)
+        self._window = window
         self.setObjectName("drop")
         self.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
@@ -22,6 +23,6 @@ class DropSign(Label):
 
     def show_over(self, text: str) -> None:
         self.setText(text)
-        self.setGeometry(self.parentWidget().rect().adjusted(MARGIN, MARGIN, -MARGIN, -MARGIN))
+        self.setGeometry(self._window.rect().adjusted(MARGIN, MARGIN, -MARGIN, -MARGIN))
         self.show()
         self.raise_()

@@ -328,7 +328,7 @@ def test_in_a_low_play_face_the_knobs_take_the_place_of_the_keys(alive: MainWind
     alive.show_face("play")
     strip = alive.instrument
     strip.set_unfolded(True)
-    for height, seen in ((800, (True, True, True)), (720, (False, True, True)), (500, (False, True, True))):
+    for height, seen in ((720, (True, True, True)), (600, (False, True, True)), (500, (False, True, True))):
         alive.resize(1280, height)
         assert tuple(part.isVisible() for part in (strip.keys, strip.bar, strip.knobs)) == seen, height
 
