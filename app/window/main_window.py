@@ -227,10 +227,10 @@ class MainWindow(QMainWindow):
     def order_tabs(self) -> None:
         """Sets the order of the Tab key: header, notice, string, views, controls. Call it once all parts exist."""
         header = (self._menu_button, self.faces, self.presets, self._keys_button, self._test_button)
-        header += (self.notices.bell, self._audio_button)
+        aside = (self.notices.bell, self._audio_button)
         chain: list[QWidget] = []
         views = (self._string, self.left, self.right)
-        for part in (*header, self.notices, *views, self.song, self.transport, self.instrument):
+        for part in (*header, *aside, self.notices, *views, self.song, self.transport, self.instrument):
             inside = [part, *part.findChildren(QWidget)]
             stops = [
                 widget

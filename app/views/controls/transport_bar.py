@@ -61,20 +61,20 @@ class TransportBar(QFrame):
         row.setSpacing(5)
         self.slots = SlotButtons()
         self.slots.change_asked.connect(self.change_asked)
-        knob = self.knobs
-        pluck = (self._build_shape(), knob["position"], knob["amplitude_mm"], knob["width"])
-        listener = self._group(knob["listen"], knob["listen_right"], self._build_pickup())
+        knobs = self.knobs
+        pluck = (self._build_shape(), knobs["position"], knobs["amplitude_mm"], knobs["width"])
+        listener = self._group(knobs["listen"], knobs["listen_right"], self._build_pickup())
         self.areas: dict[Area, tuple[QWidget, ...]] = {
             "slots": (self._group(self.slots),),
             "pluck": (self._group(*pluck),),
-            "time": (self._loop, self._group(knob["seconds"], knob["speed"])),
+            "time": (self._loop, self._group(knobs["seconds"], knobs["speed"])),
         }
         row.addLayout(self._build_transport())
         for group in (self.areas["slots"][0], self.areas["pluck"][0], listener, self.areas["time"][1]):
             row.addWidget(group)
         row.addStretch(1)
         row.addWidget(vertical_rule())
-        row.addWidget(knob["volume_db"])
+        row.addWidget(knobs["volume_db"])
         row.addLayout(self._build_output())
 
     def set_compact(self, compact: bool, tight: bool = False) -> None:
