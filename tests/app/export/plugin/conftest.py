@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.export.plugin.build import build_plugin, this_target
+from app.export.plugin.build import build_plugin
+from app.export.plugin.formats import this_target
 from app.export.plugin.image import Image, image_of
 from app.export.plugin.parts import STEPS
 from engine.kernels import cache

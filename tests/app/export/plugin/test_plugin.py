@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from app.export.plugin.build import build_plugin, this_target
+from app.export.plugin.build import build_plugin
+from app.export.plugin.formats import TARGETS, this_target
 from app.export.plugin.image import Image
-from app.export.plugin.objects import TARGETS, object_of
+from app.export.plugin.objects import object_of
 from app.instrument.events import Controller, PatchTurned, TimedEvent
 from tests.app.export.plugin import host
 from tests.app.export.plugin.host import Event, Instance, Library, choke, midi, note_off, note_on, param, tune
