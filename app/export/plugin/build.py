@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
+from urllib.parse import quote
 from xml.sax.saxutils import escape
 
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, check_compiler
@@ -135,7 +136,7 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
     listed, described = [prefixes], [prefixes]
     for image in images:
         head = f"<urn:{image.id}> a lv2:Plugin, lv2:InstrumentPlugin, doap:Project ;"
-        listed.append(f"{head}\n  lv2:binary <{binary}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
+        listed.append(f"{head}\n  lv2:binary <{quote(binary)}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
         ports = [
             "a lv2:InputPort, atom:AtomPort ; atom:bufferType atom:Sequence ; atom:supports midi:MidiEvent ;\n"
             '    lv2:designation lv2:control ; lv2:index 0 ; lv2:symbol "events" ; lv2:name "Events"',

@@ -39,7 +39,12 @@ def objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="package")
-def bank(images: list[Image], objects: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
+def plugin_file(images: list[Image], objects: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = build_plugin(images, "clap", this_target(), tmp_path_factory.mktemp("clap") / "bank", objects)
     assert path.suffix == ".clap"
-    return Library(path)
+    return path
+
+
+@pytest.fixture(scope="package")
+def bank(plugin_file: Path) -> Library:
+    return Library(plugin_file)
