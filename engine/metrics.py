@@ -6,11 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+    Motion = NDArray[np.floating[Any]] | Tensor
 
 RESAMPLES = 2000  # of a bootstrap: its standard error is known to 1/√(2 · RESAMPLES), 1.6 %
 NULL_FLOOR_DB = -200.0  # of a null depth: what float64 can tell of two equal signals, and finite for a file
@@ -44,30 +48,31 @@ class ErrorSums:
     """
 
     def __init__(self, steps: int) -> None:
-        self._frames = torch.zeros(4, steps, dtype=torch.float64)
-        self._trajectories = torch.zeros(4, 0, dtype=torch.float64)
+        self._frames = np.zeros((4, steps))
+        self._trajectories = np.zeros((4, 0))
         self._row = 0  # of the last block
 
-    def add(self, predicted: Tensor, truth: Tensor, first: int = 0, row: int | None = None) -> None:
+    def add(self, predicted: Motion, truth: Motion, first: int = 0, row: int | None = None) -> None:
         """Adds trajectories (batch, steps, points) of equal shape; frame 0 (the input) is not among them.
 
         Args:
+            predicted, truth: two arrays, or two tensors of one device.
             first: where a block of frames belongs: 0 where it starts with frame 1.
             row: which trajectory the block's first one is. By default a block with `first` 0 is of new trajectories,
                 and any other continues with those of the block before it.
         """
         if predicted.shape != truth.shape:
             raise ValueError(f"prediction {tuple(predicted.shape)} and truth {tuple(truth.shape)} differ in shape")
-        error = predicted - truth
-        terms = (error.square(), truth.square(), error.abs(), truth.abs())
-        sums = torch.stack([term.sum(dim=2, dtype=torch.float64) for term in terms]).cpu()
-        sums[::2].masked_fill_(sums[::2].isnan(), math.inf)
+        error: Any = predicted - truth
+        with np.errstate(over="ignore", invalid="ignore"):
+            sums = np.stack([_over_points(term) for term in (error**2, truth**2, abs(error), abs(truth))])
+        sums[::2][np.isnan(sums[::2])] = math.inf
         self._frames[:, first : first + truth.shape[1]] += sums.sum(1)
         if row is None:
             row = self._row if first else self._trajectories.shape[1]
         self._row, end = row, row + len(truth)
         if (missing := end - self._trajectories.shape[1]) > 0:
-            self._trajectories = torch.cat([self._trajectories, self._frames.new_zeros(4, missing)], dim=1)
+            self._trajectories = np.concatenate([self._trajectories, np.zeros((4, missing))], axis=1)
         self._trajectories[:, row:end] += sums.sum(2)
 
     def total(self, steps: int | None = None) -> RelativeError:
@@ -100,7 +105,8 @@ class ErrorSums:
 
     def spread(self) -> RelativeError:
         """The population's standard deviation of the trajectories' own errors; infinite where one of them is."""
-        spreads = [float(torch.from_numpy(own).std(correction=0)) for own in self.per_trajectory()]
+        with np.errstate(over="ignore", invalid="ignore"):  # of errors that are infinite, or nearly
+            spreads = [float(own.std()) for own in self.per_trajectory()]
         return RelativeError(*(spread if math.isfinite(spread) else math.inf for spread in spreads))
 
     def standard_error(self, resamples: int = RESAMPLES) -> RelativeError:
@@ -111,38 +117,47 @@ class ErrorSums:
         error is; zero for a single one, which says nothing of others.
         """
         count = self._trajectories.shape[1]
-        if not bool(self._trajectories.isfinite().all()):
+        if not np.isfinite(self._trajectories).all():
             return RelativeError(math.inf, math.inf)
         drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=resamples)
-        mse, mae = _ratios(self._trajectories @ torch.from_numpy(drawn).double().T)
+        mse, mae = _ratios(self._trajectories @ drawn.T)
         return RelativeError(float(mse.std(ddof=1)), float(mae.std(ddof=1)))
 
     def of(self, rows: Sequence[int]) -> RelativeError:
         """The errors of some trajectories over all frames."""
-        mse, mae = _ratios(self._trajectories[:, list(rows)].sum(1, keepdim=True))
+        mse, mae = _ratios(self._trajectories[:, list(rows)].sum(1, keepdims=True))
         return RelativeError(float(mse[0]), float(mae[0]))
 
     def shares(self) -> NDArray[np.float64]:
         """What part of all squared error is each trajectory's, (trajectories,); zeros where there is no error."""
         squared = self._trajectories[0]
         whole = float(squared.sum())
-        return (squared / whole if whole > 0 else squared).numpy()
+        return squared / whole if whole > 0 else squared.copy()
 
     def _relative(self, frames: slice) -> tuple[float, float]:
-        mse, mae = _ratios(self._frames[:, frames].sum(1, keepdim=True))
+        mse, mae = _ratios(self._frames[:, frames].sum(1, keepdims=True))
         return float(mse[0]), float(mae[0])
 
 
-def relative_error(predicted: Tensor, truth: Tensor) -> RelativeError:
+def relative_error(predicted: Motion, truth: Motion) -> RelativeError:
     """The relative error of trajectories (batch, steps, points), frame 0 not among them."""
     sums = ErrorSums(truth.shape[1])
     sums.add(predicted, truth)
     return sums.total()
 
 
-def _ratios(sums: Tensor) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _over_points(terms: Any) -> NDArray[np.float64]:
+    """Sums (batch, steps) of terms (batch, steps, points) in double precision."""
+    if isinstance(terms, np.ndarray):
+        return np.asarray(terms.sum(2, dtype=np.float64))
+    import torch
+
+    return np.asarray(terms.sum(dim=2, dtype=torch.float64).cpu().numpy())
+
+
+def _ratios(sums: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Of sums (4, n); a silent truth matched by silence is no error, unmatched an infinite one."""
     error, truth = sums[::2], sums[1::2]
-    silent = torch.where(error == 0, 0.0, math.inf).to(error)
-    mse, mae = torch.where(truth == 0, silent, error / truth).numpy()
+    with np.errstate(divide="ignore", invalid="ignore"):
+        mse, mae = np.where(truth == 0, np.where(error == 0, 0.0, math.inf), error / truth)
     return mse, mae

@@ -19,9 +19,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from engine.resonators.base import Resonator
 
@@ -33,9 +31,10 @@ LEAST_DECAY_DB = 2.0  # of the truth over the segments of a window, for a T60
 MOST_SIMILAR = 0.5  # |Σz²|/Σ|z|²: 0 where both quadratures are seen alike, 1 where only one is
 
 Array = NDArray[np.float64]
+Phasors = NDArray[np.complex128]
 
 
-def phasors(before: Tensor, now: Tensor, after: Tensor, spacing_s: float, resonator: Resonator) -> Tensor:
+def phasors(before: Array, now: Array, after: Array, spacing_s: float, resonator: Resonator) -> Phasors:
     """z with Re z = q(t), complex128 (..., modes), for modal amplitudes q at t - d, t and t + d, d = `spacing_s`.
 
     z = q + i(exp(-σd) q(t - d) - exp(σd) q(t + d)) / 2 sin ωd, which without coupling is A exp(-σt + iωt + iφ).
@@ -43,15 +42,21 @@ def phasors(before: Tensor, now: Tensor, after: Tensor, spacing_s: float, resona
     (Eq. 3-5, averaged over a period). ωd must stay below π: sample the truth more often than the prediction.
     """
     eigenvalues = resonator.eigenvalues()
-    fading, omega = torch.exp(eigenvalues.real * spacing_s), eigenvalues.imag
-    now = now.double()
-    difference = (before.double() * fading - after.double() / fading) / 2
-    quadrature = difference / torch.sin(omega * spacing_s)
+    fading, omega = np.exp(eigenvalues.real * spacing_s), eigenvalues.imag
+    difference = (before * fading - after / fading) / 2
+    quadrature = difference / np.sin(omega * spacing_s)
     if resonator.tension_modulated:
-        stretch = resonator.stretch * (now.square() + quadrature.square()) / 2
-        rise = resonator.coupling * (stretch.sum(-1, keepdim=True) + stretch / 2)
-        quadrature = difference / torch.sin((omega.square() + rise).sqrt() * spacing_s)
-    return torch.complex(now, quadrature)
+        stretch = resonator.stretch * (now**2 + quadrature**2) / 2
+        rise = resonator.coupling * (stretch.sum(-1, keepdims=True) + stretch / 2)
+        quadrature = difference / np.sin(np.sqrt(omega**2 + rise) * spacing_s)
+    return now + 1j * quadrature
+
+
+def _complex(real: Array, imaginary: Array) -> Phasors:
+    """Also where parts are not finite, of which a product with i would make others."""
+    found = real.astype(np.complex128)
+    found.imag = imaginary
+    return found
 
 
 def segment_frames(rate_hz: float, lowest_hz: float) -> int:
@@ -70,32 +75,33 @@ class PartialTrack:
         turn: Σ z̄_k z_{k+1}, complex128; its angle is the truth's advance in a frame.
     """
 
-    power: Tensor
-    square: Tensor
-    match: Tensor
-    turn: Tensor
+    power: Array
+    square: Phasors
+    match: Phasors
+    turn: Phasors
 
     @classmethod
     def join(cls, tracks: Sequence[PartialTrack]) -> PartialTrack:
         """Of successive blocks."""
-        return cls(*(torch.cat([getattr(track, field.name) for track in tracks], dim=1) for field in fields(cls)))
+        return cls(*(np.concatenate([getattr(track, field.name) for track in tracks], 1) for field in fields(cls)))
 
-    def gain(self) -> Tensor:
+    def gain(self) -> Phasors:
         """c, prediction over truth: NaN where the mode is not resolved, infinite where the prediction is not finite.
 
         It solves the normal equations Σz̄q̂ = ½(c Σ|z|² + c̄ Σz̄²).
         """
-        determinant = self.power.square() - self.square.real.square() - self.square.imag.square()
-        gain = 2 * (self.power * self.match - self.square.conj() * self.match.conj()) / determinant
-        gain = torch.where(self.match.isfinite(), gain, math.inf)
-        return torch.where(self.square.abs() < MOST_SIMILAR * self.power, gain, math.nan)
+        determinant = self.power**2 - self.square.real**2 - self.square.imag**2
+        with np.errstate(all="ignore"):
+            gain = 2 * (self.power * self.match - self.square.conj() * self.match.conj()) / determinant
+        gain = np.where(np.isfinite(self.match), gain, math.inf)
+        return np.where(np.abs(self.square) < MOST_SIMILAR * self.power, gain, math.nan)
 
-    def turns(self) -> Tensor:
+    def turns(self) -> Array:
         """Cycles of the truth in a frame, in -½ … ½: an alias, where the mode lies above half the rate."""
-        return self.turn.angle() / (2 * math.pi)
+        return np.angle(self.turn) / (2 * math.pi)
 
 
-def track_partials(predicted: Tensor, truth: Tensor, length: int) -> PartialTrack:
+def track_partials(predicted: NDArray[np.floating[Any]], truth: Phasors, length: int) -> PartialTrack:
     """The track of a block.
 
     Args:
@@ -107,12 +113,11 @@ def track_partials(predicted: Tensor, truth: Tensor, length: int) -> PartialTrac
         raise ValueError(f"prediction {tuple(predicted.shape)} and truth {tuple(truth.shape)} differ in shape")
     shape = (len(truth), truth.shape[1] // length, length, truth.shape[2])
     frames = shape[1] * length
-    z, q = truth[:, :frames].reshape(shape), predicted[:, :frames].reshape(shape).double()
+    z, q = truth[:, :frames].reshape(shape), predicted[:, :frames].reshape(shape).astype(np.float64)
+    with np.errstate(invalid="ignore"):  # of a prediction that is not finite
+        match = _complex((z.real * q).sum(2), -(z.imag * q).sum(2))
     return PartialTrack(
-        (z.real.square() + z.imag.square()).sum(2),
-        z.square().sum(2),
-        torch.complex((z.real * q).sum(2), -(z.imag * q).sum(2)),
-        (z[:, :, :-1].conj() * z[:, :, 1:]).sum(2),
+        (z.real**2 + z.imag**2).sum(2), (z**2).sum(2), match, (z[:, :, :-1].conj() * z[:, :, 1:]).sum(2)
     )
 
 
@@ -225,13 +230,13 @@ def partial_errors(
         windows_s: (start, stop) of each window; a segment belongs where its middle lies.
     """
     length = segment_frames(rate_hz, frequencies_hz[0])
-    power, gain = track.power.numpy(), track.gain().numpy()
+    power, gain = track.power, track.gain()
     level = np.abs(gain)
     floor = 10 ** (FLOOR_DB / 10) * power.max(axis=2, keepdims=True)
     there = (power > 0) & (power >= floor) & ~np.isnan(level)
     level = np.where(there, level, 1.0)
     phased = there & np.isfinite(level) & (level >= 10 ** (WEAK_DB / 20))
-    alias_hz = track.turns().numpy() * rate_hz
+    alias_hz = track.turns() * rate_hz
     motion = _Motion(
         time_s=(np.arange(power.shape[1]) * length + (length + 1) / 2) / rate_hz,
         segment_s=length / rate_hz,

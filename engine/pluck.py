@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
 if TYPE_CHECKING:
-    from torch import Tensor
+    import numpy as np
+    from numpy.typing import NDArray
 
 Shape = Literal["gaussian", "triangular", "raised_cosine", "rounded"]
 SHAPES: tuple[Shape, ...] = get_args(Shape)
@@ -55,9 +56,9 @@ class Pluck:
         """A copy with some values changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
-    def displacement(self, grid_points: int) -> Tensor:
+    def displacement(self, grid_points: int) -> NDArray[np.float64]:
         """The raw shape in m before any projection on modes, float64 (grid_points,)."""
-        from engine import excitation  # torch only when it is needed: the command line and the window start without
+        from engine import excitation  # NumPy only when it is needed: the command line starts without
 
         peak_m = self.amplitude_mm / 1000
         if self.shape == "gaussian":

@@ -1,7 +1,8 @@
-"""What can be heard: a preset's model and the physics that it learned, behind one face, in metres.
+"""What can be heard: a preset's model and the physics that it learned, behind one face, in metres and in NumPy.
 
 A source is given initial displacements, yields frames in blocks, and keeps nothing: the state is passed. Rendering,
-comparing, the command line and the app treat model and truth alike through it.
+comparing, the command line and the app treat model and truth alike through it. Torch is imported with the first
+source that is made: voices that are compiled need none.
 """
 
 from __future__ import annotations
@@ -10,15 +11,14 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
-import torch
-from torch import Tensor
+import numpy as np
+from numpy.typing import NDArray
 
-from engine.models.base import AnyFrameModel
-from engine.pluck import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
+from engine.pluck import LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.presets import Preset, PresetInfo
-from engine.resonators.sine_transform import to_grid, to_modes
-from engine.truth import ModalState, SplittingSolver
+from engine.resonators.base import Array
 
+Floats = NDArray[np.floating[Any]]
 SILENCE = 1e-9  # of a mode, of all: what the truth leaves out is 180 dB down
 
 
@@ -32,7 +32,7 @@ class Runaway(RuntimeError):
 
 @dataclass(frozen=True)
 class SourceState:
-    """Where a source is: its own state, the frames done, and the largest displacement that is believable."""
+    """Where a source is: its own state, the frames done, and the largest displacement that is possible."""
 
     inner: Any
     frame: int
@@ -52,11 +52,11 @@ class StringSource(ABC):
     any_frame: bool
 
     @abstractmethod
-    def start(self, displacement_m: Tensor) -> SourceState:
+    def start(self, displacement_m: Array) -> SourceState:
         """The state at frame 0 for displacements (batch, grid_points), already projected on the modes in use."""
 
     @abstractmethod
-    def advance(self, state: SourceState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SourceState]:
+    def advance(self, state: SourceState, steps: int, readout: Array | None = None) -> tuple[Floats, SourceState]:
         """The next frames, (batch, steps, grid_points), or (…, points) where `readout` (grid_points, points) says.
 
         Raises:
@@ -64,7 +64,7 @@ class StringSource(ABC):
         """
 
     @abstractmethod
-    def sample(self, state: SourceState, frames: Tensor, steps: int) -> tuple[Tensor, SourceState]:
+    def sample(self, state: SourceState, frames: NDArray[np.int64], steps: int) -> tuple[Floats, SourceState]:
         """As `advance` on the whole grid, of which only some frames are kept, (batch, frames, grid_points).
 
         Args:
@@ -79,39 +79,47 @@ class ModelSource(StringSource):
     """A preset's model."""
 
     def __init__(self, preset: Preset) -> None:
+        from engine.models.base import AnyFrameModel
+
         self._model = preset.model
+        self._sampled = self._model if isinstance(self._model, AnyFrameModel) else None
         self._scale_m = preset.info.scale_m
         self.rate_hz = preset.info.rate_hz
         self.grid_points = preset.info.grid_points
-        self.any_frame = isinstance(self._model, AnyFrameModel)
+        self.any_frame = self._sampled is not None
 
-    @torch.inference_mode()
-    def start(self, displacement_m: Tensor) -> SourceState:
+    def start(self, displacement_m: Array) -> SourceState:
+        import torch
+
         _check_grid(displacement_m, self.grid_points)
-        displacement = (displacement_m / self._scale_m).float()
-        inner = self._model.encode(displacement)
-        return SourceState(inner, 0, RUNAWAY_FACTOR * max(float(displacement_m.abs().max()), LEAST_PEAK_M))
+        with torch.inference_mode():
+            inner = self._model.encode(torch.from_numpy(displacement_m / self._scale_m).float())
+        return SourceState(inner, 0, RUNAWAY_FACTOR * max(float(np.abs(displacement_m).max()), LEAST_PEAK_M))
 
-    @torch.inference_mode()
-    def advance(self, state: SourceState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SourceState]:
-        frames, inner = self._model.advance(state.inner, steps, readout)
-        return self._believed(frames, torch.arange(1, steps + 1), state), self._after(state, inner, steps)
+    def advance(self, state: SourceState, steps: int, readout: Array | None = None) -> tuple[Floats, SourceState]:
+        import torch
 
-    @torch.inference_mode()
-    def sample(self, state: SourceState, frames: Tensor, steps: int) -> tuple[Tensor, SourceState]:
-        if isinstance(self._model, AnyFrameModel) and len(frames) < steps:
-            found, inner = self._model.sample(state.inner, frames, steps)
-        else:
-            found, inner = self._model.advance(state.inner, steps)
-            found = found if len(frames) == steps else found[:, frames - 1]
-        return self._believed(found, frames, state), self._after(state, inner, steps)
+        with torch.inference_mode():
+            points = None if readout is None else torch.from_numpy(readout)
+            frames, inner = self._model.advance(state.inner, steps, points)
+        return self._checked(frames.numpy(), np.arange(1, steps + 1), state), self._after(state, inner, steps)
 
-    def _believed(self, found: Tensor, frames: Tensor, state: SourceState) -> Tensor:
+    def sample(self, state: SourceState, frames: NDArray[np.int64], steps: int) -> tuple[Floats, SourceState]:
+        import torch
+
+        if self._sampled is None or len(frames) == steps:
+            every, after = self.advance(state, steps)
+            return every if len(frames) == steps else every[:, frames - 1], after
+        with torch.inference_mode():
+            found, inner = self._sampled.sample(state.inner, torch.from_numpy(frames), steps)
+        return self._checked(found.numpy(), frames, state), self._after(state, inner, steps)
+
+    def _checked(self, found: Floats, frames: NDArray[np.int64], state: SourceState) -> Floats:
         """In m. Raises Runaway."""
-        found = found * self._scale_m
-        believable = found.abs() <= state.limit_m  # False for a NaN
-        if not bool(believable.all()):
-            first = int((~believable).any(dim=2).any(dim=0).nonzero()[0])
+        found = found * found.dtype.type(self._scale_m)
+        possible = np.abs(found) <= state.limit_m  # False for a NaN
+        if not possible.all():
+            first = int(np.argmin(possible.all(axis=(0, 2))))
             raise Runaway((state.frame + int(frames[first])) / self.rate_hz)
         return found
 
@@ -128,46 +136,36 @@ class TruthSource(StringSource):
     """
 
     def __init__(self, info: PresetInfo, substeps: int | None = None) -> None:
+        from engine.truth import SplittingSolver
+
         self.rate_hz = info.rate_hz
         self.grid_points = info.grid_points
         self.any_frame = True  # it steps through all of them; their shapes are most of the cost
         self._resonator = info.resonator
         self._solver = SplittingSolver(self._resonator, info.rate_hz, substeps=substeps, silence=SILENCE)
 
-    def start(self, displacement_m: Tensor) -> SourceState:
-        _check_grid(displacement_m, self.grid_points)
-        return SourceState(ModalState.at_rest(self._resonator.to_modes(displacement_m.double())), 0, float("inf"))
+    def start(self, displacement_m: Array) -> SourceState:
+        from engine.truth import ModalState
 
-    def advance(self, state: SourceState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, SourceState]:
+        _check_grid(displacement_m, self.grid_points)
+        return SourceState(ModalState.at_rest(self._resonator.to_modes(displacement_m)), 0, float("inf"))
+
+    def advance(self, state: SourceState, steps: int, readout: Array | None = None) -> tuple[Floats, SourceState]:
         amplitudes, inner = self._solver.advance(state.inner, steps)
         shapes = self._resonator.shapes
-        to_points = shapes if readout is None else shapes @ readout.double()
-        return amplitudes @ to_points, SourceState(inner, state.frame + steps, state.limit_m)
+        to_points = shapes if readout is None else shapes @ readout
+        return amplitudes.numpy() @ to_points, SourceState(inner, state.frame + steps, state.limit_m)
 
-    def sample(self, state: SourceState, frames: Tensor, steps: int) -> tuple[Tensor, SourceState]:
-        amplitudes, inner = self._solver.sample(state.inner, frames, steps)
-        return amplitudes @ self._resonator.shapes, SourceState(inner, state.frame + steps, state.limit_m)
+    def sample(self, state: SourceState, frames: NDArray[np.int64], steps: int) -> tuple[Floats, SourceState]:
+        import torch
 
-
-def project(displacement_m: Tensor, modes: int) -> Tensor:
-    """Displacement (..., grid_points) without what lies outside the first `modes` modes."""
-    return to_grid(to_modes(displacement_m, modes), displacement_m.shape[-1])
+        amplitudes, inner = self._solver.sample(state.inner, torch.from_numpy(frames), steps)
+        found = amplitudes.numpy() @ self._resonator.shapes
+        return found, SourceState(inner, state.frame + steps, state.limit_m)
 
 
-def _check_grid(displacement: Tensor, grid_points: int) -> None:
+def _check_grid(displacement: Array, grid_points: int) -> None:
     if displacement.ndim != 2 or displacement.shape[1] != grid_points:
         raise ValueError(
             f"initial displacement must have shape (batch, {grid_points}), not {tuple(displacement.shape)}"
         )
-
-
-__all__ = [
-    "FULL_SCALE_M",
-    "SILENCE",
-    "ModelSource",
-    "Runaway",
-    "SourceState",
-    "StringSource",
-    "TruthSource",
-    "project",
-]

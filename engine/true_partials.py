@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import torch
-from torch import Tensor
+import numpy as np
 
-from engine.partials import phasors
+from engine.partials import Array, Phasors, phasors
 from engine.resonators.base import Resonator
 from engine.truth import ModalState, SplittingSolver
 
@@ -16,13 +15,13 @@ OVERSAMPLING = 4  # of the truth whose phasors are wanted
 
 def true_phasors(
     resonator: Resonator,
-    initial: Tensor,
+    initial: Array,
     rate_hz: float,
     steps: int,
     block: int,
     *,
     substeps: int | None = None,
-) -> Iterator[Tensor]:
+) -> Iterator[Phasors]:
     """Phasors of frames 1 … steps in m, complex128 (batch, up to `block`, modes).
 
     Args:
@@ -36,8 +35,7 @@ def true_phasors(
     for first in range(0, steps, block):
         samples, state = solver.advance(state, OVERSAMPLING * min(block, steps - first))
         beyond, _ = solver.advance(state, 1)
-        before, now, after = (
-            torch.cat([samples, beyond], dim=1)[:, OVERSAMPLING - 1 + offset :: OVERSAMPLING] for offset in (-1, 0, 1)
-        )
+        every = np.concatenate([samples.numpy(), beyond.numpy()], axis=1)
+        before, now, after = (every[:, OVERSAMPLING - 1 + offset :: OVERSAMPLING] for offset in (-1, 0, 1))
         count = now.shape[1]
         yield phasors(before[:, :count], now, after, 1 / sample_hz, resonator)

@@ -10,8 +10,9 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from engine.models import KoopmanVar, KoopmanVarConfiguration
 from engine.models.base import Physics
+from engine.models.configurations import KoopmanVarConfiguration
+from engine.models.koopman_var import KoopmanVar
 from engine.presets import PresetInfo, TrainedRange, save_preset
 from engine.resonators.string import StringParameters
 from engine.schema import write

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
-from engine.models import MODELS
+from engine.models import MODELS, OF_MANY_STRINGS
 from engine.schema import SchemaError, read, read_toml, write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 
@@ -45,7 +45,6 @@ TITLE_WORDS = {  # where a musician would not know the tables' name
     "frnn": "Fourier RNN",
 }
 
-OF_MANY_STRINGS = frozenset({"koopman_tension"})  # learned by `family train`, no model of one cell
 
 Initial = Literal["gaussian", "noise"]
 _NAME = re.compile(

@@ -12,11 +12,12 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from engine.metrics import ErrorSums, RelativeError
-from engine.models import StringModel
+from engine.models.base import StringModel
 from engine.partials import (
     PartialErrors,
     PartialTrack,
@@ -51,7 +52,7 @@ def evaluate_model(model: StringModel[Any], dataset: Dataset, split: str, steps:
     c = dataset.configuration
     kept = (steps or c.steps) // c.stride
     device = next(model.parameters()).device
-    synthesis = (c.resonator.shapes / dataset.scale_m).float().to(device)
+    synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m).float().to(device)
     sums = ErrorSums(kept)
     with _in_evaluation(model):
         for amplitudes in dataset.split(split).split(TRAJECTORIES_AT_ONCE):
@@ -122,8 +123,8 @@ def evaluate_past_horizon(
     c = dataset.configuration
     steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)
     device = next(model.parameters()).device
-    synthesis = c.resonator.shapes / dataset.scale_m
-    ear = listening_weights(torch.tensor([listen]), c.grid_points).float()
+    synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m)
+    ear = torch.from_numpy(listening_weights(np.array([listen]), c.grid_points)).float()
     spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
     string, sound, distances = ErrorSums(steps), ErrorSums(steps), []
     parts = _parts(c, split, trajectories)
@@ -169,7 +170,7 @@ def evaluate_partials(
     c = dataset.configuration
     device = next(model.parameters()).device
     synthesis = c.resonator.shapes / dataset.scale_m
-    analysis = c.resonator.analysis.float().to(device)
+    analysis = torch.from_numpy(c.resonator.analysis).float().to(device)
     linear_hz = (c.resonator.eigenvalues().imag / (2 * math.pi)).tolist()
     length = segment_frames(c.rate_hz, linear_hz[0])
     block = max(1, frames_at_once // length) * length
@@ -178,7 +179,7 @@ def evaluate_partials(
     parts = _parts(c, split, trajectories)
     with _in_evaluation(model):
         for part, rows in enumerate(parts):
-            state, tracks = model.encode((initial[rows] @ synthesis).float().to(device)), []
+            state, tracks = model.encode(torch.from_numpy(initial[rows] @ synthesis).float().to(device)), []
             true = true_phasors(
                 c.resonator,
                 initial[rows],
@@ -189,7 +190,7 @@ def evaluate_partials(
             )
             for first, truth in zip(range(0, steps, block), true, strict=True):
                 predicted, state = model.advance(state, truth.shape[1], analysis)
-                tracks.append(track_partials(predicted.cpu() * dataset.scale_m, truth, length))
+                tracks.append(track_partials(predicted.cpu().numpy() * np.float32(dataset.scale_m), truth, length))
                 report((part + (first + truth.shape[1]) / steps) / len(parts))
             found.append(partial_errors(PartialTrack.join(tracks), c.rate_hz, linear_hz, windows_s))
     return PartialErrors.join(found)
@@ -218,7 +219,7 @@ def errors_by_rise(sums: ErrorSums, configuration: DatasetConfiguration, split: 
     shares = sums.shares()
     initial = draw_initial(configuration)[split_rows(configuration.count, split)][: len(shares)]
     rise = configuration.resonator.relative_tension_rise(initial)
-    order = torch.argsort(rise).tolist()
+    order = np.argsort(rise, kind="stable").tolist()
     edges = [round(part * len(order)) for part in RISE_PARTS]
     groups = [order[first:last] for first, last in pairwise(edges) if last > first]
     return [
@@ -267,7 +268,7 @@ def _true_motion(dataset: Dataset, rows: slice, steps: int, block: int) -> tuple
     if len(dataset.amplitudes) and steps <= c.steps and c.stride == 1:
         stored = dataset.amplitudes[rows, : steps + 1]
         return stored[:, 0].double(), (frames.double() for frames in stored[:, 1:].split(block, dim=1))
-    initial = draw_initial(c)[rows]
+    initial = torch.from_numpy(draw_initial(c)[rows])
     return initial, _simulated(_solver(c), initial, steps, block)
 
 

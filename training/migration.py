@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import replace
 
-from engine.models import MODELS, RETIRED, read_model_configuration
+from engine.models import RETIRED, model_class, read_model_configuration
 from engine.schema import SchemaError, write
 from training.cell import load
 from training.configuration import DATA_VERSION, TrainingConfiguration, digest_of, unlike_default
@@ -22,7 +22,7 @@ def earlier_digest(configuration: TrainingConfiguration) -> str:
     """By the second rule: a start had a name where it was the model's own, and flags for others."""
     start, model, given = configuration.start, configuration.model, configuration.model_configuration
     recipe = {name: value for name, value in unlike_default(configuration.recipe).items() if name != "start"}
-    recipe["initialisation"] = MODELS[model][0].own_initialisation() if start in STARTS else start
+    recipe["initialisation"] = model_class(model).own_initialisation() if start in STARTS else start
     if start in (BLIND_PURSUIT, PHASES):
         recipe["blind"] = True
     if start == PHASES and model == "koopman_integrated" and "state_size" not in given:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from engine.metrics import ErrorSums
-from engine.models import StringModel
+from engine.models.base import StringModel
 from engine.presets import Preset, PresetError, PresetInfo, load_preset
 from engine.schema import SchemaError
 from training.configuration import DatasetConfiguration, TrainingConfiguration, read_configuration

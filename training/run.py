@@ -13,7 +13,15 @@ from typing import Any
 import torch
 from filelock import FileLock, Timeout
 
-from engine.excitation import (
+from engine.metrics import ErrorSums
+from engine.models.base import count_parameters
+from engine.presets import PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
+from engine.schema import SchemaError, read, write
+from engine.whole_file import whole_file
+from training import provenance
+from training.configuration import DatasetConfiguration, TrainingConfiguration
+from training.data.dataset import Dataset, load_dataset
+from training.data.draws import (
     CENTRE_RANGE,
     PEAK_RANGE_M,
     PLUCK_PEAK_RANGE_M,
@@ -21,14 +29,6 @@ from engine.excitation import (
     PLUCK_WIDTH_RANGE,
     WIDTH_RANGE,
 )
-from engine.metrics import ErrorSums
-from engine.models import count_parameters
-from engine.presets import PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
-from engine.schema import SchemaError, read, write
-from engine.whole_file import whole_file
-from training import provenance
-from training.configuration import DatasetConfiguration, TrainingConfiguration
-from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import Diverged, FitResult, Progress, fit
 from training.fitting.log import TrainingLog

@@ -1,4 +1,7 @@
-"""How a run's model starts: by name, what that start is given of the string, in words, and what makes it."""
+"""How a run's model starts: by name, what that start is given of the string, in words, and what makes it.
+
+Nothing here imports torch before a start is looked up: names of runs are read without it.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,11 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-import torch
-
 from engine.bounds import LARGEST_HEADER_BYTES, LARGEST_PRESET_BYTES
-from engine.models import DMD, MODELS, StringModel, build_model, read_model_configuration
-from engine.models.base import Physics
+from engine.models import build_model, model_class, read_model_configuration
 
 if TYPE_CHECKING:
+    from engine.models.base import StringModel
     from training.configuration import TrainingConfiguration
     from training.data.dataset import Dataset
     from training.fitting.pursuit import LatentFit
@@ -43,7 +44,7 @@ class Start(NamedTuple):
 
 def starts_of(model: str) -> dict[str, Start]:
     """The starts of a model by name; the first is the default. A model declares its own, whose weights it draws."""
-    own = {how: Start(given, _own, (model,)) for how, given in MODELS[model][0].initialisations.items()}
+    own = {how: Start(given, _own, (model,)) for how, given in model_class(model).initialisations.items()}
     found = {name: start for name, start in STARTS.items() if model in start.models}
     return found | own if LEAST_SQUARES in found else own | found
 
@@ -82,6 +83,10 @@ def new_model(
         scale_m: its data set's.
         found: sizes that its data have set.
     """
+    import torch
+
+    from engine.models.base import Physics
+
     data = configuration.data
     model = build_model(configuration.model, {**configuration.model_configuration, **(found or {})})
     size = LARGEST_HEADER_BYTES + sum(part.nbytes for part in model.state_dict().values())
@@ -101,13 +106,19 @@ def _own(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
 
 
 def _least_squares(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
-    synthesis = (dataset.configuration.resonator.shapes / dataset.scale_m).float()
+    import torch
+
+    from engine.models.dmd import DMD
+
+    synthesis = torch.from_numpy(dataset.configuration.resonator.shapes / dataset.scale_m).float()
     truth = dataset.split("train")[:, : configuration.steps + 1] @ synthesis
     sizes = read_model_configuration("dmd", configuration.model_configuration, "model_configuration")
     return DMD.fit(truth, sizes), None
 
 
 def _pursued(configuration: TrainingConfiguration, dataset: Dataset, *, blind: bool) -> Made:
+    import torch
+
     from training.fitting.pursuit import pursue
 
     model = new_model(configuration, dataset.scale_m)

@@ -6,8 +6,8 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import torch
-from torch import Tensor
+import numpy as np
+from numpy.typing import NDArray
 
 from app.presets.library import PresetEntry
 from app.rendering.job import BLOCK_FRAMES
@@ -16,10 +16,11 @@ from app.shared.worker import Cancelled, Job
 from engine.metrics import NULL_FLOOR_DB, ErrorSums
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
-from engine.resonators.sine_transform import listening_weights, synthesis_matrix, to_modes
+from engine.resonators.sine_transform import listening_weights, project, synthesis_matrix, to_modes
 from engine.resonators.string import StringParameters
-from engine.sources import ModelSource, Runaway, StringSource, TruthSource, project
+from engine.sources import ModelSource, Runaway, StringSource, TruthSource
 
+Floats = NDArray[np.floating]
 FRAMES_AT_ONCE = BLOCK_FRAMES  # as the window renders
 WARM_UP_FRAMES = 64  # rendered before time is taken, so that compilation and caches do not count
 
@@ -95,16 +96,16 @@ class _Truths:
 
     def __init__(self, basis: Basis) -> None:
         self._basis = basis
-        self._known: dict[tuple[object, ...], Tensor] = {}
+        self._known: dict[tuple[object, ...], Floats] = {}
 
-    def amplitudes(self, info: PresetInfo, job: Job) -> Tensor:
+    def amplitudes(self, info: PresetInfo, job: Job) -> Floats:
         """float32 (frames, modes) in m, of the frames after the first."""
         key = (info.string, info.tension_modulated, info.rate_hz, info.modes, info.grid_points)
         if key not in self._known:
             blocks = []
             for block, _ in _frames(TruthSource(info), self._basis, info, job):
-                blocks.append(to_modes(block[0], info.modes).float())
-            self._known[key] = torch.cat(blocks)
+                blocks.append(to_modes(block[0], info.modes).astype(np.float32))
+            self._known[key] = np.concatenate(blocks)
         return self._known[key]
 
 
@@ -116,8 +117,8 @@ def _compare_one(
     source = ModelSource(preset)
     job.check()
     true = truths.amplitudes(info, job)
-    synthesis = synthesis_matrix(info.grid_points, info.modes).float()
-    ear = listening_weights(torch.tensor([basis.listen]), info.grid_points).float()
+    synthesis = synthesis_matrix(info.grid_points, info.modes).astype(np.float32)
+    ear = listening_weights(np.array([basis.listen]), info.grid_points).astype(np.float32)
     steps = len(true)
     string, sound = ErrorSums(steps), ErrorSums(steps)
     first, work_s, note = 0, 0.0, ""
@@ -125,16 +126,17 @@ def _compare_one(
         _warm_up(source, basis, info)
         for predicted, spent_s in _frames(source, basis, info, job):
             block = (true[first : first + predicted.shape[1]] @ synthesis)[None]
-            string.add(predicted.float(), block, first)
-            sound.add(predicted.float() @ ear, block @ ear, first)
+            predicted = predicted.astype(np.float32)
+            string.add(predicted, block, first)
+            sound.add(predicted @ ear, block @ ear, first)
             first, work_s = first + predicted.shape[1], work_s + spent_s
             job.report(before + share * first / steps)
     except Runaway as error:
         note = f"runs away {error.time_s:.2f} s after the pluck"
         for start in range(first, steps, FRAMES_AT_ONCE):
             block = (true[start : start + FRAMES_AT_ONCE] @ synthesis)[None]
-            string.add(torch.full_like(block, torch.nan), block, start)
-            sound.add(torch.full_like(block @ ear, torch.nan), block @ ear, start)
+            string.add(np.full_like(block, np.nan), block, start)
+            sound.add(np.full_like(block @ ear, np.nan), block @ ear, start)
     end_s = max(steps / info.rate_hz, info.horizon_s)
     windows = string.windows(info.rate_hz, (0.0, info.horizon_s, end_s))
     past = windows[1] if len(windows) > 1 else None
@@ -151,7 +153,7 @@ def _compare_one(
     )
 
 
-def _frames(source: StringSource, basis: Basis, info: PresetInfo, job: Job) -> Iterator[tuple[Tensor, float]]:
+def _frames(source: StringSource, basis: Basis, info: PresetInfo, job: Job) -> Iterator[tuple[Floats, float]]:
     """Blocks (1, frames, grid_points) in m, and the processor seconds that each took."""
     state = source.start(_initial(basis, info))
     steps = max(1, round(basis.seconds * info.rate_hz))
@@ -166,5 +168,5 @@ def _warm_up(source: StringSource, basis: Basis, info: PresetInfo) -> None:
     source.advance(source.start(_initial(basis, info)), WARM_UP_FRAMES)
 
 
-def _initial(basis: Basis, info: PresetInfo) -> Tensor:
+def _initial(basis: Basis, info: PresetInfo) -> NDArray[np.float64]:
     return project(basis.pluck.displacement(info.grid_points), info.modes)[None]

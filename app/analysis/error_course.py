@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from app.analysis.growing import BLOCK_FRAMES
@@ -54,7 +53,7 @@ class ErrorCourse:
             self.take.motion_m(name)[start:stop].reshape(count, length, -1) for name in ("model", "truth")
         )
         sums = ErrorSums(length)
-        sums.add(torch.from_numpy(model), torch.from_numpy(truth))  # a window counts as a trajectory
+        sums.add(model, truth)  # a window counts as a trajectory
         mse, mae = sums.per_trajectory()
         here = slice(self.ready, self.ready + count)
         self.curves["rmse"][here], self.curves["mae"][here] = np.sqrt(mse), mae

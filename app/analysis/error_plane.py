@@ -11,15 +11,14 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from app.shared.worker import Job
 from engine.metrics import ErrorSums
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, Pluck
 from engine.presets import Preset
-from engine.sources import TruthSource, project
-from engine.truth import default_substeps
+from engine.resonators.sine_transform import project
+from engine.sources import TruthSource
 
 SMALLEST_AMPLITUDE_MM = 0.5
 STRIDES = (16, 8, 4, 2, 1)  # of the finest grid, level by level
@@ -122,20 +121,24 @@ def error_of_plucks(preset: Preset) -> Callable[[list[Pluck], Job], Array]:
 
     They are infinite where the output is not finite.
     """
+    import torch
+
+    from engine.truth import default_substeps
+
     info, model = preset.info, preset.model
     truth = TruthSource(info, -(-default_substeps(info.resonator, info.rate_hz) // COARSER))
 
     @torch.inference_mode()
     def errors(plucks: list[Pluck], job: Job) -> Array:
-        initial = project(torch.stack([pluck.displacement(info.grid_points) for pluck in plucks]), info.modes)
-        state = model.encode((initial / info.scale_m).float())
+        initial = project(np.stack([pluck.displacement(info.grid_points) for pluck in plucks]), info.modes)
+        state = model.encode(torch.from_numpy(initial / info.scale_m).float())
         true_state = truth.start(initial)
         sums, first = ErrorSums(info.horizon_steps), 0
         while first < info.horizon_steps:
             steps = min(FRAMES_AT_ONCE, info.horizon_steps - first)
             predicted, state = model.advance(state, steps)
             true, true_state = truth.advance(true_state, steps)
-            sums.add(predicted * info.scale_m, true, first)
+            sums.add(predicted.numpy() * info.scale_m, true, first)
             first += steps
             job.check()
         return sums.per_trajectory()[1]

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.models.eigenvalues import VANISHED
 from engine.presets import Preset, PresetInfo
 
 NEPERS_OF_60_DB = math.log(1000)
@@ -72,7 +71,7 @@ class PoleFigure:
 def pole_figure(preset: Preset) -> PoleFigure:
     """The eigenvalues of a preset's model, and those of its string for small amplitudes."""
     info = preset.info
-    own = (info.resonator.eigenvalues() / info.rate_hz).numpy().astype(np.complex128)
+    own = info.resonator.eigenvalues() / info.rate_hz
     found = [log.numpy() for log in preset.model.log_eigenvalues()]
     note = _NOTES.get(info.model, "")
     if not found:
@@ -81,6 +80,8 @@ def pole_figure(preset: Preset) -> PoleFigure:
 
 
 def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
+    from engine.models.eigenvalues import VANISHED  # and torch
+
     kept = [_upper_half(log[log.real > math.log(VANISHED)]) for log in layers]
     log = np.concatenate([*kept, np.empty(0, complex)])
     layer = np.repeat(np.arange(len(kept)), [len(one) for one in kept])
@@ -88,8 +89,8 @@ def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
     folded_hz = angle * info.rate_hz / (2 * math.pi)
     with np.errstate(divide="ignore"):
         t60_s = np.where(log.real < 0, NEPERS_OF_60_DB / (-log.real * info.rate_hz), math.inf)
-    modes_hz = info.resonator.eigenvalues().imag.numpy() / (2 * math.pi)
-    modes_s = NEPERS_OF_60_DB / info.resonator.sigma.numpy()
+    modes_hz = info.resonator.eigenvalues().imag / (2 * math.pi)
+    modes_s = NEPERS_OF_60_DB / info.resonator.sigma
     mode, mode_hz = _nearest(folded_hz, modes_hz, info.rate_hz, _octaves(t60_s)[:, None] - _octaves(modes_s))
     with np.errstate(divide="ignore"):
         cents = 1200 * np.log2(np.maximum(mode_hz, 0) / modes_hz[mode])

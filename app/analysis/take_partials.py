@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 
 from app.rendering import Take
 from app.shared.worker import Job
@@ -21,9 +20,8 @@ from engine.partials import (
     track_partials,
 )
 from engine.pluck import Pluck
-from engine.resonators.sine_transform import analysis_matrix, to_modes
-from engine.sources import project
-from engine.true_partials import true_phasors
+from engine.resonators.base import Array
+from engine.resonators.sine_transform import analysis_matrix, project, to_modes
 
 FRAMES_AT_ONCE = 2000
 WINDOWS = {"trained": "as trained", "past": "past it", "all": "all of it"}
@@ -60,9 +58,11 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     Raises:
         Cancelled: the job was cancelled.
     """
+    from engine.true_partials import true_phasors  # and torch
+
     info = take.info
     last = round((take.seconds if take.model_ends_s is None else take.model_ends_s) * info.rate_hz)
-    modes_hz = info.resonator.eigenvalues().imag.numpy() / (2 * math.pi)
+    modes_hz = info.resonator.eigenvalues().imag / (2 * math.pi)
     length = segment_frames(info.rate_hz, modes_hz[0])
     if last < length:
         return {}
@@ -84,7 +84,7 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     spans = {"trained": (0.0, min(info.horizon_s, end_s)), "past": (info.horizon_s, end_s), "all": (0.0, end_s)}
     spans = {name: span for name, span in spans.items() if span[1] - span[0] >= seconds}
     errors = partial_errors(track, info.rate_hz, modes_hz.tolist(), list(spans.values()))
-    similar = (track.square.abs().sum(1) >= MOST_SIMILAR * track.power.sum(1))[0].numpy()
+    similar = (np.abs(track.square).sum(1) >= MOST_SIMILAR * track.power.sum(1))[0]
     rows: dict[str, list[PartialRow]] = {}
     for window, name in enumerate(spans):
         rows[name] = [
@@ -94,20 +94,20 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     return rows
 
 
-def _model_modes(take: Take, steps: int, block: int) -> Iterator[torch.Tensor]:
+def _model_modes(take: Take, steps: int, block: int) -> Iterator[Array]:
     """The model's modal amplitudes in m, (1, up to `block`, modes), of frames 1 … steps."""
     info, source = take.info, take.model
     if source is None or not source.any_frame:  # the take holds every frame
         motion = take.motions["model"]
         for first in range(1, steps + 1, block):
-            frames = torch.from_numpy(motion.read(first, min(first + block, steps + 1)))
-            yield to_modes(frames[None].double(), info.modes)
+            frames = motion.read(first, min(first + block, steps + 1))
+            yield to_modes(frames[None].astype(np.float64), info.modes)
         return
     analysis = analysis_matrix(info.grid_points, info.modes)
     state = source.start(project(take.pluck.displacement(info.grid_points), info.modes)[None])
     for first in range(0, steps, block):
         amplitudes, state = source.advance(state, min(block, steps - first), analysis)
-        yield amplitudes.double()
+        yield amplitudes.astype(np.float64)
 
 
 def _row(mode: int, errors: PartialErrors, window: int, note: str) -> PartialRow:
@@ -133,8 +133,8 @@ def _note(mode_hz: float, rate_hz: int, similar: bool) -> str:
     return ""
 
 
-def _initial(pluck: Pluck, grid_points: int, modes: int) -> torch.Tensor:
-    return to_modes(project(pluck.displacement(grid_points), modes)[None].double(), modes)
+def _initial(pluck: Pluck, grid_points: int, modes: int) -> Array:
+    return to_modes(project(pluck.displacement(grid_points), modes)[None], modes)
 
 
 def _figure(value: float) -> float | None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from engine.plain_text import one_line
 
 RATES_HZ = (8_000, 384_000)
-LONGEST_S = 60.0
+NOTE_LENGTHS_S = SHORTEST_S, LONGEST_S = 0.15, 60.0
 MOST_CHANNELS = 8
 LARGEST_BYTES = 512 * 2**20
 

@@ -6,14 +6,14 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-import torch
 from numpy.lib import format as npy
-from torch import Tensor
+from numpy.typing import NDArray
 
 from engine.plain_text import one_line
 from engine.result_file import whole_file
 from training.cli.console import Failure, Report
 
+Array = NDArray[np.floating]
 MOST_NUMBERS = 8 * 2**20  # of a file of displacements: 64 MiB in double precision
 LARGEST_RESULT_BYTES = 4 * 2**30
 BYTES_AT_ONCE = 16 * 2**20  # of a result, computed at a time
@@ -21,10 +21,10 @@ FRAMES_AT_ONCE = 4096
 IMPLAUSIBLE_PEAK_M = 0.1  # a larger displacement is probably meant in millimetres
 
 # displacements (batch, points) -> blocks (batch, frames, points) from frame 0 to the last, in m
-Motion = Callable[[Tensor], Iterator[Tensor]]
+Motion = Callable[[Array], Iterator[Array]]
 
 
-def read_displacements(path: Path) -> Tensor:
+def read_displacements(path: Path) -> Array:
     """Initial displacements in m, float64 (batch, points).
 
     Raises:
@@ -42,7 +42,7 @@ def read_displacements(path: Path) -> Tensor:
     if not np.isfinite(values).all():
         row, point = np.argwhere(~np.isfinite(values))[0]
         raise Failure(f"{path}: entry [{row}, {point}] is {values[row, point]}; replace it by a displacement in m")
-    return torch.from_numpy(values)
+    return values
 
 
 def check_result_size(batch: int, frames: int, points: int) -> None:
@@ -59,7 +59,7 @@ def check_result_size(batch: int, frames: int, points: int) -> None:
         )
 
 
-def write_motion(path: Path, initial: Tensor, steps: int, motion: Motion, report: Report) -> None:
+def write_motion(path: Path, initial: Array, steps: int, motion: Motion, report: Report) -> None:
     """Writes float64 (batch, steps + 1, points) in m, whole or not at all, a few trajectories at a time.
 
     Raises:
@@ -72,12 +72,12 @@ def write_motion(path: Path, initial: Tensor, steps: int, motion: Motion, report
     done = 0
     with whole_file(path) as file:
         npy.write_array_header_1_0(file, header)
-        for few in initial.split(rows):
-            frames: Iterator[Tensor] = motion(few)
+        for few in np.split(initial, range(rows, batch, rows)):
+            frames: Iterator[Array] = motion(few)
             if len(few) > 1:  # a trajectory's frames lie together in the file
-                frames = iter([torch.cat(list(frames), dim=1)])
+                frames = iter([np.concatenate(list(frames), axis=1)])
             for block in frames:
-                file.write(_finite(block).numpy().astype("<f8").tobytes())
+                file.write(_finite(block).astype("<f8").tobytes())
                 done += block.shape[0] * block.shape[1]
                 report(done / (batch * (steps + 1)))
 
@@ -105,7 +105,7 @@ def _load(path: Path) -> np.ndarray:
     return array
 
 
-def _finite(block: Tensor) -> Tensor:
-    if not bool(torch.isfinite(block).all()):
+def _finite(block: Array) -> Array:
+    if not np.isfinite(block).all():
         raise Failure("the motion is not finite; displacement is in m: lower U0, or raise --substeps")
     return block

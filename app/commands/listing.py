@@ -60,12 +60,13 @@ def models(json: Json = False) -> None:
     """List the models, with their parameters at the paper's sizes."""
     import torch
 
-    from engine.models import MODELS, count_parameters
+    from engine.models import MODELS, build_model
+    from engine.models.base import count_parameters
 
     found = []
     with torch.device("meta"):  # sizes without memory
-        for name, (kind, configuration) in MODELS.items():
-            found.append({"name": name, "parameters": count_parameters(kind(configuration()))})
+        for name in MODELS:
+            found.append({"name": name, "parameters": count_parameters(build_model(name))})
     if json:
         print_json(found)
     else:

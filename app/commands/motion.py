@@ -14,9 +14,7 @@ from training.cli.console import Failure, number, print_json, print_table, progr
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from torch import Tensor
-
-    from app.commands.arrays import Motion
+    from app.commands.arrays import Array, Motion
     from engine.metrics import ErrorSums
     from engine.pluck import Pluck
     from engine.presets import Preset, PresetInfo
@@ -98,7 +96,7 @@ def simulate(
     motion = _fast(resonator, rate, steps, substeps) if fast else _dop853(resonator, rate, steps)
     with progress("simulate") as report:
         arrays.write_motion(out, initial, steps, motion, report)
-    if (peak_m := float(initial.abs().max())) > arrays.IMPLAUSIBLE_PEAK_M:
+    if (peak_m := float(abs(initial).max())) > arrays.IMPLAUSIBLE_PEAK_M:
         say(f"note: {u0} rises to {peak_m:g} m; displacement is in metres")
 
 
@@ -132,7 +130,7 @@ def predict(
         say(f"warning: {words}")
 
 
-def _outside_family(info: PresetInfo, initial: Tensor) -> list[str]:
+def _outside_family(info: PresetInfo, initial: Array) -> list[str]:
     """How a string and its displacements differ from those of a preset of many where the error grows."""
     if info.family is None:
         return []
@@ -224,7 +222,8 @@ def window_edges(seconds: float, info: PresetInfo) -> list[float]:
 def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
     from app.commands import arrays
     from engine.metrics import ErrorSums
-    from engine.sources import ModelSource, TruthSource, project
+    from engine.resonators.sine_transform import project
+    from engine.sources import ModelSource, TruthSource
 
     info = preset.info
     initial = project(pluck.displacement(info.grid_points), info.modes)[None]
@@ -235,7 +234,7 @@ def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
         for count in arrays.blocks_of(steps):
             predicted, model_state = model.advance(model_state, count)
             true, truth_state = truth.advance(truth_state, count)
-            sums.add(predicted.double(), true, first=done)
+            sums.add(predicted, true, first=done)
             done += count
             report(done / steps)
     return sums
@@ -261,12 +260,12 @@ def _fast(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None
 
     solver = SplittingSolver(resonator, rate_hz, substeps=substeps)
 
-    def motion(initial: Tensor) -> Iterator[Tensor]:
+    def motion(initial: Array) -> Iterator[Array]:
         state = ModalState.at_rest(resonator.to_modes(initial))
-        yield resonator.to_grid(state.amplitude[:, None])
+        yield resonator.to_grid(state.amplitude.numpy()[:, None])
         for count in blocks_of(steps):
             amplitudes, state = solver.advance(state, count)
-            yield resonator.to_grid(amplitudes)
+            yield resonator.to_grid(amplitudes.numpy())
 
     return motion
 
@@ -274,25 +273,26 @@ def _fast(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None
 def _dop853(resonator: Resonator, rate_hz: float, steps: int) -> Motion:
     from engine.truth import ModalState, solve_dop853
 
-    def motion(initial: Tensor) -> Iterator[Tensor]:
+    def motion(initial: Array) -> Iterator[Array]:
         start = ModalState.at_rest(resonator.to_modes(initial))
-        yield resonator.to_grid(solve_dop853(resonator, start, rate_hz, steps))
+        yield resonator.to_grid(solve_dop853(resonator, start, rate_hz, steps).numpy())
 
     return motion
 
 
 def _predicted(preset: Preset, steps: int) -> Motion:
     from app.commands.arrays import blocks_of
-    from engine.sources import ModelSource, project
+    from engine.resonators.sine_transform import project
+    from engine.sources import ModelSource
 
     source = ModelSource(preset)
 
-    def motion(initial: Tensor) -> Iterator[Tensor]:
+    def motion(initial: Array) -> Iterator[Array]:
         start = project(initial, preset.info.modes)
         yield start[:, None]
         state = source.start(start)
         for count in blocks_of(steps):
             frames, state = source.advance(state, count)
-            yield frames.double()
+            yield frames
 
     return motion

@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from app.instrument.loud_keys import LoudKey, LoudKeys
 from app.instrument.strings import HIGHEST_HZ
@@ -71,9 +70,7 @@ def faust_program(patch: Patch, preset: PresetInfo, most_modes: int | None = Non
     bridge = patch.pickup.kind == "bridge"
     tables = key_tables(keys, bridge)
     pulls = _pulls(patch, modes, grid_points)
-    ears = [
-        [1.0] * modes if bridge else mode_shapes(torch.tensor([point]), modes)[:, 0].tolist() for point in ear.points
-    ]
+    ears = [[1.0] * modes if bridge else mode_shapes(np.array([point]), modes)[:, 0].tolist() for point in ear.points]
     lines = [
         *_comments(patch, modes),
         f'declare name "{patch.name}";',

@@ -17,11 +17,10 @@ from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, Bits, Pickup, PlayedSource, Source
 from engine.bounds import HIGHEST_RATE_HZ, SIZES
 from engine.plain_text import one_line
-from engine.pluck import Pluck
+from engine.pluck import FULL_SCALE_M, Pluck
 from engine.presets import Preset, PresetError, of_string, preset_digest
 from engine.resonators.string import StringParameters
 from engine.schema import parse_json, read
-from engine.sources import FULL_SCALE_M
 
 # fields of `SoundRequest`
 REQUESTED = ("pluck", "listen", "listen_right", "pickup", "seconds", "decay_db", "source", "through")

@@ -247,7 +247,7 @@ def decayed_frames(sound: Sound, rate_hz: int, decay_db: float) -> int:
 def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Callable[[float], None]) -> Recording:
     """The samples (frames, channels) of the voice that a device would play."""
     preset, info = request.preset, request.preset.info
-    program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset.model, info, rate_hz)
+    program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset, rate_hz)
     ear = Ear(request.points, request.pickup)
     through, recording = request.through, None
     for block in voice_blocks(

@@ -14,8 +14,9 @@ from pathlib import Path
 from pydantic import TypeAdapter, ValidationError
 
 from app.audio.impulse_file import ImpulseError, read_impulse
+from app.patches.fields import LONGEST_NAME
 from app.patches.library import file_stem
-from app.patches.patch import LONGEST_NAME, Reference
+from app.patches.patch import Reference
 from engine.bounds import LARGEST_IMPULSE_BYTES
 from engine.effects import BODIES, Impulse
 from engine.folders import user_folder

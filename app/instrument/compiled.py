@@ -13,7 +13,6 @@ from app.instrument.loud_keys import LoudKeys
 from app.instrument.table import fill_gain, programs_of, strings_of, table_of, wheeled
 from app.patches.patch import Patch
 from engine.kernels import playing_layout as of
-from engine.models.koopman_tension import KoopmanTension
 from engine.presets import Preset
 from engine.voices import CompiledPlayer, Ear
 from engine.voices.player import Report, Ringing, Table
@@ -81,15 +80,15 @@ class InstrumentPlayer:
         ear: Ear | None = None,
         most_notes: int = 40,
     ) -> None:
-        if not isinstance(preset.model, KoopmanTension):
+        if not preset.info.of_many_strings:
             raise ValueError(
                 f"{preset.path}: its model learned one string only; choose a preset of many, as studio_any_string"
             )
         if preset.info.recorded is not None:
             raise ValueError(f"{preset.path}: its string was learned from a recording; `Player` plays it")
-        self._info, self.grid_points = preset.info, preset.model.configuration.grid_points
+        self._info, self.grid_points = preset.info, preset.info.grid_points
         self._sources = tuple(gains)
-        self._programs = programs_of(preset.model, rate_hz, self._sources)
+        self._programs = programs_of(preset, rate_hz, self._sources)
         self._lock = threading.Lock()
         self._serial = self._instrument = 0
         self.table: Table | None = None

@@ -14,11 +14,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from app.instrument.strings import MOST_MODES, KeyString, Strings
-from app.patches.patch import HIGHEST_KEY, VELOCITIES, Patch
+from app.patches.fields import HIGHEST_KEY
+from app.patches.patch import VELOCITIES, Patch
 from engine.pluck import LARGEST_AMPLITUDE_MM
 from engine.resonators.sine_transform import analysis_matrix
 
@@ -38,8 +38,8 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
     strings = Strings(patch)
     plucks = [patch.pluck.pluck(velocity) for velocity in range(VELOCITIES[1] + 1)]
     amplitudes_mm = np.array([pluck.amplitude_mm for pluck in plucks])
-    shapes_m = torch.stack([pluck.displacement(GRID_POINTS) for pluck in plucks])
-    modal_m = (shapes_m @ analysis_matrix(GRID_POINTS, MOST_MODES)).numpy()
+    shapes_m = np.stack([pluck.displacement(GRID_POINTS) for pluck in plucks])
+    modal_m = shapes_m @ analysis_matrix(GRID_POINTS, MOST_MODES)
     found = np.full((HIGHEST_KEY + 1, len(plucks)), np.nan)
     low, high = patch.range
     for key in range(low, high + 1):
@@ -57,8 +57,8 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
 def _of_string(string: KeyString, modal_m: NDArray[np.float64]) -> NDArray[np.float64]:
     """The glides (plucks,) of plucks with these modal amplitudes, (plucks, at least the string's modes)."""
     parameters, modes = string.parameters, string.modes
-    decayed = 2 * START_S * parameters.decay_rates(modes).numpy()
+    decayed = 2 * START_S * parameters.decay_rates(modes)
     decayed = np.maximum(decayed, 1e-9)  # a string may be without damping
-    squares = (modal_m[:, :modes] * parameters.wavenumbers(modes).numpy()) ** 2 * (-np.expm1(-decayed) / decayed)
-    coupling = float(parameters.tension_coupling(1)) / parameters.undamped_frequency(1) ** 2
+    squares = (modal_m[:, :modes] * parameters.wavenumbers(modes)) ** 2 * (-np.expm1(-decayed) / decayed)
+    coupling = float(parameters.tension_coupling(1)[0]) / parameters.undamped_frequency(1) ** 2
     return np.asarray(600 * np.log2(1 + coupling * (squares.sum(1) / 2 + squares[:, 0] / 4)))

@@ -12,20 +12,24 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import soundfile
+from numpy.typing import NDArray
+from scipy.signal import resample_poly
 
 from app.audio.note_file import NoteFileError, read_note
 from app.instrument.bodies import own_bodies
+from app.patches.fields import explained
 from app.patches.library import PatchError, file_stem, own_patches, save_patch
-from app.patches.patch import Body, Category, Fretted, Patch, PhysicalString, Pickup, PluckChoices, explained
+from app.patches.patch import Body, Category, Fretted, Patch, PhysicalString, Pickup, PluckChoices
 from engine.folders import usable_files, user_folder
 from engine.result_file import WriteError, explain, whole_file
 from training.recording.fit import FREE_POLES
 from training.recording.joint import combined
-from training.recording.learn import Learned, learn
+from training.recording.learn import Learned, examined, learn
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, RecordingError
 from training.recording.physics import Kind
-from training.recording.preset import Source, body_response, listening_point, write_preset
+from training.recording.preset import Source, body_response, listening_point, recorded_note, write_preset
 from training.recording.table import as_data
 
 CATEGORIES: dict[Kind, Category] = {"guitar": "guitar", "bass": "bass", "harp": "harp", "piano": "keys"}
@@ -82,6 +86,32 @@ def learn_files(
         except RecordingError as error:
             raise RecordingError(f"{path}: {error}") from error
     return found
+
+
+def reasons_against(path: Path) -> list[str]:
+    """Why a file is not one note of a string, in words with the remedy; empty: it is one.
+
+    Raises:
+        NoteFileError, RecordingError: nothing can be learned from it in any case.
+    """
+    file = read_note(path)
+    return [f"{each.reason}: {each.remedy}" for each in examined(file.samples, file.rate_hz).findings]
+
+
+def both_sounds(learned: Learned, rate_hz: int) -> dict[str, NDArray[np.float32]]:
+    """Recording and learned note, (frames, 1) each at a rate, ±1 being full scale, as `--as-recorded` renders it.
+
+    One gain for both: the recording peaks at -6 dBFS.
+    """
+    shared = math.gcd(rate_hz, learned.note.rate_hz)
+    recording = resample_poly(learned.note.samples, rate_hz // shared, learned.note.rate_hz // shared)
+    note = recorded_note(learned.note, learned.fitted, learned.source).sound(rate_hz)
+    frames = min(len(recording), len(note))
+    gain = 0.5 / max(float(np.abs(recording).max()), 1e-9)
+    return {
+        name: np.ascontiguousarray(gain * sound[:frames, None], np.float32)
+        for name, sound in (("recording", recording), ("learned", note))
+    }
 
 
 def check_name(name: str) -> str:
@@ -154,4 +184,13 @@ def _patch(name: str, stem: str, learned: Learned, partials: int, kind: Kind) ->
         raise PatchError(f"{name}: {explained(error)}") from error
 
 
-__all__ = ["Kept", "NoteFileError", "RecordingError", "check_name", "keep", "learn_files"]
+__all__ = [
+    "Kept",
+    "NoteFileError",
+    "RecordingError",
+    "both_sounds",
+    "check_name",
+    "keep",
+    "learn_files",
+    "reasons_against",
+]

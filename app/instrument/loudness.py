@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from app.instrument.effects import RESPONSE_HZ, Response
@@ -59,8 +58,7 @@ def level_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | 
 
 def gain_of(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None) -> float:
     """The factor that brings a pluck at the reference velocity to the wanted level; 1 where it is silent."""
-    with torch.inference_mode():
-        found = level_db(resonator, pluck, ear, response)
+    found = level_db(resonator, pluck, ear, response)
     if found == -math.inf:  # at a fixed end: it would be far too loud anywhere else
         return 1.0
     low, high = GAIN_RANGE_DB
@@ -90,9 +88,9 @@ def _heard(
     resonator: Resonator, pluck: Pluck, ear: Ear
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """The amplitudes of the partials as heard, (modes, points), re full scale; σ and ω in 1/s, (modes,)."""
-    q = resonator.to_modes(pluck.displacement(resonator.points)).numpy()
-    weights = (resonator.shapes @ ear.weights(resonator.points, resonator.force_weights)).numpy() / FULL_SCALE_M
-    sigma, omega = resonator.sigma.numpy(), resonator.omega.numpy()
+    q = resonator.to_modes(pluck.displacement(resonator.points))
+    weights = resonator.shapes @ ear.weights(resonator.points, resonator.force_weights) / FULL_SCALE_M
+    sigma, omega = resonator.sigma, resonator.omega
     if ear.pickup == "velocity":
         weights = weights * omega[:, None] * (FULL_SCALE_M / FULL_SCALE_M_S)
     return weights * q[:, None], sigma, omega

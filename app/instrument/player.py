@@ -25,7 +25,6 @@ from app.instrument.loud_keys import LoudKeys, on_string
 from app.instrument.strings import KeyString, Strings, bent, chosen_string, damped, fretting, slid
 from app.patches.patch import Patch, StringSet
 from app.shared.parameters import OF_PATCHES
-from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo
 from engine.resonators.base import Resonator
@@ -138,11 +137,10 @@ class Player:
         sources: Sequence[str] = SOURCES,
         ear: Ear | None = None,
     ) -> None:
-        if not isinstance(preset.model, KoopmanTension):
+        if not preset.info.of_many_strings:
             raise ValueError(
                 f"{preset.path}: its model learned one string only; choose a preset of many, as studio_any_string"
             )
-        self._model: KoopmanTension = preset.model
         self._preset, self._rate_hz, self._deliver = preset, rate_hz, deliver
         self._sources = tuple(sources)
         self._lock = threading.RLock()
@@ -307,7 +305,7 @@ class Player:
     # How it is done
 
     def _take(self, keys: LoudKeys) -> None:
-        rate_hz, model = self._rate_hz, self._model
+        rate_hz, preset = self._rate_hz, self._preset
 
         @lru_cache(maxsize=KEPT_KEYS)
         def key_of(key: int, string: int | None) -> Key | None:
@@ -319,7 +317,7 @@ class Player:
                 programs[source] = (
                     solver_program(found.resonator, rate_hz)
                     if source == "truth"
-                    else tension_program(model, found.resonator, rate_hz)
+                    else tension_program(preset.weights, preset.configuration, found.resonator, rate_hz)
                 )
             return Key(keys.patch, found.string, found.resonator, found.gain, programs)
 

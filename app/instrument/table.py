@@ -14,7 +14,7 @@ from app.patches.patch import Fretted, Patch, StringSet
 from app.shared.parameters import OF_PATCHES
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
-from engine.models.koopman_tension import KoopmanTension
+from engine.presets import Preset
 from engine.voices.player import Table
 from engine.voices.programs import solver_memory, tension_memory
 
@@ -62,9 +62,10 @@ def wheeled(patch: Patch, wheel: int, *parts: str) -> Patch:
     return patch.with_value(patch.mod_wheel, value + wheel / 127 * (goal - value))
 
 
-def programs_of(model: KoopmanTension, rate_hz: int, sources: Iterable[str]) -> tuple[NDArray[np.float64], ...]:
+def programs_of(preset: Preset, rate_hz: int, sources: Iterable[str]) -> tuple[NDArray[np.float64], ...]:
     """What the kernels read of each source."""
-    return tuple(solver_memory(rate_hz) if each == "truth" else tension_memory(model, rate_hz) for each in sources)
+    model = tension_memory(preset.weights, preset.configuration, rate_hz)
+    return tuple(solver_memory(rate_hz) if each == "truth" else model for each in sources)
 
 
 def table_of(

@@ -10,7 +10,8 @@ import unicodedata
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.patches.patch import CATEGORIES, LONGEST_NAME, Patch, explained
+from app.patches.fields import LONGEST_NAME, explained
+from app.patches.patch import CATEGORIES, Patch
 from engine import bounds
 from engine.folders import user_folder
 from engine.plain_text import one_line

@@ -10,8 +10,10 @@ import itertools
 import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, ValidationError, model_validator
 
+from app.patches.fields import LONGEST_NAME, Flag, Key, Name, Reference, Share, Text, Value, parameter, plain, ranged
+from app.patches.tuning import TuningChoice
 from app.shared.parameters import MOST_MACROS, OF_PATCHES, modulated_by
 from app.shared.vocabulary import Pickup as PickupKind
 from engine import bounds
@@ -26,88 +28,27 @@ Mode = Literal["poly", "guitar", "mpe"]
 ASSIGNABLE = tuple(each.id for each in modulated_by("macro"))  # what macros may turn
 WHEEL = tuple(each.id for each in modulated_by("wheel"))  # what the modulation wheel may turn
 
-LONGEST_NAME = 60  # characters
-LONGEST_DESCRIPTION = 400
-LONGEST_SCALE = 2**16  # characters of a .scl or .kbm file
 MOST_STRINGS = 128
 MOST_TARGETS = 8
-FORBIDDEN_IN_NAMES = '/\\:*?"<>|'  # on Linux, macOS or Windows
-HIGHEST_KEY = 127
 VELOCITIES = (1, 127)
 
 
-def _plain(text: str) -> str:
-    if not text.isprintable():
-        raise ValueError("must be one line of printable characters; remove the others")
-    return text.strip()
-
-
-def _safe(name: str) -> str:
-    """A name that is a valid file name on every system, and no path."""
-    name = _plain(name)
-    if name.startswith(".") or name.endswith(".") or any(c in FORBIDDEN_IN_NAMES for c in name):
-        raise ValueError(f"must not begin or end with a full stop, or hold one of {FORBIDDEN_IN_NAMES}; rename it")
-    return name
-
-
-def _lines(text: str) -> str:
-    if not all(c.isprintable() or c in "\r\n\t" for c in text):
-        raise ValueError("must be the text of a Scala file, without control characters; save it as plain text")
-    return text
-
-
-def explained(error: ValueError) -> str:
-    """The first field that was refused, in words: its path, what it must be, and what was found."""
-    if not isinstance(error, ValidationError):
-        return str(error)
-    first = error.errors(include_url=False, include_context=False)[0]
-    field = ".".join(str(part) for part in first["loc"])[:100]
-    said = first["msg"].removeprefix("Value error, ")
-    found = first["input"]
-    shown = f", found {bounds.brief(found)}" if isinstance(found, str | float | int | None) else ""
-    return f"{field}: {said}{shown}" if field else said
-
-
-def _number(low: float, high: float) -> Any:
-    return Field(ge=low, le=high, strict=True, allow_inf_nan=False)
-
-
-def _parameter(id: str) -> Any:
-    """A field with range and default of the table of parameters."""
-    parameter = OF_PATCHES[id]
-    low, high = parameter.limits
-    return Field(parameter.default, ge=low, le=high, strict=True, allow_inf_nan=False)
-
-
-Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_safe)]
-Reference = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_safe)]  # a name elsewhere, "" for none
-Text = Annotated[str, Field(max_length=LONGEST_DESCRIPTION), AfterValidator(_plain)]
-ScalaText = Annotated[str, Field(max_length=LONGEST_SCALE), AfterValidator(_lines)]
-Key = Annotated[int, _number(0, HIGHEST_KEY)]
-Share = Annotated[float, _number(0, 1)]
-Flag = Annotated[bool, Field(strict=True)]
-
-
-class _Value(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class PhysicalString(_Value):
+class PhysicalString(Value):
     """The eight parameters of `StringParameters`; this class does not need the engine to be loaded."""
 
-    length_m: Annotated[float, _number(*bounds.STRING["length_m"])]
-    area_m2: Annotated[float, _number(*bounds.STRING["area_m2"])]
-    second_moment_m4: Annotated[float, _number(*bounds.STRING["second_moment_m4"])]
-    density_kg_m3: Annotated[float, _number(*bounds.STRING["density_kg_m3"])]
-    youngs_modulus_pa: Annotated[float, _number(*bounds.STRING["youngs_modulus_pa"])]
-    damping_d1_kg_m_s: Annotated[float, _number(*bounds.STRING["damping_d1_kg_m_s"])]
-    damping_d3_kg_m_s: Annotated[float, _number(*bounds.STRING["damping_d3_kg_m_s"])]
-    tension_n: Annotated[float, _number(*bounds.STRING["tension_n"])]
+    length_m: Annotated[float, ranged(*bounds.STRING["length_m"])]
+    area_m2: Annotated[float, ranged(*bounds.STRING["area_m2"])]
+    second_moment_m4: Annotated[float, ranged(*bounds.STRING["second_moment_m4"])]
+    density_kg_m3: Annotated[float, ranged(*bounds.STRING["density_kg_m3"])]
+    youngs_modulus_pa: Annotated[float, ranged(*bounds.STRING["youngs_modulus_pa"])]
+    damping_d1_kg_m_s: Annotated[float, ranged(*bounds.STRING["damping_d1_kg_m_s"])]
+    damping_d3_kg_m_s: Annotated[float, ranged(*bounds.STRING["damping_d3_kg_m_s"])]
+    tension_n: Annotated[float, ranged(*bounds.STRING["tension_n"])]
 
     @property
     def parameters(self) -> StringParameters:
         """The same for the engine, which this loads."""
-        from engine.resonators.string import StringParameters  # brings torch
+        from engine.resonators.string import StringParameters  # brings NumPy
 
         return StringParameters(**self.model_dump())
 
@@ -117,21 +58,21 @@ class PhysicalString(_Value):
         return self.parameters.undamped_frequency(1) / math.tau
 
 
-class Fretted(_Value):
+class Fretted(Value):
     """One string, shortened for each key to the length of its pitch."""
 
     kind: Literal["fretted"] = "fretted"
     string: PhysicalString
 
 
-class OpenString(_Value):
+class OpenString(Value):
     """One string of a set, and the MIDI key of its whole length."""
 
     note: Key
     string: PhysicalString
 
 
-class StringSet(_Value):
+class StringSet(Value):
     """Strings by rising open note. A key shortens the highest at or below it; below all, it slackens the lowest."""
 
     kind: Literal["set"] = "set"
@@ -145,7 +86,7 @@ class StringSet(_Value):
         return self
 
 
-class Knobs(_Value):
+class Knobs(Value):
     """Multipliers of the strings' own values; 1 leaves them as they are.
 
     The tuning says which pitch a key has. At one pitch and one mass the tension goes with the square of the length,
@@ -163,17 +104,17 @@ class Knobs(_Value):
         length: of the length; the tension grows with its square. As `tension`, with what follows exchanged.
     """
 
-    stiffness: float = _parameter("knobs.stiffness")
-    decay: float = _parameter("knobs.decay")
-    brightness_decay: float = _parameter("knobs.brightness_decay")
-    modulus: float = _parameter("knobs.modulus")
-    density: float = _parameter("knobs.density")
-    gauge: float = _parameter("knobs.gauge")
-    tension: float = _parameter("knobs.tension")
-    length: float = _parameter("knobs.length")
+    stiffness: float = parameter("knobs.stiffness")
+    decay: float = parameter("knobs.decay")
+    brightness_decay: float = parameter("knobs.brightness_decay")
+    modulus: float = parameter("knobs.modulus")
+    density: float = parameter("knobs.density")
+    gauge: float = parameter("knobs.gauge")
+    tension: float = parameter("knobs.tension")
+    length: float = parameter("knobs.length")
 
 
-class PluckChoices(_Value):
+class PluckChoices(Value):
     """How a key plucks its string. Widths are as in `engine.pluck.Pluck`; a triangle has none.
 
     Attributes:
@@ -185,12 +126,12 @@ class PluckChoices(_Value):
     """
 
     shape: Shape = "triangular"
-    position: float = _parameter("pluck.position")
-    width: float = _parameter("pluck.width")
-    width_hard: float = _parameter("pluck.width_hard")
-    softest_mm: float = _parameter("pluck.softest_mm")
-    hardest_mm: float = _parameter("pluck.hardest_mm")
-    curve: float = _parameter("pluck.curve")
+    position: float = parameter("pluck.position")
+    width: float = parameter("pluck.width")
+    width_hard: float = parameter("pluck.width_hard")
+    softest_mm: float = parameter("pluck.softest_mm")
+    hardest_mm: float = parameter("pluck.hardest_mm")
+    curve: float = parameter("pluck.curve")
     stops: Flag = True
 
     @model_validator(mode="after")
@@ -211,76 +152,52 @@ class PluckChoices(_Value):
         )
 
 
-class Pickup(_Value):
+class Pickup(Value):
     """Where the string is heard, one point or left and right, and whether as displacement or its velocity."""
 
     points: Annotated[tuple[Share, ...], Field(min_length=1, max_length=2)] = (DEFAULT_LISTEN,)
     kind: PickupKind = "displacement"
 
 
-class Damping(_Value):
+class Damping(Value):
     """What a released key does: nothing (`let_ring`), or all partials decay by 60 dB in `release_t60_s`."""
 
-    release_t60_s: float = _parameter("damping.release_t60_s")
+    release_t60_s: float = parameter("damping.release_t60_s")
     let_ring: Flag = False
 
 
-class TuningChoice(_Value):
-    """Which pitch each key has; see `app.patches.tuning`.
-
-    Attributes:
-        a4_hz: pitch of key 69; a keyboard mapping has a reference pitch of its own.
-        scale: the text of a .scl file, "" for twelve equal steps. Without a mapping it begins at key 60.
-        keymap: the text of a .kbm file, "" for none.
-        transpose: by how many keys everything sounds higher.
-    """
-
-    a4_hz: float = _parameter("tuning.a4_hz")
-    scale: ScalaText = ""
-    keymap: ScalaText = ""
-    transpose: int = _parameter("tuning.transpose")
-
-    @model_validator(mode="after")
-    def _gives_pitches(self) -> Self:
-        if self.scale or self.keymap:
-            from app.patches.tuning import Tuning  # brings a library that few patches need
-
-            Tuning(self)
-        return self
-
-
-class Body(_Value):
+class Body(Value):
     """The body of the instrument: the name of an impulse response ("": none), its mix, its size (1: as it is)."""
 
     name: Reference = ""
-    mix: float = _parameter("body.mix")
-    size: float = _parameter("body.size")
+    mix: float = parameter("body.mix")
+    size: float = parameter("body.size")
 
 
-class Room(_Value):
+class Room(Value):
     """The room: its mix (0: none), and its reverberation time."""
 
-    mix: float = _parameter("room.mix")
-    t60_s: float = _parameter("room.t60_s")
+    mix: float = parameter("room.mix")
+    t60_s: float = parameter("room.t60_s")
 
 
-class Target(_Value):
+class Target(Value):
     """A field that a macro changes, by its path, and its values at 0 and 1."""
 
     field: str
-    low: Annotated[float, _number(-1e6, 1e6)]
-    high: Annotated[float, _number(-1e6, 1e6)]
+    low: Annotated[float, ranged(-1e6, 1e6)]
+    high: Annotated[float, ranged(-1e6, 1e6)]
 
 
-class Macro(_Value):
+class Macro(Value):
     """One knob that changes several fields; `value` is its position."""
 
-    name: Annotated[str, Field(min_length=1, max_length=24), AfterValidator(_plain)]
+    name: Annotated[str, Field(min_length=1, max_length=24), AfterValidator(plain)]
     value: Share = 0.5
     targets: Annotated[tuple[Target, ...], Field(min_length=1, max_length=MOST_TARGETS)]
 
 
-class Patch(_Value):
+class Patch(Value):
     """The whole instrument.
 
     Attributes:
@@ -306,13 +223,13 @@ class Patch(_Value):
     pickup: Pickup = Pickup()
     damping: Damping = Damping()
     mode: Mode = "poly"
-    bend_semitones: Annotated[float, _number(0, 48)] = 2.0
+    bend_semitones: Annotated[float, ranged(0, 48)] = 2.0
     bend_by: Literal["tension", "length"] = "tension"
     mod_wheel: str = "none"
     tuning: TuningChoice = TuningChoice()
     body: Body = Body()
     room: Room = Room()
-    level_db: float = _parameter("level_db")
+    level_db: float = parameter("level_db")
     macros: Annotated[tuple[Macro, ...], Field(max_length=MOST_MACROS)] = ()
 
     @model_validator(mode="after")
@@ -380,7 +297,7 @@ class Patch(_Value):
         if not inner:  # the level, which is the patch's own
             bounds.check(name, value, OF_PATCHES[name].limits, "dB")
             return name, value
-        section: _Value = getattr(self, name)
+        section: Value = getattr(self, name)
         changed: Any = value
         if len(inner) == 2:
             entries = list(getattr(section, inner[0]))

@@ -7,16 +7,17 @@ is retuned, whichever first and last one a mapping names. It is loaded only wher
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
-import numpy as np
+from pydantic import model_validator
 
+from app.patches.fields import ScalaText, Value, explained, parameter
 from engine.bounds import brief
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
 
 if TYPE_CHECKING:
-    from app.patches.patch import TuningChoice
+    import numpy as np
 
 A4_KEY = 69
 SCALA_FILES = (".scl", ".kbm")
@@ -25,6 +26,28 @@ MOST_NOTES = 1_000  # of a scale
 LARGEST_MAPPED = 20_000.0  # of any number in a keyboard mapping: the library loops up to it
 PITCHES_HZ = (1e-60, 1e60)  # of any key, so that their squares are numbers; what no string plays is refused there
 NOTES = (-128, 255)  # all keys, with any transposition and bend
+
+
+class TuningChoice(Value):
+    """Which pitch each key has.
+
+    Attributes:
+        a4_hz: pitch of key 69; a keyboard mapping has a reference pitch of its own.
+        scale: the text of a .scl file, "" for twelve equal steps. Without a mapping it begins at key 60.
+        keymap: the text of a .kbm file, "" for none.
+        transpose: by how many keys everything sounds higher.
+    """
+
+    a4_hz: float = parameter("tuning.a4_hz")
+    scale: ScalaText = ""
+    keymap: ScalaText = ""
+    transpose: int = parameter("tuning.transpose")
+
+    @model_validator(mode="after")
+    def _gives_pitches(self) -> Self:
+        if self.scale or self.keymap:  # brings a library that few patches need
+            Tuning(self)
+        return self
 
 
 class Tuning:
@@ -44,6 +67,8 @@ class Tuning:
         A key that the mapping leaves out has a pitch between those of its neighbours, for slides; whether a key is to
         sound, `mapped` says.
         """
+        import numpy as np  # patches are read without
+
         note += self._transpose
         if self._table is None:
             return float(self._a4_hz * 2 ** ((note - A4_KEY) / 12))
@@ -51,6 +76,8 @@ class Tuning:
 
     def mapped(self, key: int) -> bool:
         """Whether the keyboard mapping gives the key a pitch of its own; a key that is left out stays silent."""
+        import numpy as np
+
         return self._table is None or bool(np.isin(key + self._transpose, self._table[0]))
 
 
@@ -60,8 +87,6 @@ def read_scala(path: Path) -> str:
     Raises:
         ValueError: it cannot be read, is too long, or can be no tuning; the message names the file, in one line.
     """
-    from app.patches.patch import TuningChoice, explained
-
     try:
         raw = read_bounded(path, LARGEST_FILE_BYTES)
     except UnusableFile as error:
@@ -82,6 +107,7 @@ def read_scala(path: Path) -> str:
 
 
 def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
+    import numpy as np
     import tuning_library
 
     # only comments and descriptions may hold other than ASCII, and they have no effect

@@ -13,7 +13,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from app.shared.thread_priority import Rank, step_back
@@ -46,8 +45,8 @@ class AheadVoice:
 
     voice: Voice
     source: ModelSource
-    initial_m: torch.Tensor
-    weights: torch.Tensor
+    initial_m: NDArray[np.float64]
+    weights: NDArray[np.float64]
     key: tuple[object, ...]
     begin: Callable[[], None]
     failed: Callable[[Exception], None]
@@ -99,17 +98,17 @@ class AheadVoice:
         began_s = time.monotonic()
         if self._state is None:
             self._state = self.source.start(self.initial_m[None])
-            block = (self.initial_m.double() @ self.weights)[None]
+            block = (self.initial_m @ self.weights)[None]
         else:
             steps = min(AHEAD_FRAMES if self.done > AHEAD_FIRST else AHEAD_FIRST, self.voice.room)
             try:
                 frames, self._state = self.source.advance(self._state, steps, self.weights)
-                block = frames[0].double()
+                block = frames[0].astype(np.float64)
             except Runaway as error:
                 self.ends_s, self.finished = error.time_s, True
                 self.voice.end_here()
                 return
-        samples = (block / FULL_SCALE_M).float().numpy()
+        samples = (block / FULL_SCALE_M).astype(np.float32)
         self._take(samples)
         self._frames.append(samples)
         if self.done > 1 + AHEAD_FIRST:

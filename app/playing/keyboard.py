@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, Pluck
 
 if TYPE_CHECKING:
-    from engine.presets import PresetInfo  # and torch with it, which settings are read without
+    from engine.presets import PresetInfo  # and NumPy with it, which settings are read without
 
 PLACES = 10
 ANYWHERE = (0.05, 0.95)  # of a model without trained positions

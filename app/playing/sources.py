@@ -8,14 +8,13 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from torch import Tensor
 
 from app.rendering.loaded import Loaded
 from app.rendering.subject import StringOf, Subject
 from engine.pluck import Pluck
 from engine.presets import Preset, load_preset
 from engine.presets.of_string import of_string
-from engine.sources import project
+from engine.resonators.sine_transform import project
 from engine.voices import Program, model_program, truth_program
 
 KINDS = ("truth", "model")
@@ -71,22 +70,19 @@ class Sources:
         with self._loading:
             preset = self.load(subject).preset
             if (found := self._programs.get(key)) is None:
-                if kind == "truth":
-                    found = truth_program(preset.info, rate_hz)
-                else:
-                    found = model_program(preset.model, preset.info, rate_hz)
+                found = truth_program(preset.info, rate_hz) if kind == "truth" else model_program(preset, rate_hz)
                 with self._lock:
                     self._programs[key] = found
             return found
 
-    def begin(self, subject: Subject, source: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
+    def begin(self, subject: Subject, source: str, rate_hz: int, pluck: Pluck) -> tuple[Array, tuple[Array, Array]]:
         """A pluck's displacement (grid_points,) in m, and the start of a voice of the program. Both are kept.
 
         Raises PresetError.
         """
         return self._kept_begin(subject, source, rate_hz, pluck)
 
-    def _begin(self, subject: Subject, source: str, rate_hz: int, pluck: Pluck) -> tuple[Tensor, tuple[Array, Array]]:
+    def _begin(self, subject: Subject, source: str, rate_hz: int, pluck: Pluck) -> tuple[Array, tuple[Array, Array]]:
         info = self.load(subject).preset.info
         initial_m = project(pluck.displacement(info.grid_points), info.modes)
         return initial_m, self.program(subject, source, rate_hz).start(initial_m)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from psygnal import Signal
@@ -36,16 +37,19 @@ class PresetEntry:
     """A preset that can be chosen, of which only the metadata has been read.
 
     Attributes:
-        parameters: how many the model has.
         heard: how its sound differs from the truth's; None where it has not been measured.
     """
 
     name: str
     path: Path
     info: PresetInfo
-    parameters: int
     size_bytes: int = 0
     heard: Heard | None = None
+
+    @cached_property
+    def parameters(self) -> int:
+        """How many the model has. Raises PresetError: the description is of an impossible model."""
+        return described_parameters(self.path, self.info)
 
     @property
     def own(self) -> bool:
@@ -141,7 +145,7 @@ def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
     """Cached by time and size of the file, because the browser lists all presets whenever it opens."""
     info = read_info(path)
     listed = replace(info, title=display_title(path.stem, info))
-    return PresetEntry(path.stem, path, listed, described_parameters(path, info), size_bytes)
+    return PresetEntry(path.stem, path, listed, size_bytes)
 
 
 def display_title(name: str, info: PresetInfo) -> str:

@@ -6,8 +6,6 @@ import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 
-import torch
-
 from app.rendering.line import Line
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
@@ -186,7 +184,7 @@ class Job:
         """Adds the error of new pictures."""
         first, stop = self._measured, take.ready_frames
         if stop > first:
-            model, truth = (torch.from_numpy(take.motions[name].read(first, stop)[None]) for name in SOURCES)
+            model, truth = (take.motions[name].read(first, stop)[None] for name in SOURCES)
             self._errors.add(model, truth, first - 1, row=0)
             self._measured = stop
 

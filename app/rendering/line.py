@@ -5,16 +5,16 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from app.rendering.listening import Listening
 from app.rendering.strobe import Flashes, Strobe
 from app.rendering.take import Motion, Signal
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
-from engine.sources import Runaway, SourceState, StringSource, project
+from engine.resonators.base import Array
+from engine.resonators.sine_transform import project
+from engine.sources import Runaway, SourceState, StringSource
 from engine.voices import Ear, Program
 
 
@@ -131,7 +131,7 @@ class _Frames:
         ends: the last frame before the call in which it ran away; None: it has not.
     """
 
-    def __init__(self, source: StringSource | None, initial_m: Tensor) -> None:
+    def __init__(self, source: StringSource | None, initial_m: Array) -> None:
         self._source, self._initial = source, initial_m
         self._state: SourceState | None = None if source is None else source.start(initial_m)
         self.done = 0
@@ -139,23 +139,23 @@ class _Frames:
 
     def take(self, numbers: NDArray[np.int64], stop: int) -> NDArray[np.float32]:
         """Frames of these ascending numbers in `done` … stop - 1, (frames, grid_points) in m; passes up to `stop`."""
-        out = torch.zeros(len(numbers), self._initial.shape[1])
+        out = np.zeros((len(numbers), self._initial.shape[1]), np.float32)
         following = int(len(numbers) > 0 and numbers[0] == 0)
         if self._source is not None:
-            out[:following] = self._initial.float()
+            out[:following] = self._initial
         if self._state is not None and len(numbers) > following:
             assert self._source is not None
-            ahead = torch.from_numpy(numbers[following:] - self._state.frame)
+            ahead = numbers[following:] - self._state.frame
             try:
                 found, self._state = self._source.sample(self._state, ahead, stop - 1 - self._state.frame)
-                out[following:] = found[0].float()
+                out[following:] = found[0]
             except Runaway:  # at rest from here on: such values must never reach a loudspeaker
                 self._state, self.ends = None, max(self.done - 1, 0)
         self.done = stop
-        return out.numpy()
+        return out
 
 
 @lru_cache(maxsize=8)  # the same for every source of a take
-def _initial_m(pluck: Pluck, grid_points: int, modes: int) -> Tensor:
+def _initial_m(pluck: Pluck, grid_points: int, modes: int) -> Array:
     """The string at its release, (1, grid_points) in m."""
     return project(pluck.displacement(grid_points), modes)[None]

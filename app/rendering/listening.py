@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from torch import Tensor
 
 from app.rendering.take import Motion, Signal
 from engine.kernels.layout import QUANTUM, REACH
 from engine.pluck import FULL_SCALE_M
+from engine.resonators.base import Array
 from engine.sources import Runaway, SourceState, StringSource
 from engine.voices import Ear, OfflineVoice, Program
 
@@ -37,7 +37,7 @@ class Listening:
         signal: Signal,
         source: StringSource,
         program: Program,
-        initial_m: Tensor,
+        initial_m: Array,
         ear: Ear,
         motion: Motion | None,
     ) -> None:
@@ -69,14 +69,14 @@ class Listening:
         """The next samples to give to the voice, in m, (frames, points)."""
         stop = min(self._given + RENDERED_FRAMES, self.signal.frames)
         if self._motion is not None:
-            return np.asarray(self._motion.read(self._given, stop) @ self._weights.float().numpy())
+            return np.asarray(self._motion.read(self._given, stop) @ self._weights.astype(np.float32))
         if self._state is None:
             self._state = self._source.start(self._initial)
-            return (self._initial.double() @ self._weights).float().numpy()
+            return (self._initial @ self._weights).astype(np.float32)
         if stop == self._given:
             return self._last[:0]
         frames, self._state = self._source.advance(self._state, stop - self._given, self._weights)
-        return frames[0].float().numpy()
+        return frames[0].astype(np.float32)
 
     def _give(self, samples_m: NDArray[np.float32]) -> None:
         voice = self._offline.voice

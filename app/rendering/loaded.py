@@ -28,7 +28,7 @@ class Loaded:
 
     @cached_property
     def model_program(self) -> Program:
-        return model_program(self.preset.model, self.preset.info, self.preset.info.rate_hz)
+        return model_program(self.preset, self.preset.info.rate_hz)
 
     @cached_property
     def truth_program(self) -> Program:

@@ -6,6 +6,7 @@ A request that differs only in listening points, slow motion or other presets ke
 from __future__ import annotations
 
 import threading
+import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -22,6 +23,7 @@ TIDY_AFTER_S = 1.0  # without anything to render, until free memory is given bac
 IN_STEP_S = 0.5  # for how long after its pluck a motion may be held in step with its sound
 LEAD_S = 0.08  # how far ahead of the sound it is rendered meanwhile
 LOOK_AGAIN_S = 0.01
+PATIENCE_S = 5.0  # for the first sound
 
 
 class RenderWorker:
@@ -31,12 +33,17 @@ class RenderWorker:
         load: returns a preset's model and truth; called in the worker's thread.
         hurried: whether plucks are being played. A new motion is then rendered no faster than its sound for a while,
             so that plucks in quick succession leave processor time for everything else.
+        sounds: whether a pluck would sound. The first motion, which loads torch, waits for that, for some seconds.
     """
 
     def __init__(
-        self, listener: RenderListener, load: Callable[[Subject], Loaded], hurried: Callable[[], bool] = lambda: False
+        self,
+        listener: RenderListener,
+        load: Callable[[Subject], Loaded],
+        hurried: Callable[[], bool] = lambda: False,
+        sounds: Callable[[], bool] = lambda: True,
     ) -> None:
-        self._listener, self._load, self._hurried = listener, load, hurried
+        self._listener, self._load, self._hurried, self._sounds = listener, load, hurried, sounds
         self._mailbox = threading.Condition()
         self._request: RenderRequest | None = None
         self._closing = False
@@ -62,6 +69,9 @@ class RenderWorker:
 
     def _run(self) -> None:
         step_back(Rank.RENDERING)
+        ends_s = time.monotonic() + PATIENCE_S
+        while not (self._closing or self._sounds() or time.monotonic() > ends_s):
+            time.sleep(LOOK_AGAIN_S)
         job: Job | None = None
         untidy = False  # whether anything was rendered since free memory was given back
         while True:

@@ -42,7 +42,7 @@ class Listener(BaseModel):
     @property
     def ear(self) -> Ear:
         """As the engine takes it; the first point, in stereo the left, is drawn."""
-        from engine.voices import Ear  # brings torch
+        from engine.voices import Ear  # brings Numba
 
         return Ear(self.points, self.pickup, self.solo)
 

@@ -82,7 +82,7 @@ def _why_solo_silent(choices: Choices, library: Library) -> str:
     info = info_of(choices, entry)
     if choices.solo > info.modes:
         return f"silent: mode {choices.solo} is soloed, and this string has {info.modes}"
-    amplitudes = to_modes(choices.pluck.displacement(info.grid_points), choices.solo).abs()
+    amplitudes = np.abs(to_modes(choices.pluck.displacement(info.grid_points), choices.solo))
     if float(amplitudes[-1]) < 1e-4 * choices.amplitude_mm / 1000:
         return f"silent: this pluck does not excite mode {choices.solo}, which is soloed"
     return ""

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QGuiApplication
@@ -33,13 +34,14 @@ from app.views.controls.slot_buttons import SLOTS
 from app.views.dialogs.about_dialog import AboutDialog
 from app.views.dialogs.abx_dialog import AbxDialog
 from app.views.dialogs.help_dialog import HelpDialog
+from app.views.dialogs.learn_dialog import LearnDialog
 from app.views.dialogs.preset_card import preset_browser
 from app.views.instrument.patch_card import patch_browser
 from app.views.string.view import StringView
 from app.window.about import about_text
 from app.window.appearance import Appearance
 from app.window.audio_control import AudioControl
-from app.window.dropped_files import receive
+from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports
 from app.window.instruments import Instruments
 from app.window.main_window import KEY_NAMES, KEYS, PLAYED_KEYS, MainWindow
@@ -51,6 +53,9 @@ from app.window.preset_desk import PresetDesk
 from app.window.remembering import Keeper
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
+
+if TYPE_CHECKING:
+    from app.instrument.learned import Kept
 
 FRAME_MS = 16
 IDLE_MS = 100  # between two looks while nothing moves
@@ -101,6 +106,7 @@ class Controller(QObject):
         self._peak_db = METER_FLOOR_DB
         self._abx: AbxDialog | None = None  # while it is open, nothing else plays
         self._help: HelpDialog | None = None
+        self._learning: LearnDialog | None = None
         self.library = Library([])
         problems = self.library.refresh()
         self.presets = PresetDesk(
@@ -280,7 +286,7 @@ class Controller(QObject):
         self._help.raise_()
 
     def take_file(self, file: Path) -> None:
-        """Takes a dropped file: installs and chooses a preset, restores a WAV's recipe; other sounds become bodies.
+        """Takes a dropped file: installs and chooses a preset, restores a WAV's recipe; asks what other sounds are.
 
         Patches, strings, scales and MIDI files go to `patches`.
         """
@@ -288,6 +294,11 @@ class Controller(QObject):
             self.patches.take_file(file)
             return
         dropped = receive(file, self.library)
+        if dropped.sound:
+            self._ask_what_it_is(file)
+        self._take(file, dropped)
+
+    def _take(self, file: Path, dropped: Dropped) -> None:
         notice = dropped.notice
         try:
             self.session.update(**dropped.choices)
@@ -298,6 +309,29 @@ class Controller(QObject):
         if notice:
             self.window.notices.tell(notice)
 
+    def _ask_what_it_is(self, file: Path) -> None:
+        """String or body? One dialog at a time: a further file takes its place."""
+        if self._learning is not None:
+            self._learning.done(0)
+        self.performance.stop()
+        dialog = self._learning = LearnDialog(file, self.sound, self.window)
+        dialog.body_chosen.connect(lambda: self._take(file, receive_body(file)))
+        dialog.instrument_kept.connect(self._play_learned)
+        dialog.finished.connect(self._learning_ended)
+        dialog.open()
+
+    def _learning_ended(self) -> None:
+        dialog, self._learning = self._learning, None
+        if dialog is not None:
+            dialog.deleteLater()
+
+    def _play_learned(self, kept: Kept) -> None:
+        """Chooses an instrument that was just learned."""
+        self.library.refresh()
+        self.patches.reload()
+        self.patches.take_file(kept.patch)
+        self.window.notices.tell(f"{kept.patch.stem}: learned. Its report: {kept.report}")
+
     @property
     def entry(self) -> PresetEntry | None:
         """The chosen preset."""
@@ -307,6 +341,8 @@ class Controller(QObject):
         """Saves the settings and ends every thread."""
         if self._abx is not None:
             self._abx.abandon()
+        if self._learning is not None:
+            self._learning.done(0)
         self._timer.stop()
         self._deck_timer.stop()
         self.keeper.close()

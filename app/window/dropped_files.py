@@ -1,4 +1,4 @@
-"""What a dropped file means: a preset becomes the user's own, a WAV's recipe is restored, another sound is a body."""
+"""What a dropped file means: a preset is installed, a WAV's recipe restored, another sound is a string or a body."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import soundfile
+
 from app.audio.impulse_file import ImpulseError, cut_words
+from app.audio.note_file import NOTE_LENGTHS_S
 from app.export.recipe import NoRecipe, Recipe, RecipeError, changed_preset_notice, preset_of, read_recipe
 from app.instrument.bodies import ENDINGS, install_body
 from app.patches.instrument import SingleString
@@ -19,15 +22,19 @@ from engine.result_file import WriteError
 
 @dataclass(frozen=True)
 class Dropped:
-    """What follows: new values of `Choices`, a notice for the user ("": none), the name of a body for the patch."""
+    """What follows: new values of `Choices`, a notice for the user ("": none), the name of a body for the patch.
+
+    `sound`: it is a string or a body, and the user chooses.
+    """
 
     choices: dict[str, Any] = field(default_factory=dict)
     notice: str = ""
     body: str = ""
+    sound: bool = False
 
 
 def receive(file: Path, library: Library) -> Dropped:
-    """Takes a dropped file: a preset is in the library afterwards, a body in its folder. Errors become notices."""
+    """Takes a dropped file: a preset is in the library afterwards. Errors become notices."""
     ending = file.suffix.lower()
     try:
         if ending == SUFFIX:
@@ -35,26 +42,31 @@ def receive(file: Path, library: Library) -> Dropped:
         if ending == ".wav":
             return _recipe(file, library)
         if ending in ENDINGS:
-            return _body(file)
+            return _other_sound(file)
     except NoRecipe:
         return _other_sound(file)
-    except (InstallError, RecipeError, ImpulseError, WriteError) as error:
+    except (InstallError, RecipeError, WriteError) as error:
         return Dropped(notice=str(error))
-    kinds = f"a preset ({SUFFIX}), a patch, a string, a scale, a MIDI file, an exported WAV, an impulse response"
+    kinds = f"a preset ({SUFFIX}), a patch, a string, a scale, a MIDI file, an exported WAV, a note, a body"
     return Dropped(notice=f"{file}: not a file that is used here; drop one of these: {kinds}")
 
 
-def _body(file: Path) -> Dropped:
-    """Raises ImpulseError or WriteError: it cannot be one."""
-    return Dropped(body=install_body(file), notice=cut_words(file))
-
-
 def _other_sound(file: Path) -> Dropped:
-    """A WAV without a recipe: an impulse response."""
+    """A sound as long as a note may be a string; any other is a body."""
     try:
-        return _body(file)
+        seconds = soundfile.info(file).duration
+    except (OSError, soundfile.SoundFileError):
+        seconds = 0.0
+    shortest_s, longest_s = NOTE_LENGTHS_S
+    return Dropped(sound=True) if shortest_s <= seconds <= longest_s else receive_body(file)
+
+
+def receive_body(file: Path) -> Dropped:
+    """Installs an impulse response as a body, which the patch then has. Errors become notices."""
+    try:
+        return Dropped(body=install_body(file), notice=cut_words(file))
     except (ImpulseError, WriteError) as error:
-        return Dropped(notice=f"{error}. It has no recipe either")
+        return Dropped(notice=str(error))
 
 
 def _preset(file: Path, library: Library) -> Dropped:

@@ -70,6 +70,7 @@ class _Start(QObject):
         self._window, self._settings, self._path, self._notice = window, settings, path, notice
         self._alive = alive
         self._thread = threading.Thread(target=self._load, name="engine-loader")
+        self._torch = threading.Thread(target=load_torch, name="torch-loader", daemon=True)
         self._controller: Controller | None = None
         self.failure: Exception | None = None
         self._loaded.connect(self._begin, Qt.ConnectionType.QueuedConnection)
@@ -105,17 +106,20 @@ class _Start(QObject):
             self._window.notices.tell(self._notice)
         self._alive(self._controller)
         self._patience_s = time.monotonic() + PATIENCE_S
-        self._take_files()
+        self._follow_up()
 
-    def _take_files(self) -> None:
-        """Takes one file after another, each when keys would sound: of a MIDI file, the first notes do too."""
+    def _follow_up(self) -> None:
+        """Loads torch when keys would sound, then takes one file after another: of MIDI files, all notes sound."""
         controller = self._controller
-        if not self._files or controller is None:
-            return
-        if _playable(controller) or time.monotonic() > self._patience_s:
+        assert controller is not None
+        if controller.performance.playable or time.monotonic() > self._patience_s:
+            if self._torch.ident is None:
+                self._torch.start()
+            if not self._files:
+                return
             controller.take_file(self._files.pop(0))
             self._patience_s = time.monotonic() + PATIENCE_S
-        QTimer.singleShot(LOOK_MS, self, self._take_files)
+        QTimer.singleShot(LOOK_MS, self, self._follow_up)
 
     def _failed(self, error: Exception) -> None:
         """Shows the error in a dialog; the window stays until its user closes it."""
@@ -124,25 +128,23 @@ class _Start(QObject):
         self._faults.tell(log_fault(error, "while the engine was loaded"), CANNOT_START)
 
 
-def _playable(controller: Controller) -> bool:
-    """Whether a pluck would sound at once, and a key of the patch if there is one."""
-    performance = controller.performance
-    ready = controller.session.choices.patch is None or performance.notes.keys.player is not None
-    return performance.at_hand and ready
-
-
 def load_engine() -> None:
-    """Loads what the first paint does not need: two seconds, most of it for torch."""
+    """Loads what the first sound needs and the first paint does not."""
     threading.Thread(target=_find_devices, name="sound-finder", daemon=True).start()
-    import torch
     from threadpoolctl import threadpool_limits
 
     from engine.kernels.warm import warm
 
-    torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
     # NumPy's products are small here; the threads of its BLAS, one a core, would spin between them for nothing.
     threadpool_limits(limits=1, user_api="blas")
     warm()
+
+
+def load_torch() -> None:
+    """Loads what pictures need, and models that are rendered ahead."""
+    import torch
+
+    torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
 
 
 def _find_devices() -> None:

@@ -17,6 +17,7 @@ from app.instrument.facts import facts_of, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.player import is_another
 from app.instrument.strings import KeyString, Strings
+from app.patches.fields import explained
 from app.patches.instrument import SingleString
 from app.patches.library import (
     SUFFIX,
@@ -28,8 +29,8 @@ from app.patches.library import (
     rename_patch,
     save_patch,
 )
-from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet, TuningChoice, explained
-from app.patches.tuning import SCALA_FILES, read_scala
+from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet
+from app.patches.tuning import SCALA_FILES, TuningChoice, read_scala
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octaves_of
 from app.playing.playback import Playback
 from app.presets.library import Library

@@ -71,7 +71,7 @@ class Performance(QObject):
         mail.refused.connect(self._window.notices.tell)
         self._sources = Sources()
         self.notes = Notes(sound, self._sources, library.find, mail.refused.emit, sound.set_effects)
-        self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0)
+        self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable)
 
     @property
     def entry(self) -> PresetEntry | None:
@@ -92,6 +92,11 @@ class Performance(QObject):
     def at_hand(self) -> bool:
         """Whether the chosen pluck would sound at once: its sources are loaded, and the output is open."""
         return self._sound.status().changes_done > 0 and self.notes.at_hand
+
+    @property
+    def playable(self) -> bool:
+        """Whether a pluck would sound at once, and a key of the patch if there is one."""
+        return self.at_hand and (self._session.choices.patch is None or self.notes.keys.player is not None)
 
     @property
     def playing(self) -> bool:

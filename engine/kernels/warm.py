@@ -6,27 +6,29 @@ It takes the better part of a minute where nothing has been compiled yet, and ab
 from __future__ import annotations
 
 from dataclasses import astuple
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import torch
 
 from engine.effects import Effects, Room
 from engine.kernels import cache, layout
-from engine.models import StringModel, build_model
-from engine.models.base import Physics
+from engine.models._tension_arrays import CURVES
 from engine.pluck import Pluck
-from engine.presets import PresetInfo, TrainedRange
-from engine.resonators.sine_transform import listening_weights
+from engine.presets import Preset, PresetInfo, TrainedRange
+from engine.resonators.base import Array
+from engine.resonators.sine_transform import listening_weights, project
 from engine.resonators.string import StringParameters
-from engine.sources import TruthSource, project
-from engine.voices import CompiledPlayer, Ear, Mixer, Program, Voice, bank_program, plain_program, truth_program
+from engine.voices import CompiledPlayer, Ear, Mixer, Program, Voice, model_program, plain_program, truth_program
+
+if TYPE_CHECKING:
+    from engine.models.base import StringModel
 
 RATE_HZ = 48_000
 INFO = PresetInfo(
     title="",
-    model="koopman_integrated",
-    model_configuration={},
+    model="koopman_tension",
+    model_configuration={"grid_points": 16, "modes": 4, "degree": 0},
     string=StringParameters(),
     tension_modulated=True,
     initial="pluck",
@@ -39,8 +41,8 @@ INFO = PresetInfo(
     initialisation="",
     seed=0,
 )
+PRESET = Preset("", Path(), INFO, dict.fromkeys(CURVES, np.zeros(1)))
 LATENTS = {"grid_points": INFO.grid_points, "state_size": 4}
-ONE_TENSION = {"grid_points": INFO.grid_points, "modes": INFO.modes}
 MODULATED = {"modulation": True, "adiabatic": True, "physical_units": True}
 BANKS: tuple[dict[str, Any], ...] = ({}, MODULATED)
 EARS = (Ear((0.3,)), Ear((0.3, 0.7), "velocity"))
@@ -50,7 +52,7 @@ FRAMES = 4 * layout.QUANTUM
 def warm() -> None:
     """Loads what a pluck needs at once; where not all has been compiled yet, compiles all."""
     if cache.is_whole():
-        _sound(_struck(_bank({}), EARS[0]))
+        _sound(_struck(model_program(PRESET, RATE_HZ), EARS[0]))
     else:
         voices()
         models()
@@ -59,7 +61,7 @@ def warm() -> None:
 
 def voices() -> None:
     """A few quanta of every kind of voice; what a device calls is compiled as it is imported."""
-    for program in (*map(_bank, BANKS), _shared_tension(), truth_program(INFO, RATE_HZ)):
+    for program in (*map(_bank, BANKS), model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
         for ear in EARS:
             voice = _struck(program, ear)
             voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
@@ -72,16 +74,20 @@ def voices() -> None:
 
 def models() -> None:
     """A few frames of every model that has compiled parts, and of the solver."""
-    readout = listening_weights(torch.tensor([0.3]), INFO.grid_points).float()
+    import torch
+
+    from engine.sources import TruthSource
+
+    readout = torch.from_numpy(listening_weights(np.array([0.3]), INFO.grid_points)).float()
     with torch.inference_mode():
         for name, sizes in (
-            ("koopman_tension", ONE_TENSION),
+            ("koopman_tension", INFO.model_configuration),
             ("s5", {"grid_points": INFO.grid_points}),
             ("fgru", {"grid_points": INFO.grid_points}),
             ("frnn", {"grid_points": INFO.grid_points}),
         ):
             model = _model(name, sizes)
-            _, state = model.advance(model.encode((_initial_m()[None] / INFO.scale_m).float()), 2)
+            _, state = model.advance(model.encode(torch.from_numpy(_initial_m()[None] / INFO.scale_m).float()), 2)
             model.advance(state, 2, readout)
     truth = TruthSource(INFO)
     truth.advance(truth.start(_initial_m()[None]), 2)
@@ -99,13 +105,9 @@ def _string() -> None:
 
 
 def _bank(sizes: dict[str, Any]) -> Program:
+    from engine.voices.banks import bank_program
+
     program = bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ)
-    assert program is not None
-    return program
-
-
-def _shared_tension() -> Program:
-    program = bank_program(_model("koopman_tension", ONE_TENSION), INFO, RATE_HZ)
     assert program is not None
     return program
 
@@ -121,13 +123,18 @@ def _sound(voice: Voice) -> None:
 
 
 def _model(name: str, sizes: dict[str, Any]) -> StringModel[Any]:
+    import torch
+
+    from engine.models import build_model
+    from engine.models.base import Physics
+
     model = build_model(name, sizes)
     physics = Physics(INFO.resonator, INFO.rate_hz)
     model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(0))
     return model.eval()
 
 
-def _initial_m() -> torch.Tensor:
+def _initial_m() -> Array:
     return project(Pluck().displacement(INFO.grid_points), INFO.modes)
 
 

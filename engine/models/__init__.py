@@ -1,42 +1,53 @@
-"""The learned models, by name. Adding one: its file, and a line in `MODELS`."""
+"""The learned models, by name. Adding one: its configuration, its file, and a line in `MODELS`.
+
+Nothing here imports torch before a model is made: presets are listed and played without it.
+"""
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from engine import bounds
-from engine.models._diagonal import DiagonalModel
-from engine.models.base import StringModel, count_parameters
-from engine.models.dmd import DMD, DMDConfiguration
-from engine.models.fno import FGRU, FRNN, FGRUConfiguration, FRNNConfiguration
-from engine.models.integrated_phase import IntegratedPhaseConfiguration, KoopmanIntegrated
-from engine.models.koopman import Koopman, KoopmanConfiguration
-from engine.models.koopman_tension import KoopmanTension, KoopmanTensionConfiguration
-from engine.models.koopman_var import KoopmanVar, KoopmanVarConfiguration
-from engine.models.lru import LRU, LRUConfiguration
-from engine.models.s5 import S5, S5Configuration
+from engine.models import configurations as sizes
 from engine.schema import SchemaError, read, without_retired
 
-# name in presets and on the command line -> (class, configuration). Defaults are the paper's sizes, and our own for
-# models that the paper does not have: `koopman_integrated`, `koopman_tension`.
-MODELS: dict[str, tuple[type[StringModel[Any]], type]] = {
-    "dmd": (DMD, DMDConfiguration),
-    "koopman": (Koopman, KoopmanConfiguration),
-    "koopman_var": (KoopmanVar, KoopmanVarConfiguration),
-    "koopman_integrated": (KoopmanIntegrated, IntegratedPhaseConfiguration),
-    "koopman_tension": (KoopmanTension, KoopmanTensionConfiguration),
-    "fgru": (FGRU, FGRUConfiguration),
-    "frnn": (FRNN, FRNNConfiguration),
-    "lru": (LRU, LRUConfiguration),
-    "s5": (S5, S5Configuration),
+if TYPE_CHECKING:
+    from engine.models.base import StringModel
+
+# name in presets and on the command line -> (file and class, configuration). Defaults are the paper's sizes, and our
+# own for models that the paper does not have: `koopman_integrated`, `koopman_tension`.
+MODELS: dict[str, tuple[str, type]] = {
+    "dmd": ("dmd.DMD", sizes.DMDConfiguration),
+    "koopman": ("koopman.Koopman", sizes.KoopmanConfiguration),
+    "koopman_var": ("koopman_var.KoopmanVar", sizes.KoopmanVarConfiguration),
+    "koopman_integrated": ("integrated_phase.KoopmanIntegrated", sizes.IntegratedPhaseConfiguration),
+    "koopman_tension": ("koopman_tension.KoopmanTension", sizes.KoopmanTensionConfiguration),
+    "fgru": ("fno.FGRU", sizes.FGRUConfiguration),
+    "frnn": ("fno.FRNN", sizes.FRNNConfiguration),
+    "lru": ("lru.LRU", sizes.LRUConfiguration),
+    "s5": ("s5.S5", sizes.S5Configuration),
 }
 
+
+OF_MANY_STRINGS = frozenset({"koopman_tension"})  # take any resonator
 
 # sizes of earlier versions, and the only value that they ever had in a model that was kept
 RETIRED: dict[str, dict[str, Any]] = {
     "koopman_integrated": {"multiplier_widths": [], "decoder_widths": [], "rate_unit": 1e-3, "gain_limit_db": 6.0}
 }
+
+
+def model_class(name: str) -> type[StringModel[Any]]:
+    """The class of a model, and torch with it.
+
+    Raises:
+        KeyError: no such model.
+    """
+    module, _, kind = MODELS[name][0].partition(".")
+    found: type[StringModel[Any]] = getattr(importlib.import_module(f"{__name__}.{module}"), kind)
+    return found
 
 
 def build_model(name: str, configuration: Mapping[str, Any] | None = None) -> StringModel[Any]:
@@ -46,7 +57,7 @@ def build_model(name: str, configuration: Mapping[str, Any] | None = None) -> St
         SchemaError: a field is unknown, of another type, or refused by the configuration.
         KeyError: no such model.
     """
-    return MODELS[name][0](read_model_configuration(name, configuration or {}, "model_configuration"))
+    return model_class(name)(read_model_configuration(name, configuration or {}, "model_configuration"))
 
 
 def read_model_configuration(name: str, data: object, where: str) -> Any:
@@ -63,29 +74,4 @@ def read_model_configuration(name: str, data: object, where: str) -> Any:
     return configuration
 
 
-__all__ = [
-    "DMD",
-    "FGRU",
-    "FRNN",
-    "LRU",
-    "MODELS",
-    "S5",
-    "DMDConfiguration",
-    "DiagonalModel",
-    "FGRUConfiguration",
-    "FRNNConfiguration",
-    "IntegratedPhaseConfiguration",
-    "Koopman",
-    "KoopmanConfiguration",
-    "KoopmanIntegrated",
-    "KoopmanTension",
-    "KoopmanTensionConfiguration",
-    "KoopmanVar",
-    "KoopmanVarConfiguration",
-    "LRUConfiguration",
-    "S5Configuration",
-    "StringModel",
-    "build_model",
-    "count_parameters",
-    "read_model_configuration",
-]
+__all__ = ["MODELS", "OF_MANY_STRINGS", "RETIRED", "build_model", "model_class", "read_model_configuration"]

@@ -6,6 +6,7 @@ Lindstedt's first order in closed form (`averaged_*`), and the mean tension to a
 
 from __future__ import annotations
 
+import numpy as np
 import torch
 from torch import Tensor, nn
 
@@ -48,7 +49,7 @@ def averaged_coupling(physics: Physics) -> Tensor:
     resonator = physics.resonator
     share = resonator.coupling / (4 * resonator.omega)
     squares = resonator.stretch * physics.scale_m**2
-    return share[:, None] * squares * (1 + 0.5 * torch.eye(resonator.modes, dtype=torch.float64)) / physics.rate_hz
+    return torch.from_numpy(share[:, None] * squares * (1 + 0.5 * np.eye(resonator.modes)) / physics.rate_hz)
 
 
 def averaged_amplitude(physics: Physics) -> Tensor:
@@ -56,7 +57,7 @@ def averaged_amplitude(physics: Physics) -> Tensor:
 
     The action ω q² / 2 stays while ω changes slowly, so that √ω q does.
     """
-    frequencies = physics.resonator.omega / physics.rate_hz
+    frequencies = torch.from_numpy(physics.resonator.omega / physics.rate_hz)
     return averaged_coupling(physics) / (2 * frequencies[:, None])
 
 
@@ -70,9 +71,9 @@ def averaged_modulation(physics: Physics) -> tuple[Tensor, Tensor]:
         α + β, nepers for Re z_m², and α - β, radians for Im z_m², of amplitudes in normalised units.
     """
     resonator = physics.resonator
-    omega = resonator.omega
+    omega = torch.from_numpy(resonator.omega)
     squares = resonator.stretch * physics.scale_m**2
-    share = resonator.coupling[:, None] * squares / (16 * omega)
+    share = torch.from_numpy(resonator.coupling[:, None] * squares) / (16 * omega)
     difference = omega[:, None] - omega
     alpha = share / (omega[:, None] + omega)
     beta = torch.where(difference == 0, 0.0, -share / torch.where(difference == 0, 1.0, difference))

@@ -5,7 +5,7 @@ displacement of each; what comes out is *decoded* on the grid, or only at listen
 value: blocks chain, and nothing is remembered behind the caller's back.
 
 Models work in the preset's normalised units (displacement divided by its scale) and at the sample rate that
-they were trained at. Adding a model: one file with its configuration (a frozen dataclass), its state and a
+they were trained at. Adding a model: its configuration in `configurations.py`, one file with its state and a
 final subclass of `StringModel`, and one line in `engine/models/__init__.py`.
 """
 
@@ -44,7 +44,7 @@ class Physics:
     @property
     def log_eigenvalues(self) -> Tensor:
         """log λ = (-σ + iω_d) / rate at rest, complex128 (modes,)."""
-        return self.resonator.eigenvalues() / self.rate_hz
+        return torch.from_numpy(self.resonator.eigenvalues() / self.rate_hz)
 
 
 class StringModel(nn.Module, ABC, Generic[State]):
@@ -99,21 +99,6 @@ class StringModel(nn.Module, ABC, Generic[State]):
         """
         return []
 
-    def tuned(self, physics: Physics) -> StringModel[Any]:
-        """What was learned, with another resonator, rate or scale.
-
-        Raises:
-            ValueError: the model learned one string, which its weights are.
-        """
-        raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
-
-    @torch.no_grad()
-    def check_physics(self, physics: Physics) -> None:
-        """Raises ValueError, naming the tensor, where the model holds another resonator than this one.
-
-        A model that learned one string holds none: its weights are all there is of it.
-        """
-
     def forward(self, displacement: Tensor, steps: int, readout: Tensor | None = None) -> Tensor:
         """Frames 1 … steps after a release from `displacement` (batch, grid_points): (batch, steps, points)."""
         return self.advance(self.encode(displacement), steps, readout)[0]
@@ -142,14 +127,6 @@ def check_initialisation(model: StringModel[State], how: str) -> None:
     """Raises ValueError, naming what there is, where a model does not know `how`."""
     if how not in model.initialisations:
         raise ValueError(f"initialisation {how!r} is not one of {', '.join(model.initialisations)}")
-
-
-def check_sizes(configuration: object, *names: str) -> None:
-    """Raises ValueError, naming the field, where a size or one of a tuple of sizes is below 1."""
-    for name in names:
-        value = getattr(configuration, name)
-        if any(size < 1 for size in (value if isinstance(value, tuple) else (value,))):
-            raise ValueError(f"{name} must be at least 1, not {value}")
 
 
 def count_parameters(model: nn.Module) -> int:

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import ClassVar
 
 import torch
@@ -21,31 +20,11 @@ from torch import Tensor, nn
 
 from engine.models import eigenvalues
 from engine.models._diagonal import DiagonalModel, KoopmanState, dense, read_weight
-from engine.models.base import LINEAR_STRING, Physics, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, Physics, check_initialisation
+from engine.models.configurations import DMDConfiguration
 
 _ROWS_AT_ONCE = 16_384  # of the Hankel matrix: bounds the memory of a fit
 _VANISHED = -700.0  # log |λ| of a mode that is not there: finite in a file, and λ¹ is as good as 0
-
-
-@dataclass(frozen=True)
-class DMDConfiguration:
-    """Sizes; the defaults are the paper's (10,200 parameters: 50 complex eigenvalues, and modes on 101 points).
-
-    Attributes:
-        lags: frames in the embedding.
-        rank: singular vectors kept, which is the number of modes. Two for each mode of the string are enough.
-    """
-
-    grid_points: int = 101
-    lags: int = 2
-    rank: int = 50
-
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "lags", "rank")
-        if self.rank > self.lags * self.grid_points:
-            raise ValueError(
-                f"rank must be at most lags times grid_points, {self.lags * self.grid_points}, not {self.rank}"
-            )
 
 
 class DMD(DiagonalModel):
@@ -124,7 +103,7 @@ class DMD(DiagonalModel):
             )
         half = torch.exp(physics.log_eigenvalues)
         eigenvalues = torch.cat([half, half.conj()])
-        frame = physics.resonator.shapes.T.repeat(1, 2)  # (grid_points, 2 modes)
+        frame = torch.from_numpy(physics.resonator.shapes).T.repeat(1, 2)  # (grid_points, 2 modes)
         self._store(eigenvalues, torch.cat([frame * eigenvalues**-lag for lag in range(c.lags)]))
 
     def _store(self, eigenvalues: Tensor, modes: Tensor) -> None:

@@ -12,8 +12,9 @@ import math
 import torch
 from torch import Tensor
 
+from engine.models._tension_arrays import SLOWEST_LOG
+
 VANISHED = 1e-12  # |λ| of a state that is gone after a sample: an unused mode of a fit
-SLOWEST_LOG = -24.0  # ν_log of a mode without losses: after a minute at 48 kHz it is 0.001 dB down
 STORED = frozenset({"nu_log", "theta_log"})  # the names of parameters that hold ν_log and θ_log
 
 

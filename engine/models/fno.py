@@ -26,44 +26,13 @@ from torch.utils.checkpoint import checkpoint
 
 from engine.models._fno_rollout import FGRURollout, FRNNRollout, channel_matrices, joined
 from engine.models._fno_transform import transform_matrices
-from engine.models.base import Physics, StringModel, check_initialisation, check_sizes
+from engine.models.base import Physics, StringModel, check_initialisation
+from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
 
 if TYPE_CHECKING:
     from engine.models import _fno_kernel as kernel
 
 KEPT_BYTES = 2_000_000_000  # of a roll-out, for its gradient
-
-
-@dataclass(frozen=True)
-class FGRUConfiguration:
-    """Sizes; the defaults are the paper's (640,033 parameters).
-
-    Attributes:
-        width: channels of the hidden field.
-    """
-
-    grid_points: int = 101
-    width: int = 32
-
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "width")
-
-
-@dataclass(frozen=True)
-class FRNNConfiguration:
-    """Sizes; the defaults are the paper's (643,201 parameters).
-
-    Attributes:
-        width: channels of the hidden field.
-        depth: Fourier layers in a step.
-    """
-
-    grid_points: int = 101
-    width: int = 32
-    depth: int = 3
-
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "width", "depth")
 
 
 @dataclass(frozen=True)

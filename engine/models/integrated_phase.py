@@ -64,7 +64,8 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation
+from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.eigenvalues import pack
 from engine.models.string_modes import StringModes
 
@@ -75,40 +76,6 @@ SETTLED = 16  # node spacings after which the segments of a sample may be as lon
 MODULATION_UNIT = 1e-3  # of M: with it a weight of 1 suits an optimiser's usual steps
 SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
 NUMBERS_AT_ONCE = 2**17  # frames times latents in a block of a long advance: what suits a processor's cache
-
-
-@dataclass(frozen=True)
-class IntegratedPhaseConfiguration:
-    """Sizes. An empty tuple of widths leaves that network out.
-
-    Attributes:
-        state_size: number n of complex eigenvalues: one for each mode, or more to spare.
-        encoder_widths: hidden widths of the MLP that is added to the linear encoder.
-        eigenvalue_widths: hidden widths of g.
-        modulation: whether there are M_in and M_out. Evaluated at every frame.
-        adiabatic: whether f follows the mean tension to all orders and there are A_in and A_out, too, which need
-            the modulation.
-        node_spacing: samples between the nodes of the integral of g; energies hardly change in between.
-        physical_units: K, g and M receive the tension that each mode adds, as a share of that at rest, instead of
-            the energies, and yield shares of each mode's frequency: numbers of the order of 1 for every mode,
-            which an optimiser and a network need. A start from the physics fills the units in.
-        second_order: whether g counts by Σ E_m.
-    """
-
-    grid_points: int = 101
-    state_size: int = 25
-    encoder_widths: tuple[int, ...] = (128, 128)
-    eigenvalue_widths: tuple[int, ...] = (128, 128)
-    modulation: bool = False
-    adiabatic: bool = False
-    node_spacing: int = 40
-    physical_units: bool = False
-    second_order: bool = False
-
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "state_size", "encoder_widths", "eigenvalue_widths", "node_spacing")
-        if self.adiabatic and not self.modulation:
-            raise ValueError("adiabatic needs modulation = true")
 
 
 @dataclass(frozen=True)
@@ -504,13 +471,13 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         mode = torch.arange(n) % modes
         if self.energy_units is not None and self.rate_units is not None:
             unit_m = torch.eye(modes, dtype=torch.float64)[mode] * physics.scale_m
-            self.energy_units.copy_(physics.resonator.relative_tension_rise(unit_m))
-            self.rate_units.copy_(physics.resonator.omega[mode] / physics.rate_hz)
-        analysis = physics.resonator.analysis.T[mode]
+            self.energy_units.copy_(torch.from_numpy(physics.resonator.relative_tension_rise(unit_m.numpy())))
+            self.rate_units.copy_(torch.from_numpy(physics.resonator.omega / physics.rate_hz)[mode])
+        analysis = torch.from_numpy(physics.resonator.analysis).T[mode]
         imaginary = eigenvalues.slope_at_rest(log_eigenvalues)[:, None] * analysis
         self.encoder.weight.copy_(torch.cat([analysis, imaginary]))
         self.decoder.weight.zero_()
-        self.decoder.weight[:, :modes] = physics.resonator.shapes.T.to(self.decoder.weight)
+        self.decoder.weight[:, :modes] = torch.from_numpy(physics.resonator.shapes).T.to(self.decoder.weight)
 
 
 def _integrated_nodes(time: int, spacing: int) -> int:

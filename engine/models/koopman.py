@@ -10,7 +10,6 @@ where φ and φ⁻¹ are MLPs.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import torch
@@ -31,7 +30,8 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import LINEAR_STRING, Physics, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, Physics, check_initialisation
+from engine.models.configurations import KoopmanConfiguration
 from engine.models.eigenvalues import pack
 
 SELU_SLOPE = 1.0507009873554805  # of its straight part, which is what is above 0
@@ -39,27 +39,6 @@ HELD_AT = 4.0  # standard deviations of displacement above SELU's bend: most plu
 SHARPEST = 0.05  # "physics": relative rise of a mode's frequency by the strongest plucks
 HELD_AT_EXACT = 12.0  # the same for `store_basis`: the strongest plucks stay above it, too
 SPARE_WEIGHT = 1e-3  # "physics": size of the decoder's weights for the latents that are to spare
-
-
-@dataclass(frozen=True)
-class KoopmanConfiguration:
-    """Sizes; the defaults are the paper's (191,077 parameters).
-
-    Attributes:
-        state_size: number n of complex eigenvalues.
-        encoder_widths, decoder_widths: hidden widths of the MLPs.
-        mixing_layer: a dense layer 2n → 2n at the encoder's end, without an activation before it. The paper's text
-            does not name it, its number of parameters has it.
-    """
-
-    grid_points: int = 101
-    state_size: int = 128
-    encoder_widths: tuple[int, ...] = (128, 128)
-    decoder_widths: tuple[int, ...] = (128, 128)
-    mixing_layer: bool = True
-
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "state_size", "encoder_widths", "decoder_widths")
 
 
 class Koopman(DiagonalModel):
@@ -137,13 +116,13 @@ class Koopman(DiagonalModel):
         sharpest = SHARPEST if physics.resonator.tension_modulated else 0.0
         log_eigenvalues = linear_string_eigenvalues(c.state_size, physics, generator, sharpest)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
-        analysis = physics.resonator.analysis.T[torch.arange(c.state_size) % modes]
+        analysis = torch.from_numpy(physics.resonator.analysis).T[torch.arange(c.state_size) % modes]
         encoder = dense_layers(self.encoder)
         if c.mixing_layer:
             nn.init.eye_(encoder.pop().weight)
         _store_linear_map(encoder, linear_string_encoder(analysis), generator)
         synthesis = torch.zeros(c.grid_points, 2 * c.state_size)
-        synthesis[:, :modes] = physics.resonator.shapes.T
+        synthesis[:, :modes] = torch.from_numpy(physics.resonator.shapes).T
         _store_linear_map(dense_layers(self.decoder), synthesis, generator, SPARE_WEIGHT)
 
 

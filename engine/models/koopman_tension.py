@@ -50,8 +50,9 @@ from typing import ClassVar, NamedTuple
 import torch
 from torch import Tensor, nn
 
-from engine.models import eigenvalues
-from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation, check_sizes
+from engine.models._tension_arrays import resonator_arrays
+from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation
+from engine.models.configurations import KoopmanTensionConfiguration
 
 SERIES = 1 / 12  # r and p of small hω
 SPARE = 1.5  # of the energy at the start: more is not believed
@@ -59,36 +60,6 @@ SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
 FRAMES_AT_ONCE = 4096
 HARDEST_KICK = 0.3  # of the root of Σ η²κ (q² + v²/ω²) as a string sets out: beyond it nodes come closer
 MOST_NODES = 3  # times as many as a soft pluck has
-SAME_RESONATOR = 1e-9  # relative: processors round logarithms and sines differently
-LEAST_PHASE = 0.02  # between nodes: a voice of more would take too much of the device's time
-
-
-@dataclass(frozen=True)
-class KoopmanTensionConfiguration:
-    """Sizes.
-
-    Attributes:
-        modes: of the resonator, or more: those to spare rest.
-        degree: of each curve's polynomial in (hω)².
-        node_phase: the largest phase in rad that the first mode turns between nodes.
-        highest_phase: the same of the highest mode; below π/2 no two modes are pumped.
-    """
-
-    grid_points: int = 101
-    modes: int = 25
-    degree: int = 3
-    node_phase: float = 0.05
-    highest_phase: float = 1.56
-
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "modes")
-        if self.modes > self.grid_points - 2:
-            raise ValueError(f"a grid of {self.grid_points} points cannot hold {self.modes} modes")
-        if not 0 <= self.degree <= 32:
-            raise ValueError(f"degree must lie in 0 … 32, not {self.degree}")
-        for name in ("node_phase", "highest_phase"):
-            if not LEAST_PHASE <= getattr(self, name) <= math.pi:
-                raise ValueError(f"{name} must lie in {LEAST_PHASE} … π, not {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
@@ -144,7 +115,7 @@ Run = Callable[[KoopmanTensionState, Step], tuple[Tensor, KoopmanTensionState]] 
 
 
 class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
-    """See the module. The resonator is a buffer: `tuned` gives the same model of another."""
+    """See the module. The resonator is a buffer: `for_resonator` gives the same model of another."""
 
     initialisations: ClassVar = {
         "kicks": f"{LINEAR_STRING}, and how tension couples them",
@@ -181,7 +152,7 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
             self._take(physics)
 
     @torch.no_grad()
-    def tuned(self, physics: Physics) -> KoopmanTension:
+    def for_resonator(self, physics: Physics) -> KoopmanTension:
         """What was learned, with another resonator, rate or scale."""
         resonator = physics.resonator
         sizes = replace(self.configuration, modes=resonator.modes, grid_points=resonator.points)
@@ -190,17 +161,6 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
             getattr(other, name).copy_(getattr(self, name))
         other._take(physics)
         return other.train(self.training)
-
-    @torch.no_grad()
-    def check_physics(self, physics: Physics) -> None:
-        """See the contract."""
-        other = KoopmanTension(self.configuration)
-        other._take(physics)
-        own = dict(self.named_buffers())
-        for name, expected in other.named_buffers():
-            largest = float(expected.abs().max())
-            if not torch.allclose(own[name], expected, rtol=SAME_RESONATOR, atol=1e-3 * SAME_RESONATOR * largest):
-                raise ValueError(f"tensor {name!r} is of another string, or of other modes, rate_hz or scale_m")
 
     def encode(self, displacement: Tensor, velocity: Tensor | None = None) -> KoopmanTensionState:
         """See the contract; here of strings that may ring.
@@ -375,24 +335,9 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         return self.stretch.clamp(min=0)
 
     def _take(self, physics: Physics) -> None:
-        """The resonator, its modes first; latents to spare rest: they have no shape and no share in the tension."""
-        resonator, c, n = physics.resonator, self.configuration, physics.modes
-        if n > c.modes or resonator.points != c.grid_points:
-            raise ValueError(
-                f"model_configuration.modes is {c.modes} on {c.grid_points} points, the resonator has {n} modes on "
-                f"{resonator.points}"
-            )
-        spare = torch.full((c.modes - n,), n - 1)
-        mode = torch.cat([torch.arange(n), spare])
-        log_eigenvalues = physics.log_eigenvalues[mode]
-        for parameter, found in zip((self.nu_log, self.theta_log), eigenvalues.stored(log_eigenvalues), strict=True):
-            parameter.copy_(found)
-        for buffer in (self.coupling, self.stretch, self.shapes, self.analysis):
-            buffer.zero_()
-        self.coupling[:n] = resonator.coupling / physics.rate_hz**2
-        self.stretch[:n] = resonator.stretch * physics.scale_m**2
-        self.shapes[:n] = resonator.shapes
-        self.analysis[:, :n] = resonator.analysis
+        arrays = resonator_arrays(self.configuration, physics.resonator, physics.rate_hz, physics.scale_m)
+        for name, array in arrays.items():
+            getattr(self, name).copy_(torch.from_numpy(array))
 
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:

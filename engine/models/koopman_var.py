@@ -13,7 +13,6 @@ cannot be known before. Intervals are therefore halved until a line through thei
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import torch
@@ -37,28 +36,12 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import LINEAR_STRING, Physics, check_initialisation, check_sizes
+from engine.models.base import LINEAR_STRING, Physics, check_initialisation
+from engine.models.configurations import KoopmanVarConfiguration
 from engine.models.eigenvalues import pack
 
 LONG = 4 * FRAMES_AT_ONCE  # frames, times the batch, of a block with interpolated multipliers: they hold few latents
 SHORT = 512  # frames of a block of which every multiplier is computed: to look for fewer takes as long
-
-
-@dataclass(frozen=True)
-class KoopmanVarConfiguration:
-    """Sizes; the defaults are the paper's (134,885 parameters).
-
-    Attributes:
-        state_size: number n of complex eigenvalues.
-        multiplier_widths: hidden widths of the multiplier's MLP.
-    """
-
-    grid_points: int = 101
-    state_size: int = 128
-    multiplier_widths: tuple[int, ...] = (128, 128, 128)
-
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "state_size", "multiplier_widths")
 
 
 class KoopmanVar(DiagonalModel):
@@ -185,11 +168,11 @@ class KoopmanVar(DiagonalModel):
         n, modes = self.configuration.state_size, physics.modes
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
-        analysis = physics.resonator.analysis.T[torch.arange(n) % modes]
+        analysis = torch.from_numpy(physics.resonator.analysis).T[torch.arange(n) % modes]
         self.encoder.weight.copy_(linear_string_encoder(analysis))
         self.decoder.weight.mul_(0.01)
         self.decoder.weight[:, :n] = 0
-        self.decoder.weight[:, :modes] = physics.resonator.shapes.T
+        self.decoder.weight[:, :modes] = torch.from_numpy(physics.resonator.shapes).T
         last = dense_layers(self.multiplier)[-1]
         last.weight.mul_(0.01)
         last.bias[:n] = 1

@@ -6,33 +6,14 @@ every parameter value.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 
 from engine.models import eigenvalues
+from engine.models.configurations import LRUConfiguration
 from engine.models.ssm import DiagonalSSM, SSMString
-
-
-@dataclass(frozen=True)
-class LRUConfiguration:
-    """Sizes; the defaults are the paper's (636,221 parameters).
-
-    Attributes:
-        state_size: complex states of every layer.
-        layers: blocks after the first layer.
-    """
-
-    grid_points: int = 101
-    state_size: int = 128
-    layers: int = 8
-
-    def __post_init__(self) -> None:
-        for name, least in (("grid_points", 3), ("state_size", 1), ("layers", 0)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
 
 
 class LRULayer(DiagonalSSM):

@@ -9,42 +9,17 @@ of each conjugate pair is kept; the output is 2 Re(C x). The real part of Λ is 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 
+from engine.models.configurations import S5Configuration
 from engine.models.ssm import DiagonalSSM, SSMString, draw_lecun, scale_rows
 
 # the initial draw of Δ, in the source's arbitrary unit of time; Smith et al. have 1e-3 as the smallest, too
 SMALLEST_STEP = {"paper": 1e-4, "physics": 1e-3}
 LARGEST_STEP = 0.1
-
-
-@dataclass(frozen=True)
-class S5Configuration:
-    """Sizes; the defaults are the paper's (307,879 parameters).
-
-    Attributes:
-        state_size: states of every layer; half of them, one of each conjugate pair, are stored.
-        hippo_blocks: diagonal blocks of the initial state matrix, each a HiPPO-LegS matrix.
-        layers: blocks after the first layer.
-    """
-
-    grid_points: int = 101
-    state_size: int = 128
-    hippo_blocks: int = 16
-    layers: int = 6
-
-    def __post_init__(self) -> None:
-        for name, least in (("grid_points", 3), ("state_size", 2), ("hippo_blocks", 1), ("layers", 0)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
-        if self.state_size % (2 * self.hippo_blocks):
-            raise ValueError(
-                f"state_size must be a multiple of twice the {self.hippo_blocks} hippo_blocks, not {self.state_size}"
-            )
 
 
 def hippo_normal(size: int) -> tuple[Tensor, Tensor]:

@@ -349,11 +349,11 @@ class SSMString(StringModel[SSMState], ABC):
             )
         log_eigenvalues = physics.log_eigenvalues
         # q_k = Re(z λᵏ) with Re z = q₀; Im z makes the velocity zero
-        analysis = physics.resonator.analysis.T
+        analysis = torch.from_numpy(physics.resonator.analysis).T
         imaginary = slope_at_rest(log_eigenvalues)[:, None] * analysis
         first.set_modes(log_eigenvalues, torch.stack([analysis, imaginary], dim=1))
         first.C.zero_()
-        first.C[:, :modes, 0] = (physics.resonator.shapes.T / first.conjugates).to(first.C)
+        first.C[:, :modes, 0] = (torch.from_numpy(physics.resonator.shapes).T / first.conjugates).to(first.C)
         for block in self.layers:
             assert isinstance(block, Block)
             block.gate.weight[:points].zero_()

@@ -10,25 +10,30 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import math
 import os
 import stat
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import torch
+import numpy as np
+from numpy.typing import NDArray
 from safetensors import SafetensorError, safe_open
-from safetensors.torch import save_file
-from torch import Tensor
 
 from engine import bounds
-from engine.models import StringModel, build_model, count_parameters, read_model_configuration
-from engine.models.base import Physics
+from engine.models import build_model, read_model_configuration
+from engine.models._tension_arrays import CURVES, check_resonator, resonator_arrays, shapes_of_arrays
 from engine.plain_text import one_line
 from engine.presets.info import PresetInfo
 from engine.presets.migrations import UnknownVersion, migrated
 from engine.schema import SchemaError, parse_json, read, write
 from engine.whole_file import whole_file
+
+if TYPE_CHECKING:
+    from engine.models.base import StringModel
 
 METADATA_KEY = "learned_strings"
 
@@ -42,16 +47,35 @@ class PresetError(ValueError):
 
 @dataclass(frozen=True)
 class Preset:
-    """A loaded preset: its file's stem as name, its facts and its model, ready to be used."""
+    """A loaded preset.
+
+    Attributes:
+        name: its file's stem.
+        weights: of its model, by name.
+    """
 
     name: str
     path: Path
     info: PresetInfo
-    model: StringModel[Any]
+    weights: Mapping[str, NDArray[Any]]
 
-    @property
-    def parameters(self) -> int:
-        return count_parameters(self.model)
+    @cached_property
+    def configuration(self) -> Any:
+        """The sizes of its model."""
+        return _configuration(self.info)
+
+    @cached_property
+    def model(self) -> StringModel[Any]:
+        """The model in evaluation mode, made when it is first asked for, and torch with it."""
+        import torch
+
+        model = _empty_model(self.path, self.info)
+        # copies: NumPy aligns memory less than torch, and sums depend on alignment by a rounding
+        weights = {name: torch.from_numpy(array).clone() for name, array in self.weights.items()}
+        model.load_state_dict(weights, assign=True)
+        for parameter in model.parameters():
+            parameter.requires_grad_(True)
+        return model.eval()
 
 
 def save_preset(path: Path, info: PresetInfo, model: StringModel[Any]) -> None:
@@ -61,9 +85,11 @@ def save_preset(path: Path, info: PresetInfo, model: StringModel[Any]) -> None:
         PresetError: a weight is not finite.
         OSError: the folder cannot be written or the disk is full.
     """
+    from safetensors.torch import save_file
+
     tensors = {name: t.detach().cpu().contiguous() for name, t in model.state_dict().items()}
     for name, tensor in tensors.items():
-        _check_finite(path, name, tensor)
+        _check_finite(path, name, tensor.numpy())
     text = json.dumps(write(info), allow_nan=False)
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as unfinished:
@@ -85,7 +111,7 @@ def read_info(path: Path) -> PresetInfo:
 
 
 def load_preset(path: Path) -> Preset:
-    """A preset with its model in evaluation mode.
+    """A preset with its weights, of which a model can be made.
 
     Raises:
         PresetError: see `read_info`; also a tensor that is missing, unknown, re-shaped, re-typed or not finite, or of
@@ -93,24 +119,21 @@ def load_preset(path: Path) -> Preset:
     """
     with _open(path) as file:
         info = _info_of(path, file)
-        model = _empty_model(path, info)
-        expected = model.state_dict()
+        expected = _forms(path, info)
         found = set(file.keys())
         if missing := sorted(set(expected) - found):
             raise PresetError(f"{path}: tensor {missing[0]!r} is missing; get the preset again or train it again")
         if unknown := sorted(found - set(expected)):
             raise PresetError(f"{path}: tensor {unknown[0]!r} is unknown to a {info.model}; get the preset again")
-        for name, tensor in expected.items():
-            _check_form(path, name, tensor, file.get_slice(name))
-        # copies: in the mapped file their alignment follows the header's length, and sums with it by a rounding
-        tensors = {name: file.get_tensor(name).clone() for name in expected}
-    for name, tensor in tensors.items():
-        _check_finite(path, name, tensor)
-    model.load_state_dict(tensors, assign=True)
-    _check_physics(path, info, model)
-    for parameter in model.parameters():
-        parameter.requires_grad_(True)
-    return Preset(path.stem, path, info, model.eval())
+        for name, form in expected.items():
+            _check_form(path, name, form, file.get_slice(name))
+        weights = {name: np.array(file.get_tensor(name)) for name in expected}
+    for name, array in weights.items():
+        _check_finite(path, name, array)
+    preset = Preset(path.stem, path, info, weights)
+    if info.of_many_strings:
+        _check_resonator(preset)
+    return preset
 
 
 def described_parameters(path: Path, info: PresetInfo) -> int:
@@ -119,6 +142,10 @@ def described_parameters(path: Path, info: PresetInfo) -> int:
     Raises:
         PresetError: the description is of an impossible model; `path` names it in the message.
     """
+    if info.of_many_strings:
+        return sum(math.prod(_forms(path, info)[name][0]) for name in CURVES)
+    from engine.models.base import count_parameters
+
     return count_parameters(_empty_model(path, info))
 
 
@@ -152,7 +179,7 @@ class _open:
         try:
             _check_kind(self._path, self._path.stat())
             check_header(self._path)
-            self._file = safe_open(self._path, framework="pt")
+            self._file = safe_open(self._path, framework="numpy")
             return self._file.__enter__()
         except FileNotFoundError:
             raise PresetError(f"{self._path}: no such preset file; check the path") from None
@@ -203,57 +230,74 @@ def _info_of(path: Path, file: Any) -> PresetInfo:
         raise PresetError(f"{path}: {error}") from error
     try:
         info = read(PresetInfo, data, "metadata")
-        read_model_configuration(info.model, info.model_configuration, "metadata.model_configuration")
+        configuration = _configuration(info)
     except SchemaError as error:
         raise PresetError(f"{path}: {error}; get the preset again or train it again") from error
+    if configuration.grid_points != info.grid_points:
+        raise PresetError(
+            f"{path}: metadata.grid_points is {info.grid_points}, the model's grid has {configuration.grid_points}; "
+            "get the preset again"
+        )
     return info
+
+
+def _configuration(info: PresetInfo) -> Any:
+    return read_model_configuration(info.model, info.model_configuration, "metadata.model_configuration")
 
 
 def _empty_model(path: Path, info: PresetInfo) -> StringModel[Any]:
     """The model without memory behind it, so that absurd sizes in the metadata cost nothing."""
+    import torch
+
     try:
         with torch.device("meta"):
             model = build_model(info.model, info.model_configuration)
     except (RuntimeError, OverflowError, MemoryError) as error:
         raise PresetError(f"{path}: metadata.model_configuration asks for an impossible model ({error})") from error
-    if model.grid_points != info.grid_points:
-        raise PresetError(
-            f"{path}: metadata.grid_points is {info.grid_points}, the model's grid has {model.grid_points}; "
-            "get the preset again"
-        )
     return model
 
 
-_SAFETENSORS_TYPES = {
-    torch.float32: "F32",
-    torch.float64: "F64",
-    torch.complex64: "C64",
-    torch.int64: "I64",
-    torch.bool: "BOOL",
-}
+Form = tuple[tuple[int, ...], str]  # shape, and type by its name in safetensors
 
 
-def _check_form(path: Path, name: str, expected: Tensor, found: Any) -> None:
+def _forms(path: Path, info: PresetInfo) -> dict[str, Form]:
+    """What a preset's tensors must be, by name."""
+    if info.of_many_strings:
+        return {name: (shape, "F64") for name, shape in shapes_of_arrays(_configuration(info)).items()}
+    import torch
+
+    types = {
+        torch.float32: "F32",
+        torch.float64: "F64",
+        torch.complex64: "C64",
+        torch.int64: "I64",
+        torch.bool: "BOOL",
+    }
+    weights = _empty_model(path, info).state_dict()
+    return {name: (tuple(tensor.shape), types[tensor.dtype]) for name, tensor in weights.items()}
+
+
+def _check_form(path: Path, name: str, expected: Form, found: Any) -> None:
     shape, kind = tuple(found.get_shape()), found.get_dtype()
-    if shape != tuple(expected.shape):
-        raise PresetError(
-            f"{path}: tensor {name!r} has shape {shape}, expected {tuple(expected.shape)}; get the preset again"
-        )
-    if kind != _SAFETENSORS_TYPES[expected.dtype]:
-        raise PresetError(
-            f"{path}: tensor {name!r} is of type {kind}, expected {_SAFETENSORS_TYPES[expected.dtype]}; "
-            "get the preset again"
-        )
+    if shape != expected[0]:
+        raise PresetError(f"{path}: tensor {name!r} has shape {shape}, expected {expected[0]}; get the preset again")
+    if kind != expected[1]:
+        raise PresetError(f"{path}: tensor {name!r} is of type {kind}, expected {expected[1]}; get the preset again")
 
 
-def _check_physics(path: Path, info: PresetInfo, model: StringModel[Any]) -> None:
+def _check_resonator(preset: Preset) -> None:
     """Sound follows the metadata and pictures the tensors: both must be of one string."""
     try:
-        model.check_physics(Physics(info.resonator, info.rate_hz, info.scale_m))
+        check_resonator(preset.weights, arrays_of(preset.info))
     except (ValueError, OverflowError) as error:
-        raise PresetError(f"{path}: metadata.string: {error}; get the preset again") from error
+        raise PresetError(f"{preset.path}: metadata.string: {error}; get the preset again") from error
 
 
-def _check_finite(path: Path, name: str, tensor: Tensor) -> None:
-    if not bool(torch.isfinite(tensor).all()):
+def arrays_of(info: PresetInfo) -> dict[str, NDArray[np.float64]]:
+    """The weights that follow from the string, of a preset of many."""
+    return resonator_arrays(_configuration(info), info.resonator, info.rate_hz, info.scale_m)
+
+
+def _check_finite(path: Path, name: str, array: NDArray[Any]) -> None:
+    if not np.isfinite(array).all():
         raise PresetError(f"{path}: tensor {name!r} holds values that are not finite; the preset cannot be used")

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, Literal
 
 from engine import bounds
-from engine.models import MODELS
+from engine.models import MODELS, OF_MANY_STRINGS
 from engine.pluck import SHAPES, Pluck
 from engine.presets.migrations import FORMAT_VERSION
 from engine.resonators.base import Resonator
@@ -102,6 +102,11 @@ class PresetInfo:
         self.string.check_motion(self.modes, self.grid_points, self.rate_hz, self.tension_modulated)
 
     @property
+    def of_many_strings(self) -> bool:
+        """Whether its model takes any string."""
+        return self.model in OF_MANY_STRINGS
+
+    @property
     def horizon_s(self) -> float:
         return self.horizon_steps / self.rate_hz
 
@@ -128,7 +133,7 @@ class PresetInfo:
             omega=string.undamped_frequencies(modes),
             sigma=string.decay_rates(modes),
             coupling=string.tension_coupling(modes) if resonator.tension_modulated else resonator.coupling,
-            stretch=string.wavenumbers(modes).square(),
+            stretch=string.wavenumbers(modes) ** 2,
         )
 
     def modes_of(self, partials: int) -> int:

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from pathlib import Path
 
-from engine.models.base import Physics
-from engine.presets.file import Preset, PresetError
+from engine.presets.file import Preset, PresetError, arrays_of
 from engine.presets.finding import SHIPPED
 from engine.presets.info import PresetInfo
 from engine.resonators.string import StringParameters
@@ -72,11 +71,13 @@ def of_string(
     if string is None and rate_hz is None and modes is None:
         return preset
     try:
-        told = info_of_string(preset.info, string, rate_hz, modes)
-        model = preset.model.tuned(Physics(told.resonator, told.rate_hz, told.scale_m))
+        if not preset.info.of_many_strings:
+            raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
+        info = info_of_string(preset.info, string, rate_hz, modes)
+        weights = {**preset.weights, **arrays_of(info)}
     except (ValueError, OverflowError) as error:
         raise PresetError(f"{preset.path}: string: {error}") from error
-    return replace(preset, info=told, model=model.eval())
+    return replace(preset, info=info, weights=weights)
 
 
 def info_of_string(

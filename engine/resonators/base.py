@@ -13,8 +13,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-import torch
-from torch import Tensor
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Resonator:
         sigma: decay rates σ in 1/s, (modes,): a free mode falls as exp(-σt).
         coupling: k, in 1/s² for a stretch of 1, (modes,); zeros: linear.
         stretch: η² in 1/m², (modes,): the stretch is Σ η² q².
-        tension_rise: ΔT/T₀ of a stretch of 1, ().
+        tension_rise: ΔT/T₀ of a stretch of 1.
         shapes: displacement of each mode at amplitude 1 on the points of a grid, (modes, points).
         analysis: (points, modes), its inverse for what lies in its modes: displacement @ analysis = amplitudes.
         mirror: the sign that each mode takes where the resonator is turned end to end, (modes,); None: it is not
@@ -38,15 +40,15 @@ class Resonator:
         ValueError: shapes that do not go together, or numbers that are not finite.
     """
 
-    omega: Tensor
-    sigma: Tensor
-    coupling: Tensor
-    stretch: Tensor
-    tension_rise: Tensor
-    shapes: Tensor
-    analysis: Tensor
-    mirror: Tensor | None = None
-    end_force: Tensor | None = None
+    omega: Array
+    sigma: Array
+    coupling: Array
+    stretch: Array
+    tension_rise: float
+    shapes: Array
+    analysis: Array
+    mirror: Array | None = None
+    end_force: Array | None = None
 
     def __post_init__(self) -> None:
         modes, points = self.shapes.shape
@@ -55,16 +57,16 @@ class Resonator:
             if value is None:
                 continue
             others = {"shapes": (modes, points), "analysis": (points, modes), "tension_rise": ()}
-            if tuple(value.shape) != (expected := others.get(field.name, (modes,))):
-                raise ValueError(f"resonator: {field.name} has the shape {tuple(value.shape)}, not {expected}")
-            if not bool(torch.isfinite(value).all()):
+            if (shape := np.shape(value)) != (expected := others.get(field.name, (modes,))):
+                raise ValueError(f"resonator: {field.name} has the shape {shape}, not {expected}")
+            if not np.isfinite(value).all():
                 raise ValueError(f"resonator: {field.name} holds a number that is not finite")
-        if bool((self.omega.diff() < 0).any()):
+        if (np.diff(self.omega) < 0).any():
             raise ValueError("resonator: omega must not fall from one mode to the next")
 
     @property
     def modes(self) -> int:
-        return self.shapes.shape[0]
+        return len(self.shapes)
 
     @property
     def points(self) -> int:
@@ -72,7 +74,7 @@ class Resonator:
         return self.shapes.shape[1]
 
     @property
-    def force_weights(self) -> Tensor | None:
+    def force_weights(self) -> Array | None:
         """float64 (points,): displacement @ weights = force on that end in N; None: it has no such end."""
         return None if self.end_force is None else self.analysis @ self.end_force
 
@@ -81,31 +83,31 @@ class Resonator:
         """Whether any amplitude moves another mode's frequency."""
         return bool(self.coupling.any())
 
-    def eigenvalues(self) -> Tensor:
+    def eigenvalues(self) -> NDArray[np.complex128]:
         """Continuous-time eigenvalues -σ + i√(ω² - σ²) at rest, complex128 (modes,).
 
         Raises:
             ValueError: a mode is damped so strongly that it no longer oscillates.
         """
         squared = self.omega**2 - self.sigma**2
-        if bool((squared <= 0).any()):
-            first = int((squared <= 0).nonzero()[0]) + 1
+        if (squared <= 0).any():
+            first = int(np.argmax(squared <= 0)) + 1
             raise ValueError(f"mode {first} is overdamped: lower its damping, or keep fewer modes")
-        return torch.complex(-self.sigma, squared.sqrt())
+        return -self.sigma + 1j * np.sqrt(squared)
 
     def falls_s(self, db: float) -> float:
         """How long its slowest mode takes to fall by so many dB, as a free one; inf where it never does."""
         slowest = float(self.sigma.min())
         return db * math.log(10) / 20 / slowest if slowest > 0 else math.inf
 
-    def relative_tension_rise(self, amplitudes: Tensor) -> Tensor:
+    def relative_tension_rise(self, amplitudes: Array) -> Array:
         """ΔT/T₀ of modal amplitudes (..., modes) in m; result (...)."""
-        return (self.stretch * amplitudes.square()).sum(-1) * self.tension_rise
+        return np.asarray((self.stretch * amplitudes**2).sum(-1) * self.tension_rise)
 
-    def to_modes(self, displacement: Tensor) -> Tensor:
-        """Displacement (..., points) to modal amplitudes (..., modes), same dtype and unit."""
-        return displacement @ self.analysis.to(displacement)
+    def to_modes(self, displacement: NDArray[np.floating]) -> Array:
+        """Displacement (..., points) to modal amplitudes (..., modes), of the same unit."""
+        return displacement @ self.analysis
 
-    def to_grid(self, amplitudes: Tensor) -> Tensor:
-        """Modal amplitudes (..., modes) to displacement (..., points), same dtype and unit."""
-        return amplitudes @ self.shapes.to(amplitudes)
+    def to_grid(self, amplitudes: NDArray[np.floating]) -> Array:
+        """Modal amplitudes (..., modes) to displacement (..., points), of the same unit."""
+        return amplitudes @ self.shapes

@@ -19,14 +19,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-import torch
-from numpy.typing import NDArray
 
 from engine import bounds
-from engine.resonators.base import Resonator
+from engine.resonators.base import Array, Resonator
 from engine.resonators.string import StringParameters
-
-Array = NDArray[np.float64]
 
 FADES_SEMITONES = 3.0  # a note's own corrections fall as a Gaussian of this width
 MOST_CENTS = 60.0
@@ -159,7 +155,7 @@ class RecordedString:
         """
         partials = (modes + 1) // 2
         law = string.resonator(partials, tension_modulated=tension_modulated, grid_points=grid_points)
-        omega, sigma = law.omega.numpy(), law.sigma.numpy()
+        omega, sigma = law.omega, law.sigma
         hz = omega / (2 * math.pi)
         fade = math.exp(-((12 * math.log2(hz[0] / self.pitch_hz) / FADES_SEMITONES) ** 2))
         own = {name: self._faded(name, partials, fade) for name in OF_PARTIALS}
@@ -171,15 +167,15 @@ class RecordedString:
         omegas = np.maximum.accumulate(np.stack([first, second], 1).ravel())[:modes]
         sigmas = np.stack([sigma, np.minimum(sigma * own["second_ratio"], 0.5 * second)], 1).ravel()[:modes]
         shares = np.stack([1 - own["second_share"], own["second_share"]], 1).ravel()[:modes]
-        partial = torch.arange(modes) // 2
+        partial = np.arange(modes) // 2
         return Resonator(
-            omega=torch.from_numpy(omegas),
-            sigma=torch.from_numpy(sigmas.copy()),
+            omega=omegas,
+            sigma=sigmas,
             coupling=law.coupling[partial],
             stretch=law.stretch[partial],
             tension_rise=law.tension_rise,
             shapes=law.shapes[partial],
-            analysis=law.analysis[:, partial] * torch.from_numpy(shares.copy()),
+            analysis=law.analysis[:, partial] * shares,
             mirror=None if law.mirror is None else law.mirror[partial],
         )
 

@@ -10,54 +10,60 @@ from __future__ import annotations
 import math
 from functools import lru_cache
 
-import torch
-from torch import Tensor
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.resonators.base import Array
 
 LARGEST_KEPT = 65_536  # numbers of a table that is remembered: 64 MB of all
 
 
-def mode_shapes(positions: Tensor, modes: int) -> Tensor:
+def mode_shapes(positions: Array, modes: int) -> Array:
     """sin(μπx) at `positions` (points,) in units of the length: float64 (modes, points)."""
-    mu = torch.arange(1, modes + 1, dtype=torch.float64)
-    return torch.sin(math.pi * mu[:, None] * positions.to(torch.float64)[None, :])
+    return np.sin(math.pi * np.arange(1, modes + 1)[:, None] * positions)
 
 
-def grid_positions(grid_points: int) -> Tensor:
+def grid_positions(grid_points: int) -> Array:
     """`grid_points` equidistant positions from 0 to 1, both ends included, float64."""
-    return torch.linspace(0, 1, grid_points, dtype=torch.float64)
+    return np.linspace(0, 1, grid_points)
 
 
-def synthesis_matrix(grid_points: int, modes: int) -> Tensor:
+def synthesis_matrix(grid_points: int, modes: int) -> Array:
     """float64 (modes, grid_points): amplitudes @ synthesis = displacement, with exact zeros at the ends."""
     _check(grid_points, modes)
     if grid_points * modes > LARGEST_KEPT:
         return _sines.__wrapped__(grid_points, modes)
-    return _sines(grid_points, modes).clone()
+    return _sines(grid_points, modes).copy()
 
 
 @lru_cache(maxsize=128)  # strings of many pitches have many numbers of modes, on one grid
-def _sines(grid_points: int, modes: int) -> Tensor:
+def _sines(grid_points: int, modes: int) -> Array:
     shapes = mode_shapes(grid_positions(grid_points), modes)
     shapes[:, 0] = shapes[:, -1] = 0
     return shapes
 
 
-def analysis_matrix(grid_points: int, modes: int) -> Tensor:
+def analysis_matrix(grid_points: int, modes: int) -> Array:
     """float64 (grid_points, modes): displacement @ analysis = amplitudes (q = 2/ℓ Δx Σ u sin(μπx/ℓ))."""
     return synthesis_matrix(grid_points, modes).T * (2 / (grid_points - 1))
 
 
-def to_modes(displacement: Tensor, modes: int) -> Tensor:
-    """Displacement (..., grid_points) to modal amplitudes (..., modes), same dtype and unit."""
-    return displacement @ analysis_matrix(displacement.shape[-1], modes).to(displacement)
+def to_modes(displacement: NDArray[np.floating], modes: int) -> Array:
+    """Displacement (..., grid_points) to modal amplitudes (..., modes), of the same unit."""
+    return displacement @ analysis_matrix(displacement.shape[-1], modes)
 
 
-def to_grid(amplitudes: Tensor, grid_points: int) -> Tensor:
-    """Modal amplitudes (..., modes) to displacement (..., grid_points), same dtype and unit."""
-    return amplitudes @ synthesis_matrix(grid_points, amplitudes.shape[-1]).to(amplitudes)
+def to_grid(amplitudes: NDArray[np.floating], grid_points: int) -> Array:
+    """Modal amplitudes (..., modes) to displacement (..., grid_points), of the same unit."""
+    return amplitudes @ synthesis_matrix(grid_points, amplitudes.shape[-1])
 
 
-def listening_weights(positions: Tensor, grid_points: int) -> Tensor:
+def project(displacement: NDArray[np.floating], modes: int) -> Array:
+    """Displacement (..., grid_points) without what lies outside the first `modes` modes."""
+    return to_grid(to_modes(displacement, modes), displacement.shape[-1])
+
+
+def listening_weights(positions: Array, grid_points: int) -> Array:
     """float64 (grid_points, points): displacement @ weights = displacement at `positions` in 0..1.
 
     Band-limited interpolation with every mode that the grid can hold: on a grid point it picks that point.

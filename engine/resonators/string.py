@@ -9,11 +9,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from engine import bounds
-from engine.resonators.base import Resonator
+from engine.resonators.base import Array, Resonator
 from engine.resonators.sine_transform import analysis_matrix, synthesis_matrix
 
 
@@ -47,20 +46,20 @@ class StringParameters:
         """ρA."""
         return self.density_kg_m3 * self.area_m2
 
-    def wavenumbers(self, modes: int) -> Tensor:
+    def wavenumbers(self, modes: int) -> Array:
         """η_μ = μπ/ℓ in rad/m, float64 (modes,)."""
-        return torch.arange(1, modes + 1, dtype=torch.float64) * (math.pi / self.length_m)
+        return np.arange(1.0, modes + 1) * (math.pi / self.length_m)
 
-    def decay_rates(self, modes: int) -> Tensor:
+    def decay_rates(self, modes: int) -> Array:
         """σ_μ = (d₁ + d₃η²) / 2ρA in 1/s, float64 (modes,): a free mode decays as exp(-σt)."""
         eta = self.wavenumbers(modes)
         return (self.damping_d1_kg_m_s + self.damping_d3_kg_m_s * eta**2) / (2 * self.mass_per_length_kg_m)
 
-    def undamped_frequencies(self, modes: int) -> Tensor:
+    def undamped_frequencies(self, modes: int) -> Array:
         """ω_μ = √((EIη⁴ + T₀η²) / ρA) in rad/s, float64 (modes,)."""
         eta = self.wavenumbers(modes)
         bending = self.youngs_modulus_pa * self.second_moment_m4
-        return ((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m).sqrt()
+        return np.sqrt((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m)
 
     def decay_rate(self, mode: int) -> float:
         """σ of one mode, as in `decay_rates`."""
@@ -73,14 +72,14 @@ class StringParameters:
         bending = self.youngs_modulus_pa * self.second_moment_m4
         return math.sqrt((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m)
 
-    def tension_coupling(self, modes: int) -> Tensor:
+    def tension_coupling(self, modes: int) -> Array:
         """k_μ = EAη_μ² / 4ρA in 1/(m² s²)·m², float64 (modes,).
 
         The tension-modulated string adds the acceleration -k_μ q_μ Σ η_m² q_m² (Eq. 3-5 on modal amplitudes).
         """
         return self.youngs_modulus_pa * self.area_m2 * self.wavenumbers(modes) ** 2 / (4 * self.mass_per_length_kg_m)
 
-    def bridge_forces(self, modes: int) -> Tensor:
+    def bridge_forces(self, modes: int) -> Array:
         """Force of each mode at amplitude 1 m on the support at x = 0, in N, float64 (modes,).
 
         The transverse force that a stiff string exerts on its support is T₀ ∂y/∂x - EI ∂³y/∂x³ (N. H. Fletcher,
@@ -96,18 +95,15 @@ class StringParameters:
             ValueError: the grid does not hold so many modes.
         """
         coupling = self.tension_coupling(modes)
-        signs = 1.0 - 2.0 * (torch.arange(modes, dtype=torch.float64) % 2)
         return Resonator(
             omega=self.undamped_frequencies(modes),
             sigma=self.decay_rates(modes),
-            coupling=coupling if tension_modulated else torch.zeros_like(coupling),
-            stretch=self.wavenumbers(modes).square(),
-            tension_rise=torch.tensor(
-                self.youngs_modulus_pa * self.area_m2 / (4 * self.tension_n), dtype=torch.float64
-            ),
+            coupling=coupling if tension_modulated else np.zeros_like(coupling),
+            stretch=self.wavenumbers(modes) ** 2,
+            tension_rise=self.youngs_modulus_pa * self.area_m2 / (4 * self.tension_n),
             shapes=synthesis_matrix(grid_points, modes),
             analysis=analysis_matrix(grid_points, modes),
-            mirror=signs,
+            mirror=np.where(np.arange(modes) % 2, -1.0, 1.0),
             end_force=self.bridge_forces(modes),
         )
 

@@ -28,5 +28,5 @@ def damped_rotation(eigenvalues: Tensor, time_s: Tensor) -> Tensor:
 
 def solve_linear(resonator: Resonator, state: ModalState, times_s: Tensor) -> Tensor:
     """Modal amplitudes at `times_s` (times,) without any coupling: float64 (batch, times, modes)."""
-    flow = damped_rotation(resonator.eigenvalues(), times_s)
+    flow = damped_rotation(torch.from_numpy(resonator.eigenvalues()), times_s)
     return state.amplitude[:, None] * flow[:, 0, 0] + state.velocity[:, None] * flow[:, 0, 1]

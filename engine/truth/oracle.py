@@ -28,8 +28,8 @@ def solve_dop853(
     from scipy.integrate import solve_ivp  # slow to load, and only the oracle needs it
 
     modes = resonator.modes
-    stiffness, friction = resonator.omega.square().numpy(), 2 * resonator.sigma.numpy()
-    eta_squared, coupling = resonator.stretch.numpy(), resonator.coupling.numpy()
+    stiffness, friction = resonator.omega**2, 2 * resonator.sigma
+    eta_squared, coupling = resonator.stretch, resonator.coupling
 
     def right_side(_time_s: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
         q, v = y[:modes], y[modes:]

@@ -4,8 +4,7 @@ The method is ABA(8,6,4) of Blanes et al., "New families of symplectic splitting
 integration in dynamical astronomy", Appl. Numer. Math. 68 (2013): A is the linear string (solved exactly, so
 the linear case is exact for any step), B the tension modulation, whose smallness the method exploits.
 
-One scheme, two kernels that agree to rounding: a compiled scalar loop where the tensors lie on the CPU, and
-plain PyTorch operations elsewhere.
+It runs as a compiled scalar loop on the CPU.
 """
 
 from __future__ import annotations
@@ -18,15 +17,10 @@ import torch
 from torch import Tensor
 
 from engine.bounds import SUBSTEPS_IN_A_PERIOD
+from engine.kernels.scheme import KICKS, ROTATIONS
 from engine.resonators.base import Resonator
 from engine.truth.linear import damped_rotation
 from engine.truth.state import ModalState
-
-# Half of the palindromes: A₁ B₁ A₂ B₂ A₃ B₃ A₄ B₄ A₄ B₃ A₃ B₂ A₂ B₁ A₁.
-_A_HALF = (0.0711334264982231178, 0.241153427956640099, 0.521411761772814789, -0.333698616227678006)
-_B_HALF = (0.183083687472197222, 0.310782859898574870, -0.0265646185119588007, 0.0653961422823734185)
-ROTATIONS = (*_A_HALF, *reversed(_A_HALF))
-KICKS = (*_B_HALF, *reversed(_B_HALF[:3]))
 
 
 def default_substeps(resonator: Resonator, rate_hz: float) -> int:
@@ -48,8 +42,7 @@ class SplittingSolver:
         substeps: integration steps per sample; None takes `default_substeps`. What is linear needs one.
         silence: where above 0, the highest modes are left out from when their amplitudes fall below this share of all
             modes' together (no mode moves another that rests), and the sub-steps follow the highest that is left: a
-            string that rings on costs a fraction of one that was just released. Only on the CPU.
-        device: where to compute; a state is moved there.
+            string that rings on costs a fraction of one that was just released.
     """
 
     def __init__(
@@ -59,7 +52,6 @@ class SplittingSolver:
         *,
         substeps: int | None = None,
         silence: float = 0.0,
-        device: torch.device | str = "cpu",
     ) -> None:
         if not rate_hz > 0:
             raise ValueError(f"sample rate must be above 0 Hz, not {rate_hz}")
@@ -71,9 +63,8 @@ class SplittingSolver:
         self.rate_hz = rate_hz
         self.tension_modulated = tension_modulated = resonator.tension_modulated
         self.substeps = (substeps or default_substeps(resonator, rate_hz)) if tension_modulated else 1
-        self.device = torch.device(device)
         self._silence = silence
-        omega = resonator.omega
+        omega = torch.from_numpy(resonator.omega)
         self._inverse_omega_squared = omega.pow(-2)
         # sub-steps by how many modes move, and what depends on them, once for each number that there is
         wanted = torch.ceil(self.substeps * omega / omega[-1]) if silence else torch.full_like(omega, self.substeps)
@@ -81,12 +72,12 @@ class SplittingSolver:
         steps_s = 1 / (rate_hz * self._substeps.double())[:, None]
         rotations = ROTATIONS if tension_modulated else (1.0,)
         times_s = torch.tensor(rotations, dtype=torch.float64) * steps_s
-        flows = damped_rotation(resonator.eigenvalues(), times_s.flatten())
-        self._flows = flows.reshape(*times_s.shape, 4, modes).to(self.device)
+        flows = damped_rotation(torch.from_numpy(resonator.eigenvalues()), times_s.flatten())
+        self._flows = flows.reshape(*times_s.shape, 4, modes)
         kicks = KICKS if tension_modulated else ()
         self._kicks = torch.tensor(kicks, dtype=torch.float64) * steps_s
-        self._coupling = resonator.coupling.to(self.device)
-        self._eta_squared = resonator.stretch.to(self.device)
+        self._coupling = torch.from_numpy(resonator.coupling)
+        self._eta_squared = torch.from_numpy(resonator.stretch)
 
     @property
     def constants(self) -> tuple[Tensor, ...]:
@@ -106,15 +97,10 @@ class SplittingSolver:
         """
         if state.modes != self.modes:
             raise ValueError(f"the solver holds {self.modes} modes, the state {state.modes}")
-        q = state.amplitude.to(self.device, torch.float64).clone().contiguous()
-        v = state.velocity.to(self.device, torch.float64).clone().contiguous()
-        if self.device.type == "cpu":
-            out = q.new_empty(q.shape[0], len(frames), self.modes)
-            self._advance_compiled(q, v, steps, frames, out)
-            return out, ModalState(q, v)
-        every = q.new_empty(q.shape[0], steps, self.modes)
-        self._advance_tensors(q, v, every)
-        return every if len(frames) == steps else every[:, frames - 1], ModalState(q, v)
+        q, v = (part.double().clone().contiguous() for part in (state.amplitude, state.velocity))
+        out = q.new_empty(q.shape[0], len(frames), self.modes)
+        self._advance_compiled(q, v, steps, frames, out)
+        return out, ModalState(q, v)
 
     def solve(self, state: ModalState, steps: int) -> Tensor:
         """Modal amplitudes of frames 0 … steps, float64 (batch, steps + 1, modes)."""
@@ -138,16 +124,3 @@ class SplittingSolver:
         share = -(-q.shape[0] // workers)
         with ThreadPoolExecutor(workers) as pool:  # the kernel holds no interpreter lock
             list(pool.map(run, (slice(i, i + share) for i in range(0, q.shape[0], share))))
-
-    def _advance_tensors(self, q: Tensor, v: Tensor, out: Tensor) -> None:
-        kicks = self._kicks[-1].tolist()
-        for step in range(out.shape[1]):
-            for _ in range(self.substeps):
-                for stage, (qq, qv, vq, vv) in enumerate(self._flows[-1]):
-                    if stage:
-                        stretch = (self._eta_squared * q * q).sum(-1, keepdim=True)
-                        v -= kicks[stage - 1] * stretch * self._coupling * q
-                    rotated = qq * q + qv * v
-                    v.mul_(vv).addcmul_(vq, q)
-                    q.copy_(rotated)
-            out[:, step] = q

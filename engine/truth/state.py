@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from engine.resonators.base import Array
+
 
 @dataclass(frozen=True)
 class ModalState:
@@ -23,10 +25,10 @@ class ModalState:
             )
 
     @classmethod
-    def at_rest(cls, amplitude: Tensor) -> ModalState:
+    def at_rest(cls, amplitude: Tensor | Array) -> ModalState:
         """A string released with zero velocity from `amplitude` (batch, modes) in m."""
-        amplitude = amplitude.to(torch.float64)
-        return cls(amplitude, torch.zeros_like(amplitude))
+        released = torch.as_tensor(amplitude, dtype=torch.float64)
+        return cls(released, torch.zeros_like(released))
 
     @property
     def modes(self) -> int:

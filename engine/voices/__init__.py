@@ -14,7 +14,6 @@ from engine.voices.offline import OfflineVoice, render_voice, voice_blocks
 from engine.voices.player import CompiledPlayer
 from engine.voices.programs import (
     Program,
-    bank_program,
     model_program,
     plain_program,
     rendered_program,
@@ -30,7 +29,6 @@ __all__ = [
     "OfflineVoice",
     "Program",
     "Voice",
-    "bank_program",
     "model_program",
     "plain_program",
     "render_voice",

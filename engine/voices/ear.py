@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
-import torch
-from torch import Tensor
+import numpy as np
 
 from engine.kernels.layout import BRIGHTER
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, LEAST_PEAK_M
+from engine.resonators.base import Array
 from engine.resonators.sine_transform import analysis_matrix, listening_weights, synthesis_matrix
 
 PickupKind = Literal["displacement", "velocity", "bridge"]
@@ -38,7 +38,7 @@ class Ear:
         """What is 0 dBFS, in m, m/s or N."""
         return FULL_SCALES[self.pickup]
 
-    def weights(self, grid_points: int, force: Tensor | None = None) -> Tensor:
+    def weights(self, grid_points: int, force: Array | None = None) -> Array:
         """float64 (grid_points, points): displacement @ weights is the signal; 0 for a mode beyond the grid.
 
         It is in m, of which the velocity is taken later; at the bridge, in N times the ratio of the full scales.
@@ -54,24 +54,24 @@ class Ear:
         if force is None:
             raise ValueError("it has no end whose force can be heard; choose another pick-up")
         if self.solo > grid_points - 2:
-            force = torch.zeros_like(force)
+            force = np.zeros_like(force)
         elif self.solo > 0:
             shape = synthesis_matrix(grid_points, self.solo)[-1]
             force = analysis_matrix(grid_points, self.solo)[:, -1] * (shape @ force)
-        return (force * (FULL_SCALE_M / FULL_SCALE_N))[:, None].repeat(1, len(self.points))
+        return (force * (FULL_SCALE_M / FULL_SCALE_N))[:, None].repeat(len(self.points), axis=1)
 
-    def largest(self, displacement_m: Tensor, force: Tensor | None = None) -> float:
+    def largest(self, displacement_m: Array, force: Array | None = None) -> float:
         """A bound of the signal after a release from this shape, in the unit of `weights`; narrow plucks pass it.
 
         A velocity is bounded by ten times the displacement of full scale. The force at an end never passes tension
         times the steepest slope: waves to both sides have half of it each, and the end doubles it.
         """
-        peak = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
+        peak = max(float(np.abs(displacement_m).max()), LEAST_PEAK_M)
         if self.pickup != "bridge" or force is None:
             return peak * (BRIGHTER if self.pickup == "velocity" else 1.0)
-        place = torch.linspace(0, 1, len(force), dtype=torch.float64)
+        place = np.linspace(0, 1, len(force))
         tension = float((place * (1 - place)) @ force)  # per length: the slope of this curve is 1 at the end
-        steepest = float(displacement_m.double().diff().abs().max()) * (len(force) - 1)
+        steepest = float(np.abs(np.diff(displacement_m)).max()) * (len(force) - 1)
         return max(peak, tension * steepest * (FULL_SCALE_M / FULL_SCALE_N))
 
     def is_on_node(self, point: float) -> bool:
@@ -82,11 +82,11 @@ class Ear:
 
 
 @lru_cache(maxsize=16)  # asked for with every block
-def _weights(listening_points: tuple[float, ...], solo: int, grid_points: int) -> Tensor:
-    points = torch.tensor(listening_points, dtype=torch.float64)
+def _weights(listening_points: tuple[float, ...], solo: int, grid_points: int) -> Array:
+    points = np.array(listening_points)
     if solo == 0:
         return listening_weights(points, grid_points)
     if solo > grid_points - 2:
-        return torch.zeros(grid_points, len(points), dtype=torch.float64)
+        return np.zeros((grid_points, len(points)))
     mode = analysis_matrix(grid_points, solo)[:, -1:]
-    return mode * torch.sin(math.pi * solo * points)[None]
+    return mode * np.sin(math.pi * solo * points)

@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from torch import Tensor
 
 from engine.effects import Effects
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.presets import PresetInfo
-from engine.sources import ModelSource, Runaway, project
+from engine.resonators.base import Array
+from engine.resonators.sine_transform import project
+from engine.sources import ModelSource, Runaway
 from engine.voices.ear import Ear
 from engine.voices.mixer import Mixer
 from engine.voices.programs import Program
@@ -37,7 +38,7 @@ class OfflineVoice:
     def __init__(
         self,
         program: Program,
-        initial_m: Tensor,
+        initial_m: Array,
         ear: Ear,
         seconds: float = 0.0,
         source_rate_hz: int = 0,
@@ -126,14 +127,14 @@ def voice_blocks(
             return
 
 
-def _fill(voice: Voice, source: ModelSource, initial_m: Tensor, ear: Ear, advanced: Callable[[float], None]) -> None:
+def _fill(voice: Voice, source: ModelSource, initial_m: Array, ear: Ear, advanced: Callable[[float], None]) -> None:
     """Renders all samples of a voice beforehand."""
     weights = voice.program.grid_weights(ear)
     state = source.start(initial_m[None])
-    voice.append(((initial_m.double() @ weights)[None] / FULL_SCALE_M).float().numpy())
+    voice.append((initial_m @ weights)[None] / FULL_SCALE_M)
     total = voice.room
     while voice.room:
         steps = AHEAD_FIRST if voice.room == total else AHEAD_FRAMES
         frames, state = source.advance(state, min(steps, voice.room), weights)
-        voice.append((frames[0].double() / FULL_SCALE_M).float().numpy())
+        voice.append(frames[0].astype(np.float64) / FULL_SCALE_M)
         advanced(FILLING * (1 - voice.room / total))

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from engine.kernels import layout as at
 from engine.kernels.layout import ATTACK_S, END_FADE_S, FADE_S, LONGEST_S, SILENT_DB
@@ -33,7 +31,7 @@ class Voice:
     def __init__(
         self,
         program: Program,
-        displacement_m: Tensor,
+        displacement_m: NDArray[np.float64],
         ear: Ear,
         gain: float = 1.0,
         seconds: float = 0.0,
@@ -54,7 +52,7 @@ class Voice:
         counts[at.ENDS_AT] = round(min(program.ends_s, LONGEST_S) * program.rate_hz)
         counts[at.ENDS_IN] = round(END_FADE_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
-        memory[at.PEAK] = max(float(displacement_m.abs().max()), LEAST_PEAK_M)
+        memory[at.PEAK] = max(float(np.abs(displacement_m).max()), LEAST_PEAK_M)
         memory[at.LIMIT] = RUNAWAY_FACTOR * ear.largest(displacement_m, program.force) / FULL_SCALE_M
         first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
@@ -82,9 +80,7 @@ class Voice:
     def of_samples(cls, program: Program, samples: NDArray[np.float32]) -> Voice:
         """Of samples (frames, points) of full scale at the program's own rate, all of which are there."""
         ear = Ear((0.5,) * samples.shape[1])
-        voice = cls(
-            program, torch.full((3,), FULL_SCALE_M), ear, 1.0, len(samples) / program.rate_hz, program.rate_hz
-        )
+        voice = cls(program, np.full(3, FULL_SCALE_M), ear, 1.0, len(samples) / program.rate_hz, program.rate_hz)
         voice.append(samples)
         voice.end_here()
         return voice
@@ -306,8 +302,7 @@ class Voice:
 
 def _rows(resonator: Resonator) -> NDArray[np.float64]:
     """ω², σ, k and η², one after the other."""
-    own = resonator.omega.square(), resonator.sigma, resonator.coupling, resonator.stretch
-    return np.concatenate([each.numpy() for each in own])
+    return np.concatenate([resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch])
 
 
 def _state(modes: int) -> int:

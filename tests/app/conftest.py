@@ -43,7 +43,7 @@ def hear(derivative: Callable[[np.ndarray, int], np.ndarray]) -> Hear:
             motion = take.motions[name]
             frames_m, rate_hz = motion.read(), round(motion.rate_hz)
             signal = listened.signals[name] = Signal(rate_hz, len(ear.points), take.seconds)
-            samples = frames_m @ ear.weights(frames_m.shape[1]).float().numpy()
+            samples = frames_m @ ear.weights(frames_m.shape[1]).astype(np.float32)
             if ear.pickup == "velocity":
                 samples = derivative(samples, rate_hz).astype(np.float32)
             signal.append(samples)

@@ -12,12 +12,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 from torch.utils.flop_counter import FlopCounterMode
 
-from engine.models import StringModel, build_model
-from engine.models.base import Physics
+from engine.models import build_model
+from engine.models.base import Physics, StringModel
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.resonators.sine_transform import listening_weights
 from engine.resonators.string import StringParameters
@@ -100,8 +101,8 @@ def measure(report: Callable[[float, str], None]) -> RenderBenchmark:
 
 def _measure(case: Case, products_per_s: float, written_per_s: float) -> RenderTiming:
     model = _untrained(case)
-    pluck = (Pluck().displacement(model.grid_points) / SCALE_M).float()[None]
-    point = listening_weights(torch.tensor([DEFAULT_LISTEN]), model.grid_points).float()
+    pluck = torch.from_numpy(Pluck().displacement(model.grid_points) / SCALE_M).float()[None]
+    point = torch.from_numpy(listening_weights(np.array([DEFAULT_LISTEN]), model.grid_points)).float()
     samples = round(AUDIO_S * case.rate_hz)
 
     def floor(readout: Tensor | None) -> float:

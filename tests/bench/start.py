@@ -94,7 +94,7 @@ def _watch_for_sound(controller: Controller, times_s: dict[str, float]) -> None:
     times_s["alive"] = time.time()
 
     def look() -> None:
-        if controller.performance.at_hand:
+        if controller.performance.playable:
             times_s["ready"] = time.time()
             timer.stop()
             controller.window.close()

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from engine.kernels.layout import QUANTUM
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
-from engine.sources import project
+from engine.resonators.sine_transform import project
 from engine.voices import Ear, Mixer, Voice, model_program
 from tests.bench.play import analysis
 
@@ -29,7 +29,7 @@ def keys() -> list[int]:
 def played(keys: list[int], gain: float) -> tuple[NDArray[np.float32], float]:
     """The sound, (frames, 2), and the limiter's strongest reduction in dB."""
     preset = load_preset(SHIPPED / "studio_nylon_b3.safetensors")
-    program, ear, random = model_program(preset.model, preset.info, RATE_HZ), Ear((0.37,)), np.random.default_rng(2)
+    program, ear, random = model_program(preset, RATE_HZ), Ear((0.37,)), np.random.default_rng(2)
     begins = []
     for place in PLACES:
         initial_m = project(Pluck(place).displacement(preset.info.grid_points), preset.info.modes)

@@ -14,14 +14,13 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import torch
-from numpy.typing import NDArray
 
 from app.presets.library import STUDIO
 from engine.pluck import DEFAULT_LISTEN, FULL_SCALE_M, Pluck
 from engine.presets import SHIPPED, Preset, load_preset, preset_files
-from engine.sources import ModelSource, StringSource, TruthSource, project
-from engine.voices import Ear, Mixer, Program, Voice, bank_program, truth_program
+from engine.resonators.sine_transform import project
+from engine.sources import ModelSource, StringSource, TruthSource
+from engine.voices import Ear, Mixer, Program, Voice, model_program, truth_program
 from engine.voices.voice import ATTACK_S
 from tests.bench.machine import Machine, one_thread
 
@@ -103,8 +102,8 @@ def measure(report: Callable[[float, str], None]) -> VoicesBenchmark:
 def _measure(path: Path) -> tuple[list[VoiceCost], StrikeCost]:
     preset = load_preset(path)
     info = preset.info
-    model, truth = bank_program(preset.model, info, RATE_HZ), truth_program(info, RATE_HZ)
-    own_rate = bank_program(preset.model, info, info.rate_hz)
+    model, truth = model_program(preset, RATE_HZ), truth_program(info, RATE_HZ)
+    own_rate = model_program(preset, info.rate_hz)
     assert model is not None and own_rate is not None
     errors = {
         "model": _error(own_rate, preset, ModelSource(preset)),
@@ -159,9 +158,8 @@ def _error(program: Program, preset: Preset, source: StringSource) -> float:
     mixer.add(voice)
     found = mixer.render(frames)[first:, 0].astype(np.float64)
     initial_m = project(PLUCK.displacement(info.grid_points), info.modes)
-    with torch.inference_mode():
-        blocks, _ = source.advance(source.start(initial_m[None]), frames - 1, EAR.weights(info.grid_points))
-    expected: NDArray[np.float64] = blocks[0, first - 1 :, 0].double().numpy() / FULL_SCALE_M
+    blocks, _ = source.advance(source.start(initial_m[None]), frames - 1, EAR.weights(info.grid_points))
+    expected = blocks[0, first - 1 :, 0].astype(np.float64) / FULL_SCALE_M
     return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
 
 

@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from torch import Tensor
 
 from engine.kernels import layout as at
-from engine.models import KoopmanVar
+from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, Preset, PresetInfo, TrainedRange, load_preset
+from engine.resonators.base import Array
+from engine.resonators.sine_transform import project
 from engine.resonators.string import StringParameters
-from engine.sources import project
-from engine.voices import Ear, Mixer, Program, Voice, bank_program
+from engine.voices import Ear, Mixer, Program, Voice, model_program
 
 PLUCK, EAR = Pluck(0.3), Ear((0.37,))
 
@@ -43,12 +43,10 @@ def _shipped(name: str) -> Preset:
 @cache
 def _bank(name: str, rate_hz: int) -> Program:
     preset = _shipped(name)
-    program = bank_program(preset.model, preset.info, rate_hz)
-    assert program is not None
-    return program
+    return model_program(preset, rate_hz)
 
 
-def _initial_m(info: PresetInfo, pluck: Pluck) -> Tensor:
+def _initial_m(info: PresetInfo, pluck: Pluck) -> Array:
     return project(pluck.displacement(info.grid_points), info.modes)
 
 
@@ -59,7 +57,7 @@ def shipped() -> Callable[[str], Preset]:
 
 
 @pytest.fixture(scope="session")
-def initial_m() -> Callable[[PresetInfo, Pluck], Tensor]:
+def initial_m() -> Callable[[PresetInfo, Pluck], Array]:
     """The displacement that a string of a preset's is released from, (grid_points,)."""
     return _initial_m
 

@@ -7,9 +7,16 @@ import math
 import numpy as np
 import pytest
 import torch
-from torch import Tensor
 
-from engine.partials import PartialErrors, PartialTrack, partial_errors, phasors, segment_frames, track_partials
+from engine.partials import (
+    Array,
+    PartialErrors,
+    PartialTrack,
+    partial_errors,
+    phasors,
+    segment_frames,
+    track_partials,
+)
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, SplittingSolver
 
@@ -19,23 +26,23 @@ LINEAR_HZ = (STRING.resonator(10).eigenvalues().imag / (2 * math.pi)).tolist()  
 RESOLVED = [0, 1, 2, 3, 4, 5, 6, 8, 9]  # mode 8 is at 1994 Hz
 
 
-def times(seconds: float) -> Tensor:
-    return torch.arange(1, round(seconds * RATE_HZ) + 1, dtype=torch.float64)[:, None] / RATE_HZ
+def times(seconds: float) -> Array:
+    return np.arange(1, round(seconds * RATE_HZ) + 1)[:, None] / RATE_HZ
 
 
-def partial(time_s: Tensor, hz: Tensor, sigma: Tensor, level: float = 1.0, cycles: float = 0.1) -> Tensor:
+def partial(time_s: Array, hz: Array, sigma: Array, level: float = 1.0, cycles: float = 0.1) -> Array:
     """Phasors (1, frames, modes)."""
-    return (level * torch.exp(torch.complex(-sigma * time_s, 2 * math.pi * (hz * time_s + cycles))))[None]
+    return (level * np.exp(-sigma * time_s + 2j * math.pi * (hz * time_s + cycles)))[None]
 
 
-def errors(predicted: Tensor, truth: Tensor, *windows_s: tuple[float, float]) -> PartialErrors:
+def errors(predicted: Array, truth: Array, *windows_s: tuple[float, float]) -> PartialErrors:
     track = track_partials(predicted, truth, segment_frames(RATE_HZ, LINEAR_HZ[0]))
     return partial_errors(track, RATE_HZ, LINEAR_HZ, windows_s)
 
 
-def ten_modes(seconds: float = 2.0) -> tuple[Tensor, Tensor, Tensor]:
+def ten_modes(seconds: float = 2.0) -> tuple[Array, Array, Array]:
     """Times, frequencies, and decay rates so low that every mode is there throughout."""
-    return times(seconds), torch.tensor(LINEAR_HZ, dtype=torch.float64), torch.linspace(1, 3, 10, dtype=torch.float64)
+    return times(seconds), np.array(LINEAR_HZ), np.linspace(1, 3, 10)
 
 
 def test_detuning_level_and_decay_are_what_they_were_made() -> None:
@@ -46,15 +53,15 @@ def test_detuning_level_and_decay_are_what_they_were_made() -> None:
     found = errors(predicted, partial(time_s, hz, sigma), (0, 0.02), (0, 1), (1, 2), (0, 2))
     assert np.isnan(found.cents[0, :, 7]).all()  # not resolved
     whole = {name: getattr(found, name)[0, 3, RESOLVED] for name in ("frequency_hz", "cents", "t60_s")}
-    assert whole["frequency_hz"] == pytest.approx(hz[RESOLVED].numpy(), rel=1e-6)
+    assert whole["frequency_hz"] == pytest.approx(hz[RESOLVED], rel=1e-6)
     assert whole["cents"] == pytest.approx(cents, abs=0.002)
-    assert whole["t60_s"] == pytest.approx(3 * math.log(10) / sigma[RESOLVED].numpy(), rel=1e-6)
+    assert whole["t60_s"] == pytest.approx(3 * math.log(10) / sigma[RESOLVED], rel=1e-6)
     assert found.t60_error_percent[0, 3, RESOLVED] == pytest.approx(100 / 0.9 - 100, abs=0.05)
     # at the start the level is what it was made; it rises by 0.1σ · 8.69 dB a second
     assert found.level_db[0, 0, RESOLVED] == pytest.approx(level_db, abs=0.05)
     # the phase runs ahead by the detuning in Hz each second: the mean is that of the middle
     for window, middle_s in ((1, 0.5), (2, 1.5), (3, 1.0)):
-        expected = (detuned - hz)[RESOLVED].numpy() * middle_s
+        expected = (detuned - hz)[RESOLVED] * middle_s
         assert found.phase_cycles[0, window, RESOLVED] == pytest.approx(expected, rel=2e-3)
     # a row of the summary holds magnitudes
     (row, *_) = found.by_mode(3)
@@ -92,9 +99,9 @@ def test_a_glide_is_told_of_truth_and_prediction() -> None:
     """Frequencies that fall in a straight line, the prediction's further: between the thirds' middles two thirds."""
     time_s, hz, sigma = ten_modes(1)
 
-    def gliding(fall: float) -> Tensor:  # relative, in the whole second
-        fallen_s = time_s - fall * time_s.square() / 2
-        return torch.exp(torch.complex(-sigma * time_s, 2 * math.pi * hz * fallen_s))[None]
+    def gliding(fall: float) -> Array:  # relative, in the whole second
+        fallen_s = time_s - fall * time_s**2 / 2
+        return np.exp(-sigma * time_s + 2j * math.pi * hz * fallen_s)[None]
 
     found = errors(gliding(0.02).real, gliding(0.01), (0, 1), (0, 0.05))
     true, predicted = (1200 * math.log2((1 - fall / 6) / (1 - 5 * fall / 6)) for fall in (0.01, 0.02))
@@ -111,9 +118,9 @@ def test_a_glide_is_told_of_truth_and_prediction() -> None:
 
 def test_what_lies_below_the_floor_is_absent() -> None:
     time_s, hz, sigma = ten_modes(1)
-    levels = torch.ones(10, dtype=torch.float64)
+    levels = np.ones(10)
     levels[2], levels[3], levels[4] = 0, 0.9e-3, 1.1e-3
-    sigma = torch.full_like(sigma, 1.0)
+    sigma = np.full_like(sigma, 1.0)
     truth = partial(time_s, hz, sigma) * levels
     found = errors(truth.real, truth, (0, 1))
     assert np.isnan(found.level_db[0, 0]).tolist() == [n in (2, 3, 7) for n in range(10)]
@@ -149,7 +156,7 @@ def test_a_t60_needs_a_decay() -> None:
 def test_predictions_that_are_silent_weak_or_not_numbers() -> None:
     time_s, hz, sigma = ten_modes(1)
     truth = partial(time_s, hz, sigma)
-    broken = truth.real.clone()
+    broken = truth.real.copy()
     broken[:, :, 0], broken[:, :, 1], broken[:, 2000:, 2] = 0, 0.01 * truth.real[:, :, 1], math.nan
     broken[:, :, 3] = math.inf
     found = errors(broken, truth, (0, 0.4), (0.6, 1))
@@ -164,8 +171,8 @@ def test_predictions_that_are_silent_weak_or_not_numbers() -> None:
 
 
 def test_silence_has_no_partials() -> None:
-    silence = torch.zeros(2, 400, 10, dtype=torch.float64)
-    found = errors(silence, torch.complex(silence, silence), (0, 0.1))
+    silence = np.zeros((2, 400, 10))
+    found = errors(silence, silence.astype(complex), (0, 0.1))
     assert np.isnan(found.level_db).all()
     assert found.weighted(0).level_db is None
 
@@ -181,8 +188,8 @@ def test_blocks_join_to_the_whole() -> None:
     ]
     whole = track_partials(predicted, truth, length)
     joined = PartialTrack.join(blocks)
-    assert torch.equal(whole.match, joined.match)
-    assert torch.equal(whole.turn, joined.turn)
+    assert np.array_equal(whole.match, joined.match)
+    assert np.array_equal(whole.turn, joined.turn)
     trajectories = PartialErrors.join([errors(predicted, truth, (0, 1))] * 2)
     assert trajectories.cents.shape == (2, 1, 10)
 
@@ -194,28 +201,28 @@ def test_too_short_for_a_segment() -> None:
 
 def test_the_phasors_of_the_linear_string_are_exact() -> None:
     eigenvalues = STRING.resonator(10).eigenvalues()
-    amplitude = torch.linspace(1, 2, 10, dtype=torch.float64)
+    amplitude = np.linspace(1, 2, 10)
     spacing_s = 1 / 16_000
-    expected = amplitude * torch.exp(eigenvalues * torch.linspace(0, 0.1, 50, dtype=torch.float64)[:, None])
-    around = [(expected * torch.exp(eigenvalues * offset)).real for offset in (-spacing_s, 0, spacing_s)]
+    expected = amplitude * np.exp(eigenvalues * np.linspace(0, 0.1, 50)[:, None])
+    around = [(expected * np.exp(eigenvalues * offset)).real for offset in (-spacing_s, 0, spacing_s)]
     found = phasors(*around, spacing_s, STRING.resonator(10, tension_modulated=False))
-    assert torch.allclose(found, expected, rtol=0, atol=1e-12)
+    assert np.allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_the_phasors_of_a_tense_string_are_circles() -> None:
     """One mode alone, whose tension rises by 5 %: ellipses, if its frequency were taken to be that at rest."""
     state = ModalState.at_rest(torch.tensor([[0.0137]]))
-    assert STRING.resonator(1).relative_tension_rise(state.amplitude) == pytest.approx(0.05, abs=0.01)
-    samples = SplittingSolver(STRING.resonator(1), 16_000).solve(state, 4000)
+    assert STRING.resonator(1).relative_tension_rise(state.amplitude.numpy()) == pytest.approx(0.05, abs=0.01)
+    samples = SplittingSolver(STRING.resonator(1), 16_000).solve(state, 4000).numpy()
     around = (samples[:, :-2], samples[:, 1:-1], samples[:, 2:])
     roundness = []
     for modulated in (True, False):
         z = phasors(*around, 1 / 16_000, STRING.resonator(1, tension_modulated=modulated))
-        roundness.append(float(z.imag.norm() / z.real.norm()))
+        roundness.append(float(np.linalg.norm(z.imag) / np.linalg.norm(z.real)))
     assert roundness[0] == pytest.approx(1, abs=0.002)
     assert roundness[1] > 1.01
 
 
 def test_shapes_must_agree() -> None:
     with pytest.raises(ValueError, match="differ in shape"):
-        track_partials(torch.zeros(1, 40, 2), torch.zeros(1, 40, 3, dtype=torch.complex128), 20)
+        track_partials(np.zeros((1, 40, 2)), np.zeros((1, 40, 3), complex), 20)

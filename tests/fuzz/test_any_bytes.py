@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.export.recipe import Recipe
-from app.patches.patch import Patch, explained
+from app.patches.fields import explained
+from app.patches.patch import Patch
 from app.session.choices import Choices
 from app.window.settings import Settings, load_settings
 from engine import bounds

@@ -23,8 +23,7 @@ from app.export.recipe import RecipeError, read_recipe
 from app.export.sampled.store import read_index
 from app.instrument.midi_file import MOST_EVENTS, MidiFileError, read_midi
 from app.patches.library import PatchError, read_patch
-from app.patches.patch import TuningChoice
-from app.patches.tuning import Tuning, read_scala
+from app.patches.tuning import Tuning, TuningChoice, read_scala
 from app.presets.library import list_presets
 from app.window.settings import Settings, load_settings, read_settings
 from engine.folders import usable_files

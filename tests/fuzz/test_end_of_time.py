@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from engine.audible import heard_level_db
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset, read_info
-from engine.sources import ModelSource, project
+from engine.resonators.sine_transform import project
+from engine.sources import ModelSource
 from engine.voices import Ear, Mixer, Voice, model_program, voice_blocks
 from engine.voices.programs import voice_ends_s
 from engine.voices.voice import END_FADE_S
@@ -30,14 +30,13 @@ CHEAP = ("dmd", "koopman", "koopman_var", "koopman_integrated")  # at 4 kHz, or 
 PRESETS = sorted(SHIPPED.glob("*.safetensors"))
 
 
-@torch.inference_mode()
 @pytest.mark.parametrize("path", PRESETS, ids=lambda path: path.stem)
 def test_a_shipped_preset_is_silent_in_the_end(path: Path) -> None:
     info = read_info(path)
     if not LONG and not (info.model in CHEAP and (info.rate_hz == 4000 or info.model == "dmd")):
         pytest.skip("run.py test --fuzz has it")
     preset = load_preset(path)
-    program, source, ends_s = model_program(preset.model, info, info.rate_hz), ModelSource(preset), voice_ends_s(info)
+    program, source, ends_s = model_program(preset, info.rate_hz), ModelSource(preset), voice_ends_s(info)
     ends, last = round(ends_s * info.rate_hz), round(LAST_S * info.rate_hz)
     kept, frames = np.zeros(0, np.float32), 0
     for block in voice_blocks(program, source, info, Pluck(), EAR, ends_s + END_FADE_S + LAST_S):
@@ -57,7 +56,7 @@ def test_a_shipped_preset_gives_its_place_free_where_it_is_played(path: Path) ->
     if not LONG and info.rate_hz != 4000:
         pytest.skip("run.py test --fuzz has it")
     preset = load_preset(path)
-    program = model_program(preset.model, info, info.rate_hz)
+    program = model_program(preset, info.rate_hz)
     if program.rendered:
         return
     initial_m = project(Pluck().displacement(info.grid_points), info.modes)

@@ -5,9 +5,10 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from engine.models import LRU, MODELS, LRUConfiguration
+from engine.models import MODELS, OF_MANY_STRINGS
+from engine.models.configurations import LRUConfiguration
 from engine.schema import SchemaError
-from training.cell import OF_MANY_STRINGS, Case, Cell, configuration_of, load, recipe_names
+from training.cell import Case, Cell, configuration_of, load, recipe_names
 from training.start import starts_of
 
 OF_CELLS = sorted(MODELS.keys() - OF_MANY_STRINGS)
@@ -74,7 +75,7 @@ def test_a_digest_covers_what_a_model_has_by_default(monkeypatch: pytest.MonkeyP
     class Larger(LRUConfiguration):
         state_size: int = 256
 
-    monkeypatch.setitem(MODELS, "lru", (LRU, Larger))
+    monkeypatch.setitem(MODELS, "lru", ("lru.LRU", Larger))
     assert found.digest != digest
 
 

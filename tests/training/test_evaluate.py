@@ -15,8 +15,8 @@ from torch import Tensor, nn
 
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
-from engine.resonators.sine_transform import to_grid, to_modes
 from engine.truth import ModalState, SplittingSolver
+from tests.engine.tensors import to_grid, to_modes
 from training.configuration import DatasetConfiguration
 from training.data.dataset import Dataset, load_dataset
 from training.evaluate import evaluate_model, evaluate_partials, evaluate_past_horizon
@@ -165,7 +165,7 @@ def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path: Path) 
         (partials.t60_error_percent, 0.01),
     ):
         assert np.nanmax(np.abs(errors)) < most
-    sigma = c.string.decay_rates(c.modes).numpy()
+    sigma = c.string.decay_rates(c.modes)
     there = ~np.isnan(partials.t60_s[:, 0])
     expected = np.broadcast_to(3 * math.log(10) / sigma, there.shape)
     assert there.sum() > 10

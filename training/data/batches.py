@@ -36,9 +36,9 @@ class TrainingData:
         c = dataset.configuration
         self._stride = c.stride
         self._amplitudes = dataset.split("train").to(device)
-        self._synthesis = (c.resonator.shapes / dataset.scale_m).float().to(device)
+        self._synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m).float().to(device)
         mirror = c.resonator.mirror
-        self._mirror = (torch.ones(c.modes) if mirror is None else mirror.float()).to(device)
+        self._mirror = (torch.ones(c.modes) if mirror is None else torch.from_numpy(mirror).float()).to(device)
         self.count = len(self._amplitudes)
 
     def draw(self, recipe: Recipe, rows: Tensor, horizon: int, iteration: int) -> Batch:

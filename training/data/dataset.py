@@ -22,11 +22,12 @@ import torch
 from filelock import FileLock
 from torch import Tensor
 
-from engine.excitation import DRAWS
+from engine.resonators.base import Array
 from engine.schema import write
 from engine.truth import ModalState, SplittingSolver
 from engine.whole_file import naming
 from training.configuration import DATA_VERSION, DatasetConfiguration, unlike_default
+from training.data.draws import DRAWS
 
 CHUNK = 50  # trajectories a step of the progress
 FRAMES_AT_ONCE = 100  # kept frames that are simulated in one go
@@ -78,14 +79,15 @@ def dataset_folder(configuration: DatasetConfiguration, cache: Path | None = Non
     return (cache or default_cache()) / "datasets" / dataset_key(configuration)
 
 
-def draw_initial(configuration: DatasetConfiguration) -> Tensor:
+def draw_initial(configuration: DatasetConfiguration) -> Array:
     """Initial modal amplitudes of all trajectories, float64 (count, modes)."""
     generator = torch.Generator().manual_seed(configuration.seed)
     draw = DRAWS[configuration.initial]
     initial = configuration.resonator.to_modes(draw(configuration.count, configuration.grid_points, generator))
     if configuration.largest_tension_rise is not None:
         rise = configuration.resonator.relative_tension_rise(initial)
-        initial = initial * (configuration.largest_tension_rise / rise).sqrt().clamp(max=1)[:, None]
+        with np.errstate(divide="ignore"):  # of silence
+            initial = initial * np.minimum(np.sqrt(configuration.largest_tension_rise / rise), 1)[:, None]
     return initial
 
 
@@ -189,13 +191,13 @@ def _simulate(c: DatasetConfiguration, file: Path, progress: Callable[[int, int]
         return amplitudes.checksum
 
 
-def displacement_deviation(amplitudes: np.ndarray[Any, Any], shapes: Tensor) -> float:
+def displacement_deviation(amplitudes: np.ndarray[Any, Any], shapes: Array) -> float:
     """The standard deviation of displacement over trajectories, frames and grid points, for (…, modes)."""
     gram, column = shapes @ shapes.T / shapes.shape[1], shapes.mean(1)
     total = squared = 0.0
     frames = amplitudes.reshape(-1, amplitudes.shape[-1])
     for first in range(0, len(frames), 100_000):
-        chunk = torch.from_numpy(frames[first : first + 100_000].astype(np.float64))
+        chunk = frames[first : first + 100_000].astype(np.float64)
         squared += float(((chunk @ gram) * chunk).sum())
         total += float((chunk @ column).sum())
     mean = total / len(frames)

@@ -13,8 +13,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from engine.models import StringModel
-from engine.models.base import Physics
+from engine.models.base import Physics, StringModel
+from engine.models.koopman_tension import KoopmanTension
 from training.family.motions import solve
 from training.family.strings import Column, PluckedString, displacement_m, draw_string
 
@@ -104,10 +104,12 @@ def measure(
 
 
 def player(model: StringModel[Any]) -> Player:
-    """A model of many strings."""
+    """A model of many strings. Raises ValueError: it learned one string, which its weights are."""
+    if not isinstance(model, KoopmanTension):
+        raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
 
     def play(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
-        own = model.tuned(Physics(plucked.resonator, rate_hz, SCALE_M))
+        own = model.for_resonator(Physics(plucked.resonator, rate_hz, SCALE_M))
         return rollout(own, plucked, steps)
 
     return play
@@ -119,7 +121,7 @@ def rollout(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tens
     while done < steps:
         count = min(4_800, steps - done)
         frames, state = model.advance(state, count)
-        blocks.append(plucked.resonator.to_modes(frames[0].double()) * SCALE_M)
+        blocks.append(torch.from_numpy(plucked.resonator.to_modes(frames[0].double().numpy()) * SCALE_M))
         done += count
     return torch.cat(blocks)
 

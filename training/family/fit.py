@@ -131,7 +131,7 @@ def geometric_mean(errors: Tensor) -> float:
 @torch.no_grad()
 def _motion(model: KoopmanTension, case: Case, rate_hz: int, frames: int) -> Tensor:
     """Modal amplitudes in m, (frames, modes): sines are orthogonal, so that their errors are the grid's."""
-    own = model.tuned(Physics(case.plucked.resonator, rate_hz))
+    own = model.for_resonator(Physics(case.plucked.resonator, rate_hz))
     return own.amplitudes(own.encode(displacement_m(case.plucked)[None]), frames)[0]
 
 

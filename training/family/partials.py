@@ -90,8 +90,8 @@ def _errors(play: Player, plucked: PluckedString, rate_hz: int, seconds: float) 
     block = max(1, FRAMES_AT_ONCE // length) * length
     played = play(plucked, rate_hz, steps)[None].split(block, dim=1)
     substeps = substeps_of(resonator, rate_hz)
-    true = true_phasors(resonator, plucked.amplitudes_m[None], rate_hz, steps, block, substeps=substeps)
-    tracks = [track_partials(predicted, truth, length) for predicted, truth in zip(played, true, strict=True)]
+    true = true_phasors(resonator, plucked.amplitudes_m[None].numpy(), rate_hz, steps, block, substeps=substeps)
+    tracks = [track_partials(predicted.numpy(), truth, length) for predicted, truth in zip(played, true, strict=True)]
     return partial_errors(PartialTrack.join(tracks), rate_hz, linear_hz, [(0.0, seconds)])
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 
 import torch
 
-from engine.models import KoopmanTension, build_model
+from engine.models import build_model
 from engine.models.base import Physics
+from engine.models.koopman_tension import KoopmanTension
 from engine.presets import PresetInfo, TrainedRange, save_preset
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, read_toml, write
@@ -140,7 +141,7 @@ def mean_errors(model: KoopmanTension, cases: list[Case], rate_hz: int) -> tuple
     play = player(model)
     squared = absolute = 0.0
     for case in cases:
-        shapes = case.plucked.resonator.shapes
+        shapes = torch.from_numpy(case.plucked.resonator.shapes)
         truth = case.truth @ shapes
         wrong = play(case.plucked, rate_hz, len(truth)) @ shapes - truth
         squared += float(wrong.square().sum() / truth.square().sum()) / len(cases)

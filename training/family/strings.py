@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+import torch
 from torch import Tensor
 
 from engine import excitation
@@ -79,8 +80,8 @@ def draw_from(ranges: StringFamily, random: np.random.Generator, shape: Shape | 
     else:
         displacement = excitation.gaussian(place, half_width, 1e-3, GRID_POINTS)
     amplitudes = resonator.to_modes(displacement)
-    amplitudes = amplitudes * (rise / resonator.relative_tension_rise(amplitudes)).sqrt()
-    return PluckedString(string, resonator, amplitudes, pitch_hz, inharmonicity, rise)
+    amplitudes = amplitudes * np.sqrt(rise / resonator.relative_tension_rise(amplitudes))
+    return PluckedString(string, resonator, torch.from_numpy(amplitudes), pitch_hz, inharmonicity, rise)
 
 
 def string_of(pitch_hz: float, inharmonicity: float, t60_s: float, bright_t60_s: float) -> StringParameters:
@@ -109,7 +110,7 @@ def string_of(pitch_hz: float, inharmonicity: float, t60_s: float, bright_t60_s:
 
 def displacement_m(plucked: PluckedString) -> Tensor:
     """At its release, float64 (grid_points,)."""
-    return plucked.resonator.to_grid(plucked.amplitudes_m)
+    return torch.from_numpy(plucked.resonator.to_grid(plucked.amplitudes_m.numpy()))
 
 
 def _log_uniform(random: np.random.Generator, bounds: tuple[float, float]) -> float:

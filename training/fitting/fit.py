@@ -20,7 +20,7 @@ from torch.nn import BatchNorm1d
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from engine.metrics import ErrorSums, RelativeError
-from engine.models import StringModel
+from engine.models.base import StringModel
 from engine.plain_text import one_line
 from engine.schema import SchemaError, read, write
 from training.configuration import Recipe, TrainingConfiguration, read_configuration
@@ -345,7 +345,7 @@ def _fit_at_once(
     if not _is_finite(error):
         raise Diverged("the fit grows beyond all numbers on the validation set; choose a lower rank")
     seconds = time.monotonic() - started
-    synthesis = (dataset.configuration.resonator.shapes / dataset.scale_m).float()
+    synthesis = torch.from_numpy(dataset.configuration.resonator.shapes / dataset.scale_m).float()
     truth = dataset.split("train")[:100, : configuration.steps + 1] @ synthesis
     with torch.no_grad():
         loss = float((model(truth[:, 0], configuration.steps) - truth[:, 1:]).square().mean())

@@ -16,7 +16,7 @@ from typing import Any, Protocol, runtime_checkable
 import torch
 from torch import Tensor
 
-from engine.models import StringModel
+from engine.models.base import StringModel
 from training.configuration import Recipe
 from training.data.batches import Batch
 

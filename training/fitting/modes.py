@@ -47,18 +47,18 @@ def known_modes(dataset: Dataset, steps: int) -> Modes:
     """Those of the string: prior knowledge that the paper's models do not have."""
     c = dataset.configuration
     amplitudes = dataset.split("train")[:, : steps + 1].double() / dataset.scale_m
-    linear = c.resonator.eigenvalues() / c.rate_hz
+    linear = torch.from_numpy(c.resonator.eigenvalues() / c.rate_hz)
     rise = 0.0
     if c.tension_modulated:  # at most half of the tension's, at the start of the strongest motion
-        rise = 0.5 * float(c.resonator.relative_tension_rise(amplitudes[:, 0] * dataset.scale_m).max())
+        rise = 0.5 * float(c.resonator.relative_tension_rise(amplitudes[:, 0].numpy() * dataset.scale_m).max())
     grids = []
     for eigenvalue in linear:
         own = float(eigenvalue.imag)
         reach = own - 4 * math.pi / steps, own * (1 + rise) + math.pi / steps
         spacing = max(math.pi / 2 / steps, own * rise / FREQUENCIES)
         grids.append(_grid(own, reach, spacing, -float(eigenvalue.real), steps))
-    mirror = (torch.ones(c.modes) if c.resonator.mirror is None else c.resonator.mirror).tolist()
-    return Modes(c.resonator.shapes, amplitudes, tuple(grids), tuple(mirror))
+    mirror = [1.0] * c.modes if c.resonator.mirror is None else c.resonator.mirror.tolist()
+    return Modes(torch.from_numpy(c.resonator.shapes), amplitudes, tuple(grids), tuple(mirror))
 
 
 def found_modes(dataset: Dataset, steps: int) -> Modes:
@@ -95,7 +95,7 @@ def found_modes(dataset: Dataset, steps: int) -> Modes:
 def _displacements(dataset: Dataset, steps: int) -> Iterator[Tensor]:
     """The training split on the grid, float64 (AT_ONCE, steps + 1, grid_points) at a time."""
     c = dataset.configuration
-    synthesis = c.resonator.shapes / dataset.scale_m
+    synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m)
     for part in dataset.split("train")[:, : steps + 1].split(AT_ONCE):
         yield part.double() @ synthesis
 

@@ -21,7 +21,9 @@ import torch
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from engine.models import FGRU, FRNN, KoopmanIntegrated, StringModel
+from engine.models.base import StringModel
+from engine.models.fno import FGRU, FRNN
+from engine.models.integrated_phase import KoopmanIntegrated
 from engine.models.string_modes import StringModes
 from training.fitting.modes import SLOWEST, Modes
 from training.research.fourier_wiring import store_in_fgru, store_in_frnn

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor, nn
 
-from engine.models import StringModel
+from engine.models.base import StringModel
 from engine.models.koopman import Koopman
 from training.configuration import Recipe
 from training.data.batches import flips

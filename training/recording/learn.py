@@ -48,6 +48,26 @@ class Learned:
     seconds: float
 
 
+@dataclass(frozen=True)
+class Examined:
+    """A recording before it is learned: its note, its series of partials, and what speaks against it."""
+
+    note: Note
+    series: Series | None
+    findings: tuple[Finding, ...]
+
+
+def examined(samples: Array, rate_hz: int) -> Examined:
+    """Examines a recording, as `learn` does first.
+
+    Raises:
+        RecordingError: it is no recording of one note in any case.
+    """
+    note = note_of(samples, rate_hz)
+    series, peaks = number_note(note)
+    return Examined(note, series, examine(samples, note, series, peaks))
+
+
 def learn(
     samples: Array,
     rate_hz: int,
@@ -72,10 +92,9 @@ def learn(
         Refused: the gate says that it is not one note of a string.
     """
     started = time.monotonic()
-    note = note_of(samples, rate_hz)
-    series, peaks = number_note(note)
+    found = examined(samples, rate_hz)
+    note, series, findings = found.note, found.series, found.findings
     progress(0.05)
-    findings = examine(samples, note, series, peaks)
     if findings and not anyway:
         raise Refused(findings)
     if series is None or not series.present:

@@ -259,8 +259,8 @@ def pluck_place(physics: Physics) -> float:
 def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[float, ...]]:
     """What the note's partials add to the law of its string, as `engine.resonators.recorded` keeps it."""
     count = max(each.number for each in physics.partials)
-    omega = string.undamped_frequencies(count).numpy()
-    sigma = string.decay_rates(count).numpy()
+    omega = string.undamped_frequencies(count)
+    sigma = string.decay_rates(count)
     law = np.interp(np.log(physics.smooth_hz), np.log(omega / (2 * math.pi)), np.log(sigma))
     smooth_ratio = np.clip(np.array(physics.smooth_decay) / np.exp(law), *RATIOS)
     smooth = sigma * np.exp(

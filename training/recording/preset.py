@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from engine.models.base import Physics as ModelPhysics
 from engine.presets import Preset, PresetInfo, find_preset, load_preset, save_preset
+from engine.presets.file import arrays_of
 from engine.resonators.recorded import RecordedNote, RecordedString
 from training.recording.fit import LearnedNote
 from training.recording.glide import TIMES_S
@@ -108,8 +108,7 @@ def write_preset(path: Path, title: str, strung: Strung, recorded: RecordedStrin
         test_rel_mse=None,
         test_rel_mae=None,
     )
-    model = base.model.tuned(ModelPhysics(info.resonator, info.rate_hz, info.scale_m))
-    save_preset(path, info, model)
+    save_preset(path, info, replace(base, info=info, weights={**base.weights, **arrays_of(info)}).model)
     return info
 
 

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from engine.resonators.base import Resonator
@@ -59,12 +58,12 @@ def synthetic_note(seed: int, seconds: float = 2.8, snr_db: float = 50.0, rise_c
     law = string.resonator(count, grid_points=count + 2)
     split = 2 ** (random.uniform(0.4, 2.0, count) / 1200)
     slower = np.exp(random.uniform(-0.7, 0.7, count))  # than the first, or faster
-    pair = torch.arange(2 * count) // 2
-    omega = np.stack([law.omega.numpy(), law.omega.numpy() * split], 1).ravel()
-    sigma = np.stack([law.sigma.numpy(), law.sigma.numpy() * slower], 1).ravel()
+    pair = np.arange(2 * count) // 2
+    omega = np.stack([law.omega, law.omega * split], 1).ravel()
+    sigma = np.stack([law.sigma, law.sigma * slower], 1).ravel()
     resonator = Resonator(
-        torch.from_numpy(omega),
-        torch.from_numpy(sigma),
+        omega,
+        sigma,
         law.coupling[pair],
         law.stretch[pair],
         law.tension_rise,
@@ -77,9 +76,9 @@ def synthetic_note(seed: int, seconds: float = 2.8, snr_db: float = 50.0, rise_c
     share = random.uniform(0.25, 0.75)
     q = np.stack([share * shape, (1 - share) * shape], 1).ravel()
     wanted = 4 * (2 ** (rise_cents * random.uniform(0, 1) / 1200) - 1)
-    q *= math.sqrt(max(wanted, 1e-9) / float(resonator.relative_tension_rise(torch.from_numpy(q))))
+    q *= math.sqrt(max(wanted, 1e-9) / float(resonator.relative_tension_rise(q)))
     solver = SplittingSolver(resonator, RATE_HZ, substeps=SUBSTEPS, silence=1e-7)
-    state = ModalState(torch.from_numpy(q)[None], torch.zeros(1, 2 * count, dtype=torch.float64))
+    state = ModalState.at_rest(q[None])
     modes = solver.solve(state, round(seconds * RATE_HZ))[0].numpy()
     heard = np.repeat(k * np.sin(math.pi * k * listened), 2)
     sound = modes @ heard

@@ -78,8 +78,8 @@ def _one(plucked: PluckedString) -> tuple[Tensor, ...]:
     present = (number <= modes).float()
     start = torch.zeros(MOST_MODES)
     start[:modes] = (plucked.amplitudes_m / amplitude_m).float()
-    sigma = string.decay_rates(MOST_MODES) / frequency
-    omega = string.undamped_frequencies(MOST_MODES) / frequency
+    sigma = torch.from_numpy(string.decay_rates(MOST_MODES) / frequency)
+    omega = torch.from_numpy(string.undamped_frequencies(MOST_MODES) / frequency)
     growth = float(sigma[1] - sigma[0]) / 3
     scaled = (
         math.log10(inharmonicity(string)) + 4,

@@ -7,8 +7,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
-from engine.models import StringModel, build_model
-from engine.models.base import Physics
+from engine.models import build_model
+from engine.models.base import Physics, StringModel
 from training.family.errors import SCALE_M, Player, rollout
 from training.family.strings import PluckedString
 from training.research.slow_flow import slow_flow
@@ -17,7 +17,7 @@ from training.research.slow_flow import slow_flow
 def linear_string(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
     """The string without tension modulation: what all errors are large beside."""
     times = torch.arange(1, steps + 1, dtype=torch.float64)[:, None] / rate_hz
-    eigenvalues = plucked.resonator.eigenvalues()
+    eigenvalues = torch.from_numpy(plucked.resonator.eigenvalues())
     sine = -eigenvalues.real / eigenvalues.imag
     angle = times * eigenvalues.imag
     return plucked.amplitudes_m * torch.exp(times * eigenvalues.real) * (angle.cos() + sine * angle.sin())

@@ -108,11 +108,11 @@ def resonant_triads(frequencies: Array) -> NDArray[np.int32]:
 
 
 def _modes(resonator: Resonator) -> _Modes:
-    stretch, coupling = (np.ascontiguousarray(t.numpy()) for t in (resonator.stretch, resonator.coupling))
+    stretch, coupling = (np.ascontiguousarray(t) for t in (resonator.stretch, resonator.coupling))
     c = float(coupling.sum() / stretch.sum()) if stretch.any() else 0.0
     if not np.allclose(coupling, c * stretch, rtol=1e-9, atol=0):
         raise ValueError("the slow flow needs an energy: the resonator's coupling must be a multiple of its stretch")
-    eigenvalues = resonator.eigenvalues().numpy()
+    eigenvalues = resonator.eigenvalues()
     frequencies = np.ascontiguousarray(eigenvalues.imag)
     closest = np.diff(np.sort(frequencies)).min(initial=np.inf)
     if closest < LEAST_GAP * frequencies.min():

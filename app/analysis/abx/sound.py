@@ -10,12 +10,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
 
 from app.analysis.abx.trials import Identity
 from engine.kernels.limiter import CEILING
-from engine.spectra import spectral_distances
 
 SOURCES = ("model", "truth")  # of A and B
 LARGEST_PEAK = CEILING / 2  # at a restart two sounds overlap: the new beginning and the end of the old one
@@ -80,4 +78,8 @@ def make_stimuli(sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, volume
 
 def _convergence(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
     """The distance of the magnitude spectra (see `engine.spectra`); differences in phase alone are hardly heard."""
+    import torch
+
+    from engine.spectra import spectral_distances
+
     return float(spectral_distances(torch.from_numpy(a)[None], torch.from_numpy(b)[None])[0])

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from PySide6.QtCore import QPoint, QRect, QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton, QToolTip, QVBoxLayout, QWidget
 
-from app.patches.patch import Macro, Patch, TuningChoice
+from app.patches.patch import Macro, Patch
+from app.patches.tuning import TuningChoice
 from app.shared.parameters import MACROS, OF_PATCHES
 from app.views.controls.knob import Knob
 from app.views.controls.name_button import NameButton

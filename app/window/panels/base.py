@@ -15,7 +15,6 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ClassVar
 
-import torch
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QWidget
 
@@ -70,7 +69,6 @@ class Panel(QWidget):
         self.library = library
         self.background = Background(self.key, self, rests=self._rests)
         self.background.failed.connect(self.told)
-        self._cores = torch.get_num_threads()
         self._seen_s = time.monotonic()
         self._growing: Take | None = None  # jobs rest while it is rendered
         self._grown = (-1, 0.0)  # its frames when it last grew, and when that was
@@ -96,7 +94,7 @@ class Panel(QWidget):
         """Starts a long job in place of the one under way; `background` has its signals."""
 
         def on_one_core(job: Job) -> object:
-            with _one_core(self._cores):
+            with _one_core():
                 return work(job)
 
         self.look()
@@ -124,16 +122,21 @@ class Panel(QWidget):
 
 _lock = threading.Lock()
 _holders: list[None] = []
+_usual = [1]
 
 
 @contextmanager
-def _one_core(usual: int) -> Iterator[None]:
+def _one_core() -> Iterator[None]:
     """While any job is under way, torch computes on one core; then on the usual number again.
 
     PyTorch's number of threads belongs partly to the calling thread and partly to the process, so the last job to end
     restores it.
     """
+    import torch
+
     with _lock:
+        if not _holders:
+            _usual[0] = torch.get_num_threads()
         _holders.append(None)
         torch.set_num_threads(1)
     try:
@@ -142,4 +145,4 @@ def _one_core(usual: int) -> Iterator[None]:
         with _lock:
             _holders.pop()
             if not _holders:
-                torch.set_num_threads(usual)
+                torch.set_num_threads(_usual[0])

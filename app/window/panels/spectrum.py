@@ -162,7 +162,7 @@ class SpectrumPanel(Panel):
 
     def take_started(self, take: Take) -> None:
         self._shown = self._standing = ()  # which would hold the last take
-        self._partials_hz = take.info.resonator.omega.numpy() / (2 * np.pi)
+        self._partials_hz = take.info.resonator.omega / (2 * np.pi)
 
     def show_moment(self, moment: Moment) -> None:
         self._moments += 1

@@ -115,7 +115,7 @@ class StringPanel(Panel):
 
     def _show_pluck(self) -> None:
         choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
-        shape_mm = choices.pluck.displacement(SHAPE_POINTS).numpy() * MM
+        shape_mm = choices.pluck.displacement(SHAPE_POINTS) * MM
         view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
         left, right = choices.listen, choices.listen_right if choices.stereo else None
         view.set_listening_points(*((None, None) if choices.pickup == "bridge" else (left, right)))

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-import torch
 
 from app.analysis.error_course import ErrorCourse
 from app.rendering import Take
@@ -29,7 +28,7 @@ def test_windows_are_the_engines_however_the_take_grows(make_take: Callable[...,
     assert course.complete
     edges_s = np.arange(course.windows + 1) * course.window_s
     sums = ErrorSums(1500)
-    sums.add(*(torch.from_numpy(motion[None, 1:]) for motion in (MODEL, TRUTH)))
+    sums.add(*(motion[None, 1:] for motion in (MODEL, TRUTH)))
     expected = sums.windows(take.info.rate_hz, list(edges_s))
     assert course.curves["mae"] == pytest.approx([window.rel_mae for window in expected])
     assert course.curves["rmse"] == pytest.approx([window.rel_mse**0.5 for window in expected])

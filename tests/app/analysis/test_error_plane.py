@@ -24,7 +24,8 @@ from app.shared.worker import Cancelled
 from engine.metrics import relative_error
 from engine.pluck import Pluck
 from engine.presets import load_preset
-from engine.sources import ModelSource, TruthSource, project
+from engine.resonators.sine_transform import project
+from engine.sources import ModelSource, TruthSource
 
 
 def test_levels_are_nested_in_the_finest() -> None:
@@ -88,7 +89,7 @@ def test_errors_are_those_of_the_sources(small_preset: Path, job: object) -> Non
             source.advance(source.start(initial), 400)[0]
             for source in (ModelSource(preset), TruthSource(preset.info))
         )
-        assert error == pytest.approx(relative_error(model.double(), truth).rel_mae, rel=1e-3)
+        assert error == pytest.approx(relative_error(model, truth).rel_mae, rel=1e-3)
 
 
 def test_output_that_is_not_finite_is_an_infinite_error(small_preset: Path, job: object) -> None:

@@ -7,15 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from app.analysis.take_partials import take_partials
 from app.rendering import Take
 from app.shared.worker import Cancelled, Job
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetInfo, load_preset, read_info
-from engine.resonators.sine_transform import to_grid, to_modes
-from engine.sources import ModelSource, TruthSource, project
+from engine.resonators.sine_transform import project, to_grid, to_modes
+from engine.sources import ModelSource, TruthSource
 from engine.voices import Ear
 from tests.app.takes import append_to
 
@@ -36,9 +35,9 @@ def take_of(
     for string in (replace(info, string=tighter), info):
         source = TruthSource(string)
         frames, _ = source.advance(source.start(initial), take.frames - 1)
-        motions.append(torch.cat([initial, frames[0]]))
-    changed = to_modes(motions[0], info.modes) * torch.tensor(gains, dtype=torch.float64)
-    append_to(take, to_grid(changed, info.grid_points).float().numpy(), motions[1].float().numpy())
+        motions.append(np.concatenate([initial, frames[0]]))
+    changed = to_modes(motions[0], info.modes) * np.array(gains)
+    append_to(take, to_grid(changed, info.grid_points).astype(np.float32), motions[1].astype(np.float32))
     return take
 
 
@@ -100,7 +99,7 @@ def test_a_take_of_pictures_has_the_partials_of_every_sample(job: Job) -> None:
     frames = round(0.2 * info.rate_hz)
     initial = project(pluck.displacement(info.grid_points), info.modes)[None]
     following, _ = source.advance(source.start(initial), frames)
-    every = torch.cat([initial[:, None], following], dim=1)[0].float().numpy()
+    every = np.concatenate([initial[:, None], following], axis=1)[0].astype(np.float32)
     whole = Take("whole", info, pluck, 0.2, Ear((0.5,)))
     append_to(whole, every, every)
     pictures = Take("pictures", info, pluck, 0.2, Ear((0.5,)), stride=8, model=source)

@@ -22,8 +22,8 @@ from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
-from engine.sources import project
-from engine.voices import Ear, Mixer, Program, Voice, bank_program, truth_program
+from engine.resonators.sine_transform import project
+from engine.voices import Ear, Mixer, Program, Voice, model_program, truth_program
 
 PRESET = "nylon_nonlinear_gaussian_4k_koopman_integrated"
 EAR = Ear((0.37, 0.7))
@@ -34,7 +34,7 @@ SECOND_S, SWITCH_S, RELEASE_S, END_S = 0.3, 0.7, 1.1, 1.3  # after the first not
 def notes(rate_hz: int, first_frame: int) -> tuple[Voice, Voice, Voice]:
     """The first note as model and, unheard, as truth, and the second one. They know when they begin and end."""
     preset = load_preset(SHIPPED / f"{PRESET}.safetensors")
-    bank = bank_program(preset.model, preset.info, rate_hz)
+    bank = model_program(preset, rate_hz)
     assert bank is not None
     truth = truth_program(preset.info, rate_hz)
 

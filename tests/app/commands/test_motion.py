@@ -16,9 +16,9 @@ from app.commands import arrays, motion
 from engine.metrics import relative_error
 from engine.pluck import Pluck
 from engine.presets import find_string, load_preset, read_string
-from engine.resonators.sine_transform import to_grid, to_modes
+from engine.resonators.sine_transform import project, to_grid, to_modes
 from engine.resonators.string import StringParameters
-from engine.sources import ModelSource, TruthSource, project
+from engine.sources import ModelSource, TruthSource
 from engine.truth import ModalState, solve_linear
 
 
@@ -48,16 +48,16 @@ def test_the_linear_string_is_the_closed_form(run, u0: Path, folder: Path) -> No
     assert (found.status, found.out, found.err) == (0, "", "")
     motion_m = np.load(folder / "out.npy")
     assert (motion_m.dtype, motion_m.shape) == (np.float64, (3, 201, 101))
-    start = ModalState.at_rest(to_modes(torch.from_numpy(np.load(u0)), 10))
+    start = ModalState.at_rest(to_modes(np.load(u0), 10))
     truth = to_grid(
-        solve_linear(StringParameters().resonator(start.modes), start, torch.arange(201).double() / 4000), 101
-    ).numpy()
+        solve_linear(StringParameters().resonator(start.modes), start, torch.arange(201).double() / 4000).numpy(), 101
+    )
     assert relative_l2(motion_m, truth) < 1e-12
     assert list(folder.iterdir()) == [folder / "out.npy"]
 
 
 def test_frame_0_is_the_displacement_projected_on_the_modes(run, u0: Path, small_preset: Path, folder: Path) -> None:
-    expected = project(torch.from_numpy(np.load(u0)), 10).numpy()
+    expected = project(np.load(u0), 10)
     assert np.abs(expected - np.load(u0)).max() > 1e-6
     run(*simulate(u0, folder / "s.npy", "nonlinear", 3))
     run("predict", small_preset, u0, folder / "p.npy", "--steps", 3)
@@ -80,7 +80,7 @@ def test_fewer_substeps_are_a_choice(run, u0: Path, folder: Path) -> None:
 
 @pytest.mark.parametrize("points", [12, 57])
 def test_any_grid_that_holds_the_modes_will_do(run, folder: Path, points: int) -> None:
-    np.save(folder / "u0.npy", Pluck().displacement(points)[None].float().numpy())
+    np.save(folder / "u0.npy", Pluck().displacement(points)[None].astype(np.float32))
     assert run(*simulate(folder / "u0.npy", folder / "out.npy")).status == 0
     assert np.load(folder / "out.npy").shape == (1, 201, points)
 
@@ -105,12 +105,12 @@ def test_blocks_do_not_show_in_the_file(run, u0, folder: Path, small_preset: Pat
 def test_a_prediction_is_the_models_in_metres(run, u0: Path, small_preset: Path, folder: Path) -> None:
     assert run("predict", small_preset, u0, folder / "out.npy", "--steps", 50).status == 0
     preset = load_preset(small_preset)
-    start = project(torch.from_numpy(np.load(u0)), 10)
+    start = project(np.load(u0), 10)
     with torch.no_grad():
-        frames = preset.model((start / preset.info.scale_m).float(), 50) * preset.info.scale_m
+        frames = preset.model(torch.from_numpy(start / preset.info.scale_m).float(), 50).numpy() * preset.info.scale_m
     found = np.load(folder / "out.npy")
     assert (found.dtype, found.shape) == (np.float64, (3, 51, 101))
-    assert found[:, 1:] == pytest.approx(frames.numpy(), abs=1e-9)
+    assert found[:, 1:] == pytest.approx(frames, abs=1e-9)
 
 
 BAD_INPUTS = {
@@ -225,10 +225,10 @@ def test_compare_is_the_papers_metric_over_grid_and_time(run, small_preset: Path
     preset = load_preset(small_preset)
     start = project(Pluck(0.4, 3).displacement(101), 10)[None]
     model, truth = (s.advance(s.start(start), 800)[0] for s in (ModelSource(preset), TruthSource(preset.info)))
-    expected = relative_error(model.double(), truth)
+    expected = relative_error(model, truth)
     assert facts["rel_mse"] == pytest.approx(expected.rel_mse, rel=1e-5)
     assert facts["rel_mae"] == pytest.approx(expected.rel_mae, rel=1e-5)
-    late = relative_error(model[:, 400:].double(), truth[:, 400:])
+    late = relative_error(model[:, 400:], truth[:, 400:])
     assert [w["past_horizon"] for w in facts["windows"]] == [False, True]
     assert facts["windows"][1]["rel_mse"] == pytest.approx(late.rel_mse, rel=1e-5)
 
@@ -275,7 +275,7 @@ STEEL_E4 = "steel_e4"
 
 
 def test_a_preset_of_many_strings_predicts_the_string_that_is_named(run, folder: Path) -> None:
-    initial = Pluck(0.3, 1.0).displacement(101)[None].numpy()
+    initial = Pluck(0.3, 1.0).displacement(101)[None]
     np.save(folder / "u.npy", initial)
     of_string = ("--string", STEEL_E4, "--steps", 300)
     assert run("predict", "studio_any_string", folder / "u.npy", folder / "model.npy", *of_string).status == 0
@@ -288,7 +288,7 @@ def test_a_preset_of_many_strings_predicts_the_string_that_is_named(run, folder:
 
 
 def test_a_string_file_rate_and_modes_are_taken(run, folder: Path) -> None:
-    np.save(folder / "u.npy", Pluck(0.3, 1.0).displacement(101)[None].numpy())
+    np.save(folder / "u.npy", Pluck(0.3, 1.0).displacement(101)[None])
     (folder / "mine.toml").write_bytes(find_string(STEEL_E4).read_bytes())
     told = ("--string", folder / "mine.toml", "--rate", 22_050, "--modes", 12, "--steps", 40)
     assert run("predict", "studio_any_string", folder / "u.npy", folder / "m.npy", *told).status == 0
@@ -296,7 +296,7 @@ def test_a_string_file_rate_and_modes_are_taken(run, folder: Path) -> None:
 
 
 def test_a_string_beyond_the_family_is_rendered_and_told(run, folder: Path) -> None:
-    np.save(folder / "u.npy", Pluck(0.3, 20.0, "triangular").displacement(101)[None].numpy())
+    np.save(folder / "u.npy", Pluck(0.3, 20.0, "triangular").displacement(101)[None])
     text = find_string(STEEL_E4).read_text(encoding="utf-8")
     slack = text.replace("tension_n = 72.592", "tension_n = 0.72592")
     slack = re.sub("d3_kg_m_s = .*", "d3_kg_m_s = 1e-8", slack)
@@ -319,7 +319,7 @@ def test_a_string_beyond_the_family_is_rendered_and_told(run, folder: Path) -> N
     ],
 )
 def test_an_impossible_string_is_one_line(run, folder: Path, old: str, new: str, words: str) -> None:
-    np.save(folder / "u.npy", Pluck().displacement(101)[None].numpy())
+    np.save(folder / "u.npy", Pluck().displacement(101)[None])
     text = find_string(STEEL_E4).read_text(encoding="utf-8")
     assert old in text
     (folder / "bad.toml").write_text(text.replace(old, new), encoding="utf-8")
@@ -332,7 +332,7 @@ def test_an_impossible_string_is_one_line(run, folder: Path, old: str, new: str,
 
 
 def test_a_preset_of_one_string_refuses_another(run, small_preset: Path, folder: Path) -> None:
-    np.save(folder / "u.npy", Pluck().displacement(101)[None].numpy())
+    np.save(folder / "u.npy", Pluck().displacement(101)[None])
     found = run("predict", small_preset, folder / "u.npy", folder / "m.npy", "--string", STEEL_E4, "--steps", 9)
     assert (found.status, "choose a preset of many strings" in found.err) == (1, True)
 

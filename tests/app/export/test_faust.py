@@ -16,7 +16,8 @@ from app.instrument.loud_keys import LoudKeys
 from app.instrument.offline import render_note
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Body, Damping, Patch, Pickup, PluckChoices, Room, TuningChoice
+from app.patches.patch import Body, Damping, Patch, Pickup, PluckChoices, Room
+from app.patches.tuning import TuningChoice
 from engine.presets import SHIPPED, Preset, load_preset
 from engine.voices import Ear
 
@@ -62,12 +63,12 @@ def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
     assert key is not None
     t, b, c, d, loud = (np.array(column) for column in key_tables([key, None]))
     mu2 = np.arange(1, key.resonator.modes + 1) ** 2
-    np.testing.assert_allclose(mu2 * (t[0] + b[0] * mu2), key.resonator.omega.numpy() ** 2, rtol=1e-12)
-    np.testing.assert_allclose(c[0] + d[0] * mu2, key.resonator.sigma.numpy(), rtol=1e-12)
+    np.testing.assert_allclose(mu2 * (t[0] + b[0] * mu2), key.resonator.omega**2, rtol=1e-12)
+    np.testing.assert_allclose(c[0] + d[0] * mu2, key.resonator.sigma, rtol=1e-12)
     assert (t[1], loud[1]) == (t[0], 0)  # a silent key has a neighbour's string
     at_bridge = key_tables([key], bridge=True)[4][0] * mu2 * (t[0] + b[0] * mu2) / np.sqrt(mu2)
     assert key.resonator.end_force is not None
-    expected = key.gain * key.string.shortened * key.resonator.end_force.numpy()
+    expected = key.gain * key.string.shortened * key.resonator.end_force
     np.testing.assert_allclose(at_bridge, expected, rtol=1e-12)
 
 

@@ -18,7 +18,7 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
-from engine.sources import project
+from engine.resonators.sine_transform import project
 from engine.voices import Ear, Mixer, Voice, model_program, voice_blocks
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
@@ -38,7 +38,7 @@ def write(note: Note, path: Path, choices: ExportChoices = FIXED, source: str = 
 def test_body_room_and_level_are_those_that_a_device_is_given(tmp_path: Path) -> None:
     found = write(a_note(), tmp_path / "a.wav")
     preset = load_preset(PRESET)
-    program = model_program(preset.model, preset.info, 48_000)
+    program = model_program(preset, 48_000)
     voice = Voice(program, project(Pluck(0.35, 4.0).displacement(101), preset.info.modes), Ear((0.37,)), 0.5)
     mixer = Mixer(48_000, limited=False)
     mixer.set_effects(effects_of(GUITAR))
@@ -68,7 +68,7 @@ def test_the_string_alone_and_a_difference_have_neither_body_nor_room(tmp_path: 
 
 def test_a_room_rings_out_after_the_string() -> None:
     preset = load_preset(PRESET)
-    program, effects = model_program(preset.model, preset.info, 48_000), effects_of(GUITAR)
+    program, effects = model_program(preset, 48_000), effects_of(GUITAR)
     assert effects is not None
     dry, wet = (
         np.concatenate(

@@ -17,7 +17,8 @@ from app.instrument.strings import pitch_hz_of
 from app.instrument.table import VALUES
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Patch, TuningChoice
+from app.patches.patch import Patch
+from app.patches.tuning import TuningChoice
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.layout import QUANTUM

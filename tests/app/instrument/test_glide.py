@@ -9,7 +9,8 @@ from app.instrument.glide import START_S, glides_cents
 from app.instrument.offline import render_note
 from app.instrument.strings import Strings
 from app.patches.library import find_patch
-from app.patches.patch import Patch, TuningChoice
+from app.patches.patch import Patch
+from app.patches.tuning import TuningChoice
 from engine.presets import Preset
 from tests.bench.tune import pitch_hz
 

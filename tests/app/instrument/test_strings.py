@@ -7,7 +7,8 @@ import pytest
 
 from app.instrument.loud_keys import on_string
 from app.instrument.strings import Strings, bent, damped, fretted, pitch_hz_of, slid, turned
-from app.patches.patch import Knobs, OpenString, Patch, StringSet, TuningChoice
+from app.patches.patch import Knobs, OpenString, Patch, StringSet
+from app.patches.tuning import TuningChoice
 from engine.resonators.family import inharmonicity
 from engine.resonators.string import StringParameters
 from tests.app.instrument.conftest import physical

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from app.patches.patch import TuningChoice
-from app.patches.tuning import Tuning, read_scala
+from app.patches.tuning import Tuning, TuningChoice, read_scala
 
 C4_HZ = 440 * 2 ** (-9 / 12)
 JUST = [Fraction(a, b) for a, b in ((9, 8), (5, 4), (4, 3), (3, 2), (5, 3), (15, 8), (2, 1))]

@@ -13,10 +13,10 @@ import torch
 
 from app.playing.ahead import CARE, LEAST_S, Ahead, AheadVoice
 from app.playing.sources import Sources
-from engine.models import KoopmanVar
-from engine.models.koopman_var import KoopmanState
-from engine.pluck import Pluck
-from engine.sources import FULL_SCALE_M, ModelSource, project
+from engine.models.koopman_var import KoopmanState, KoopmanVar
+from engine.pluck import FULL_SCALE_M, Pluck
+from engine.resonators.sine_transform import project
+from engine.sources import ModelSource
 from engine.voices import Ear, Mixer, Voice
 
 RATE_HZ = 4_000  # of the small preset and of the mixer: samples are heard as they are rendered
@@ -104,7 +104,7 @@ def test_it_begins_when_a_little_is_there_and_is_the_models_signal(ahead: Ahead,
     assert LEAST_S <= told.begun_s[0] < 1.0
     assert voice.waits_s == 0
     frames, _ = voice.source.advance(voice.source.start(voice.initial_m[None]), 2_000, voice.weights)
-    expected = frames[0, :, 0].numpy() / FULL_SCALE_M
+    expected = frames[0, :, 0] / FULL_SCALE_M
     attack = 16
     assert heard(voice.voice, 2_001)[1 + attack :] == pytest.approx(expected[attack:], abs=1e-5)
 

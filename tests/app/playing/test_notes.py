@@ -29,8 +29,7 @@ from app.presets.library import PresetEntry
 from app.rendering import RenderRequest
 from engine.kernels import layout as at
 from engine.kernels.layout import AHEAD
-from engine.models import KoopmanVar
-from engine.models.koopman_var import KoopmanState
+from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import load_preset, read_info, save_preset
 from engine.voices import Ear, Mixer, Voice

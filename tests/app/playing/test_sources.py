@@ -14,7 +14,7 @@ from app.playing import sources as module
 from app.playing.sources import Sources
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetError, load_preset
-from engine.sources import project
+from engine.resonators.sine_transform import project
 
 RATE_HZ = 8_000
 Wait = Callable[[Callable[[], bool]], None]

@@ -21,7 +21,7 @@ from app.shared.parameters import PARAMETERS
 from app.views.controls.browser_rows import ListedRows, RowsModel
 from app.views.dialogs.preset_card import COLUMNS as BROWSER_COLUMNS
 from app.views.dialogs.preset_card import preset_row
-from app.window.dropped_files import receive
+from app.window.dropped_files import Dropped, receive, receive_body
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset, preset_digest
 from training.heard_file import COLUMNS, NAME, Heard, add_heard
@@ -182,7 +182,10 @@ def test_foreign_and_broken_files_are_one_notice(library: Library, tmp_path: Pat
         assert dropped.choices == {}
         assert words in dropped.notice
     soundfile.write(tmp_path / "a.wav", np.zeros(5), 8000)
-    assert "has no recipe" in receive(tmp_path / "a.wav", library).notice
+    assert "no impulse response" in receive(tmp_path / "a.wav", library).notice
+    soundfile.write(tmp_path / "a.wav", np.zeros(8000), 8000)
+    assert receive(tmp_path / "a.wav", library) == Dropped(sound=True)
+    assert "no impulse response" in receive_body(tmp_path / "a.wav").notice
 
 
 def entry(**changes: object) -> PresetEntry:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-import torch
+from numpy.typing import NDArray
 
 from app.playing.sources import Sources
 from app.rendering import SOURCES, RenderRequest, Take
@@ -17,7 +17,8 @@ from app.rendering.job import Job
 from engine.metrics import ErrorSums
 from engine.pluck import Pluck
 from engine.presets import SHIPPED
-from engine.sources import StringSource, project
+from engine.resonators.sine_transform import project
+from engine.sources import StringSource
 from engine.voices import Ear
 
 STUDIO = SHIPPED / "studio_nylon_b3.safetensors"  # a bank, of which any frame can be had
@@ -79,11 +80,11 @@ def finished(job: Job) -> Take:
     return job.take
 
 
-def frames_m(source: StringSource, take: Take) -> torch.Tensor:
+def frames_m(source: StringSource, take: Take) -> NDArray[np.float64]:
     """Every frame in one piece, float64 (frames, grid_points)."""
     initial_m = project(PLUCK.displacement(source.grid_points), take.info.modes)[None]
     following, _ = source.advance(source.start(initial_m), round(take.seconds * take.info.rate_hz))
-    return torch.cat([initial_m[:, None], following], dim=1)[0].double()
+    return np.concatenate([initial_m[:, None], following], axis=1)[0]
 
 
 @PRESETS
@@ -91,7 +92,7 @@ def test_pictures_and_flashes_are_frames_of_the_motion(preset: Any, job: Render,
     take, loaded = finished(job(preset)), sources.load(preset)
     assert take.stride == {STUDIO: 8, ANY_STRING: 8, NETWORK: 3, STEPS: 1}[preset]
     for name, source in (("model", loaded.model), ("truth", loaded.truth)):
-        every = frames_m(source, take).numpy()
+        every = frames_m(source, take)
         near = 1e-5 * np.abs(every).max()
         motion = take.motions[name]
         assert motion.complete
@@ -114,7 +115,7 @@ def test_a_signal_is_what_is_heard_of_the_motion(
     take, loaded = finished(job(preset, ear=ear)), sources.load(preset)
     rate_hz = take.info.rate_hz
     for name, source in (("model", loaded.model), ("truth", loaded.truth)):
-        expected = (frames_m(source, take)[:] @ ear.weights(source.grid_points)).numpy()
+        expected = frames_m(source, take) @ ear.weights(source.grid_points)
         if ear.pickup == "velocity":
             expected = derivative(expected, rate_hz)
         found = take.listened.signals[name].read()

@@ -18,10 +18,10 @@ from app.rendering import RenderRequest, RenderWorker, Take
 from app.rendering import worker as worker_module
 from app.rendering.line import Line
 from engine.metrics import ErrorSums
-from engine.models import KoopmanVar
-from engine.models.koopman_var import KoopmanState
+from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
-from engine.sources import StringSource, project
+from engine.resonators.sine_transform import project
+from engine.sources import StringSource
 from engine.voices import Ear
 
 DEADLINE_S = 30.0
@@ -84,7 +84,7 @@ def expected_m(source: StringSource, pluck: Pluck, modes: int, frames: int) -> n
     """All frames in one piece, (frames, grid_points)."""
     initial_m = project(pluck.displacement(source.grid_points), modes)[None]
     following, _ = source.advance(source.start(initial_m), frames - 1)
-    return torch.cat([initial_m[:, None], following], dim=1)[0].float().numpy()
+    return np.concatenate([initial_m[:, None], following], axis=1)[0].astype(np.float32)
 
 
 def test_a_take_is_what_its_sources_give_in_one_piece(
@@ -129,6 +129,20 @@ def test_while_plucks_are_heard_a_motion_keeps_step_with_its_sound(
         assert not take.complete
         hurried = False
         wait_until(lambda: take.complete)
+    finally:
+        worker.close()
+
+
+def test_the_first_motion_waits_until_a_pluck_would_sound(small_preset: Path, heard: Heard) -> None:
+    """It loads torch, which would keep the sound waiting."""
+    sounds = False
+    worker = RenderWorker(heard, Sources().load, sounds=lambda: sounds)
+    try:
+        worker.submit(request_of(small_preset))
+        time.sleep(0.3)
+        assert not heard.started
+        sounds = True
+        wait_until(lambda: bool(heard.finished))
     finally:
         worker.close()
 
@@ -189,7 +203,7 @@ def test_the_error_that_is_told_is_that_of_the_take(small_preset: Path, worker: 
     wait_until(lambda: bool(heard.finished))
     take, errors = heard.finished[0]
     expected = ErrorSums(take.frames - 1)
-    expected.add(*(torch.from_numpy(take.motion_m(name)[None, 1:].copy()) for name in ("model", "truth")))
+    expected.add(*(take.motion_m(name)[None, 1:].copy() for name in ("model", "truth")))
     assert errors.total() == expected.total()
     assert errors.per_frame()[0] == pytest.approx(expected.per_frame()[0])
 

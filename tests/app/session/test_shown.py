@@ -16,7 +16,7 @@ from engine.presets import read_info
 @pytest.fixture
 def library(small_preset: Path) -> Library:
     info = replace(read_info(small_preset), title="Steel E4, bright")
-    return Library([PresetEntry("steel_e4", small_preset, info, 1)])
+    return Library([PresetEntry("steel_e4", small_preset, info)])
 
 
 def test_at_first_it_is_model_and_truth(library: Library) -> None:

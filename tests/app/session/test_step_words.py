@@ -8,7 +8,8 @@ import pytest
 
 from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED, read_patch
-from app.patches.patch import ASSIGNABLE, Body, Patch, TuningChoice
+from app.patches.patch import ASSIGNABLE, Body, Patch
+from app.patches.tuning import TuningChoice
 from app.session.choices import Session
 from app.session.history import RECORDED, History
 from app.session.step_words import SEVERAL, step_words

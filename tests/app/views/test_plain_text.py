@@ -38,9 +38,7 @@ EVIL = "<img src=evil>"
 @pytest.fixture
 def entry(small_preset: Path) -> PresetEntry:
     words = {name: f"{name} {EVIL}" for name in ("title", "description", "knows", "licence", "initialisation")}
-    return PresetEntry(
-        f"name {EVIL}", Path("/x") / f"{EVIL}.safetensors", replace(read_info(small_preset), **words), 1
-    )
+    return PresetEntry(f"name {EVIL}", Path("/x") / f"{EVIL}.safetensors", replace(read_info(small_preset), **words))
 
 
 def formatted(root: QWidget) -> Iterator[str]:

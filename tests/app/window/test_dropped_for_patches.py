@@ -136,7 +136,7 @@ def test_a_sound_that_is_no_body_is_told_and_changes_nothing(
     own_folder: Path, patched: Controller, tmp_path: Path
 ) -> None:
     before = patched.session.choices
-    for path in (knock(tmp_path / "long.wav", seconds=31.0), knock(tmp_path / "long.flac", seconds=31.0)):
+    for path in (knock(tmp_path / "long.wav", seconds=61.0), knock(tmp_path / "long.flac", seconds=61.0)):
         drop(patched, path)
         assert f"{path}: no impulse response that can be used" in patched.window.notices.text
     assert patched.session.choices == before
@@ -193,13 +193,17 @@ def test_a_recipe_of_the_model_that_plays_the_patch_leaves_the_patch_and_its_pic
 
 @pytest.mark.parametrize("ending", ["wav", "flac"])
 def test_a_long_body_is_taken_and_the_notice_says_how_much_of_it(
-    patched: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
+    qtbot: QtBot, patched: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ending: str
 ) -> None:
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
     path = tmp_path / f"hall.{ending}"
     noise = 0.3 * np.random.default_rng(0).uniform(-1, 1, round(6.97 * 48_000))
     soundfile.write(path, noise * np.geomspace(1, 1e-3, len(noise)), 48_000, "PCM_24")
     drop(patched, path)
+    dialog = patched._learning  # as long as a note: the dialog asks
+    assert dialog is not None
+    qtbot.waitUntil(dialog.body.isChecked)
+    dialog.start.click()
     assert patched.patches.patch is not None
     assert patched.patches.patch.body.name == "hall"
     assert f"hall.{ending} lasts 6.97 s: its first 3 s, faded out, are the body." in patched.window.notices.text

@@ -14,7 +14,8 @@ from app.instrument.events import NoteOff, NoteOn, PluckAt, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
-from app.patches.patch import Macro, Patch, Pickup, Target, TuningChoice
+from app.patches.patch import Macro, Patch, Pickup, Target
+from app.patches.tuning import TuningChoice
 from app.rendering.subject import string_of
 from app.shared.key_names import note_name
 from app.window.controller import Controller

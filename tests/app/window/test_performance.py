@@ -24,8 +24,7 @@ from app.window.main_window import MainWindow
 from app.window.performance import Performance
 from app.window.settings import Settings
 from engine.kernels.layout import QUANTUM
-from engine.models import KoopmanVar
-from engine.models.koopman_var import KoopmanState
+from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import SHIPPED
 from engine.voices import Mixer

@@ -5,22 +5,25 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import permutations
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from engine.kernels import layout as at
-from engine.models import KoopmanIntegrated
-from engine.models.dmd import DMD, DMDConfiguration
+from engine.models.configurations import DMDConfiguration
+from engine.models.dmd import DMD
+from engine.models.integrated_phase import KoopmanIntegrated
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
+from engine.schema import write
 from engine.sources import ModelSource
 from engine.truth import ModalState, SplittingSolver, solve_linear
-from engine.voices import Ear, Mixer, Voice, bank_program, model_program, render_voice
+from engine.voices import Ear, Mixer, Voice, model_program, render_voice
+from engine.voices.banks import bank_program
 
 KNOWING = "nylon_nonlinear_gaussian_4k_koopman_integrated"
 HINTED = f"{KNOWING}_hinted"
@@ -31,7 +34,7 @@ Signal = NDArray[np.float64]
 Rung = Callable[..., Signal]
 Strike = Callable[..., Voice]
 Shipped = Callable[[str], Preset]
-Initial = Callable[[PresetInfo, Pluck], Tensor]
+Initial = Callable[[PresetInfo, Pluck], Signal]
 
 
 def relative(found: Signal, expected: Signal) -> float:
@@ -51,7 +54,7 @@ def test_at_the_presets_rate_it_is_the_models_own_rendering(
     source, let_go_m = ModelSource(preset), initial_m(preset.info, pluck)
     weights = ear.weights(source.grid_points)
     frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, weights)
-    expected = frames_m[0].double().numpy() / FULL_SCALE_M
+    expected = frames_m[0] / FULL_SCALE_M
     assert relative(found[1:], expected) < 3e-5
 
 
@@ -64,8 +67,11 @@ def test_at_any_rate_it_is_the_model_at_those_times(
     found = rung(rate_hz, strike(name, pluck, rate_hz, STEREO), attack=False)
     frames = torch.arange(0, rate_hz, 11)
     with torch.inference_mode():
-        state = preset.model.encode((initial_m(preset.info, pluck)[None] / preset.info.scale_m).float())
-        times, weights = frames.double() * preset.info.rate_hz / rate_hz, STEREO.weights(preset.info.grid_points)
+        state = preset.model.encode(
+            torch.from_numpy(initial_m(preset.info, pluck)[None] / preset.info.scale_m).float()
+        )
+        times = frames.double() * preset.info.rate_hz / rate_hz
+        weights = torch.from_numpy(STEREO.weights(preset.info.grid_points))
         expected = (
             preset.model.decode(preset.model.latents(state.origin, times), weights)[0].double().numpy()
             * preset.info.scale_m
@@ -79,19 +85,19 @@ def test_a_dmd_of_the_linear_string_is_the_linear_string(
     rate_hz: int, small_info: Callable[[bool], PresetInfo], rung: Rung
 ) -> None:
     info = small_info(False)
-    noise_m = 5e-3 * torch.rand(4, info.grid_points, generator=torch.Generator().manual_seed(0)).double()
+    noise_m = 5e-3 * torch.rand(4, info.grid_points, generator=torch.Generator().manual_seed(0)).double().numpy()
     solver = SplittingSolver(info.string.resonator(info.modes, tension_modulated=False), info.rate_hz)
     start = ModalState.at_rest(to_modes(noise_m, info.modes))
-    trajectories = to_grid(solver.solve(start, 400), info.grid_points) / info.scale_m
+    trajectories = torch.from_numpy(to_grid(solver.solve(start, 400).numpy(), info.grid_points) / info.scale_m)
     model = DMD.fit(trajectories, DMDConfiguration(info.grid_points, 2, 2 * info.modes))
     program = bank_program(model, info, rate_hz)
     assert program is not None
-    let_go_m = to_grid(start.amplitude[0], info.grid_points)
+    let_go_m = to_grid(start.amplitude[0].numpy(), info.grid_points)
     found = rung(rate_hz // 2, Voice(program, let_go_m, EAR), attack=False)[:, :1]
     times_s = torch.arange(len(found)).double() / rate_hz
     exact = solve_linear(info.resonator, ModalState(start.amplitude[:1], start.velocity[:1]), times_s)
-    expected = to_grid(exact[0], info.grid_points) @ EAR.weights(info.grid_points) / FULL_SCALE_M
-    assert relative(found, expected.numpy()) < 3e-5
+    expected = to_grid(exact[0].numpy(), info.grid_points) @ EAR.weights(info.grid_points) / FULL_SCALE_M
+    assert relative(found, expected) < 3e-5
 
 
 @pytest.mark.parametrize(("first", "second"), list(permutations((KNOWING, NYLON, STEEL), 2)))
@@ -145,7 +151,9 @@ def test_a_dmd_that_the_kernel_cannot_hold_is_rendered_ahead(
     with torch.no_grad():
         model.magnitude_log.fill_(-0.01 if rank else -1e9)
     assert bank_program(model, info, 48_000) is None
-    assert model_program(model, info, 48_000).rendered
+    sizes = write(model.configuration)
+    weights = {name: tensor.numpy() for name, tensor in model.state_dict().items()}
+    assert model_program(Preset("", Path(), replace(info, model_configuration=sizes), weights), 48_000).rendered
     with torch.no_grad():
         model.magnitude_log[: at.MOST_MODES].fill_(-0.01)
         model.magnitude_log[at.MOST_MODES :].fill_(-1e9)
@@ -156,7 +164,7 @@ def test_a_dmd_that_the_kernel_cannot_hold_is_rendered_ahead(
 def test_at_a_low_rate_no_latent_is_heard_as_another(shipped: Shipped) -> None:
     """What a device of 48 kHz gives below 3.5 kHz is what one of 8 kHz gives."""
     preset, pluck = shipped(STEEL), Pluck(0.13, 2.0, width=0.03)
-    programs = {rate: model_program(preset.model, preset.info, rate) for rate in (8_000, 48_000)}
+    programs = {rate: model_program(preset, rate) for rate in (8_000, 48_000)}
     low, high = (
         render_voice(program, ModelSource(preset), preset.info, pluck, EAR, 0.5)[:, 0]
         for program in programs.values()

@@ -7,7 +7,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-import torch
 from numba import njit
 
 from engine.effects import Effects, Room
@@ -57,7 +56,7 @@ def string_voice() -> Voice:
 def test_samples_and_voices_are_published_when_they_are_there(published: Published) -> None:
     """The numbers that show them to the device's thread change in no other way."""
     samples = np.full((100, 1), 0.25, np.float32)
-    rendered = Voice(plain_program(RATE_HZ), torch.full((3,), FULL_SCALE_M), Ear((0.5,)), 1.0, 1.0, RATE_HZ)
+    rendered = Voice(plain_program(RATE_HZ), np.full(3, FULL_SCALE_M), Ear((0.5,)), 1.0, 1.0, RATE_HZ)
     rendered.append(samples)
     assert published == [(at.READY, 100)]
     assert rendered.memory.view(np.int64)[at.READY] == 0

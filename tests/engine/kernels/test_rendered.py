@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import soxr
-import torch
 from numpy.typing import NDArray
 
 from engine.kernels.layout import QUANTUM
@@ -35,7 +34,7 @@ def band_limited(rate_hz: int, seconds: float) -> NDArray[np.float32]:
 
 def waiting(program: Program, seconds: float, source_rate_hz: int, ear: Ear = MIDDLE) -> Voice:
     """Without any samples yet."""
-    voice = Voice(program, torch.full((41,), FULL_SCALE_M), ear, 1.0, seconds, source_rate_hz)
+    voice = Voice(program, np.full(41, FULL_SCALE_M), ear, 1.0, seconds, source_rate_hz)
     voice.never_ends()
     return voice
 

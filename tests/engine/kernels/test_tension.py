@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from engine.kernels import layout, tension
 from engine.kernels.modes import row
@@ -17,12 +16,12 @@ from engine.pluck import FULL_SCALE_M, FULL_SCALE_N, Pluck
 from engine.presets import Preset, PresetInfo, of_string
 from engine.sources import ModelSource, TruthSource
 from engine.truth import ModalState, SplittingSolver
-from engine.voices import Ear, Mixer, Voice, bank_program
+from engine.voices import Ear, Mixer, Voice, model_program
 from engine.voices.programs import truth_program
 
 STEREO = Ear((0.37, 0.8))
 Rung = Callable[..., NDArray[np.float64]]
-Initial = Callable[[PresetInfo, Pluck], Tensor]
+Initial = Callable[[PresetInfo, Pluck], NDArray[np.float64]]
 
 
 def relative(found: NDArray[np.float64], expected: NDArray[np.float64]) -> float:
@@ -39,16 +38,14 @@ def test_a_voice_is_the_model_and_the_string(
     preset = of_string(shipped("studio_any_string"), rate_hz=rate_hz)
     info = preset.info
     let_go_m = initial_m(info, pluck)
-    _, state = preset.model.advance(preset.model.encode((let_go_m[None] / info.scale_m).float()), 1)
+    _, state = preset.model.advance(preset.model.encode(torch.from_numpy(let_go_m[None] / info.scale_m).float()), 1)
     assert state.nodes.tolist() == [nodes]
-    program = bank_program(preset.model, info, rate_hz)
-    assert program is not None
+    program = model_program(preset, rate_hz)
     found = rung(rate_hz // 4, Voice(program, let_go_m, STEREO), attack=False)
     weights = STEREO.weights(info.grid_points)
     for source in (ModelSource(preset), TruthSource(info)):
-        readout = weights.float() if isinstance(source, ModelSource) else weights
-        frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, readout)
-        expected = torch.cat([(let_go_m @ weights)[None], frames_m[0].double()]).numpy() / FULL_SCALE_M
+        frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, weights)
+        expected = np.concatenate([(let_go_m @ weights)[None], frames_m[0]]) / FULL_SCALE_M
         hard = nodes > 2 and isinstance(source, TruthSource)
         assert relative(found, expected) < (1e-3 if hard else 1e-5)
 
@@ -60,23 +57,22 @@ def test_the_force_at_the_bridge_is_that_of_the_solvers_modes(
     preset = of_string(shipped("studio_any_string"), rate_hz=48_000)
     info, bridge = preset.info, Ear((0.5,), "bridge")
     let_go_m = initial_m(info, Pluck(0.12, 4.0, "triangular"))
-    model = bank_program(preset.model, info, 48_000)
-    program = model if source == "model" else truth_program(info, 48_000)
-    assert program is not None and info.resonator.end_force is not None
+    program = model_program(preset, 48_000) if source == "model" else truth_program(info, 48_000)
+    assert info.resonator.end_force is not None
     found = rung(24_000, Voice(program, let_go_m, bridge), attack=False)
     q = info.resonator.to_modes(let_go_m)[None]
     amplitudes, _ = SplittingSolver(info.resonator, 48_000).advance(ModalState.at_rest(q), len(found) - 1)
-    expected = torch.cat([q, amplitudes[0]]) @ info.resonator.end_force / FULL_SCALE_N
-    assert relative(found, expected[:, None].numpy()) < 1e-4
+    expected = np.concatenate([q, amplitudes[0].numpy()]) @ info.resonator.end_force / FULL_SCALE_N
+    assert relative(found, expected[:, None]) < 1e-4
 
 
-def ringing(info: PresetInfo, frames: int) -> tuple[Tensor, Tensor]:
+def ringing(info: PresetInfo, frames: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """The preset's string so long after a pluck that raises its tension by a half, in m and m/s, (modes,)."""
     amplitudes = info.resonator.to_modes(Pluck(0.3, 1.0, "triangular").displacement(info.grid_points))
-    amplitudes = amplitudes * (0.5 / info.resonator.relative_tension_rise(amplitudes)).sqrt()
+    amplitudes = amplitudes * np.sqrt(0.5 / info.resonator.relative_tension_rise(amplitudes))
     solver = SplittingSolver(info.resonator, info.rate_hz)
     _, state = solver.advance(ModalState.at_rest(amplitudes[None]), frames)
-    return state.amplitude[0], state.velocity[0]
+    return state.amplitude[0].numpy(), state.velocity[0].numpy()
 
 
 def test_a_voice_that_sets_out_from_a_ringing_string_is_the_model_and_the_string(
@@ -86,29 +82,29 @@ def test_a_voice_that_sets_out_from_a_ringing_string_is_the_model_and_the_string
     info, model = preset.info, preset.model
     assert isinstance(model, KoopmanTension)
     q, v = ringing(info, 301)
-    program = bank_program(model, info, 48_000)
-    assert program is not None
+    program = model_program(preset, 48_000)
     shape_m = info.resonator.to_grid(q)
-    found = rung(48_000, Voice(program, shape_m, STEREO, begin=(q.numpy(), v.numpy())), attack=False)
+    found = rung(48_000, Voice(program, shape_m, STEREO, begin=(q, v)), attack=False)
     points = info.resonator.shapes @ STEREO.weights(info.grid_points)
     steps = len(found) - 1
-    true, _ = SplittingSolver(info.resonator, 48_000).advance(ModalState(q[None], v[None]), steps)
-    encoded = model.encode(*(info.resonator.to_grid(each)[None] / info.scale_m for each in (q, v / 48_000)))
+    true, _ = SplittingSolver(info.resonator, 48_000).advance(
+        ModalState(torch.from_numpy(q)[None], torch.from_numpy(v)[None]), steps
+    )
+    encoded = model.encode(
+        *(torch.from_numpy(info.resonator.to_grid(each)[None] / info.scale_m) for each in (q, v / 48_000))
+    )
     for amplitudes in (model.amplitudes(encoded, steps) * info.scale_m, true):
-        expected = torch.cat([(q @ points)[None], amplitudes[0] @ points]).numpy() / FULL_SCALE_M
+        expected = np.concatenate([(q @ points)[None], amplitudes[0].numpy() @ points]) / FULL_SCALE_M
         assert relative(found, expected) < 1e-5
 
 
 def test_what_is_set_out_comes_back(shipped: Callable[[str], Preset]) -> None:
     """Also where all modes swing alike, which no pluck does, and raise the tension by a half."""
-    info, model = shipped("studio_any_string").info, shipped("studio_any_string").model
-    program = bank_program(model, info, 48_000)
-    assert program is not None
-    alike = torch.ones(info.modes, dtype=torch.float64)
-    alike = alike * (0.5 / info.resonator.relative_tension_rise(alike)).sqrt()
+    info, program = shipped("studio_any_string").info, model_program(shipped("studio_any_string"), 48_000)
+    alike = np.sqrt(0.5 / info.resonator.relative_tension_rise(np.ones(info.modes))) * np.ones(info.modes)
     states = [ringing(info, 1), ringing(info, 301), ringing(info, 2_000), (alike, alike * info.resonator.omega)]
-    for q, v in ((q.numpy(), v.numpy()) for q, v in states):
-        memory = Voice(program, info.resonator.to_grid(torch.from_numpy(q)), STEREO, begin=(q, v)).memory
+    for q, v in states:
+        memory = Voice(program, info.resonator.to_grid(q), STEREO, begin=(q, v)).memory
         tension.prepare(memory, program.memory, q, v)
         tension.set_out(memory, q, v, False)
         assert relative(row(memory, len(q), 0), q) > 1e-6
@@ -119,14 +115,12 @@ def test_what_is_set_out_comes_back(shipped: Callable[[str], Preset]) -> None:
 
 
 def test_a_string_retuned_to_its_own_modes_does_not_change(shipped: Callable[[str], Preset]) -> None:
-    info, model = shipped("studio_any_string").info, shipped("studio_any_string").model
-    program = bank_program(model, info, 48_000)
-    assert program is not None
-    q, v = (each.numpy() for each in ringing(info, 301))
+    info, program = shipped("studio_any_string").info, model_program(shipped("studio_any_string"), 48_000)
+    q, v = ringing(info, 301)
     heard, latents = [], []
     for retuned in (False, True):
         mixer = Mixer(48_000, limited=False)
-        voice = Voice(program, info.resonator.to_grid(torch.from_numpy(q)), STEREO, begin=(q, v))
+        voice = Voice(program, info.resonator.to_grid(q), STEREO, begin=(q, v))
         mixer.add(voice)
         for _ in range(100):
             if retuned:
@@ -139,8 +133,7 @@ def test_a_string_retuned_to_its_own_modes_does_not_change(shipped: Callable[[st
 
 def test_it_falls_silent_and_ends(shipped: Callable[[str], Preset], initial_m: Initial, rung: Rung) -> None:
     preset = shipped("studio_any_string")
-    program = bank_program(preset.model, preset.info, 48_000)
-    assert program is not None
+    program = model_program(preset, 48_000)
     voice = Voice(program, initial_m(preset.info, Pluck(0.3, 0.5)), STEREO)
     found = rung(48_000 * 30, voice, attack=False)
     assert voice.over

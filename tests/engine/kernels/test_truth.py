@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.presets import Preset, PresetInfo
@@ -21,7 +20,7 @@ from engine.voices import Ear, Voice, truth_program
 
 STEREO = Ear((0.37, 0.8))
 Rung = Callable[..., NDArray[np.float64]]
-Initial = Callable[[PresetInfo, Pluck], Tensor]
+Initial = Callable[[PresetInfo, Pluck], NDArray[np.float64]]
 Info = Callable[[bool], PresetInfo]
 
 
@@ -39,7 +38,7 @@ def test_it_is_the_string_that_models_learn(
     source, let_go_m = TruthSource(info), initial_m(info, pluck)
     weights = STEREO.weights(info.grid_points)
     frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, weights)
-    expected = torch.cat([(let_go_m @ weights)[None], frames_m[0]]).numpy() / FULL_SCALE_M
+    expected = np.concatenate([(let_go_m @ weights)[None], frames_m[0]]) / FULL_SCALE_M
     assert relative(found, expected) < 1e-4
 
 
@@ -49,7 +48,7 @@ def test_after_a_second_it_is_the_oracles(small_info: Info, initial_m: Initial, 
     found = rung(8000, Voice(truth_program(info, 8000), let_go_m, STEREO), attack=False)
     start = ModalState.at_rest(to_modes(let_go_m[None], info.modes))
     exact = solve_dop853(info.resonator, start, 8000, 7999, rtol=1e-7, atol=1e-10)
-    expected = (to_grid(exact[0], info.grid_points) @ STEREO.weights(info.grid_points)).numpy() / FULL_SCALE_M
+    expected = to_grid(exact[0].numpy(), info.grid_points) @ STEREO.weights(info.grid_points) / FULL_SCALE_M
     assert relative(found[7000:], expected[7000:]) < 1e-4
 
 
@@ -61,7 +60,7 @@ def test_the_linear_string_is_exact(rate_hz: int, small_info: Info, initial_m: I
     found = rung(rate_hz // 2, Voice(truth_program(info, rate_hz), let_go_m, STEREO), attack=False)
     start = ModalState.at_rest(to_modes(let_go_m[None], info.modes))
     exact = solve_linear(info.resonator, start, torch.arange(len(found)).double() / rate_hz)
-    expected = (to_grid(exact[0], info.grid_points) @ STEREO.weights(info.grid_points)).numpy() / FULL_SCALE_M
+    expected = to_grid(exact[0].numpy(), info.grid_points) @ STEREO.weights(info.grid_points) / FULL_SCALE_M
     assert relative(found, expected) < 1e-7
 
 

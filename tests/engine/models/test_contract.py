@@ -9,14 +9,15 @@ from typing import Any
 import pytest
 import torch
 
-from engine.models import MODELS, StringModel, build_model, count_parameters
-from engine.models.base import AnyFrameModel, Physics
+from engine.models import MODELS, build_model, model_class
+from engine.models.base import AnyFrameModel, Physics, StringModel, count_parameters
 from engine.pluck import Pluck
 from engine.presets import load_preset, read_info, save_preset
-from engine.resonators.sine_transform import listening_weights
+from engine.resonators.sine_transform import project
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, write
-from engine.sources import ModelSource, project
+from engine.sources import ModelSource
+from tests.engine.tensors import displacement_of, listening_weights
 
 PAPER_COUNTS = {
     "koopman": 191_077,
@@ -49,7 +50,7 @@ def test_the_counts_are_those_of_table_2(name: str) -> None:
 @torch.inference_mode()
 def test_any_splitting_into_blocks_is_the_same_motion(named_model: tuple[str, StringModel[Any]]) -> None:
     _, model = named_model
-    initial = (Pluck().displacement(101) / 1e-3).float()[None]
+    initial = (displacement_of(Pluck()) / 1e-3).float()[None]
     whole = model(initial, 700)
     state, parts = model.encode(initial), []
     for steps in (1, 64, 65, 257, 313):
@@ -64,8 +65,8 @@ def test_some_frames_are_those_of_all(named_model: tuple[str, StringModel[Any]])
     _, model = named_model
     if not isinstance(model, AnyFrameModel):
         pytest.skip("it steps through every frame")
-    initial = (Pluck().displacement(101) / 1e-3).float()[None]
-    weights = listening_weights(torch.tensor([0.37, 0.61], dtype=torch.float64), 101).float()
+    initial = (displacement_of(Pluck()) / 1e-3).float()[None]
+    weights = listening_weights([0.37, 0.61], 101).float()
     whole = model(initial, 1900)
     near = 1e-5 * float(whole.abs().max())
     state, done = model.encode(initial), 0
@@ -82,7 +83,7 @@ def test_some_frames_are_those_of_all(named_model: tuple[str, StringModel[Any]])
 @torch.inference_mode()
 def test_a_state_can_be_gone_on_from_twice(named_model: tuple[str, StringModel[Any]]) -> None:
     _, model = named_model
-    initial = (Pluck().displacement(101) / 1e-3).float()[None]
+    initial = (displacement_of(Pluck()) / 1e-3).float()[None]
     _, state = model.advance(model.encode(initial), 50)
     first, _ = model.advance(state, 30)
     again, _ = model.advance(state, 30)
@@ -92,8 +93,8 @@ def test_a_state_can_be_gone_on_from_twice(named_model: tuple[str, StringModel[A
 @torch.inference_mode()
 def test_listening_is_the_grid_at_that_point(named_model: tuple[str, StringModel[Any]]) -> None:
     _, model = named_model
-    initial = (Pluck().displacement(101) / 1e-3).float()[None]
-    weights = listening_weights(torch.tensor([0.37, 0.61], dtype=torch.float64), 101).float()
+    initial = (displacement_of(Pluck()) / 1e-3).float()[None]
+    weights = listening_weights([0.37, 0.61], 101).float()
     grid = model(initial, 64)
     heard = model(initial, 64, weights)
     assert heard.shape == (1, 64, 2)
@@ -131,8 +132,8 @@ def test_a_preset_of_it_renders_what_the_model_does(
     initial = project(Pluck(0.4, 3.0).displacement(101), info.modes)[None]
     frames, _ = source.advance(source.start(initial), 16)
     with torch.inference_mode():
-        expected = model((initial / info.scale_m).float(), 16) * info.scale_m
-    torch.testing.assert_close(frames, expected)
+        expected = model(torch.from_numpy(initial / info.scale_m).float(), 16) * info.scale_m
+    torch.testing.assert_close(torch.from_numpy(frames), expected)
 
 
 def test_sizes_are_checked_by_name() -> None:
@@ -142,7 +143,7 @@ def test_sizes_are_checked_by_name() -> None:
 
 @pytest.mark.parametrize(
     ("name", "how"),
-    [(name, how) for name, (kind, _) in MODELS.items() for how in kind.initialisations if how != "paper"],
+    [(name, how) for name in MODELS for how in model_class(name).initialisations if how != "paper"],
 )
 def test_a_string_without_losses_can_be_started_from(name: str, how: str) -> None:
     string = StringParameters(damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)

@@ -9,10 +9,11 @@ import pytest
 import torch
 
 from engine.models.base import Physics, count_parameters
-from engine.models.dmd import DMD, DMDConfiguration
-from engine.resonators.sine_transform import listening_weights, to_grid, to_modes
+from engine.models.configurations import DMDConfiguration
+from engine.models.dmd import DMD
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, SplittingSolver
+from tests.engine.tensors import listening_weights, to_grid, to_modes
 
 STRING, MODES, RATE_HZ = StringParameters(), 25, 16_000
 
@@ -79,7 +80,7 @@ def test_many_trajectories_agree_with_pydmd() -> None:
 
 
 def test_finds_the_linear_strings_eigenvalues() -> None:
-    half = np.exp(STRING.resonator(MODES).eigenvalues().numpy() / RATE_HZ)
+    half = np.exp(STRING.resonator(MODES).eigenvalues() / RATE_HZ)
     assert_same_set(eigenvalues(fitted()), np.concatenate([half, half.conj()]), 1e-7)
 
 
@@ -117,7 +118,7 @@ def test_any_splitting_into_blocks_is_the_same_motion() -> None:
 @torch.no_grad()
 def test_listening_is_the_grid_at_that_point() -> None:
     model, initial = fitted(), trajectories()[:, 0].float()
-    weights = listening_weights(torch.tensor([0.37, 0.123], dtype=torch.float64), 101)
+    weights = listening_weights([0.37, 0.123], 101)
     heard = model(initial, 50, weights)
     torch.testing.assert_close(heard, model(initial, 50) @ weights.float(), rtol=1e-4, atol=1e-4)
 

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 import torch
 
-from engine.models import FGRU, FRNN, FGRUConfiguration, FRNNConfiguration, count_parameters
 from engine.models._fno_transform import transform_matrices
-from engine.models.base import Physics
-from engine.models.fno import FieldState, FourierConvolution
-from engine.resonators.sine_transform import listening_weights
+from engine.models.base import Physics, count_parameters
+from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
+from engine.models.fno import FGRU, FRNN, FieldState, FourierConvolution
 from engine.resonators.string import StringParameters
+from tests.engine.tensors import listening_weights
 
 REFERENCES = Path(__file__).parent / "references"
 Model = FGRU | FRNN
@@ -191,7 +191,7 @@ def test_a_state_is_a_value(make: Make) -> None:
 @torch.no_grad()
 def test_listening_is_the_grid_at_that_point(make: Make) -> None:
     model = drawn(make())
-    weights = listening_weights(torch.tensor([0.37, 0.123], dtype=torch.float64), 11)
+    weights = listening_weights([0.37, 0.123], 11)
     heard = model(initial(2, 11), 50, weights)
     torch.testing.assert_close(heard, model(initial(2, 11), 50) @ weights.float(), rtol=1e-4, atol=1e-5)
 

@@ -2,19 +2,21 @@
 
 import math
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 
-from engine.excitation import draw_gaussians, draw_noise
-from engine.models import MODELS, IntegratedPhaseConfiguration, KoopmanIntegrated, count_parameters
+from engine.models import MODELS, model_class
 from engine.models._averaging import FIXED_POINT_STEPS
 from engine.models._cubics import integrate_parabolas
-from engine.models.base import Physics
-from engine.models.integrated_phase import GAIN_LIMIT, RATE_UNIT
-from engine.resonators.sine_transform import listening_weights, synthesis_matrix, to_grid, to_modes
+from engine.models.base import Physics, count_parameters
+from engine.models.configurations import IntegratedPhaseConfiguration
+from engine.models.integrated_phase import GAIN_LIMIT, RATE_UNIT, KoopmanIntegrated
+from engine.resonators.sine_transform import synthesis_matrix
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, SplittingSolver, solve_linear
+from tests.engine.tensors import draw, listening_weights, to_grid, to_modes
 
 SMALL = {"encoder_widths": (12,), "eigenvalue_widths": (12, 12)}
 KINDS: tuple[dict, ...] = (
@@ -133,13 +135,13 @@ def test_phases_stay_exact_after_a_million_steps() -> None:
 @pytest.mark.parametrize("sizes", KINDS)
 def test_listening_is_the_grid_at_that_point(sizes: dict) -> None:
     model = stirred_model(**sizes)
-    weights = listening_weights(torch.tensor([0.37, 0.123], dtype=torch.float64), 101)
+    weights = listening_weights([0.37, 0.123], 101)
     assert relative(model(initial(), 50, weights), model(initial(), 50) @ weights.float()) < 1e-5
 
 
 def test_listening_with_gradients_is_listening_without() -> None:
     model = stirred_model()
-    weights = listening_weights(torch.tensor([0.37], dtype=torch.float64), 101)
+    weights = listening_weights([0.37], 101)
     heard = model(initial(), 1000, weights)
     heard.square().sum().backward()
     assert model.K.grad is not None
@@ -154,7 +156,7 @@ def test_phases_stay_exact_at_a_listening_point() -> None:
     model.nu_log.fill_(math.log(1e-7))
     state = model.encode(initial(1))
     late = type(state)(state.origin, 1_000_000, state.integral)
-    weights = listening_weights(torch.tensor([0.37], dtype=torch.float64), 101)
+    weights = listening_weights([0.37], 101)
     heard, _ = model.advance(late, 300, weights)
     exact = model.decode(model.latents(state.origin, 1_000_000 + torch.arange(1, 301)), weights)
     assert relative(heard, exact) < 1e-5
@@ -181,9 +183,9 @@ def test_physics_initialisation_is_the_linear_string() -> None:
 @torch.no_grad()
 def test_averaging_is_nearly_the_tension_modulated_string() -> None:
     string, rate_hz, steps = StringParameters(), 4_000, 4000
-    amplitudes = to_modes(draw_gaussians(8, 101, torch.Generator().manual_seed(0)), 10)
+    amplitudes = draw("gaussian", 8, 10)
     solver = SplittingSolver(string.resonator(10), rate_hz)
-    truth = solver.solve(ModalState.at_rest(amplitudes), steps) @ (synthesis_matrix(101, 10) / 1e-3)
+    truth = solver.solve(ModalState.at_rest(amplitudes), steps) @ torch.from_numpy(synthesis_matrix(101, 10) / 1e-3)
     errors = {}
     for how in ("physics", "averaging"):
         model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10))
@@ -201,7 +203,7 @@ def test_physical_units_change_no_start_but_its_numbers() -> None:
     assert relative(scaled(loud, 3000), model(loud, 3000)) < 1e-4
     assert 0.1 < scaled.K.abs().max() < 2 and scaled.M_out is not None and 0.01 < scaled.M_out.abs().max() < 20
     assert float(scaled.energy_units[0]) == pytest.approx(  # type: ignore[index]
-        float(StringParameters().resonator(3).relative_tension_rise(torch.tensor([1e-3, 0, 0]))), rel=1e-6
+        float(StringParameters().resonator(3).relative_tension_rise(np.array([1e-3, 0, 0]))), rel=1e-6
     )
 
 
@@ -232,7 +234,7 @@ def test_modulation_is_what_a_strong_low_mode_does_to_a_high_one_within_a_period
 def test_the_action_keeps_the_phase_long_after_the_start() -> None:
     """Energies that decay from the first amplitudes, not from the actions, mistake the frequency for good."""
     string, rate_hz = StringParameters(), 4_000
-    amplitudes = to_modes(draw_noise(8, 101, torch.Generator().manual_seed(0)), 10)
+    amplitudes = draw("noise", 8, 10)
     truth, _ = SplittingSolver(string.resonator(10), rate_hz).advance(ModalState.at_rest(amplitudes), 5 * rate_hz)
     errors = {}
     for adiabatic in (False, True):
@@ -314,7 +316,8 @@ def test_every_parameter_learns(sizes: dict) -> None:
 
 def test_sizes_and_name() -> None:
     assert 57_000 < count_parameters(KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10))) < 58_000
-    assert MODELS["koopman_integrated"] == (KoopmanIntegrated, IntegratedPhaseConfiguration)
+    assert model_class("koopman_integrated") is KoopmanIntegrated
+    assert MODELS["koopman_integrated"][1] is IntegratedPhaseConfiguration
     with torch.device("meta"):
         assert KoopmanIntegrated(IntegratedPhaseConfiguration()).K.is_meta
 

@@ -8,10 +8,11 @@ import pytest
 import torch
 
 from engine.models.base import Physics, count_parameters
-from engine.models.koopman import SHARPEST, Koopman, KoopmanConfiguration
-from engine.resonators.sine_transform import listening_weights, to_grid
+from engine.models.configurations import KoopmanConfiguration
+from engine.models.koopman import SHARPEST, Koopman
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, solve_linear
+from tests.engine.tensors import listening_weights, to_grid
 
 REFERENCE = Path(__file__).parent / "references" / "koopman.npz"
 PHYSICS = Physics(StringParameters().resonator(10), 4_000)
@@ -111,7 +112,7 @@ def test_random_access_is_the_sequence() -> None:
 @pytest.mark.parametrize("decoder_widths", [(), (16,), (16, 16)])
 def test_listening_is_the_grid_at_that_point(decoder_widths: tuple[int, ...]) -> None:
     model = small_model(decoder_widths=decoder_widths)
-    weights = listening_weights(torch.tensor([0.37, 0.123], dtype=torch.float64), 101)
+    weights = listening_weights([0.37, 0.123], 101)
     heard = model(displacement(), 50, weights)
     torch.testing.assert_close(heard, model(displacement(), 50) @ weights.float(), rtol=1e-4, atol=1e-5)
 
@@ -120,7 +121,7 @@ def test_initialisations_lie_where_they_should() -> None:
     radius = torch.exp(-small_model().nu_log.detach().exp())
     assert 0.99 - 1e-6 <= float(radius.min()) <= float(radius.max()) <= 1
     physical = small_model(how="physics")
-    linear = StringParameters().resonator(10).eigenvalues() / 4_000
+    linear = torch.from_numpy(StringParameters().resonator(10).eigenvalues() / 4_000)
     torch.testing.assert_close(physical.nu_log.detach()[:10].exp().double(), -linear.real, rtol=1e-5, atol=0)
     raised = physical.theta_log.detach().exp().double() / linear.imag.repeat(4)[:32]
     torch.testing.assert_close(raised, 1 + SHARPEST * (torch.arange(32) // 10).double() / 3, rtol=1e-5, atol=0)

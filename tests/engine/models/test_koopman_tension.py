@@ -15,6 +15,7 @@ from engine.models.koopman_tension import SERIES, KoopmanTension
 from engine.pluck import Pluck
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, SplittingSolver
+from tests.engine.tensors import displacement_of, of_tension_rise, to_grid, to_modes
 
 NYLON = StringParameters()
 STEEL = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
@@ -33,16 +34,15 @@ def made(
 def pluck_m(string: StringParameters, modes: int, rise: float) -> Tensor:
     """A displacement (1, 101) in m that raises the tension by `rise`."""
     resonator = string.resonator(modes)
-    amplitudes = resonator.to_modes(Pluck(0.3, 1.0, "triangular").displacement(101))
-    amplitudes = amplitudes * (rise / resonator.relative_tension_rise(amplitudes)).sqrt()
-    return resonator.to_grid(amplitudes)[None]
+    amplitudes = to_modes(displacement_of(Pluck(0.3, 1.0, "triangular")), modes)
+    return to_grid(of_tension_rise(resonator, amplitudes, rise), 101)[None]
 
 
 def true_motion(string: StringParameters, displacement_m: Tensor, modes: int, rate_hz: float, steps: int) -> Tensor:
     resonator = string.resonator(modes)
     solver = SplittingSolver(resonator, rate_hz)
-    state = ModalState.at_rest(resonator.to_modes(displacement_m))
-    return resonator.to_grid(solver.solve(state, steps)[:, 1:])
+    state = ModalState.at_rest(to_modes(displacement_m, resonator.modes))
+    return to_grid(solver.solve(state, steps)[:, 1:], 101)
 
 
 def relative_error(model: KoopmanTension, displacement_m: Tensor, truth_m: Tensor) -> float:
@@ -66,8 +66,8 @@ def test_what_backward_error_analysis_knows_is_worth_two_orders(
 def test_a_linear_string_is_exact() -> None:
     displacement = pluck_m(NYLON, 25, 0.3)
     resonator = NYLON.resonator(25, tension_modulated=False)
-    solved = SplittingSolver(resonator, 4_000).solve(ModalState.at_rest(resonator.to_modes(displacement)), 400)
-    truth = resonator.to_grid(solved[:, 1:])
+    solved = SplittingSolver(resonator, 4_000).solve(ModalState.at_rest(to_modes(displacement, resonator.modes)), 400)
+    truth = to_grid(solved[:, 1:], 101)
     assert relative_error(made(NYLON, 25, "series", 4_000, linear=True), displacement, truth) < 1e-12
 
 
@@ -81,7 +81,7 @@ def test_a_quiet_string_is_the_linear_one() -> None:
 
 def test_another_string_takes_what_was_learned() -> None:
     model = made(NYLON, 25, "series")
-    other = model.tuned(Physics(STEEL.resonator(40), 48_000, 1e-3))
+    other = model.for_resonator(Physics(STEEL.resonator(40), 48_000, 1e-3))
     displacement = pluck_m(STEEL, 40, 0.1)
     expected = made(STEEL, 40, "series")
     with torch.inference_mode():
@@ -92,7 +92,7 @@ def test_another_string_takes_what_was_learned() -> None:
 @pytest.mark.parametrize("rate_hz", [4_000, 16_000, 44_100, 96_000])
 def test_any_rate_is_the_truth_at_that_rate(rate_hz: int) -> None:
     displacement = pluck_m(NYLON, 25, 0.2)
-    model = made(NYLON, 25, "series").tuned(Physics(NYLON.resonator(25), rate_hz, 1e-3))
+    model = made(NYLON, 25, "series").for_resonator(Physics(NYLON.resonator(25), rate_hz, 1e-3))
     steps = rate_hz // 20
     truth = true_motion(NYLON, displacement, 25, rate_hz, steps)
     with torch.inference_mode():
@@ -116,7 +116,7 @@ def modes_alike_m(rise: float, modes: int = 25) -> Tensor:
     resonator = NYLON.resonator(modes)
     amplitudes = torch.ones(modes, dtype=torch.float64)
     amplitudes[::2] = -1
-    return resonator.to_grid(amplitudes * (rise / resonator.relative_tension_rise(amplitudes)).sqrt())[None]
+    return to_grid(of_tension_rise(resonator, amplitudes, rise), 101)[None]
 
 
 def test_a_hard_pluck_with_its_stretch_in_high_modes_takes_more_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -152,8 +152,7 @@ LOW = StringParameters(0.65, 5e-7, 7.4e-16, 1000.0, 2e10, 1.376e-3, 2.41e-7, 3.4
 def ringing(string: StringParameters, modes: int, pluck: Pluck, rise: float, frames: int) -> tuple[Tensor, Tensor]:
     """A string so long after a pluck that raises the tension by `rise`: amplitudes in m, speeds in m a frame."""
     resonator = string.resonator(modes)
-    amplitudes = resonator.to_modes(pluck.displacement(101))
-    amplitudes = amplitudes * (rise / resonator.relative_tension_rise(amplitudes)).sqrt()
+    amplitudes = of_tension_rise(resonator, to_modes(displacement_of(pluck), modes), rise)
     _, state = SplittingSolver(resonator, 48_000).advance(ModalState.at_rest(amplitudes[None]), frames)
     return state.amplitude, state.velocity / 48_000
 
@@ -174,7 +173,7 @@ def test_a_string_that_rings_sets_out_as_truly_as_one_at_rest(
     resonator, model = string.resonator(modes), made(string, modes, "series")
     amplitudes, speeds = ringing(string, modes, pluck, 0.5, frames)
     truth, _ = SplittingSolver(resonator, 48_000).advance(ModalState(amplitudes, speeds * 48_000), 48_000)
-    state = model.encode(*(resonator.to_grid(each) / 1e-3 for each in (amplitudes, speeds)))
+    state = model.encode(*(to_grid(each, 101) / 1e-3 for each in (amplitudes, speeds)))
     found = model.amplitudes(state, 48_000) * 1e-3
     assert float((found - truth).square().sum() / truth.square().sum()) < allowed
 
@@ -191,10 +190,10 @@ def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed() ->
     """It swings as far as one that was pulled so: what bounds it is the energy, not the displacement it begins at."""
     model = made(NYLON, 25, "series", 16_000)
     resonator = NYLON.resonator(25)
-    amplitudes = resonator.to_modes(modes_alike_m(0.5))
-    speeds = amplitudes * resonator.eigenvalues().imag / 16_000
-    pulled = model.encode(resonator.to_grid(amplitudes) / 1e-3)
-    struck = model.encode(torch.zeros(1, 101).double(), resonator.to_grid(speeds) / 1e-3)
+    amplitudes = to_modes(modes_alike_m(0.5), resonator.modes)
+    speeds = amplitudes * torch.from_numpy(resonator.eigenvalues().imag) / 16_000
+    pulled = model.encode(to_grid(amplitudes, 101) / 1e-3)
+    struck = model.encode(torch.zeros(1, 101).double(), to_grid(speeds, 101) / 1e-3)
     assert model._nodes(struck).tolist() == model._nodes(pulled).tolist() == [5]
     assert 0.5 < float(struck.largest_energy / pulled.largest_energy) <= 1
     truth, _ = SplittingSolver(resonator, 16_000).advance(ModalState(0 * amplitudes, speeds * 16_000), 1_600)
@@ -203,9 +202,9 @@ def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed() ->
 
 
 def test_the_compiled_loop_of_a_ringing_string_is_the_definition() -> None:
-    model, resonator = made(NYLON, 25, "series"), NYLON.resonator(25)
+    model = made(NYLON, 25, "series")
     state = ringing(NYLON, 25, Pluck(0.3, 1.0, "triangular"), 0.4, 100)
-    displacement, velocity = (resonator.to_grid(each) / 1e-3 for each in state)
+    displacement, velocity = (to_grid(each, 101) / 1e-3 for each in state)
     plain, _ = model.advance(model.encode(displacement, velocity), 300)
     with torch.no_grad():
         compiled, _ = model.advance(model.encode(displacement, velocity), 300)
@@ -260,7 +259,7 @@ def test_any_weights_stay_bounded_and_fall_silent(seed: int) -> None:
 def test_phases_are_kept_where_the_curves_were_learned() -> None:
     learned = made(NYLON, 57, "series")
     for rate_hz in (48_000, 16_000, 4_000, 44_100):
-        model = learned.tuned(Physics(NYLON.resonator(57), rate_hz, 1e-3))
+        model = learned.for_resonator(Physics(NYLON.resonator(57), rate_hz, 1e-3))
         with torch.no_grad():
             _, state = model.advance(model.encode(torch.zeros(1, 101)), 1)
         assert state.nodes is not None

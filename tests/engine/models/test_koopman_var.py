@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import torch
 
-from engine.models import KoopmanVar, KoopmanVarConfiguration, count_parameters
-from engine.models.base import Physics
-from engine.resonators.sine_transform import listening_weights, to_grid
+from engine.models.base import Physics, count_parameters
+from engine.models.configurations import KoopmanVarConfiguration
+from engine.models.koopman_var import KoopmanVar
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, solve_linear
+from tests.engine.tensors import listening_weights, to_grid
 
 REFERENCE = Path(__file__).parent / "references" / "koopman_var.npz"
 
@@ -61,7 +62,7 @@ def test_agrees_with_a_plain_recurrence() -> None:
 
 
 @torch.no_grad()
-@pytest.mark.parametrize("readout", [None, listening_weights(torch.tensor([0.37], dtype=torch.float64), 101)])
+@pytest.mark.parametrize("readout", [None, listening_weights([0.37], 101)])
 def test_any_splitting_into_blocks_is_the_same_motion(readout: torch.Tensor | None) -> None:
     model = small_model()
     initial = torch.randn(2, 101, generator=torch.Generator().manual_seed(1))
@@ -74,7 +75,7 @@ def test_any_splitting_into_blocks_is_the_same_motion(readout: torch.Tensor | No
 
 
 @torch.no_grad()
-@pytest.mark.parametrize("readout", [None, listening_weights(torch.tensor([0.37], dtype=torch.float64), 101)])
+@pytest.mark.parametrize("readout", [None, listening_weights([0.37], 101)])
 @pytest.mark.parametrize("how", ["paper", "physics"])
 def test_interpolated_multipliers_are_close_to_those_of_every_frame(how: str, readout: torch.Tensor | None) -> None:
     model = small_model(how=how)
@@ -107,7 +108,7 @@ def test_phases_stay_exact_after_a_million_steps() -> None:
 def test_listening_is_the_grid_at_that_point() -> None:
     model = small_model()
     initial = torch.randn(2, 101, generator=torch.Generator().manual_seed(1))
-    weights = listening_weights(torch.tensor([0.37, 0.123], dtype=torch.float64), 101)
+    weights = listening_weights([0.37, 0.123], 101)
     heard = model(initial, 50, weights)
     torch.testing.assert_close(heard, model(initial, 50) @ weights.float(), rtol=1e-4, atol=1e-5)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from engine.models import LRU, LRUConfiguration, count_parameters
-from engine.models.base import Physics
-from engine.models.lru import LRULayer
+from engine.models.base import Physics, count_parameters
+from engine.models.configurations import LRUConfiguration
+from engine.models.lru import LRU, LRULayer
 from engine.resonators.string import StringParameters
 
 REFERENCE = Path(__file__).parent / "references" / "lru.npz"

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import torch
 
-from engine.models import S5, S5Configuration, count_parameters
-from engine.models.base import Physics
-from engine.models.s5 import S5Layer, hippo_normal
+from engine.models.base import Physics, count_parameters
+from engine.models.configurations import S5Configuration
+from engine.models.s5 import S5, S5Layer, hippo_normal
 from engine.resonators.string import StringParameters
 
 REFERENCE = Path(__file__).parent / "references" / "s5.npz"

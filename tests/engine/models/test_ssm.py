@@ -5,12 +5,14 @@ from __future__ import annotations
 import pytest
 import torch
 
-from engine.models import LRU, S5, LRUConfiguration, S5Configuration
 from engine.models.base import Physics
+from engine.models.configurations import LRUConfiguration, S5Configuration
+from engine.models.lru import LRU
+from engine.models.s5 import S5
 from engine.models.ssm import Block, SSMString, evolve, recur
-from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, solve_linear
+from tests.engine.tensors import listening_weights, to_grid
 
 PHYSICS = Physics(StringParameters().resonator(10, grid_points=21), 4_000)
 NAMES = ("lru", "s5")
@@ -117,7 +119,7 @@ def test_training_normalises_over_batch_and_time_and_reaches_every_weight(name: 
 @torch.no_grad()
 def test_listening_is_the_grid_at_that_point(name: str) -> None:
     model = small_model(name)
-    weights = listening_weights(torch.tensor([0.37, 0.123], dtype=torch.float64), 21)
+    weights = listening_weights([0.37, 0.123], 21)
     heard = model(initial(), 50, weights)
     torch.testing.assert_close(heard, model(initial(), 50) @ weights.float(), rtol=1e-4, atol=1e-5)
 

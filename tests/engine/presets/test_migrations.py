@@ -14,7 +14,8 @@ from engine.pluck import Pluck
 from engine.presets import PresetError, load_preset, preset_digest, preset_files, read_info
 from engine.presets.file import METADATA_KEY
 from engine.presets.migrations import FORMAT_VERSION, MIGRATIONS, UnknownVersion, migrated
-from engine.sources import ModelSource, project
+from engine.resonators.sine_transform import project
+from engine.sources import ModelSource
 
 SHIPPED = json.loads(Path(__file__).with_name("shipped.json").read_text(encoding="utf-8"))
 FRAMES = 64  # from the pluck on: enough to tell any other weights or any other reading of them

@@ -6,6 +6,7 @@ import math
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 
@@ -20,9 +21,10 @@ from engine.presets import (
     read_described_string,
     read_string,
 )
+from engine.resonators.sine_transform import project
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError
-from engine.sources import ModelSource, TruthSource, project
+from engine.sources import ModelSource, TruthSource
 
 STEEL = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
 TOML = """
@@ -46,7 +48,7 @@ def test_a_steel_string_is_played_by_the_same_preset() -> None:
     model, truth = ModelSource(preset), TruthSource(preset.info)
     found, _ = model.advance(model.start(initial), 4410)
     expected, _ = truth.advance(truth.start(initial), 4410)
-    assert float((found - expected).square().sum() / expected.square().sum()) < 1e-9
+    assert float(((found - expected) ** 2).sum() / (expected**2).sum()) < 1e-9
 
 
 def test_nothing_given_is_the_preset_itself() -> None:
@@ -142,7 +144,7 @@ def test_modes_are_counted_in_closed_form() -> None:
     for string in (StringParameters(), STEEL):
         preset = of_string(load_preset(find_preset("studio_any_string")), string, 48_000)
         assert preset.info.modes == string.modes_below(20_000)
-    assert torch.isfinite(STEEL.undamped_frequencies(3)).all()
+    assert np.isfinite(STEEL.undamped_frequencies(3)).all()
 
 
 BEYOND = {
@@ -172,8 +174,9 @@ def test_every_shipped_string_is_a_preset_with_what_was_learned(name: str) -> No
     assert own.info.string == string
     assert own.info.description == f"{description} Played by the model of every string."
     for key, tensor in expected.model.state_dict().items():
-        # logarithms differ in their last digit between makes of processor
-        torch.testing.assert_close(own.model.state_dict()[key], tensor, rtol=1e-12, atol=1e-15)
+        # logarithms differ in their last digit between makes of processor; so do places on the grid between NumPy
+        # and the PyTorch that wrote these files, and the sine of mode 99 has 300 times that
+        torch.testing.assert_close(own.model.state_dict()[key], tensor, rtol=1e-12, atol=1e-13)
 
 
 @pytest.mark.parametrize("name", NAMES)

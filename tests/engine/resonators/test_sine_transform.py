@@ -1,7 +1,7 @@
 """The transform is exact on the grid."""
 
+import numpy as np
 import pytest
-import torch
 
 from engine.resonators import sine_transform
 from engine.resonators.sine_transform import listening_weights, mode_shapes, to_grid, to_modes
@@ -9,29 +9,29 @@ from engine.resonators.sine_transform import listening_weights, mode_shapes, to_
 
 @pytest.mark.parametrize("modes", [1, 10, 25, 99])
 def test_round_trip(modes: int) -> None:
-    amplitudes = torch.randn(4, modes, dtype=torch.float64, generator=torch.Generator().manual_seed(1))
+    amplitudes = np.random.default_rng(1).normal(size=(4, modes))
     displacement = to_grid(amplitudes, 101)
-    assert displacement[:, [0, -1]].eq(0).all()
-    torch.testing.assert_close(to_modes(displacement, modes), amplitudes)
+    assert (displacement[:, [0, -1]] == 0).all()
+    np.testing.assert_allclose(to_modes(displacement, modes), amplitudes, rtol=1e-7, atol=1e-12)
 
 
 def test_a_grid_point_listens_to_itself() -> None:
-    displacement = torch.zeros(101, dtype=torch.float64)
+    displacement = np.zeros(101)
     displacement[37] = 1
-    heard = displacement @ listening_weights(torch.tensor([0.37, 0.36], dtype=torch.float64), 101)
-    torch.testing.assert_close(heard, torch.tensor([1.0, 0.0], dtype=torch.float64), atol=1e-12, rtol=0)
+    heard = displacement @ listening_weights(np.array([0.37, 0.36]), 101)
+    np.testing.assert_allclose(heard, [1.0, 0.0], atol=1e-12, rtol=0)
 
 
 def test_listening_between_points_is_exact_for_band_limited_shapes() -> None:
-    amplitudes = torch.tensor([1.0, 0.5, -0.25], dtype=torch.float64)
-    position = torch.tensor([0.4321], dtype=torch.float64)
+    amplitudes = np.array([1.0, 0.5, -0.25])
+    position = np.array([0.4321])
     heard = to_grid(amplitudes, 101) @ listening_weights(position, 101)
-    torch.testing.assert_close(heard, amplitudes @ mode_shapes(position, 3))
+    np.testing.assert_allclose(heard, amplitudes @ mode_shapes(position, 3), rtol=1e-12)
 
 
 def test_too_many_modes_are_refused() -> None:
     with pytest.raises(ValueError, match="holds 1 to 99 modes, not 100"):
-        to_modes(torch.zeros(101), 100)
+        to_modes(np.zeros(101), 100)
 
 
 def test_large_tables_are_not_remembered() -> None:
@@ -39,4 +39,4 @@ def test_large_tables_are_not_remembered() -> None:
     before = sine_transform._sines.cache_info().currsize
     large = sine_transform.synthesis_matrix(1_003, 1_001)
     assert sine_transform._sines.cache_info().currsize == before
-    assert torch.equal(large[:7], sine_transform.synthesis_matrix(1_003, 7))
+    assert np.array_equal(large[:7], sine_transform.synthesis_matrix(1_003, 7))

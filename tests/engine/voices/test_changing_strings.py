@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from engine.kernels import layout
+from engine.models._tension_arrays import CURVES
 from engine.models.base import Physics
-from engine.models.koopman_tension import KoopmanTension, KoopmanTensionConfiguration
+from engine.models.configurations import KoopmanTensionConfiguration
+from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
@@ -44,9 +46,15 @@ def program(kind: str, resonator: Resonator | None = None, coarser: int = 15) ->
     own = resonator or modes_of(STRING)
     if kind == "truth":
         return solver_program(own, RATE_HZ, coarser)
-    model = KoopmanTension(KoopmanTensionConfiguration(modes=own.modes))
-    model.initialise("series", Physics(own, RATE_HZ), torch.Generator())
-    return tension_program(model, own, RATE_HZ)
+    return series_program(own, RATE_HZ)
+
+
+def series_program(resonator: Resonator, rate_hz: int) -> Program:
+    """Of a model as it starts."""
+    model = KoopmanTension(KoopmanTensionConfiguration(modes=resonator.modes))
+    model.initialise("series", Physics(resonator, rate_hz), torch.Generator())
+    curves = {name: getattr(model, name).detach().numpy() for name in CURVES}
+    return tension_program(curves, model.configuration, resonator, rate_hz)
 
 
 def struck(of: Program, pluck: Pluck = PLUCK, ear: Ear = EAR) -> Voice:
@@ -118,12 +126,12 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
     voice.retune(last, 5 * layout.QUANTUM / RATE_HZ)
     heard.append(mixer.render((quanta - 4) * layout.QUANTUM)[:, 0])
 
-    q = first.to_modes(PLUCK.displacement(101)).numpy()
+    q = first.to_modes(PLUCK.displacement(101))
     state, expected, weights = np.concatenate([q, 0 * q]), [], of.weights(EAR)[0][0, :4]
     for quantum in range(quanta):
         share = min(max((quantum - 3) / 5, 0.0), 1.0)
         squares, sigma, coupling, stretch = (
-            (1 - share) * a.numpy() + share * b.numpy()
+            (1 - share) * a + share * b
             for a, b in (
                 (first.omega**2, last.omega**2),
                 (first.sigma, last.sigma),
@@ -199,9 +207,7 @@ def test_modes_above_half_the_rate_are_silent_from_the_start() -> None:
     few = modes_of(STRING, below)
 
     def at(resonator: Resonator) -> NDArray[np.float64]:
-        model = KoopmanTension(KoopmanTensionConfiguration(modes=resonator.modes))
-        model.initialise("series", Physics(resonator, low_hz), torch.Generator())
-        mixer, voice = Mixer(low_hz, limited=False), struck(tension_program(model, resonator, low_hz))
+        mixer, voice = Mixer(low_hz, limited=False), struck(series_program(resonator, low_hz))
         mixer.add(voice)
         return mixer.render(3_200)[:, 0].astype(np.float64)
 

@@ -9,9 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
 from engine.kernels import layout as at
 from engine.kernels.layout import AHEAD
@@ -23,7 +21,7 @@ from engine.voices import (
     Mixer,
     Program,
     Voice,
-    bank_program,
+    model_program,
     render_voice,
     rendered_program,
     truth_program,
@@ -33,7 +31,7 @@ from engine.voices.voice import END_FADE_S
 
 NAME, PLUCK, SECONDS = "nylon_nonlinear_gaussian_4k_koopman_integrated", Pluck(0.3), 0.2
 RATE_HZ = 44_100
-Initial = Callable[[PresetInfo, Pluck], Tensor]
+Initial = Callable[[PresetInfo, Pluck], NDArray[np.float64]]
 
 
 @pytest.fixture
@@ -44,9 +42,7 @@ def preset(shipped: Callable[[str], Preset]) -> Preset:
 def program_of(kind: str, preset: Preset) -> Program:
     if kind == "truth":
         return truth_program(preset.info, RATE_HZ)
-    program = bank_program(preset.model, preset.info, RATE_HZ)
-    assert program is not None
-    return program
+    return model_program(preset, RATE_HZ)
 
 
 @pytest.mark.parametrize("kind", ["bank", "truth"])
@@ -64,11 +60,11 @@ def test_it_is_a_mixer_with_that_one_voice(kind: str, ear: Ear, preset: Preset, 
 def test_a_model_that_is_no_bank_is_rendered_and_converted(small_preset: Path, initial_m: Initial) -> None:
     preset, ear = load_preset(small_preset), Ear((0.3, 0.6))
     info, source = preset.info, ModelSource(preset)
-    assert bank_program(preset.model, info, RATE_HZ) is None
+    assert model_program(preset, RATE_HZ).rendered
     found = render_voice(rendered_program(info, info.rate_hz), source, info, PLUCK, ear, SECONDS)
     let_go_m, weights = initial_m(info, PLUCK), ear.weights(info.grid_points)
     frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, weights)
-    expected: NDArray[np.float64] = (torch.cat([(let_go_m @ weights)[None], frames_m[0]]) / FULL_SCALE_M).numpy()
+    expected = np.concatenate([(let_go_m @ weights)[None], frames_m[0]]) / FULL_SCALE_M
     attack = round(0.002 * info.rate_hz)
     np.testing.assert_allclose(found[attack:], expected[attack:], atol=1e-6)  # its own rate: as it is
     higher = render_voice(rendered_program(info, 48_000), source, info, PLUCK, ear, SECONDS)
@@ -106,9 +102,9 @@ def undying(kind: str, preset: Preset) -> tuple[Program, ModelSource]:
     else:
         program = rendered_program(preset.info, RATE_HZ)
 
-        def hum(state: object, steps: int, weights: Tensor) -> tuple[Tensor, object]:
-            wave = 1e-4 * torch.cos(torch.arange(steps) * math.pi / 4)
-            return wave[None, :, None].expand(1, steps, weights.shape[1]), state
+        def hum(state: object, steps: int, weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], object]:
+            wave = 1e-4 * np.cos(np.arange(steps) * math.pi / 4)
+            return np.tile(wave[None, :, None], (1, 1, weights.shape[1])), state
 
         source.advance = hum  # type: ignore[assignment, method-assign]
     return replace(program, ends_s=0.3), source

@@ -18,7 +18,7 @@ PLAIN = Recipe(epochs=1, flip=False, steps_per_batch=0)
 def modal(dataset: Dataset, displacement: torch.Tensor) -> torch.Tensor:
     """Amplitudes in m of normalised displacement."""
     c = dataset.configuration
-    return displacement.double() @ analysis_matrix(c.grid_points, c.modes) * dataset.scale_m
+    return displacement.double() @ torch.from_numpy(analysis_matrix(c.grid_points, c.modes)) * dataset.scale_m
 
 
 def test_all_frames_of_the_horizon_are_the_data(small_dataset: Dataset) -> None:

@@ -30,9 +30,9 @@ def test_a_draw_that_would_break_the_string_is_softened() -> None:
     free = DatasetConfiguration("pluck", 48_000, 40, count=60)
     capped = draw_initial(replace(free, largest_tension_rise=0.02))
     drawn, rise = draw_initial(free), free.resonator.relative_tension_rise(draw_initial(free))
-    assert bool((rise > 0.02).any()) and bool((rise < 0.02).any())
-    torch.testing.assert_close(free.resonator.relative_tension_rise(capped), rise.clamp(max=0.02))
-    assert torch.equal(capped[rise <= 0.02], drawn[rise <= 0.02])
+    assert (rise > 0.02).any() and (rise < 0.02).any()
+    np.testing.assert_allclose(free.resonator.relative_tension_rise(capped), np.minimum(rise, 0.02))
+    assert np.array_equal(capped[rise <= 0.02], drawn[rise <= 0.02])
     with pytest.raises(ValueError, match="largest_tension_rise must be above 0"):
         replace(free, largest_tension_rise=0.0)
 

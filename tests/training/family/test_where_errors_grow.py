@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import torch
 
-from engine.models import KoopmanTension
+from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Shape
 from engine.presets import find_preset, load_preset
 from engine.resonators.family import StringFamily

@@ -17,6 +17,7 @@ from engine.metrics import ErrorSums
 from engine.models import build_model
 from engine.models.base import Physics
 from engine.presets import Preset, PresetError, PresetInfo, TrainedRange
+from engine.resonators.base import Array
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.schema import write
 from engine.truth import ModalState, SplittingSolver
@@ -64,17 +65,18 @@ def preset(model: str = "koopman_var", name: str = "", horizon: int = HORIZON, *
         seed=0,
         training=write(training),
     )
-    return Preset(name or f"tiny_{model}", Path(f"{name or model}.safetensors"), info, built.eval())
+    weights = {key: tensor.numpy() for key, tensor in built.state_dict().items()}
+    return Preset(name or f"tiny_{model}", Path(f"{name or model}.safetensors"), info, weights)
 
 
-def truth_and_model(one: Preset, rows: slice, steps: int) -> tuple[torch.Tensor, torch.Tensor]:
+def truth_and_model(one: Preset, rows: slice, steps: int) -> tuple[Array, Array]:
     """Frames 0 … steps in m, by the solver and the model themselves."""
     data = extrapolation.common_data([one])
     solver = SplittingSolver(data.resonator, data.rate_hz)
-    truth = to_grid(solver.solve(ModalState.at_rest(draw_initial(data)[rows]), steps), data.grid_points)
+    truth = to_grid(solver.solve(ModalState.at_rest(draw_initial(data)[rows]), steps).numpy(), data.grid_points)
     with torch.no_grad():
-        model = one.model((truth[:, 0] / 1e-3).float(), steps).double() * 1e-3
-    return truth, torch.cat([truth[:, :1], model], dim=1)
+        model = one.model(torch.from_numpy(truth[:, 0] / 1e-3).float(), steps).double().numpy() * 1e-3
+    return truth, np.concatenate([truth[:, :1], model], axis=1)
 
 
 def line(axes: Axes, index: int) -> tuple[np.ndarray, np.ndarray]:
@@ -94,7 +96,7 @@ def test_sounds_are_those_of_the_validation_set() -> None:
     one = preset()
     data = Dataset(extrapolation.common_data([one]), torch.empty(0), 1e-3)
     truth, model = truth_and_model(one, slice(25, 27), 60)
-    weights = listening_weights(torch.tensor([0.2]), 101)
+    weights = listening_weights(np.array([0.2]), 101)
     shares: list[float] = []
     for frames in (1000, 7):  # blocks do not show
         found = evaluate_past_horizon(
@@ -108,7 +110,7 @@ def test_sounds_are_those_of_the_validation_set() -> None:
             frames_at_once=frames,
             report=shares.append,
         )
-        expected = torch.stack([model, truth]) @ weights[:, 0] / 1e-3
+        expected = torch.from_numpy(np.stack([model, truth]) @ weights[:, 0] / 1e-3)
         torch.testing.assert_close(found.sounds, expected.float(), atol=1e-5, rtol=1e-4)
     assert shares[-1] == 1
 
@@ -180,7 +182,7 @@ def test_extrapolation_goes_past_training() -> None:
     one = preset()
     figure = extrapolation.extrapolation([one], seconds=0.1, trajectory=2, trajectories=2)
     truth, model = truth_and_model(one, slice(26, 27), 400)
-    weights = listening_weights(torch.tensor([0.37]), 101)
+    weights = listening_weights(np.array([0.37]), 101)
     for words, first in (("the start", 0), ("the end", 320)):
         (axes,) = (axes for axes in figure.axes if axes.get_title() == words)
         for place, frames in ((0, truth), (1, model)):
@@ -216,7 +218,7 @@ def test_every_model_with_linear_dynamics_has_eigenvalues(model: str, layers: in
     one = preset(model)
     found = one.model.log_eigenvalues()
     assert [log.dtype for log in found] == [torch.complex128] * layers
-    linear = one.info.string.resonator(5).eigenvalues() / 4000
+    linear = torch.from_numpy(one.info.string.resonator(5).eigenvalues() / 4000)
     nearest = (found[0].exp()[:, None] - linear.exp()).abs().amin(0)
     assert float(nearest.max()) < 1e-5  # all of them started from the string's
 

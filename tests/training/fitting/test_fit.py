@@ -10,7 +10,7 @@ import pytest
 import torch
 
 from engine.metrics import RelativeError
-from engine.models import DMD
+from engine.models.dmd import DMD
 from training.cell import Cell, configuration_of
 from training.configuration import Recipe, TrainingConfiguration
 from training.data.batches import Batch

@@ -3,8 +3,10 @@
 import pytest
 import torch
 
-from engine.models import KoopmanVar, KoopmanVarConfiguration, build_model
+from engine.models import build_model
 from engine.models.base import Physics
+from engine.models.configurations import KoopmanVarConfiguration
+from engine.models.koopman_var import KoopmanVar
 from engine.resonators.string import StringParameters
 from training.configuration import Recipe
 from training.data.batches import Batch

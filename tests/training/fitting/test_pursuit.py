@@ -7,7 +7,9 @@ from dataclasses import replace
 import pytest
 import torch
 
-from engine.models import Koopman, KoopmanConfiguration, KoopmanVar, KoopmanVarConfiguration
+from engine.models.configurations import KoopmanConfiguration, KoopmanVarConfiguration
+from engine.models.koopman import Koopman
+from engine.models.koopman_var import KoopmanVar
 from engine.resonators.sine_transform import synthesis_matrix
 from training.configuration import Recipe
 from training.data.dataset import Dataset
@@ -15,6 +17,7 @@ from training.fitting.modes import found_modes, known_modes
 from training.fitting.pursuit import pursue
 
 STEPS = 400
+SINES = torch.from_numpy(synthesis_matrix(101, 5))
 
 
 def koopman(state_size: int = 40) -> Koopman:
@@ -32,7 +35,7 @@ def test_an_encoder_that_has_learned_its_targets_predicts_every_frame(small_data
     origin = torch.complex(*parts.chunk(2, dim=1)).to(torch.complex64)
     found = model.decode(model.latents(origin, torch.arange(1, STEPS + 1)))
     amplitudes = small_dataset.split("train")[:, 1 : STEPS + 1] / small_dataset.scale_m
-    truth = amplitudes @ synthesis_matrix(101, 5).float()
+    truth = amplitudes @ SINES.float()
     assert float((found - truth).square().sum() / truth.square().sum()) < 1e-3
     energies = latents.targets.square().sum(1) * latents.unit**2
     assert torch.allclose(energies, amplitudes.square().mean(1).sum(1), rtol=1e-3)
@@ -46,7 +49,9 @@ def test_its_loss_is_the_error_of_the_prediction(small_dataset: Dataset) -> None
     rows = torch.arange(16)
     _, error = latents.loss(model, Recipe(epochs=1, flip=False), rows, 0)
     latents.yield_latents(model)
-    truth = (small_dataset.split("train")[:, : STEPS + 1] / small_dataset.scale_m) @ synthesis_matrix(101, 5).float()
+    truth = (small_dataset.split("train")[:, : STEPS + 1] / small_dataset.scale_m) @ torch.from_numpy(
+        synthesis_matrix(101, 5)
+    ).float()
     found = model(truth[:, 0], STEPS)
     assert float((found - truth[:, 1:]).square().mean()) == pytest.approx(float(error), rel=0.03)
 
@@ -56,7 +61,7 @@ def test_a_mirrored_string_has_mirrored_coordinates(small_dataset: Dataset) -> N
     latents = pursue(koopman(), small_dataset, STEPS, torch.Generator().manual_seed(0))
     amplitudes = small_dataset.split("train")[:, 0] / small_dataset.scale_m
     signs = torch.tensor([1.0, -1, 1, -1, 1])
-    mirrored = (amplitudes * signs) @ synthesis_matrix(101, 5).float()
+    mirrored = (amplitudes * signs) @ SINES.float()
     assert torch.allclose(latents.initial.flip(1), mirrored, atol=1e-5)
     assert set(latents.mirror.tolist()) == {1.0, -1.0}
 
@@ -65,7 +70,7 @@ def test_a_mirrored_string_has_mirrored_coordinates(small_dataset: Dataset) -> N
 @torch.no_grad()
 def test_modes_are_known_or_found_in_the_displacement_alone(small_dataset: Dataset, blind: bool) -> None:
     modes = (found_modes if blind else known_modes)(small_dataset, STEPS)
-    sines = synthesis_matrix(101, 5)
+    sines = SINES
     alike = modes.shapes @ sines.T / 50
     torch.testing.assert_close(alike.abs(), torch.eye(5, dtype=torch.float64), rtol=0, atol=2e-3)
     truth = small_dataset.split("train")[:, : STEPS + 1].double() / small_dataset.scale_m @ sines
@@ -92,7 +97,7 @@ def test_a_blind_pursuit_predicts_every_frame_too(small_dataset: Dataset) -> Non
     parts = latents.targets.double() @ latents.mixing.T
     origin = torch.complex(*parts.chunk(2, dim=1)).to(torch.complex64)
     found = model.decode(model.latents(origin, torch.arange(1, STEPS + 1)))
-    truth = small_dataset.split("train")[:, 1 : STEPS + 1] / small_dataset.scale_m @ synthesis_matrix(101, 5).float()
+    truth = small_dataset.split("train")[:, 1 : STEPS + 1] / small_dataset.scale_m @ SINES.float()
     assert float((found - truth).square().sum() / truth.square().sum()) < 3e-3
 
 

@@ -65,7 +65,7 @@ def test_a_note_survives_its_preset(learned: Learned, tmp_path: Path) -> None:
 def test_modes_of_the_recorded_pitch_are_the_notes(learned: Learned) -> None:
     recorded = recorded_of(learned)
     resonator = recorded.resonator(learned.strung.string, 2 * len(recorded.cents))
-    hz = resonator.omega.numpy() / (2 * math.pi)
+    hz = resonator.omega / (2 * math.pi)
     for each in learned.physics.partials[:6]:
         lower = each.poles[0]
         assert abs(1200 * math.log2(hz[2 * (each.number - 1)] / lower.hz)) < 0.5

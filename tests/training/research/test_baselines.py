@@ -47,7 +47,7 @@ def test_strings_with_the_same_three_numbers_are_one_to_a_baseline() -> None:
     )
     resonator = other.resonator(plucked.resonator.modes)
     amplitudes = plucked.amplitudes_m * (units(other)[1] / units(one)[1])
-    rise = float(resonator.relative_tension_rise(amplitudes))
+    rise = float(resonator.relative_tension_rise(amplitudes.numpy()))
     assert rise == pytest.approx(plucked.tension_rise, rel=1e-9)
     lower = PluckedString(other, resonator, amplitudes, plucked.pitch_hz / slower, plucked.inharmonicity, rise)
     assert units(one)[0] / units(other)[0] == pytest.approx(slower)

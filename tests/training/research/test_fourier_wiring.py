@@ -3,8 +3,8 @@
 import pytest
 import torch
 
-from engine.models import FGRU, FRNN, FGRUConfiguration, FRNNConfiguration
-from engine.models.fno import FourierConvolution
+from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
+from engine.models.fno import FGRU, FRNN, FourierConvolution
 from engine.models.string_modes import StringModes
 from engine.resonators.sine_transform import synthesis_matrix
 from training.research.fourier_wiring import Kernels, shared_coupling, store_in_fgru, store_in_frnn
@@ -19,7 +19,7 @@ def modes(coupled: float = 0.0, count: int = 5, points: int = POINTS) -> StringM
     squares = torch.rand(30, count, generator=torch.Generator().manual_seed(3), dtype=torch.float64)
     coupling = coupled * n[:, None] * n**2 * (1 + 0.5 * torch.eye(count, dtype=torch.float64))
     starts = torch.complex(torch.ones_like(n), eigenvalues.real / eigenvalues.imag)
-    return StringModes(synthesis_matrix(points, count), eigenvalues, starts, coupling, squares)
+    return StringModes(torch.from_numpy(synthesis_matrix(points, count)), eigenvalues, starts, coupling, squares)
 
 
 def motion(string: StringModes, initial: torch.Tensor, steps: int) -> torch.Tensor:

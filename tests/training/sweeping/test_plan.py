@@ -5,9 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from engine.models import MODELS
+from engine.models import MODELS, OF_MANY_STRINGS
 from engine.schema import SchemaError
-from training.cell import OF_MANY_STRINGS
 from training.sweeping.plan import load_plan, plan_names
 
 PLAN = """

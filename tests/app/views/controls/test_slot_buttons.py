@@ -19,7 +19,7 @@ def slots(qtbot: QtBot, small_preset: Path) -> SlotButtons:
     made = SlotButtons()
     qtbot.addWidget(made)
     info = replace(read_info(small_preset), title="Steel E4")
-    made.set_entries([PresetEntry("studio_steel_e4", small_preset, info, 1)])
+    made.set_entries([PresetEntry("studio_steel_e4", small_preset, info)])
     made.show_choices(Choices(a="preset:studio_steel_e4", b="difference"))
     made.show_gains({"a": -1.2, "b": 20.0})
     return made

@@ -7,7 +7,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QAbstractButton, QToolTip
 from pytestqt.qtbot import QtBot
 
-from app.patches.patch import Macro, Patch, Target, TuningChoice
+from app.patches.patch import Macro, Patch, Target
+from app.patches.tuning import TuningChoice
 from app.views.instrument.patch_bar import PatchBar
 
 LEFT = Qt.MouseButton.LeftButton

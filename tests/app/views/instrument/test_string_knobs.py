@@ -6,7 +6,8 @@ import pytest
 from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
-from app.patches.patch import Patch, Pickup, TuningChoice
+from app.patches.patch import Patch, Pickup
+from app.patches.tuning import TuningChoice
 from app.views.instrument.string_knobs import StringKnobs
 
 

@@ -1,0 +1,76 @@
+"""Fields of patches: checked numbers, names and texts, and why one was refused."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+
+from app.shared.parameters import OF_PATCHES
+from engine import bounds
+
+LONGEST_NAME = 60  # characters
+LONGEST_DESCRIPTION = 400
+LONGEST_SCALE = 2**16  # characters of a .scl or .kbm file
+FORBIDDEN_IN_NAMES = '/\\:*?"<>|'  # on Linux, macOS or Windows
+HIGHEST_KEY = 127
+
+
+def plain(text: str) -> str:
+    """The text without white space around it. Raises ValueError: it is not one printable line."""
+    if not text.isprintable():
+        raise ValueError("must be one line of printable characters; remove the others")
+    return text.strip()
+
+
+def _safe(name: str) -> str:
+    """A name that is a valid file name on every system, and no path."""
+    name = plain(name)
+    if name.startswith(".") or name.endswith(".") or any(c in FORBIDDEN_IN_NAMES for c in name):
+        raise ValueError(f"must not begin or end with a full stop, or hold one of {FORBIDDEN_IN_NAMES}; rename it")
+    return name
+
+
+def _lines(text: str) -> str:
+    if not all(c.isprintable() or c in "\r\n\t" for c in text):
+        raise ValueError("must be the text of a Scala file, without control characters; save it as plain text")
+    return text
+
+
+def explained(error: ValueError) -> str:
+    """The first field that was refused, in words: its path, what it must be, and what was found."""
+    if not isinstance(error, ValidationError):
+        return str(error)
+    first = error.errors(include_url=False, include_context=False)[0]
+    field = ".".join(str(part) for part in first["loc"])[:100]
+    said = first["msg"].removeprefix("Value error, ")
+    found = first["input"]
+    shown = f", found {bounds.brief(found)}" if isinstance(found, str | float | int | None) else ""
+    return f"{field}: {said}{shown}" if field else said
+
+
+def ranged(low: float, high: float) -> Any:
+    """A field with a range."""
+    return Field(ge=low, le=high, strict=True, allow_inf_nan=False)
+
+
+def parameter(id: str) -> Any:
+    """A field with range and default of the table of parameters."""
+    declared = OF_PATCHES[id]
+    low, high = declared.limits
+    return Field(declared.default, ge=low, le=high, strict=True, allow_inf_nan=False)
+
+
+Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_safe)]
+Reference = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_safe)]  # a name elsewhere, "" for none
+Text = Annotated[str, Field(max_length=LONGEST_DESCRIPTION), AfterValidator(plain)]
+ScalaText = Annotated[str, Field(max_length=LONGEST_SCALE), AfterValidator(_lines)]
+Key = Annotated[int, ranged(0, HIGHEST_KEY)]
+Share = Annotated[float, ranged(0, 1)]
+Flag = Annotated[bool, Field(strict=True)]
+
+
+class Value(BaseModel):
+    """A part of a patch: immutable, without unknown fields."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")

@@ -1,0 +1,293 @@
+"""A dropped recording: string or body; the string is learned, compared with the recording, and kept or not."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import (
+    QDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLayout,
+    QLineEdit,
+    QProgressBar,
+    QPushButton,
+    QRadioButton,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
+
+from app.audio.note_file import NoteFileError
+from app.audio.sound import Sound
+from app.patches.library import PatchError
+from app.playing.pair import Pair
+from app.shared.worker import Job
+from app.views.background import Background
+from app.views.controls.form import form_label, row_of, spin_box
+from app.views.controls.parts import combo_box, label, read_only_text
+from engine.plain_text import duration
+from engine.presets import PresetError
+from engine.result_file import WriteError
+
+if TYPE_CHECKING:
+    from training.recording.learn import Learned
+
+EXPECTED = (NoteFileError, PatchError, PresetError, WriteError, ValueError)
+KINDS = (("Guitar", "guitar"), ("Bass", "bass"), ("Harp", "harp"), ("Piano", "piano"))
+LONGEST_M, THICKEST_MM = 5.0, 10.0
+HEARD: tuple[tuple[Literal["recording", "learned"], str], ...] = (
+    ("recording", "▶  Recording"),
+    ("learned", "▶  Learned string"),
+)
+
+
+class LearnDialog(QDialog):
+    """Nothing is written before "Keep and play". Errors are stated without anything copied from the recording.
+
+    Attributes:
+        state: what is found, or how far it is.
+    """
+
+    body_chosen = Signal(str)  # the file
+    instrument_kept = Signal(object)  # `Kept`
+
+    def __init__(self, file: Path, output: Sound, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle(file.name)
+        self.setMinimumWidth(620)
+        self._file, self._output = file, output
+        self._learned: Learned | None = None
+        self._pair: Pair | None = None
+        self._against: list[str] | None = None  # None: not examined yet
+        self._then: Callable[[Any], None] = self._show_examined
+        self._began_s = 0.0
+        self._background = Background("learn", self, expected=EXPECTED)
+        self._background.progressed.connect(self._show_progress)
+        self._background.finished.connect(lambda result: self._then(result))
+        self._background.failed.connect(self._failed)
+        self._background.cancelled.connect(self._cancelled)
+        self.string, self.body = QRadioButton("A string: learn it from this note"), QRadioButton("A body")
+        self.body.setToolTip("The sound becomes an impulse response: instruments are played through it")
+        self.string.setToolTip("The note becomes a preset and an instrument over two octaves")
+        self.name = QLineEdit(file.stem[:60])
+        self.name.setAccessibleName("Name of the instrument")
+        self.kind = combo_box("Instrument", KINDS, "guitar")
+        self.kind.setToolTip("For what a sound does not give: density and length")
+        tip = "Assumed where it is 0"
+        self.length_m = spin_box("Sounding length", (0, LONGEST_M), 0, tip, " m", 3, 0.01)
+        self.gauge_mm = spin_box("Diameter", (0, THICKEST_MM), 0, tip, " mm", 2, 0.05)
+        self.state = label("faint", selectable=True)
+        self.bar = QProgressBar(maximum=1000)
+        self.bar.setAccessibleName("Progress")
+        self.report = read_only_text("Report")
+        self.heard = {key: QPushButton(text) for key, text in HEARD}
+        self.start = QPushButton("Continue", default=True)
+        self.start.setObjectName("primary")
+        self.close_button = QPushButton("Cancel")
+        self._pages = QStackedWidget()
+        self._lay_out()
+        self._connect()
+        self._examine()
+
+    def _lay_out(self) -> None:
+        question, form = QWidget(), QFormLayout()
+        rows: dict[str, QWidget | QLayout] = {
+            "Name": self.name,
+            "Instrument": row_of(self.kind),
+            "Length": row_of(self.length_m),
+            "Diameter": row_of(self.gauge_mm),
+        }
+        for name, part in rows.items():
+            form.addRow(form_label(name), part)
+        column = QVBoxLayout(question)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addWidget(label(text="String or body?"))
+        column.addWidget(self.string)
+        column.addLayout(form)
+        column.addWidget(self.body)
+        column.addStretch(1)
+        result, sounds = QWidget(), QHBoxLayout()
+        for button in self.heard.values():
+            button.setCheckable(True)
+            button.setToolTip("Both play on, in a loop; the switch is at the same moment")
+            sounds.addWidget(button, 1)
+        column = QVBoxLayout(result)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.addLayout(sounds)
+        column.addWidget(self.report)
+        for page in (question, result):
+            self._pages.addWidget(page)
+        buttons = QHBoxLayout()
+        buttons.addStretch(1)
+        buttons.addWidget(self.close_button)
+        buttons.addWidget(self.start)
+        column = QVBoxLayout(self)
+        column.setSpacing(12)
+        for part in (self._pages, self.bar, self.state):
+            column.addWidget(part)
+        column.addLayout(buttons)
+        self.bar.hide()
+
+    def _connect(self) -> None:
+        self.start.clicked.connect(self._continue)
+        self.close_button.clicked.connect(self.reject)
+        for choice in (self.string, self.body):
+            choice.toggled.connect(self._show_choice)
+        for key, button in self.heard.items():
+            button.clicked.connect(partial(self._hear, key))
+
+    # String or body
+
+    def _examine(self) -> None:
+        self.state.setText("Is this one note of a string? …")
+        self.start.setEnabled(False)
+
+        def work(job: Job) -> list[str]:
+            from app.instrument.learned import reasons_against
+
+            return reasons_against(self._file)
+
+        self._then = self._show_examined
+        self._background.start(work)
+
+    def _show_examined(self, against: list[str]) -> None:
+        self._against = against
+        (self.body if against else self.string).setChecked(True)
+        self._show_choice()
+
+    def _show_choice(self) -> None:
+        if self._background.busy:
+            return
+        for part in (self.name, self.kind, self.length_m, self.gauge_mm):
+            part.setEnabled(self.string.isChecked())
+        against = self._against or []
+        if self.body.isChecked():
+            words = "Not one note of a string:" if against else "This sounds like one note of a string."
+        else:
+            words = "Learned all the same, although:" if against else "One note of a string: about five seconds."
+        self.state.setText("\n".join([words, *(f"• {each}" for each in against)]))
+        self.start.setText("Use as body" if self.body.isChecked() else "Learn")
+        self.start.setEnabled(self.body.isChecked() or self.string.isChecked())
+
+    def _continue(self) -> None:
+        if self._learned is not None:
+            self._keep()
+        elif self.body.isChecked():
+            self.body_chosen.emit(str(self._file))
+            self.accept()
+        elif self._against is not None:
+            self._learn()
+
+    # Learning
+
+    def _learn(self) -> None:
+        choices = {
+            "kind": self.kind.currentData(),
+            "length_m": self.length_m.value() or None,
+            "gauge_mm": self.gauge_mm.value() or None,
+            "anyway": bool(self._against),
+        }
+        name, rate_hz = self.name.text(), self._output.rate_hz
+
+        def work(job: Job) -> tuple[Any, Any]:
+            from app.instrument.learned import both_sounds, check_name, learn_files
+
+            check_name(name)
+            (learned,) = learn_files([self._file], progress=job.progress, **choices)
+            return learned, both_sounds(learned, rate_hz)
+
+        self._pages.setEnabled(False)
+        self.start.setEnabled(False)
+        self.bar.setValue(0)
+        self.bar.show()
+        self._began_s = time.monotonic()
+        self._then = self._show_learned
+        self._background.start(work)
+
+    def _show_progress(self, share: float, *_: object) -> None:
+        self.bar.setValue(round(1000 * share))
+        spent_s = time.monotonic() - self._began_s
+        left = f" About {duration(spent_s * (1 / share - 1))} left." if share > 0.1 else ""
+        self.state.setText(f"Learning the string.{left}")
+
+    def _show_learned(self, result: tuple[Any, Any]) -> None:
+        from training.recording.table import as_text
+
+        self._learned, sounds = result
+        assert self._learned is not None
+        self._pair = Pair(self._output.mixer, sounds)
+        self.report.setPlainText("\n".join(as_text(self._learned)))
+        self._pages.setCurrentIndex(1)
+        self._ready("Nothing is written yet.")
+        self.start.setText("Keep and play")
+        self.start.setEnabled(True)
+        self.heard["learned"].setFocus()
+
+    def _hear(self, name: str) -> None:
+        for key, button in self.heard.items():
+            button.setChecked(key == name and button.isChecked())
+        if self._pair is None:
+            return
+        if not any(button.isChecked() for button in self.heard.values()):
+            self._pair.stop()
+            return
+        self._pair.select(name)
+        self._pair.play()
+
+    # The end
+
+    def _keep(self) -> None:
+        learned, name, kind = self._learned, self.name.text(), self.kind.currentData()
+
+        def work(job: Job) -> Any:
+            from app.instrument.learned import keep
+
+            assert learned is not None
+            return keep(name, [learned], kind)
+
+        self._pages.setEnabled(False)
+        self.start.setEnabled(False)
+        self._then = self._show_kept
+        self._background.start(work)
+
+    def _show_kept(self, kept: object) -> None:
+        self.instrument_kept.emit(kept)
+        self.accept()
+
+    def _failed(self, message: str, _details: str) -> None:
+        if self._against is None:  # not even examined: it can only be a body
+            self.string.setEnabled(False)
+            self._against = [message]
+            self.body.setChecked(True)
+            self._show_choice()
+            return
+        self._ready(message)
+        self.start.setEnabled(True)
+
+    def _cancelled(self) -> None:
+        self._ready("Cancelled; nothing was written.")
+        self.start.setEnabled(True)
+
+    def _ready(self, words: str) -> None:
+        self.bar.hide()
+        self._pages.setEnabled(True)
+        self.state.setText(words)
+
+    def reject(self) -> None:
+        """Escape or Cancel: ends the learning under way, otherwise closes."""
+        if self._background.busy and self._against is not None:
+            self._background.stop()
+        else:
+            super().reject()
+
+    def done(self, result: int) -> None:
+        if self._pair is not None:
+            self._pair.stop()
+        self._background.close()
+        super().done(result)

@@ -1,0 +1,213 @@
+"""The sizes of every learned model. Nothing here needs torch, so that presets are listed and checked without it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+LEAST_PHASE = 0.02  # of `koopman_tension` between nodes: a voice of more would take too much of the device's time
+
+
+def check_sizes(configuration: object, *names: str) -> None:
+    """Raises ValueError, naming the field, where a size or one of a tuple of sizes is below 1."""
+    for name in names:
+        value = getattr(configuration, name)
+        if any(size < 1 for size in (value if isinstance(value, tuple) else (value,))):
+            raise ValueError(f"{name} must be at least 1, not {value}")
+
+
+@dataclass(frozen=True)
+class DMDConfiguration:
+    """Sizes; the defaults are the paper's (10,200 parameters: 50 complex eigenvalues, and modes on 101 points).
+
+    Attributes:
+        lags: frames in the embedding.
+        rank: singular vectors kept, which is the number of modes. Two for each mode of the string are enough.
+    """
+
+    grid_points: int = 101
+    lags: int = 2
+    rank: int = 50
+
+    def __post_init__(self) -> None:
+        check_sizes(self, "grid_points", "lags", "rank")
+        if self.rank > self.lags * self.grid_points:
+            raise ValueError(
+                f"rank must be at most lags times grid_points, {self.lags * self.grid_points}, not {self.rank}"
+            )
+
+
+@dataclass(frozen=True)
+class KoopmanConfiguration:
+    """Sizes; the defaults are the paper's (191,077 parameters).
+
+    Attributes:
+        state_size: number n of complex eigenvalues.
+        encoder_widths, decoder_widths: hidden widths of the MLPs.
+        mixing_layer: a dense layer 2n → 2n at the encoder's end, without an activation before it. The paper's text
+            does not name it, its number of parameters has it.
+    """
+
+    grid_points: int = 101
+    state_size: int = 128
+    encoder_widths: tuple[int, ...] = (128, 128)
+    decoder_widths: tuple[int, ...] = (128, 128)
+    mixing_layer: bool = True
+
+    def __post_init__(self) -> None:
+        check_sizes(self, "grid_points", "state_size", "encoder_widths", "decoder_widths")
+
+
+@dataclass(frozen=True)
+class KoopmanVarConfiguration:
+    """Sizes; the defaults are the paper's (134,885 parameters).
+
+    Attributes:
+        state_size: number n of complex eigenvalues.
+        multiplier_widths: hidden widths of the multiplier's MLP.
+    """
+
+    grid_points: int = 101
+    state_size: int = 128
+    multiplier_widths: tuple[int, ...] = (128, 128, 128)
+
+    def __post_init__(self) -> None:
+        check_sizes(self, "grid_points", "state_size", "multiplier_widths")
+
+
+@dataclass(frozen=True)
+class IntegratedPhaseConfiguration:
+    """Sizes. An empty tuple of widths leaves that network out.
+
+    Attributes:
+        state_size: number n of complex eigenvalues: one for each mode, or more to spare.
+        encoder_widths: hidden widths of the MLP that is added to the linear encoder.
+        eigenvalue_widths: hidden widths of g.
+        modulation: whether there are M_in and M_out. Evaluated at every frame.
+        adiabatic: whether f follows the mean tension to all orders and there are A_in and A_out, too, which need
+            the modulation.
+        node_spacing: samples between the nodes of the integral of g; energies hardly change in between.
+        physical_units: K, g and M receive the tension that each mode adds, as a share of that at rest, instead of
+            the energies, and yield shares of each mode's frequency: numbers of the order of 1 for every mode,
+            which an optimiser and a network need. A start from the physics fills the units in.
+        second_order: whether g counts by Σ E_m.
+    """
+
+    grid_points: int = 101
+    state_size: int = 25
+    encoder_widths: tuple[int, ...] = (128, 128)
+    eigenvalue_widths: tuple[int, ...] = (128, 128)
+    modulation: bool = False
+    adiabatic: bool = False
+    node_spacing: int = 40
+    physical_units: bool = False
+    second_order: bool = False
+
+    def __post_init__(self) -> None:
+        check_sizes(self, "grid_points", "state_size", "encoder_widths", "eigenvalue_widths", "node_spacing")
+        if self.adiabatic and not self.modulation:
+            raise ValueError("adiabatic needs modulation = true")
+
+
+@dataclass(frozen=True)
+class KoopmanTensionConfiguration:
+    """Sizes.
+
+    Attributes:
+        modes: of the resonator, or more: those to spare rest.
+        degree: of each curve's polynomial in (hω)².
+        node_phase: the largest phase in rad that the first mode turns between nodes.
+        highest_phase: the same of the highest mode; below π/2 no two modes are pumped.
+    """
+
+    grid_points: int = 101
+    modes: int = 25
+    degree: int = 3
+    node_phase: float = 0.05
+    highest_phase: float = 1.56
+
+    def __post_init__(self) -> None:
+        check_sizes(self, "grid_points", "modes")
+        if self.modes > self.grid_points - 2:
+            raise ValueError(f"a grid of {self.grid_points} points cannot hold {self.modes} modes")
+        if not 0 <= self.degree <= 32:
+            raise ValueError(f"degree must lie in 0 … 32, not {self.degree}")
+        for name in ("node_phase", "highest_phase"):
+            if not LEAST_PHASE <= getattr(self, name) <= math.pi:
+                raise ValueError(f"{name} must lie in {LEAST_PHASE} … π, not {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
+class FGRUConfiguration:
+    """Sizes; the defaults are the paper's (640,033 parameters).
+
+    Attributes:
+        width: channels of the hidden field.
+    """
+
+    grid_points: int = 101
+    width: int = 32
+
+    def __post_init__(self) -> None:
+        check_sizes(self, "grid_points", "width")
+
+
+@dataclass(frozen=True)
+class FRNNConfiguration:
+    """Sizes; the defaults are the paper's (643,201 parameters).
+
+    Attributes:
+        width: channels of the hidden field.
+        depth: Fourier layers in a step.
+    """
+
+    grid_points: int = 101
+    width: int = 32
+    depth: int = 3
+
+    def __post_init__(self) -> None:
+        check_sizes(self, "grid_points", "width", "depth")
+
+
+@dataclass(frozen=True)
+class LRUConfiguration:
+    """Sizes; the defaults are the paper's (636,221 parameters).
+
+    Attributes:
+        state_size: complex states of every layer.
+        layers: blocks after the first layer.
+    """
+
+    grid_points: int = 101
+    state_size: int = 128
+    layers: int = 8
+
+    def __post_init__(self) -> None:
+        for name, least in (("grid_points", 3), ("state_size", 1), ("layers", 0)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
+
+
+@dataclass(frozen=True)
+class S5Configuration:
+    """Sizes; the defaults are the paper's (307,879 parameters).
+
+    Attributes:
+        state_size: states of every layer; half of them, one of each conjugate pair, are stored.
+        hippo_blocks: diagonal blocks of the initial state matrix, each a HiPPO-LegS matrix.
+        layers: blocks after the first layer.
+    """
+
+    grid_points: int = 101
+    state_size: int = 128
+    hippo_blocks: int = 16
+    layers: int = 6
+
+    def __post_init__(self) -> None:
+        for name, least in (("grid_points", 3), ("state_size", 2), ("hippo_blocks", 1), ("layers", 0)):
+            if getattr(self, name) < least:
+                raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
+        if self.state_size % (2 * self.hippo_blocks):
+            raise ValueError(
+                f"state_size must be a multiple of twice the {self.hippo_blocks} hippo_blocks, not {self.state_size}"
+            )

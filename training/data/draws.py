@@ -1,0 +1,68 @@
+"""Random initial displacements: the paper's protocol (Gaussian, noise), and plucks of a musician.
+
+All of them are at rest, in metres on a grid. Gaussians and noise follow §4.1 of the paper and its authors' ranges.
+PyTorch draws the numbers: a seed means the same data for ever.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import torch
+
+from engine.excitation import gaussian, held, raised_cosine, triangular
+from engine.resonators.base import Array
+from engine.resonators.sine_transform import grid_positions
+
+CENTRE_RANGE = (0.3, 0.7)  # of a random Gaussian, in lengths
+WIDTH_RANGE = (0.02, 0.1)  # of a random Gaussian, in lengths
+PEAK_RANGE_M = (1e-3, 1e-2)  # of both random kinds
+PLUCK_POSITION_RANGE = (0.05, 0.95)  # of a random pluck, which may have any shape
+PLUCK_WIDTH_RANGE = (0.03, 0.3)
+PLUCK_PEAK_RANGE_M = (5e-4, 1e-2)
+
+
+def draw_gaussians(count: int, grid_points: int, generator: torch.Generator) -> Array:
+    """`count` random Gaussians of the paper's protocol, float64 (count, grid_points)."""
+    centre, width, peak = (
+        _uniform(count, low, high, generator) for low, high in (CENTRE_RANGE, WIDTH_RANGE, PEAK_RANGE_M)
+    )
+    return held(peak * np.exp(-(((grid_positions(grid_points) - centre) / width) ** 2)))
+
+
+def draw_noise(count: int, grid_points: int, generator: torch.Generator) -> Array:
+    """`count` draws of U(0, 1) at each point scaled to a random peak, float64 (count, grid_points)."""
+    peak = _uniform(count, *PEAK_RANGE_M, generator)
+    raw = torch.rand(count, grid_points, generator=generator, dtype=torch.float64).numpy()
+    raw[:, 0] = raw[:, -1] = 0
+    return raw / raw.max(1, keepdims=True) * peak
+
+
+def draw_plucks(count: int, grid_points: int, generator: torch.Generator) -> Array:
+    """`count` plucks of a musician: Gaussian, triangular and raised-cosine in turn, float64 (count, grid_points).
+
+    Positions are uniform; widths and peaks are so on a logarithmic scale, because narrow and soft ones count as much.
+    """
+    position = _uniform(count, *PLUCK_POSITION_RANGE, generator)[:, 0].tolist()
+    width, peak_m = (
+        np.exp(_uniform(count, math.log(low), math.log(high), generator)[:, 0]).tolist()
+        for low, high in (PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M)
+    )
+    drawn = []
+    for number, (at, wide, peak) in enumerate(zip(position, width, peak_m, strict=True)):
+        shape = number % 3
+        if shape == 0:
+            drawn.append(gaussian(at, wide, peak, grid_points))
+        elif shape == 1:
+            drawn.append(triangular(at, peak, grid_points))
+        else:
+            drawn.append(raised_cosine(at, wide, peak, grid_points))
+    return np.stack(drawn)
+
+
+DRAWS = {"gaussian": draw_gaussians, "noise": draw_noise, "pluck": draw_plucks}
+
+
+def _uniform(count: int, low: float, high: float, generator: torch.Generator) -> Array:
+    return low + (high - low) * torch.rand(count, 1, generator=generator, dtype=torch.float64).numpy()
