@@ -36,9 +36,9 @@ def plugin(
     Several instruments make one bank. The first build takes up to a minute, later ones some seconds. It needs the
     extra learned-strings[plugin].
     """
-    from app.export.plugin.build import FORMATS, build_plugin, install_folder, this_target
+    from app.export.plugin.build import build_plugin
+    from app.export.plugin.formats import FORMATS, TARGETS, install_folder, this_target
     from app.export.plugin.image import image_of
-    from app.export.plugin.objects import TARGETS
     from app.patches.library import SHIPPED, find_patch, list_patches
     from engine.kernels import cache
     from training.cli.arguments import open_preset
@@ -62,10 +62,22 @@ def plugin(
             for kind in FORMATS if form == ALL else (form,):
                 folder = install_folder(kind, each) if install else (out or Path()) / (each if target == ALL else "")
                 began_s = time.monotonic()
-                path = build_plugin(images, kind, each, folder / name, kept, say)
+                path = build_plugin(images, kind, each, folder / name, kept, _Steps())
                 print(f"{one_line(str(path))}: {_size(path) / 1e6:.1f} MB, {time.monotonic() - began_s:.1f} s")
     except (ValueError, OSError) as error:
         raise Failure(str(error)) from error
+
+
+class _Steps:
+    """Says each step once."""
+
+    def __init__(self) -> None:
+        self._latest = ""
+
+    def __call__(self, step: str) -> None:
+        if step != self._latest:
+            say(step)
+        self._latest = step
 
 
 def _size(path: Path) -> int:

@@ -93,10 +93,12 @@ class Exports(QObject):
         patch = choices.patch
         preset = None if played is None else self._library.find(played.patch.preset)
         player = None if patch is None else self._library.find(patch.preset)
+        instrument = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
             "note": heard_note(choices, self._library, self._through(choices)),
             "performance": played and HeardPerformance(played, None if preset is None else preset.path),
-            "sampler": None if patch is None or player is None else HeardInstrument(patch, player),
+            "sampler": instrument,
+            "plugin": instrument,
         }
 
     def _exported(self, job: object) -> None:

@@ -1,7 +1,10 @@
 """An instrument as a native plug-in: its image, the kernels' object code, a shell in C, and their linking.
 
+formats   kinds of plug-ins, systems, and where hosts look for them
 image     an instrument as one block of bytes that the shell reads, and the header of offsets
+parts     what macros change: body, room, levels of keys
 objects   the compiled kernels for each system
 build     files of a plug-in: written, linked, installed
+job       all of that for the window
 shell/    the plug-in's interface to hosts, in C
 """

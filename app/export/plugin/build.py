@@ -2,89 +2,25 @@
 
 from __future__ import annotations
 
-import platform
 import shutil
-import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from importlib.resources import files
-from importlib.util import find_spec
 from pathlib import Path
+from urllib.parse import quote
 from xml.sax.saxutils import escape
 
+from app.export.plugin.formats import FORMATS, TARGETS, PluginError, check_compiler
 from app.export.plugin.image import MAKER, Image, layout_header
-from app.export.plugin.objects import STUBS, TARGETS, object_of
+from app.export.plugin.objects import STUBS, object_of, run_waiting
 from app.shared.version import program_version
 from engine.whole_file import whole_file
 
-EXTRA = "learned-strings[plugin]"
 COMMON = ("instrument.c",)
 LIBRARY_ENDINGS = {"linux": ".so", "windows": ".dll", "macos": ".dylib"}
 VST3_ENDINGS = {"linux": ".so", "windows": ".vst3"}
 VST3_FOLDERS = {"linux-x64": "x86_64-linux", "linux-arm64": "aarch64-linux", "windows-x64": "x86_64-win"}
-_HERE = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}
-_MACHINES = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64", "aarch64": "arm64"}
-
-
-class PluginError(ValueError):
-    """A plug-in cannot be built; the message names what is missing and the remedy."""
-
-
-@dataclass(frozen=True)
-class Format:
-    """A kind of plug-in.
-
-    Attributes:
-        sources: of the shell, added to those of every format.
-        ending: of the file or the folder.
-        folders: by system, where hosts of one user look for it, below the home folder.
-    """
-
-    sources: tuple[str, ...]
-    ending: str
-    folders: Mapping[str, str]
-
-
-FORMATS: Mapping[str, Format] = {
-    "clap": Format(
-        ("clap.c",),
-        ".clap",
-        {
-            "linux": ".clap",
-            "windows": "AppData/Local/Programs/Common/CLAP",
-            "macos": "Library/Audio/Plug-Ins/CLAP",
-        },
-    ),
-    "vst3": Format(
-        ("vst3.c", "clap.c"),
-        ".vst3",
-        {
-            "linux": ".vst3",
-            "windows": "AppData/Local/Programs/Common/VST3",
-            "macos": "Library/Audio/Plug-Ins/VST3",
-        },
-    ),
-    "lv2": Format(
-        ("lv2.c",),
-        ".lv2",
-        {"linux": ".lv2", "windows": "AppData/Roaming/LV2", "macos": "Library/Audio/Plug-Ins/LV2"},
-    ),
-}
-
-
-def this_target() -> str:
-    """The target of this computer. Raises PluginError: it is none of `TARGETS`."""
-    found = f"{_HERE.get(platform.system(), '')}-{_MACHINES.get(platform.machine().lower(), '')}"
-    if found not in TARGETS:
-        raise PluginError(f"no plug-ins are built for this system; choose one of {', '.join(TARGETS)}")
-    return found
-
-
-def install_folder(form: str, target: str) -> Path:
-    """Where the hosts of this user look for plug-ins of a format."""
-    return Path.home() / FORMATS[form].folders[target.partition("-")[0]]
 
 
 def build_plugin(
@@ -101,18 +37,17 @@ def build_plugin(
         form: one of FORMATS.
         path: without an ending it gets that of the format.
         cache: a folder that keeps object files for the next build.
-        advanced: is called with the name of each step.
+        advanced: is called with the name of each step, again and again while it takes; may raise, to end it.
 
     Raises:
         PluginError: the compiler is not installed, or linking failed.
         ObjectError: the kernels cannot be compiled for the target.
     """
-    if find_spec("ziglang") is None:
-        raise PluginError(f"building a plug-in needs a C compiler: pip install '{EXTRA}' brings one")
+    check_compiler()
     own = FORMATS[form]
     path = path if path.suffix == own.ending else path.with_name(path.name + own.ending)
     advanced("compiling the kernels")
-    kernels = object_of(target, cache)
+    kernels = object_of(target, cache, lambda: advanced("compiling the kernels"))
     advanced("linking")
     with tempfile.TemporaryDirectory(prefix="learned-strings-plugin-") as name:
         folder = Path(name)
@@ -122,7 +57,14 @@ def build_plugin(
         (folder / "stubs.c").write_text(_stubs(), encoding="utf-8")
         (folder / "images.c").write_text(_images(images, folder), encoding="utf-8")
         library = folder / "library"
-        _link(folder, (*COMMON, *own.sources, "images.c", "stubs.c"), kernels, target, library)
+        _link(
+            folder,
+            (*COMMON, *own.sources, "images.c", "stubs.c"),
+            kernels,
+            target,
+            library,
+            lambda: advanced("linking"),
+        )
         return _placed(library, images, form, target, path)
 
 
@@ -177,13 +119,15 @@ def _stubs() -> str:
     return "\n".join(lines) + "\n"
 
 
-def _link(folder: Path, sources: Sequence[str], kernels: Path, target: str, library: Path) -> None:
+def _link(
+    folder: Path, sources: Sequence[str], kernels: Path, target: str, library: Path, waiting: Callable[[], None]
+) -> None:
     command = [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].linker, "-shared", "-O2", "-std=c23"]
     command += ["-fvisibility=hidden", "-fno-sanitize=all", "-s", "-fPIC", "-o", str(library)]
     command += [*(str(folder / name) for name in sources), str(kernels), "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    if done.returncode:
-        raise PluginError(f"linking for {target} failed: {done.stderr.strip()[-600:]}")
+    code, said = run_waiting(command, None, waiting)
+    if code:
+        raise PluginError(f"linking for {target} failed: {said.strip()[-600:]}")
 
 
 def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
@@ -192,7 +136,7 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
     listed, described = [prefixes], [prefixes]
     for image in images:
         head = f"<urn:{image.id}> a lv2:Plugin, lv2:InstrumentPlugin, doap:Project ;"
-        listed.append(f"{head}\n  lv2:binary <{binary}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
+        listed.append(f"{head}\n  lv2:binary <{quote(binary)}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
         ports = [
             "a lv2:InputPort, atom:AtomPort ; atom:bufferType atom:Sequence ; atom:supports midi:MidiEvent ;\n"
             '    lv2:designation lv2:control ; lv2:index 0 ; lv2:symbol "events" ; lv2:name "Events"',

@@ -6,21 +6,24 @@ Text and objects are kept by the digest of the kernels and of the compilers' ver
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import re
 import subprocess
 import sys
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
+from app.export.plugin.formats import TARGETS, Target
 from engine.whole_file import whole_file
 
 ENTRIES = ("render", "begin", "partition")
 PREFIX = "ls_"
+WAIT_S = 0.1
 # What the code may ask of the shell and of the C library; all else would be a reference to Python.
 _LIBRARY = """
 cos sin sincos sincosf exp exp2 log log10 log1p log2 pow ceil floor rint round sqrt fmod tan atan atan2
@@ -36,28 +39,6 @@ numba_runtime_build_excinfo_struct numba_unpickle numba_unpickle_no_gil
 """
 ALLOWED, STUBS = frozenset(_LIBRARY.split()), frozenset(_ERROR_PATHS.split())  # the shell answers with stubs
 
-
-@dataclass(frozen=True)
-class Target:
-    """A system that plug-ins are built for.
-
-    Attributes:
-        triple: of LLVM; `linker`: of the linker, where it has another name for it.
-        cpu: the oldest processor that is served.
-    """
-
-    triple: str
-    cpu: str
-    linker: str
-
-
-TARGETS: Mapping[str, Target] = {
-    "linux-x64": Target("x86_64-unknown-linux-gnu", "x86-64-v2", "x86_64-linux-gnu.2.17"),
-    "linux-arm64": Target("aarch64-unknown-linux-gnu", "generic", "aarch64-linux-gnu.2.17"),
-    "windows-x64": Target("x86_64-w64-windows-gnu", "x86-64-v2", "x86_64-windows-gnu"),
-    "macos-x64": Target("x86_64-apple-macosx11.0.0", "x86-64-v2", "x86_64-macos.11.0"),
-    "macos-arm64": Target("arm64-apple-macosx11.0.0", "apple-m1", "aarch64-macos.11.0"),
-}
 
 _TEXTS = """
 import sys
@@ -90,8 +71,11 @@ def digest() -> str:
     return found.hexdigest()[:16]
 
 
-def object_of(target: str, folder: Path) -> Path:
+def object_of(target: str, folder: Path, waiting: Callable[[], None] = lambda: None) -> Path:
     """The object file of the kernels for a target, from `folder` or compiled into it (half a minute the first time).
+
+    Args:
+        waiting: is called a few times a second meanwhile; may raise, to end it.
 
     Raises:
         ObjectError: an unknown target, or the code needs what no plug-in has.
@@ -101,23 +85,41 @@ def object_of(target: str, folder: Path) -> Path:
     path = folder / f"kernels-{digest()}-{target}.o"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        compiled = _compiled(_texts(folder), TARGETS[target])
+        compiled = _compiled(_texts(folder, waiting), TARGETS[target])
         with whole_file(path) as part:
             part.write_bytes(compiled)
     return path
 
 
-def _texts(folder: Path) -> dict[str, str]:
+def _texts(folder: Path, waiting: Callable[[], None]) -> dict[str, str]:
     """LLVM code of the entries, compiled by a process of its own, for Numba's options hold for a whole process."""
     paths = {name: folder / f"kernels-{digest()}-{name}.ll" for name in ENTRIES}
     if not all(path.exists() for path in paths.values()):
         with ExitStack() as whole:
             parts = [f"{name}={whole.enter_context(whole_file(path))}" for name, path in paths.items()]
             command = [sys.executable, "-c", _TEXTS, *parts]
-            done = subprocess.run(command, env=_environment(), capture_output=True, text=True, check=False)
-            if done.returncode:
-                raise ObjectError(f"the kernels cannot be compiled: {done.stderr.strip()[-400:]}")
+            code, said = run_waiting(command, _environment(), waiting)
+            if code:
+                raise ObjectError(f"the kernels cannot be compiled: {said.strip()[-400:]}")
     return {name: path.read_text(encoding="utf-8") for name, path in paths.items()}
+
+
+def run_waiting(
+    command: Sequence[str], environment: Mapping[str, str] | None, waiting: Callable[[], None]
+) -> tuple[int, str]:
+    """A command's exit status, and what it reported; it is ended where `waiting` raises."""
+    with tempfile.TemporaryFile() as said:
+        process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=said)
+        try:
+            while process.poll() is None:
+                waiting()
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(WAIT_S)
+        finally:
+            process.kill()
+            process.wait()
+        said.seek(0)
+        return process.returncode, said.read().decode(errors="replace")
 
 
 def _environment() -> dict[str, str]:

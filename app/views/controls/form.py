@@ -12,7 +12,14 @@ from app.views.controls.parts import tool_button
 from app.views.controls.plain import Label
 
 LABEL_WIDTH = 104
-FILTERS = {".wav": "WAV (*.wav)", ".sfz": "SFZ (*.sfz)", ".sf2": "SoundFont 2 (*.sf2)"}
+FILTERS = {
+    ".wav": "WAV (*.wav)",
+    ".sfz": "SFZ (*.sfz)",
+    ".sf2": "SoundFont 2 (*.sf2)",
+    ".clap": "CLAP (*.clap)",
+    ".vst3": "VST3 (*.vst3)",
+    ".lv2": "LV2 (*.lv2)",
+}
 
 
 def form_label(text: str) -> QLabel:

@@ -25,6 +25,7 @@ from app.views.dialogs.export_pages import (
     Kind,
     NotePage,
     PerformancePage,
+    PluginPage,
     SamplerPage,
     WavForm,
 )
@@ -62,13 +63,13 @@ class ExportDialog(QDialog):
         self._subjects: Mapping[Kind, Any] = {}
         self.wav = WavForm(export)
         self.note, self.performance = NotePage(export, self.wav), PerformancePage(export, self.wav)
-        self.sampler = SamplerPage(sampled)
+        self.sampler, self.plugin = SamplerPage(sampled), PluginPage()
         self.pages: dict[Kind, ExportPage] = dict(
-            zip(KINDS, (self.note, self.performance, self.sampler), strict=True)
+            zip(KINDS, (self.note, self.performance, self.sampler, self.plugin), strict=True)
         )
         self.tabs = QTabBar(drawBase=False, expanding=False)
         self.tabs.setAccessibleName("What to export")
-        self.tabs.setToolTip("A note, what was recorded, or the patch for samplers")
+        self.tabs.setToolTip("A note, what was recorded, or the patch for samplers or as a plug-in")
         self._settled = QTimer(self, singleShot=True, interval=SETTLE_MS)
         self._settled.timeout.connect(self._update)
         self._lay_out()

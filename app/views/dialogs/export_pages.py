@@ -1,4 +1,4 @@
-"""The pages of the export dialog, one for each kind of export: a note, a performance, an instrument for samplers."""
+"""The pages of the export dialog: a note, a performance, an instrument for samplers, and one as a plug-in."""
 
 from __future__ import annotations
 
@@ -25,6 +25,8 @@ from app.export.files import ExportError
 from app.export.job import ExportJob
 from app.export.note import HeardNote, Note, NoteExport
 from app.export.played import Played, PlayedExport, recorded_files
+from app.export.plugin.formats import FORMATS, PluginError, check_compiler, install_folder, this_target
+from app.export.plugin.job import PluginExport
 from app.export.recipe import source_words
 from app.export.sampled.choices import SampledChoices
 from app.export.sampled.export import SampledExport
@@ -45,7 +47,7 @@ from engine.presets import PresetError, preset_digest
 from engine.result_file import explain
 
 Rows = dict[str, QWidget | QLayout]
-Kind = Literal["note", "performance", "sampler"]
+Kind = Literal["note", "performance", "sampler", "plugin"]
 SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (
     ("Model", "model"),
     ("Truth", "truth"),
@@ -55,6 +57,15 @@ SOURCE_NAMES: tuple[tuple[str, Chosen], ...] = (
 RATES_HZ = (44_100, 48_000, 96_000)
 BITS_NAMES: dict[Bits, str] = {"16": "16-bit PCM, dithered", "24": "24-bit PCM", "32f": "32-bit floating point"}
 FORM_NAMES = (("SFZ with FLAC samples", "flac"), ("SFZ with WAV samples", "wav"), ("SoundFont 2", "sf2"))
+PLUGIN_NAMES = {"clap": "CLAP", "vst3": "VST3", "lv2": "LV2"}
+SYSTEM_NAMES = {
+    "linux-x64": "Linux",
+    "linux-arm64": "Linux (ARM)",
+    "windows-x64": "Windows",
+    "macos-arm64": "macOS",
+    "macos-x64": "macOS (Intel)",
+}
+PLUGIN_NOTE = "The first one takes a minute, later ones some seconds."
 RECIPE_NOTE = "Each file stores its settings: drop it on the window to restore its preset and pluck."
 MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
 RESUMES = "A cancelled export keeps its samples, and continues from there the next time."
@@ -413,7 +424,64 @@ class SamplerPage(ExportPage):
             self.file.suggest(plain_stem(self._subject.patch.name) + self.file.suffix)
 
 
-PAGES: dict[Kind, type[ExportPage]] = {"note": NotePage, "performance": PerformancePage, "sampler": SamplerPage}
+class PluginPage(ExportPage):
+    """A patch as a plug-in for a DAW: format, system, place."""
+
+    title, missing, writes_wav = "Plug-in", "There is no instrument to export: choose one first.", False
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._subject: HeardInstrument | None = None
+        self.what = label()
+        self.form = combo_box("Format", [(name, form) for form, name in PLUGIN_NAMES.items()], "clap")
+        self.form.setToolTip("CLAP and VST3 for most DAWs; LV2 for Ardour, Qtractor and others on Linux")
+        self.system = combo_box("System", [(name, target) for target, name in SYSTEM_NAMES.items()], _this_system())
+        self.system.setToolTip("Of the computer that it is for")
+        self.file = FilePicker("", "Where the plug-in is written; hosts look for it where it is suggested")
+        rows: Rows = {"Sound": self.what, "Format": row_of(self.form, self.system), "File": self.file}
+        _lay_out(self, rows)
+        for signal in _watch((self.form, self.system), self.changed):
+            signal.connect(self._suggest_name)
+        self.file.changed.connect(self.changed)
+
+    def show_subject(self, subject: HeardInstrument | None) -> None:
+        self._subject = subject
+        if subject is not None:
+            self.what.setText(f"{subject.patch.name}, played by {subject.preset.title}")
+            self._suggest_name()
+
+    def job(self) -> PluginExport:
+        if self._subject is None:
+            raise ValueError(self.missing)
+        check_compiler()
+        patch, preset = self._subject.patch, self._subject.preset.path
+        return PluginExport(patch, preset, self.form.currentData(), self.system.currentData(), self.file.path)
+
+    def offer(self) -> tuple[str, str]:
+        return "Replace" if self.job().path.exists() else "Export", PLUGIN_NOTE
+
+    def _suggest_name(self) -> None:
+        form, system = self.form.currentData(), self.system.currentData()
+        self.file.suffix = FORMATS[form].ending
+        if self._subject is not None:
+            folder = install_folder(form, system) if system == _this_system() else Path.home()
+            self.file.suggest(str(folder / (plain_stem(self._subject.patch.name) + self.file.suffix)))
+
+
+PAGES: dict[Kind, type[ExportPage]] = {
+    "note": NotePage,
+    "performance": PerformancePage,
+    "sampler": SamplerPage,
+    "plugin": PluginPage,
+}
+
+
+def _this_system() -> str:
+    """The target of this computer; where there is none, the first."""
+    try:
+        return this_target()
+    except PluginError:
+        return next(iter(SYSTEM_NAMES))
 
 
 def _through(note: Note) -> str:

@@ -25,7 +25,7 @@ def test_bad_requests_are_refused(words: list[str], said: str, capsys: pytest.Ca
 def test_without_a_compiler_the_extra_is_named(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("app.export.plugin.build.find_spec", lambda name: None)
+    monkeypatch.setattr("app.export.plugin.formats.find_spec", lambda name: None)
     assert main(["plugin", "Concert harp", "--out", str(tmp_path)]) == 1
     assert "learned-strings[plugin]" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.export.plugin.build import build_plugin, this_target
+from app.export.plugin.build import build_plugin
+from app.export.plugin.formats import this_target
 from app.export.plugin.image import Image, image_of
 from app.export.plugin.parts import STEPS
 from engine.kernels import cache
@@ -38,7 +39,12 @@ def objects(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="package")
-def bank(images: list[Image], objects: Path, tmp_path_factory: pytest.TempPathFactory) -> Library:
+def plugin_file(images: list[Image], objects: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = build_plugin(images, "clap", this_target(), tmp_path_factory.mktemp("clap") / "bank", objects)
     assert path.suffix == ".clap"
-    return Library(path)
+    return path
+
+
+@pytest.fixture(scope="package")
+def bank(plugin_file: Path) -> Library:
+    return Library(plugin_file)

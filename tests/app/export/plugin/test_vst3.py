@@ -12,7 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.export.plugin.build import build_plugin, this_target
+from app.export.plugin.build import build_plugin
+from app.export.plugin.formats import this_target
 from app.export.plugin.image import Image
 from app.instrument.events import Bend, Controller, NoteOff, NoteOn
 from tests.app.export.plugin import host, vst3_host

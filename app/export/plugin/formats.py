@@ -1,0 +1,101 @@
+"""Kinds of plug-ins, the systems that they are built for, and where hosts look for them."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+
+EXTRA = "learned-strings[plugin]"
+_HERE = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}
+_MACHINES = {"x86_64": "x64", "amd64": "x64", "arm64": "arm64", "aarch64": "arm64"}
+
+
+class PluginError(ValueError):
+    """A plug-in cannot be built; the message names what is missing and the remedy."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of plug-in.
+
+    Attributes:
+        sources: of the shell, added to those of every format.
+        ending: of the file or the folder.
+        folders: by system, where hosts of one user look for it, below the home folder.
+    """
+
+    sources: tuple[str, ...]
+    ending: str
+    folders: Mapping[str, str]
+
+
+FORMATS: Mapping[str, Format] = {
+    "clap": Format(
+        ("clap.c",),
+        ".clap",
+        {
+            "linux": ".clap",
+            "windows": "AppData/Local/Programs/Common/CLAP",
+            "macos": "Library/Audio/Plug-Ins/CLAP",
+        },
+    ),
+    "vst3": Format(
+        ("vst3.c", "clap.c"),
+        ".vst3",
+        {
+            "linux": ".vst3",
+            "windows": "AppData/Local/Programs/Common/VST3",
+            "macos": "Library/Audio/Plug-Ins/VST3",
+        },
+    ),
+    "lv2": Format(
+        ("lv2.c",),
+        ".lv2",
+        {"linux": ".lv2", "windows": "AppData/Roaming/LV2", "macos": "Library/Audio/Plug-Ins/LV2"},
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Target:
+    """A system that plug-ins are built for.
+
+    Attributes:
+        triple: of LLVM; `linker`: of the linker, where it has another name for it.
+        cpu: the oldest processor that is served.
+    """
+
+    triple: str
+    cpu: str
+    linker: str
+
+
+TARGETS: Mapping[str, Target] = {
+    "linux-x64": Target("x86_64-unknown-linux-gnu", "x86-64-v2", "x86_64-linux-gnu.2.17"),
+    "linux-arm64": Target("aarch64-unknown-linux-gnu", "generic", "aarch64-linux-gnu.2.17"),
+    "windows-x64": Target("x86_64-w64-windows-gnu", "x86-64-v2", "x86_64-windows-gnu"),
+    "macos-x64": Target("x86_64-apple-macosx11.0.0", "x86-64-v2", "x86_64-macos.11.0"),
+    "macos-arm64": Target("arm64-apple-macosx11.0.0", "apple-m1", "aarch64-macos.11.0"),
+}
+
+
+def this_target() -> str:
+    """The target of this computer. Raises PluginError: it is none of `TARGETS`."""
+    found = f"{_HERE.get(platform.system(), '')}-{_MACHINES.get(platform.machine().lower(), '')}"
+    if found not in TARGETS:
+        raise PluginError(f"no plug-ins are built for this system; choose one of {', '.join(TARGETS)}")
+    return found
+
+
+def install_folder(form: str, target: str) -> Path:
+    """Where the hosts of this user look for plug-ins of a format."""
+    return Path.home() / FORMATS[form].folders[target.partition("-")[0]]
+
+
+def check_compiler() -> None:
+    """Raises PluginError: the compiler is not installed."""
+    if find_spec("ziglang") is None:
+        raise PluginError(f"building a plug-in needs a C compiler: pip install '{EXTRA}' brings one")

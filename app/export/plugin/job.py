@@ -1,0 +1,57 @@
+"""The export of a plug-in as the window runs it."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.export.plugin.formats import check_compiler, install_folder, this_target
+from app.patches.patch import Patch
+from app.shared.worker import Progress
+
+SHARES = {"reading the instrument": 0.05, "compiling the kernels": 0.2, "linking": 0.9}
+
+
+@dataclass(frozen=True)
+class PluginExport:
+    """A plug-in of one instrument.
+
+    Attributes:
+        preset: the file of the preset that plays it.
+        path: with the ending of the format.
+    """
+
+    patch: Patch
+    preset: Path
+    form: str
+    target: str
+    path: Path
+
+    @property
+    def folder(self) -> Path:
+        return self.path.parent
+
+    def run(self, progress: Progress) -> str:
+        """See `ExportJob`."""
+        check_compiler()
+        from app.export.plugin.build import build_plugin  # brings LLVM
+        from app.export.plugin.image import image_of
+        from engine.kernels import cache
+        from engine.presets import load_preset
+
+        def advanced(step: str) -> None:
+            progress(SHARES[step], step.capitalize())
+
+        advanced("reading the instrument")
+        image = image_of(self.patch, load_preset(self.preset))
+        kept = cache.folder() or Path(tempfile.gettempdir())
+        path = build_plugin([image], self.form, self.target, self.path, kept, advanced)
+        if self.target != this_target():
+            return f"Built {path}. Copy it to the other computer."
+        if path.parent == install_folder(self.form, self.target):
+            return f"Built {path}. Hosts find it at their next scan."
+        return f"Built {path}. Hosts look in {install_folder(self.form, self.target)}."
+
+    def cancelled(self) -> str:
+        return "nothing was written."

@@ -1,0 +1,99 @@
+"""The export of an instrument as a plug-in: what the dialog suggests, builds and shows."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from pytestqt.qtbot import QtBot
+
+from app.export.choices import ExportChoices
+from app.export.plugin.formats import FORMATS, install_folder, this_target
+from app.export.sampled.choices import SampledChoices
+from app.patches.library import find_patch
+from app.presets.library import list_presets
+from app.views.dialogs.export_dialog import ExportDialog
+from app.views.dialogs.export_pages import PLUGIN_NAMES, PLUGIN_NOTE, SYSTEM_NAMES, HeardInstrument
+
+
+@pytest.fixture
+def gate() -> threading.Event:
+    """What building waits for."""
+    made = threading.Event()
+    made.set()
+    return made
+
+
+@pytest.fixture
+def dialog(
+    qtbot: QtBot, preset_folder: Path, monkeypatch: pytest.MonkeyPatch, gate: threading.Event, tmp_path: Path
+) -> Iterator[ExportDialog]:
+    def build(
+        images: list[str], form: str, target: str, path: Path, cache: Path, advanced: Callable[[str], None]
+    ) -> Path:
+        while not gate.wait(0.01):
+            advanced("compiling the kernels")
+        advanced("linking")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(f"{images} {form} {target}", encoding="utf-8")
+        return path
+
+    monkeypatch.setattr("app.export.plugin.formats.find_spec", lambda name: name)
+    monkeypatch.setattr("app.export.plugin.build.build_plugin", build)
+    monkeypatch.setattr("app.export.plugin.image.image_of", lambda patch, preset: patch.name)
+    monkeypatch.setattr("app.export.plugin.formats.Path.home", lambda: tmp_path)
+    made = ExportDialog(ExportChoices(), SampledChoices())
+    qtbot.addWidget(made)
+    preset = list_presets(preset_folder)[0][0]
+    made.show_subjects({"plugin": HeardInstrument(find_patch("Classical guitar").patch, preset)})
+    made.open_at("plugin")
+    yield made
+    gate.set()
+    made.accept()
+
+
+def choose(dialog: ExportDialog, form: str, system: str) -> None:
+    page = dialog.plugin
+    page.form.setCurrentIndex(page.form.findData(form))
+    page.system.setCurrentIndex(page.system.findData(system))
+
+
+def test_it_suggests_the_place_where_hosts_look(qtbot: QtBot, dialog: ExportDialog, tmp_path: Path) -> None:
+    assert set(PLUGIN_NAMES) == set(FORMATS)
+    for form in FORMATS:
+        choose(dialog, form, this_target())
+        assert dialog.plugin.file.path == install_folder(form, this_target()) / f"Classical_guitar.{form}"
+    choose(dialog, "vst3", next(each for each in SYSTEM_NAMES if each != this_target()))
+    assert dialog.plugin.file.path == tmp_path / "Classical_guitar.vst3"
+    assert dialog.state.text() == PLUGIN_NOTE
+
+
+def test_it_builds_and_shows_where_it_was_put(qtbot: QtBot, dialog: ExportDialog) -> None:
+    choose(dialog, "clap", this_target())
+    dialog.save.click()
+    qtbot.waitUntil(lambda: "Built" in dialog.state.text())
+    path = install_folder("clap", this_target()) / "Classical_guitar.clap"
+    assert f"Built {path}" in dialog.state.text()
+    assert "next scan" in dialog.state.text()
+    assert path.read_text(encoding="utf-8") == f"['Classical guitar'] clap {this_target()}"
+    assert dialog.save.text() == "Replace"
+
+
+def test_it_can_be_cancelled_while_it_compiles(qtbot: QtBot, dialog: ExportDialog, gate: threading.Event) -> None:
+    gate.clear()
+    dialog.save.click()
+    qtbot.waitUntil(lambda: "Compiling the kernels" in dialog.state.text())
+    dialog.close_button.click()
+    qtbot.waitUntil(lambda: "Cancelled; nothing was written." in dialog.state.text())
+    assert not dialog.plugin.file.path.exists()
+
+
+def test_without_a_compiler_the_extra_is_named(
+    qtbot: QtBot, dialog: ExportDialog, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("app.export.plugin.formats.find_spec", lambda name: None)
+    choose(dialog, "lv2", this_target())
+    qtbot.waitUntil(lambda: "learned-strings[plugin]" in dialog.state.text())
+    assert not dialog.save.isEnabled()
