@@ -82,7 +82,7 @@ class StringPanel(Panel):
 
     @property
     def _sources(self) -> tuple[ShownSource, ...]:
-        """What is drawn: both slots, or in Play what is heard."""
+        """The drawn sources: both slots, or in Play the audible one."""
         sources = shown_sources(self.session.choices, self.library)
         return tuple(each for each in sources if each.heard) if self._plain else sources
 
