@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 from app.export.choices import Chosen, ExportChoices
-from app.export.files import SoundRequest, WavReport, default_file_name, export_sounds
+from app.export.files import SoundRequest, WavReport, export_sounds
 from app.export.sound import Through
+from app.shared.key_names import note_name
 from app.shared.vocabulary import Pickup, PlayedSource, Source
 from app.shared.worker import Progress
 from engine.pluck import Pluck
 from engine.presets import load_preset, of_string
 from engine.resonators.string import StringParameters
+
+LONGEST_NAME = 80  # characters of an instrument's name
+LEAST_MM = 0.05  # softer plucks count as this soft
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,7 @@ class Note:
         preset: its file; preset_rate_hz: the rate of its model.
         string: the one that a preset of many plays; None: the preset's own.
         through: the instrument's level, body and room; None: there is no instrument.
+        name: for its file, see `musical_name`; empty: that of the preset.
     """
 
     preset: Path
@@ -35,11 +41,30 @@ class Note:
     pickup: Pickup = "displacement"
     string: StringParameters | None = None
     through: Through | None = None
+    name: str = ""
 
-    def file_name(self, rate_hz: int, source: Source) -> str:
-        """A name with preset, string, pluck, rate (0: the model's) and source."""
-        first_hz = "" if self.string is None else f"_{self.string.undamped_frequency(1) / math.tau:.1f}Hz"
-        return default_file_name(self.preset.stem + first_hz, self.pluck, rate_hz or self.preset_rate_hz, source)
+    def file_name(self, source: Source) -> str:
+        """Its name, and the source where that is not the model."""
+        kind = "" if source == "model" else f" {source}"
+        return f"{self.name or self.preset.stem}{kind}.wav"
+
+
+def musical_name(title: str, first_hz: float, softest_mm: float, hardest_mm: float, amplitude_mm: float) -> str:
+    """A name such as "Steel acoustic E3 soft", safe as a file's name.
+
+    Args:
+        title: of the instrument; words after a comma or a dash are left out.
+        first_hz: frequency of the first partial, which gives the note.
+        softest_mm, hardest_mm: the range of plucks, of which soft and hard are the outer thirds of its logarithm.
+    """
+    short = re.split(r"[,—]| - ", title)[0]
+    plain = " ".join(re.sub(r"[^\w .+-]", " ", short[:LONGEST_NAME]).split()).lstrip(". -") or "Note"
+    key = round(69 + 12 * math.log2(first_hz / 440))
+    note = note_name(key).replace("♯", "#") if 0 <= key <= 127 else f"{first_hz:.0f} Hz"
+    softest_mm, amplitude_mm = max(softest_mm, LEAST_MM), max(amplitude_mm, LEAST_MM)
+    share = math.log(amplitude_mm / softest_mm) / math.log(max(hardest_mm / softest_mm, 1.001))
+    loudness = "soft" if share < 1 / 3 else "hard" if share > 2 / 3 else "medium"
+    return " ".join((plain, *([] if note in plain.split() else [note]), loudness))
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,9 @@ _MODELS = {
 }
 
 
+LEAST_SHARE = 1e-5  # smaller ones are shown as less than this
+
+
 def model_word(model: str) -> str:
     """The name that a model is shown with; its key in `MODELS` where it has no name here."""
     return _MODELS.get(model, (model, ""))[0]
@@ -56,6 +59,11 @@ def error_word(info: PresetInfo) -> str:
     return "–" if info.rel_mae is None else percent(info.rel_mae)
 
 
-def percent(share: float) -> str:
-    """A share in percent, with two digits below 10 % and none behind the point from there on."""
-    return f"{100 * share:.2g} %" if share < 0.1 else f"{100 * share:.0f} %"
+def percent(share: float, digits: int = 2) -> str:
+    """A share in percent: so many digits below 10 %, as many decimals as `digits` − 2 from there on.
+
+    Shares below LEAST_SHARE are shown as less than that.
+    """
+    if share < LEAST_SHARE:
+        return f"< {100 * LEAST_SHARE:g} %"
+    return f"{100 * share:.{digits}g} %" if share < 0.1 else f"{100 * share:.{max(0, digits - 2)}f} %"

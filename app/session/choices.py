@@ -16,6 +16,7 @@ from app.patches.patch import Patch, PhysicalString
 from app.session.listener import Listener, points_of
 from app.session.monitor import Monitor
 from app.shared.parameters import OF_CHOICES
+from app.shared.vocabulary import Face
 from engine.pluck import Pluck, Shape
 
 
@@ -64,6 +65,7 @@ class Choices(Monitor, Listener, PluckedString):
     loop: bool = False
     volume_db: float = _parameter("volume_db")
     speed: float = _parameter("speed")
+    face: Face = "play"
     left_view: str = "spectrum"  # names of panels
     right_view: str = "waveform"
     motion: bool = True  # whether the string's picture shows its motion, and the envelope of it

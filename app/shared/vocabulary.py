@@ -1,4 +1,4 @@
-"""Names of sources, pick-ups and sample formats, here so that they are known before the engine is loaded."""
+"""Names of sources, pick-ups, sample formats and faces, here so that they are known before the engine is loaded."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ Source = Literal["model", "truth", "difference", "both"]
 PlayedSource = Literal["model", "truth", "difference"]  # of an instrument
 Pickup = Literal["displacement", "velocity", "bridge"]
 PICKUPS: tuple[Pickup, ...] = get_args(Pickup)
-PICKUP_TITLES: dict[Pickup, str] = {"displacement": "Point", "velocity": "Velocity", "bridge": "Bridge"}
+PICKUP_TITLES: dict[Pickup, str] = {"displacement": "Point", "velocity": "Magnetic", "bridge": "Bridge"}
+Face = Literal["play", "lab"]  # of the window
 Bits = Literal["16", "24", "32f"]  # of a WAV's samples; f: floating point
 BITS: tuple[Bits, ...] = get_args(Bits)
 DIFFERENCE_GAIN_RANGE_DB = (0.0, 80.0)

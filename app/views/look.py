@@ -1,4 +1,4 @@
-"""The theme and the UI scale, as chosen."""
+"""The theme and the text size, as chosen."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pydantic import AliasChoices, BaseModel, ConfigDict, Field
 
 
 class Look(BaseModel):
-    """`size_percent`, the UI scale, takes effect at the next start. Settings of version 0.1 call the theme `face`."""
+    """`size_percent`: of text. Settings of version 0.1 call the theme `face`."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

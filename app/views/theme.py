@@ -7,21 +7,21 @@ the pens that they were made with: `app.views.plots.plots.recolour` exchanges th
 from __future__ import annotations
 
 import re
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Literal
 
 from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QColor, QFont, QPalette
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QWidget
 
 ThemeChoice = Literal["system", "dark", "light"]
 
 
 @dataclass(frozen=True)
 class Theme:
-    """The colours of a theme, one for each role."""
+    """The colours of a theme, one for each role, and the scale of text."""
 
     background: str
     panel: str
@@ -40,6 +40,7 @@ class Theme:
     ground_bottom: str
     shade: str  # over plucks outside the training range
     shade_alpha: int  # 0 … 255
+    scale: float = 1.0  # of text, and of what holds it
 
 
 DARK = Theme(
@@ -81,6 +82,7 @@ LIGHT = Theme(
     shade_alpha=26,
 )
 
+FONT_PX = 12
 SHEET = Path(__file__).with_name("sheet.qss")
 SIGNS = Path(__file__).parent / "signs"  # pictures for the style sheet, in the themes' colours
 
@@ -137,9 +139,10 @@ def _luminance(colour: QColor) -> float:
 
 
 def _style_sheet() -> str:
-    tick = SIGNS / f"tick_{'dark' if present == DARK else 'light'}.svg"
+    tick = SIGNS / f"tick_{'dark' if present.background == DARK.background else 'light'}.svg"
     values = {**asdict(present), "tick": tick.as_posix()}
-    return re.sub(r"@(\w+)", lambda found: str(values[found[1]]), SHEET.read_text("utf-8"))
+    sheet = re.sub(r"font-size: (\d+)px", lambda found: f"font-size: {px(int(found[1]))}px", SHEET.read_text("utf-8"))
+    return re.sub(r"@(\w+)", lambda found: str(values[found[1]]), sheet)
 
 
 def _palette() -> QPalette:
@@ -164,23 +167,55 @@ def _palette() -> QPalette:
     return palette
 
 
-def apply_theme(app: QApplication, choice: ThemeChoice = "dark") -> None:
-    """Sets Fusion with the theme's palette and style sheet for the application; "system" follows the desktop."""
+def apply_theme(app: QApplication, choice: ThemeChoice = "dark", size_percent: int = 100) -> None:
+    """Sets Fusion with the theme's palette and style sheet for the application; "system" follows the desktop.
+
+    `size_percent`: of text.
+    """
     app.setStyleSheet("")  # replaced directly, a sheet is applied to a widget once more for each of its ancestors
     if app.style().name() != "fusion":  # while a sheet is set, the style has no name
         app.setStyle("Fusion")
     hints = app.styleHints()
     hints.setColorScheme(_SCHEMES[choice])  # the window's frame and the file dialogs follow
     light = choice == "light" or (choice == "system" and hints.colorScheme() == Qt.ColorScheme.Light)
-    use(LIGHT if light else DARK)
+    use(replace(LIGHT if light else DARK, scale=size_percent / 100))
     app.setPalette(_palette())
+    font = app.font()  # of what no style sheet reaches: axes of plots
+    font.setPixelSize(px(FONT_PX))
+    app.setFont(font)
     app.setStyleSheet(_style_sheet())
 
 
-def small_font(size_px: int = 11, bold: bool = False) -> QFont:
-    """The application's font in a size in pixels, for painted text."""
+def px(pixels: float) -> int:
+    """Pixels that grow with the text."""
+    return round(pixels * present.scale)
+
+
+class _Fixed(QObject):
+    """Keeps a widget at a size that grows with the text; lives as long as the widget."""
+
+    def __init__(self, widget: QWidget, width: int | None, height: int | None) -> None:
+        super().__init__(widget)
+        self._widget, self._width, self._height = widget, width, height
+        changes.theme_changed.connect(self.fit)
+        self.fit()
+
+    def fit(self) -> None:
+        if self._width is not None:
+            self._widget.setFixedWidth(px(self._width))
+        if self._height is not None:
+            self._widget.setFixedHeight(px(self._height))
+
+
+def fix_size(widget: QWidget, width: int | None = None, height: int | None = None) -> None:
+    """Fixes a widget's size in pixels that grow with the text."""
+    _Fixed(widget, width, height)
+
+
+def small_font(size_px: int = 11, bold: bool = False, grows: bool = True) -> QFont:
+    """The application's font in a size in pixels, for painted text; `grows`: with the text."""
     font = QFont(QApplication.font())
-    font.setPixelSize(size_px)
+    font.setPixelSize(px(size_px) if grows else size_px)
     font.setBold(bold)
     return font
 

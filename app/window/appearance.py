@@ -1,4 +1,4 @@
-"""Applies the theme that the user has chosen, or follows that of the desktop; remembers the UI scale."""
+"""Applies the theme that the user has chosen, or follows that of the desktop, and the text size."""
 
 from __future__ import annotations
 
@@ -24,10 +24,7 @@ class Appearance(QObject):
     def _change(self, field: str, value: object) -> None:
         self.look = Look.model_validate({**self.look.model_dump(), field: value})
         self._window.menu.show_look(self.look)
-        if field == "theme":
-            self._put_on()
-        else:
-            self._window.notices.inform(f"UI scale: {value} % after a restart.")
+        self._put_on()
 
     def _follow(self) -> None:
         if self.look.theme == "system":
@@ -36,4 +33,4 @@ class Appearance(QObject):
     def _put_on(self) -> None:
         application = QApplication.instance()
         assert isinstance(application, QApplication)
-        apply_theme(application, self.look.theme)
+        apply_theme(application, self.look.theme, self.look.size_percent)

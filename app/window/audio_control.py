@@ -14,6 +14,7 @@ from app.audio.choices import Buffer, DeviceChoice, SoundChoice
 from app.audio.devices import AudioDevice, output_devices
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
 from app.audio.sound import Sound, SoundStatus
+from app.presets.words import rate_word
 from app.views.controls.plain import plain_tip
 from app.views.dialogs.audio_dialog import AudioDialog, AudioState
 from app.window.main_window import MainWindow
@@ -43,7 +44,6 @@ class AudioControl(QObject):
         self._listed: list[DeviceChoice] | None = None
         self._moments = 0
         self._dialog: AudioDialog | None = None
-        window.audio_asked.connect(self.show_dialog)
 
     def open(self, rescan: bool = False) -> None:
         """Opens the output as chosen. Returns at once; `show` sees what became of it."""
@@ -122,19 +122,13 @@ class AudioControl(QObject):
         self._listed = listed
 
     def _show_badge(self, status: SoundStatus, model_rate_hz: int) -> None:
-        label = self._window.rate_label
-        model = f"{model_rate_hz / 1000:g}"
-        fault = status.device is None
-        text = f"{model} kHz  ·  no sound" if fault else f"{model} → {status.rate_hz / 1000:g} kHz"
-        if label.text() != text:
-            label.setText(text)
-            label.setToolTip(
-                plain_tip(f"{status.problem or 'No audio output'}\nAudio settings: Ctrl+,")
-                if fault
-                else "The model's rate, converted to the sound device's rate"
-            )
-            label.setProperty("fault", fault)
-            label.style().polish(label)
+        rate, fault = rate_word(model_rate_hz), status.device is None
+        converted = "" if status.rate_hz == model_rate_hz else f" → {rate_word(status.rate_hz)}"
+        text = f"{rate}  ·  no sound" if fault else f"{rate}{converted}"
+        tip = "The model's rate, converted to the sound device's rate" if converted else "The sample rate"
+        if fault:
+            tip = f"{status.problem or 'No audio output'}\nAudio settings: Ctrl+,"
+        self._window.show_rate(text, plain_tip(tip), fault)
 
     def _state(self, status: SoundStatus) -> AudioState:
         device, gaps = status.device, status.gaps  # the latest ones: the one that was known may be gone

@@ -29,6 +29,7 @@ from app.session.choices import OBSERVED, Session
 from app.session.history import History
 from app.session.slots import missing_presets
 from app.shared.log import log_file
+from app.views.controls.app_menu import ENTRIES
 from app.views.controls.knob import Knob
 from app.views.controls.slot_buttons import SLOTS
 from app.views.dialogs.about_dialog import AboutDialog
@@ -44,7 +45,7 @@ from app.window.audio_control import AudioControl
 from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports
 from app.window.instruments import Instruments
-from app.window.main_window import KEY_NAMES, KEYS, PLAYED_KEYS, MainWindow
+from app.window.main_window import PLAYED_KEYS, MainWindow
 from app.window.panels import Moment, StringPanel
 from app.window.panels.rack import fill
 from app.window.patch_desk import TAKEN_FILES, PatchDesk
@@ -135,6 +136,7 @@ class Controller(QObject):
             self.performance,
             self.instruments,
             window.instrument,
+            window.song,
             patch_browser(window),
             settings.patch_favourites,
         )
@@ -142,7 +144,8 @@ class Controller(QObject):
         self.patches.informed.connect(window.notices.inform)
         window.may_close = self.patches.recordings.may_close
         self.instruments.played.connect(self.patches.show_played)
-        window.show_instrument(settings.instrument.shown)
+        window.show_keys(settings.instrument.shown)
+        self.patches.outside_changed.connect(window.show_outside)
         window.instrument.show_surface(settings.instrument.surface)
         window.instrument.set_unfolded(settings.instrument.unfolded)
         for dragged in (window.instrument.bar, window.instrument.knobs):
@@ -157,9 +160,8 @@ class Controller(QObject):
             window,
         )
         self.exports.told.connect(window.notices.tell)
-        window.transport.export_asked.connect(lambda: self.exports.open("note"))
-        window.export_asked.connect(lambda: self.exports.open("note"))
-        window.sampled_asked.connect(lambda: self.exports.open("sampler"))
+        window.transport.export_asked.connect(window.action["export"].trigger)
+        self._connect_actions()
         self.keeper = Keeper(settings_path, settings, self.settings, self)
         self.keeper.failed.connect(window.notices.tell)
         for problem in problems:
@@ -183,30 +185,45 @@ class Controller(QObject):
             panel.told.connect(window.notices.tell)
         self.presets.browser.played.connect(lambda name: self.pluck())
         self.presets.told.connect(window.notices.tell)
-        window.previous_asked.connect(lambda: self.presets.step(-1))
-        window.next_asked.connect(lambda: self.presets.step(1))
-        window.browse_asked.connect(self.presets.toggle)
         window.file_dropped.connect(lambda path: self.take_file(Path(path)))
         window.transport.slots.set_entries(self.library.entries)
         self.library.changed.connect(lambda: window.transport.slots.set_entries(self.library.entries))
         window.transport.change_asked.connect(self._change)
         window.transport.play_asked.connect(self.play_or_stop)
-        window.abx_asked.connect(self.listening_test)
-        window.play_asked.connect(self.play_or_stop)
         window.pluck_asked.connect(self.pluck)
-        window.switch_asked.connect(session.switch_source)
-        window.loop_asked.connect(lambda: session.update(loop=not session.choices.loop))
-        window.help_asked.connect(self.show_help)
-        window.about_asked.connect(lambda: AboutDialog(about_text(self._settings_path, SHIPPED), window).open())
-        window.all_modes_asked.connect(lambda: session.update(solo=0))
+        window.face_asked.connect(lambda face: session.update(face=face))
+
+    def _connect_actions(self) -> None:
+        """What the menu and its shortcuts do; the window itself does the rest."""
+        window, session = self.window, self.session
+        does: dict[str, Callable[[], object]] = {
+            "record": self.patches.recordings.record,
+            "export": lambda: self.exports.open("note"),
+            "sampler": lambda: self.exports.open("sampler"),
+            "undo": self._undo,
+            "redo": self._redo,
+            "play": self.play_or_stop,
+            "loop": lambda: session.update(loop=not session.choices.loop),
+            "instruments": self.patches.desk.toggle,
+            "browse": self.presets.toggle,
+            "previous": lambda: self.presets.step(-1),
+            "next": lambda: self.presets.step(1),
+            "switch": session.switch_source,
+            "all_modes": lambda: session.update(solo=0),
+            "abx": self.listening_test,
+            "motion": lambda: session.update(motion=not session.choices.motion),
+            "envelope": lambda: session.update(envelope=not session.choices.envelope),
+            "audio": self.audio.show_dialog,
+            "midi": lambda: self.instruments.midi.show_dialog(window),
+            "help": self.show_help,
+            "about": lambda: AboutDialog(about_text(self._settings_path, SHIPPED), window).open(),
+        }
+        for name, do in does.items():
+            window.action[name].triggered.connect(lambda _=False, do=do: do())
 
     def _connect_history(self) -> None:
-        window, session, history = self.window, self.session, self.history
-        window.undo_asked.connect(self._undo)
-        window.redo_asked.connect(self._redo)
+        window, history = self.window, self.history
         window.menu.aboutToShow.connect(lambda: window.menu.show_steps(history.undo_words, history.redo_words))
-        window.motion_asked.connect(lambda: session.update(motion=not session.choices.motion))
-        window.envelope_asked.connect(lambda: session.update(envelope=not session.choices.envelope))
         strings = (panel.view for panel in self.panels if isinstance(panel, StringPanel))
         draggable: list[StringView | Knob] = [*strings, *window.transport.knobs.values()]
         for dragged in draggable:
@@ -280,7 +297,7 @@ class Controller(QObject):
     def show_help(self) -> None:
         if self._help is None:
             views = [(panel.title, panel.help) for panel in self.panels if panel.help]
-            keys = [*PLAYED_KEYS, *((KEY_NAMES.get(key, key), what) for key, _, what in KEYS)]
+            keys = [*PLAYED_KEYS, *((entry.key_name, entry.does) for entry in ENTRIES.values() if entry.key)]
             self._help = HelpDialog(keys, views, log_file(), self.window)
         self._help.show()
         self._help.raise_()
@@ -368,7 +385,7 @@ class Controller(QObject):
                 "favourites": tuple(sorted(self.presets.favourites)),
                 "patch_favourites": tuple(sorted(self.patches.desk.favourites)),
                 "instrument": InstrumentChoice(
-                    shown=self.window.shows_instrument,
+                    shown=self.window.shows_keys,
                     surface=self.window.instrument.surface,
                     unfolded=self.window.instrument.unfolded,
                 ),
@@ -388,6 +405,8 @@ class Controller(QObject):
         window.transport.show_choices(choices)
         if "preset" in names:
             self.presets.choice_changed()
+        if "face" in names:
+            window.show_face(choices.face)
         window.left.show_key(choices.left_view)
         window.right.show_key(choices.right_view)
         for panel in self.panels:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -9,11 +10,13 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.export.choices import ExportChoices
-from app.export.note import HeardNote, Note
+from app.export.note import HeardNote, Note, musical_name
 from app.export.played import PlayedExport
 from app.export.sampled.choices import SampledChoices
 from app.export.sound import Through
-from app.presets.library import Library
+from app.patches.patch import Patch
+from app.playing.keyboard import Reach
+from app.presets.library import Library, PresetEntry
 from app.presets.words import shape_word
 from app.session.choices import Choices, Session
 from app.session.slots import other_preset
@@ -126,9 +129,20 @@ def heard_note(choices: Choices, library: Library, through: Through | None) -> H
         choices.pickup,
         None if choices.string is None else choices.string.parameters,
         through,
+        _name(choices, entry),
     )
     saved: PlayedSource = "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
     return HeardNote(note, saved, another is not None, choices.difference_gain_db, _words(entry.title, choices))
+
+
+def _name(choices: Choices, entry: PresetEntry) -> str:
+    """For a file: of the instrument whose key was played, else of the preset."""
+    string = entry.info.string if choices.string is None else choices.string.parameters
+    title, amplitudes_mm = entry.info.title, Reach.of(entry.info).amplitude_mm
+    if isinstance(choices.instrument, Patch):
+        pluck = choices.instrument.pluck
+        title, amplitudes_mm = choices.instrument.name, (pluck.softest_mm, pluck.hardest_mm)
+    return musical_name(title, string.undamped_frequency(1) / math.tau, *amplitudes_mm, choices.amplitude_mm)
 
 
 def _words(title: str, choices: Choices) -> str:
@@ -141,6 +155,6 @@ def _words(title: str, choices: Choices) -> str:
         heard += f" (left) and {choices.listen_right:.2f} (right)"
     if choices.pickup == "bridge":
         heard = "heard at the bridge"
-    velocity = ", velocity" if choices.pickup == "velocity" else ""
+    kind = ", magnetic pick-up" if choices.pickup == "velocity" else ""
     modes = f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""
-    return f"{title}{string}: {pluck}, {heard}{velocity}{modes}"
+    return f"{title}{string}: {pluck}, {heard}{kind}{modes}"

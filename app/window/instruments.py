@@ -69,7 +69,6 @@ class Instruments(QObject):
         self.midi = MidiControl(midi, self.play, self._play_note, self)
         self.midi.performed.connect(lambda changes: session.update(**changes))
         self.midi.told.connect(self.told)
-        window.midi_asked.connect(lambda: self.midi.show_dialog(window))
 
     def start(self) -> None:
         """Opens the remembered MIDI input, if any."""

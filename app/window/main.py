@@ -175,12 +175,10 @@ def run(
     path = settings_file()
     settings, notice = load_settings(path)
     settings = with_patch(settings)
-    if settings.look.size_percent != 100:  # Qt reads it when the application is made
-        os.environ.setdefault("QT_SCALE_FACTOR", str(settings.look.size_percent / 100))
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)
     application.setApplicationName("Learned Strings")
-    apply_theme(application, settings.look.theme)
+    apply_theme(application, settings.look.theme, settings.look.size_percent)
     window = MainWindow()
     window.restore_geometry(settings.window_geometry)
     faults = Faults(window)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from pathlib import Path
 
 from PySide6.QtCore import QByteArray, QMargins, QPoint, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QCloseEvent,
     QDragEnterEvent,
+    QDragLeaveEvent,
     QDropEvent,
     QKeySequence,
     QPaintEvent,
@@ -19,6 +21,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import (
     QAbstractButton,
     QComboBox,
+    QFileDialog,
     QGraphicsView,
     QHBoxLayout,
     QMainWindow,
@@ -29,51 +32,44 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.shared.vocabulary import Face
+from app.views import theme
 from app.views.controls.app_menu import AppMenu, menu_button
 from app.views.controls.deck import Deck
+from app.views.controls.drop_sign import DropSign
 from app.views.controls.focus_ring import FocusRing
 from app.views.controls.notice_bar import NoticeBar
-from app.views.controls.parts import tool_button
+from app.views.controls.parts import tool_button, words_label
 from app.views.controls.plain import Label, plain_tip
 from app.views.controls.preset_bar import PresetBar
+from app.views.controls.segments import Segments
 from app.views.controls.sideways import Sideways
+from app.views.controls.song_strip import SongStrip
 from app.views.controls.transport_bar import TransportBar
+from app.views.faces import FACES, TITLES, Area
 from app.views.instrument.panel import InstrumentPanel
 from engine.kernels import cache  # and not the compiler
+from engine.plain_text import one_line
 
-KEYS = (  # (key, name of the signal, what it does)
-    ("Space", "play_asked", "play from the pluck, or stop"),
-    ("Return", "pluck_asked", "pluck"),
-    ("B", "switch_asked", "switch between A and B at the playhead"),
-    ("Esc", "all_modes_asked", "play all modes again"),
-    ("Ctrl+L", "loop_asked", "loop"),
-    ("PgUp", "previous_asked", "previous preset"),
-    ("PgDown", "next_asked", "next preset"),
-    ("Ctrl+P", "browse_asked", "browse the presets"),
-    ("Ctrl+Z", "undo_asked", "undo: patch and its knobs, preset, pluck, listening point, duration"),
-    ("Ctrl+Shift+Z", "redo_asked", "redo"),
-    ("M", "motion_asked", "show or hide the string's motion"),
-    ("N", "envelope_asked", "show or hide the envelope of the motion"),
-    ("Ctrl+E", "export_asked", "export WAV"),
-    ("Ctrl+Shift+E", "sampled_asked", "export the patch as an instrument for samplers (SFZ, SoundFont)"),
-    ("Ctrl+T", "abx_asked", "blind listening test (ABX)"),
-    ("Ctrl+,", "audio_asked", "audio settings"),
-    ("F8", "notices_asked", "notices since the start"),
-    ("Ctrl+M", "midi_asked", "MIDI"),
-    ("Ctrl+K", "instrument_asked", "show or hide the instrument: keys and patch"),
-    ("F10", "menu_asked", "menu"),
-    ("F1", "help_asked", "help"),
-    ("Ctrl+Q", "quit_asked", "quit"),
-)
-KEY_NAMES = {"Return": "Enter", "PgUp": "Page up", "PgDown": "Page down"}  # as tooltips call them
 FAILED = "The models cannot be loaded."
 LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
-WIDE, HIGH = 1100, 560  # pixels: a narrower window hides brand and instrument button; a lower one the preset's facts
-ROOMY = 1240  # pixels: in a narrower window the controls are compact
+WIDE, HIGH = (
+    1100,
+    560,
+)  # pixels: a narrower window hides brand, keys and ABX button; a lower the preset's facts
+ROOMY, TIGHT = 1240, 900  # pixels: in a narrower window the controls are compact, and more so
 ALL_HIGH = 640  # pixels: a lower window shows the instrument instead of the views
-KNOBS_HIGH = 780  # pixels: in a lower one the string's knobs take the place of the keys, and all stands closer
+KNOBS_HIGH, AIRY = (
+    610,
+    780,
+)  # pixels: a lower one shows knobs in place of keys; parts stand closer
 FACTS_HEIGHT = 20
 BRIEFLY_MS = 1_800  # a text over the window
+LONGEST_NAME = 60  # characters of a file
+FILE_FILTER = (
+    "Files that can be opened (*.mid *.midi *.json *.toml *.scl *.kbm *.safetensors *.wav *.flac *.aif *.aiff)"
+    ";;All files (*)"
+)
 TITLE_BAR = 40  # pixels, at most; its height is known only once the window is shown
 
 PLAYED_KEYS = (  # see `app/playing/keyboard.py`
@@ -91,30 +87,9 @@ PLAYED_KEYS = (  # see `app/playing/keyboard.py`
 class MainWindow(QMainWindow):
     """Its parts are public: `presets`, `left`, `right`, `transport`, `instrument`, `notices`, `menu`."""
 
-    play_asked = Signal()
     pluck_asked = Signal()
-    switch_asked = Signal()
-    loop_asked = Signal()
-    all_modes_asked = Signal()
-    previous_asked = Signal()
-    next_asked = Signal()
-    undo_asked = Signal()
-    redo_asked = Signal()
-    motion_asked = Signal()
-    envelope_asked = Signal()
-    export_asked = Signal()
-    sampled_asked = Signal()
-    abx_asked = Signal()
-    audio_asked = Signal()
-    notices_asked = Signal()
-    midi_asked = Signal()
-    instrument_asked = Signal()
-    browse_asked = Signal()
+    face_asked = Signal(str)
     file_dropped = Signal(str)  # a path
-    menu_asked = Signal()
-    help_asked = Signal()
-    about_asked = Signal()
-    quit_asked = Signal()
     closing = Signal()
     first_painted = Signal()  # once, after the first paint
 
@@ -124,71 +99,88 @@ class MainWindow(QMainWindow):
         self.setMinimumSize(760, 480)
         self.resize(1280, 800)
         self._painted = False
+        self._folder = ""  # of the file that was opened last
         self._tabbed_to: QWidget | None = None  # what got the keyboard by the Tab key
         self.may_close: Callable[[], bool] = lambda: True  # asked before it is closed
+        self.menu = AppMenu(self)
+        self.action = self.menu.action
+        self._menu_button = menu_button(self.menu)
+        self.face: Face = "play"
         self.presets = PresetBar()
         self.left, self.right = Deck("Views on the left"), Deck("Views on the right")
         self.transport = TransportBar()
+        self.song = SongStrip()
         self.instrument = InstrumentPanel()
         self.notices = NoticeBar()
         self.error_label = Label()
         self.error_label.setToolTip(
             "Mean absolute error of the model relative to the truth, for this pluck and the whole string:\n"
-            "as trained is over the time that the model was trained for"
+            "within the time that the model was trained for, and after it"
         )
         self._solo = tool_button("", "Play all modes", "One mode is soloed; click, or Esc, to play all modes")
         self._solo.setObjectName("solo")
         self._solo.setVisible(False)
-        self._solo.clicked.connect(self.all_modes_asked)
+        self._solo.clicked.connect(self.action["all_modes"].trigger)
         self.rate_label = Label()
         self.rate_label.setObjectName("badge")
         self._audio_button = tool_button("Audio …", "Audio settings", "Audio output, sample rate and buffer (Ctrl+,)")
-        self._audio_button.clicked.connect(self.audio_asked)
-        tip = "Show or hide the instrument: keys and patch (Ctrl+K). A low window shows it instead of the views"
-        self._instrument_button = tool_button("Instrument", tip=tip)
-        self._instrument_button.setCheckable(True)
-        self._instrument_button.setChecked(True)
-        self._instrument_button.toggled.connect(self.show_instrument)
-        self.instrument_asked.connect(self._instrument_button.toggle)
-        self.menu = AppMenu(self)
-        self._menu_button = menu_button(self.menu)
+        self._audio_button.clicked.connect(self.action["audio"].trigger)
+        tip = "Show or hide the keys (Ctrl+K). In a low window they take the place of the plots"
+        self._keys_button = tool_button("Keys", tip=tip)
+        self._keys_button.setCheckable(True)
+        self._keys_button.toggled.connect(self.show_keys)
+        self.faces = Segments("Face", TITLES)
+        self.faces.chosen.connect(self.face_asked)
+        self.growth_sign = Label("ⓘ")
+        self.growth_sign.setObjectName("badge")
+        self.growth_sign.setAccessibleName("Error of the model")
+        self.outside_label = words_label()
+        self.outside_label.setObjectName("warning")
         self._lay_out()
         self.setAcceptDrops(True)
-        for key, signal, _ in KEYS:
-            shortcut = QShortcut(QKeySequence(key), self)
-            shortcut.setAutoRepeat(False)
-            shortcut.activated.connect(self._press_or_pluck if key == "Return" else getattr(self, signal))
-        self.notices_asked.connect(self.notices.show_all)
-        self.menu_asked.connect(self._menu_button.showMenu)
-        for action, signal in self.menu.asked.items():
-            action.triggered.connect(getattr(self, signal))
-        self.quit_asked.connect(self.close)
+        enter = QShortcut(QKeySequence("Return"), self)
+        enter.setAutoRepeat(False)
+        enter.activated.connect(self._press_or_pluck)
+        for name, do in (
+            ("pluck", self.pluck_asked.emit),
+            ("notices", self.notices.show_all),
+            ("menu", self._menu_button.showMenu),
+            ("keys", self._keys_button.toggle),
+            ("face", lambda: self.face_asked.emit("lab" if self.face == "play" else "play")),
+            ("open", self._ask_for_files),
+            ("quit", self.close),
+        ):
+            self.action[name].triggered.connect(lambda _=False, do=do: do())
 
     def _lay_out(self) -> None:
         self._brand = Label("LEARNED STRINGS")
         self._brand.setObjectName("brand")
         self._head = head = QHBoxLayout()
+        head.addWidget(self._menu_button)
+        head.addWidget(self.faces)
         head.addWidget(self._brand)
         head.addWidget(self.presets, 1)
+        head.addStretch(0)
         tip = "Blind listening test: can you tell A and B apart? (Ctrl+T)"
         self._test_button = test = tool_button("ABX …", "Listening test", tip)
-        test.clicked.connect(self.abx_asked)
-        aside = (self._instrument_button, test, self.rate_label, self.notices.bell)
-        for widget in (*aside, self._audio_button, self._menu_button):
+        test.clicked.connect(self.action["abx"].trigger)
+        for widget in (self._keys_button, test, self.growth_sign, self.rate_label, self.notices.bell):
             head.addWidget(widget)
+        head.addWidget(self._audio_button)
         self._facts = QWidget()
         self._facts_row = facts = QHBoxLayout(self._facts)
         facts.setContentsMargins(0, 0, 0, 0)
         facts.setSpacing(24)
         for part in (self.presets.card, self._solo):  # of one height, so that the solo button moves nothing
-            part.setFixedHeight(FACTS_HEIGHT)
-        facts.addWidget(self.presets.card, 1)
+            theme.fix_size(part, height=FACTS_HEIGHT)
+        facts.addWidget(self.presets.card, 3)
+        facts.addWidget(self.outside_label, 2)
         facts.addWidget(self._solo)
         facts.addWidget(self.error_label)
         self._decks = decks = QSplitter(Qt.Orientation.Horizontal)
         decks.addWidget(self.left)
         decks.addWidget(self.right)
-        decks.setSizes([560, 720])
+        decks.setSizes([620, 660])
         self._stage = QSplitter(Qt.Orientation.Vertical)
         self._loading = Label(LOADING if cache.is_whole() else COMPILING)
         self._loading.setObjectName("faint")
@@ -200,10 +192,15 @@ class MainWindow(QMainWindow):
         for splitter in (decks, self._stage):
             splitter.setChildrenCollapsible(False)
             splitter.setHandleWidth(8)
+        self._areas: dict[Area, tuple[QWidget, ...]] = {
+            "preset": (self.presets,),
+            **self.transport.areas,
+        }
         self._column = column = QVBoxLayout()
         column.addLayout(head)
         column.addWidget(self._facts)
         column.addWidget(self._stage, 1)
+        column.addWidget(self.song)
         column.addWidget(Sideways(self.transport))
         column.addWidget(self.instrument)
         middle = QWidget()
@@ -211,6 +208,8 @@ class MainWindow(QMainWindow):
         self.setCentralWidget(middle)
         self.notices.setParent(middle)
         FocusRing(middle)
+        self._drop_sign = DropSign(self)
+        theme.changes.theme_changed.connect(self._fit)
 
     def show_string(self, view: QWidget) -> None:
         """Puts the string's view above the decks, gives it the focus and enables the window, which was loading."""
@@ -227,9 +226,11 @@ class MainWindow(QMainWindow):
 
     def order_tabs(self) -> None:
         """Sets the order of the Tab key: header, notice, string, views, controls. Call it once all parts exist."""
-        header = (self.presets, self._instrument_button, self.notices.bell, self._audio_button, self._menu_button)
+        header = (self._menu_button, self.faces, self.presets, self._keys_button, self._test_button)
+        header += (self.notices.bell, self._audio_button)
         chain: list[QWidget] = []
-        for part in (*header, self.notices, self._string, self.left, self.right, self.transport, self.instrument):
+        views = (self._string, self.left, self.right)
+        for part in (*header, self.notices, *views, self.song, self.transport, self.instrument):
             inside = [part, *part.findChildren(QWidget)]
             stops = [
                 widget
@@ -263,29 +264,95 @@ class MainWindow(QMainWindow):
         self._alive = alive
         self.instrument.setEnabled(alive)
         self._share_height()
-        self.rate_label.setVisible(alive)
+        self.faces.setEnabled(alive)
+        self._show_rate_label()
+
+    # Faces
+
+    def show_face(self, face: Face) -> None:
+        """Shows the areas of a face, and hides the others."""
+        self.face = face
+        self.faces.show_key(face)
+        for area, widgets in self._areas.items():
+            for widget in widgets:
+                widget.setVisible(self._shows(area))
+        self.instrument.show_patch_area(self._shows("patch"))
+        self.action["keys"].setEnabled(face == "lab")
+        self._column.setStretchFactor(self.instrument, int(face == "play"))
+        self._show_growth()
+        self._show_rate_label()
+        self.show_keys(self.shows_keys)
+        self._fit()
+
+    def _shows(self, area: Area) -> bool:
+        return area in FACES[self.face]
 
     @property
-    def shows_instrument(self) -> bool:
-        return self._instrument_button.isChecked()
+    def shows_keys(self) -> bool:
+        """Whether the keys are shown in the Lab; in Play they always are."""
+        return self._keys_button.isChecked()
 
-    def show_instrument(self, shown: bool) -> None:
-        """Folds the instrument away, or shows it."""
-        self._instrument_button.setChecked(shown)
-        self.instrument.setVisible(shown)
+    def show_keys(self, shown: bool) -> None:
+        """Shows the keys in the Lab, or hides them."""
+        self._keys_button.setChecked(shown)
+        self.instrument.setVisible(shown or self.face == "play")
         self._share_height()
 
+    @property
+    def _wide(self) -> float:
+        """The window's width, in pixels at which text has its usual size."""
+        return self.width() / theme.present.scale
+
+    @property
+    def _high(self) -> float:
+        return self.height() / theme.present.scale
+
+    def _share_width(self) -> None:
+        self._brand.setVisible(self._wide >= WIDE)
+        for button in (self._keys_button, self._test_button):  # the menu has them too
+            button.setVisible(self._wide >= WIDE and self._shows("test"))
+
     def _share_height(self) -> None:
-        """A low window hides the views beside the instrument, a lower one also the preset's facts."""
-        height = self.height()
+        """A low window hides the plots while the keys are shown, a lower one also the preset's facts."""
+        height = self._high
         self.instrument.set_low(height < KNOBS_HIGH)
-        self._decks.setVisible(self._alive and (height >= ALL_HIGH or not self.shows_instrument))
-        self._facts.setVisible(height >= HIGH)
-        home, place = (self._facts_row, 1) if height >= HIGH else (self._head, 2)
+        views = self._alive and self._shows("views") and (height >= ALL_HIGH or not self.shows_keys)
+        self._decks.setVisible(views)
+        self._facts.setVisible(height >= HIGH and self._shows("facts"))
+        home, place = (self._facts_row, 2) if height >= HIGH else (self._head, 4)
         if home.indexOf(self._solo) < 0:
             shown = not self._solo.isHidden()
             home.insertWidget(place, self._solo)
             self._solo.setVisible(shown)
+
+    def show_rate(self, text: str, tip: str, fault: bool) -> None:
+        """The sample rate, in the Lab; a fault of the sound output, in both faces."""
+        label = self.rate_label
+        if label.text() == text:
+            return
+        label.setText(text)
+        label.setToolTip(tip)
+        label.setProperty("fault", fault)
+        label.style().polish(label)
+        self._show_rate_label()
+
+    def _show_rate_label(self) -> None:
+        fault = bool(self.rate_label.property("fault"))
+        self.rate_label.setVisible(self._alive and (fault or self._shows("test")))
+
+    def show_outside(self, text: str) -> None:
+        """What of the latest note lies outside the training; "" for nothing."""
+        self.outside_label.say(text)
+        self.outside_label.setToolTip(plain_tip(text))
+
+    def show_growth(self, text: str) -> None:
+        """That the error of the latest pluck grew; "" where it did not."""
+        self.growth_sign.setToolTip(plain_tip(text))
+        self.growth_sign.setAccessibleDescription(text)
+        self._show_growth()
+
+    def _show_growth(self) -> None:
+        self.growth_sign.setVisible(self._shows("growth") and bool(self.growth_sign.toolTip()))
 
     def show_solo(self, mode: int) -> None:
         """The soloed mode; 0: none, all are heard."""
@@ -310,13 +377,15 @@ class MainWindow(QMainWindow):
             self.resize(self.size().boundedTo(room.shrunkBy(QMargins(0, TITLE_BAR, 0, 0))))
 
     def resizeEvent(self, event: QResizeEvent) -> None:
-        """A small window has narrower margins, and neither brand nor instrument button."""
+        """A small window has narrower margins, and neither brand nor buttons for keys and listening test."""
         super().resizeEvent(event)
-        for spared in (self._brand, self._instrument_button):  # the menu shows and hides the instrument too
-            spared.setVisible(self.width() >= WIDE)
+        self._fit()
+
+    def _fit(self) -> None:
+        self._share_width()
         self._share_height()
-        narrow, low = self.width() < ROOMY, self.height() < KNOBS_HIGH
-        self.transport.set_compact(narrow)
+        narrow, low = self._wide < ROOMY, self._high < AIRY
+        self.transport.set_compact(narrow, self._wide < TIGHT and self.face == "lab")
         self._head.setSpacing(6 if narrow else 10)
         aside, above = 8 if narrow else 14, 6 if low else 12
         self._column.setContentsMargins(aside, above, aside, above)
@@ -336,12 +405,27 @@ class MainWindow(QMainWindow):
                 part.setAcceptDrops(False)  # it would keep dropped files from the window
         super().showEvent(event)
 
+    # Files: dropped, or chosen in a dialog
+
+    def _ask_for_files(self) -> None:
+        paths, _ = QFileDialog.getOpenFileNames(self, "Open", self._folder, FILE_FILTER)
+        for path in paths:
+            self._folder = str(Path(path).parent)
+            self.file_dropped.emit(path)
+
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         ours = event.source() is not None  # dragged out of this window
-        if not ours and any(url.isLocalFile() for url in event.mimeData().urls()):
+        names = [Path(url.toLocalFile()).name for url in event.mimeData().urls() if url.isLocalFile()]
+        if not ours and names:
+            more = f" and {len(names) - 1} more" if len(names) > 1 else ""
+            self._drop_sign.show_over(f"Drop to open {one_line(names[0], LONGEST_NAME)}{more}")
             _copy(event)
 
+    def dragLeaveEvent(self, event: QDragLeaveEvent) -> None:
+        self._drop_sign.hide()
+
     def dropEvent(self, event: QDropEvent) -> None:
+        self._drop_sign.hide()
         _copy(event)
         for url in event.mimeData().urls():
             if url.isLocalFile():

@@ -39,12 +39,14 @@ from app.session.monitor import Monitor
 from app.session.slots import other_preset, source_title
 from app.shared.key_names import note_name
 from app.views.controls.browser import Browser
+from app.views.controls.song_strip import SongStrip
 from app.views.instrument.panel import InstrumentPanel
 from app.views.instrument.patch_card import patch_row
 from app.window.browsing import BrowserDesk
 from app.window.instruments import Instruments
 from app.window.performance import Performance
 from app.window.recordings import Recordings
+from app.window.song import Song
 from engine.plain_text import one_line
 from engine.presets import PresetError, load_preset
 from engine.presets.of_string import of_string, read_string
@@ -71,6 +73,7 @@ class PatchDesk(QObject):
 
     told = Signal(str)  # an error, for the user
     informed = Signal(str)  # what went well
+    outside_changed = Signal(str)  # what of the latest note lies outside the training; "": nothing
 
     def __init__(
         self,
@@ -79,6 +82,7 @@ class PatchDesk(QObject):
         performance: Performance,
         instruments: Instruments,
         panel: InstrumentPanel,
+        strip: SongStrip,
         browser: Browser,
         favourites: Iterable[str] = (),
     ) -> None:
@@ -99,6 +103,7 @@ class PatchDesk(QObject):
         self._noted: Patch | None = None  # the patch, when the note in the bar was judged last
         self._told_other = ""  # the source that a notice reported as not heard from keys
         self._playback = Playback(instruments.play, performance.notes, performance.notes.cancel)
+        self._song = Song(self._playback, strip)
         self._note_timer = QTimer(self, interval=NOTE_TOLD_AFTER_MS, singleShot=True)
         self._note_timer.timeout.connect(self._show_latest_note)
         self.recordings = Recordings(session, performance.notes.keys, panel.bar, self)
@@ -172,6 +177,7 @@ class PatchDesk(QObject):
         self._session.play_patch()
         if self.patch is not None:
             key = sum(self.patch.range) // 2
+            self._song.stop()
             self._playback.play(_note(key))
 
     def change(self, field: str, value: float | str) -> None:
@@ -304,7 +310,7 @@ class PatchDesk(QObject):
         if song.left_out:
             self.informed.emit(f"{song.left_out}.")
         self._session.play_patch()
-        self._playback.play(song.events)
+        self._song.load(file.name, song.events)
 
     def _take_string(self, file: Path) -> None:
         """Makes the string whose physical parameters the file has the instrument, by the model of many strings."""
@@ -357,7 +363,8 @@ class PatchDesk(QObject):
         self.informed.emit(f"{self.patch.name} now has the body {name}.")
 
     def stop(self) -> None:
-        """Stops the MIDI file that is played."""
+        """Stops the MIDI file that is played, or the note of an audition."""
+        self._song.stop()
         self._playback.stop()
 
     @property
@@ -443,8 +450,9 @@ class PatchDesk(QObject):
         self._say("; ".join(self._outside()))
 
     def _say(self, outside: str) -> None:
-        """In the bar: what is outside the training, else how pitches are had where there is no patch."""
-        self._panel.bar.show_note(outside or ("" if self.patch is not None else NO_PATCH))
+        """Reports what is outside the training; in the bar, how pitches are had where there is no patch."""
+        self.outside_changed.emit(outside)
+        self._panel.bar.show_note("" if self.patch is not None else NO_PATCH)
 
     def _outside(self) -> list[str]:
         """What of the latest note, with the present knobs, lies outside the training of its model."""
@@ -478,11 +486,14 @@ class PatchDesk(QObject):
         return found
 
     def tick(self) -> None:
-        """Shows which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
+        """Shows the MIDI file's position and which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
         now_s = time.monotonic()
-        if now_s - self._shown_s < SHOWN_EVERY_S or not self._panel.isVisible():
+        if now_s - self._shown_s < SHOWN_EVERY_S:
             return
         self._shown_s = now_s
+        self._song.tick()
+        if not self._panel.isVisible():
+            return
         self._panel.show_sounding(self._performance.notes.keys.sounding())
         self._panel.bar.show_voices(self._performance.notes.ringing)
         self.recordings.tick(now_s)
@@ -490,7 +501,7 @@ class PatchDesk(QObject):
     def close(self) -> None:
         """Ends the playback; may be called again."""
         self._note_timer.stop()
-        self._playback.stop()
+        self.stop()
 
     def _show_patch(self) -> None:
         patch, entry, panel = self.patch, self.entry, self._panel

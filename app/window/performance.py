@@ -6,6 +6,7 @@ pluck, and the views show it at the note's own time. All but `play_preset` runs 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
@@ -38,6 +39,7 @@ from app.window.panels import Panel
 from app.window.render_signals import RenderSignals
 from engine.metrics import ErrorSums
 
+GROWN, NOTICEABLE = 3.0, 0.01  # times the preset's own error, and the least share, from which an error has grown
 PLACED = {"instrument", *PluckedString.model_fields} - {"position"}  # what plucks at ten places depend on
 
 
@@ -287,7 +289,8 @@ class Performance(QObject):
         for panel in self._panels:
             panel.take_started(take)
         self.follow()
-        self._tell("rendering …")
+        self._tell("Rendering …")
+        self._window.show_growth("")
 
     def _take_finished(self, take: Take, errors: ErrorSums) -> None:
         if take is not self.take:
@@ -297,10 +300,10 @@ class Performance(QObject):
         if reason := why_ran_away(take):
             self._window.notices.tell(reason)
         windows = errors.windows(take.picture_hz, (0.0, take.info.horizon_s, max(take.seconds, take.info.horizon_s)))
-        parts = [
-            f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, ("as trained", "past it"), strict=False)
-        ]
-        self._tell("error of this pluck: " + ", ".join(parts))
+        places = ("in the training range", "beyond")
+        parts = [f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, places, strict=False)]
+        self._tell("Error of this pluck: " + ", ".join(parts))
+        self._window.show_growth(growth_words([w.rel_mae for w in windows], take.info.rel_mae))
 
     def _other_refused(self, preset: str, message: str) -> None:
         self._window.notices.tell(f"{preset} cannot be heard beside this preset: {message}")
@@ -332,3 +335,17 @@ class Performance(QObject):
         string = string_of(asked.preset) or entry.info.string
         chosen = entry.name, string, asked.pluck, asked.seconds
         return (take.preset_name, take.info.string, take.pluck, take.seconds) == chosen
+
+
+def growth_words(errors: Sequence[float], own: float | None) -> str:
+    """That the error of a pluck has grown, for people; "" where it has not.
+
+    Args:
+        errors: relative mean absolute errors within the training range and beyond, as far as there are.
+        own: that of the preset on validation data; None: not known.
+    """
+    largest = max((error for error in errors if not math.isnan(error)), default=0.0)
+    if largest < max(NOTICEABLE, GROWN * (own or 0.0)):
+        return ""
+    where = "on this pluck" if errors and errors[0] == largest else "past the end of its training"
+    return f"The model's error grows to {percent(largest)} {where}. The Lab shows it (F9)."

@@ -32,11 +32,11 @@ FIRST_FAVOURITES = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "
 
 
 class InstrumentChoice(BaseModel):
-    """How the instrument's strip is shown: at all, as keys or strings, with the string's knobs."""
+    """How the instrument's strip is shown: in the Lab too, as keys or strings, with the string's knobs."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    shown: bool = True
+    shown: bool = False
     surface: Literal["keys", "neck"] = "keys"
     unfolded: bool = False
 

@@ -1,6 +1,7 @@
 """Draw the pictures of the window without a screen: `PYTHONPATH=. .venv/bin/python docs/images/window.py`.
 
-`window.png`: a model trained on 25 ms after a hard pluck, with the playhead past the training.
+`window.png`: the Lab, a model trained on 25 ms after a hard pluck, with the playhead past the training.
+`play.png`: the face Play, with a chord on the neck of a guitar.
 `string.webp`: the string from the pluck on, slowed as under a stroboscope.
 """
 
@@ -24,6 +25,7 @@ from app.window.controller import Controller
 HERE = Path(__file__).resolve().parent
 PRESET = "nylon_nonlinear_gaussian_16k_lru_400"
 CHOICES = {
+    "face": "lab",
     "preset": PRESET,
     "keys_play": "place",
     "position": 0.35,
@@ -34,6 +36,7 @@ CHOICES = {
     "right_view": "space_time",
 }
 AT_S = 0.1
+CHORD = (40, 47, 52, 56, 59, 64)  # E major, open
 FRAMES, FRAME_MS = 60, 70
 FLASH_S = 1 / 246.9 + 0.00027  # a period of the string and a little more
 
@@ -76,8 +79,30 @@ def _steps(controller: Controller) -> Iterator[None]:
         frames.append(picture(view))
     first, *others = frames
     first.save(HERE / "string.webp", save_all=True, append_images=others, duration=FRAME_MS, loop=0, quality=60)
+    yield from _play(controller)
     window.close()
     yield
+
+
+def _play(controller: Controller) -> Iterator[None]:
+    """Switches to Play, waits for the guitar and plays a chord."""
+    window = controller.window
+    controller.session.update(face="play", speed=0.004)
+    controller.patches.choose("classical_guitar")
+    window.instrument.show_surface("neck")
+    window.resize(1280, 800)
+    while controller.performance.notes.keys.player is None:
+        yield
+    for _ in range(5):
+        yield
+    for key in CHORD:
+        window.instrument.pressed.emit(key, 110)
+    for _ in range(3):
+        yield
+    window.notices.hide()
+    window.notices.bell.set_unseen(0)
+    window.rate_label.hide()  # there is no sound device here
+    window.grab().save(str(HERE / "play.png"))
 
 
 def picture(widget: QWidget) -> Image.Image:

@@ -116,11 +116,11 @@ def controller(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[ob
     from app.session.choices import Choices
     from app.window.controller import Controller
     from app.window.main_window import MainWindow
-    from app.window.settings import Settings
+    from app.window.settings import InstrumentChoice, Settings
 
     window = MainWindow()
     qtbot.addWidget(window)
-    settings = Settings(choices=Choices(seconds=0.5))
+    settings = Settings(choices=Choices(seconds=0.5, face="lab"), instrument=InstrumentChoice(shown=True))
     made = Controller(window, settings, tmp_path / "settings.json", make_sound)
     with qtbot.waitExposed(window):
         window.show()

@@ -292,9 +292,9 @@ class _User(QObject):
         if random.random() < 0.2:
             stage.controller.performance.seek(random.uniform(0, session.choices.seconds))
         if random.random() < 0.05:
-            stage.window.play_asked.emit()  # stops it
+            stage.window.action["play"].trigger()  # stops it
         if random.random() < 0.1:
-            random.choice((stage.window.undo_asked, stage.window.redo_asked)).emit()
+            stage.window.action[random.choice(("undo", "redo"))].trigger()
 
 
 class _Watch(QObject):

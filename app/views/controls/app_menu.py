@@ -1,9 +1,11 @@
-"""The window's menu: theme, UI scale, undo, and the dialogs without a button in the header."""
+"""The window's actions: one table of menus, words and shortcuts, and the menu that is made of it."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from PySide6.QtCore import Signal
-from PySide6.QtGui import QAction, QActionGroup
+from PySide6.QtGui import QAction, QActionGroup, QKeySequence
 from PySide6.QtWidgets import QMenu, QToolButton, QWidget
 
 from app.views.controls.parts import tool_button
@@ -13,63 +15,128 @@ from engine.plain_text import one_line
 THEMES = {"system": "Follow system", "dark": "Dark", "light": "Light"}
 LONGEST_STEP = 60  # characters
 SIZES_PERCENT = (100, 115, 125, 150)
+KEY_NAMES = {"Return": "Enter", "PgUp": "Page up", "PgDown": "Page down"}  # as tooltips call them
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One action: its name in the code, its words in the menu, its shortcut, and what it does, for the help."""
+
+    name: str
+    text: str
+    key: str = ""
+    does: str = ""
+
+    @property
+    def key_name(self) -> str:
+        return KEY_NAMES.get(self.key, self.key)
+
+
+# A shortcut works in the whole window. Enter is not the menu's: it presses the button that Tab went to, else plucks.
+MENUS: dict[str, tuple[Entry, ...]] = {
+    "&File": (
+        Entry("open", "Open …", "Ctrl+O", "open a MIDI file, instrument, preset, scale or sound"),
+        Entry("record", "Record", "Ctrl+R", "record what is played; again: end the recording and save it"),
+        Entry("export", "Export …", "Ctrl+E", "export WAV"),
+        Entry(
+            "sampler",
+            "Export for samplers …",
+            "Ctrl+Shift+E",
+            "export the patch as an instrument for samplers (SFZ, SoundFont)",
+        ),
+        Entry("quit", "Quit", "Ctrl+Q", "quit"),
+    ),
+    "&Edit": (
+        Entry("undo", "Undo", "Ctrl+Z", "undo: patch and its knobs, preset, pluck, listening point, duration"),
+        Entry("redo", "Redo", "Ctrl+Shift+Z", "redo"),
+    ),
+    "&Play": (
+        Entry("play", "Play or stop", "Space", "play from the pluck, or stop"),
+        Entry("pluck", "Pluck", "Return", "pluck"),
+        Entry("loop", "Loop", "Ctrl+L", "loop"),
+        Entry("instruments", "Instruments …", "Ctrl+I", "browse the instruments"),
+        Entry("browse", "Presets …", "Ctrl+P", "browse the presets"),
+        Entry("previous", "Previous preset", "PgUp", "previous preset"),
+        Entry("next", "Next preset", "PgDown", "next preset"),
+        Entry("switch", "Switch A and B", "B", "switch between A and B at the playhead"),
+        Entry("all_modes", "Play all modes", "Esc", "play all modes again"),
+        Entry("abx", "Listening test (ABX) …", "Ctrl+T", "blind listening test (ABX)"),
+    ),
+    "&View": (
+        Entry("face", "Play or Lab", "F9", "switch between the faces Play and Lab"),
+        Entry("keys", "Keys in Lab", "Ctrl+K", "show or hide the keys in Lab"),
+        Entry("motion", "Motion", "M", "show or hide the string's motion"),
+        Entry("envelope", "Envelope", "N", "show or hide the envelope of the motion"),
+    ),
+    "&Settings": (
+        Entry("audio", "Audio settings …", "Ctrl+,", "audio settings"),
+        Entry("midi", "MIDI …", "Ctrl+M", "MIDI"),
+    ),
+    "&Help": (
+        Entry("help", "Help", "F1", "help"),
+        Entry("menu", "Menu", "F10", "menu"),
+        Entry("notices", "Notices …", "F8", "notices since the start"),
+        Entry("about", "About Learned Strings"),
+    ),
+}
+ENTRIES = {entry.name: entry for entries in MENUS.values() for entry in entries}
+LOOK_MENU = "&View"  # has the theme and the text size too
 
 
 class AppMenu(QMenu):
-    """Emits `look_asked`; shows `show_look`. `asked`: for each action the name of the window's signal to emit."""
+    """Emits `look_asked`; shows `show_look`. `action`: each QAction by the name of its entry."""
 
     look_asked = Signal(str, object)  # a field of `Look` and its new value
 
-    def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self._choices: dict[tuple[str, object], QAction] = {}
-        self._add_choices("Theme", "theme", {name: theme for theme, name in THEMES.items()})
-        self._add_choices("UI scale (after restart)", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
-        self.addSeparator()
-        self._undo, self._redo = self.addAction("Undo"), self.addAction("Redo")
-        self.addSeparator()
-        self.asked = {self._undo: "undo_asked", self._redo: "redo_asked"} | {
-            self.addAction(text): signal
-            for text, signal in (
-                ("Show or hide instrument\tCtrl+K", "instrument_asked"),
-                ("Export instrument …\tCtrl+Shift+E", "sampled_asked"),
-                ("Audio settings …\tCtrl+,", "audio_asked"),
-                ("MIDI …\tCtrl+M", "midi_asked"),
-                ("Notices …\tF8", "notices_asked"),
-                ("Help\tF1", "help_asked"),
-                ("About Learned Strings", "about_asked"),
-                ("Quit\tCtrl+Q", "quit_asked"),
-            )
-        }
+    def __init__(self, window: QWidget | None = None) -> None:
+        super().__init__(window)
+        self._looks: dict[tuple[str, object], QAction] = {}
+        self.action: dict[str, QAction] = {}
+        for title, entries in MENUS.items():
+            menu = self.addMenu(title)
+            for entry in entries:
+                self._add(menu, entry)
+            if title == LOOK_MENU:
+                menu.addSeparator()
+                self._add_looks(menu, "Theme", "theme", {name: theme for theme, name in THEMES.items()})
+                self._add_looks(menu, "Text size", "size_percent", {f"{p} %": p for p in SIZES_PERCENT})
+        if window is not None:
+            window.addActions(list(self.action.values()))  # or their shortcuts would wait for the menu
+
+    def _add(self, menu: QMenu, entry: Entry) -> None:
+        action = self.action[entry.name] = menu.addAction(_words(entry))
+        if entry.key != "Return":
+            action.setShortcut(QKeySequence(entry.key))
+            action.setAutoRepeat(False)
 
     def show_look(self, look: Look) -> None:
-        for (field, value), action in self._choices.items():
+        for (field, value), action in self._looks.items():
             action.setChecked(getattr(look, field) == value)
 
     def show_steps(self, undo: str, redo: str) -> None:
         """What undo and redo would change; "" where there is nothing to."""
-        for action, what, step, keys in (
-            (self._undo, "Undo", undo, "Ctrl+Z"),
-            (self._redo, "Redo", redo, "Ctrl+Shift+Z"),
-        ):
-            name = f": {one_line(step, LONGEST_STEP)}".replace("&", "&&") if step else ""
-            action.setText(f"{what}{name}\t{keys}")
-            action.setEnabled(bool(step))
+        for name, step in (("undo", undo), ("redo", redo)):
+            words = f": {one_line(step, LONGEST_STEP)}".replace("&", "&&") if step else ""
+            self.action[name].setText(f"{ENTRIES[name].text}{words}")
 
-    def _add_choices(self, title: str, field: str, values: dict[str, object]) -> None:
-        menu = self.addMenu(title)
+    def _add_looks(self, above: QMenu, title: str, field: str, values: dict[str, object]) -> None:
+        menu = above.addMenu(title)
         group = QActionGroup(menu)
         for text, value in values.items():
             action = menu.addAction(text)
             action.setCheckable(True)
             action.triggered.connect(lambda _=False, value=value: self.look_asked.emit(field, value))
             group.addAction(action)
-            self._choices[field, value] = action
+            self._looks[field, value] = action
+
+
+def _words(entry: Entry) -> str:
+    return f"{entry.text}\t{entry.key_name}" if entry.key == "Return" else entry.text
 
 
 def menu_button(menu: QMenu) -> QToolButton:
     """The button in the header that opens the menu."""
-    button = tool_button("☰", "Menu", "Theme, UI scale, undo, export instrument, audio, MIDI, notices, help")
+    button = tool_button("☰", "Menu", "Open, record, export, instruments, settings, theme, text size and help (F10)")
     button.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
     button.setMenu(menu)
     return button

@@ -7,6 +7,7 @@ from pathlib import Path
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtWidgets import QDoubleSpinBox, QFileDialog, QHBoxLayout, QLabel, QLineEdit, QSpinBox, QWidget
 
+from app.views import theme
 from app.views.controls.parts import tool_button
 from app.views.controls.plain import Label
 
@@ -24,7 +25,7 @@ FILTERS = {
 def form_label(text: str) -> QLabel:
     """A form's label; all are of one width, so that the forms of a dialog are aligned."""
     made = Label(text)
-    made.setFixedWidth(LABEL_WIDTH)
+    made.setFixedWidth(theme.px(LABEL_WIDTH))
     made.setMinimumHeight(28)
     made.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
     return made

@@ -108,10 +108,15 @@ class Knob(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:
-        return QSize(self._width, LOW_HEIGHT if self._low else HEIGHT)
+        return QSize(theme.px(self._width), theme.px(LOW_HEIGHT if self._low else HEIGHT))
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(self._width, LOW_HEIGHT if self._low else HEIGHT)
+        return self.sizeHint()
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.StyleChange:  # text of another size
+            self.updateGeometry()
 
     def set_narrow(self, narrow: bool) -> None:
         """For a window with little room."""
@@ -196,7 +201,7 @@ class Knob(QWidget):
 
     def _type(self, start: str) -> None:
         editor = _Editor(start, self)
-        editor.setGeometry(2, self.height() - 26, self.width() - 4, 24)
+        editor.setGeometry(2, self.height() - theme.px(24) - 2, self.width() - 4, theme.px(24))
         editor.setAccessibleName(f"{self._name}, typed")
         editor.show()
         editor.setFocus()
@@ -234,11 +239,14 @@ class Knob(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        scale = theme.present.scale  # all of it grows with the text
+        painter.scale(scale, scale)
+        width, height = self.width() / scale, self.height() / scale
         ink = QColor(theme.TEXT if self.isEnabled() else theme.DISABLED)
         if self.hasFocus():
             painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
-            painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
-        middle, radius = (QPointF(self.width() / 2, 29), 13.0) if self._low else (QPointF(self.width() / 2, 38), 18.0)
+            painter.drawRoundedRect(QRectF(1, 1, width - 2, height - 2), 6, 6)
+        middle, radius = (QPointF(width / 2, 29), 13.0) if self._low else (QPointF(width / 2, 38), 18.0)
         ring = QRectF(middle.x() - radius, middle.y() - radius, 2 * radius, 2 * radius)
         start = 90 + SWEEP_DEGREES / 2
         share = self.parameter.share(self._value)
@@ -253,12 +261,11 @@ class Knob(QWidget):
         painter.drawEllipse(middle, radius - 5, radius - 5)
         painter.setPen(QPen(ink, 2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))
         painter.drawLine(middle + direction * 5, middle + direction * (radius - 6))
-        width = self.width()
-        painter.setFont(theme.small_font(9 if self._low or self._width == NARROW_WIDTH else 10))
+        painter.setFont(theme.small_font(9 if self._low or self._width == NARROW_WIDTH else 10, grows=False))
         painter.setPen(QColor(theme.TEXT if self.hasFocus() else theme.FAINT))
-        name = painter.fontMetrics().elidedText(self._name.upper(), Qt.TextElideMode.ElideRight, width)
+        name = painter.fontMetrics().elidedText(self._name.upper(), Qt.TextElideMode.ElideRight, int(width))
         painter.drawText(QRectF(0, 0 if self._low else 3, width, 14), Qt.AlignmentFlag.AlignCenter, name)
         painter.setPen(ink)
-        painter.setFont(theme.small_font(10 if self._low else 12))
-        foot = QRectF(0, self.height() - (17 if self._low else 23), width, 18)
+        painter.setFont(theme.small_font(10 if self._low else 12, grows=False))
+        foot = QRectF(0, height - (17 if self._low else 23), width, 18)
         painter.drawText(foot, Qt.AlignmentFlag.AlignCenter, self._figure or self.text)

@@ -26,10 +26,10 @@ class Meter(QWidget):
         self._hold = 0
 
     def sizeHint(self) -> QSize:
-        return QSize(150, 40)
+        return QSize(theme.px(150), theme.px(40))
 
     def minimumSizeHint(self) -> QSize:
-        return QSize(90, 40)
+        return QSize(theme.px(84), theme.px(40))
 
     def show_level(self, peak_db: float, limiting: bool) -> None:
         """The peak in dBFS, and whether the limiter reduces it now."""
@@ -43,12 +43,12 @@ class Meter(QWidget):
 
     def _pixels(self, peak_db: float) -> int:
         """The length of the bar at a level, in pixels of the screen."""
-        return round((1 - peak_db / LOWEST_DB) * self._bar.width() * self.devicePixelRatioF())
+        return round((1 - peak_db / LOWEST_DB) * self._bar.width() * theme.present.scale * self.devicePixelRatioF())
 
     @property
     def _bar(self) -> QRectF:
         """The bar at 0 dBFS."""
-        return QRectF(12, 8, self.width() - 68, 9)
+        return QRectF(12, 8, self.width() / theme.present.scale - 68, 9)
 
     @property
     def limit_light(self) -> bool:
@@ -57,6 +57,8 @@ class Meter(QWidget):
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        scale = theme.present.scale  # all of it grows with the text
+        painter.scale(scale, scale)
         bar = self._bar
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(theme.LINE))
@@ -68,12 +70,12 @@ class Meter(QWidget):
         painter.setBrush(gradient)
         share = 1 - self._peak_db / LOWEST_DB
         painter.drawRoundedRect(QRectF(bar.left(), bar.top(), bar.width() * share, bar.height()), 3, 3)
-        painter.setFont(theme.small_font(9))
+        painter.setFont(theme.small_font(9, grows=False))
         painter.setPen(QColor(theme.FAINT))
         for db in (-60, -40, -20, 0) if bar.width() > 80 else (-60, 0):
             x = bar.left() + bar.width() * (1 - db / LOWEST_DB)
             painter.drawText(QRectF(x - 14, 20, 28, 12), Qt.AlignmentFlag.AlignCenter, f"{db}")
-        light = QRectF(self.width() - 44, 5, 44, 16)
+        light = QRectF(self.width() / scale - 44, 5, 44, 16)
         painter.setPen(Qt.PenStyle.NoPen)
         painter.setBrush(QColor(theme.WARNING if self._hold else theme.LINE))
         painter.drawRoundedRect(light, 3, 3)

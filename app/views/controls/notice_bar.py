@@ -122,7 +122,7 @@ class Bell(QToolButton):
         self.set_unseen(0)
 
     def sizeHint(self) -> QSize:
-        return QSize(44, super().sizeHint().height())
+        return QSize(theme.px(44), super().sizeHint().height())
 
     def set_unseen(self, unseen: int) -> None:
         self.unseen = unseen
@@ -147,4 +147,8 @@ class Bell(QToolButton):
         if self.unseen:
             painter.setFont(theme.small_font(10, bold=True))
             painter.setPen(QColor(theme.WARNING))
-            painter.drawText(QRectF(8, -8, 18, 16), Qt.AlignmentFlag.AlignVCenter, str(min(self.unseen, 99)))
+            painter.drawText(
+                QRectF(8, -theme.px(8), theme.px(18), theme.px(16)),
+                Qt.AlignmentFlag.AlignVCenter,
+                str(min(self.unseen, 99)),
+            )

@@ -6,9 +6,10 @@ from PySide6.QtWidgets import QComboBox
 
 from app.shared.vocabulary import PICKUP_TITLES
 from app.views.controls.parts import combo_box
+from app.views.theme import fix_size
 from engine.pluck import SHAPES, Shape
 
-AT_BRIDGE = "The bridge hears the whole string: choose Point or Velocity to listen at a place"
+AT_BRIDGE = "The bridge hears the whole string: choose Point or Magnetic to listen at a place"
 NO_WIDTH = "A triangle has no width: choose another shape to turn it"
 _NAMES: dict[Shape, str] = {
     "gaussian": "Gaussian",
@@ -16,7 +17,7 @@ _NAMES: dict[Shape, str] = {
     "raised_cosine": "Raised cosine",
     "rounded": "Rounded",
 }
-_WIDTH, _PICKUP_WIDTH = 106, 64  # pixels: the longest name, with the padding of _TIGHT
+_WIDTH, _PICKUP_WIDTH = 106, 74  # pixels: the longest name, with the padding of _TIGHT
 _TIGHT = "QComboBox {{ padding: 5px 0 5px 6px; }} QComboBox::drop-down {{ border: none; width: {}px; }}"
 _ARROW, _PICKUP_ARROW = 17, 9  # pixels
 
@@ -37,5 +38,5 @@ def pickup_box() -> QComboBox:
 
 def _tight(box: QComboBox, width: int, arrow: int) -> QComboBox:
     box.setStyleSheet(_TIGHT.format(arrow))
-    box.setFixedWidth(width)
+    fix_size(box, width)
     return box

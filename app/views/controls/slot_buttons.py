@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 SLOTS = ("a", "b")
 DIFFERENCE_GAINS_DB = range(0, int(DIFFERENCE_GAIN_RANGE_DB[1]) + 1, 10)
-WIDTH, NARROW_WIDTH = 148, 108  # fixed, so that a longer title moves nothing
+WIDTH, NARROW_WIDTH, TIGHT_WIDTH = 148, 108, 82  # fixed, so that a longer title moves nothing
 PADDING = 18  # of the style sheet, with the borders
 
 _SOURCES = (
@@ -50,7 +50,7 @@ class SlotButtons(QWidget):
         for row, slot in enumerate(SLOTS):
             button = QPushButton()
             button.setCheckable(True)
-            button.setFixedWidth(self._width)
+            button.setFixedWidth(theme.px(self._width))
             button.clicked.connect(lambda _=False, slot=slot: self.change_asked.emit("heard", slot))
             group.addButton(button)
             self._buttons[slot] = button
@@ -63,11 +63,11 @@ class SlotButtons(QWidget):
         self._entries = entries
         self._show()
 
-    def set_narrow(self, narrow: bool) -> None:
-        """For a window with little room."""
-        self._width = NARROW_WIDTH if narrow else WIDTH
+    def set_narrow(self, narrow: bool, tight: bool = False) -> None:
+        """For a window with little room; `tight`: with very little."""
+        self._width = TIGHT_WIDTH if tight else NARROW_WIDTH if narrow else WIDTH
         for button in self._buttons.values():
-            button.setFixedWidth(self._width)
+            button.setFixedWidth(theme.px(self._width))
         self._show()
 
     def show_choices(self, choices: Choices) -> None:
@@ -111,7 +111,7 @@ class SlotButtons(QWidget):
     def _fitted(self, letter: str, text: str, gain: str) -> str:
         """The text that fits a button: where room is short, the gain loses its unit, then `text` is cut."""
         metrics = QFontMetrics(theme.small_font(12, bold=True))
-        room = self._width - PADDING
+        room = theme.px(self._width) - PADDING
         for beside in (gain, gain.removesuffix(" dB")):
             words = "  ".join(part for part in (letter, text, beside) if part)
             if metrics.horizontalAdvance(words) <= room:

@@ -6,6 +6,7 @@ from PySide6.QtCore import QSignalBlocker, Qt, Signal
 from PySide6.QtWidgets import (
     QFrame,
     QHBoxLayout,
+    QLayout,
     QPushButton,
     QSizePolicy,
     QVBoxLayout,
@@ -14,12 +15,14 @@ from PySide6.QtWidgets import (
 
 from app.session.choices import Choices
 from app.shared.parameters import OF_CHOICES
+from app.views import theme
 from app.views.controls.knob import Knob
 from app.views.controls.meter import Meter
 from app.views.controls.parts import tool_button, vertical_rule
 from app.views.controls.plain import Label
 from app.views.controls.shape_box import AT_BRIDGE, NO_WIDTH, pickup_box, shape_box
 from app.views.controls.slot_buttons import SlotButtons
+from app.views.faces import Area
 from engine.pluck import (
     FULL_SCALE_M,
     FULL_SCALE_M_S,
@@ -45,45 +48,54 @@ class TransportBar(QFrame):
         for field, knob in self.knobs.items():
             knob.value_asked.connect(lambda value, field=field: self.change_asked.emit(field, value))
         self.meter = Meter()
-        self._compact = False
+        self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)")
+        self._loop.setCheckable(True)
+        self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
+        self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
+        self._fitted = (False, False, 1.0)  # compact, tight, scale of text
+        self._tight = False
+        self._groups: list[QHBoxLayout] = []
         self._playing: bool | None = None  # as shown; None after a click, which checks the button by itself
         self._row = row = QHBoxLayout(self)
         row.setContentsMargins(12, 8, 12, 8)
         row.setSpacing(5)
-        row.addLayout(self._build_transport())
-        row.addWidget(vertical_rule())
         self.slots = SlotButtons()
         self.slots.change_asked.connect(self.change_asked)
-        row.addWidget(self.slots)
-        row.addWidget(vertical_rule())
-        row.addLayout(self._build_shape())
-        for field in ("position", "amplitude_mm", "width"):
-            row.addWidget(self.knobs[field])
-        row.addWidget(vertical_rule())
-        for field in ("listen", "listen_right"):
-            row.addWidget(self.knobs[field])
-        row.addLayout(self._build_pickup())
-        row.addWidget(vertical_rule())
-        for field in ("seconds", "speed"):
-            row.addWidget(self.knobs[field])
+        knob = self.knobs
+        pluck = (self._build_shape(), knob["position"], knob["amplitude_mm"], knob["width"])
+        listener = self._group(knob["listen"], knob["listen_right"], self._build_pickup())
+        self.areas: dict[Area, tuple[QWidget, ...]] = {
+            "slots": (self._group(self.slots),),
+            "pluck": (self._group(*pluck),),
+            "time": (self._loop, self._group(knob["seconds"], knob["speed"])),
+        }
+        row.addLayout(self._build_transport())
+        for group in (self.areas["slots"][0], self.areas["pluck"][0], listener, self.areas["time"][1]):
+            row.addWidget(group)
         row.addStretch(1)
         row.addWidget(vertical_rule())
-        row.addWidget(self.knobs["volume_db"])
+        row.addWidget(knob["volume_db"])
         row.addLayout(self._build_output())
 
-    def set_compact(self, compact: bool) -> None:
-        """Narrower by a fifth, for a window with little room."""
-        if compact == self._compact:
+    def set_compact(self, compact: bool, tight: bool = False) -> None:
+        """Narrower by a fifth, for a window with little room; `tight`: with very little, symbols for words."""
+        if (compact, tight, theme.present.scale) == self._fitted:
             return
-        self._compact = compact
+        self._fitted = compact, tight, theme.present.scale
+        self._tight, self._playing = tight, None
+        self._loop.setText("⟳" if tight else "⟳  Loop")
+        self.show_playing(self._play.isChecked())
         self._row.setContentsMargins(*((4, 8, 4, 8) if compact else (12, 8, 12, 8)))
         self._row.setSpacing(2 if compact else 5)
+        for group in self._groups:
+            group.setSpacing(1 if compact else 5)
         for knob in self.knobs.values():
             knob.set_narrow(compact)
-        self.slots.set_narrow(compact)
+        self.slots.set_narrow(compact, tight)
         self._export.setText("Export …" if compact else "Export WAV …")
         for button in (self._play, self._loop, self._stereo, self._export):
             button.setProperty("compact", compact)
+            button.setProperty("tight", tight)
             button.style().unpolish(button)
             button.style().polish(button)
 
@@ -109,22 +121,20 @@ class TransportBar(QFrame):
             return
         self._playing = playing
         self._play.setChecked(playing)
-        self._play.setText("■  Stop" if playing else "▶  Play")
+        words = "■  Stop" if playing else "▶  Play"
+        self._play.setText(words[0] if self._tight else words)
 
     def _forget_playing(self) -> None:
         self._playing = None
 
     def _build_transport(self) -> QVBoxLayout:
         self._play = QPushButton("▶  Play")
+        self._play.setAccessibleName("Play or stop")
         self._play.setObjectName("play")
         self._play.setCheckable(True)
         self._play.setToolTip("Play from the pluck, or stop (Space)")
         self._play.clicked.connect(self._forget_playing)
         self._play.clicked.connect(self.play_asked)
-        self._loop = tool_button("⟳  Loop", "Loop", "Repeat (Ctrl+L)")
-        self._loop.setCheckable(True)
-        self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
         column = QVBoxLayout()
         column.addWidget(self._play)
         column.addWidget(self._loop)
@@ -141,7 +151,8 @@ class TransportBar(QFrame):
         self._pickup = pickup_box()
         self._pickup.setToolTip(
             f"Point: displacement of the listening point (full scale {1000 * FULL_SCALE_M:g} mm)\n"
-            f"Velocity: of that point, as from a magnetic pick-up: brighter (full scale {FULL_SCALE_M_S:g} m/s)\n"
+            f"Magnetic: velocity of that point, as a magnetic pick-up senses it: brighter "
+            f"(full scale {FULL_SCALE_M_S:g} m/s)\n"
             f"Bridge: the force on the end at 0, which drives a body (full scale {FULL_SCALE_N:g} N)\n{OF_THE_PATCH}"
         )
         self._pickup.activated.connect(lambda row: self.change_asked.emit("pickup", self._pickup.itemData(row)))
@@ -172,3 +183,18 @@ class TransportBar(QFrame):
         column.addWidget(self.meter)
         column.addWidget(self._export)
         return column
+
+    def _group(self, *parts: QWidget | QLayout) -> QWidget:
+        """A rule and parts beside each other, which are shown and hidden together."""
+        group = QWidget()
+        row = QHBoxLayout(group)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(5)
+        row.addWidget(vertical_rule())
+        for part in parts:
+            if isinstance(part, QLayout):
+                row.addLayout(part)
+            else:
+                row.addWidget(part)
+        self._groups.append(row)
+        return group

@@ -217,8 +217,8 @@ class NotePage(ExportPage):
         path, source = self.file.path, self.source.currentData()
         if source != "files":
             return {source: path}
-        stem = path.stem.removesuffix("_model").removesuffix("_truth")
-        return {name: path.with_name(f"{stem}_{name}.wav") for name in ("model", "truth")}
+        stem = path.stem.removesuffix(" model").removesuffix(" truth")
+        return {name: path.with_name(f"{stem} {name}.wav") for name in ("model", "truth")}
 
     def job(self) -> NoteExport:
         if self._subject is None:
@@ -245,7 +245,7 @@ class NotePage(ExportPage):
         beyond = f"adds no bandwidth: the model ends at {note.preset_rate_hz / 2000:g} kHz"
         own = "" if rate_hz else f"{note.preset_rate_hz / 1000:g} kHz"
         self._wav.note.setText(beyond if rate_hz > note.preset_rate_hz else own)
-        self.file.suggest(note.file_name(rate_hz, "model" if source == "files" else source))
+        self.file.suggest(note.file_name("model" if source == "files" else source))
         two = source == "files"
         self.names.setText("\n".join(path.name for path in self.paths().values()) if two else "")
         self._form.setRowVisible(self.names, two)

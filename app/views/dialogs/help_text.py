@@ -10,10 +10,10 @@ TOUR = (
     ),
     (
         "Choose an instrument",
-        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs change tension, "
-        "length, material, damping and pluck while it rings; Record saves what you play; a dropped MIDI file is "
-        "played. In the same strip you choose whether the computer's keys play pitches or choose where the string is "
-        "plucked.",
+        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs shows every knob "
+        "in place of the macros: tension, length, material, damping and pluck. Record saves what you play; a MIDI "
+        "file that is opened or dropped is played. In the same strip you choose whether the computer's keys play "
+        "pitches or choose where the string is plucked.",
     ),
     (
         "Pluck",
@@ -21,9 +21,9 @@ TOUR = (
     ),
     (
         "Compare",
-        "Press B to hear the truth, the numerical solution of the string's equation, at the same playhead and "
-        "level. B again returns. The small arrows beside A and B select their sources: model, truth, the amplified "
-        "difference, or another preset.",
+        "Press F9 for the Lab, and B to hear the truth, the numerical solution of the string's equation, at the same "
+        "playhead and level. B again returns. The small arrows beside A and B select their sources: model, truth, "
+        "the amplified difference, or another preset.",
     ),
     (
         "Look",
@@ -43,7 +43,7 @@ TOUR = (
     (
         "Listen elsewhere",
         "Drag the green marker beneath the string. At a node of a partial, that partial is not heard; at the ends "
-        "nothing is. Stereo has two listening points; Velocity is the signal of a magnetic pick-up. While keys play "
+        "nothing is. Stereo has two listening points; Magnetic is a magnetic pick-up. While keys play "
         "the patch, all three belong to it, and what you hear is saved, recorded and exported.",
     ),
     (

@@ -121,8 +121,8 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
             ("Aliased", f"partials {audible + 1} … {info.modes} lie above half the rate, in model and truth")
         )
     if info.rel_mae is not None:
-        test = "" if info.test_rel_mae is None else f", on the test set {100 * info.test_rel_mae:.2g} %"
-        facts.append(("Error", f"{100 * info.rel_mae:.2g} % of the motion in validation{test}"))
+        test = "" if info.test_rel_mae is None else f", on the test set {percent(info.test_rel_mae)}"
+        facts.append(("Error", f"{percent(info.rel_mae)} of the motion in validation{test}"))
     facts.append(("Given", f"before training: {info.knows or 'nothing but the displacement'}"))
     facts.append(("Heard", heard_sentence(entry.heard, entry.name)))
     if info.training_seconds is not None:

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPen
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen
 from PySide6.QtWidgets import QWidget
 
 from app.shared.key_names import note_name
@@ -18,11 +18,12 @@ from app.views import theme
 from app.views.instrument.playable import Playable
 
 MOST_ROWS, MOST_FRETS = 8, 24
-NAMES_WIDTH = 40  # open strings, left of the nut
-FOOT = 15  # numbers of frets, names of octaves
+_NAMES_WIDTH = 40  # open strings, left of the nut
+_FOOT = 15  # numbers of frets, names of octaves
 SHORTEST = 0.14  # of the fan's height
 THICK, THIN = 2.6, 1.0  # lowest and highest string, in pixels
 LARGEST_DOT = 14.0
+SWING = 0.42  # of a string's row, at full level
 INLAYS = (3, 5, 7, 9, 12, 15, 17, 19, 21, 24)
 TIP = (
     "Click or drag to play: softer at the upper edge of a string's row, harder at the lower.\n"
@@ -71,11 +72,11 @@ class Neck(Playable):
 
     def fret_x(self, fret: float) -> float:
         """In pixels."""
-        return NAMES_WIDTH + fret_share(fret, self.frets) * (self.width() - NAMES_WIDTH - 6)
+        return theme.px(_NAMES_WIDTH) + fret_share(fret, self.frets) * (self.width() - theme.px(_NAMES_WIDTH) - 6)
 
     def cell(self, string: int, fret: int) -> QRectF:
         """Where a finger stops the string: from the fret before to this one; fret 0: the name of the open string."""
-        height = (self.height() - FOOT) / len(self._strings)
+        height = (self.height() - theme.px(_FOOT)) / len(self._strings)
         top = (len(self._strings) - 1 - string) * height
         left = 0.0 if fret <= 0 else self.fret_x(fret - 1)
         return QRectF(left, top, self.fret_x(max(fret, 0)) - left, height)
@@ -102,15 +103,15 @@ class Neck(Playable):
             return self._low + int(at.x() / self.width() * (self._high - self._low + 1))
         string = self._row_at(at)
         fret = next((n for n in range(self.frets + 1) if at.x() < self.fret_x(n)), None)
-        return None if fret is None or at.y() >= self.height() - FOOT else self._strings[string][1] + fret
+        return None if fret is None or at.y() >= self.height() - theme.px(_FOOT) else self._strings[string][1] + fret
 
     def _row_at(self, at: QPointF) -> int:
-        height = (self.height() - FOOT) / len(self._strings)
+        height = (self.height() - theme.px(_FOOT)) / len(self._strings)
         return min(max(len(self._strings) - 1 - int(at.y() / height), 0), len(self._strings) - 1)
 
     def share_at(self, key: int, at: QPointF) -> float:
         if not self.in_rows:
-            return at.y() / (self.height() - FOOT)
+            return at.y() / (self.height() - theme.px(_FOOT))
         rect = self.cell(self._row_at(at), 0)
         return (at.y() - rect.top()) / rect.height()
 
@@ -127,7 +128,9 @@ class Neck(Playable):
         for key in range(self._low, self._high + 1):
             self._paint_column(painter, key, QColor(theme.TEXT if key in open_keys else theme.FAINT), 0.0)
             if key % 12 == 0:
-                place = QRectF(self._column(key).center().x() - 16, self.height() - FOOT, 32, FOOT - 1)
+                place = QRectF(
+                    self._column(key).center().x() - 16, self.height() - theme.px(_FOOT), 32, theme.px(_FOOT) - 1
+                )
                 painter.setPen(QColor(theme.FAINT))
                 painter.drawText(place, Qt.AlignmentFlag.AlignCenter, note_name(key))
 
@@ -149,12 +152,12 @@ class Neck(Playable):
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(theme.TEXT), 1.5))
             key = self.cursor_key
-            place = self._cell_of(key) if self.in_rows else self._column(key).adjusted(0, 0, 0, -FOOT)
+            place = self._cell_of(key) if self.in_rows else self._column(key).adjusted(0, 0, 0, -theme.px(_FOOT))
             painter.drawRoundedRect(place.adjusted(1, 1, -1, -1), 3, 3)
 
     def _paint_board(self, painter: QPainter) -> None:
-        bottom = self.height() - FOOT
-        board = QRectF(NAMES_WIDTH, 1, self.fret_x(self.frets) - NAMES_WIDTH, bottom - 2)
+        bottom = self.height() - theme.px(_FOOT)
+        board = QRectF(theme.px(_NAMES_WIDTH), 1, self.fret_x(self.frets) - theme.px(_NAMES_WIDTH), bottom - 2)
         painter.setPen(QPen(QColor(theme.LINE), 1))
         painter.setBrush(QColor(theme.RAISED))
         painter.drawRoundedRect(board, 3, 3)
@@ -170,33 +173,34 @@ class Neck(Playable):
             for share in (0.25, 0.75) if fret % 12 == 0 else (0.5,):
                 painter.drawEllipse(QPointF((x + before) / 2, share * bottom), 4.5, 4.5)
             painter.setPen(QColor(theme.FAINT))
-            number = QRectF(before - 10, bottom + 1, x - before + 20, FOOT - 2)
+            number = QRectF(before - 10, bottom + 1, x - before + 20, theme.px(_FOOT) - 2)
             painter.drawText(number, Qt.AlignmentFlag.AlignCenter, str(fret))
         painter.setPen(QPen(QColor(theme.FAINT), 4))
-        painter.drawLine(QPointF(NAMES_WIDTH, 2), QPointF(NAMES_WIDTH, bottom - 2))
+        painter.drawLine(QPointF(theme.px(_NAMES_WIDTH), 2), QPointF(theme.px(_NAMES_WIDTH), bottom - 2))
 
     def _paint_string(self, painter: QPainter, number: int) -> None:
         name, open_key = self._strings[number]
         row = self.cell(number, 0)
         painter.setFont(theme.small_font(11, bold=True))
         painter.setPen(QColor(theme.TEXT if self.sounds(open_key) else theme.DISABLED))
-        room = NAMES_WIDTH - 10
+        room = theme.px(_NAMES_WIDTH) - 10
         cut = painter.fontMetrics().elidedText(name, Qt.TextElideMode.ElideRight, room)
         painter.drawText(QRectF(0, row.top(), room, row.height()), Qt.AlignmentFlag.AlignCenter, cut)
         thick = THICK - (THICK - THIN) * number / max(1, len(self._strings) - 1)
         painter.setPen(QPen(QColor(theme.FAINT), thick))
         y = row.center().y()
-        painter.drawLine(QPointF(NAMES_WIDTH, y), QPointF(self.fret_x(self.frets), y))
+        painter.drawLine(QPointF(theme.px(_NAMES_WIDTH), y), QPointF(self.fret_x(self.frets), y))
 
     def _paint_stopped(self, painter: QPainter, key: int, lit: QColor, level: float) -> None:
         """A dot where a key is held, and its string from there on."""
-        size = min(LARGEST_DOT, (self.height() - FOOT) / len(self._strings) - 2)
+        size = min(LARGEST_DOT, (self.height() - theme.px(_FOOT)) / len(self._strings) - 2)
         cell = self._cell_of(key)
-        x = cell.right() - min(size, cell.width() / 2) if cell.left() > 0 else NAMES_WIDTH
+        x = cell.right() - min(size, cell.width() / 2) if cell.left() > 0 else theme.px(_NAMES_WIDTH)
         middle = QPointF(x, cell.center().y())
         if level > 0:
             painter.setPen(QPen(lit, 2))
             painter.drawLine(middle, QPointF(self.fret_x(self.frets), middle.y()))
+            self._paint_swing(painter, middle, level)
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(theme.translucent(self.colour.name(), 70))
             painter.drawEllipse(middle, *(2 * [size / 2 + 4 * level]))
@@ -204,9 +208,19 @@ class Neck(Playable):
         painter.setBrush(self.colour if level > 0 else QColor(theme.FAINT))
         painter.drawEllipse(middle, *(2 * [size / 2 * (0.6 + 0.4 * level)]))
 
+    def _paint_swing(self, painter: QPainter, stop: QPointF, level: float) -> None:
+        """How far a string swings, from where it is stopped to the bridge."""
+        far, reach = self.fret_x(self.frets), SWING * level * (self.height() - theme.px(_FOOT)) / len(self._strings)
+        swing = QPainterPath(stop)
+        for side in (-1, 1):
+            swing.quadTo((stop.x() + far) / 2, stop.y() + 2 * side * reach, far if side < 0 else stop.x(), stop.y())
+        painter.setPen(Qt.PenStyle.NoPen)
+        painter.setBrush(theme.translucent(self.colour.name(), 90))
+        painter.drawPath(swing)
+
     def _paint_column(self, painter: QPainter, key: int, ink: QColor, thicker: float) -> QPointF:
         """A key's string in the fan; gives its end."""
-        length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (self.height() - FOOT - 8)
+        length = max(SHORTEST, 2 ** (-(key - self._low) / 24)) * (self.height() - theme.px(_FOOT) - 8)
         x = self._column(key).center().x()
         thick = THICK - (THICK - THIN) * (key - self._low) / max(1, self._high - self._low)
         painter.setPen(QPen(ink, thick + thicker))

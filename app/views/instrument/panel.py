@@ -20,6 +20,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.views import theme
 from app.views.controls.parts import tool_button
 from app.views.controls.plain import Label
 from app.views.controls.segments import Segments
@@ -30,9 +31,10 @@ from app.views.instrument.piano_keys import PianoKeys
 from app.views.instrument.string_knobs import StringKnobs
 
 HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or click the strings"}
-FOLD_TIP = "Show or hide the knobs of the string"
-LOW_TIP = "Show the knobs of the string in place of the keys, or the keys again: the window is too low for both"
+FOLD_TIP = "Show every knob of the string in place of the macros, or the macros again"
+LOW_TIP = "Show every knob of the string in place of macros and keys, or these again"
 ROOMY = 1320  # pixels: in a narrower window the bar is compact
+TIGHT = 900  # pixels: a narrower one has no button that renames
 PLAYS_WIDTH = 164  # pixels: of the longer words, so that the keys beside them stay where they are
 KEYS_PLAY = {  # what the computer's keys play -> (words, tip)
     "pitch": ("Keys play pitches", "The computer's keys play the patch, as a piano's two rows"),
@@ -76,6 +78,7 @@ class InstrumentPanel(QFrame):
         self._hint = Label(HINTS["keys"], self._stack)
         self._hint.setObjectName("hint")
         self._hint.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
+        self._patch_area = True
         self._lay_out()
 
     def _lay_out(self) -> None:
@@ -141,6 +144,13 @@ class InstrumentPanel(QFrame):
         self._fold.setChecked(unfolded)
         self._share_room()
 
+    def show_patch_area(self, shown: bool) -> None:
+        """Shows the bar and the knobs of the string, or only what is played on."""
+        self._patch_area = shown
+        self._bar_row.setVisible(shown)
+        self._fold.setVisible(shown)
+        self._share_room()
+
     def set_low(self, low: bool) -> None:
         """For a window with little height: the knobs of the string then take the place of the keys."""
         if low != self._low:
@@ -153,7 +163,7 @@ class InstrumentPanel(QFrame):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.bar.set_compact(self.width() < ROOMY)
+        self.bar.set_compact(self.width() < theme.px(ROOMY), self.width() < theme.px(TIGHT))
 
     def _share_room(self) -> None:
         self._grid.removeWidget(self._knobs_row)
@@ -166,8 +176,10 @@ class InstrumentPanel(QFrame):
             self._grid.setContentsMargins(12, 8, 12, 10)
             self._grid.setVerticalSpacing(8)
         self._fold.setToolTip(LOW_TIP if self._low else FOLD_TIP)
-        self._knobs_row.setVisible(self.unfolded)
-        self._stack.setVisible(not (self._low and self.unfolded))
+        unfolded = self.unfolded and self._patch_area
+        self._knobs_row.setVisible(unfolded)
+        self._stack.setVisible(not (self._low and unfolded))
+        self.bar.show_macros(not unfolded)
 
     def set_range(self, low: int, high: int) -> None:
         """The lowest and the highest key that have a string."""

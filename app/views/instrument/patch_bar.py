@@ -1,7 +1,7 @@
 """Which patch: previous, next, its name, which opens the browser; save, rename, revert; its macros, body and room.
 
-Below them is its state: what lies outside the model's training, a Scala scale, octave and velocity of the
-computer's keys, the number of voices, and recording.
+Below them is its state: a Scala scale, octave and velocity of the computer's keys, the number of voices, and
+recording.
 """
 
 from __future__ import annotations
@@ -55,6 +55,7 @@ class PatchBar(QFrame):
         self.setAccessibleName("Patch")
         self._macros: tuple[Macro, ...] = ()
         self._compact = False
+        self._shows_macros = True
         self._recorded_s: float | None = None
         self._unsaved = 0
         self.knobs = {field: Knob(OF_PATCHES[field]) for field in MIXES}
@@ -165,7 +166,7 @@ class PatchBar(QFrame):
         for button in (lower, higher):
             button.setObjectName("chip")
         row = QHBoxLayout()
-        row.setSpacing(4)
+        row.setSpacing(8)
         row.addWidget(self.note, 1)
         for widget in (self.scala, lower, self.octave, higher, self.velocity, self.voices, self.record):
             row.addWidget(widget)
@@ -181,7 +182,7 @@ class PatchBar(QFrame):
         self.body.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
         self.body.setMinimumWidth(104)
         self.body.activated.connect(lambda row: self.body_chosen.emit(str(self.body.itemData(row))))
-        head = Label("BODY")
+        head = Label("BODY TYPE")
         head.setObjectName("knob")
         column = QVBoxLayout()
         column.setSpacing(3)
@@ -197,8 +198,9 @@ class PatchBar(QFrame):
 
     # What is shown
 
-    def set_compact(self, compact: bool) -> None:
-        """For a window with little room."""
+    def set_compact(self, compact: bool, tight: bool = False) -> None:
+        """For a window with little room; `tight`: with very little, where the browser alone renames."""
+        self.rename.setVisible(not tight)
         if compact != self._compact:
             self._compact = compact
             self._share_width()
@@ -245,18 +247,28 @@ class PatchBar(QFrame):
         """Whether keys play the patch as it was saved."""
         self.compare.setChecked(comparing)
 
+    def show_macros(self, shown: bool) -> None:
+        """Shows the macros; else, beside all knobs of the string, what they turn: the mixes of body and room."""
+        self._shows_macros = shown
+        self._share_knobs()
+
     def _show_macros(self, macros: tuple[Macro, ...]) -> None:
-        for number, knob in enumerate(self.macros):
-            knob.setVisible(number < len(macros))
-            if number >= len(macros):
-                continue
-            macro = macros[number]
+        for number, (knob, macro) in enumerate(zip(self.macros, macros, strict=False)):
             if number >= len(self._macros) or _named(self._macros[number]) != _named(macro):
                 knob.set_name(macro.name, f"{macro.name}: changes {', '.join(_named(macro)[1])}")
             knob.set_value(macro.value)
         self._macros = macros
-        self._before_macros.setVisible(bool(macros))
+        self._share_knobs()
         self._share_width()
+
+    def _share_knobs(self) -> None:
+        """Every value has one knob: a mix that is a macro's only target is that macro's while macros are shown."""
+        for number, knob in enumerate(self.macros):
+            knob.setVisible(self._shows_macros and number < len(self._macros))
+        self._before_macros.setVisible(self._shows_macros and bool(self._macros))
+        alone = {macro.targets[0].field for macro in self._macros if len(macro.targets) == 1}
+        for field, knob in self.knobs.items():
+            knob.setVisible(not (self._shows_macros and field in alone))
 
     def _show_scala(self, tuning: TuningChoice) -> None:
         """What of Scala tunes the patch; a click removes it."""
@@ -330,12 +342,7 @@ class PatchBar(QFrame):
         button.setMenu(self._unsaved_menu if waits else None)  # type: ignore[arg-type]
 
     def show_note(self, text: str) -> None:
-        """A warning: what lies outside the model's training; "" for none."""
-        if text == self.note.text():
-            return
-        self.note.setObjectName("warning" if text else "faint")
-        self.note.style().unpolish(self.note)
-        self.note.style().polish(self.note)
+        """What is missing; "" for nothing."""
         self.note.say(text)
         self.note.setToolTip(plain_tip(text))
 

@@ -71,7 +71,7 @@ class PianoKeys(Playable):
     @property
     def _letter_size(self) -> int:
         """In pixels: as large as a black key is wide."""
-        return min(max(round(0.9 * BLACK_WIDTH * self._pitch), SMALLEST_LETTER), LARGEST_LETTER)
+        return min(max(round(0.9 * BLACK_WIDTH * self._pitch), SMALLEST_LETTER), theme.px(LARGEST_LETTER))
 
     def key_rect(self, key: int) -> QRectF:
         if not self._first <= key <= self._last:
@@ -145,14 +145,14 @@ class PianoKeys(Playable):
         if letter or key % 12 == 0:
             painter.setPen(QColor(_ink(filling)))
         if key % 12 == 0:
-            self._paint_word(painter, rect, note_name(key), 16, 9)
+            self._paint_word(painter, rect, note_name(key), 16, theme.px(9))
         if letter:
             self._paint_word(painter, rect, letter, 18 if is_black(key) else 30, self._letter_size)
 
     def _paint_word(self, painter: QPainter, key: QRectF, word: str, above: int, size: int) -> None:
         """A word on a key, `above` pixels above its lower edge."""
-        painter.setFont(theme.small_font(size, bold=above > 16))
-        place = QRectF(key.left() - 4, key.bottom() - above, key.width() + 8, 13)
+        painter.setFont(theme.small_font(size, bold=above > 16, grows=False))
+        place = QRectF(key.left() - 4, key.bottom() - theme.px(above), key.width() + 8, theme.px(13))
         painter.drawText(place, Qt.AlignmentFlag.AlignCenter, word)
 
 

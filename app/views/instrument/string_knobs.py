@@ -9,12 +9,12 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.patches.patch import Patch
-from app.shared.parameters import DECAY, OF_PATCHES, PICKUP, PITCH, PLUCK, STRING, in_group
+from app.shared.parameters import DECAY, OF_PATCHES, PITCH, PLUCK, STRING, in_group
 from app.views import theme
 from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob
 from app.views.controls.parts import faint, vertical_rule
 from app.views.controls.plain import Label, plain_tip
-from app.views.controls.shape_box import AT_BRIDGE, NO_WIDTH, shape_box
+from app.views.controls.shape_box import NO_WIDTH, shape_box
 from engine.pluck import SHAPES
 
 HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
@@ -27,11 +27,10 @@ WIDTHS = {  # in pixels, by the longest name or value
     "pluck.width_hard": 66,
 }  # the others are narrow
 NO_A4 = "The Scala keyboard mapping of this patch has a reference pitch of its own, so that A4 would change nothing"
-MONO = "The patch is heard at one point, in mono"
 LETS_RING = "The patch lets its strings ring: no key damps them"
 
 
-GROUPS = (PITCH, STRING, DECAY, PLUCK, PICKUP)  # in the order of the strip
+GROUPS = (PITCH, STRING, DECAY, PLUCK)  # in the order of the strip; the pick-up is in the transport bar
 SHAPED = ("pluck.width", "pluck.width_hard")
 
 
@@ -41,7 +40,7 @@ class Facts(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._facts: dict[str, str] = {}
-        self.setFixedHeight(FACTS_HEIGHT)
+        theme.fix_size(self, height=FACTS_HEIGHT)
         self.setAccessibleName("The string under one key, as the knobs make it")
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
@@ -95,12 +94,13 @@ class StringKnobs(QWidget):
         column.setSpacing(SPACING)
         column.addLayout(row)
         column.addWidget(self.facts)
-        self.setFixedHeight(HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)  # or a low window would squeeze it
+        # or a low window would squeeze it
+        theme.fix_size(self, height=HEAD_HEIGHT + LOW_HEIGHT + SPACING + FACTS_HEIGHT)
 
     def _group(self, group: str) -> QVBoxLayout:
         head = faint(group)
         head.setObjectName("group")
-        head.setFixedHeight(HEAD_HEIGHT)
+        theme.fix_size(head, height=HEAD_HEIGHT)
         row = QHBoxLayout()
         row.setSpacing(0)
         if group == PLUCK:
@@ -124,7 +124,7 @@ class StringKnobs(QWidget):
     def _shape_column(self) -> QVBoxLayout:
         name = Label("SHAPE")
         name.setObjectName("knob")
-        name.setFixedHeight(14)  # as a knob's name
+        theme.fix_size(name, height=14)  # as a knob's name
         column = QVBoxLayout()
         column.setContentsMargins(0, 0, 4, 0)
         column.setSpacing(4)
@@ -141,11 +141,9 @@ class StringKnobs(QWidget):
         for field, knob in self.knobs.items():
             value = _value(patch, field)
             knob.set_barred(_why_barred(patch, field))
-            if value is not None:
-                knob.set_value(value)
-            before = None if saved is None else _value(saved, field)
-            if before is not None:
-                knob.default = before
+            knob.set_value(value)
+            if saved is not None:
+                knob.default = _value(saved, field)
         with QSignalBlocker(self.shape):
             self.shape.setCurrentIndex(SHAPES.index(patch.pluck.shape))
 
@@ -163,19 +161,14 @@ def _why_barred(patch: Patch, field: str) -> str:
     """Why a field means nothing in this patch; "" where it does."""
     if field in SHAPED and patch.pluck.shape == "triangular":
         return NO_WIDTH
-    if field.startswith("pickup.points") and patch.pickup.kind == "bridge":
-        return AT_BRIDGE
     if field == "damping.release_t60_s" and patch.damping.let_ring:
         return LETS_RING
     if field == "tuning.a4_hz" and patch.tuning.keymap.strip():
         return NO_A4
-    return MONO if _value(patch, field) is None else ""
+    return ""
 
 
-def _value(patch: Patch, field: str) -> float | None:
-    """None where the patch has no such field, as a second pick-up point."""
+def _value(patch: Patch, field: str) -> float:
     if field.startswith("tuning."):
         return float(getattr(patch.tuning, field.removeprefix("tuning.")))
-    if field == "pickup.points.1" and len(patch.pickup.points) < 2:
-        return None
     return patch.value(field)

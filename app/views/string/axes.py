@@ -11,7 +11,7 @@ from pyqtgraph.functions import create_qpolygonf, ndarray_from_qpolygonf
 from PySide6.QtCore import QPointF
 from PySide6.QtGui import QPolygonF
 
-MARGIN_X = 46
+MARGIN_X = 54
 MARGIN_TOP = 38
 MARGIN_BOTTOM = 40
 

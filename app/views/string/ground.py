@@ -29,8 +29,8 @@ class TrainedPlucks:
     amplitude_mm: tuple[float, float] | None = None
 
 
-def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pluck: int | None) -> None:
-    """Paints the gradient, the grid, the scale and the hatching.
+def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks | None, pluck: int | None) -> None:
+    """Paints the gradient and, unless `trained` is None, the grid, the scale and the hatching.
 
     `pluck`: the end of the string, 0 or 1, that the pluck is nearer to; None while the motion is shown. Only for a
     pluck are amplitudes hatched, which a string in motion all crosses, and words written, which it would cover.
@@ -41,6 +41,8 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks, pl
     painter.setPen(QPen(QColor(theme.LINE), 1))
     painter.setBrush(gradient)
     painter.drawRoundedRect(QRectF(0.5, 0.5, axes.width - 1, axes.height - 1), 6, 6)
+    if trained is None:
+        return
     paint_grid(painter, axes)
     _paint_scale(painter, axes)
     if trained.position is not None:
@@ -95,6 +97,15 @@ def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: s
         painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
 
 
+def paint_remark(painter: QPainter, axes: StringAxes, text: str) -> None:
+    """Paints a line in the upper left corner, why nothing is heard."""
+    painter.setPen(QColor(theme.FAINT))
+    painter.setFont(theme.small_font(11))
+    room = axes.width - 2 * MARGIN_X
+    cut = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(room))
+    painter.drawText(QRectF(MARGIN_X, LEGEND_Y - 10, room, 20), Qt.AlignmentFlag.AlignVCenter, cut)
+
+
 def _shade(painter: QPainter, area: QRectF) -> None:
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(theme.translucent(theme.present.shade, theme.present.shade_alpha))
@@ -117,8 +128,8 @@ def _paint_untrained_positions(
         painter.setFont(theme.small_font(11))
         for row, text in enumerate(lines):
             painter.setPen(theme.translucent(theme.TEXT if row == 0 else theme.FAINT, 190))
-            line = area.adjusted(4, 0, -4, -8 - LINE_HEIGHT * (1 - row))
-            if painter.fontMetrics().horizontalAdvance(text) > line.width() or line.height() < LINE_HEIGHT:
+            line = area.adjusted(4, 0, -4, -8 - theme.px(LINE_HEIGHT) * (1 - row))
+            if painter.fontMetrics().horizontalAdvance(text) > line.width() or line.height() < theme.px(LINE_HEIGHT):
                 continue  # the hatching says it
             painter.drawText(line, Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignBottom, text)
 
@@ -136,7 +147,7 @@ def _paint_untrained_amplitudes(painter: QPainter, axes: StringAxes, trained: Tr
             continue
         area = QRectF(axes.at(left, top_mm), axes.at(right, bottom_mm))
         _shade(painter, area)
-        if area.height() >= LINE_HEIGHT:
+        if area.height() >= theme.px(LINE_HEIGHT):
             painter.setFont(theme.small_font(11))
             painter.setPen(theme.translucent(theme.TEXT, 190))
             painter.drawText(area.adjusted(8, 0, -8, 0), free | Qt.AlignmentFlag.AlignVCenter, text)

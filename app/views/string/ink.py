@@ -33,8 +33,11 @@ class ShownPluck:
     label: str = ""
 
 
-def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard: str) -> None:
-    """The sources, the heard one in front, and above it pieces of the lines that it hides.
+GLOW = ((4.0, 0.25), (2.4, 0.5), (1.2, 0.8))  # pixels from the string on both sides, share of its colour
+
+
+def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard: str, glows: bool = False) -> None:
+    """The sources, the heard one in front, and above it pieces of those it hides. `glows`: brighter, no grid.
 
     Opaque fills and thin pens only: this is drawn sixty times a second.
     """
@@ -43,10 +46,15 @@ def paint_motion(painter: QPainter, axes: StringAxes, frame: StringFrame, heard:
     for name in order:
         band = frame.lowest[name], frame.highest[name]
         _paint_band(painter, axes, band, name, 0.24 if name == heard else 0.18)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
-    paint_grid(painter, axes)  # the opaque bands have covered it
+    if not glows:
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)
+        paint_grid(painter, axes)  # the opaque bands have covered it
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
     for name in order:
+        for far, share in GLOW if glows else ():
+            painter.setPen(QPen(theme.blended(_hue(name), theme.PANEL, share), 1))
+            for shift in (-far, far):
+                painter.drawPolyline(axes.curve(frame.shapes[name]).translated(0, shift))
         painter.setPen(QPen(QColor(_hue(name)), 1))
         curve = axes.curve(frame.shapes[name])
         for shift in (-0.8, 0.0, 0.8) if name == heard else (-0.4, 0.4):  # wider pens are ten times slower

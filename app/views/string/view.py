@@ -30,7 +30,7 @@ from app.views import theme
 from app.views.controls.parts import tool_button
 from app.views.controls.plain import plain_tip
 from app.views.string.axes import MARGIN_X, StringAxes
-from app.views.string.ground import TrainedPlucks, paint_ground, paint_legend
+from app.views.string.ground import TrainedPlucks, paint_ground, paint_legend, paint_remark
 from app.views.string.ink import (
     ShownPluck,
     paint_caption,
@@ -108,6 +108,7 @@ class StringView(QWidget):
         self._ground_pixmap: QPixmap | None = None
         self._ground_key: tuple[object, ...] = ()
         self._backdrop: tuple[object, object, QPixmap] | None = None  # ground, envelopes, and both in one picture
+        self._plain = False
         self._toggles = (
             self._toggle("Motion", "Show the string in motion; off saves processor time (M)", self.motion_toggled),
             self._toggle(
@@ -146,6 +147,13 @@ class StringView(QWidget):
     def set_warning(self, text: str) -> None:
         """Why this pluck is silent, or outside the training range; "" for neither."""
         self._warning = text
+        self.update()
+
+    def set_plain(self, plain: bool) -> None:
+        """Draws the string alone, bright, without scale, legend, hatching and time."""
+        self._plain = plain
+        for button in self._toggles:
+            button.setVisible(not plain)
         self.update()
 
     def set_sources(self, sources: tuple[ShownSource, ...]) -> None:
@@ -343,7 +351,7 @@ class StringView(QWidget):
         for button in reversed(self._toggles):
             size = button.sizeHint()
             right -= size.width()
-            button.setGeometry(right, 6, size.width(), 22)
+            button.setGeometry(right, 6, size.width(), theme.px(22))
             right -= 6
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -355,7 +363,7 @@ class StringView(QWidget):
         if self._frame is None or self._drag == "pluck":
             paint_pluck(painter, axes, self._pluck)
         else:
-            paint_motion(painter, axes, self._frame, self._heard)
+            paint_motion(painter, axes, self._frame, self._heard, self._plain)
         paint_ends(painter, axes)
         below = event.rect().bottom() > axes.bottom  # what lies there is painted again
         for side, position in self._listening.items():
@@ -368,7 +376,7 @@ class StringView(QWidget):
             paint_listening_labels(painter, axes, {"listen": self._listening["left"]} if one else self._listening)
         grabbed = "pluck" in (self._drag, self._hovered)
         paint_handle(painter, self._handle(axes), self._pluck, self._shows_pluck, grabbed, axes.x(1))
-        if self._frame is not None and not self._shows_pluck:
+        if self._frame is not None and not self._shows_pluck and not self._plain:
             paint_caption(painter, axes, self._frame)
 
     @property
@@ -397,7 +405,7 @@ class StringView(QWidget):
         """The picture behind the string, painted again only when something in it changes."""
         # on which side words would be in the way of the pluck, with the words at its handle
         pluck = int(self._pluck.position > 0.4) if self._shows_pluck else None
-        chosen = (self._trained, pluck, self._sources, self._warning)
+        chosen = (self._trained, pluck, self._sources, self._warning, self._plain)
         key = (axes, self.devicePixelRatioF(), *chosen, theme.present, self.hasFocus())
         if self._ground_pixmap is None or self._ground_key != key:
             pixmap = QPixmap(self.size() * self.devicePixelRatioF() + QSize(1, 1))  # at 125 % it ends within a pixel
@@ -405,8 +413,11 @@ class StringView(QWidget):
             pixmap.fill(QColor(theme.BACKGROUND))
             painter = QPainter(pixmap)
             painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            paint_ground(painter, axes, self._trained, pluck)
-            paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
+            paint_ground(painter, axes, None if self._plain else self._trained, pluck)
+            if not self._plain:
+                paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
+            elif self._warning:
+                paint_remark(painter, axes, self._warning)
             if self.hasFocus():
                 painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
                 painter.setBrush(Qt.BrushStyle.NoBrush)

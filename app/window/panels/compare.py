@@ -12,6 +12,7 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QMenu, QToolButton
 
 from app.analysis.comparison import Basis, ComparedRow, compare, same_string
+from app.presets import words
 from app.presets.library import Library, PresetEntry
 from app.session.choices import PluckedString, Session
 from app.session.slots import other_preset
@@ -27,7 +28,7 @@ def percent(value: float) -> str:
     """A relative error; ∞: the model ran away."""
     if math.isinf(value):
         return "ran away"
-    return f"{100 * value:.3g} %" if value < 10 else "> 1000 %"
+    return words.percent(value, 3) if value < 10 else "> 1000 %"
 
 
 def scientific(value: float) -> str:

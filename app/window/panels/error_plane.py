@@ -15,6 +15,7 @@ from PySide6.QtGui import QKeyEvent, QMouseEvent
 
 from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS, ErrorPlane, PlanePicture, nearest_cell, refine
 from app.presets.library import Library
+from app.presets.words import percent
 from app.rendering.subject import Subject, load_subject, string_of
 from app.session.choices import Session
 from app.session.slots import info_of, subject_of
@@ -140,7 +141,7 @@ class ErrorPlanePanel(Panel):
             self._words.setText(self._resting)
             return
         error = self._picture.at(position, amplitude_mm)
-        text = "runs away" if math.isinf(error) else f"error as trained about {100 * error:.2g} %"
+        text = "runs away" if math.isinf(error) else f"error as trained about {percent(error)}"
         if self._picture.spacing > 1:
             text += ", still coarse"
         trained = "" if self.map.is_trained(position, amplitude_mm) else ",  outside the training range"

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import Qt
 
 from app.analysis.error_course import ErrorCourse
+from app.presets import words
 from app.presets.library import Library
 from app.rendering import Take
 from app.session.choices import Session
@@ -169,7 +170,7 @@ class ErrorTimePanel(TimePanel[ErrorCourse]):
 
 def percent(error: float) -> str:
     """A relative error with three digits."""
-    return f"{100 * error:.3g} %"
+    return words.percent(error, 3)
 
 
 def _decades(low: float, high: float) -> list[tuple[float, str]]:

@@ -13,7 +13,7 @@ from app.rendering.take import Listened
 from app.session.choices import Choices, PluckedString, Session
 from app.session.listener import Listener
 from app.session.monitor import Monitor
-from app.session.shown import LEGEND_FIELDS, shown_sources
+from app.session.shown import LEGEND_FIELDS, ShownSource, shown_sources
 from app.session.silence import why_difference_silent, why_silent
 from app.session.slots import info_of
 from app.shared.vocabulary import DIFFERENCE
@@ -67,11 +67,24 @@ class StringPanel(Panel):
             self._take = None
         if names & WARNING_FIELDS:
             self._show_pluck()
-        if names & LEGEND_FIELDS:
-            self.view.set_sources(shown_sources(choices, self.library))
-            self._shown = ()
+        if names & {"face", *LEGEND_FIELDS}:
+            self.view.set_plain(self._plain)
+            self.view.set_sources(self._sources)
+            self._shown = self._standing = ()
+        if "face" in names:
+            self.view.set_warning(self._pluck_warning())
         if names & {"motion", "envelope"}:
             self.view.set_shown(choices.motion, choices.envelope)
+
+    @property
+    def _plain(self) -> bool:
+        return self.session.choices.face == "play"
+
+    @property
+    def _sources(self) -> tuple[ShownSource, ...]:
+        """What is drawn: both slots, or in Play what is heard."""
+        sources = shown_sources(self.session.choices, self.library)
+        return tuple(each for each in sources if each.heard) if self._plain else sources
 
     def take_started(self, take: Take) -> None:
         self._envelope = Envelope()
@@ -91,7 +104,7 @@ class StringPanel(Panel):
             self.view.show_frame(None)
             self._shown = ()
             return
-        motions = [HeardMotion(take, s.source, s.gain) for s in shown_sources(choices, self.library)]
+        motions = [HeardMotion(take, s.source, s.gain) for s in self._sources]
         there = [motion for motion in motions if motion.there]
         # the sound may be ahead of the motions, and one motion ahead of another: all are shown at one time
         position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in there)])
@@ -127,7 +140,7 @@ class StringPanel(Panel):
         silent = why_silent(choices, self.library)
         if not silent and choices.source_heard == DIFFERENCE and self._take is not None:
             silent = why_difference_silent(choices, self._take)
-        if silent:
+        if silent or self._plain:
             return silent
         return "; ".join(outside_training(info_of(choices, entry), choices.pluck)) if entry else ""
 

@@ -10,7 +10,7 @@ import soundfile
 
 from app.export.choices import ExportChoices
 from app.export.files import export_sound
-from app.export.note import HeardNote, Note, NoteExport
+from app.export.note import HeardNote, Note, NoteExport, musical_name
 from app.export.recipe import read_recipe, request_of
 from app.export.sound import SoundRequest, Through
 from app.instrument.effects import effects_of
@@ -101,3 +101,18 @@ def test_a_body_that_has_changed_is_told() -> None:
 )
 def test_what_is_heard_is_saved_and_both_again(source: str, another: bool, last: str, chosen: str) -> None:
     assert HeardNote(a_note(), source, another, 20.0, "").chosen(last) == chosen  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("title", "first_hz", "amplitude_mm", "name"),
+    [
+        ("Steel-string acoustic", 164.8, 0.2, "Steel-string acoustic E3 soft"),
+        ("Nylon B3, 16 kHz", 246.9, 1.0, "Nylon B3 medium"),
+        ("Harp <1/2>", 92.5, 9.0, "Harp 1 2 F#2 hard"),
+        ("..", 20_000.0, 0.0, "Note 20000 Hz soft"),
+    ],
+)
+def test_a_file_is_named_as_musicians_would(title: str, first_hz: float, amplitude_mm: float, name: str) -> None:
+    assert musical_name(title, first_hz, 0.1, 10.0, amplitude_mm) == name
+    assert a_note(name=name).file_name("model") == f"{name}.wav"
+    assert a_note(name=name).file_name("truth") == f"{name} truth.wav"

@@ -20,5 +20,6 @@ def played(
     controller.library.refresh()
     controller.patches.choose("steel_string_acoustic")
     qtbot.waitUntil(lambda: controller.performance.notes.keys.player is not None)
+    controller.session.update(face="play")
     controller.window.setFocus()
     return controller

@@ -47,7 +47,7 @@ def gains(controller: Controller) -> dict[str, float]:
 def wait_for_take(qtbot: QtBot, controller: Controller) -> None:
     """Until what is chosen is rendered; the words alone may be of the pluck before."""
     label = controller.window.error_label
-    qtbot.waitUntil(lambda: controller.performance.ready and "error of this pluck" in label.text())
+    qtbot.waitUntil(lambda: controller.performance.ready and "Error of this pluck" in label.text())
 
 
 def test_a_drag_on_the_string_plucks_there(qtbot: QtBot, controller: Controller) -> None:

@@ -48,7 +48,7 @@ def heard(qtbot: QtBot, window: MainWindow, tmp_path: Path, numb_output: Open) -
     abx = AbxChoices(trials=2, folder=str(tmp_path / "records"))
     settings = Settings(choices=Choices(seconds=0.5, volume_db=-6), abx=abx)
     made = Controller(window, settings, tmp_path / "settings.json", make_sound)
-    qtbot.waitUntil(lambda: "error of this pluck" in window.error_label.text())
+    qtbot.waitUntil(lambda: "Error of this pluck" in window.error_label.text())
     return made
 
 

@@ -22,7 +22,7 @@ from app.window.main_window import MainWindow
 
 def close_when_rendered():
     window = next((each for each in QApplication.topLevelWidgets() if isinstance(each, MainWindow)), None)
-    if window is not None and "error of this pluck" in window.error_label.text():
+    if window is not None and "Error of this pluck" in window.error_label.text():
         window.close()
 
 application = QApplication([])

@@ -6,19 +6,24 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from itertools import pairwise
+from operator import attrgetter
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QSize, Qt, QTimer
-from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QMenu, QTabBar, QWidget
+from PySide6.QtCore import QMetaMethod, QMimeData, QPoint, QPointF, QSize, Qt, QTimer, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDragLeaveEvent, QDropEvent, QKeySequence
+from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QFileDialog, QMenu, QTabBar, QWidget
 from pytestqt.qtbot import QtBot
 
+from app.shared.vocabulary import Face
 from app.views import theme
+from app.views.controls.app_menu import ENTRIES
 from app.views.controls.focus_ring import FocusRing
+from app.views.controls.sideways import Sideways
 from app.views.look import Look
 from app.window.appearance import Appearance
 from app.window.controller import Controller
-from app.window.main_window import KEYS, MainWindow
+from app.window.main_window import MainWindow
 
 ROOT = Path(__file__).parents[3]
 
@@ -232,11 +237,17 @@ def test_it_opens_no_larger_than_the_screen(qtbot: QtBot) -> None:
         assert window.height() < room.height()
 
 
-def test_every_key_has_its_signal_and_words() -> None:
-    assert len({key for key, _, _ in KEYS}) == len(KEYS)
-    for _, signal, what in KEYS:
-        assert hasattr(MainWindow, signal)
-        assert what
+def test_every_action_is_in_the_menu_and_does_something(controller: Controller) -> None:
+    keys = [entry.key for entry in ENTRIES.values() if entry.key]
+    assert len(set(keys)) == len(keys)
+    for name, entry in ENTRIES.items():
+        action = controller.window.action[name]
+        assert entry.does or not entry.key
+        assert action.text().startswith(entry.text.removesuffix(" …"))
+        assert action.isSignalConnected(QMetaMethod.fromSignal(action.triggered)), name
+        if entry.key not in ("", "Return"):
+            assert action.shortcut() == QKeySequence(entry.key)
+            assert action in controller.window.actions(), "its shortcut works while no menu is open"
 
 
 def test_the_look_is_chosen_in_the_menu(qtbot: QtBot, qapp: QApplication) -> None:
@@ -251,9 +262,17 @@ def test_the_look_is_chosen_in_the_menu(qtbot: QtBot, qapp: QApplication) -> Non
         assert made.look.theme == "light"
         assert theme.present == theme.LIGHT
         assert actions["Light"].isChecked()
+        knob, brand = window.transport.knobs["volume_db"], window._brand
+        small = knob.sizeHint(), brand.sizeHint(), theme.small_font(10).pixelSize()
         actions["150 %"].trigger()
         assert made.look.size_percent == 150
-        assert "restart" in window.notices.text
+        large = knob.sizeHint(), brand.sizeHint(), theme.small_font(10).pixelSize()
+        for before, after in zip(small[:2], large[:2], strict=True):
+            assert after.width() > before.width()
+            assert after.height() == pytest.approx(1.5 * before.height(), rel=0.15)
+        assert large[2] == 1.5 * small[2]
+        actions["100 %"].trigger()
+        assert (knob.sizeHint(), theme.small_font(10).pixelSize()) == (small[0], small[2])
     finally:
         theme.apply_theme(qapp, "dark")
         qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
@@ -266,34 +285,33 @@ def alive(qtbot: QtBot) -> MainWindow:
     window = MainWindow()
     qtbot.addWidget(window)
     window.show_string(QWidget())
+    window.show_face("lab")
+    window.show_keys(True)
     with qtbot.waitExposed(window):
         window.show()
     return window
 
 
-def test_the_instrument_is_folded_away_and_comes_back(qtbot: QtBot, alive: MainWindow) -> None:
+def test_in_the_lab_the_keys_are_folded_away_and_come_back(qtbot: QtBot, alive: MainWindow) -> None:
     alive.resize(1280, 720)
-    assert alive.shows_instrument
+    assert alive.shows_keys
     assert alive.instrument.isVisible()
     for shown in (False, True):
-        alive.instrument_asked.emit()  # Ctrl+K, and the menu
-        assert alive.shows_instrument == alive.instrument.isVisible() == shown
-    qtbot.mouseClick(alive._instrument_button, Qt.MouseButton.LeftButton)
+        alive.action["keys"].trigger()  # Ctrl+K, and the menu
+        assert alive.shows_keys == alive.instrument.isVisible() == shown
+    qtbot.mouseClick(alive._keys_button, Qt.MouseButton.LeftButton)
     assert not alive.instrument.isVisible()
+    alive.show_face("play")
+    assert alive.instrument.isVisible()
 
 
-def test_in_a_low_window_the_knobs_take_the_place_of_the_keys_and_the_views_go_last(alive: MainWindow) -> None:
-    parts = (alive.left, alive._facts, alive.instrument.keys, alive.instrument.bar, alive.instrument.knobs)
-    alive.instrument.set_unfolded(True)
-    for height, seen in (
-        (800, (True, True, True, True, True)),
-        (720, (True, True, False, True, True)),
-        (640, (True, True, False, True, True)),  # of 720 with a title bar and a task bar
-        (600, (False, True, False, True, True)),
-        (500, (False, False, False, True, True)),
-    ):
+def test_in_a_low_lab_the_plots_make_room_for_the_keys(alive: MainWindow) -> None:
+    parts = (alive.left, alive._facts, alive.instrument.keys)
+    for height, seen in ((800, (True, True, True)), (640, (True, True, True)), (600, (False, True, True))):
         alive.resize(1280, height)
         assert tuple(part.isVisible() for part in parts) == seen, height
+    alive.resize(1280, 500)
+    assert not alive._facts.isVisible()
     alive.show_solo(3)
     for height in (500, 700, 500):
         alive.resize(1280, height)
@@ -301,8 +319,136 @@ def test_in_a_low_window_the_knobs_take_the_place_of_the_keys_and_the_views_go_l
     alive.show_solo(0)
     alive.resize(1280, 700)
     assert not alive._solo.isVisible()
-    alive.show_instrument(False)
+    alive.resize(1280, 500)
+    alive.show_keys(False)
     assert alive.left.isVisible()
+
+
+def test_in_a_low_play_face_the_knobs_take_the_place_of_the_keys(alive: MainWindow) -> None:
+    alive.show_face("play")
+    strip = alive.instrument
+    strip.set_unfolded(True)
+    for height, seen in ((720, (True, True, True)), (600, (False, True, True)), (500, (False, True, True))):
+        alive.resize(1280, height)
+        assert tuple(part.isVisible() for part in (strip.keys, strip.bar, strip.knobs)) == seen, height
+
+
+AREAS = {  # by face: what is shown of it, and what is not
+    "play": ("instrument.bar", "instrument.keys", "_string", "transport.meter"),
+    "lab": ("presets", "left", "right", "transport.slots", "_facts", "_test_button", "_string", "transport.meter"),
+}
+
+
+@pytest.mark.parametrize(("face", "other"), [("play", "lab"), ("lab", "play")])
+def test_each_face_shows_its_areas(alive: MainWindow, face: Face, other: Face) -> None:
+    alive.resize(1280, 800)
+    alive.show_face(other)
+    alive.show_face(face)
+    for name in AREAS[face]:
+        assert attrgetter(name)(alive).isVisible(), name
+    for name in set(AREAS[other]) - set(AREAS[face]) - {"instrument.keys"}:
+        assert not attrgetter(name)(alive).isVisible(), name
+
+
+def test_one_key_changes_the_face_and_the_choice_is_kept(qtbot: QtBot, controller: Controller) -> None:
+    window = controller.window
+    assert window.face == controller.session.choices.face == "lab"
+    qtbot.keyClick(window, Qt.Key.Key_F9)
+    assert window.face == controller.settings().choices.face == "play"
+    buttons = {button.text(): button for button in window.faces.findChildren(QAbstractButton)}
+    qtbot.mouseClick(buttons["Lab"], Qt.MouseButton.LeftButton)
+    assert window.face == "lab"
+
+
+@pytest.mark.parametrize("face", ["play", "lab"])
+@pytest.mark.parametrize("unfolded", [False, True])
+def test_every_value_has_one_knob_in_a_face(played: Controller, face: Face, unfolded: bool) -> None:
+    """Macros with one target are the knob of that target."""
+    window, patch = played.window, played.session.choices.patch
+    assert patch is not None
+    window.resize(1600, 1000)
+    played.session.update(face=face)
+    window.instrument.set_unfolded(unfolded)
+    strip, same = window.instrument, {"listen": "pickup.points.0", "listen_right": "pickup.points.1"}
+    shown = [same.get(field, field) for field, knob in window.transport.knobs.items() if knob.isVisible()]
+    shown += [field for knobs in (strip.bar.knobs, strip.knobs.knobs) for field, k in knobs.items() if k.isVisible()]
+    for macro, knob in zip(patch.macros, strip.bar.macros, strict=False):
+        shown += [macro.targets[0].field] if knob.isVisible() and len(macro.targets) == 1 else []
+    assert len(shown) == len(set(shown)) >= 6
+    assert len({"position", "pluck.position"} & set(shown)) <= 1
+
+
+def test_nothing_is_red_in_play_until_the_error_grew_and_then_a_sign_shows(alive: MainWindow) -> None:
+    alive.show_face("play")
+    assert not alive.growth_sign.isVisible()
+    alive.show_growth("The error grew.")
+    assert alive.growth_sign.isVisible()
+    assert "grew" in alive.growth_sign.toolTip()
+    alive.show_face("lab")
+    assert not alive.growth_sign.isVisible()
+
+
+def test_in_play_the_rate_shows_only_with_a_fault(alive: MainWindow) -> None:
+    for face, fault, seen in (("play", False, False), ("lab", False, True), ("play", True, True)):
+        alive.show_face(face)
+        alive.show_rate(f"48 kHz {face}", "", fault)
+        assert alive.rate_label.isVisible() == seen
+
+
+def test_a_sign_shows_while_files_hover_over_the_window(alive: MainWindow) -> None:
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile("/tmp/song.mid"), QUrl.fromLocalFile("/tmp/other.wav")])
+    buttons, mods = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    copy = Qt.DropAction.CopyAction
+    QApplication.sendEvent(alive, QDragEnterEvent(QPoint(50, 50), copy, data, buttons, mods))
+    assert alive._drop_sign.isVisible()
+    assert "song.mid and 1 more" in alive._drop_sign.text()
+    QApplication.sendEvent(alive, QDragLeaveEvent())
+    assert not alive._drop_sign.isVisible()
+    QApplication.sendEvent(alive, QDragEnterEvent(QPoint(50, 50), copy, data, buttons, mods))
+    dropped: list[str] = []
+    alive.file_dropped.connect(dropped.append)
+    QApplication.sendEvent(alive, QDropEvent(QPointF(50, 50), copy, data, buttons, mods))
+    assert not alive._drop_sign.isVisible()
+    assert len(dropped) == 2
+
+
+def test_files_are_opened_from_the_menu(alive: MainWindow, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(QFileDialog, "getOpenFileNames", lambda *_: (["/tmp/a.mid", "/tmp/b.scl"], ""))
+    opened: list[str] = []
+    alive.file_dropped.connect(opened.append)
+    alive.action["open"].trigger()
+    assert opened == ["/tmp/a.mid", "/tmp/b.scl"]
+
+
+@pytest.fixture
+def larger(qapp: QApplication) -> Iterator[None]:
+    """Text of 150 %."""
+    sheet, font = qapp.styleSheet(), qapp.font()
+    theme.apply_theme(qapp, "dark", 150)
+    yield
+    theme.apply_theme(qapp, "dark")
+    qapp.setStyleSheet(sheet)
+    qapp.setFont(font)
+
+
+@pytest.mark.usefixtures("larger")
+@pytest.mark.parametrize("height", [720, 800])
+@pytest.mark.parametrize("face", ["play", "lab"])
+def test_nothing_is_cut_off_with_text_of_150_percent(
+    qtbot: QtBot, played: Controller, face: Face, height: int
+) -> None:
+    window = played.window
+    played.session.update(face=face)
+    window.show_keys(False)
+    window.resize(1280, height)
+    qtbot.waitUntil(lambda: window.centralWidget().minimumSizeHint().height() <= height)
+    assert window.centralWidget().minimumSizeHint().width() <= 1280
+    for area in window.findChildren(Sideways):
+        if area.isVisible():
+            qtbot.waitUntil(lambda area=area: area.widget().minimumSizeHint().width() <= area.width())
+    if face == "lab":
+        assert window.left.isVisible() and window.right.isVisible()
 
 
 LONG = "A fault in words that are long enough for two lines where the window is narrow. " * 2
@@ -314,7 +460,7 @@ def heights(window: MainWindow) -> list[int]:
 
 @pytest.mark.usefixtures("themed")
 @pytest.mark.parametrize("size", [(1280, 720), (1280, 800), (1920, 1080), (1280, 640), (1000, 640)])
-def test_neither_a_notice_nor_the_knobs_of_the_string_remove_the_views(
+def test_neither_a_notice_nor_the_knobs_of_the_string_remove_what_is_seen(
     qtbot: QtBot, controller: Controller, size: tuple[int, int]
 ) -> None:
     window, middle = controller.window, controller.window.centralWidget()
@@ -325,9 +471,7 @@ def test_neither_a_notice_nor_the_knobs_of_the_string_remove_the_views(
     window.notices.tell(LONG)
     qtbot.wait(50)
     assert heights(window) == bare, "it lies over the window"
-    window.instrument.set_unfolded(True)
     qtbot.waitUntil(lambda: middle.minimumSizeHint().height() <= window.height())
-    assert window.instrument.knobs.isVisible()
     for view, least in (
         (window._string, window._string.minimumSizeHint().height()),
         (window.left, window.left.minimumSizeHint().height()),
@@ -335,8 +479,11 @@ def test_neither_a_notice_nor_the_knobs_of_the_string_remove_the_views(
     ):
         assert view.isVisible()
         assert view.height() >= least > 0
-    if not window.instrument.keys.isVisible():
-        assert heights(window) == bare
+    controller.session.update(face="play")
+    window.instrument.set_unfolded(True)
+    qtbot.waitUntil(lambda: middle.minimumSizeHint().height() <= window.height())
+    assert window.instrument.knobs.isVisible()
+    assert window._string.height() >= window._string.minimumSizeHint().height()
 
 
 @pytest.mark.usefixtures("themed")
@@ -344,6 +491,7 @@ def test_neither_a_notice_nor_the_knobs_of_the_string_remove_the_views(
 def test_the_knobs_of_the_string_work_at_150_percent(qtbot: QtBot, played: Controller, height: int) -> None:
     window, strip = played.window, played.window.instrument
     middle = window.centralWidget()
+    played.session.update(face="play")
     window.notices.tell(LONG)
     window.resize(853, height)
     for part in (strip.bar, strip.keys):
@@ -351,16 +499,14 @@ def test_the_knobs_of_the_string_work_at_150_percent(qtbot: QtBot, played: Contr
     qtbot.mouseClick(strip._fold, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: middle.minimumSizeHint().height() <= window.height())
     assert window._string.height() >= window._string.minimumHeight()
-    transport = window.transport
-    transport._pickup.activated.emit(transport._pickup.findData("velocity"))  # the bridge has no listening place
-    knob = strip.knobs.knobs["pickup.points.0"]  # one of the last
+    knob = strip.knobs.knobs["pluck.curve"]  # the last
     tab_to(qtbot, window, knob)
     qtbot.waitUntil(lambda: knob.visibleRegion().boundingRect().size() == knob.size())
     patch = played.session.choices.patch
     qtbot.keyClick(knob, Qt.Key.Key_Up)
     changed = played.session.choices.patch
     assert patch is not None and changed is not None
-    assert changed.pickup.points[0] == pytest.approx(patch.pickup.points[0] + 0.01)
+    assert changed.pluck.curve == pytest.approx(patch.pluck.curve + 0.05)
     qtbot.mouseClick(strip._choice.findChildren(QAbstractButton)[0], Qt.MouseButton.LeftButton)
     assert strip.keys.isVisible()
 

@@ -40,7 +40,7 @@ def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, playe
 
     qtbot.waitUntil(shown)
     qtbot.waitUntil(lambda: played.window.instrument.keys.level(48) > 0.1)
-    qtbot.waitUntil(lambda: "error of this pluck" in played.window.error_label.text())
+    qtbot.waitUntil(lambda: "Error of this pluck" in played.window.error_label.text())
     (struck,) = played.performance.notes.keys.player.sounding()  # type: ignore[union-attr]
     assert not struck.damped
     qtbot.keyRelease(played.window, Qt.Key.Key_A)
@@ -300,14 +300,14 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
 
 
 def test_what_is_beyond_training_is_told_and_follows_the_knobs(qtbot: QtBot, played: Controller) -> None:
-    bar = played.window.instrument.bar
+    label = played.window.outside_label
 
     def told(beyond: bool) -> None:
-        qtbot.waitUntil(lambda: ("decay time near 3 kHz" in bar.note.toolTip()) == beyond)
+        qtbot.waitUntil(lambda: ("decay time near 3 kHz" in label.toolTip()) == beyond)
 
     played.patches.change("knobs.brightness_decay", 0.1)
     played.patches.change("knobs.decay", 0.5)
-    assert not bar.note.toolTip()  # nothing was struck
+    assert not label.toolTip()  # nothing was struck
     played.window.instrument.pressed.emit(80, 100)
     told(True)
     played.patches.change("knobs.decay", 1.5)
@@ -317,20 +317,20 @@ def test_what_is_beyond_training_is_told_and_follows_the_knobs(qtbot: QtBot, pla
     played.patches.change("knobs.brightness_decay", 3.0)
     played.patches.change("knobs.stiffness", 10.0)
     told(False)  # the inharmonicity is beyond the training, and no error grows with it
-    assert "inharmonicity" not in bar.note.toolTip()
+    assert "inharmonicity" not in label.toolTip()
     played.patches.change("knobs.brightness_decay", 0.1)
     played.patches.change("knobs.decay", 0.5)
     told(True)  # before the next key
     played.session.play_string()
-    assert not bar.note.toolTip()
+    assert not label.toolTip()
     played.session.play_patch()
-    assert not bar.note.toolTip()
+    assert not label.toolTip()
     played.window.instrument.pressed.emit(80, 100)
     told(True)
     played.patches.choose("concert_harp")
-    assert not bar.note.toolTip()
+    assert not label.toolTip()
     qtbot.wait(2 * NOTE_TOLD_AFTER_MS)
-    assert not bar.note.toolTip()
+    assert not label.toolTip()
 
 
 def test_the_transport_changes_where_the_patch_is_heard(played: Controller) -> None:

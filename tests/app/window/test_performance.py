@@ -21,7 +21,7 @@ from app.playing.note import Note
 from app.session.choices import Choices
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
-from app.window.performance import Performance
+from app.window.performance import Performance, growth_words
 from app.window.settings import Settings
 from engine.kernels.layout import QUANTUM
 from engine.models.koopman_var import KoopmanState, KoopmanVar
@@ -58,7 +58,7 @@ def window(
         lambda on_problem: Sound(on_problem, look_up=lambda *_: SPEAKERS, open_output=numb_output),
     )
     made.show()
-    qtbot.waitUntil(lambda: "error of this pluck" in made.error_label.text())
+    qtbot.waitUntil(lambda: "Error of this pluck" in made.error_label.text())
     qtbot.waitUntil(lambda: controller.sound.status().device == SPEAKERS)
     yield controller
     made.close()
@@ -335,13 +335,13 @@ def test_how_long_a_model_is_waited_for_is_told_and_then_its_error(
 ) -> None:
     window.session.update(preset="rendered", seconds=0.8)
     label = window.window.error_label
-    qtbot.waitUntil(lambda: performance.ready and performance.settled and "error of this pluck" in label.text())
+    qtbot.waitUntil(lambda: performance.ready and performance.settled and "Error of this pluck" in label.text())
     performance.pluck()
     qtbot.waitUntil(lambda: label.text().startswith("Koopman, variable: buffering, starts in 0."))
     (note,) = ringing(performance)
     assert performance.position_s == 0 or not note.pending
     qtbot.waitUntil(lambda: not note.pending)
-    qtbot.waitUntil(lambda: "error of this pluck" in label.text())
+    qtbot.waitUntil(lambda: "Error of this pluck" in label.text())
 
 
 def test_space_stops_what_has_not_sounded_yet(
@@ -356,3 +356,21 @@ def test_space_stops_what_has_not_sounded_yet(
     assert not performance.playing
     assert note.over
     qtbot.waitUntil(lambda: "buffering" not in window.window.error_label.text())
+
+
+@pytest.mark.parametrize(
+    ("errors", "own", "words"),
+    [
+        ([0.001, 0.004], 0.001, ""),  # grown, but too small to be noticed
+        ([0.02, 0.05], 0.028, ""),  # as large as ever
+        ([0.03, 1.16], 0.028, "116 % past the end of its training"),
+        ([0.2, 0.05], 0.01, "20 % on this pluck"),
+        ([0.2], None, "20 % on this pluck"),
+        ([float("nan")], 0.01, ""),
+        ([], None, ""),
+    ],
+)
+def test_an_error_that_grew_is_put_into_words(errors: list[float], own: float | None, words: str) -> None:
+    said = growth_words(errors, own)
+    assert words in said
+    assert bool(said) == bool(words)

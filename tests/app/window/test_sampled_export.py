@@ -46,8 +46,7 @@ def open_dialog(qtbot: QtBot, controller: Controller):
 
 def test_without_a_patch_it_says_so(controller: Controller) -> None:
     controller.session.update(patch=None)
-    action = next(action for action in controller.window.menu.asked if action.text().startswith("Export instrument"))
-    action.trigger()
+    controller.window.action["sampler"].trigger()
     assert controller.exports.dialog is None
     assert "There is no patch to export" in controller.window.notices.notices[-1].message
 

@@ -16,23 +16,20 @@ CONTROL, SHIFT = Qt.KeyboardModifier.ControlModifier, Qt.KeyboardModifier.ShiftM
 def actions(controller: Controller) -> list[QAction]:
     menu = controller.window.menu
     menu.aboutToShow.emit()
-    return [action for action in menu.actions() if action.text().startswith(("Undo", "Redo"))]
+    return [menu.action["undo"], menu.action["redo"]]
 
 
 def test_the_menu_names_both_steps_and_takes_them(controller: Controller) -> None:
-    assert [(each.text(), each.isEnabled()) for each in actions(controller)] == [
-        ("Undo\tCtrl+Z", False),
-        ("Redo\tCtrl+Shift+Z", False),
-    ]
+    assert [each.text() for each in actions(controller)] == ["Undo", "Redo"]
     controller.patches.choose("classical_guitar")
     controller.session.update(position=0.77)
     undo, redo = actions(controller)
-    assert undo.text() == "Undo: pluck position\tCtrl+Z"
+    assert undo.text() == "Undo: pluck position"
     undo.trigger()
     assert controller.session.choices.position != 0.77
     undo, redo = actions(controller)
-    assert undo.text() == "Undo: patch Classical guitar\tCtrl+Z"
-    assert (redo.text(), redo.isEnabled()) == ("Redo: pluck position\tCtrl+Shift+Z", True)
+    assert undo.text() == "Undo: patch Classical guitar"
+    assert redo.text() == "Redo: pluck position"
     redo.trigger()
     assert controller.session.choices.position == 0.77
 

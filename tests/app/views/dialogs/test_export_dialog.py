@@ -73,7 +73,7 @@ def test_it_writes_the_file_that_it_named(
 ) -> None:
     assert not dialog.show_folder.isVisible()
     run(qtbot, dialog, "Saved")
-    path = tmp_path / "small_x0.40_a4.0_4000_model.wav"
+    path = tmp_path / "A small string B3 medium.wav"
     for words in (str(path), "dBFS, 0 clipped", "The last 0.40 s lie past the model's training"):
         assert words in dialog.state.text()
     info = soundfile.info(path)
@@ -89,13 +89,13 @@ def test_it_writes_the_file_that_it_named(
 def test_both_become_two_files(qtbot: QtBot, made, tmp_path: Path) -> None:
     dialog = made({"source": "files"})
     run(qtbot, dialog, "Saved")
-    assert wavs(tmp_path) == ["small_x0.40_a4.0_4000_model.wav", "small_x0.40_a4.0_4000_truth.wav"]
+    assert wavs(tmp_path) == ["A small string B3 medium model.wav", "A small string B3 medium truth.wav"]
 
 
 def test_stereo_and_the_pick_up_reach_the_file(qtbot: QtBot, made, tmp_path: Path) -> None:
     dialog = made(heard={"stereo": True, "listen_right": 0.7, "pickup": "velocity"})
     run(qtbot, dialog, "Saved")
-    with soundfile.SoundFile(tmp_path / "small_x0.40_a4.0_4000_model.wav") as file:
+    with soundfile.SoundFile(tmp_path / "A small string B3 medium.wav") as file:
         recipe = json.loads(file.comment)
         assert (file.channels, recipe["listen_right"], recipe["pickup"]) == (2, 0.7, "velocity")
 
@@ -105,14 +105,13 @@ def test_length_by_decay_and_its_limit(qtbot: QtBot, made, tmp_path: Path) -> No
     assert dialog.note.decay.isVisible()
     assert not dialog.note.seconds.isVisible()
     run(qtbot, dialog, "Not decayed at the maximum length")
-    assert soundfile.info(tmp_path / "small_x0.40_a4.0_4000_model.wav").frames == 1200
+    assert soundfile.info(tmp_path / "A small string B3 medium.wav").frames == 1200
 
 
 def test_what_a_rate_means_is_told(dialog: ExportDialog) -> None:
     rate = dialog.wav.rate
     rate.setCurrentIndex(rate.findData(96_000))
     assert dialog.wav.note.text() == "adds no bandwidth: the model ends at 2 kHz"
-    assert dialog.note.file.edit.text().endswith("_96000_model.wav")
 
 
 def test_a_folder_that_is_not_there_is_told(qtbot: QtBot, dialog: ExportDialog, tmp_path: Path) -> None:
@@ -149,7 +148,7 @@ def test_what_is_heard_is_offered_first(qtbot: QtBot, made, tmp_path: Path) -> N
     dialog = made({"source": "model"}, {"heard": "b"})
     assert dialog.note.source.currentData() == "truth"
     run(qtbot, dialog, "Saved")
-    assert wavs(tmp_path) == ["small_x0.40_a4.0_4000_truth.wav"]
+    assert wavs(tmp_path) == ["A small string B3 medium truth.wav"]
     dialog = made({}, {"a": "difference", "difference_gain_db": 36.0, "solo": 2})
     assert dialog.note.source.currentData() == "difference"
     assert (dialog.note.gain.isVisible(), dialog.note.gain.value()) == (True, 36)
@@ -159,9 +158,9 @@ def test_what_is_heard_is_offered_first(qtbot: QtBot, made, tmp_path: Path) -> N
 def test_another_preset_that_is_heard_is_the_one_that_is_saved(made) -> None:
     dialog = made({"source": "files"}, {"b": "preset:other", "heard": "b"})
     assert dialog.note.source.currentData() == "model"
-    assert Path(dialog.note.file.edit.text()).name.startswith("other_")
+    assert dialog.note.job().note.preset.stem == "other"
     gone = made({}, {"a": "preset:gone"})
-    assert Path(gone.note.file.edit.text()).name.startswith("small_")
+    assert gone.note.job().note.preset.stem == "small"
 
 
 def test_both_stay_chosen_while_one_of_them_is_heard(made) -> None:
@@ -173,7 +172,7 @@ def test_a_name_without_its_suffix_gets_it(made) -> None:
     dialog = made({"source": "files"})
     dialog.note.file.edit.clear()
     QTest.keyClicks(dialog.note.file.edit, "guitar v1.2")
-    assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2_model.wav", "guitar v1.2_truth.wav"]
+    assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2 model.wav", "guitar v1.2 truth.wav"]
     dialog.note.source.setCurrentIndex(0)
     assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2.wav"]
 
@@ -185,7 +184,7 @@ def test_what_the_patch_adds_is_heard_in_the_file_unless_the_string_alone_is_wan
     dialog = made({}, {"instrument": guitar.model_copy(update={"preset": "small", "pickup": Pickup(points=(0.1,))})})
     assert "With the body, room and level of Classical guitar" in dialog.note.what.text()
     run(qtbot, dialog, "Saved")
-    path = tmp_path / "small_x0.40_a4.0_4000_model.wav"
+    path = tmp_path / "Classical guitar B3 hard.wav"
     through = read_recipe(path).through
     assert through is not None and (through.gain, through.body, through.room) == (0.5, guitar.body, guitar.room)
     assert soundfile.info(path).channels == 2
@@ -201,16 +200,16 @@ def test_what_the_patch_adds_is_heard_in_the_file_unless_the_string_alone_is_wan
 
 
 def test_it_follows_another_pluck_until_it_begins(qtbot: QtBot, made, tmp_path: Path) -> None:
-    dialog, other = made(), made({}, {"position": 0.25, "heard": "b"})
+    dialog, other = made(), made({}, {"amplitude_mm": 0.01, "heard": "b"})
     dialog.show_subjects(other._subjects)
-    assert Path(dialog.note.file.edit.text()).name == "small_x0.25_a4.0_4000_truth.wav"
+    assert Path(dialog.note.file.edit.text()).name == "A small string B3 soft truth.wav"
     dialog.note.seconds.setValue(600)
     dialog.save.click()
     dialog.show_subjects(made()._subjects)
     dialog.close_button.click()
-    assert "x0.25" in dialog.note.file.edit.text()
+    assert "soft" in dialog.note.file.edit.text()
     qtbot.waitUntil(lambda: "Cancelled; no file was written" in dialog.state.text())
-    assert "x0.40" in dialog.note.file.edit.text()
+    assert "medium" in dialog.note.file.edit.text()
 
 
 def test_two_files_are_both_named(made) -> None:

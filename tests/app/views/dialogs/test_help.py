@@ -9,24 +9,24 @@ from pytestqt.qtbot import QtBot
 
 from app.presets.words import model_word
 from app.shared.log import log_file
+from app.views.controls.app_menu import ENTRIES
 from app.views.dialogs.about_dialog import AboutDialog
 from app.views.dialogs.help_text import MODELS
 from app.window.about import about_text, library_versions
 from app.window.controller import Controller
-from app.window.main_window import KEY_NAMES, KEYS
 from engine.models import MODELS as KNOWN_MODELS
 
 
 def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller) -> None:
-    controller.window.help_asked.emit()
+    controller.window.action["help"].trigger()
     dialog = controller._help
     assert dialog is not None
     assert dialog.isVisible()
     assert not dialog.isModal()
     texts = {dialog.tabs.tabText(row): dialog.tabs.widget(row).toPlainText() for row in range(dialog.tabs.count())}
-    for key, _, what in KEYS:
-        assert KEY_NAMES.get(key, key) in texts["Keys"]
-        assert what in texts["Keys"]
+    for entry in ENTRIES.values():
+        assert entry.key_name in texts["Keys"]
+        assert not entry.key or entry.does in texts["Keys"]
     for panel in controller.panels:
         assert panel.title in texts["Views"]
         assert panel.help, panel.key

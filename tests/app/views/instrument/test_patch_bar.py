@@ -102,8 +102,8 @@ def test_what_the_instrument_does_is_told(qtbot: QtBot, bar: PatchBar) -> None:
     assert bar.octave.text() == "from C-1"
     bar.show_velocity(17)
     assert bar.velocity.text() == "velocity 17"
-    bar.show_note("Beyond training: stiffness")
-    assert bar.note.objectName() == "warning"
+    bar.show_note("Choose a patch")
+    assert bar.note.objectName() == "faint"
     with qtbot.waitSignal(bar.octave_asked) as told:
         (higher,) = (each for each in bar.findChildren(QAbstractButton) if each.accessibleName() == "Octave up")
         qtbot.mouseClick(higher, LEFT)

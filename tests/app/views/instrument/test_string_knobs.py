@@ -60,24 +60,19 @@ def test_it_is_transposed_by_whole_keys(qtbot: QtBot, knobs: StringKnobs) -> Non
 def test_what_a_patch_does_not_have_cannot_be_turned(knobs: StringKnobs, guitar: Patch) -> None:
     mono = guitar.model_copy(
         update={
-            "pickup": Pickup(points=(0.2,)),
             "pluck": guitar.pluck.model_copy(update={"shape": "triangular"}),
             "damping": guitar.damping.model_copy(update={"let_ring": True}),
         }
     )
     knobs.show_patch(mono)
     off = {field for field, knob in knobs.knobs.items() if not knob.isEnabled()}
-    assert off == {"pickup.points.1", "pluck.width", "pluck.width_hard", "damping.release_t60_s"}
+    assert off == {"pluck.width", "pluck.width_hard", "damping.release_t60_s"}
     assert "no width" in knobs.knobs["pluck.width"].toolTip()
-    assert "in mono" in knobs.knobs["pickup.points.1"].toolTip()
     assert "ring" in knobs.knobs["damping.release_t60_s"].toolTip()
     gaussian = mono.model_copy(update={"pluck": mono.pluck.model_copy(update={"shape": "gaussian"})})
     knobs.show_patch(gaussian)
     assert knobs.knobs["pluck.width"].isEnabled()
     assert "no width" not in knobs.knobs["pluck.width"].toolTip()
-    knobs.show_patch(gaussian.model_copy(update={"pickup": Pickup(points=(0.2,), kind="bridge")}))
-    assert not knobs.knobs["pickup.points.0"].isEnabled()
-    assert "The bridge hears the whole string" in knobs.knobs["pickup.points.0"].toolTip()
 
 
 def test_the_shape_of_the_pluck_is_chosen_in_words(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:

@@ -59,7 +59,7 @@ def make(qtbot: QtBot, take: Take) -> Iterator[Make]:
     panels: list[Panel] = []
 
     def made(kind: type[Panel]) -> Panel:
-        panel = kind(Session(), Library([]))
+        panel = kind(Session(Choices(face="lab")), Library([]))
         panels.append(panel)
         panel.choices_changed(frozenset(Choices.model_fields))
         qtbot.addWidget(panel)
@@ -279,7 +279,7 @@ def test_the_error_over_time(qtbot: QtBot, make: Make, take: Take) -> None:
     assert view.readout.text() == ""
     view.quantities.show_key("relative")
     view.quantities.chosen.emit("relative")
-    assert "validation 70.7 %, 25 %" in view.readout.text()
+    assert "validation 70.7 %, 25.0 %" in view.readout.text()
 
 
 def test_ten_seconds_are_asked_for_with_a_button(qtbot: QtBot, make: Make) -> None:

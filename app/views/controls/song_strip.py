@@ -1,0 +1,71 @@
+"""The transport of a MIDI file: its name, play or stop, and its position."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QHBoxLayout, QSlider, QWidget
+
+from app.views.controls.elided_label import ElidedLabel
+from app.views.controls.parts import faint, tool_button
+
+STEPS_PER_S = 10
+KEY_STEP_S, PAGE_STEP_S = 1, 10
+NARROWEST_NAME = 80  # pixels
+
+
+class SongStrip(QWidget):
+    """Hidden while there is no file. Gestures emit signals; setters show what became of them."""
+
+    play_asked = Signal()  # or stop
+    seek_asked = Signal(float)  # to a time in s
+    close_asked = Signal()
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAccessibleName("MIDI file")
+        self._length_s = 0.0
+        self.play = tool_button("▶", "Play the MIDI file", "Play or stop the MIDI file")
+        self.play.setObjectName("narrow")
+        self.play.clicked.connect(self.play_asked)
+        self.name = ElidedLabel()
+        self.name.setMinimumWidth(NARROWEST_NAME)
+        self.slider = QSlider(Qt.Orientation.Horizontal)
+        self.slider.setAccessibleName("Position in the MIDI file")
+        self.slider.setToolTip("Position in the MIDI file; arrow keys move it by a second")
+        self.slider.setSingleStep(KEY_STEP_S * STEPS_PER_S)
+        self.slider.setPageStep(PAGE_STEP_S * STEPS_PER_S)
+        self.slider.valueChanged.connect(self._ask)
+        self.time = faint()
+        self.closer = tool_button("✕", "Close the MIDI file", "Stop and close the MIDI file")
+        self.closer.setObjectName("narrow")
+        self.closer.clicked.connect(self.close_asked)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        for widget, share in ((self.play, 0), (self.name, 1), (self.slider, 3), (self.time, 0), (self.closer, 0)):
+            row.addWidget(widget, share)
+        self._shown_step = 0
+        self.hide()
+
+    def show_song(self, name: str, length_s: float) -> None:
+        self._length_s = length_s
+        self.name.say(name)
+        self.name.setToolTip(name)
+        self.slider.setMaximum(max(1, round(length_s * STEPS_PER_S)))
+        self.show()
+
+    def show_position(self, position_s: float, playing: bool) -> None:
+        self.play.setText("■" if playing else "▶")
+        self.time.setText(f"{_clock(position_s)} / {_clock(self._length_s)}")
+        self.slider.setAccessibleDescription(_clock(position_s))
+        if not self.slider.isSliderDown():
+            self._shown_step = round(position_s * STEPS_PER_S)
+            self.slider.setValue(self._shown_step)
+
+    def _ask(self, step: int) -> None:
+        if step != self._shown_step:
+            self._shown_step = step
+            self.seek_asked.emit(step / STEPS_PER_S)
+
+
+def _clock(seconds: float) -> str:
+    return f"{int(seconds) // 60}:{int(seconds) % 60:02d}"
