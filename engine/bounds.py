@@ -50,6 +50,17 @@ STRING: Mapping[str, tuple[float, float]] = {
     "tension_n": (1e-3, 1e6),
 }
 
+# Two polarisations: parameter -> least and most, and the unit
+POLARISATIONS: Mapping[str, tuple[tuple[float, float], str]] = {
+    "angle_deg": ((0.0, 80.0), "°"),
+    "second_heard": ((0.0, 1.0), ""),
+    "second_cents": ((0.0, 20.0), "cents"),
+    "conductance_s_kg": ((0.0, 0.5), "s/kg"),
+    "second_conductance_s_kg": ((0.0, 0.5), "s/kg"),
+}
+
+LOSSES: Mapping[str, tuple[float, float]] = {"air": (0.0, 20.0), "friction": (0.0, 0.1), "bending": (0.0, 1.0)}
+
 # Motion
 HIGHEST_RATE_HZ = 1_000_000
 MOST_FRAMES = 10**9  # of a horizon

@@ -66,6 +66,7 @@ class InstrumentPlayer:
         gains: by source ("model", "truth"), of all its notes.
         ear: where strings are heard; None: at the patch's own points.
         most_notes: that ring at once; the oldest makes room.
+        varied: whether plucks vary from stroke to stroke, as the patch says; the same strokes vary alike.
 
     Raises:
         ValueError: the preset learned one string only, or the tuning is impossible.
@@ -79,6 +80,7 @@ class InstrumentPlayer:
         gains: Mapping[str, float],
         ear: Ear | None = None,
         most_notes: int = 40,
+        varied: bool = True,
     ) -> None:
         if not preset.info.of_many_strings:
             raise ValueError(
@@ -89,7 +91,7 @@ class InstrumentPlayer:
         self._info, self.grid_points = preset.info, preset.info.grid_points
         self._sources = tuple(gains)
         self._programs = programs_of(preset, rate_hz, self._sources)
-        self._lock = threading.Lock()
+        self._lock, self._varied = threading.Lock(), varied
         self._serial = self._instrument = 0
         self.table: Table | None = None
         self.compiled = CompiledPlayer(rate_hz, min(of.MOST_MODES, self.grid_points - 2), most_notes)
@@ -167,7 +169,14 @@ class InstrumentPlayer:
             self._loud, self.table = (
                 loud,
                 table_of(
-                    loud, self.grid_points, self._sources, self._programs, self._serial, self._instrument, before
+                    loud,
+                    self.grid_points,
+                    self._sources,
+                    self._programs,
+                    self._serial,
+                    self._instrument,
+                    before,
+                    self._varied,
                 ),
             )
             self.compiled.take(self.table, frame)

@@ -15,6 +15,7 @@ from app.shared.parameters import OF_PATCHES
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.presets import Preset
+from engine.resonators.polarised import PAIRS
 from engine.voices.player import Table
 from engine.voices.programs import solver_memory, tension_memory
 
@@ -76,12 +77,14 @@ def table_of(
     serial: int,
     instrument: int,
     near: Table | None = None,
+    varied: bool = True,
 ) -> Table:
     """The table of a patch. Gains of keys are filled in by `fill_gain`; until then they are those of `near`.
 
     Args:
         serial: above that of all tables before.
         instrument: the same for the same instrument with a knob turned.
+        varied: whether plucks vary from stroke to stroke, as the patch says.
     """
     patch, ear = loud.patch, loud.ear
     memory = np.zeros(of.table_slots(grid_points))
@@ -95,6 +98,25 @@ def table_of(
     points = [of.BRIDGE] * len(ear.points) if ear.pickup == "bridge" else ear.points
     memory[of.TABLE_POINT : of.TABLE_POINT + len(points)] = points
     counts[of.TABLE_SOLO], counts[of.TABLE_GRID] = ear.solo, grid_points
+    if (moving := loud.polarisations) is not None:
+        counts[of.TABLE_PAIRS], memory[of.TABLE_DETUNING] = PAIRS, moving.detuning
+        for first, both in (
+            (of.TABLE_PULLED, moving.pulled),
+            (of.TABLE_HEARD, moving.heard),
+            (of.TABLE_CONDUCTANCE, (moving.conductance_s_kg, moving.second_conductance_s_kg)),
+        ):
+            memory[first : first + 2] = both
+    else:
+        memory[of.TABLE_DETUNING] = 1.0
+    if patch.losses is not None:
+        lost = patch.losses.air, patch.losses.friction, patch.losses.bending
+        memory[of.TABLE_LOSSES : of.TABLE_LOSSES + 3] = lost
+    if patch.sympathy_s_kg > 0:
+        counts[of.TABLE_SYMPATHY] = of.EVERY_KEY if patch.damping.let_ring else of.OPEN_STRINGS
+        memory[of.TABLE_SYMPATHY_S_KG] = patch.sympathy_s_kg
+    pluck = patch.pluck
+    memory[of.TABLE_RELEASE_S : of.TABLE_RELEASE_S + 2] = pluck.release_ms / 1000, pluck.release_hard_ms / 1000
+    memory[of.TABLE_VARIATION] = pluck.variation if varied else 0.0
     goal = wheel_goal(patch) if patch.mod_wheel in VALUES else None
     counts[of.TABLE_WHEEL] = -1 if goal is None else VALUES.index(patch.mod_wheel)
     memory[of.TABLE_WHEEL_GOAL] = 0.0 if goal is None else goal

@@ -128,7 +128,7 @@ class KoopmanTensionConfiguration:
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "modes")
-        if self.modes > self.grid_points - 2:
+        if self.modes > 2 * (self.grid_points - 2):  # two polarisations
             raise ValueError(f"a grid of {self.grid_points} points cannot hold {self.modes} modes")
         if not 0 <= self.degree <= 32:
             raise ValueError(f"degree must lie in 0 … 32, not {self.degree}")

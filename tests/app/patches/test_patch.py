@@ -37,6 +37,12 @@ Make = Callable[..., Patch]
         ("pickup.points", {"pickup": {"points": [0.1, 0.2, 0.3]}}),
         ("damping.let_ring", {"damping": {"let_ring": 1}}),
         ("pluck.stops", {"pluck": {"stops": "no"}}),
+        ("release_hard_ms", {"pluck": {"release_ms": 2.0}}),
+        ("pluck.variation", {"pluck": {"variation": 1.5}}),
+        ("polarisations.angle_deg", {"polarisations": {"angle_deg": 90}}),
+        ("polarisations.conductance_s_kg", {"polarisations": {"conductance_s_kg": -1}}),
+        ("losses.friction", {"losses": {"friction": 1}}),
+        ("sympathy_s_kg", {"sympathy_s_kg": -0.1}),
         ("tuning.scale", {"tuning": {"scale": "x" * 65_537}}),
         ("tuning.scale", {"tuning": {"scale": "a\x1b[2J"}}),
         ("mod_wheel", {"mod_wheel": "name"}),
@@ -52,6 +58,12 @@ Make = Callable[..., Patch]
 def test_impossible_values_are_refused_by_name(make_patch: Make, field: str, changes: dict[str, Any]) -> None:
     with pytest.raises(ValidationError, match=field):
         make_patch(**changes)
+
+
+def test_a_release_is_a_ratio_for_each_step_of_velocity() -> None:
+    slow = PluckChoices(release_ms=4.0, release_hard_ms=1.0)
+    assert [1000 * slow.release_s(velocity) for velocity in (1, 64, 127)] == pytest.approx([4.0, 2.0, 1.0])
+    assert PluckChoices().release_s(100) == 0.0
 
 
 def test_a_patch_survives_json(make_patch: Make) -> None:
