@@ -11,6 +11,7 @@ import numpy as np
 from app.instrument.effects import Response, body_response
 from app.instrument.loudness import HIGHEST_PEAK_DB, REFERENCE_VELOCITY, gain_of, peak_db
 from app.instrument.strings import KeyString, Strings
+from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.kernels.playing_layout import HIGHEST_SIGMA
 from engine.pluck import LARGEST_AMPLITUDE_MM, Pluck
@@ -42,7 +43,9 @@ class LoudKeys:
     """
 
     def __init__(self, patch: Patch, ear: Ear, preset: PresetInfo, near: LoudKeys | None = None) -> None:
-        """Raises ValueError: the tuning is impossible."""
+        """Raises ValueError: the tuning is impossible, or the patch has drums."""
+        if isinstance(patch.strings, Drums):
+            raise ValueError(f"{patch.name} has drums, and no strings; choose an instrument of strings")
         self.patch, self.ear = patch, ear
         self._whole, self._preset = replace(ear, solo=0), preset
         self.strings = Strings(patch)

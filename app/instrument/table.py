@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.instrument.drum_keys import DrumKeys, block_of
 from app.instrument.loud_keys import LoudKeys
 from app.instrument.strings import KNOBS, STRING
+from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
 from app.shared.parameters import OF_PATCHES
 from engine.kernels import layout as at
@@ -70,7 +73,7 @@ def programs_of(preset: Preset, rate_hz: int, sources: Iterable[str]) -> tuple[N
 
 
 def table_of(
-    loud: LoudKeys,
+    loud: LoudKeys | DrumKeys,
     grid_points: int,
     sources: Iterable[str],
     programs: tuple[NDArray[np.float64], ...],
@@ -125,9 +128,12 @@ def table_of(
         counts[of.TABLE_PROGRAMS + place] = program.ctypes.data
     counts[of.TABLE_SOURCES] = len(programs)
     memory[of.TABLE_VALUES : of.TABLE_VALUES + of.VALUES] = [_value(patch, name) for name in VALUES]
+    if isinstance(loud, DrumKeys):
+        return Table(_with_drums(memory, loud), programs)
     for key in range(of.KEYS):
         memory[of.TABLE_PITCHES + key] = loud.strings.pitch_hz(key) or 0.0
     strings = patch.strings
+    assert not isinstance(strings, Drums)
     if isinstance(strings, Fretted):
         memory[of.TABLE_OPEN + of.OPEN_STRING : of.TABLE_OPEN + of.OPEN_SLOTS] = _row(strings.string)
     else:
@@ -144,7 +150,24 @@ def table_of(
     return Table(memory, programs)
 
 
-def fill_gain(table: Table, loud: LoudKeys, key: int, string: int | None = None) -> None:
+def _with_drums(memory: NDArray[np.float64], loud: DrumKeys) -> NDArray[np.float64]:
+    """The table with the drums of all keys, and their gains. A key whose drum is impossible has none."""
+    blocks: list[NDArray[np.float64]] = []
+    first = len(memory) + of.KEYS
+    slots = np.zeros(of.KEYS, np.int64)
+    low, high = loud.patch.range
+    for key in range(low, high + 1):
+        with contextlib.suppress(ValueError):
+            if (found := loud.of_key(key)) is not None:
+                memory[of.TABLE_GAINS + key * of.GAINS] = found.gain
+                blocks.append(block_of(found))
+                slots[key] = first
+                first += len(blocks[-1])
+    memory.view(np.int64)[of.TABLE_DRUMS] = len(memory)
+    return np.concatenate([memory, slots.view(np.float64), *blocks])
+
+
+def fill_gain(table: Table, loud: LoudKeys | DrumKeys, key: int, string: int | None = None) -> None:
     """Computes the gain of a key, where it is not known, in half a millisecond. Any thread.
 
     Args:
@@ -153,6 +176,9 @@ def fill_gain(table: Table, loud: LoudKeys, key: int, string: int | None = None)
     Raises:
         ValueError: the key has no possible string.
     """
+    if isinstance(loud, DrumKeys):
+        loud.of_key(key)  # whose gain the table has
+        return
     slot = of.TABLE_GAINS + key * of.GAINS + (0 if string is None else 1 + string)
     if table.memory[slot] > 0:
         return

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
+from app.patches.drums import Drums
 from app.patches.fields import LONGEST_NAME, Flag, Key, Name, Reference, Share, Text, Value, parameter, plain, ranged
 from app.patches.tuning import TuningChoice
 from app.shared.parameters import MOST_MACROS, OF_PATCHES, modulated_by
@@ -22,7 +23,7 @@ from engine.pluck import DEFAULT_LISTEN, Pluck, Shape
 if TYPE_CHECKING:
     from engine.resonators.string import StringParameters
 
-Category = Literal["guitar", "bass", "harp", "keys", "world", "experimental"]
+Category = Literal["guitar", "bass", "harp", "keys", "world", "drums", "experimental"]
 CATEGORIES: tuple[Category, ...] = get_args(Category)
 Mode = Literal["poly", "guitar", "mpe"]
 ASSIGNABLE = tuple(each.id for each in modulated_by("macro"))  # what macros may turn
@@ -277,7 +278,7 @@ class Patch(Value):
     description: Text = ""
     author: Text = ""
     preset: Name = "studio_any_string"
-    strings: Annotated[Fretted | StringSet, Field(discriminator="kind")]
+    strings: Annotated[Fretted | StringSet | Drums, Field(discriminator="kind")]
     knobs: Knobs = Knobs()
     range: tuple[Key, Key] = (28, 88)
     pluck: PluckChoices = PluckChoices()

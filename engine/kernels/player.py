@@ -26,9 +26,9 @@ import math
 import numpy as np
 from numba import carray, njit
 
+from engine.kernels import drums, strings
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
-from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
 from engine.kernels.modes import TOO_HIGH
@@ -1152,6 +1152,13 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
         return
     table, tables = _at(address), _whole(address)
     if kind == of.NOTE_ON and value > 0.0:
+        if tables[of.TABLE_DRUMS] != 0 and players[event + of.EVENT_VOICES] == 0:
+            number = _free_note(player, players, mixers)
+            first = _slots_of_voice(players, number, 0)
+            stride = _slots_of_voice(players, number, 1) - first
+            if not drums.strike(player, players, table, tables, event, first, stride):
+                _refuse(player, players, event)
+                return
         _note_on(player, players, table, tables, mixers, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
         _note_off(player, players, table, tables, channel, key, frame, now)
@@ -1201,6 +1208,8 @@ def _hear(player: np.ndarray, players: np.ndarray) -> None:
                     wanted = player[note + of.NOTE_GAIN] * player[of.PLAYER_SOURCE_GAINS + source]
                     _at(address)[at.WANTED_GAIN] = wanted
             _listen(player, players, note)
+        elif players[note + of.NOTE_STATE] == of.RINGS and _whole(players[of.PLAYER_TABLE])[of.TABLE_DRUMS] != 0:
+            drums.hear(player, players, _at(players[of.PLAYER_TABLE]), _whole(players[of.PLAYER_TABLE]), note)
 
 
 @njit(**COMPILED)

@@ -83,6 +83,7 @@ TABLE_SYMPATHY = 38  # W which strings ring with those that are played
 NO_SYMPATHY, EVERY_KEY, OPEN_STRINGS = 0, 1, 2
 TABLE_SYMPATHY_S_KG = 39  # R conductance of the bridge that drives them
 TABLE_LOSSES = 40  # R three: to the air, by friction, by bending
+TABLE_DRUMS = 43  # W slot of the slots of drums of all keys (KEYS,), 0 where a key has none; 0: strings are played
 TABLE_VALUES = 48  # R
 TABLE_PITCHES = TABLE_VALUES + VALUES  # R of keys in Hz; 0: silent
 TABLE_GAINS = TABLE_PITCHES + KEYS  # R (KEYS, GAINS); below 0: a guess; 0: none is known; not a number: impossible
@@ -93,6 +94,17 @@ OPEN_STRING = 2  # R
 OPEN_SLOTS = OPEN_STRING + STRING
 MOST_STRINGS = 128
 TABLE_SINES = TABLE_OPEN + MOST_STRINGS * OPEN_SLOTS  # R sin(π k / (grid - 1)), k below 2 (grid - 1)
+
+# Slots of the drum of a key; then seven rows (modes,): ω², σ, k, η², the speed that 1 N s gives, two points' weights
+DRUM_MODES = 0  # W
+DRUM_MALLET_KG = 1  # R
+DRUM_CONTACT_S = 2  # R at 1 m/s
+DRUM_SOFTEST_M_S = 3  # R speed of the softest blow
+DRUM_HARDEST_M_S = 4  # R
+DRUM_MASS_KG = 5  # R of each mode
+DRUM_HEADER = 8
+DRUM_ROWS = 7
+MOST_DRUM_MODES = 1_600
 
 
 def table_slots(grid_points: int) -> int:

@@ -79,7 +79,8 @@ def test_what_plucks_a_patch_stops_its_string_unless_the_patch_says_otherwise(ma
     assert Patch.model_validate(older).pluck.stops
     hammered = make_patch(pluck={"stops": False})
     assert not Patch.model_validate_json(hammered.model_dump_json()).pluck.stops
-    struck = {entry.name for entry in list_patches(SHIPPED)[0] if not entry.patch.pluck.stops}
+    patches = list_patches(SHIPPED)[0]
+    struck = {each.name for each in patches if not each.patch.pluck.stops and each.patch.category != "drums"}
     assert struck == {"cimbalom", "felt_on_wires", "santur_in_shur"}
 
 
