@@ -73,6 +73,8 @@ class DrumKey:
 class DrumKeys:
     """Of one patch of drums, heard at `ear`; see `LoudKeys`. Modes of a drum are remembered."""
 
+    polarisations = None
+
     def __init__(self, patch: Patch, ear: Ear, near: DrumKeys | None = None) -> None:
         """Raises ValueError: the tuning is impossible, or a drum."""
         assert isinstance(patch.strings, Drums)

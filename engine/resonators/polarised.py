@@ -89,7 +89,7 @@ class Polarisations:
         single = np.arange(len(partial)) >= 2 * min(PAIRS, partials)
         pulled = np.where(single, 1 / self.heard[0], pulled)  # so that it is heard as the others are
         omega, sigma = self._rates(string, partials, losses)
-        assert law.end_force is not None and law.mirror is not None
+        assert law.end_force is not None and law.mirror is not None and law.analysis is not None
         return Resonator(
             omega=omega,
             sigma=sigma,

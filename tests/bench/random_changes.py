@@ -8,7 +8,7 @@ from random import Random
 from typing import Any
 
 from app.patches.instrument import SingleString
-from app.patches.patch import Patch, PhysicalString, StringSet
+from app.patches.patch import Fretted, Patch, PhysicalString, StringSet
 from app.session.choices import Choices
 from app.shared.parameters import OF_CHOICES
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
@@ -38,7 +38,7 @@ def _strings(patch: Patch) -> list[PhysicalString | None]:
     found = patch.strings
     if isinstance(found, StringSet):
         return [None, *(each.string for each in found.strings)]
-    return [None, found.string]
+    return [None, found.string] if isinstance(found, Fretted) else [None]
 
 
 def _held(random: Random, repertoire: Repertoire) -> str:
