@@ -98,6 +98,10 @@ LONGEST_IMPULSE_S = 3.0
 IMPULSE_RATE_HZ = (8_000, 384_000)
 MOST_IMPULSE_CHANNELS = 2
 
+# Effects
+BODY_SIZE = (0.5, 2.0)  # in lengths of its model
+ROOM_T60_S = (0.2, 3.0)
+
 # Work
 MOST_RUNS = 2_000  # of a plan
 LARGEST_DATASET_BYTES = 64 * 2**30

@@ -8,19 +8,16 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.commands import options
 from app.commands.render import (
     BitsOption,
     DecayDb,
-    GainDb,
-    Listen,
-    ListenRight,
     Normalise,
     PickupOption,
     Rate,
     check_sound,
 )
 from engine.plain_text import one_line
-from engine.pluck import DEFAULT_LISTEN
 from training.cli import arguments
 from training.cli.console import Failure, progress, say
 
@@ -35,7 +32,7 @@ def batch(
     ],
     amplitudes: Annotated[str, typer.Option(metavar="MM,…", help="Peak displacements in mm, separated by commas.")],
     out: Annotated[Path, typer.Option(metavar="DIR", help="The folder, made if needed.")],
-    seconds: arguments.Seconds,
+    seconds: options.Seconds,
     strings: Annotated[
         str | None,
         typer.Option(
@@ -49,13 +46,13 @@ def batch(
     ] = "model",
     rate: Rate = None,
     bits: BitsOption = "24",
-    listen: Listen = DEFAULT_LISTEN,
-    listen_right: ListenRight = None,
+    listen: options.Listen = options.DEFAULT_LISTEN,
+    listen_right: options.ListenRight = None,
     pickup: PickupOption = "displacement",
-    difference_gain_db: GainDb = 0.0,
+    difference_gain_db: options.GainDb = 0.0,
     decay_db: DecayDb = None,
-    shape: arguments.Shape = arguments.DEFAULT_SHAPE,
-    width: arguments.Width = arguments.DEFAULT_WIDTH,
+    shape: options.Shape = options.DEFAULT_SHAPE,
+    width: options.Width = options.DEFAULT_WIDTH,
     normalise: Normalise = False,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Render files again that are there.")] = False,
 ) -> None:
@@ -67,7 +64,7 @@ def batch(
     places, heights = _numbers("--positions", positions), _numbers("--amplitudes", amplitudes)
     for place in places:
         for height in heights:
-            pluck = arguments.check_pluck(place, height, shape, width)
+            pluck = options.check_pluck(place, height, shape, width)
     check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
     from app.export.batch import INDEX, BatchPlan, NamedString, run_batch
     from app.export.wav import WavSettings

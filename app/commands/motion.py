@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from app.commands import options
 from engine.plain_text import one_line
 from training.cli import arguments
 from training.cli.console import Failure, number, print_json, print_table, progress, say
@@ -143,11 +144,11 @@ def _outside_family(info: PresetInfo, initial: Array) -> list[str]:
 
 def compare(
     preset: arguments.PresetName,
-    position: arguments.Position,
-    amplitude_mm: arguments.AmplitudeMm,
-    seconds: arguments.Seconds,
-    shape: arguments.Shape = arguments.DEFAULT_SHAPE,
-    width: arguments.Width = arguments.DEFAULT_WIDTH,
+    position: options.Position,
+    amplitude_mm: options.AmplitudeMm,
+    seconds: options.Seconds,
+    shape: options.Shape = options.DEFAULT_SHAPE,
+    width: options.Width = options.DEFAULT_WIDTH,
     string: arguments.StringName = None,
     rate: arguments.StringRate = None,
     modes: arguments.StringModes = None,
@@ -157,7 +158,7 @@ def compare(
 
     Prints relative errors over the whole grid, in total, by second, and past the training horizon.
     """
-    pluck = arguments.check_pluck(position, amplitude_mm, shape, width)
+    pluck = options.check_pluck(position, amplitude_mm, shape, width)
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
     loaded = arguments.open_preset_of_string(preset, string, rate, modes)
     info = loaded.info

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 
 import typer
 
+from app.commands import options
 from app.shared.vocabulary import Bits, Pickup, Source
-from engine.pluck import DEFAULT_LISTEN
 from training.cli import arguments
 from training.cli.console import Failure, progress, say
 
@@ -28,10 +28,6 @@ Rate = Annotated[
     ),
 ]
 BitsOption = Annotated[Bits, typer.Option(help="16 (dithered) or 24 bits, or 32f: floating point, never clips.")]
-Listen = Annotated[float, typer.Option(metavar="X", help="Listening point: 0 and 1 are the fixed ends.")]
-ListenRight = Annotated[
-    float | None, typer.Option(help="Listening point of a right channel; without it the file is mono.", metavar="X")
-]
 PickupOption = Annotated[
     Pickup,
     typer.Option(
@@ -43,7 +39,6 @@ DecayDb = Annotated[
     float | None,
     typer.Option(metavar="DB", help="End when the sound has decayed by so much, after --seconds at the latest."),
 ]
-GainDb = Annotated[float, typer.Option(metavar="DB", help="Gain of the difference.")]
 Normalise = Annotated[
     bool, typer.Option("--normalise", help="Normalise to -1 dBFS, with one gain for model and truth.")
 ]
@@ -55,24 +50,24 @@ def render(
         str | None, typer.Argument(metavar="PRESET", help="A preset's name or the path of its file.")
     ] = None,
     out: Annotated[Path | None, typer.Argument(metavar="OUT.wav", help="The file to write.")] = None,
-    position: Annotated[float | None, typer.Option(metavar="X", help=arguments.POSITION_HELP)] = None,
-    amplitude_mm: Annotated[float | None, typer.Option(metavar="MM", help=arguments.AMPLITUDE_HELP)] = None,
-    seconds: Annotated[float | None, typer.Option(metavar="S", help=arguments.SECONDS_HELP)] = None,
+    position: Annotated[float | None, options.POSITION] = None,
+    amplitude_mm: Annotated[float | None, options.AMPLITUDE_MM] = None,
+    seconds: Annotated[float | None, options.SECONDS] = None,
     string: arguments.StringName = None,
     modes: arguments.StringModes = None,
     rate: Rate = None,
     bits: BitsOption = "24",
-    listen: Listen = DEFAULT_LISTEN,
-    listen_right: ListenRight = None,
+    listen: options.Listen = options.DEFAULT_LISTEN,
+    listen_right: options.ListenRight = None,
     pickup: PickupOption = "displacement",
     source: Annotated[
         Source,
         typer.Option(help="truth: the solved physics; difference: model minus truth; both: model left, truth right."),
     ] = "model",
-    difference_gain_db: GainDb = 0.0,
+    difference_gain_db: options.GainDb = 0.0,
     decay_db: DecayDb = None,
-    shape: arguments.Shape = arguments.DEFAULT_SHAPE,
-    width: arguments.Width = arguments.DEFAULT_WIDTH,
+    shape: options.Shape = options.DEFAULT_SHAPE,
+    width: options.Width = options.DEFAULT_WIDTH,
     normalise: Normalise = False,
     as_recorded: Annotated[
         bool,
@@ -111,7 +106,7 @@ def render(
     preset, out = _given("PRESET", preset), _given("OUT.wav", out)
     position, amplitude_mm = _given("--position", position), _given("--amplitude-mm", amplitude_mm)
     seconds = _given("--seconds", seconds)
-    pluck = arguments.check_pluck(position, amplitude_mm, shape, width)
+    pluck = options.check_pluck(position, amplitude_mm, shape, width)
     check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
     from app.export.files import SoundRequest, WavSettings
 
@@ -136,13 +131,10 @@ def check_sound(
 ) -> None:
     """Checks the ranges of the options that `render` and `batch` share. Raises as `arguments.check_range`."""
     from app.export.files import LONGEST_S, RATE_RANGE_HZ
-    from app.export.sound import DECAY_RANGE_DB, DIFFERENCE_GAIN_RANGE_DB
+    from app.export.sound import DECAY_RANGE_DB
 
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
-    arguments.check_range("--listen", listen, 0, 1)
-    arguments.check_range("--difference-gain-db", difference_gain_db, *DIFFERENCE_GAIN_RANGE_DB, "dB")
-    if listen_right is not None:
-        arguments.check_range("--listen-right", listen_right, 0, 1)
+    options.check(listen=listen, listen_right=listen_right, difference_gain_db=difference_gain_db)
     if decay_db is not None:
         arguments.check_range("--decay-db", decay_db, *DECAY_RANGE_DB, "dB")
     if rate is not None:

@@ -12,8 +12,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
-from engine.effects.body import SIZE
-from engine.effects.room import T60_S
+from engine.bounds import BODY_SIZE, ROOM_T60_S
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 
 Modulation = Literal["none", "learn", "macro", "wheel"]  # each includes those before it
@@ -92,6 +91,11 @@ class Parameter:
     def shown(self, value: float) -> str:
         """The value with its unit."""
         return self.taper.text.format(value)
+
+    @property
+    def unit(self) -> str:
+        """As `shown` ends; "" for a bare number."""
+        return self.taper.text.rpartition("}")[2].strip()
 
     def allows(self, modulation: Modulation) -> bool:
         """Whether this kind of modulation may change it."""
@@ -208,9 +212,11 @@ OF_PATCHES: Mapping[str, Parameter] = {
             "pickup.points.1", "right", (0, 1), 1 - DEFAULT_LISTEN, PLACE, PICKUP, "macro", "right listening point"
         ),
         Parameter("body.mix", "mix", (0, 1), 0.5, PERCENT, BODY, "wheel", "body mix", 1.0),
-        Parameter("body.size", "size", SIZE, 1.0, TIMES, BODY, "wheel", "body size", wheel_factor=2),
+        Parameter("body.size", "size", BODY_SIZE, 1.0, TIMES, BODY, "wheel", "body size", wheel_factor=2),
         Parameter("room.mix", "room", (0, 1), 0, PERCENT, BODY, "wheel", wheel=1.0),
-        Parameter("room.t60_s", "time", T60_S, 1.2, SECONDS, BODY, "wheel", "reverberation time", wheel_factor=3),
+        Parameter(
+            "room.t60_s", "time", ROOM_T60_S, 1.2, SECONDS, BODY, "wheel", "reverberation time", wheel_factor=3
+        ),
         Parameter("level_db", "level", (-60, 24), 0, Taper(0.5, "{:+.1f} dB"), BODY, "macro"),
     )
 }

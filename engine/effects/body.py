@@ -20,7 +20,6 @@ from engine.effects.body_table import BODIES, Wood
 from engine.effects.impulse import Impulse, as_loud, faded, resampled, without_subsonic
 
 SOUND_M_S = 343.0
-SIZE = (0.5, 2.0)
 SUBSONIC = 0.55  # of the lowest mode: below it a body radiates next to nothing
 MOST_PER_HZ = 0.06  # modes: where more overlap, fewer and stronger ones sound the same
 LEAST_ALIKE = 0.2  # of left and right, at high frequencies
@@ -49,7 +48,7 @@ class Body:
 
     def __post_init__(self) -> None:
         bounds.check("mix", self.mix, (0.0, 1.0))
-        bounds.check("size", self.size, SIZE)
+        bounds.check("size", self.size, bounds.BODY_SIZE)
         if self.name not in BODIES:
             raise ValueError(f"no body is named {bounds.brief(self.name)}; there are {', '.join(BODIES)}")
 
@@ -102,7 +101,7 @@ def _density(wood: Wood, frequency_hz: NDArray[np.float64]) -> NDArray[np.float6
 
 def _higher_hz(wood: Wood, draw: np.random.Generator) -> NDArray[np.float64]:
     """Frequencies of the modes above the lowest, the same at any rate and size."""
-    first_hz, last_hz = wood.lowest[-1].frequency_hz, HIGHEST_HZ * SIZE[1]
+    first_hz, last_hz = wood.lowest[-1].frequency_hz, HIGHEST_HZ * bounds.BODY_SIZE[1]
     grid_hz = np.arange(first_hz, last_hz, 1.0)
     counted = np.cumsum(_density(wood, grid_hz))  # modes from the first one up to a frequency
     count = int(counted[-1])

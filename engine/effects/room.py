@@ -21,7 +21,6 @@ from numpy.typing import NDArray
 from engine import bounds
 from engine.effects.impulse import as_loud, faded, resampled, room_for, without_subsonic
 
-T60_S = (0.2, 3.0)
 RATE_HZ = 48_000  # at which it is made, so that it is the same room at any rate
 SPEED_M_S = 343.0
 SIDES_M = np.array([5.6, 4.3, 2.8])  # at a T60 of half a second; they grow with its root
@@ -51,7 +50,7 @@ class Room:
 
     def __post_init__(self) -> None:
         bounds.check("mix", self.mix, (0.0, 1.0))
-        bounds.check("t60_s", self.t60_s, T60_S, "s")
+        bounds.check("t60_s", self.t60_s, bounds.ROOM_T60_S, "s")
 
     def response(self, rate_hz: int) -> NDArray[np.float64]:
         """Of the reverberation alone, (frames, 2), as loud as what it is given."""
@@ -66,7 +65,7 @@ def _response(t60_s: float, rate_hz: int) -> NDArray[np.float64]:
     frames = round(t60_s * RATE_HZ)
     time_s = np.arange(frames) / RATE_HZ
     early, direct_m = _images(sides_m, mixing_s, frames)
-    noise = np.random.default_rng(_SEED).standard_normal((round(T60_S[1] * RATE_HZ), 2))[:frames]
+    noise = np.random.default_rng(_SEED).standard_normal((round(bounds.ROOM_T60_S[1] * RATE_HZ), 2))[:frames]
     late = noise * direct_m * math.sqrt(4 * math.pi * SPEED_M_S / volume_m3 / RATE_HZ)
     turn = np.clip(2 * time_s / mixing_s - 1, 0.0, 1.0)[:, None] * (np.pi / 2)
     found = _decayed(early * np.cos(turn) + late * np.sin(turn), time_s, t60_s)

@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from engine import pluck as plucks
-
 if TYPE_CHECKING:
     from engine.presets import Preset
 
@@ -49,17 +47,6 @@ StringModes = Annotated[
     ),
 ]
 
-POSITION_HELP = "Where to pluck: 0 and 1 are the fixed ends, 0.5 the middle."
-AMPLITUDE_HELP = "Peak displacement in mm."
-SECONDS_HELP = "Duration in s."
-Position = Annotated[float, typer.Option(metavar="X", help=POSITION_HELP)]
-AmplitudeMm = Annotated[float, typer.Option(metavar="MM", help=AMPLITUDE_HELP)]
-Seconds = Annotated[float, typer.Option(metavar="S", help=SECONDS_HELP)]
-Shape = Annotated[plucks.Shape, typer.Option(help="The pluck's shape.")]
-Width = Annotated[float, typer.Option(metavar="X", help="Width of the pluck as a fraction of the string's length.")]
-DEFAULT_SHAPE = plucks.Pluck().shape
-DEFAULT_WIDTH = plucks.Pluck().width
-
 
 def check_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
     """Checks that low ≤ value ≤ high.
@@ -70,14 +57,6 @@ def check_range(option: str, value: float, low: float, high: float, unit: str = 
     if not low <= value <= high:
         text = f" {unit}" if unit else ""
         raise typer.BadParameter(f"must lie in {low:.10g} … {high:.10g}{text}, not {value:.10g}", param_hint=option)
-
-
-def check_pluck(position: float, amplitude_mm: float, shape: plucks.Shape, width: float) -> plucks.Pluck:
-    """The pluck of these options, whose ranges are checked."""
-    check_range("--position", position, *plucks.POSITION_RANGE)
-    check_range("--amplitude-mm", amplitude_mm, 0, plucks.LARGEST_AMPLITUDE_MM, "mm")
-    check_range("--width", width, *plucks.WIDTH_RANGE)
-    return plucks.Pluck(position, amplitude_mm, shape, width)
 
 
 def open_preset(name_or_path: str) -> Preset:
