@@ -200,6 +200,7 @@ class Controller(QObject):
             "record": self.patches.recordings.record,
             "export": lambda: self.exports.open("note"),
             "sampler": lambda: self.exports.open("sampler"),
+            "plugin": lambda: self.exports.open("plugin"),
             "undo": self._undo,
             "redo": self._redo,
             "play": self.play_or_stop,

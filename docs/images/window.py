@@ -96,7 +96,7 @@ def _play(controller: Controller) -> Iterator[None]:
     for _ in range(5):
         yield
     for key in CHORD:
-        window.instrument.pressed.emit(key, 110)
+        window.instrument.pressed.emit(key, 80)
     for _ in range(3):
         yield
     window.notices.hide()

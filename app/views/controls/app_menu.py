@@ -44,6 +44,7 @@ MENUS: dict[str, tuple[Entry, ...]] = {
             "Ctrl+Shift+E",
             "export the patch as an instrument for samplers (SFZ, SoundFont)",
         ),
+        Entry("plugin", "Export plug-in …"),
         Entry("quit", "Quit", "Ctrl+Q", "quit"),
     ),
     "&Edit": (

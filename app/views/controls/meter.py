@@ -77,7 +77,7 @@ class Meter(QWidget):
             painter.drawText(QRectF(x - 14, 20, 28, 12), Qt.AlignmentFlag.AlignCenter, f"{db}")
         light = QRectF(self.width() / scale - 44, 5, 44, 16)
         painter.setPen(Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.WARNING if self._hold else theme.LINE))
+        painter.setBrush(QColor(theme.TEXT if self._hold else theme.LINE))
         painter.drawRoundedRect(light, 3, 3)
         painter.setPen(QColor(theme.BACKGROUND if self._hold else theme.FAINT))
         painter.drawText(light, Qt.AlignmentFlag.AlignCenter, "LIMIT")
