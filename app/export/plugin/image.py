@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from app.export.plugin.parts import MIXES, STEPS, levels, mixed, parts_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.table import VALUES, wheel_goal
+from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
 from engine.effects.partitions import FADE_S
@@ -155,8 +156,10 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     """The image of an instrument.
 
     Raises:
-        ValueError: its model learned one string only, or its tuning is impossible.
+        ValueError: it has drums, its model learned one string only, or its tuning is impossible.
     """
+    if isinstance(patch.strings, Drums):
+        raise ValueError(f"{patch.name} has drums, which plug-ins cannot play yet; choose an instrument of strings")
     player = InstrumentPlayer(patch, preset, PREPARED_HZ, {"model": 1.0, "truth": 1.0})
     player.prepare()
     table = player.table
