@@ -16,7 +16,7 @@ from app.instrument.loud_keys import LoudKeys
 from app.instrument.offline import render_note
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Body, Damping, Patch, Pickup, PluckChoices, Room
+from app.patches.patch import Body, Damping, Patch, Pickup, PluckChoices, Polarisations, Room
 from app.patches.tuning import TuningChoice
 from engine.presets import SHIPPED, Preset, load_preset
 from engine.voices import Ear
@@ -25,6 +25,8 @@ RATE_HZ = 48_000
 SECONDS, HELD_S = 1.2, 0.8
 VELOCITY = 100
 QUIET: dict[str, Any] = {"softest_mm": 0.01, "hardest_mm": 0.02}
+PLAIN: dict[str, Any] = {"release_ms": 0.0, "release_hard_ms": 0.0, "variation": 0.0}
+ALONE: dict[str, Any] = {"body": Body(), "room": Room(), "polarisations": None, "sympathy_s_kg": 0.0}
 DRIVER = Path(__file__).with_name("faust_driver.cpp")
 needs_faust = pytest.mark.skipif(
     shutil.which("faust") is None or shutil.which("g++") is None, reason="needs faust and g++"
@@ -33,8 +35,8 @@ needs_faust = pytest.mark.skipif(
 
 def quiet(name: str, **changes: object) -> Patch:
     patch = read_patch(PATCHES / f"{name}.json")
-    pluck = PluckChoices.model_validate({**dict(patch.pluck), **QUIET})
-    return Patch.model_validate({**dict(patch), "body": Body(), "room": Room(), "pluck": pluck, **changes})
+    pluck = PluckChoices.model_validate({**dict(patch.pluck), **QUIET, **PLAIN})
+    return Patch.model_validate({**dict(patch), **ALONE, "pluck": pluck, **changes})
 
 
 @pytest.fixture(scope="module")
@@ -70,6 +72,15 @@ def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
     assert key.resonator.end_force is not None
     expected = key.gain * key.string.shortened * key.resonator.end_force
     np.testing.assert_allclose(at_bridge, expected, rtol=1e-12)
+
+
+def test_its_decay_is_that_of_the_first_polarisation(preset: Preset) -> None:
+    patch = quiet("classical_guitar", polarisations=Polarisations(conductance_s_kg=0.02))
+    keys = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info)
+    key = keys.of_key(60)
+    assert key is not None
+    _, _, c, d, _ = (np.array(column) for column in key_tables([key], False, patch.knobs.decay * 0.02))
+    np.testing.assert_allclose(c[0] + d[0] * np.array([1, 4, 9]), key.resonator.sigma[[0, 2, 4]], rtol=1e-12)
 
 
 def test_the_program_says_what_it_is(preset: Preset) -> None:
