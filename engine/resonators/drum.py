@@ -138,7 +138,7 @@ class DrumModes:
 
     Attributes:
         omega, sigma: with the air; (modes,).
-        scale: √(μ/μ_n), by which mass-normalised shapes are smaller.
+        scale: √(μ/μ_n); mass-normalised shapes are smaller by it.
     """
 
     drum: DrumParameters
