@@ -50,6 +50,40 @@ STRING: Mapping[str, tuple[float, float]] = {
     "tension_n": (1e-3, 1e6),
 }
 
+# Two polarisations: parameter -> least and most, and the unit
+POLARISATIONS: Mapping[str, tuple[tuple[float, float], str]] = {
+    "angle_deg": ((0.0, 80.0), "°"),
+    "second_heard": ((0.0, 1.0), ""),
+    "second_cents": ((0.0, 20.0), "cents"),
+    "conductance_s_kg": ((0.0, 0.5), "s/kg"),
+    "second_conductance_s_kg": ((0.0, 0.5), "s/kg"),
+}
+
+LOSSES: Mapping[str, tuple[float, float]] = {"air": (0.0, 20.0), "friction": (0.0, 0.1), "bending": (0.0, 1.0)}
+
+# Drums: likewise
+DRUM: Mapping[str, tuple[float, float]] = {
+    "length_m": (0.01, 3.0),
+    "width_m": (0.005, 3.0),
+    "thickness_m": (1e-5, 0.02),
+    "density_kg_m3": (1.0, 1e5),
+    "youngs_modulus_pa": (1e5, 1e13),
+    "poisson": (0.01, 0.5),
+    "tension_n_m": (0.0, 1e6),
+    "damping_d1_kg_m2_s": (0.0, 1e4),
+    "damping_d3_kg_s": (0.0, 1e3),
+    "uneven": (0.0, 0.05),
+    "air_kg_m3": (0.0, 2.0),
+    "cavity_m3": (0.0, 10.0),
+}
+MALLET: Mapping[str, tuple[float, float]] = {
+    "mass_kg": (1e-4, 5.0),
+    "radius_m": (0.0, 0.2),
+    "contact_s": (1e-5, 0.05),
+}
+STRIKE_SPEED_M_S = (0.0, 30.0)
+MOST_SURFACE_MODES = 20_000  # that are looked at before the lowest are chosen
+
 # Motion
 HIGHEST_RATE_HZ = 1_000_000
 MOST_FRAMES = 10**9  # of a horizon

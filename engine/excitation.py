@@ -48,6 +48,19 @@ def rounded(position: float, width: float, peak_m: float, grid_points: int) -> A
     return held(shape * (peak_m / shape.max()))
 
 
+def release_factor(omega: Array, release_s: float) -> Array:
+    """What is left of modes of angular frequencies ω when the force that pulls them falls to nothing in a time.
+
+    The force falls as a raised cosine does. In a linear string the motion that follows is that of a release at once,
+    in the middle of that time, from amplitudes that are smaller by the Fourier transform of the fall's slope: a slow
+    release is mellow. (Released by a finger in milliseconds: D. Chadefaux et al., "Experimentally based description
+    of harp plucking", JASA 131, 2012.)
+    """
+    half = omega * (release_s / (2 * np.pi))
+    near = np.abs(half - 1) < 1e-6  # there it is 1/2
+    return np.where(near, 0.5, np.sinc(half) / np.where(near, 1.0, 1 - half**2))
+
+
 def held(displacement: Array) -> Array:
     """The displacement (..., grid_points) with the ends held at zero, in place."""
     displacement[..., 0] = displacement[..., -1] = 0

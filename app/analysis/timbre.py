@@ -134,10 +134,13 @@ LEAST_DISTANCE_DB = 5.0
 def timbre(patch: Patch, preset: Preset, source: str = "model") -> Timbre:
     """The figures of a patch at its key nearest to E3 by octaves, without its room.
 
+    Plucks vary from stroke to stroke in `repeats_db` alone.
+
     Raises:
         ValueError: the key has no possible string.
     """
-    patch = patch.with_value("room.mix", 0.0)
+    varied = patch.with_value("room.mix", 0.0)
+    patch = varied.model_copy(update={"pluck": varied.pluck.model_copy(update={"variation": 0.0})})
     key = measured_key(patch)
     string = Strings(patch).of_key(key)
     if string is None:
@@ -168,7 +171,7 @@ def timbre(patch: Patch, preset: Preset, source: str = "model") -> Timbre:
         t60_s(note, LATE_S),
         centroids[1] / centroids[0],
         _two_notes_db(played, patch, key),
-        _repeats_db(played, patch, key),
+        _repeats_db(played, varied, key),
     )
 
 

@@ -18,6 +18,7 @@ import typer
 
 from app.commands import (
     batch,
+    drums,
     faust,
     info,
     instruments,
@@ -97,6 +98,7 @@ cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
 cli.add_typer(instruments.instruments, name="instruments")
 cli.add_typer(family.family, name="family")
+cli.add_typer(drums.drums, name="drums")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

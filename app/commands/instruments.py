@@ -54,6 +54,7 @@ def measure(
 
     try:
         entries = [find_patch(name) for name in names] if names else list_patches(SHIPPED)[0]
+        entries = [entry for entry in entries if names or entry.patch.strings.kind != "drums"]
     except PatchError as error:
         raise Failure(str(error)) from error
     presets = {name: open_preset(name) for name in sorted({entry.patch.preset for entry in entries})}

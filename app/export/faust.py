@@ -66,9 +66,11 @@ def faust_program(patch: Patch, preset: PresetInfo, most_modes: int | None = Non
     sounding = [key for key in keys if key is not None]
     if not sounding:
         raise ValueError(f"{patch.name}: none of its keys has a possible string; change its range, strings or tuning")
-    modes = min(max(key.resonator.modes for key in sounding), most_modes or grid_points)
+    modes = min(max(key.string.modes for key in sounding), most_modes or grid_points)
     bridge = patch.pickup.kind == "bridge"
-    tables = key_tables(keys, bridge)
+    moving = loud.polarisations
+    lost = 0.0 if moving is None else patch.knobs.decay * moving.conductance_s_kg
+    tables = key_tables(keys, bridge, lost)
     pulls = _pulls(patch, modes, grid_points)
     ears = [[1.0] * modes if bridge else mode_shapes(np.array([point]), modes)[:, 0].tolist() for point in ear.points]
     lines = [
@@ -141,16 +143,18 @@ def _comments(patch: Patch, modes: int) -> list[str]:
     return [
         f"// {patch.name}, of {PROGRAM} {program_version()}: its quiet string, {modes} modes.",
         "// Quiet: each mode rings by itself. Not in it: what a hard pluck's tension does (pitch that glides, modes",
-        "// that trade energy), body, room, pedal, macros. freq, gain and gate are Faust's; a voice is a string.",
+        "// that trade energy), the second polarisation, how plucks take time and vary, body, room, pedal, macros.",
+        "// freq, gain and gate are Faust's; a voice is a string.",
         "// To compile, as an example:  faust2jaqt -midi -nvoices 16 FILE.dsp",
     ]
 
 
-def key_tables(keys: list[LoudKey | None], bridge: bool = False) -> list[list[float]]:
+def key_tables(keys: list[LoudKey | None], bridge: bool = False, conductance_s_kg: float = 0.0) -> list[list[float]]:
     """t, b, c, d and loudness of each key; a silent one has its neighbour's string and no loudness.
 
     Args:
         bridge: the force at the bridge is heard, ρA ω²/η of each mode; ρAℓ/π of it is in the loudness.
+        conductance_s_kg: of the bridge, to which the first polarisation loses energy.
     """
     rows: list[list[float]] = []
     for key in keys:
@@ -163,7 +167,7 @@ def key_tables(keys: list[LoudKey | None], bridge: bool = False) -> list[list[fl
             [
                 string.tension_n / mass * eta2,
                 string.youngs_modulus_pa * string.second_moment_m4 / mass * eta2**2,
-                string.damping_d1_kg_m_s / (2 * mass),
+                string.damping_d1_kg_m_s / (2 * mass) + conductance_s_kg * string.tension_n / string.length_m,
                 string.damping_d3_kg_m_s / (2 * mass) * eta2,
                 key.gain * key.string.shortened * (mass / math.sqrt(eta2) if bridge else 1.0),
             ]

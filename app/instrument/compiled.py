@@ -8,9 +8,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from app.instrument import events
+from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.loud_keys import LoudKeys
 from app.instrument.table import fill_gain, programs_of, strings_of, table_of, wheeled
+from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.kernels import playing_layout as of
 from engine.presets import Preset
@@ -66,6 +68,7 @@ class InstrumentPlayer:
         gains: by source ("model", "truth"), of all its notes.
         ear: where strings are heard; None: at the patch's own points.
         most_notes: that ring at once; the oldest makes room.
+        varied: whether plucks vary from stroke to stroke, as the patch says; the same strokes vary alike.
 
     Raises:
         ValueError: the preset learned one string only, or the tuning is impossible.
@@ -79,6 +82,7 @@ class InstrumentPlayer:
         gains: Mapping[str, float],
         ear: Ear | None = None,
         most_notes: int = 40,
+        varied: bool = True,
     ) -> None:
         if not preset.info.of_many_strings:
             raise ValueError(
@@ -89,13 +93,15 @@ class InstrumentPlayer:
         self._info, self.grid_points = preset.info, preset.info.grid_points
         self._sources = tuple(gains)
         self._programs = programs_of(preset, rate_hz, self._sources)
-        self._lock = threading.Lock()
+        self._lock, self._varied = threading.Lock(), varied
         self._serial = self._instrument = 0
         self.table: Table | None = None
-        self.compiled = CompiledPlayer(rate_hz, min(of.MOST_MODES, self.grid_points - 2), most_notes)
+        self._of_drums = isinstance(patch.strings, Drums)
+        modes = of.MOST_DRUM_MODES if self._of_drums else min(of.MOST_MODES, self.grid_points - 2)
+        self.compiled = CompiledPlayer(rate_hz, modes, most_notes)
         self.compiled.set_source_gains(gains.values())
         heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        self._loud = LoudKeys(patch, heard, self._info)
+        self._loud = self._keys(patch, heard)
         self.take(self._loud)
 
     # What is played
@@ -142,7 +148,14 @@ class InstrumentPlayer:
             found.append(Controller(events.MOD_WHEEL, wheel, moved_by))
         return found
 
-    def loud_keys(self, patch: Patch, ear: Ear | None = None, nearly: bool = False) -> LoudKeys:
+    def _keys(self, patch: Patch, ear: Ear, near: LoudKeys | DrumKeys | None = None) -> LoudKeys | DrumKeys:
+        if not isinstance(patch.strings, Drums):
+            return LoudKeys(patch, ear, self._info, near if isinstance(near, LoudKeys) else None)
+        if not self._of_drums:
+            raise ValueError(f"{patch.name} has drums, of which this player of strings cannot hold the modes")
+        return DrumKeys(patch, ear, near if isinstance(near, DrumKeys) else None)
+
+    def loud_keys(self, patch: Patch, ear: Ear | None = None, nearly: bool = False) -> LoudKeys | DrumKeys:
         """What `take` needs of a patch. It takes milliseconds, in which keys are played.
 
         Args:
@@ -152,9 +165,9 @@ class InstrumentPlayer:
             ValueError: the tuning is impossible.
         """
         heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        return LoudKeys(patch, heard, self._info, self._loud if nearly else None)
+        return self._keys(patch, heard, self._loud if nearly else None)
 
-    def take(self, loud: LoudKeys, frame: int = 0) -> None:
+    def take(self, loud: LoudKeys | DrumKeys, frame: int = 0) -> None:
         """Plays these keys from a frame on; strings that ring glide to them.
 
         Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
@@ -167,7 +180,14 @@ class InstrumentPlayer:
             self._loud, self.table = (
                 loud,
                 table_of(
-                    loud, self.grid_points, self._sources, self._programs, self._serial, self._instrument, before
+                    loud,
+                    self.grid_points,
+                    self._sources,
+                    self._programs,
+                    self._serial,
+                    self._instrument,
+                    before,
+                    self._varied,
                 ),
             )
             self.compiled.take(self.table, frame)

@@ -11,16 +11,20 @@ START_S, as high modes of short strings die away before a pitch is heard. The gl
 
 from __future__ import annotations
 
+import contextlib
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.instrument.drum_keys import DrumKeys
 from app.instrument.strings import MOST_MODES, KeyString, Strings
+from app.patches.drums import Drums
 from app.patches.fields import HIGHEST_KEY
 from app.patches.patch import VELOCITIES, Patch
 from engine.pluck import LARGEST_AMPLITUDE_MM
 from engine.resonators.sine_transform import analysis_matrix
+from engine.voices import Ear
 
 START_S = 0.1  # of a note, over which its pitch is averaged
 GRID_POINTS = 101
@@ -35,6 +39,8 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
     Raises:
         ValueError: the tuning is impossible.
     """
+    if isinstance(patch.strings, Drums):
+        return _of_drums(patch)
     strings = Strings(patch)
     plucks = [patch.pluck.pluck(velocity) for velocity in range(VELOCITIES[1] + 1)]
     amplitudes_mm = np.array([pluck.amplitude_mm for pluck in plucks])
@@ -50,6 +56,19 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
         if string is not None:
             pulled = np.minimum(string.shortened, LARGEST_AMPLITUDE_MM / amplitudes_mm)
             found[key] = _of_string(string, modal_m * pulled[:, None])
+    found.setflags(write=False)
+    return found
+
+
+def _of_drums(patch: Patch) -> NDArray[np.float64]:
+    """As `glides_cents`, by the mean tension of a blow's first swing."""
+    keys = DrumKeys(patch, Ear(tuple(patch.pickup.points)))
+    found = np.full((HIGHEST_KEY + 1, VELOCITIES[1] + 1), np.nan)
+    low, high = patch.range
+    for key in range(low, high + 1):
+        with contextlib.suppress(ValueError):
+            if (drum := keys.of_key(key)) is not None:
+                found[key] = [drum.drop_cents(velocity, patch.pluck.curve) for velocity in range(len(found[key]))]
     found.setflags(write=False)
     return found
 

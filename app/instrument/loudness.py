@@ -12,13 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.effects import RESPONSE_HZ, Response
+from engine.excitation import release_factor
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
 from engine.resonators.base import Resonator
 from engine.voices import Ear
 
 PART_S = 0.4  # of the note: a loudness meter's block
-# The level of a note at REFERENCE_VELOCITY. Six such notes of the classical guitar, strummed, peak at -5 dBFS.
-WANTED_DB = -24.0
+# The level of a note at REFERENCE_VELOCITY. Six such notes of the classical guitar, strummed, peak at -9 dBFS.
+WANTED_DB = -29.0
 HIGHEST_PEAK_DB = WANTED_DB + 15.0  # of such a note of any key
 PEAK_BLOCKS = 54  # blocks of 54 frames: 60 ms
 REFERENCE_VELOCITY = 100
@@ -40,13 +41,16 @@ def k_weight(frequencies_hz: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.abs(shelf * high_pass) ** 2
 
 
-def level_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None) -> float:
+def level_db(
+    resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None, release_s: float = 0.0
+) -> float:
     """The K-weighted level of a quiet pluck's first 0.4 s, in dB re full scale; -inf for silence.
 
     Args:
         response: of the body that the string is heard through.
+        release_s: of the pluck.
     """
-    amplitudes, sigma, omega = _heard(resonator, pluck, ear)
+    amplitudes, sigma, omega = _heard(resonator, pluck, ear, release_s)
     falls = 2 * sigma * PART_S
     mean = np.where(falls > 1e-6, -np.expm1(-falls) / np.maximum(falls, 1e-6), 1.0)
     frequencies_hz = omega / (2 * np.pi)
@@ -56,18 +60,22 @@ def level_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | 
     return 10 * float(np.log10(total)) if total > 0 else -float("inf")
 
 
-def gain_of(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None) -> float:
+def gain_of(
+    resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None, release_s: float = 0.0
+) -> float:
     """The factor that brings a pluck at the reference velocity to the wanted level; 1 where it is silent."""
-    found = level_db(resonator, pluck, ear, response)
+    found = level_db(resonator, pluck, ear, response, release_s)
     if found == -math.inf:  # at a fixed end: it would be far too loud anywhere else
         return 1.0
     low, high = GAIN_RANGE_DB
     return float(10 ** (min(max(WANTED_DB - found, low), high) / 20))
 
 
-def peak_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None) -> float:
+def peak_db(
+    resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | None = None, release_s: float = 0.0
+) -> float:
     """The highest sample of a quiet pluck's first 60 ms, in dB re full scale; -inf for silence."""
-    amplitudes, sigma, omega = _heard(resonator, pluck, ear)
+    amplitudes, sigma, omega = _heard(resonator, pluck, ear, release_s)
     eigenvalues = (1j * omega - sigma) / RESPONSE_HZ
     blocks = np.arange(PEAK_BLOCKS)
     begins, within = (np.exp(np.multiply.outer(steps, eigenvalues)) for steps in (blocks * PEAK_BLOCKS, blocks))
@@ -85,10 +93,12 @@ def peak_db(resonator: Resonator, pluck: Pluck, ear: Ear, response: Response | N
 
 
 def _heard(
-    resonator: Resonator, pluck: Pluck, ear: Ear
+    resonator: Resonator, pluck: Pluck, ear: Ear, release_s: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """The amplitudes of the partials as heard, (modes, points), re full scale; σ and ω in 1/s, (modes,)."""
     q = resonator.to_modes(pluck.displacement(resonator.points))
+    if release_s:
+        q = q * release_factor(resonator.omega, release_s)
     weights = resonator.shapes @ ear.weights(resonator.points, resonator.force_weights) / FULL_SCALE_M
     sigma, omega = resonator.sigma, resonator.omega
     if ear.pickup == "velocity":

@@ -23,6 +23,7 @@ from app.instrument.events import (
 )
 from app.instrument.midi_chunks import checked_chunks
 from app.instrument.strings import Strings
+from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from engine.plain_text import one_line
@@ -135,7 +136,7 @@ def _in_time(song: Any) -> Iterator[tuple[float, Any]]:
 
 
 def read_song(path: Path, patch: Patch | None) -> Song:
-    """What a patch plays of a MIDI file: all but drums, which are no strings, and notes for which it has none.
+    """What a patch plays of a MIDI file: strings leave drums out, and drums on pads all else; and keys without sound.
 
     In MPE channel 10 is one as the others. In guitar mode a file whose notes are all on one channel is no guitar's,
     whichever channel that is: it plays any key.
@@ -145,7 +146,13 @@ def read_song(path: Path, patch: Patch | None) -> Song:
     """
     timed, mode = read_midi(path), patch.mode if patch is not None else "poly"
     notes_on = {each.event.channel for each in timed if isinstance(each.event, NoteOn)}
+    pads = patch is not None and isinstance(patch.strings, Drums) and patch.strings.keys == "pads"
     drums = set() if mode == "mpe" else notes_on & {DRUMS}
+    if pads and drums:
+        timed = [each for each in timed if channels_in([each.event]) in (drums, set())]
+        return _song(path, patch, timed, [f"its other channels ({len(notes_on) - 1})"] if len(notes_on) > 1 else [])
+    if pads:
+        drums = set()
     channels = notes_on - drums
     if not channels:
         raise MidiFileError(f"{path}: holds only drums (channel 10); give a MIDI file with other notes")
@@ -153,11 +160,18 @@ def read_song(path: Path, patch: Patch | None) -> Song:
         timed = [each for each in timed if channels_in([each.event]) != drums]
     if mode == "guitar" and len(channels) == 1:
         timed = [replace(each, event=_on_keys(each.event)) for each in timed if channels_in([each.event]) == channels]
-    left_out = ["its drums (channel 10)"] if drums else []
+    return _song(path, patch, timed, ["its drums (channel 10)"] if drums else [])
+
+
+def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: list[str]) -> Song:
+    """The song; `left_out` with the notes for which the patch has no sound."""
     keys = [each.event.key for each in timed if isinstance(each.event, NoteOn)]
     if patch is not None and (silent := _silent(patch, keys)):
         low, high = (note_name(key) for key in patch.range)
-        left_out.append(f"{silent} of its {len(keys)} notes, for which {patch.name} has no string ({low} to {high})")
+        sounding = "drum" if isinstance(patch.strings, Drums) else "string"
+        left_out.append(
+            f"{silent} of its {len(keys)} notes, for which {patch.name} has no {sounding} ({low} to {high})"
+        )
     return Song(timed, f"{path.name} is played without {' and '.join(left_out)}" if left_out else "")
 
 

@@ -31,6 +31,7 @@ BLOCK_FRAMES = 4_096
 LONGEST_TAIL_S = 60.0
 SILENT_DB = -90.0  # re full scale: after the last event it ends where the peak of a block is lower
 STOLEN_S = 0.03
+SYMPATHY_S = 5.0  # for which strings may ring that are not played
 MOST_RINGING = 96  # where more strings ring, the oldest fade out
 
 
@@ -39,13 +40,19 @@ class _Stage:
 
     Args:
         gains: of the sources that are heard together; a difference, of two, is heard without body and room.
+        varied: whether plucks vary from stroke to stroke; those of a difference do not.
     """
 
-    def __init__(self, patch: Patch, preset: Preset, rate_hz: int, gains: Mapping[str, float], limited: bool) -> None:
+    def __init__(
+        self, patch: Patch, preset: Preset, rate_hz: int, gains: Mapping[str, float], limited: bool, varied: bool
+    ) -> None:
         self.mixer = Mixer(rate_hz, limited=limited)
-        self.player = InstrumentPlayer(patch, preset, rate_hz, gains, most_notes=MOST_RINGING)
+        compared = len(gains) > 1
+        self.player = InstrumentPlayer(
+            patch, preset, rate_hz, gains, most_notes=MOST_RINGING, varied=varied and not compared
+        )
         self.mixer.set_player(self.player.compiled)
-        self._dry = len(gains) > 1
+        self._dry = compared
         self.tail_s = 0.0
         self._set_effects()
 
@@ -64,6 +71,8 @@ class _Stage:
         self.mixer.set_effects(effects)
         if effects is not None:
             self.tail_s = max(self.tail_s, effects.tail_s(self.mixer.rate_hz))
+        if self._heard_through().sympathy_s_kg > 0:
+            self.tail_s = max(self.tail_s, SYMPATHY_S)
 
     def _heard_through(self) -> Patch:
         return self.player.heard_through
@@ -77,7 +86,9 @@ class _Stage:
 class _VoicedStage(_Stage):
     """The same for a string learned from a recording, whose modes the compiled player does not compute."""
 
-    def __init__(self, patch: Patch, preset: Preset, rate_hz: int, gains: Mapping[str, float], limited: bool) -> None:
+    def __init__(
+        self, patch: Patch, preset: Preset, rate_hz: int, gains: Mapping[str, float], limited: bool, varied: bool
+    ) -> None:
         self.mixer = Mixer(rate_hz, limited=limited)
         self._gains = gains
         self._struck: list[Struck] = []
@@ -120,6 +131,7 @@ def render_events(
     limited: bool = True,
     advanced: Callable[[float], None] = lambda seconds: None,
     difference_gain_db: float = 0.0,
+    varied: bool = True,
 ) -> Iterator[NDArray[np.float32]]:
     """The sound of a patch that plays events, in blocks (frames, channels), ±1 being full scale. Deterministic.
 
@@ -130,12 +142,13 @@ def render_events(
         seconds: its length; None: until all has died away, a minute after the last event at most.
         limited: through the limiter, as it is heard; without it, samples may pass full scale.
         advanced: is called with the seconds rendered so far; may raise, to end it.
+        varied: whether plucks vary from stroke to stroke, as the patch says; in a difference they never do.
 
     Raises:
         ValueError: a key has no possible string, or there is no such `source`.
     """
     kind = _Stage if preset.info.recorded is None else _VoicedStage
-    stage = kind(patch, preset, rate_hz, _gains(source, difference_gain_db), limited)
+    stage = kind(patch, preset, rate_hz, _gains(source, difference_gain_db), limited, varied)
     channels = channels_played(patch, timed)
     skipped = AHEAD if limited else 0  # the delay of the limiter
     done, events = 0, sorted(timed, key=lambda each: each.time_s)
@@ -200,7 +213,7 @@ def render_note(
     source: str = "model",
     advanced: Callable[[float], None] = lambda seconds: None,
 ) -> NDArray[np.float32]:
-    """One key that is held for `held_s`, (frames, channels), `seconds` long, without a limiter.
+    """One key that is held for `held_s`, (frames, channels), `seconds` long, without a limiter and without variation.
 
     Args:
         advanced: as in `render_events`.
@@ -212,7 +225,9 @@ def render_note(
     if held_s < seconds:
         events.append((held_s, NoteOff(key)))
     timed = [TimedEvent(time_s, event) for time_s, event in events]
-    blocks = list(render_events(patch, preset, timed, rate_hz, source, seconds, limited=False, advanced=advanced))
+    blocks = list(
+        render_events(patch, preset, timed, rate_hz, source, seconds, limited=False, advanced=advanced, varied=False)
+    )
     sound = np.concatenate(blocks)
     if not math.isfinite(float(np.abs(sound).max())):
         raise ValueError(f"key {key} at velocity {velocity}: its sound is not finite")

@@ -21,13 +21,15 @@ from functools import lru_cache
 from app.instrument import events
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.hands import GUITAR_STRINGS, Hands
-from app.instrument.loud_keys import LoudKeys, on_string
+from app.instrument.loud_keys import LoudKeys, on_string, retuned
 from app.instrument.strings import KeyString, Strings, bent, chosen_string, damped, fretting, slid
-from app.patches.patch import Patch, StringSet
+from app.patches.patch import Knobs, Patch, StringSet
 from app.shared.parameters import OF_PATCHES
+from engine.excitation import release_factor
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo
-from engine.resonators.base import Resonator
+from engine.resonators.base import Array, Resonator
+from engine.resonators.sine_transform import to_grid, to_modes
 from engine.resonators.string import StringParameters
 from engine.voices import Ear, Program, Voice
 from engine.voices.programs import solver_program, tension_program
@@ -93,6 +95,7 @@ class Struck:
     held: bool = True
     kept: bool = False
     damped: bool = False
+    knobs: Knobs | None = None  # as they are now
     retuning: threading.Lock = field(default_factory=threading.Lock)  # of its voices, by one thread at a time
 
     @property
@@ -107,7 +110,8 @@ class Struck:
 
     def retune(self, parameters: StringParameters, seconds: float, frame: int = 0) -> None:
         """Lets the voices glide to the modes of other parameters, from a frame on. Any thread; the latest counts."""
-        resonator = self.preset.retuned(self.key.resonator, parameters)
+        patch = self.key.patch if self.knobs is None else self.key.patch.model_copy(update={"knobs": self.knobs})
+        resonator = retuned(self.key.resonator, parameters, patch, self.preset)
         with self.retuning:
             self.parameters = parameters
             for voice in self.voices.values():
@@ -350,10 +354,10 @@ class Player:
         if key is None:
             return None
         pluck = on_string(key.string, self._pluck(event))
-        voices = {
-            source: Voice(program, pluck.displacement(program.grid_points), self._ear)
-            for source, program in key.programs.items()
-        }
+        release_s = self._wheeled("pluck").pluck.release_s(event.velocity)
+        grid = self._preset.info.grid_points
+        pulled = released(pluck.displacement(grid), key.string.parameters, release_s)
+        voices = {source: Voice(program, pulled, self._ear) for source, program in key.programs.items()}
         before = self._ringing.get(place)
         if before is not None and before.over:
             before = None
@@ -488,7 +492,7 @@ class Player:
     def _with_hands(self, struck: Struck) -> StringParameters:
         """The string of its key, with the present knobs, wheels and damper."""
         patch = self._wheeled("knobs")
-        string = struck.key.string.parameters
+        string, struck.knobs = struck.key.string.parameters, patch.knobs
         on = self._on(struck)
         try:
             strings = self._keys.string_of if patch is self._patch else Strings(patch).of_key
@@ -505,6 +509,15 @@ class Player:
         parameters = self._with_hands(struck)
         if parameters != struck.parameters:
             struck.retune(parameters, seconds, self._frame)
+
+
+def released(displacement: Array, string: StringParameters, release_s: float) -> Array:
+    """A pluck on the grid as it counts when its string is released within a time."""
+    if release_s == 0:
+        return displacement
+    modes = len(displacement) - 2
+    left = release_factor(string.undamped_frequencies(modes), release_s)
+    return to_grid(to_modes(displacement, modes) * left, len(displacement))
 
 
 def is_another(patch: Patch, than: Patch) -> bool:

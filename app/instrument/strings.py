@@ -11,6 +11,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from app.patches.drums import Drums
 from app.patches.patch import Fretted, Knobs, Patch, StringSet
 from app.patches.tuning import Tuning
 from engine.kernels.playing_layout import HIGHEST_HZ, MOST_MODES, MOST_SLACKENED
@@ -60,6 +61,10 @@ class Strings:
         pitch_hz = self.pitch_hz(key)
         if pitch_hz is None:
             return None
+        if isinstance(self._patch.strings, Drums):
+            raise ValueError(
+                f"key {key} of {self._patch.name} is a drum, and no string; choose an instrument of strings"
+            )
         try:
             own = self._own(key, string)
             parameters = fretted(own, pitch_hz)
@@ -73,6 +78,8 @@ class Strings:
     def pitch_hz(self, key: int) -> float | None:
         """The pitch of a key; None as in `of_key`."""
         low, high = self._patch.range
+        if isinstance(self._patch.strings, Drums) and self._patch.strings.of_key(key) is None:
+            return None
         return self._tuning.hz(key) if low <= key <= high and self._tuning.mapped(key) else None
 
     def open_hz(self, note: int) -> float:
@@ -82,6 +89,7 @@ class Strings:
     def _own(self, key: int, number: int | None) -> StringParameters:
         """The whole string on which a key is played, with the patch's knobs."""
         strings = self._patch.strings
+        assert not isinstance(strings, Drums)
         if isinstance(strings, Fretted):
             return turned(strings.string.parameters, self._patch.knobs)
         ordered = strings.strings[::-1]

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.instrument.drum_keys import DrumKeys, block_of
 from app.instrument.loud_keys import LoudKeys
 from app.instrument.strings import KNOBS, STRING
+from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
 from app.shared.parameters import OF_PATCHES
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.presets import Preset
+from engine.resonators.polarised import PAIRS
 from engine.voices.player import Table
 from engine.voices.programs import solver_memory, tension_memory
 
@@ -69,19 +73,21 @@ def programs_of(preset: Preset, rate_hz: int, sources: Iterable[str]) -> tuple[N
 
 
 def table_of(
-    loud: LoudKeys,
+    loud: LoudKeys | DrumKeys,
     grid_points: int,
     sources: Iterable[str],
     programs: tuple[NDArray[np.float64], ...],
     serial: int,
     instrument: int,
     near: Table | None = None,
+    varied: bool = True,
 ) -> Table:
     """The table of a patch. Gains of keys are filled in by `fill_gain`; until then they are those of `near`.
 
     Args:
         serial: above that of all tables before.
         instrument: the same for the same instrument with a knob turned.
+        varied: whether plucks vary from stroke to stroke, as the patch says.
     """
     patch, ear = loud.patch, loud.ear
     memory = np.zeros(of.table_slots(grid_points))
@@ -95,6 +101,25 @@ def table_of(
     points = [of.BRIDGE] * len(ear.points) if ear.pickup == "bridge" else ear.points
     memory[of.TABLE_POINT : of.TABLE_POINT + len(points)] = points
     counts[of.TABLE_SOLO], counts[of.TABLE_GRID] = ear.solo, grid_points
+    if (moving := loud.polarisations) is not None:
+        counts[of.TABLE_PAIRS], memory[of.TABLE_DETUNING] = PAIRS, moving.detuning
+        for first, both in (
+            (of.TABLE_PULLED, moving.pulled),
+            (of.TABLE_HEARD, moving.heard),
+            (of.TABLE_CONDUCTANCE, (moving.conductance_s_kg, moving.second_conductance_s_kg)),
+        ):
+            memory[first : first + 2] = both
+    else:
+        memory[of.TABLE_DETUNING] = 1.0
+    if patch.losses is not None:
+        lost = patch.losses.air, patch.losses.friction, patch.losses.bending
+        memory[of.TABLE_LOSSES : of.TABLE_LOSSES + 3] = lost
+    if patch.sympathy_s_kg > 0:
+        counts[of.TABLE_SYMPATHY] = of.EVERY_KEY if patch.damping.let_ring else of.OPEN_STRINGS
+        memory[of.TABLE_SYMPATHY_S_KG] = patch.sympathy_s_kg
+    pluck = patch.pluck
+    memory[of.TABLE_RELEASE_S : of.TABLE_RELEASE_S + 2] = pluck.release_ms / 1000, pluck.release_hard_ms / 1000
+    memory[of.TABLE_VARIATION] = pluck.variation if varied else 0.0
     goal = wheel_goal(patch) if patch.mod_wheel in VALUES else None
     counts[of.TABLE_WHEEL] = -1 if goal is None else VALUES.index(patch.mod_wheel)
     memory[of.TABLE_WHEEL_GOAL] = 0.0 if goal is None else goal
@@ -103,9 +128,12 @@ def table_of(
         counts[of.TABLE_PROGRAMS + place] = program.ctypes.data
     counts[of.TABLE_SOURCES] = len(programs)
     memory[of.TABLE_VALUES : of.TABLE_VALUES + of.VALUES] = [_value(patch, name) for name in VALUES]
+    if isinstance(loud, DrumKeys):
+        return Table(_with_drums(memory, loud), programs)
     for key in range(of.KEYS):
         memory[of.TABLE_PITCHES + key] = loud.strings.pitch_hz(key) or 0.0
     strings = patch.strings
+    assert not isinstance(strings, Drums)
     if isinstance(strings, Fretted):
         memory[of.TABLE_OPEN + of.OPEN_STRING : of.TABLE_OPEN + of.OPEN_SLOTS] = _row(strings.string)
     else:
@@ -122,7 +150,24 @@ def table_of(
     return Table(memory, programs)
 
 
-def fill_gain(table: Table, loud: LoudKeys, key: int, string: int | None = None) -> None:
+def _with_drums(memory: NDArray[np.float64], loud: DrumKeys) -> NDArray[np.float64]:
+    """The table with the drums of all keys, and their gains. A key whose drum is impossible has none."""
+    blocks: list[NDArray[np.float64]] = []
+    first = len(memory) + of.KEYS
+    slots = np.zeros(of.KEYS, np.int64)
+    low, high = loud.patch.range
+    for key in range(low, high + 1):
+        with contextlib.suppress(ValueError):
+            if (found := loud.of_key(key)) is not None:
+                memory[of.TABLE_GAINS + key * of.GAINS] = found.gain
+                blocks.append(block_of(found))
+                slots[key] = first
+                first += len(blocks[-1])
+    memory.view(np.int64)[of.TABLE_DRUMS] = len(memory)
+    return np.concatenate([memory, slots.view(np.float64), *blocks])
+
+
+def fill_gain(table: Table, loud: LoudKeys | DrumKeys, key: int, string: int | None = None) -> None:
     """Computes the gain of a key, where it is not known, in half a millisecond. Any thread.
 
     Args:
@@ -131,6 +176,9 @@ def fill_gain(table: Table, loud: LoudKeys, key: int, string: int | None = None)
     Raises:
         ValueError: the key has no possible string.
     """
+    if isinstance(loud, DrumKeys):
+        loud.of_key(key)  # whose gain the table has
+        return
     slot = of.TABLE_GAINS + key * of.GAINS + (0 if string is None else 1 + string)
     if table.memory[slot] > 0:
         return

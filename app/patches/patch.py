@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
+from app.patches.drums import Drums
 from app.patches.fields import LONGEST_NAME, Flag, Key, Name, Reference, Share, Text, Value, parameter, plain, ranged
 from app.patches.tuning import TuningChoice
 from app.shared.parameters import MOST_MACROS, OF_PATCHES, modulated_by
@@ -22,7 +23,7 @@ from engine.pluck import DEFAULT_LISTEN, Pluck, Shape
 if TYPE_CHECKING:
     from engine.resonators.string import StringParameters
 
-Category = Literal["guitar", "bass", "harp", "keys", "world", "experimental"]
+Category = Literal["guitar", "bass", "harp", "keys", "world", "drums", "experimental"]
 CATEGORIES: tuple[Category, ...] = get_args(Category)
 Mode = Literal["poly", "guitar", "mpe"]
 ASSIGNABLE = tuple(each.id for each in modulated_by("macro"))  # what macros may turn
@@ -123,6 +124,10 @@ class PluckChoices(Value):
         curve: 0 is even; towards 1 the middle velocities are louder, towards -1 softer.
         stops: whether what plucks a string that rings stops it first, as a finger or a plectrum does. Otherwise the
             pluck is added to the motion, as under a hammer.
+        release_ms, release_hard_ms: time in which the softest and the hardest pluck release the string; between
+            them a step of velocity is a ratio. Slower is mellower. Both 0: at once.
+        variation: spread of place, force, width, angle and release from stroke to stroke. Comparisons of model
+            and truth leave it out.
     """
 
     shape: Shape = "triangular"
@@ -133,6 +138,15 @@ class PluckChoices(Value):
     hardest_mm: float = parameter("pluck.hardest_mm")
     curve: float = parameter("pluck.curve")
     stops: Flag = True
+    release_ms: Annotated[float, ranged(0, 20)] = 0.0
+    release_hard_ms: Annotated[float, ranged(0, 20)] = 0.0
+    variation: Share = 0.0
+
+    @model_validator(mode="after")
+    def _both_take_time(self) -> Self:
+        if (self.release_ms > 0) != (self.release_hard_ms > 0):
+            raise ValueError("release_ms and release_hard_ms must both be 0, or both above 0; change one")
+        return self
 
     @model_validator(mode="after")
     def _softest_is_softer(self) -> Self:
@@ -142,8 +156,7 @@ class PluckChoices(Value):
 
     def pluck(self, velocity: float) -> Pluck:
         """The pluck of a velocity in 1 … 127, which need not be an integer; others count as the nearest."""
-        low, high = VELOCITIES
-        share = min(1.0, max(0.0, (velocity - low) / (high - low))) ** (4**-self.curve)
+        share = self._share(velocity)
         return Pluck(
             self.position,
             self.softest_mm * (self.hardest_mm / self.softest_mm) ** share,
@@ -151,12 +164,57 @@ class PluckChoices(Value):
             self.width * (self.width_hard / self.width) ** share,
         )
 
+    def release_s(self, velocity: float) -> float:
+        """The time in which a pluck of a velocity releases the string; 0: at once."""
+        if self.release_ms == 0:
+            return 0.0
+        return self.release_ms / 1000 * (self.release_hard_ms / self.release_ms) ** self._share(velocity)
+
+    def _share(self, velocity: float) -> float:
+        low, high = VELOCITIES
+        return float(min(1.0, max(0.0, (velocity - low) / (high - low))) ** (4**-self.curve))
+
 
 class Pickup(Value):
     """Where the string is heard, one point or left and right, and whether as displacement or its velocity."""
 
     points: Annotated[tuple[Share, ...], Field(min_length=1, max_length=2)] = (DEFAULT_LISTEN,)
     kind: PickupKind = "displacement"
+
+
+def _polarisation(name: str) -> Any:
+    return ranged(*bounds.POLARISATIONS[name][0])
+
+
+class Polarisations(Value):
+    """Motion across the string in two directions, by `engine.resonators.polarised`.
+
+    Attributes:
+        angle_deg: of the pluck, from the direction that is normal to the soundboard.
+        second_heard: what motion along the board is heard with, of motion normal to it.
+        second_cents: pitch of motion along the board, above the other.
+        conductance_s_kg, second_conductance_s_kg: of the bridge in both directions: more lets them decay sooner.
+            The decay knob multiplies both.
+    """
+
+    angle_deg: Annotated[float, _polarisation("angle_deg")] = 45.0
+    second_heard: Annotated[float, _polarisation("second_heard")] = 0.3
+    second_cents: Annotated[float, _polarisation("second_cents")] = 1.0
+    conductance_s_kg: Annotated[float, _polarisation("conductance_s_kg")] = 0.01
+    second_conductance_s_kg: Annotated[float, _polarisation("second_conductance_s_kg")] = 0.001
+
+
+class Losses(Value):
+    """Decay by mode, by `engine.resonators.losses`, beside d₁ and d₃ of the strings, which may be 0 then.
+
+    Attributes:
+        air: factor of the losses to the air; the decay knob multiplies it.
+        friction, bending: loss factors inside the string; the knob of dulling multiplies them.
+    """
+
+    air: Annotated[float, ranged(*bounds.LOSSES["air"])] = 1.0
+    friction: Annotated[float, ranged(*bounds.LOSSES["friction"])] = 2e-4
+    bending: Annotated[float, ranged(*bounds.LOSSES["bending"])] = 0.02
 
 
 class Damping(Value):
@@ -203,6 +261,10 @@ class Patch(Value):
     Attributes:
         preset: the model that plays it, by the name of a preset of many strings; never a path.
         range: the lowest and the highest key that sound.
+        losses: None: strings decay by d₁ and d₃ alone, and through the bridge.
+        sympathy_s_kg: conductance of the bridge through which strings at rest ring with those that are played: of all
+            keys where strings are let ring, else the open strings of a set. 0: they do not.
+        polarisations: None: strings move in one direction alone, and lose nothing at a bridge.
         mode: "poly": a string for each key; "guitar": a string for each MIDI channel; "mpe".
         bend_by: whether the pitch wheel changes the tension, as a bent string, or the length, as a slide.
         mod_wheel: one of WHEEL, or "none".
@@ -216,11 +278,14 @@ class Patch(Value):
     description: Text = ""
     author: Text = ""
     preset: Name = "studio_any_string"
-    strings: Annotated[Fretted | StringSet, Field(discriminator="kind")]
+    strings: Annotated[Fretted | StringSet | Drums, Field(discriminator="kind")]
     knobs: Knobs = Knobs()
     range: tuple[Key, Key] = (28, 88)
     pluck: PluckChoices = PluckChoices()
     pickup: Pickup = Pickup()
+    polarisations: Polarisations | None = None
+    losses: Losses | None = None
+    sympathy_s_kg: Annotated[float, ranged(0, 0.5)] = 0.0
     damping: Damping = Damping()
     mode: Mode = "poly"
     bend_semitones: Annotated[float, ranged(0, 48)] = 2.0

@@ -8,6 +8,7 @@
     voice      what all voices share: listening points, pick-up, gain, silence
     fourier    a transform without memory of its own
     convolver  the sum of all voices through an impulse response: body and room
+    sympathy   strings that ring with those that are played
     limiter    the safety limiter, which looks ahead
     mixer      the sum of all voices, effects, volume, limiter, meters; the device's callback
     cache      where they are kept once they are compiled

@@ -17,6 +17,7 @@ from engine.kernels.convolver import convolve
 from engine.kernels.limiter import limit
 from engine.kernels.memory import fence, pointer
 from engine.kernels.player import play
+from engine.kernels.sympathy import sympathise
 from engine.kernels.voice import add, note_gap, take_over
 
 TONE_HZ, TONE_LEVEL, TONE_FADE_S = 440.0, 0.1, 0.020
@@ -76,6 +77,8 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
             kept += 1
     fence()
     counts[at.M_ACTIVE] = kept
+    if player != 0:
+        sympathise(player, counts[at.M_HERE])
     convolve(mixer)
     _finish(mixer)
 

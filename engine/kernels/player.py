@@ -26,9 +26,9 @@ import math
 import numpy as np
 from numba import carray, njit
 
+from engine.kernels import drums, strings
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
-from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
 from engine.kernels.modes import TOO_HIGH
@@ -48,6 +48,11 @@ DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the glide to other modes
 STOP_S = 0.03  # of the fade of all strings
 STOLEN_S = 0.03  # of the fade of a note that makes room
 PLUCK_STOPS_S = 0.006  # in which a string is stopped by what plucks it again
+
+# By how much a pluck varies from stroke to stroke, at most, where an instrument varies by 1. Estimates: repeats then
+# differ by about -20 dB; those of a player that was recorded do by -4 … -12 dB
+VARIES_PLACE, VARIES_DB, VARIES_WIDTH, VARIES_RELEASE = 0.08, 1.0, 0.12, 0.2  # shares, dB
+VARIES_ANGLE = math.radians(8.0)
 
 # Controllers of MIDI
 MOD_WHEEL, DATA, SUSTAIN, FINE_DATA, SLIDE = 1, 6, 64, 38, 74
@@ -228,7 +233,7 @@ def _chosen(table: np.ndarray, count: int, key: int) -> int:
 
 
 @njit(**COMPILED)
-def _string_of(
+def string_of(
     player: np.ndarray,
     players: np.ndarray,
     table: np.ndarray,
@@ -239,7 +244,7 @@ def _string_of(
     wheeled: bool,
     out: np.ndarray,
 ) -> tuple[int, float]:
-    """The string of a key, before bends: its modes, 0 where there is none, and its share of the whole string.
+    """The string of a key, before bends: its partials, 0 where there is none, and its share of the whole string.
 
     Args:
         number: on which of a set it is played, from the highest, 0; -1, or one that would have to be slackened too
@@ -269,7 +274,7 @@ def _string_of(
     out[of.LENGTH] = strings.fretted(whole, pitch_hz)
     if not strings.possible(out):
         return 0, 1.0
-    modes = min(strings.modes_below(out, of.HIGHEST_HZ), players[of.PLAYER_MODES])
+    modes = min(strings.modes_below(out, of.HIGHEST_HZ), players[of.PLAYER_MODES] - of.MOST_PAIRS)
     return modes, out[of.LENGTH] / whole[of.LENGTH]
 
 
@@ -291,7 +296,7 @@ def _string_now(
     if pitch_hz > 0.0:
         number = players[note + of.NOTE_STRING] if mode == of.GUITAR else -1
         wheeled = players[of.PLAYER_WHEEL] != 0 and 0 <= tables[of.TABLE_WHEEL] < of.KNOBS
-        modes, _ = _string_of(player, players, table, tables, key, number, pitch_hz, wheeled, out)
+        modes, _ = string_of(player, players, table, tables, key, number, pitch_hz, wheeled, out)
         fits = modes > 0 and (wheeled or not strings.overdamped(out, modes))
     else:
         for place in range(of.STRING):
@@ -378,20 +383,22 @@ def _round(player: np.ndarray, table: np.ndarray, grid: int, position: float, pe
 @njit(**COMPILED)
 def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: int, note: int) -> None:
     """Sets one of the two sets of weights of a voice for the points of its note; modes too high are not heard."""
-    n, solo = players[note + of.NOTE_MODES], players[note + of.NOTE_SOLO]
+    n, solo, pairs = players[note + of.NOTE_MODES], players[note + of.NOTE_SOLO], players[note + of.NOTE_PAIRS]
     own, highest = player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING], TOO_HIGH * player[of.PLAYER_RATE]
-    for mode in range(1, n + 1):
-        sigma = strings.decay_rate(own, mode)
-        omega = math.sqrt(max(strings.omega_squared(own, mode) - sigma * sigma, 0.0))
+    for mode in range(n):
+        partial = strings.partial_of(mode, pairs)
+        part = player[note + of.NOTE_HEARD + strings.direction_of(mode, pairs)]
+        sigma = strings.decay_rate(own, partial)
+        omega = math.sqrt(max(strings.omega_squared(own, partial) - sigma * sigma, 0.0))
         for point in range(players[note + of.NOTE_POINTS]):
-            first = at.weights(n, which, point, 0) + mode - 1
+            first = at.weights(n, which, point, 0) + mode
             place = player[note + of.NOTE_POINT + point]
             if place == of.BRIDGE:
-                weight = strings.bridge_force(own, mode) / FULL_SCALE_N
+                weight = strings.bridge_force(own, partial) / FULL_SCALE_N
             else:
-                weight = math.sin(math.pi * mode * place) / FULL_SCALE_M
-            heard = omega <= highest and (solo == 0 or solo == mode)
-            voice[first] = weight if heard else 0.0
+                weight = math.sin(math.pi * partial * place) / FULL_SCALE_M
+            heard = omega <= highest and (solo == 0 or solo == partial)
+            voice[first] = part * weight if heard else 0.0
             voice[first + n] = 0.0
 
 
@@ -404,9 +411,79 @@ def _slots_of_voice(players: np.ndarray, note: int, source: int) -> int:
 
 
 @njit(**COMPILED)
+def _release_pluck(player: np.ndarray, own: np.ndarray, partials: int, release_s: float) -> None:
+    """Releases a pluck's partials within a time: as `excitation.release_factor`."""
+    for mode in range(partials if release_s > 0.0 else 0):
+        half = math.sqrt(strings.omega_squared(own, mode + 1)) * release_s / (2 * math.pi)
+        left = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
+        player[of.PLAYER_AMPLITUDES + mode] *= left
+
+
+@njit(**COMPILED)
+def _varied(stroke: int, key: int, which: int) -> float:
+    """A number in -1 … 1 for each stroke: the same for the same strokes (splitmix64)."""
+    mixed = np.uint64(stroke * 4096 + key * 16 + which + 1) * np.uint64(0x9E3779B97F4A7C15)
+    mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    mixed = mixed ^ (mixed >> np.uint64(31))
+    return float(np.int64(mixed >> np.uint64(12))) / 2.0**51 - 1
+
+
+@njit(**COMPILED)
+def _split(player: np.ndarray, table: np.ndarray, tables: np.ndarray, partials: int, turned: float) -> int:
+    """Splits a pluck's partials into modes of both polarisations; how many partials have two.
+
+    Args:
+        turned: by so many rad from the instrument's angle.
+    """
+    pairs = min(tables[of.TABLE_PAIRS], partials)
+    if pairs == 0:
+        return 0
+    first, cosine, sine = of.PLAYER_AMPLITUDES, math.cos(turned), math.sin(turned)
+    normal, along = table[of.TABLE_PULLED], table[of.TABLE_PULLED + 1]
+    for mode in range(partials + pairs - 1, -1, -1):
+        amplitude = player[first + strings.partial_of(mode, pairs) - 1]
+        second = strings.direction_of(mode, pairs) == 1
+        part = along * cosine + normal * sine if second else normal * cosine - along * sine
+        if mode >= 2 * pairs:  # heard as the others are
+            part = 1 / table[of.TABLE_HEARD]
+        player[first + mode] = part * amplitude
+    return pairs
+
+
+@njit(**COMPILED)
+def _fill(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    note: int,
+    string: np.ndarray,
+    out: np.ndarray,
+) -> None:
+    """ω², σ, k and η² of a note's modes, of its string as it is now, with the instrument's bridge."""
+    losses = _value(player, players, table, tables, of.DECAY)
+    inside = _value(player, players, table, tables, of.BRIGHTNESS_DECAY)
+    strings.rows(
+        string,
+        players[note + of.NOTE_MODES],
+        players[note + of.NOTE_PAIRS],
+        player[note + of.NOTE_DETUNING],
+        losses * player[note + of.NOTE_CONDUCTANCE],
+        losses * player[note + of.NOTE_CONDUCTANCE + 1],
+        losses * player[note + of.NOTE_LOSSES],
+        inside * player[note + of.NOTE_LOSSES + 1],
+        inside * player[note + of.NOTE_LOSSES + 2],
+        out,
+    )
+
+
+@njit(**COMPILED)
 def _make_voice(
     player: np.ndarray,
     players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
     address: int,
     note: int,
     kind: int,
@@ -429,7 +506,8 @@ def _make_voice(
     for mode in range(n):
         voice[first + mode] = player[of.PLAYER_AMPLITUDES + mode]
     first += at.OMEGA_SQUARED * n
-    strings.rows(player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING], n, voice[first : first + 4 * n])
+    own = player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING]
+    _fill(player, players, table, tables, note, own, voice[first : first + 4 * n])
     _weigh(player, players, voice, 0, note)
     if player[note + of.NOTE_POINT] == of.BRIDGE:
         largest = 0.0
@@ -544,7 +622,7 @@ def _retune(
             continue
         slot = _wish(player, players, number, source, address, seconds, frame, now)
         if filled == 0:
-            strings.rows(string, n, player[slot : slot + 4 * n])
+            _fill(player, players, table, tables, note, string, player[slot : slot + 4 * n])
             filled = slot
         else:
             for place in range(4 * n):
@@ -735,12 +813,13 @@ def _note_on(
         string = channel if count > 0 and _chosen(table, count, key) != channel else -1
     own, modes, gain, highest_m = _moment(player, 3), 0, 1.0, 0.0
     position = amplitude_mm = width = 0.0
+    pairs = 0
     if not prepared:
         pitch_hz = _pitch_hz(table, tables, key, player[event + of.EVENT_PITCH_HZ])
         gain = abs(table[of.TABLE_GAINS + key * of.GAINS + 1 + string])
         shortened = 1.0
         if pitch_hz > 0.0 and gain >= 0.0:
-            modes, shortened = _string_of(player, players, table, tables, key, string, pitch_hz, False, own)
+            modes, shortened = string_of(player, players, table, tables, key, string, pitch_hz, False, own)
         if modes < 1 or strings.overdamped(own, modes):
             _refuse(player, players, event)
             return
@@ -764,7 +843,23 @@ def _note_on(
             position = min(max(given, POSITION_RANGE[0]), POSITION_RANGE[1])
         elif mode == of.MPE and slide >= 0:
             position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
+        release_s, turned, varies = table[of.TABLE_RELEASE_S], 0.0, table[of.TABLE_VARIATION]
+        if release_s > 0.0:
+            release_s *= (table[of.TABLE_RELEASE_S + 1] / release_s) ** share
+        if varies > 0.0:
+            stroke = players[of.PLAYER_AGE]
+            if not given > 0.0:
+                position *= 1 + varies * VARIES_PLACE * _varied(stroke, key, 0)
+                position = min(max(position, POSITION_RANGE[0]), POSITION_RANGE[1])
+            amplitude_mm *= 10.0 ** (varies * VARIES_DB / 20 * _varied(stroke, key, 1))
+            amplitude_mm = min(amplitude_mm, LARGEST_AMPLITUDE_MM)
+            width *= 1 + varies * VARIES_WIDTH * _varied(stroke, key, 2)
+            release_s *= 1 + varies * VARIES_RELEASE * _varied(stroke, key, 3)
+            turned = varies * VARIES_ANGLE * _varied(stroke, key, 4)
         highest_m = _pull(player, table, tables, modes, position, amplitude_mm / 1000, width)
+        _release_pluck(player, own, modes, release_s)
+        pairs = _split(player, table, tables, modes, turned)
+        modes += pairs
     number = _free_note(player, players, mixers)
     note = _note(number)
     for slot in range(of.NOTE_SLOTS):
@@ -780,6 +875,13 @@ def _note_on(
     players[note + of.NOTE_HELD] = 1
     players[note + of.NOTE_PREPARED] = prepared
     players[note + of.NOTE_MODES] = modes
+    players[note + of.NOTE_PAIRS] = pairs
+    for each in range(3):
+        player[note + of.NOTE_LOSSES + each] = table[of.TABLE_LOSSES + each]
+    player[note + of.NOTE_DETUNING] = table[of.TABLE_DETUNING]
+    for each in range(2):
+        player[note + of.NOTE_HEARD + each] = table[of.TABLE_HEARD + each] if pairs > 0 else 1.0
+        player[note + of.NOTE_CONDUCTANCE + each] = table[of.TABLE_CONDUCTANCE + each]
     players[note + of.NOTE_FRAME] = frame
     player[note + of.NOTE_GAIN] = gain
     player[note + of.NOTE_PITCH_HZ] = player[event + of.EVENT_PITCH_HZ]
@@ -795,7 +897,18 @@ def _note_on(
         if not prepared and source < tables[of.TABLE_SOURCES]:
             address = players[of.PLAYER_HERE] + 8 * _slots_of_voice(players, number, source)
             kind, program = tables[of.TABLE_KINDS + source], tables[of.TABLE_PROGRAMS + source]
-            _make_voice(player, players, address, note, kind, program, tables[of.TABLE_VELOCITY], highest_m)
+            _make_voice(
+                player,
+                players,
+                table,
+                tables,
+                address,
+                note,
+                kind,
+                program,
+                tables[of.TABLE_VELOCITY],
+                highest_m,
+            )
             voice, begun = _at(address), gain * player[of.PLAYER_SOURCE_GAINS + source]
             voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
         players[note + of.NOTE_VOICES + source] = address
@@ -1039,6 +1152,13 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
         return
     table, tables = _at(address), _whole(address)
     if kind == of.NOTE_ON and value > 0.0:
+        if tables[of.TABLE_DRUMS] != 0 and players[event + of.EVENT_VOICES] == 0:
+            number = _free_note(player, players, mixers)
+            first = _slots_of_voice(players, number, 0)
+            stride = _slots_of_voice(players, number, 1) - first
+            if not drums.strike(player, players, table, tables, event, first, stride):
+                _refuse(player, players, event)
+                return
         _note_on(player, players, table, tables, mixers, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
         _note_off(player, players, table, tables, channel, key, frame, now)
@@ -1088,6 +1208,8 @@ def _hear(player: np.ndarray, players: np.ndarray) -> None:
                     wanted = player[note + of.NOTE_GAIN] * player[of.PLAYER_SOURCE_GAINS + source]
                     _at(address)[at.WANTED_GAIN] = wanted
             _listen(player, players, note)
+        elif players[note + of.NOTE_STATE] == of.RINGS and _whole(players[of.PLAYER_TABLE])[of.TABLE_DRUMS] != 0:
+            drums.hear(player, players, _at(players[of.PLAYER_TABLE]), _whole(players[of.PLAYER_TABLE]), note)
 
 
 @njit(**COMPILED)

@@ -9,8 +9,12 @@ from __future__ import annotations
 from engine.kernels import layout as at
 
 HIGHEST_HZ = 20_000.0  # of modes: those above are inaudible
-MOST_MODES = 99  # of a key's string: the shipped model's grid holds no more
+MOST_MODES = 99  # partials of a key's string: the shipped model's grid holds no more
+MOST_PAIRS = 24  # of them that have a second mode, of the other polarisation
 MOST_SLACKENED = 5  # keys that a guitar's string may be tuned below the set's
+
+AIR_VISCOSITY_PA_S, AIR_DENSITY_KG_M3 = 1.8e-5, 1.2  # at 20 °C
+HIGHEST_SIGMA = 0.5  # of ω: the most damping that bridge and losses by mode give one
 
 # A string: the fields of `StringParameters`, in their order
 LENGTH, AREA, MOMENT, DENSITY, MODULUS, D1, D3, TENSION = range(8)
@@ -68,7 +72,19 @@ TABLE_GRID = 17  # W points of the grid on which plucks have their shape
 TABLE_SOURCES = 18  # W voices of a note
 TABLE_KINDS = 19  # W four
 TABLE_PROGRAMS = 23  # W four addresses
-TABLE_VALUES = 32  # R
+TABLE_PAIRS = 27  # W partials with a second mode, of the other polarisation; 0: there is one direction
+TABLE_PULLED = 28  # R two: parts of a pluck in both directions
+TABLE_HEARD = 30  # R two: what they are heard with
+TABLE_DETUNING = 32  # R ω² of the second over that of the first
+TABLE_CONDUCTANCE = 33  # R two: of the bridge, in s/kg
+TABLE_RELEASE_S = 35  # R two: of the softest and the hardest pluck's release; 0: at once
+TABLE_VARIATION = 37  # R of plucks from stroke to stroke, 0 … 1
+TABLE_SYMPATHY = 38  # W which strings ring with those that are played
+NO_SYMPATHY, EVERY_KEY, OPEN_STRINGS = 0, 1, 2
+TABLE_SYMPATHY_S_KG = 39  # R conductance of the bridge that drives them
+TABLE_LOSSES = 40  # R three: to the air, by friction, by bending
+TABLE_DRUMS = 43  # W slot of the slots of drums of all keys (KEYS,), 0 where a key has none; 0: strings are played
+TABLE_VALUES = 48  # R
 TABLE_PITCHES = TABLE_VALUES + VALUES  # R of keys in Hz; 0: silent
 TABLE_GAINS = TABLE_PITCHES + KEYS  # R (KEYS, GAINS); below 0: a guess; 0: none is known; not a number: impossible
 TABLE_OPEN = TABLE_GAINS + KEYS * GAINS  # R (strings, OPEN_SLOTS), the highest string first
@@ -78,6 +94,17 @@ OPEN_STRING = 2  # R
 OPEN_SLOTS = OPEN_STRING + STRING
 MOST_STRINGS = 128
 TABLE_SINES = TABLE_OPEN + MOST_STRINGS * OPEN_SLOTS  # R sin(π k / (grid - 1)), k below 2 (grid - 1)
+
+# Slots of the drum of a key; then seven rows (modes,): ω², σ, k, η², the speed that 1 N s gives, two points' weights
+DRUM_MODES = 0  # W
+DRUM_MALLET_KG = 1  # R
+DRUM_CONTACT_S = 2  # R at 1 m/s
+DRUM_SOFTEST_M_S = 3  # R speed of the softest blow
+DRUM_HARDEST_M_S = 4  # R
+DRUM_MASS_KG = 5  # R of each mode
+DRUM_HEADER = 8
+DRUM_ROWS = 7
+MOST_DRUM_MODES = 1_600
 
 
 def table_slots(grid_points: int) -> int:
@@ -120,8 +147,13 @@ NOTE_POINT = 17  # R two
 NOTE_SOLO = 19  # W
 NOTE_VOICES = 20  # W four addresses; 0: none
 NOTE_FRAME = 24  # W at which it was to begin; 0: at once
-NOTE_TUNED = 25  # R semitones, beside what wheels bend it
-NOTE_OWN = 32  # R its string as its key had it when it was struck
+NOTE_PAIRS = 25  # W its first partials that have two modes
+NOTE_HEARD = 26  # R two: what both polarisations are heard with
+NOTE_DETUNING = 28  # R as in the table it was struck by
+NOTE_CONDUCTANCE = 29  # R two
+NOTE_TUNED = 31  # R semitones, beside what wheels bend it
+NOTE_LOSSES = 32  # R three
+NOTE_OWN = 40  # R its string as its key had it when it was struck
 NOTE_STRING_NOW = NOTE_OWN + STRING  # R with bends, slides, dampers and knobs
 NOTE_SLOTS = NOTE_STRING_NOW + STRING
 MOST_NOTES = 128
@@ -152,7 +184,7 @@ REPORTS = 512
 PLAYER_TABLE = 0  # W address; 0: nothing is played
 PLAYER_SERIAL = 1  # W of that table: all before are free
 PLAYER_MOST = 2  # W notes that ring at once; the oldest makes room
-PLAYER_MODES = 3  # W a voice has at most
+PLAYER_MODES = 3  # W a voice has at most, `MOST_PAIRS` above the partials
 PLAYER_PUSHED = 4  # W events that were handed over
 PLAYER_TAKEN = 5  # W and taken
 PLAYER_QUEUED = 6  # W of them, whose frame is to come
@@ -174,7 +206,14 @@ PLAYER_STRINGS = PLAYER_NOTES + MOST_NOTES * NOTE_SLOTS  # R four, for a moment
 PLAYER_AMPLITUDES = PLAYER_STRINGS + 4 * STRING  # R of a pluck's modes, for a moment
 PLAYER_PULLED = PLAYER_AMPLITUDES + at.MOST_MODES  # R of a pluck on its grid, for a moment
 MOST_GRID = 1024
-PLAYER_VOICES = PLAYER_PULLED + MOST_GRID
+PLAYER_SYMPATHETIC = PLAYER_PULLED + MOST_GRID  # W partials of strings that ring with those that are played
+PLAYER_TUNED = PLAYER_SYMPATHETIC + 1  # W instrument and kind for which they were tuned
+PLAYER_TUNED_BY = PLAYER_SYMPATHETIC + 2  # W
+PLAYER_SYMPATHY_RINGS = PLAYER_SYMPATHETIC + 3  # W whether any can be heard
+MOST_SYMPATHETIC = 512
+SYMPATHY_OWNER, SYMPATHY_COSINE, SYMPATHY_SINE, SYMPATHY_GAIN, SYMPATHY_X, SYMPATHY_Y, SYMPATHY_PLAYED = range(7)
+PLAYER_SYMPATHY = PLAYER_SYMPATHETIC + 4  # rows (MOST_SYMPATHETIC,), as above
+PLAYER_VOICES = PLAYER_SYMPATHY + 7 * MOST_SYMPATHETIC
 BLOCKS = 4  # of modes that a voice is to have
 
 

@@ -143,12 +143,61 @@ def overdamped(string: np.ndarray, modes: int) -> bool:
 
 
 @njit(**EXACT)
-def rows(string: np.ndarray, modes: int, out: np.ndarray) -> None:
-    """ω², σ, k and η² of the lowest modes, one after the other, (4 modes,)."""
+def loss(string: np.ndarray, partial: int, air: float, friction: float, bending: float) -> float:
+    """σ in 1/s that losses by mode add: as `Losses.rates`."""
+    omega, eta = math.sqrt(omega_squared(string, partial)), partial * math.pi / string[of.LENGTH]
+    diameter = 2 * math.sqrt(string[of.AREA] / math.pi)
+    drag = math.sqrt(math.pi * of.AIR_VISCOSITY_PA_S * of.AIR_DENSITY_KG_M3 * omega / (2 * math.pi))
+    bent = string[of.MODULUS] * string[of.MOMENT] * eta * eta
+    inside = (string[of.TENSION] * friction + bent * bending) / (string[of.TENSION] + bent)
+    return air * math.pi * (of.AIR_VISCOSITY_PA_S + diameter * drag) / mass(string) + 0.5 * omega * inside
+
+
+@njit(inline="always", **EXACT)
+def partial_of(mode: int, pairs: int) -> int:
+    """The partial, from 1, of a mode, from 0: pairs come first, the two polarisations side by side."""
+    return (mode // 2 if mode < 2 * pairs else mode - pairs) + 1
+
+
+@njit(inline="always", **EXACT)
+def direction_of(mode: int, pairs: int) -> int:
+    """0: the first polarisation; 1: the second."""
+    return mode % 2 if mode < 2 * pairs else 0
+
+
+@njit(**EXACT)
+def rows(
+    string: np.ndarray,
+    modes: int,
+    pairs: int,
+    detuning: float,
+    conductance: float,
+    second_conductance: float,
+    air: float,
+    friction: float,
+    bending: float,
+    out: np.ndarray,
+) -> None:
+    """ω², σ, k and η² of the lowest modes, one after the other, (4 modes,): as `Polarisations.resonator`.
+
+    Args:
+        pairs: partials of two modes, whose ω² are in the ratio `detuning`; 0: there is one direction.
+        conductance, second_conductance: of the bridge in both directions, in s/kg.
+        air, friction, bending: losses by mode, 0 for none.
+    """
     stiffness = string[of.MODULUS] * string[of.AREA] / (4 * mass(string))
+    pull = string[of.TENSION] / string[of.LENGTH]
     for mode in range(modes):
-        eta = (mode + 1) * (math.pi / string[of.LENGTH])
-        out[mode] = omega_squared(string, mode + 1)
-        out[modes + mode] = decay_rate(string, mode + 1)
+        partial, second = partial_of(mode, pairs), direction_of(mode, pairs) == 1
+        eta = partial * (math.pi / string[of.LENGTH])
+        squared = omega_squared(string, partial)
+        if second:
+            squared *= detuning
+        sigma = decay_rate(string, partial)
+        added = pull * (second_conductance if second else conductance)
+        if air + friction + bending > 0.0:
+            added += loss(string, partial, air, friction, bending)
+        out[mode] = squared
+        out[modes + mode] = min(sigma + added, of.HIGHEST_SIGMA * math.sqrt(squared)) if added > 0.0 else sigma
         out[2 * modes + mode] = stiffness * eta * eta
         out[3 * modes + mode] = eta * eta

@@ -40,6 +40,7 @@ def resonator_arrays(
             f"{resonator.points}"
         )
     spare = ((0, c.modes - n),)
+    analysis = np.zeros((resonator.points, n)) if resonator.analysis is None else resonator.analysis
     eigenvalues = np.pad(resonator.eigenvalues() / rate_hz, spare, "edge")
     with np.errstate(divide="ignore"):  # without losses
         nu_log = np.maximum(np.log(-eigenvalues.real), SLOWEST_LOG)
@@ -49,7 +50,7 @@ def resonator_arrays(
         "coupling": np.pad(resonator.coupling / rate_hz**2, spare),
         "stretch": np.pad(resonator.stretch * scale_m**2, spare),
         "shapes": np.pad(resonator.shapes, (*spare, (0, 0))),
-        "analysis": np.pad(resonator.analysis, ((0, 0), *spare)),
+        "analysis": np.pad(analysis, ((0, 0), *spare)),
     }
 
 

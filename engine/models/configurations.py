@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from engine.bounds import MOST_MATRIX_NUMBERS
+
 LEAST_PHASE = 0.02  # of `koopman_tension` between nodes: a voice of more would take too much of the device's time
 
 
@@ -128,8 +130,8 @@ class KoopmanTensionConfiguration:
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "modes")
-        if self.modes > self.grid_points - 2:
-            raise ValueError(f"a grid of {self.grid_points} points cannot hold {self.modes} modes")
+        if self.modes * self.grid_points > MOST_MATRIX_NUMBERS:
+            raise ValueError(f"modes times grid_points must be at most {MOST_MATRIX_NUMBERS}")
         if not 0 <= self.degree <= 32:
             raise ValueError(f"degree must lie in 0 … 32, not {self.degree}")
         for name in ("node_phase", "highest_phase"):

@@ -473,7 +473,7 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
             unit_m = torch.eye(modes, dtype=torch.float64)[mode] * physics.scale_m
             self.energy_units.copy_(torch.from_numpy(physics.resonator.relative_tension_rise(unit_m.numpy())))
             self.rate_units.copy_(torch.from_numpy(physics.resonator.omega / physics.rate_hz)[mode])
-        analysis = torch.from_numpy(physics.resonator.analysis).T[mode]
+        analysis = torch.from_numpy(physics.resonator.inverse).T[mode]
         imaginary = eigenvalues.slope_at_rest(log_eigenvalues)[:, None] * analysis
         self.encoder.weight.copy_(torch.cat([analysis, imaginary]))
         self.decoder.weight.zero_()

@@ -116,7 +116,7 @@ class Koopman(DiagonalModel):
         sharpest = SHARPEST if physics.resonator.tension_modulated else 0.0
         log_eigenvalues = linear_string_eigenvalues(c.state_size, physics, generator, sharpest)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
-        analysis = torch.from_numpy(physics.resonator.analysis).T[torch.arange(c.state_size) % modes]
+        analysis = torch.from_numpy(physics.resonator.inverse).T[torch.arange(c.state_size) % modes]
         encoder = dense_layers(self.encoder)
         if c.mixing_layer:
             nn.init.eye_(encoder.pop().weight)

@@ -168,11 +168,15 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         Args:
             velocity: in normalised displacement a sample, (batch, grid_points); None: at rest.
         """
+        v = None if velocity is None else velocity.double() @ self.analysis
+        return self.encode_modes(displacement.double() @ self.analysis, v)
+
+    def encode_modes(self, q: Tensor, v: Tensor | None = None) -> KoopmanTensionState:
+        """As `encode`, of amplitudes and speeds of the modes, (batch, modes): a blow, or a surface of few points."""
         sigma, omega = self._rates()
-        q = displacement.double() @ self.analysis
         x, y = q, -sigma * q / omega
-        if velocity is not None:
-            y = y - velocity.double() @ self.analysis / omega
+        if v is not None:
+            y = y - v / omega
         stretch = (self._stretch * q.square()).sum(-1)
         # 2 × the energy: of the linear string, and what the tension holds
         energy = (omega.square() * (x.square() + y.square())).sum(-1)
@@ -236,7 +240,12 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
     @torch.no_grad()
     def amplitudes(self, state: KoopmanTensionState, steps: int) -> Tensor:
         """Modal amplitudes of the next frames, float64 (batch, steps, modes), without gradients, on the CPU."""
-        return self._by_nodes(state, lambda part, step: self._compiled(part, step, steps))[0]
+        return self.advance_modes(state, steps)[0]
+
+    @torch.no_grad()
+    def advance_modes(self, state: KoopmanTensionState, steps: int) -> tuple[Tensor, KoopmanTensionState]:
+        """As `amplitudes`, and the state after them."""
+        return self._by_nodes(state, lambda part, step: self._compiled(part, step, steps))
 
     def _nodes(self, state: KoopmanTensionState) -> Tensor:
         """Of a frame, for strings as they set out, (batch,)."""

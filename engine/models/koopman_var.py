@@ -168,7 +168,7 @@ class KoopmanVar(DiagonalModel):
         n, modes = self.configuration.state_size, physics.modes
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
-        analysis = torch.from_numpy(physics.resonator.analysis).T[torch.arange(n) % modes]
+        analysis = torch.from_numpy(physics.resonator.inverse).T[torch.arange(n) % modes]
         self.encoder.weight.copy_(linear_string_encoder(analysis))
         self.decoder.weight.mul_(0.01)
         self.decoder.weight[:, :n] = 0

@@ -349,7 +349,7 @@ class SSMString(StringModel[SSMState], ABC):
             )
         log_eigenvalues = physics.log_eigenvalues
         # q_k = Re(z λᵏ) with Re z = q₀; Im z makes the velocity zero
-        analysis = torch.from_numpy(physics.resonator.analysis).T
+        analysis = torch.from_numpy(physics.resonator.inverse).T
         imaginary = slope_at_rest(log_eigenvalues)[:, None] * analysis
         first.set_modes(log_eigenvalues, torch.stack([analysis, imaginary], dim=1))
         first.C.zero_()

@@ -4,20 +4,28 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from pathlib import Path
+from typing import TypeVar
 
 from engine.presets.file import Preset, PresetError, arrays_of
 from engine.presets.finding import SHIPPED
 from engine.presets.info import PresetInfo
+from engine.resonators.drum import DrumParameters
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, read_toml
 
 HIGHEST_HZ = 20_000.0  # modes above are not heard
 STRINGS = SHIPPED / "strings"
+T = TypeVar("T")
 
 
 def read_string(path: Path) -> StringParameters:
     """The string of a TOML file; see `read_described_string`."""
     return read_described_string(path)[0]
+
+
+def read_drum(path: Path) -> tuple[DrumParameters, str]:
+    """The drum of a TOML file, and its `description`; as `read_described_string`."""
+    return _read_described(DrumParameters, path, "a drum")
 
 
 def read_described_string(path: Path) -> tuple[StringParameters, str]:
@@ -31,17 +39,22 @@ def read_described_string(path: Path) -> tuple[StringParameters, str]:
             field and remedy.
         OSError: the file cannot be read.
     """
+    return _read_described(StringParameters, path, "a string")
+
+
+def _read_described(kind: type[T], path: Path, what: str) -> tuple[T, str]:
     data = read_toml(path)
     description = data.pop("description", "")
     if not isinstance(description, str):
         raise SchemaError(f"{path}: description must be a text; put it in quotes")
-    string = read(StringParameters, data, str(path))
-    if missing := [field.name for field in fields(string) if field.name not in data]:
+    found = read(kind, data, str(path))
+    names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
+    if missing := [name for name in names if name not in data]:
         raise SchemaError(
             f"{path}: {', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing; "
-            f"a string's file gives all of {', '.join(field.name for field in fields(string))}"
+            f"{what}'s file gives all of {', '.join(names)}"
         )
-    return string, " ".join(description.split())
+    return found, " ".join(description.split())
 
 
 def find_string(name_or_path: str) -> Path:

@@ -29,8 +29,10 @@ class Resonator:
         coupling: k, in 1/s² for a stretch of 1, (modes,); zeros: linear.
         stretch: η² in 1/m², (modes,): the stretch is Σ η² q².
         tension_rise: ΔT/T₀ of a stretch of 1.
-        shapes: displacement of each mode at amplitude 1 on the points of a grid, (modes, points).
-        analysis: (points, modes), its inverse for what lies in its modes: displacement @ analysis = amplitudes.
+        shapes: displacement of each mode at amplitude 1 on the points of a grid, or at a few places of a surface,
+            (modes, points).
+        analysis: (points, modes), its inverse for what lies in its modes: displacement @ analysis = amplitudes. None:
+            the points are too few to say how all modes move.
         mirror: the sign that each mode takes where the resonator is turned end to end, (modes,); None: it is not
             symmetrical. That -q solves what q does needs no attribute: the tension does not know signs.
         end_force: force of each mode at amplitude 1 m on the end at the start of the grid, in N, (modes,), by the
@@ -46,7 +48,7 @@ class Resonator:
     stretch: Array
     tension_rise: float
     shapes: Array
-    analysis: Array
+    analysis: Array | None
     mirror: Array | None = None
     end_force: Array | None = None
 
@@ -74,9 +76,22 @@ class Resonator:
         return self.shapes.shape[1]
 
     @property
+    def inverse(self) -> Array:
+        """`analysis`.
+
+        Raises:
+            ValueError: its points are too few for amplitudes to follow from them.
+        """
+        if self.analysis is None:
+            raise ValueError(
+                f"{self.modes} modes do not follow from displacement at {self.points} places; set out from amplitudes"
+            )
+        return self.analysis
+
+    @property
     def force_weights(self) -> Array | None:
         """float64 (points,): displacement @ weights = force on that end in N; None: it has no such end."""
-        return None if self.end_force is None else self.analysis @ self.end_force
+        return None if self.end_force is None else self.inverse @ self.end_force
 
     @property
     def tension_modulated(self) -> bool:
@@ -106,7 +121,7 @@ class Resonator:
 
     def to_modes(self, displacement: NDArray[np.floating]) -> Array:
         """Displacement (..., points) to modal amplitudes (..., modes), of the same unit."""
-        return displacement @ self.analysis
+        return displacement @ self.inverse
 
     def to_grid(self, amplitudes: NDArray[np.floating]) -> Array:
         """Modal amplitudes (..., modes) to displacement (..., points), of the same unit."""

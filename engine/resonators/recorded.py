@@ -175,7 +175,7 @@ class RecordedString:
             stretch=law.stretch[partial],
             tension_rise=law.tension_rise,
             shapes=law.shapes[partial],
-            analysis=law.analysis[:, partial] * shares,
+            analysis=law.inverse[:, partial] * shares,
             mirror=None if law.mirror is None else law.mirror[partial],
         )
 

@@ -150,7 +150,7 @@ class CompiledPlayer:
     """Plays the instrument of its latest table in the mixer that it is given to.
 
     Args:
-        modes: that a voice has at most.
+        modes: partials that a voice has at most.
         most_notes: that ring at once; the oldest makes room.
     """
 
@@ -158,7 +158,7 @@ class CompiledPlayer:
         from engine.kernels.player import begin  # Numba only when it is needed
 
         self.rate_hz = rate_hz
-        self.memory = memory = np.zeros(of.player_slots(modes))
+        self.memory = memory = np.zeros(of.player_slots(modes + of.MOST_PAIRS))
         self._counts = counts = memory.view(np.int64)
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
@@ -167,7 +167,7 @@ class CompiledPlayer:
         self._prepared: list[_Prepared] = []
         self._read = 0
         memory[of.PLAYER_RATE] = rate_hz
-        counts[of.PLAYER_MODES], counts[of.PLAYER_MOST] = modes, most_notes
+        counts[of.PLAYER_MODES], counts[of.PLAYER_MOST] = modes + of.MOST_PAIRS, most_notes
         memory[of.PLAYER_SOURCE_GAINS : of.PLAYER_SOURCE_GAINS + of.MOST_SOURCES] = 1.0
         begin(self.address)
         self._events = self._records(of.PLAYER_EVENTS, of.EVENTS, EVENT)

@@ -71,6 +71,12 @@ def voices(json: Json = False) -> None:
 
 
 @bench.command()
+def drums(json: Json = False) -> None:
+    """Cost of a drum's voice by its modes, and of a kit of 16 beside 8 strings."""
+    _measure("drums", json)
+
+
+@bench.command()
 def effects(json: Json = False) -> None:
     """Cost of body and room: shares of a core, the slowest quantum, and the time to set them."""
     _measure("effects", json)

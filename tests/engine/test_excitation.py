@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
-from engine.excitation import rounded, triangular
+from engine.excitation import release_factor, rounded, triangular
 from engine.pluck import SHAPES, Pluck
 
 
@@ -38,3 +39,21 @@ def test_a_rounded_triangle_is_the_triangle_under_a_spread_force() -> None:
 def test_a_narrow_one_is_the_triangle() -> None:
     narrow, sharp = rounded(0.3, 1e-6, 2e-3, 101), triangular(0.3, 2e-3, 101)
     np.testing.assert_allclose(narrow, sharp, atol=2e-5, rtol=0)  # except modes beyond the grid
+
+
+@pytest.mark.parametrize("release_s", [0.5e-3, 2e-3, 6e-3])
+def test_a_release_in_a_time_is_one_at_once_from_a_smaller_displacement(release_s: float) -> None:
+    """Against DOP853 of modes whose force falls as a raised cosine, without losses: from the middle of the fall."""
+    omega = 2 * np.pi * np.array([110.0, 333.0, 1000.0, 2500.0])
+
+    def right_side(t: float, y: np.ndarray) -> np.ndarray:
+        share = min(max(t / release_s, 0.0), 1.0)
+        force = 1 - share + np.sin(2 * np.pi * share) / (2 * np.pi)
+        return np.concatenate([y[4:], omega**2 * (force - y[:4])])
+
+    end_s = release_s + 0.01
+    start = np.concatenate([np.ones(4), np.zeros(4)])
+    most = {"rtol": 1e-11, "atol": 1e-13, "max_step": release_s / 50}
+    found = solve_ivp(right_side, (0, end_s), start, "DOP853", **most)
+    left = release_factor(omega, release_s)
+    np.testing.assert_allclose(found.y[:4, -1], left * np.cos(omega * (end_s - release_s / 2)), atol=1e-8)

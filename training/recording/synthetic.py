@@ -68,7 +68,7 @@ def synthetic_note(seed: int, seconds: float = 2.8, snr_db: float = 50.0, rise_c
         law.stretch[pair],
         law.tension_rise,
         law.shapes[pair],
-        law.analysis[:, pair],
+        law.inverse[:, pair],
     )
     k = np.arange(1, count + 1)
     place, listened = random.uniform(0.08, 0.4), random.uniform(0.05, 0.12)

@@ -161,7 +161,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     player.prepare()
     table = player.table
     assert table is not None
-    header = _Header(magic=b"LSPLUGIN", version=1, modes=min(of.MOST_MODES, player.grid_points - 2))
+    header = _Header(magic=b"LSPLUGIN", version=1, modes=min(of.MOST_MODES, player.grid_points - 2) + of.MOST_PAIRS)
     header.most_notes = MOST_NOTES
     whole = bytearray(bytes(header))
 

@@ -50,7 +50,10 @@ def patch_card(entry: PatchEntry) -> str:
     patch, faint = entry.patch, QApplication.palette().placeholderText().color().name()
     low, high = patch.range
     strings = "one string, shortened for every key"
-    if patch.strings.kind == "set":
+    if patch.strings.kind == "drums":
+        each = "a key each" if patch.strings.keys == "pads" else "tuned to every key"
+        strings = f"{len(patch.strings.drums)} drums, {each}" if len(patch.strings.drums) > 1 else f"one drum, {each}"
+    elif patch.strings.kind == "set":
         strings = f"{len(patch.strings.strings)} strings"
     lines = [strings, f"{note_name(low)} to {note_name(high)}"]
     if patch.mode != "poly":

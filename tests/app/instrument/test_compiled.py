@@ -17,7 +17,7 @@ from app.instrument.strings import pitch_hz_of
 from app.instrument.table import VALUES
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Patch
+from app.patches.patch import Losses, Patch, Polarisations
 from app.patches.tuning import TuningChoice
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
@@ -65,9 +65,9 @@ class Reference:
 
 
 class Compiled:
-    def __init__(self, patch: Patch, preset: Preset, most: int = 40) -> None:
+    def __init__(self, patch: Patch, preset: Preset, most: int = 40, varied: bool = True) -> None:
         self.mixer = Mixer(RATE_HZ, limited=False)
-        self.player = InstrumentPlayer(patch, preset, RATE_HZ, GAINS, most_notes=most)
+        self.player = InstrumentPlayer(patch, preset, RATE_HZ, GAINS, most_notes=most, varied=varied)
         self.mixer.set_player(self.player.compiled)
 
     def handle(self, event: Event, frame: int) -> None:
@@ -109,7 +109,10 @@ def compared(patch: Patch, preset: Preset, played: Framed, quanta: int, most: in
 
 @pytest.fixture(scope="session")
 def shipped() -> dict[str, Patch]:
-    return {path.stem: read_patch(path) for path in PATCHES.glob("*.json")}
+    """Without variation from stroke to stroke and strings at rest, which the player in Python has not."""
+    read = {path.stem: read_patch(path) for path in PATCHES.glob("*.json")}
+    even = {name: patch.pluck.model_copy(update={"variation": 0.0}) for name, patch in read.items()}
+    return {name: changed(patch, pluck=even[name], sympathy_s_kg=0.0) for name, patch in read.items()}
 
 
 def changed(patch: Patch, **parts: object) -> Patch:
@@ -156,6 +159,7 @@ def drawn(patch: Patch, other: Patch, seed: int, seconds: float, count: int = 60
     return found
 
 
+TWO = Polarisations(angle_deg=30.0, second_heard=0.4, second_cents=3.0, conductance_s_kg=0.02)
 INSTRUMENTS = [
     ("classical_guitar", {}),  # wheel on a knob
     ("electric_bass", {}),  # velocity
@@ -168,13 +172,18 @@ INSTRUMENTS = [
     ("sitar", {"pluck": "stops"}),  # guitar, velocity, added
     ("koto", {"mode": "mpe", "mod_wheel": "pluck.curve"}),
     ("jazz_guitar", {"mode": "mpe"}),
+    ("flamenco_guitar", {"polarisations": TWO, "losses": Losses(), "mod_wheel": "knobs.decay"}),
+    ("cimbalom", {"polarisations": TWO, "pluck": "slow"}),
 ]
 
 
 def instrument(shipped: dict[str, Patch], name: str, parts: dict[str, object]) -> Patch:
     patch = shipped[name]
-    if parts == {"pluck": "stops"}:
-        parts = {"pluck": patch.pluck.model_copy(update={"stops": False})}
+    if parts.get("pluck") == "stops":
+        parts = {**parts, "pluck": patch.pluck.model_copy(update={"stops": False})}
+    if parts.get("pluck") == "slow":
+        slow = {"release_ms": 3.0, "release_hard_ms": 0.7}
+        parts = {**parts, "pluck": patch.pluck.model_copy(update=slow)}
     return changed(patch, **parts)
 
 
@@ -274,10 +283,25 @@ def test_threads_may_give_events_while_the_mixer_plays(shipped: dict[str, Patch]
 
 
 def test_the_same_events_give_the_same_samples(shipped: dict[str, Patch], preset: Preset) -> None:
-    patch = shipped["oud"]
+    patch = changed(shipped["oud"], pluck=shipped["oud"].pluck.model_copy(update={"variation": 1.0}))
     played = drawn(patch, shipped["kora"], 5, 0.2)
     one, other = (rendered(Compiled(patch, preset), played, 100) for _ in range(2))
     np.testing.assert_array_equal(one, other)
+
+
+def test_strokes_vary_where_the_instrument_says_so(shipped: dict[str, Patch], preset: Preset) -> None:
+    varied = shipped["koto"].pluck.model_copy(update={"variation": 1.0, "release_ms": 2.0, "release_hard_ms": 1.0})
+    patch = changed(shipped["koto"], pluck=varied, polarisations=TWO)
+    found = []
+    for stage in (Compiled(patch, preset), Compiled(patch, preset, varied=False)):
+        for number in range(5):
+            stage.player.handle(NoteOn(60, 90), 64 * number)
+        rendered(stage, (), 8)
+        plucks = [(each.position, each.amplitude_mm, each.width) for each in stage.player.reports()]
+        found.append(np.array([each for each in plucks if each[1] > 0]))
+    apart = np.abs(found[0] / found[1] - 1)
+    assert (apart > 0).all() and (apart < [0.08, 0.13, 0.12]).all()
+    assert len(np.unique(found[0], axis=0)) == 5 and len(np.unique(found[1], axis=0)) == 1
 
 
 def test_the_oldest_make_room(shipped: dict[str, Patch], preset: Preset) -> None:

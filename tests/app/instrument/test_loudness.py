@@ -17,7 +17,7 @@ from tests.bench.tune import chord_of
 RATE_HZ = 48_000
 E_MAJOR = (40, 47, 52, 56, 59, 64)
 STRUM_S = 0.01  # from key to key
-PATCHES = [entry.patch for entry in list_patches(SHIPPED)[0]]
+PATCHES = [entry.patch for entry in list_patches(SHIPPED)[0] if entry.patch.strings.kind != "drums"]
 
 
 def peak_db(patch: Patch, preset: Preset, keys: tuple[int, ...], apart_s: float) -> float:
@@ -27,13 +27,13 @@ def peak_db(patch: Patch, preset: Preset, keys: tuple[int, ...], apart_s: float)
     return 20 * float(np.log10(max(np.abs(block).max() for block in blocks)))
 
 
-def test_six_strummed_keys_of_a_guitar_peak_at_five_db(preset: Preset) -> None:
+def test_six_strummed_keys_of_a_guitar_peak_at_nine_db(preset: Preset) -> None:
     guitar = find_patch("Classical guitar").patch
     strummed = [peak_db(guitar, preset, E_MAJOR, apart_s) for apart_s in (0.005, 0.01, 0.02, 0.04)]
-    assert np.mean(strummed) == pytest.approx(-5, abs=1)
-    assert max(strummed) < 20 * np.log10(CEILING)
+    assert np.mean(strummed) == pytest.approx(-9, abs=1)
+    assert max(strummed) < -6.5
     notes = [peak_db(guitar, preset, (key,), STRUM_S) for key in E_MAJOR]
-    assert np.mean(notes) == pytest.approx(-13, abs=1)
+    assert np.mean(notes) == pytest.approx(-18, abs=1)
 
 
 def test_six_keys_at_once_stay_below_the_limiter(patch: Patch, preset: Preset) -> None:

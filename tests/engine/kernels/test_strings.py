@@ -23,7 +23,7 @@ def row(string: StringParameters) -> NDArray[np.float64]:
 @pytest.mark.parametrize("string", BOTH)
 def test_modes_are_those_of_the_parameters(string: StringParameters) -> None:
     found = np.empty(4 * 60)
-    strings.rows(row(string), 60, found)
+    strings.rows(row(string), 60, 0, 1.0, *[0.0] * 5, found)
     resonator = string.resonator(60)
     own = resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch
     np.testing.assert_allclose(found, np.concatenate(own), rtol=1e-13)

@@ -1,0 +1,154 @@
+"""Drums of an instrument: a blow becomes voices of the modes that the instrument's table holds for its key.
+
+Each key's drum is a block of the table: its modes, how a blow sets them moving, and what is heard of them. A voice is
+that of a string in all else, and its note is one whose voices are prepared.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import carray, njit
+
+from engine.kernels import layout as at
+from engine.kernels import playing_layout as of
+from engine.kernels.compiled import COMPILED
+from engine.kernels.memory import pointer
+from engine.kernels.modes import TOO_HIGH
+from engine.pluck import RUNAWAY_FACTOR
+
+HERTZ = -0.2  # power of the speed in the time of contact, as in `engine.strike`
+
+
+@njit(inline="always", **COMPILED)
+def block_of(tables: np.ndarray, key: int) -> int:
+    """First slot of the drum of a key in a table of drums; 0: the key has none."""
+    return tables[tables[of.TABLE_DRUMS] + key]
+
+
+@njit(**COMPILED)
+def strike(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    event: int,
+    first_voice: int,
+    stride: int,
+) -> bool:
+    """Makes the voices of a note in the player's memory and names them in its event; False: there is no such drum."""
+    key, velocity = players[event + of.EVENT_KEY], player[event + of.EVENT_VALUE]
+    drum = block_of(tables, key)
+    gain = abs(table[of.TABLE_GAINS + key * of.GAINS])
+    if drum == 0 or not gain >= 0.0 or tables[drum + of.DRUM_MODES] > players[of.PLAYER_MODES]:
+        return False
+    if gain == 0.0:
+        gain = 1.0
+    curve, soft = player[of.PLAYER_VALUES + of.CURVE], table[drum + of.DRUM_SOFTEST_M_S]
+    share = min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve)
+    speed = soft * (table[drum + of.DRUM_HARDEST_M_S] / soft) ** share
+    for source in range(tables[of.TABLE_SOURCES]):
+        slot = first_voice + source * stride
+        address = players[of.PLAYER_HERE] + 8 * slot
+        voice = carray(pointer(address), (stride,), np.float64)
+        begun = gain * player[of.PLAYER_SOURCE_GAINS + source]
+        _make(player, table, tables, voice, drum, speed, tables[of.TABLE_KINDS + source])
+        voice.view(np.int64)[at.PROGRAM] = tables[of.TABLE_PROGRAMS + source]
+        voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
+        players[event + of.EVENT_VOICES + source] = address
+    return True
+
+
+@njit(**COMPILED)
+def _make(
+    player: np.ndarray, table: np.ndarray, tables: np.ndarray, voice: np.ndarray, drum: int, speed: float, kind: int
+) -> None:
+    """A voice that sets out from the speeds that a blow gives its modes."""
+    counts, n, rate_hz = voice.view(np.int64), tables[drum + of.DRUM_MODES], player[of.PLAYER_RATE]
+    for slot in range(at.state(n) + at.TRUTH_ROWS * n):
+        voice[slot] = 0.0
+    counts[at.KIND], counts[at.MODES], counts[at.POINTS] = kind, n, tables[of.TABLE_POINTS]
+    counts[at.BEGAN_FRAME], counts[at.MOVING] = -1, n
+    counts[at.FADE_FRAMES] = round(at.FADE_S * rate_hz)
+    counts[at.ENDS_AT], counts[at.ENDS_IN] = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
+    voice[at.SILENT] = at.SILENT_DB * math.log(10.0) / 20
+    rows = drum + of.DRUM_HEADER
+    place = at.state(n) + at.OMEGA_SQUARED * n
+    for slot in range(4 * n):
+        voice[place + slot] = table[rows + slot]
+    weigh(player, table, tables, voice, 0, drum)
+    contact_s = table[drum + of.DRUM_CONTACT_S] * max(speed, 1e-3) ** HERTZ
+    first, widest, loudest, energy = at.state(n), 0.0, 0.0, 0.0
+    for mode in range(n):
+        omega = math.sqrt(table[rows + mode])
+        turns = omega * contact_s / (2 * math.pi)
+        pulse = 0.5
+        if turns < 1e-6:
+            pulse = 1.0
+        elif abs(turns - 1) > 1e-6:
+            pulse = math.sin(math.pi * turns) / (math.pi * turns * (1 - turns * turns))
+        voice[first + n + mode] = table[rows + 4 * n + mode] * pulse
+        energy += 0.5 * table[drum + of.DRUM_MASS_KG] * voice[first + n + mode] ** 2
+    impulse = speed / (energy + 0.5 / table[drum + of.DRUM_MALLET_KG])
+    for mode in range(n):
+        voice[first + n + mode] *= impulse
+        moved, omega = voice[first + n + mode], math.sqrt(table[rows + mode])
+        widest += abs(moved) / omega
+        heard = 0.0
+        for point in range(counts[at.POINTS]):
+            heard = max(heard, abs(voice[at.weights(n, 0, point, 0) + mode]))
+        loudest += heard * abs(moved) / omega
+    voice[at.PEAK], voice[at.LIMIT] = max(widest, 1e-9), max(RUNAWAY_FACTOR * loudest, 1e-3)
+
+
+@njit(**COMPILED)
+def weigh(
+    player: np.ndarray, table: np.ndarray, tables: np.ndarray, voice: np.ndarray, which: int, drum: int
+) -> None:
+    """Sets one of the two sets of weights of a voice; modes too high for the rate are not heard."""
+    n, highest = tables[drum + of.DRUM_MODES], TOO_HIGH * player[of.PLAYER_RATE]
+    rows = drum + of.DRUM_HEADER
+    for point in range(tables[of.TABLE_POINTS]):
+        for mode in range(n):
+            heard = table[rows + mode] <= highest * highest
+            first = at.weights(n, which, point, 0) + mode
+            voice[first] = table[rows + (5 + point) * n + mode] if heard else 0.0
+            voice[first + n] = 0.0
+
+
+@njit(**COMPILED)
+def hear(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, note: int) -> None:
+    """Lets a note follow the gains of sources and the places where the drum is heard."""
+    drum = block_of(tables, players[note + of.NOTE_KEY])
+    if drum == 0:
+        return
+    gain = abs(table[of.TABLE_GAINS + players[note + of.NOTE_KEY] * of.GAINS])
+    if not gain > 0.0:
+        gain = 1.0
+    moved = False
+    for point in range(2):
+        moved = moved or player[note + of.NOTE_POINT + point] != table[of.TABLE_POINT + point]
+    moved = moved and players[note + of.NOTE_POINTS] == tables[of.TABLE_POINTS]
+    for source in range(tables[of.TABLE_SOURCES]):
+        address = players[note + of.NOTE_VOICES + source]
+        if address == 0:
+            continue
+        voice = carray(pointer(address), (1 << 40,), np.float64)
+        counts = voice.view(np.int64)
+        if counts[at.MODES] != tables[drum + of.DRUM_MODES]:
+            moved = False
+            continue
+        voice[at.WANTED_GAIN] = gain * player[of.PLAYER_SOURCE_GAINS + source]
+        moved = moved and counts[at.NEXT_WEIGHTS] == 0
+    if not moved:
+        return
+    for point in range(2):
+        player[note + of.NOTE_POINT + point] = table[of.TABLE_POINT + point]
+    for source in range(tables[of.TABLE_SOURCES]):
+        address = players[note + of.NOTE_VOICES + source]
+        if address != 0:
+            voice = carray(pointer(address), (1 << 40,), np.float64)
+            weigh(player, table, tables, voice, 1, drum)
+            voice.view(np.int64)[at.WEIGHTS_FADED] = 0
+            voice.view(np.int64)[at.NEXT_WEIGHTS] = 1

@@ -1,0 +1,138 @@
+"""A string that moves in two directions across its length: normal to the soundboard, and along it.
+
+Kirchhoff's and Carrier's tension acts on both alike, S = Σ η² (y² + z²) (C. E. Gough, "The nonlinear free vibration
+of a damped elastic string", JASA 75, 1984). To a resonator they are modes of one shape, side by side, that share one
+stretch: solvers and models need no other equation.
+
+The bridge treats the directions differently. A conductance G at the end of a string adds T G/ℓ to its decay rates:
+a round trip of 2ℓ/c leaves 1 - 2 Z G of a wave, with Z = T/c (Fletcher and Rossing, "The Physics of Musical
+Instruments", section 2.12). Along the board it is stiffer: that motion rings longer, and two-stage decay follows
+(G. Weinreich, "Coupled piano strings", JASA 62, 1977; J. Woodhouse, "A necessary condition for double-decay
+envelopes in stringed instruments", JASA 150, 2021). Slightly different frequencies beat.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine import bounds
+from engine.kernels.playing_layout import HIGHEST_SIGMA, MOST_PAIRS
+from engine.resonators.base import Array, Resonator
+from engine.resonators.string import StringParameters
+
+PAIRS = MOST_PAIRS  # lowest partials that have two modes; an estimate: above them neither beats nor stages are heard
+
+
+@dataclass(frozen=True)
+class Polarisations:
+    """Two directions, the first normal to the board.
+
+    Attributes:
+        angle_deg: of the pluck, from the first direction.
+        second_heard: what the second is heard with, of the first.
+        second_cents: pitch of the second, above the first.
+        conductance_s_kg, second_conductance_s_kg: real part of the bridge's admittance in both directions.
+    """
+
+    angle_deg: float = 45.0
+    second_heard: float = 0.3
+    second_cents: float = 1.0
+    conductance_s_kg: float = 0.01
+    second_conductance_s_kg: float = 0.001
+
+    def __post_init__(self) -> None:
+        for name, (low_high, unit) in bounds.POLARISATIONS.items():
+            bounds.check(name, getattr(self, name), low_high, unit)
+
+    @property
+    def pulled(self) -> tuple[float, float]:
+        """Parts of a pluck in both directions."""
+        angle = math.radians(self.angle_deg)
+        return math.cos(angle), math.sin(angle)
+
+    @property
+    def heard(self) -> tuple[float, float]:
+        """What both are heard with: a pluck is heard as high as it is pulled."""
+        first, second = self.pulled
+        whole = first + self.second_heard * second
+        return 1 / whole, self.second_heard / whole
+
+    @property
+    def detuning(self) -> float:
+        """ω² of the second over that of the first."""
+        return float(2 ** (2 * self.second_cents / 1200))
+
+    def resonator(
+        self,
+        string: StringParameters,
+        partials: int,
+        *,
+        losses: float = 1.0,
+        tension_modulated: bool = True,
+        grid_points: int = 101,
+    ) -> Resonator:
+        """The string's first partials: pairs of modes, then single ones.
+
+        Args:
+            losses: factor of the bridge's conductances.
+
+        Raises:
+            ValueError: the grid does not hold so many partials.
+        """
+        law = string.resonator(partials, tension_modulated=tension_modulated, grid_points=grid_points)
+        partial, second = layout(partials)
+        pulled, heard = (np.array(each)[second] for each in (self.pulled, self.heard))
+        single = np.arange(len(partial)) >= 2 * min(PAIRS, partials)
+        pulled = np.where(single, 1 / self.heard[0], pulled)  # so that it is heard as the others are
+        omega, sigma = self._rates(string, partials, losses)
+        assert law.end_force is not None and law.mirror is not None
+        return Resonator(
+            omega=omega,
+            sigma=sigma,
+            coupling=law.coupling[partial],
+            stretch=law.stretch[partial],
+            tension_rise=law.tension_rise,
+            shapes=law.shapes[partial] * heard[:, None],
+            analysis=law.analysis[:, partial] * pulled,
+            mirror=law.mirror[partial],
+            end_force=law.end_force[partial] * heard,
+        )
+
+    def retuned(self, resonator: Resonator, string: StringParameters, losses: float = 1.0) -> Resonator:
+        """A resonator of `resonator` with the frequencies, decays and coupling of another string; same shapes."""
+        partials = partials_of(resonator.modes)
+        partial, _ = layout(partials)
+        omega, sigma = self._rates(string, partials, losses)
+        coupling = string.tension_coupling(partials)[partial]
+        return replace(
+            resonator,
+            omega=omega,
+            sigma=sigma,
+            coupling=coupling if resonator.tension_modulated else resonator.coupling,
+            stretch=string.wavenumbers(partials)[partial] ** 2,
+        )
+
+    def _rates(self, string: StringParameters, partials: int, losses: float) -> tuple[Array, Array]:
+        """ω and σ of the modes."""
+        partial, second = layout(partials)
+        omega = string.undamped_frequencies(partials)[partial]
+        omega = np.where(second == 1, omega * math.sqrt(self.detuning), omega)
+        conductance = np.array([self.conductance_s_kg, self.second_conductance_s_kg])[second]
+        added = losses * string.tension_n / string.length_m * conductance
+        return omega, np.minimum(string.decay_rates(partials)[partial] + added, HIGHEST_SIGMA * omega)
+
+
+def layout(partials: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Of each mode its partial, from 0, and its direction, 0 or 1."""
+    mode, pairs = np.arange(partials + min(PAIRS, partials)), min(PAIRS, partials)
+    paired = mode < 2 * pairs
+    return np.where(paired, mode // 2, mode - pairs), np.where(paired, mode % 2, 0)
+
+
+def partials_of(modes: int) -> int:
+    """How many partials so many modes are: the inverse of `layout`."""
+    return modes - min(PAIRS, modes // 2)

@@ -1,0 +1,138 @@
+"""Drums: the cost of a voice of many modes, and of a kit beside strings.
+
+Costs are processor time of this thread at 48 kHz, less that of an empty mixer, as shares of a core. The least of some
+repeats counts: other processes only add.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+from app.instrument.compiled import InstrumentPlayer
+from app.instrument.events import Event, NoteOn
+from app.patches.drums import Drums, PhysicalMallet
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
+from app.patches.patch import Patch
+from engine.presets import SHIPPED, load_preset
+from engine.voices import Mixer
+from tests.bench.machine import Machine, one_thread
+
+RATE_HZ = 48_000
+EDGES_S = (0.0, 0.05, 1.0)  # of the ages of voices that are measured apart
+REPEATS = 5
+STEP_FRAMES = 480
+VELOCITY = 110
+SIZES = (400, 800, 1500)  # modes
+HARD = PhysicalMallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)  # so that all modes move
+STRINGS, STRING_PATCH = (40, 45, 50, 55, 59, 64, 67, 71), "classical_guitar"
+
+
+@dataclass(frozen=True)
+class DrumCost:
+    """Of notes that begin together.
+
+    Attributes:
+        onset, first_second: shares of a core over the first 50 ms, and the first second.
+    """
+
+    what: str
+    voices: int
+    modes: int
+    onset: float
+    first_second: float
+
+
+@dataclass(frozen=True)
+class DrumsBenchmark:
+    machine: Machine
+    rate_hz: int
+    drums: tuple[DrumCost, ...]
+
+
+def measure(report: Callable[[float, str], None]) -> DrumsBenchmark:
+    """Drums of so many modes, struck by something small and hard and by a stick; a kit, and a kit with strings."""
+    found: list[DrumCost] = []
+    kit, guitar = (read_patch(PATCHES / f"{name}.json") for name in ("concert_toms", STRING_PATCH))
+    pads = [drum.note for drum in _drums(kit).drums]
+    with one_thread():
+        for number, size in enumerate(SIZES):
+            report(number / (len(SIZES) + 2), f"{size} modes")
+            patch = _of_size(size)
+            found.append(_cost("one drum, a stick", size, (patch, (47,))))
+            found.append(_cost("one drum, small and hard", size, (_with_mallet(patch), (47,))))
+        report(len(SIZES) / (len(SIZES) + 2), "kit")
+        found.append(_cost("kit", 0, (kit, pads)))
+        found.append(_cost("kit and strings", 0, (kit, pads), (guitar, STRINGS)))
+        return DrumsBenchmark(Machine.here(), RATE_HZ, tuple(found))
+
+
+def _drums(patch: Patch) -> Drums:
+    assert isinstance(patch.strings, Drums)
+    return patch.strings
+
+
+def _of_size(modes: int) -> Patch:
+    """The tom whose modes below a frequency are so many, about."""
+    from app.instrument.drum_keys import DrumKeys
+    from engine.voices import Ear
+
+    patch = read_patch(PATCHES / "tuned_toms.json")
+    low, high = 1_000.0, 19_000.0
+    for _ in range(8):
+        middle = (low + high) / 2
+        found = DrumKeys(_below(patch, middle), Ear((0.5,))).of_key(47)
+        assert found is not None
+        low, high = (middle, high) if len(found.modes) < modes else (low, middle)
+    return _below(patch, high)
+
+
+def _below(patch: Patch, highest_hz: float) -> Patch:
+    return patch.model_copy(update={"strings": _drums(patch).model_copy(update={"highest_hz": highest_hz})})
+
+
+def _with_mallet(patch: Patch) -> Patch:
+    drum = _drums(patch).drums[0].model_copy(update={"mallet": HARD})
+    return patch.model_copy(update={"strings": _drums(patch).model_copy(update={"drums": (drum,)})})
+
+
+def _cost(what: str, modes: int, *played: tuple[Patch, object]) -> DrumCost:
+    runs, empty = [], []
+    count = 0
+    for _ in range(REPEATS):
+        times, count = _times_s(played)
+        runs.append(times)
+        empty.append(sum(_times_s(())[0]))
+    empty_share = min(empty) / EDGES_S[-1]
+    onset_s, rest_s = (min(times) for times in zip(*runs, strict=True))
+    return DrumCost(
+        what, count, modes, onset_s / EDGES_S[1] - empty_share, (onset_s + rest_s) / EDGES_S[2] - empty_share
+    )
+
+
+def _times_s(played: tuple[tuple[Patch, object], ...]) -> tuple[list[float], int]:
+    """Processor time for each age, of a mixer for each instrument; and how many notes began."""
+    stages, began = [], 0
+    for patch, keys in played or ((None, ()),):
+        mixer = Mixer(RATE_HZ)
+        if patch is not None:
+            player = InstrumentPlayer(
+                patch, load_preset(SHIPPED / f"{patch.preset}.safetensors"), RATE_HZ, {"model": 1.0}
+            )
+            mixer.set_player(player.compiled)
+            events: list[Event] = [NoteOn(key, VELOCITY) for key in keys]  # type: ignore[attr-defined]
+            for event in events:
+                player.handle(event)
+            began += len(events)
+        stages.append(mixer)
+    found = []
+    for begin_s, end_s in pairwise(EDGES_S):
+        began_s = time.thread_time()
+        for _ in range(round((end_s - begin_s) * RATE_HZ) // STEP_FRAMES):
+            for mixer in stages:
+                mixer.render(STEP_FRAMES)
+        found.append(time.thread_time() - began_s)
+    return found, began

@@ -1,0 +1,123 @@
+"""Drums: frequencies, Berger's tension against a difference, air, and the solver against the oracle."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from engine.resonators.drum import DrumParameters
+from engine.strike import Mallet, Strike, pulse_spectrum
+from engine.truth import ModalState, SplittingSolver, solve_dop853
+
+TOM = DrumParameters(uneven=0.004)
+PLATE = DrumParameters("rectangle", 0.3, 0.2, 6e-4, 7850, 2e11, 0.3, tension_n_m=0)
+# A timpani's head of 65.6 cm without kettle: dimensions, tension and frequencies as in Fletcher and Rossing,
+# The Physics of Musical Instruments (1998), table 18.1, after Christian et al., JASA 76 (1984), 1336
+HEAD = DrumParameters(
+    length_m=0.656, width_m=0.656, thickness_m=0.262 / 1390, density_kg_m3=1390, tension_n_m=3990, air_kg_m3=1.2
+)
+MEASURED_HZ = {(0, 1): 82, (1, 1): 155, (2, 1): 229, (3, 1): 297, (4, 1): 366, (5, 1): 431}
+
+
+def lowest(drum: DrumParameters) -> dict[tuple[int, int], float]:
+    """Frequencies in Hz by nodal diameters and circles, of cosines."""
+    modes, found = drum.modes(800), {}
+    for m, sine, omega in zip(modes.surface.m, modes.surface.sine, modes.omega, strict=True):  # type: ignore[attr-defined]
+        if not sine:
+            n = 1 + sum(key[0] == m for key in found)
+            found[int(m), n] = omega / (2 * math.pi)
+    return found
+
+
+def test_membrane_and_plate_in_closed_form() -> None:
+    first = 2.404826 / (0.33 / 2) * math.sqrt(1500 / TOM.mass_kg_m2) / (2 * math.pi)
+    assert lowest(TOM)[0, 1] == pytest.approx(first, rel=1e-3)
+    kappa = (math.pi / 0.3) ** 2 + (math.pi / 0.2) ** 2
+    assert PLATE.modes(2000).omega[0] == pytest.approx(kappa * math.sqrt(PLATE.bending_nm / PLATE.mass_kg_m2))
+
+
+def test_pairs_are_split() -> None:
+    omega = replace(TOM, length_m=0.332, width_m=0.328).modes(2000).omega
+    epsilon = 0.004 / 0.66
+    assert omega[2] / omega[1] == pytest.approx(1 + epsilon + 0.004, rel=1e-3)
+    assert omega[4] / omega[3] == pytest.approx(1.004, rel=1e-4)
+
+
+def test_tension_of_the_stretch_is_bergers() -> None:
+    """C (1/A) ∫|∇w|² dA, by differences on a grid."""
+    modes, side = PLATE.modes(1500), 201
+    grid = np.stack(np.meshgrid(*(np.linspace(-1, 1, side),) * 2, indexing="ij"), axis=-1)
+    q = 1e-3 * np.random.default_rng(1).standard_normal(len(modes))
+    w = (q @ modes.shapes(grid.reshape(-1, 2))).reshape(side, side)
+    along, across = np.gradient(w, 0.3 / (side - 1), 0.2 / (side - 1))
+    expected = PLATE.stretching_n_m * (along**2 + across**2).mean()
+    resonator = modes.resonator(np.zeros((1, 2)))
+    at_rest = PLATE.stretching_n_m / resonator.tension_rise
+    assert float(resonator.relative_tension_rise(q)) * at_rest == pytest.approx(expected, rel=0.02)
+
+
+@pytest.mark.parametrize("mode", MEASURED_HZ)
+def test_air_loads_a_single_head_as_measured(mode: tuple[int, int]) -> None:
+    assert lowest(HEAD)[mode] == pytest.approx(MEASURED_HZ[mode], rel=0.05)
+
+
+def test_monopoles_radiate_most() -> None:
+    modes = replace(HEAD, damping_d1_kg_m2_s=0.0, damping_d3_kg_s=0.0).modes(500)
+    assert modes.sigma[0] > 2 * modes.sigma[1] > 4 * modes.sigma[3]
+
+
+def test_a_kettle_raises_the_first_mode() -> None:
+    kettle = lowest(replace(HEAD, tension_n_m=3710, cavity_m3=0.14))
+    assert kettle[0, 1] == pytest.approx(127, rel=0.1)  # measured with kettle: 127 Hz, 150 Hz
+    assert kettle[1, 1] == pytest.approx(150, rel=0.05)
+
+
+@pytest.mark.parametrize("drum", [TOM, PLATE, replace(HEAD, length_m=0.3, width_m=0.3)])
+@pytest.mark.parametrize("blow", [True, False])
+def test_solver_against_the_oracle(drum: DrumParameters, blow: bool) -> None:
+    modes = drum.modes(900, most=24)
+    resonator = modes.resonator(np.zeros((1, 2)))
+    v = Strike((0.3, 0.2), 4.0, Mallet(contact_s=0.002)).speeds(modes)
+    q = v / resonator.omega
+    share = math.sqrt(0.3 / float(resonator.relative_tension_rise(q)))
+    still = np.zeros_like(q)
+    state = ModalState(*(torch.from_numpy(part * share)[None] for part in ((still, v) if blow else (q, still))))
+    expected = solve_dop853(resonator, state, 48_000, 1200)
+    found = SplittingSolver(resonator, 48_000).solve(state, 1200)
+    assert float((found - expected).norm() / expected.norm()) < 1e-9
+
+
+def test_a_pulse_is_a_kick_at_its_middle() -> None:
+    omega, contact_s, steps = 900.0, 0.003, 20_000
+    t = (np.arange(steps) + 0.5) * contact_s / steps
+    force = (1 - np.cos(2 * np.pi * t / contact_s)) / contact_s
+    expected = (force * np.cos(omega * (t - contact_s / 2))).mean() * contact_s
+    assert pulse_spectrum(np.array([omega]), contact_s)[0] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"thickness_m": -1.0}, "thickness_m must be positive"),
+        ({"tension_n_m": 1e9}, "tension_n_m must lie in"),
+        ({"width_m": 0.2}, "two diameters, nearly the same"),
+        ({"shape": "square"}, "must be one of circle, rectangle"),
+        ({"thickness_m": 0.02, "length_m": 0.1, "width_m": 0.1}, "below a tenth of the sides"),
+    ],
+)
+def test_impossible_drums_are_refused(change: dict[str, object], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        replace(TOM, **change)  # type: ignore[arg-type]
+
+
+def test_amplitudes_do_not_follow_from_a_few_places() -> None:
+    resonator = TOM.modes(500).resonator(np.zeros((2, 2)))
+    with pytest.raises(ValueError, match="do not follow from displacement at 2 places"):
+        resonator.to_modes(np.zeros(2))
+
+
+def test_a_strike_beside_the_drum_is_refused() -> None:
+    with pytest.raises(ValueError, match="not on the drum"):
+        Strike((0.8, 0.8)).speeds(TOM.modes(500))

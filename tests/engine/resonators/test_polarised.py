@@ -1,0 +1,107 @@
+"""Two polarisations: their modes, their truth against DOP853, the model against the truth, two-stage decay."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, replace
+
+import numpy as np
+import pytest
+import torch
+
+from engine.kernels import strings
+from engine.models.base import Physics
+from engine.models.koopman_tension import KoopmanTension
+from engine.pluck import Pluck
+from engine.presets import load_preset
+from engine.presets.finding import SHIPPED
+from engine.resonators.polarised import PAIRS, Polarisations, layout
+from engine.resonators.string import StringParameters
+from engine.truth.oracle import solve_dop853
+from engine.truth.splitting import SplittingSolver
+from engine.truth.state import ModalState
+
+STRING = StringParameters()
+MOVING = Polarisations(angle_deg=40, second_heard=0.25, second_cents=2.0, conductance_s_kg=0.02)
+PLUCK = Pluck(0.17, 3.0, "rounded", 0.08)
+
+
+def test_a_pluck_is_heard_as_high_as_it_is_pulled() -> None:
+    resonator, law = MOVING.resonator(STRING, 60), STRING.resonator(60)
+    displacement = PLUCK.displacement(101)
+    heard = resonator.to_grid(resonator.to_modes(displacement))
+    np.testing.assert_allclose(heard, law.to_grid(law.to_modes(displacement)), atol=1e-12)
+    assert resonator.force_weights is not None and law.force_weights is not None
+    np.testing.assert_allclose(resonator.force_weights, law.force_weights)
+
+
+def test_without_an_angle_it_moves_as_one_string() -> None:
+    plain = Polarisations(0.0, 0.0, 0.0, 0.0, 0.0)
+    state = ModalState.at_rest(plain.resonator(STRING, 30).to_modes(PLUCK.displacement(101))[None])
+    paired = plain.resonator(STRING, 30)
+    found = SplittingSolver(paired, 48_000).solve(state, 400).numpy() @ paired.shapes
+    law = STRING.resonator(30)
+    alone = SplittingSolver(law, 48_000).solve(ModalState.at_rest(law.to_modes(PLUCK.displacement(101))[None]), 400)
+    np.testing.assert_allclose(found, alone.numpy() @ law.shapes, rtol=1e-9, atol=1e-12)
+
+
+def test_the_truth_is_that_of_dop853() -> None:
+    """Both polarisations share one tension: at velocities that glide by a quarter-tone, and not only at rest."""
+    resonator = MOVING.resonator(STRING, 12)
+    q = resonator.to_modes(Pluck(0.17, 8.0, "rounded", 0.2).displacement(101))[None]
+    state = ModalState(torch.from_numpy(q), torch.from_numpy(q[:, ::-1].copy()))
+    rise = float(resonator.relative_tension_rise(q[0]))
+    assert rise > 0.02
+    found, wanted = (
+        SplittingSolver(resonator, 48_000).solve(state, 2_000),
+        solve_dop853(resonator, state, 48_000, 2_000),
+    )
+    assert relative_l2(found, wanted) < 1e-7
+
+
+def relative_l2(found: torch.Tensor, wanted: torch.Tensor) -> float:
+    return float((found - wanted).norm() / wanted.norm())
+
+
+@pytest.mark.parametrize("amplitude_mm", [1.0, 6.0])
+def test_the_learned_curves_hold_for_both(amplitude_mm: float) -> None:
+    """As accurate as in one direction: relative MSE below 1e-6 over a second."""
+    model = load_preset(SHIPPED / "studio_any_string.safetensors").model
+    assert isinstance(model, KoopmanTension)
+    rate_hz, resonator = 48_000, MOVING.resonator(STRING, 60)
+    displacement = PLUCK.moved(amplitude_mm=amplitude_mm).displacement(101)[None]
+    tuned = model.for_resonator(Physics(resonator, rate_hz, 1.0))
+    with torch.inference_mode():
+        found = tuned.amplitudes(tuned.encode(torch.from_numpy(displacement)), rate_hz)
+    solver = SplittingSolver(resonator, rate_hz)
+    wanted, _ = solver.advance(ModalState.at_rest(resonator.to_modes(displacement)), rate_hz)
+    heard = torch.from_numpy(resonator.shapes @ np.linspace(0, 1, 101)[:, None])
+    assert relative_l2(found @ heard, wanted @ heard) ** 2 < 1e-6
+
+
+def test_compiled_rows_are_those_of_the_resonator() -> None:
+    for partials in (10, 60):
+        resonator = MOVING.resonator(STRING, partials, losses=1.7)
+        pairs, modes = min(PAIRS, partials), resonator.modes
+        found = np.empty(4 * modes)
+        losses = 1.7 * MOVING.conductance_s_kg, 1.7 * MOVING.second_conductance_s_kg
+        strings.rows(np.array(astuple(STRING)), modes, pairs, MOVING.detuning, *losses, 0.0, 0.0, 0.0, found)
+        own = resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch
+        np.testing.assert_allclose(found, np.concatenate(own), rtol=1e-12)
+
+
+def test_a_bent_string_keeps_its_layout() -> None:
+    bent = replace(STRING, tension_n=1.2 * STRING.tension_n)
+    retuned, fresh = MOVING.retuned(MOVING.resonator(STRING, 60), bent), MOVING.resonator(bent, 60)
+    for name in ("omega", "sigma", "coupling", "stretch", "shapes"):
+        np.testing.assert_allclose(getattr(retuned, name), getattr(fresh, name))
+
+
+def test_pairs_come_first() -> None:
+    partial, second = layout(PAIRS + 2)
+    assert partial[:4].tolist() == [0, 0, 1, 1] and partial[-2:].tolist() == [PAIRS, PAIRS + 1]
+    assert second[:4].tolist() == [0, 1, 0, 1] and second[-2:].tolist() == [0, 0]
+
+
+def test_an_impossible_bridge_is_refused() -> None:
+    with pytest.raises(ValueError, match="conductance_s_kg must lie in 0"):
+        Polarisations(conductance_s_kg=-1.0)
