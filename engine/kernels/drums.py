@@ -1,7 +1,7 @@
 """Drums of an instrument: a blow becomes voices of the modes that the instrument's table holds for its key.
 
-Each key's drum is a block of the table: its modes, the weights of a blow and those of the listener. A voice is that of
-a string in all else, and its note is one whose voices are prepared.
+Each key's drum is a block of the table: its modes, the weights of a blow and of the listener. A voice is that of a
+string in all else, and its note is one whose voices are prepared.
 """
 
 from __future__ import annotations
