@@ -225,7 +225,7 @@ class DrumError:
     Attributes:
         tenth: None: not measured, or the drum is silent by then.
         processor_s: for the first second of all modes.
-        slow: whether the drum decays `SLOWER` times as slowly, to be there in the tenth second.
+        slower: how many times as slowly the drum decays, to be there in the tenth second.
     """
 
     number: int
@@ -238,7 +238,11 @@ class DrumError:
     first: float
     tenth: float | None = None
     processor_s: float = 0.0
-    slow: bool = False
+    slower: float = 1.0
+
+    @property
+    def slow(self) -> bool:
+        return self.slower > 1
 
 
 @torch.inference_mode()
@@ -282,7 +286,7 @@ def measure_drum(
             _finite(wrong[name][0] / energy[0]),
             _finite(wrong[name][1] / energy[1]) if tenth and sounds else None,
             spent[name],
-            tenth,
+            SLOWER if tenth else 1.0,
         )
         for name in players
     ]
