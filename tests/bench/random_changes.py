@@ -71,6 +71,7 @@ _CHANGES: tuple[_Change, ...] = (
     lambda r, c, of: {"motion": not c.motion},
     lambda r, c, of: {"envelope": not c.envelope},
     lambda r, c, of: {"instrument": r.choice(of.patches)} if of.patches else {},
+    lambda r, c, of: {"face": r.choice(("play", "lab"))},
     lambda r, c, of: {"octave": r.randint(-4, 4)},
     lambda r, c, of: {"velocity": r.randint(1, 127)},
     lambda r, c, of: {"instrument": r.choice((SingleString(preset=c.preset), c.patch or c.instrument))},

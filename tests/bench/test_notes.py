@@ -28,8 +28,11 @@ Piece = dict[str, list[TimedEvent]]
 
 @pytest.fixture(scope="module")
 def patch() -> Patch:
+    """One direction, released at once, each stroke alike: what is judged has no beats of its own."""
     patch = read_patch(PATCHES / "classical_guitar.json")
-    return Patch.model_validate({**dict(patch), "body": Body(), "room": Room()})
+    pluck = patch.pluck.model_copy(update={"variation": 0.0, "release_ms": 0.0, "release_hard_ms": 0.0})
+    plain: dict[str, object] = {"pluck": pluck, "polarisations": None, "sympathy_s_kg": 0.0}
+    return Patch.model_validate({**dict(patch), "body": Body(), "room": Room(), **plain})
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from engine.metrics import RelativeError
+from engine.models.base import count_parameters
 from engine.presets import load_preset
 from engine.schema import write
 from training.cell import Cell, configuration_of
@@ -105,7 +106,7 @@ def test_a_row_tells_what_its_preset_measures(tmp_path: Path) -> None:
         "physics",
         True,
         420,
-        preset.parameters,
+        count_parameters(preset.model),
     )
     assert preset.info.horizon_steps == 420
     assert (tmp_path / "runs" / CELL.name / "log.png").stat().st_size > 10_000

@@ -109,7 +109,7 @@ def evaluate(
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Errors on held-out strings, inside the family and beyond it; or on drums.
+    """Errors on held-out strings within and beyond the family, or drums.
 
     Those on drums are written to a table in `--runs`, or the folder of runs, after each drum: a stopped measurement
     continues.

@@ -170,6 +170,8 @@ class SampledPlan:
         body, room = self.patch.body, self.patch.room
         silent = {"body": not body.name or body.mix == 0, "room": room.mix == 0}
         unheard = UNHEARD_FIELDS | {name for name, left_out in silent.items() if left_out}
+        if self.patch.sympathy_s_kg > 0:  # damping chooses the strings that ring with a note
+            unheard -= {"damping"}
         return self.patch.model_dump(mode="json", exclude=set(unheard))
 
     def _zone(self, keys: tuple[int, int], velocities: tuple[int, int]) -> Zone:

@@ -126,7 +126,7 @@ def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) ->
     late = [w for w in found["windows"] if w["past_horizon"]]
     assert [(w["start_s"], w["stop_s"]) for w in late] == [(0.125, 1.125), (1.125, 2.125), (2.125, 2.625)]
     # the first mode is left, and exp(-0.1 σt) of it: so much is known of the error
-    sigma, middle_s = float(DATA.string.decay_rates(1)), 2.375
+    sigma, middle_s = DATA.string.decay_rates(1).item(), 2.375
     assert late[2]["rel_mse"] == pytest.approx((1 - math.exp(-0.1 * sigma * middle_s)) ** 2, rel=0.1)
     # damped a tenth less, its error grows: the last second's figure lies between those of its windows
     assert late[1]["rel_mse"] < found["last_second"]["rel_mse"] < late[2]["rel_mse"]

@@ -45,4 +45,4 @@ def test_six_keys_at_once_stay_below_the_limiter(patch: Patch, preset: Preset) -
 def test_six_strummed_keys_do_not_engage_the_limiter(patch: Patch, preset: Preset) -> None:
     found = peak_db(patch, preset, tuple(chord_of(patch)), STRUM_S)
     print(f"{patch.name}: {found:.1f} dBFS")
-    assert -14 < found < 20 * np.log10(CEILING)
+    assert -20 < found < 20 * np.log10(CEILING)

@@ -103,7 +103,12 @@ def ends(request: pytest.FixtureRequest) -> Iterator[tuple[Backend, Sender]]:
 @pytest.fixture
 def patch() -> Patch:
     shipped = read_patch(PATCHES / "steel_string_acoustic.json")
-    dry = {"mode": "poly", "bend_semitones": 2.0, "damping": Damping(release_t60_s=RELEASE_T60_S)}
+    dry = {
+        "polarisations": None,
+        "mode": "poly",
+        "bend_semitones": 2.0,
+        "damping": Damping(release_t60_s=RELEASE_T60_S),
+    }
     return Patch.model_validate({**dict(shipped), **dry})
 
 

@@ -111,6 +111,7 @@ HEARD: list[dict[str, object]] = [
     {"body": {"name": "guitar", "mix": 0.5}},
     {"room": {"mix": 0.5, "t60_s": 0.3}},
     {"level_db": -6.0},
+    {"sympathy_s_kg": 0.02, "damping": {"let_ring": True}},
 ]
 
 
@@ -118,7 +119,8 @@ HEARD: list[dict[str, object]] = [
 def test_a_sample_is_kept_where_it_sounds_the_same(
     fields: dict[str, object], same: bool, harp: Patch, note: Callable
 ) -> None:
-    plain = Patch.model_validate({**dict(harp), "body": {}, "damping": {}, "pickup": {}, "pluck": {}})
+    bare: dict[str, object] = {"body": {}, "damping": {}, "pickup": {}, "pluck": {}, "sympathy_s_kg": 0.0}
+    plain = Patch.model_validate({**dict(harp), **bare})
     turned = Patch.model_validate({**dict(plain), **fields})
     assert turned != plain
     zone = SampledPlan(plain, KEYS, layers=3).zones[0]
