@@ -155,7 +155,9 @@ class PatchDesk(QObject):
         """Reads patches and bodies again: the user may have added files."""
         if self._panel.bar.compare.isChecked():  # the saved patch may have changed
             self.compare(False)
-        self._entries, problems = list_patches()
+        entries, problems = list_patches()
+        # drums are played by files and commands: the player of the window's keys holds strings alone
+        self._entries = [each for each in entries if each.patch.strings.kind != "drums"]
         for problem in problems:
             self.told.emit(problem)
         self._panel.bar.set_bodies(body_titles())

@@ -86,13 +86,13 @@ class Circle:
         return bool((np.hypot(places[:, 0], places[:, 1]) < 1).all())
 
     def transform(self, wavenumbers: Array, angle: Array | float) -> Array:
-        found: Array = 2 * self._height * self._hankel(wavenumbers) * self._turned(np.asarray(angle)[None])[:, 0]
+        hankel = self._hankel(wavenumbers[:, None])[:, 0]
+        found: Array = 2 * self._height * hankel * self._turned(np.asarray(angle)[None])[:, 0]
         return found
 
     def density(self, wavenumbers: Array) -> Array:
         height = 2 / jvp(self.m, self.wavenumber * self.radius_m)[:, None] ** 2  # of the radial part alone
-        hankel = np.stack([self._hankel(each) for each in wavenumbers.T], axis=1)
-        found: Array = height * self.radius_m**2 * hankel**2 * wavenumbers
+        found: Array = height * self.radius_m**2 * self._hankel(wavenumbers) ** 2 * wavenumbers
         return found
 
     def picked(self, index: Numbers) -> Circle:
@@ -110,11 +110,11 @@ class Circle:
         return turned
 
     def _hankel(self, wavenumbers: Array) -> Array:
-        """∫ J_m(κr) J_m(sr) r dr / a², where J_m(κa) = 0."""
-        z, s = self.wavenumber * self.radius_m, wavenumbers * self.radius_m
-        slope, apart = jvp(self.m, z), z**2 - s**2
+        """∫ J_m(κr) J_m(sr) r dr / a², where J_m(κa) = 0; wavenumbers: s, (modes, n)."""
+        z, s, m = self.wavenumber[:, None] * self.radius_m, wavenumbers * self.radius_m, self.m[:, None]
+        slope, apart = jvp(m, z), z**2 - s**2
         near = np.abs(z - s) < 1e-6 * z
-        found: Array = np.where(near, slope**2 / 2, -z * slope * jv(self.m, s) / np.where(near, 1.0, apart))
+        found: Array = np.where(near, slope**2 / 2, -z * slope * jv(m, s) / np.where(near, 1.0, apart))
         return found
 
 

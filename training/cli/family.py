@@ -109,10 +109,10 @@ def evaluate(
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Errors on held-out strings within and beyond the family, or drums.
+    """Errors on held-out strings, or on drums.
 
-    Those on drums are written to a table in `--runs`, or the folder of runs, after each drum: a stopped measurement
-    continues.
+    Strings are drawn inside the family and beyond it. Errors on drums are written to a table in `--runs`, or the
+    folder of runs, after each drum: a stopped measurement continues.
     """
     import torch
 
