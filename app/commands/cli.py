@@ -25,7 +25,6 @@ from app.commands import (
     learn,
     listing,
     motion,
-    patches,
     play,
     plugin,
     render,
@@ -74,7 +73,6 @@ def start(
 for command in (
     listing.presets,
     listing.models,
-    patches.patches,
     motion.simulate,
     motion.predict,
     render.render,

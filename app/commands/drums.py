@@ -161,7 +161,7 @@ def _key_of(name: str, key: int) -> tuple[Patch, DrumKey]:
     try:
         patch = find_patch(name).patch
         if not isinstance(patch.strings, Drums):
-            raise Failure(f"{patch.name} has no drums; choose one of those that `patches` lists under drums")
+            raise Failure(f"{patch.name} has no drums; choose one of those that `instruments` lists under drums")
         found = DrumKeys(patch, Ear(tuple(patch.pickup.points))).of_key(key)
     except (PatchError, ValueError) as error:
         raise Failure(str(error)) from error

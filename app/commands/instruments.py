@@ -1,4 +1,4 @@
-"""instruments: timbre of the instruments, compared with real ones."""
+"""instruments: those that can be played, and their timbre compared with real ones."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from training.cli.console import Failure, print_json, print_table, progress, say
 if TYPE_CHECKING:
     from app.analysis.timbre import Reference, Timbre
 
-instruments = typer.Typer(help="Measure instruments.", no_args_is_help=True)
+instruments = typer.Typer(invoke_without_command=True)
+FIELDS = ("name", "title", "category", "own", "description", "file")
 ACOUSTIC = ("guitar", "harp", "keys", "world")  # categories for whose plucked strings the general ranges hold
 COLUMNS = {
     "centroid_hz": "centroid Hz",
@@ -33,8 +34,33 @@ COLUMNS = {
 
 
 @instruments.callback()
-def _group() -> None:
-    """Measure instruments."""
+def listing(context: typer.Context, json: Json = False) -> None:
+    """List the instruments, factory and your own, or measure them.
+
+    Files that cannot be used are reported on standard error.
+    """
+    if context.invoked_subcommand is not None:
+        return
+    from app.patches.library import list_patches
+
+    entries, problems = list_patches()
+    for problem in problems:
+        say(problem)
+    found = [
+        dict(
+            zip(
+                FIELDS,
+                (e.name, e.patch.name, e.patch.category, e.own, e.patch.description, str(e.path)),
+                strict=True,
+            )
+        )
+        for e in entries
+    ]
+    if json:
+        print_json(found)
+    else:
+        columns = ("name", "title", "category", "description")
+        print_table(columns, [[each[column] for column in columns] for each in found])
 
 
 @instruments.command()

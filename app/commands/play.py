@@ -1,4 +1,4 @@
-"""play: a MIDI file, played by a patch, to a WAV file."""
+"""play: a MIDI file, played by an instrument, to a WAV file."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ DEFAULT_RATE_HZ = 48_000
 
 def play(
     midi: Annotated[Path, typer.Argument(metavar="FILE.mid", help="The MIDI file to play.")],
-    patch: Annotated[str, typer.Option(metavar="PATCH", help="A patch's name, or the path of its file.")],
+    instrument: Annotated[
+        str, typer.Option(metavar="INSTRUMENT", help="An instrument's name, or the path of its file.")
+    ],
     out: Annotated[Path, typer.Option(metavar="OUT.wav", help="The file to write.")],
     source: Annotated[
         Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
@@ -30,9 +32,9 @@ def play(
     ] = None,
     normalise: Annotated[bool, typer.Option("--normalise", help="Normalise to -1 dBFS.")] = False,
 ) -> None:
-    """Render a MIDI file, played by a patch, to WAV.
+    """Render a MIDI file, played by an instrument, to WAV.
 
-    The same files give the same samples. Drums (channel 10) are left out, except with a patch for MPE.
+    The same files give the same samples. Drums (channel 10) are left out, except with an instrument for MPE.
     """
     from app.export.files import LONGEST_S, RATE_RANGE_HZ
 
@@ -43,7 +45,7 @@ def play(
     from app.patches.library import PatchError, find_patch
 
     try:
-        chosen = find_patch(patch).patch
+        chosen = find_patch(instrument).patch
         song = read_song(midi, chosen)
     except (MidiFileError, PatchError) as error:
         raise Failure(str(error)) from error

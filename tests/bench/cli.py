@@ -31,7 +31,7 @@ bench = typer.Typer(
 BufferName = Annotated[
     str, typer.Option("--buffer", help="The device's: low, medium, high, or 128, 256, 512, 1024 or 2048 frames.")
 ]
-PatchName = Annotated[str, typer.Option("--patch", metavar="PATCH", help="The patch that is played.")]
+PatchName = Annotated[str, typer.Option("--instrument", metavar="INSTRUMENT", help="The instrument that is played.")]
 Seed = Annotated[int, typer.Option(min=0, help="Of the random keys and changes.")]
 
 
@@ -97,7 +97,7 @@ def train(json: Json = False) -> None:
 @bench.command()
 def tune(
     patch: Annotated[
-        list[str] | None, typer.Argument(metavar="PATCH", help="Names or files of patches; default: all.")
+        list[str] | None, typer.Argument(metavar="INSTRUMENT", help="Names or files of instruments; default: all.")
     ] = None,
     every: Annotated[int, typer.Option(min=1, max=24, help="Semitones from one measured key to the next.")] = 6,
     json: Json = False,

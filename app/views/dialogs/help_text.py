@@ -10,10 +10,10 @@ TOUR = (
     ),
     (
         "Choose an instrument",
-        "The patches at the bottom left are guitars, harps, harpsichords and others. String knobs shows every knob "
+        "The list at the bottom left has guitars, harps, harpsichords and others. String knobs shows every knob "
         "in place of the macros: tension, length, material, damping and pluck. Record saves what you play; a MIDI "
         "file that is opened or dropped is played. In the same strip you choose whether the computer's keys play "
-        "pitches or choose where the string is plucked.",
+        "notes or set the pluck position.",
     ),
     (
         "Pluck",
@@ -44,7 +44,7 @@ TOUR = (
         "Listen elsewhere",
         "Drag the green marker beneath the string. At a node of a partial, that partial is not heard; at the ends "
         "nothing is. Stereo has two listening points; Magnetic is a magnetic pick-up. While keys play "
-        "the patch, all three belong to it, and what you hear is saved, recorded and exported.",
+        "the instrument, all three belong to it, and what you hear is saved, recorded and exported.",
     ),
     (
         "Beyond the training range",
@@ -59,8 +59,8 @@ TOUR = (
     (
         "Export",
         "Ctrl+E saves what you hear as WAV: a note with body, room and level, its string alone, or a recording. "
-        "A note's file stores its settings; drop it on the window to restore them. Ctrl+Shift+E exports the patch as "
-        "an instrument for samplers.",
+        "A note's file stores its settings; drop it on the window to restore them. Ctrl+Shift+E exports the "
+        "instrument for samplers.",
     ),
 )
 

@@ -26,8 +26,10 @@ WIDTHS = {  # in pixels, by the longest name or value
     "pluck.width": 66,
     "pluck.width_hard": 66,
 }  # the others are narrow
-NO_A4 = "The Scala keyboard mapping of this patch has a reference pitch of its own, so that A4 would change nothing"
-LETS_RING = "The patch lets its strings ring: no key damps them"
+NO_A4 = (
+    "The Scala keyboard mapping of this instrument has a reference pitch of its own, so that A4 would change nothing"
+)
+LETS_RING = "Release off (let ring)"
 
 
 GROUPS = (PITCH, STRING, DECAY, PLUCK)  # in the order of the strip; the pick-up is in the transport bar
