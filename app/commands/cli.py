@@ -21,7 +21,6 @@ from app.commands import (
     drums,
     faust,
     info,
-    instruments,
     learn,
     listing,
     motion,
@@ -79,7 +78,6 @@ for command in (
     motion.predict,
     render.render,
     learn.learn,
-    learn.judge,
     play.play,
     batch.batch,
     sampled.sampled,
@@ -96,7 +94,6 @@ for command in (
     cli.command()(command)
 cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
-cli.add_typer(instruments.instruments, name="instruments")
 cli.add_typer(family.family, name="family")
 cli.add_typer(drums.drums, name="drums")
 

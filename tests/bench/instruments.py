@@ -1,4 +1,4 @@
-"""instruments: timbre of the instruments, compared with real ones."""
+"""timbre: that of the instruments, compared with real ones."""
 
 from __future__ import annotations
 
@@ -13,9 +13,8 @@ from training.cli.arguments import Json, open_preset
 from training.cli.console import Failure, print_json, print_table, progress, say
 
 if TYPE_CHECKING:
-    from app.analysis.timbre import Reference, Timbre
+    from tests.bench.timbre import Reference, Timbre
 
-instruments = typer.Typer(help="Measure instruments.", no_args_is_help=True)
 ACOUSTIC = ("guitar", "harp", "keys", "world")  # categories for whose plucked strings the general ranges hold
 COLUMNS = {
     "centroid_hz": "centroid Hz",
@@ -32,13 +31,7 @@ COLUMNS = {
 }
 
 
-@instruments.callback()
-def _group() -> None:
-    """Measure instruments."""
-
-
-@instruments.command()
-def measure(
+def timbre(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="[NAMES]", help="Names of instruments; default the factory's.")
     ] = None,
@@ -49,8 +42,9 @@ def measure(
     Each plays E3 (keyboards C4; else the nearest octave in its range) at velocity 100, by the model, without room.
     A figure in its range has a plus, one outside a minus. Distances of six instruments from one another follow.
     """
-    from app.analysis.timbre import LEAST_DISTANCE_DB, PAIRED, REFERENCES, distance_db, references_of, timbre
     from app.patches.library import SHIPPED, PatchError, find_patch, list_patches
+    from tests.bench import timbre as of_timbre
+    from tests.bench.timbre import LEAST_DISTANCE_DB, PAIRED, REFERENCES, distance_db, references_of
 
     try:
         entries = [find_patch(name) for name in names] if names else list_patches(SHIPPED)[0]
@@ -60,12 +54,12 @@ def measure(
     presets = {name: open_preset(name) for name in sorted({entry.patch.preset for entry in entries})}
     found: dict[str, Timbre] = {}
     ranges: dict[str, Mapping[str, Reference]] = {}
-    with progress("measure") as report:
+    with progress("bench timbre") as report:
         for number, entry in enumerate(entries):
             report(number / len(entries), entry.name)
             patch = entry.patch
             try:
-                found[entry.name] = timbre(patch, presets[patch.preset])
+                found[entry.name] = of_timbre.timbre(patch, presets[patch.preset])
             except ValueError as error:
                 say(f"{entry.name}: {error}")
                 continue

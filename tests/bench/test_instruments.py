@@ -1,4 +1,4 @@
-"""The command that measures instruments."""
+"""The benchmark of timbre."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 
 
 def test_instruments_are_measured_beside_ranges(run) -> None:
-    found = json.loads(run("instruments", "measure", "harpsichord", "koto", "--json").out)
+    found = json.loads(run("timbre", "harpsichord", "koto", "--json").out)
     assert set(found["instruments"]) == {"harpsichord", "koto"}
     harpsichord = found["instruments"]["harpsichord"]
     assert harpsichord["figures"]["key"] == 60
@@ -20,4 +20,4 @@ def test_instruments_are_measured_beside_ranges(run) -> None:
 
 
 def test_an_unknown_instrument_is_named(run) -> None:
-    assert "no patch" in run("instruments", "measure", "theremin").failure
+    assert "no patch" in run("timbre", "theremin").err
