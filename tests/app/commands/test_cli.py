@@ -29,7 +29,6 @@ COMMANDS = [
     "dataset",
     "train",
     "evaluate",
-    "instruments",
 ]
 
 

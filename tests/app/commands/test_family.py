@@ -22,7 +22,7 @@ def test_evaluate_draws_the_errors(run, folder: Path) -> None:
     found = run(*words, "--json")
     facts = json.loads(found.out)
     for column in ("inside", "beyond"):
-        parts = facts[column]["by_rise"]
+        parts = facts[column]["studio_any_string"]["by_rise"]
         assert sum(part["strings"] for part in parts) == 2
         assert all(0 < part["geometric_mean"] <= 1.001 * part["worst"] for part in parts)
     drawn = picture.read_text()
