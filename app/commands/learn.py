@@ -9,7 +9,7 @@ import typer
 
 from training.cli import arguments
 from training.cli.arguments import Json
-from training.cli.console import Failure, print_json, progress, say
+from training.cli.console import print_json, progress, say
 
 Instrument = Literal["guitar", "bass", "harp", "piano"]
 InstrumentOption = Annotated[Instrument, typer.Option(help="What it was: for what a sound does not give.")]
@@ -32,26 +32,19 @@ def learn(
     Of more files, takes of the same pitch share the partials, all of them the damping. Interrupt it at any time:
     nothing is written before the end.
     """
-    from app.audio.note_file import NoteFileError
     from app.instrument.learned import check_name, keep, learn_files
-    from app.patches.library import PatchError
-    from engine.result_file import WriteError
-    from training.recording.note import RecordingError
     from training.recording.table import as_data, as_text
 
     if scale_length is not None:
         arguments.check_range("--scale-length", scale_length, 0.05, 5.0, "m")
     if gauge is not None:
         arguments.check_range("--gauge", gauge, 0.05, 10.0, "mm")
-    try:
-        check_name(name)
-        with progress("learn") as report:
-            learned = learn_files(
-                notes, kind=instrument, length_m=scale_length, gauge_mm=gauge, anyway=anyway, progress=report
-            )
-        kept = keep(name, learned, instrument)
-    except (NoteFileError, RecordingError, PatchError, WriteError) as error:
-        raise Failure(str(error)) from error
+    check_name(name)
+    with progress("learn") as report:
+        learned = learn_files(
+            notes, kind=instrument, length_m=scale_length, gauge_mm=gauge, anyway=anyway, progress=report
+        )
+    kept = keep(name, learned, instrument)
     if json:
         files = {
             "preset": str(kept.preset),

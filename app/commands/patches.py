@@ -5,8 +5,6 @@ from __future__ import annotations
 from training.cli.arguments import Json
 from training.cli.console import print_json, print_table, say
 
-FIELDS = ("name", "title", "category", "own", "description", "file")
-
 
 def patches(json: Json = False) -> None:
     """List the patches, shipped and your own. Files that cannot be used are reported on standard error."""
@@ -16,14 +14,15 @@ def patches(json: Json = False) -> None:
     for problem in problems:
         say(problem)
     found = [
-        dict(
-            zip(
-                FIELDS,
-                (e.name, e.patch.name, e.patch.category, e.own, e.patch.description, str(e.path)),
-                strict=True,
-            )
-        )
-        for e in entries
+        {
+            "name": entry.name,
+            "title": entry.patch.name,
+            "category": entry.patch.category,
+            "own": entry.own,
+            "description": entry.patch.description,
+            "file": str(entry.path),
+        }
+        for entry in entries
     ]
     if json:
         print_json(found)
