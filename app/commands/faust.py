@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from engine.plain_text import one_line
-from training.cli.console import Failure, say
+from training.cli.console import say
 
 
 def faust(
@@ -25,15 +25,11 @@ def faust(
     A bank of its modes, for plug-ins, Max, the web and more.
     """
     from app.export.faust import write_faust
-    from app.patches.library import PatchError, find_patch
-    from engine.result_file import WriteError
+    from app.patches.library import find_patch
     from training.cli.arguments import open_preset
 
-    try:
-        chosen = find_patch(instrument).patch
-        written = write_faust(out, chosen, open_preset(chosen.preset).info, modes)
-    except (PatchError, ValueError, WriteError) as error:
-        raise Failure(str(error)) from error
+    chosen = find_patch(instrument).patch
+    written = write_faust(out, chosen, open_preset(chosen.preset).info, modes)
     if chosen.body.name or chosen.room.mix:
         say("note: without the instrument's body and room")
     print(f"{one_line(str(out))}: {written} modes")

@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from app.commands.cli import carry_out
+from tests.bench.baselines.command import baseline
+from tests.bench.instruments import timbre
 from tests.bench.printing import show
+from tests.bench.recordings.command import recordings
 from training.cli.arguments import Json
 from training.cli.console import Failure, progress
 
@@ -115,6 +118,11 @@ def tune(
     with progress("bench tune") as report:
         found = measure([(each, presets[each.preset]) for each in chosen], every, report)
     show(found, json)
+
+
+bench.command()(timbre)
+bench.command()(recordings)
+bench.command()(baseline)
 
 
 @bench.command()

@@ -28,7 +28,6 @@ COMMANDS = [
     "dataset",
     "train",
     "evaluate",
-    "instruments",
 ]
 
 

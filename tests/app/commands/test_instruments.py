@@ -1,4 +1,4 @@
-"""The commands that list and measure instruments."""
+"""The command that lists instruments."""
 
 from __future__ import annotations
 
@@ -35,21 +35,3 @@ def test_a_broken_instrument_is_reported_and_hides_no_other(
     assert found.err.startswith(f"learned-strings: {own / 'broken.json'}: not JSON") and found.err.count("\n") == 1
     (mine,) = (each for each in json.loads(found.out) if each["own"])
     assert (mine["name"], mine["title"]) == ("mine", "Mine")
-
-
-def test_instruments_are_measured_beside_ranges(run) -> None:
-    found = json.loads(run("instruments", "measure", "harpsichord", "koto", "--json").out)
-    assert set(found["instruments"]) == {"harpsichord", "koto"}
-    harpsichord = found["instruments"]["harpsichord"]
-    assert harpsichord["figures"]["key"] == 60
-    assert harpsichord["ranges"]["centroid_hz"] == [1500, 3000]
-    for figure, met in harpsichord["met"].items():
-        low, high = harpsichord["ranges"][figure]
-        value = harpsichord["figures"][figure]
-        assert met == (low <= value and (high is None or value <= high)), figure
-    assert list(found["distances_db"]) == ["harpsichord, koto"]
-    assert all(each["taken"] for each in found["references"])
-
-
-def test_an_unknown_instrument_is_named(run) -> None:
-    assert "no instrument" in run("instruments", "measure", "theremin").failure
