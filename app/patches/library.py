@@ -70,12 +70,12 @@ def read_patch(path: Path) -> Patch:
             raise PatchError(f"{path}: version: made by a newer version of the program; update it")
         return Patch.model_validate(data)
     except SchemaError as error:
-        raise PatchError(f"{error}; give the JSON of a patch") from error
+        raise PatchError(f"{error}; give the JSON of an instrument") from error
     except PatchError:
         raise
     except (ValueError, OverflowError) as error:
         told = explained(error) if isinstance(error, ValueError) else str(error)
-        raise PatchError(f"{path}: {one_line(told, 300)}; mend this field, or save the patch again") from error
+        raise PatchError(f"{path}: {one_line(told, 300)}; mend this field, or save the instrument again") from error
 
 
 def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
@@ -99,7 +99,7 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
             try:
                 patch = read_patch(path)
                 if path.stem in entries:
-                    raise PatchError(f"{path}: a patch of this name exists already; rename the file to use it")
+                    raise PatchError(f"{path}: an instrument of this name exists already; rename the file to use it")
                 name = _other_than(names, patch.name)
                 names.add(name.casefold())
                 entries[path.stem] = PatchEntry(path, patch.model_copy(update={"name": name}))
@@ -134,7 +134,7 @@ def find_patch(name_or_path: str) -> PatchEntry:
     if path.suffix == SUFFIX:
         return PatchEntry(path, read_patch(path))
     known = ", ".join(entry.name for entry in entries) or "none is installed"
-    raise PatchError(f"no patch {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {known}")
+    raise PatchError(f"no instrument {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {known}")
 
 
 def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
@@ -149,9 +149,9 @@ def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
     """
     path = replace or own_patches() / f"{file_stem(patch.name)}{SUFFIX}"
     if (SHIPPED / path.name).exists():
-        raise PatchError(f"{patch.name}: a shipped patch has this name; choose another")
+        raise PatchError(f"{patch.name}: a factory instrument has this name; choose another")
     if replace is None and path.exists():
-        raise PatchError(f"{patch.name}: a patch of this name or a like one exists already; choose another")
+        raise PatchError(f"{patch.name}: an instrument of this name or a like one exists already; choose another")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

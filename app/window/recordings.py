@@ -50,7 +50,7 @@ class Recordings(QObject):
         else:
             self._keys.begin_recording()
             if not self._session.choices.plays_patch:
-                self.informed.emit("Keys of a patch are recorded; plucks of a single string are not.")
+                self.informed.emit("Keys of an instrument are recorded; plucks of a single string are not.")
             self._began_s, self._began = time.monotonic(), datetime.now().astimezone()
 
     def discard(self) -> None:

@@ -42,13 +42,13 @@ MENUS: dict[str, tuple[Entry, ...]] = {
             "sampler",
             "Export for samplers …",
             "Ctrl+Shift+E",
-            "export the patch as an instrument for samplers (SFZ, SoundFont)",
+            "export the instrument for samplers (SFZ, SoundFont)",
         ),
         Entry("plugin", "Export plug-in …"),
         Entry("quit", "Quit", "Ctrl+Q", "quit"),
     ),
     "&Edit": (
-        Entry("undo", "Undo", "Ctrl+Z", "undo: patch and its knobs, preset, pluck, listening point, duration"),
+        Entry("undo", "Undo", "Ctrl+Z", "undo: instrument and its knobs, preset, pluck, listening point, duration"),
         Entry("redo", "Redo", "Ctrl+Shift+Z", "redo"),
     ),
     "&Play": (

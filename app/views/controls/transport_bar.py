@@ -31,7 +31,7 @@ from engine.pluck import (
 )
 
 KNOBS = ("position", "amplitude_mm", "width", "listen", "listen_right", "seconds", "speed", "volume_db")
-OF_THE_PATCH = "While keys play the patch, it is the patch's own and is saved with it"
+OF_THE_PATCH = "While keys play the instrument, it is the instrument's own and is saved with it"
 
 
 class TransportBar(QFrame):

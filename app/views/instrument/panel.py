@@ -37,8 +37,11 @@ ROOMY = 1320  # pixels: in a narrower window the bar is compact
 TIGHT = 900  # pixels: a narrower one has no button that renames
 PLAYS_WIDTH = 164  # pixels: of the longer words, so that the keys beside them stay where they are
 KEYS_PLAY = {  # what the computer's keys play -> (words, tip)
-    "pitch": ("Keys play pitches", "The computer's keys play the patch, as a piano's two rows"),
-    "place": ("Keys choose the place", "The computer's keys pluck the chosen preset at ten places along its string"),
+    "pitch": ("Keys play notes", "The computer's keys play the instrument, as a piano's two rows"),
+    "place": (
+        "Keys set pluck position",
+        "The computer's keys pluck the chosen preset at ten places along its string",
+    ),
 }
 _SURFACES = (
     ("keys", "Keys", "Show a piano's keyboard"),
@@ -197,7 +200,9 @@ class InstrumentPanel(QFrame):
         self.plays.setText(f"{words}  ▾")
         self.plays.setAccessibleName(words)
         self.plays.setEnabled(possible)
-        self.plays.setToolTip(f"{tip}; click to change it" if possible else f"{tip}. Choose a patch to play pitches")
+        self.plays.setToolTip(
+            f"{tip}; click to change it" if possible else f"{tip}. Choose an instrument to play pitches"
+        )
         self.bar.show_pitches(plays == "pitch")
 
     def show_letters(self, letters: Mapping[int, str]) -> None:

@@ -338,7 +338,7 @@ class StringView(QWidget):
         elif self._frame is None:
             self._span_mm = _span_mm(self._pluck.amplitude_mm)
         else:
-            largest_mm = self._frame.largest_mm()
+            largest_mm = self._frame.largest_mm(with_envelopes=self._plain)
             self._span_mm = max(_span_mm(largest_mm), min(self._span_mm, _span_mm(largest_mm, air=1.4)))
 
     # Painting

@@ -27,7 +27,7 @@ def images() -> list[Image]:
         with pytest.MonkeyPatch.context() as patched:
             if name != MOVED:
                 shape = (len(patch.macros), STEPS, KEYS)
-                patched.setattr("app.export.plugin.image.levels", lambda *_, shape=shape: np.zeros(shape, np.float32))
+                patched.setattr("app.export.plugin.image.levels", lambda *_, shape=shape: np.zeros(shape))
             found.append(image_of(patch, load_preset(SHIPPED / f"{patch.preset}.safetensors")))
     return found
 
