@@ -209,3 +209,11 @@ def test_knobs_say_which_drum_is_meant_and_which_of_them_do_nothing(kit: Control
     assert knobs.facts._facts["drum"] == "Bass drum 22 inch"
     assert not knobs.knobs["knobs.gauge"].isEnabled()
     assert knobs.knobs["knobs.decay"].isEnabled()
+
+
+def test_the_surface_of_strings_shows_the_keys_of_drums(kit: Controller) -> None:
+    panel = kit.window.instrument
+    panel.show_surface("neck")
+    assert (panel.surface, panel._stack.currentWidget()) == ("neck", panel.keys)
+    kit.patches.choose("steel_string_acoustic")
+    assert panel._stack.currentWidget() is panel.neck
