@@ -29,6 +29,8 @@ WIDTHS = {  # in pixels, by the longest name or value
 NO_A4 = (
     "The Scala keyboard mapping of this instrument has a reference pitch of its own, so that A4 would change nothing"
 )
+NO_STRING = "This instrument has drums, and no string that this could change"
+OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "knobs.modulus", "pluck.curve")
 LETS_RING = "Release off (let ring)"
 
 
@@ -161,6 +163,8 @@ class StringKnobs(QWidget):
 
 def _why_barred(patch: Patch, field: str) -> str:
     """Why a field means nothing in this patch; "" where it does."""
+    if patch.strings.kind == "drums" and field.startswith(("knobs.", "pluck.")) and field not in OF_DRUMS:
+        return NO_STRING
     if field in SHAPED and patch.pluck.shape == "triangular":
         return NO_WIDTH
     if field == "damping.release_t60_s" and patch.damping.let_ring:
