@@ -38,6 +38,7 @@ def play(
     """
     from app.export.files import LONGEST_S, RATE_RANGE_HZ
 
+    arguments.check_suffix("--out", out, ".wav")
     arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
     if seconds is not None:
         arguments.check_range("--seconds", seconds, 0.001, LONGEST_S, "s")

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 from app.patches.fields import LONGEST_NAME, explained
@@ -123,7 +124,7 @@ def find_patch(name_or_path: str) -> PatchEntry:
     """A patch by the name it is known by, by its title, or by its file's path.
 
     Raises:
-        PatchError: there is none, or its file cannot be used; the message lists the names.
+        PatchError: there is none, or its file cannot be used; the message lists like names, else all.
     """
     entries, _ = list_patches()
     wanted = name_or_path.casefold()
@@ -133,7 +134,10 @@ def find_patch(name_or_path: str) -> PatchEntry:
     path = Path(name_or_path)
     if path.suffix == SUFFIX:
         return PatchEntry(path, read_patch(path))
-    known = ", ".join(entry.name for entry in entries) or "none is installed"
+    names = [entry.name for entry in entries]
+    if close := get_close_matches(file_stem(wanted), names, cutoff=0.55):
+        raise PatchError(f"no instrument {bounds.brief(name_or_path)}; did you mean {' or '.join(close)}?")
+    known = ", ".join(names) or "none is installed"
     raise PatchError(f"no instrument {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {known}")
 
 

@@ -83,7 +83,7 @@ class Recordings(QObject):
         patches = [each.event.patch for each in events if isinstance(each.event, PatchTurned)]
         patch = patches[0] if patches else self._session.choices.patch
         if not events or patch is None:
-            self.told.emit("Nothing was played, so nothing was recorded.")
+            self.informed.emit("Nothing was played, so nothing was recorded.")
             return
         choices = self._session.choices
         heard = choices.source_heard

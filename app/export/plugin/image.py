@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.export.plugin.parts import MIXES, STEPS, levels, mixed, parts_of
+from app.export.plugin.parts import MIXES, STEPS, drum_keys, levels, losses, mixed, parts_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.table import VALUES, wheel_goal
 from app.patches.drums import Drums
@@ -41,7 +41,7 @@ NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
 SOURCE, VOLUME, VALUE, POINT, MACRO, MIX = range(6)  # kinds of the shell's parameters
 SOURCE_ID = "source"
 SOURCES = ("model", "truth", "difference")
-FEATURES = {"guitar": "guitar", "bass": "guitar", "keys": "piano"}  # of CLAP, by category
+OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "pluck.curve", "damping.release_t60_s")  # that drums follow
 
 
 class _Parameter(ctypes.Structure):
@@ -107,6 +107,7 @@ class _Header(ctypes.Structure):
             for name in (
                 "levels",
                 "level_steps",
+                "losses",
                 "wheel_mix",
                 "modes",
                 "most_notes",
@@ -158,15 +159,17 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     """The image of an instrument.
 
     Raises:
-        ValueError: it has drums, its model learned one string only, or its tuning is impossible.
+        ValueError: its model learned one string only, or its tuning is impossible.
     """
-    if isinstance(patch.strings, Drums):
-        raise ValueError(f"{patch.name} has drums, which plug-ins cannot play yet; choose an instrument of strings")
+    drums = isinstance(patch.strings, Drums)
     player = InstrumentPlayer(patch, preset, PREPARED_HZ, {"model": 1.0, "truth": 1.0})
     player.prepare()
     table = player.table
     assert table is not None
     header = _Header(magic=b"LSPLUGIN", version=1, modes=min(of.MOST_MODES, player.grid_points - 2) + of.MOST_PAIRS)
+    struck = dict(drum_keys(patch)) if drums else {}
+    if drums:
+        header.modes = max((len(each.modes.omega) for each in struck.values()), default=1)
     header.most_notes = MOST_NOTES
     whole = bytearray(bytes(header))
 
@@ -195,6 +198,11 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     header.wheel_mix = MIXES.index(patch.mod_wheel) if patch.mod_wheel in MIXES else -1
     header.wheel_goal = wheel_goal(patch) or 0.0
 
+    if drums:
+        slots = np.zeros(of.KEYS, np.int64)
+        for key, each in struck.items():
+            slots[key] = put(losses(patch, each).tobytes()) // 8
+        header.losses = put(slots.tobytes()) // 8
     parts = parts_of(patch)
     if parts.modes is not None:
         header.body, header.body_modes = put(parts.modes.tobytes()) // 8, parts.modes.shape[1]
@@ -210,7 +218,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     header.id, header.name, header.maker = id.encode()[:127], _bytes(patch.name, 63), MAKER.encode()
     header.uid[:] = uuid.uuid5(uuid.NAMESPACE_URL, f"urn:{id}").bytes
     header.description = _bytes(patch.description, 511)
-    header.features = " ".join(("instrument", "synthesizer", "stereo")).encode()
+    header.features = f"instrument {'drum' if drums else 'synthesizer'} stereo".encode()
     header.bytes = len(whole)
     whole[: ctypes.sizeof(_Header)] = bytes(header)
     controls = (
@@ -254,13 +262,15 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
         yield _record(id, MACRO, number, macro.value, MACROS[id], "Macros", macro.name)
     yield SOURCE_ID, _Parameter(_id(SOURCE_ID), SOURCE, 0, 1, 0.0, 2.0, 0.0, b"Source", b"", b"")
     yield _record("volume_db", VOLUME, 0, 0.0, OF_CHOICES["volume_db"], "")
+    drums = isinstance(patch.strings, Drums)
     for index, id in enumerate(VALUES):
-        if id in OF_PATCHES:
+        if id in (OF_DRUMS if drums else OF_PATCHES):
             yield _record(id, VALUE, index, patch.value(id), OF_PATCHES[id], OF_PATCHES[id].group.capitalize())
     for id in mixed(patch):
         parameter = OF_PATCHES[id]
         yield _record(id, MIX, MIXES.index(id), patch.value(id), parameter, parameter.group.capitalize())
-    points = () if patch.pickup.kind == "bridge" else patch.pickup.points  # at the bridge there is no place to choose
+    fixed = drums or patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
+    points = () if fixed else patch.pickup.points
     for index, point in enumerate(points):
         id = f"pickup.points.{index}"
         yield _record(id, POINT, index, point, OF_PATCHES[id], OF_PATCHES[id].group.capitalize())
@@ -292,7 +302,8 @@ def layout_header(version: str) -> str:
         "CHANNELS CHANNEL_SLOTS CHANNEL_RANGE BEND_SEMITONES PLAYER_MOST PLAYER_MODES PLAYER_PUSHED "
         "PLAYER_TAKEN PLAYER_QUEUED PLAYER_REPORTED PLAYER_RATE PLAYER_SOURCE_GAINS PLAYER_VALUES "
         "PLAYER_CHANNELS PLAYER_EVENTS PLAYER_REPORTS PLAYER_VOICES BEGAN REPORT_KIND REPORT_ID "
-        "REPORT_CHANNEL REPORT_KEY REPORT_SLOTS TABLE_GAINS GAINS TABLE_LOW TABLE_HIGH PLAYER_WHEEL",
+        "REPORT_CHANNEL REPORT_KEY REPORT_SLOTS TABLE_GAINS GAINS TABLE_LOW TABLE_HIGH PLAYER_WHEEL "
+        "TABLE_DRUMS TABLE_VALUES DRUM_MODES DRUM_HEADER DECAY BRIGHTNESS_DECAY",
     }
     lines = [f'#define LS_VERSION "{version}"']
     for module, names in wanted.items():

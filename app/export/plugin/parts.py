@@ -10,8 +10,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from app.instrument.drum_keys import DrumKey, DrumKeys
 from app.instrument.effects import effects_of
 from app.instrument.loud_keys import LoudKeys
+from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.effects import BODIES
 from engine.effects.body import HIGHEST_HZ, SUBSONIC, modes_of
@@ -87,10 +89,36 @@ def levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float64]:
 
 def _levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float64]:
     """Of all keys, in dB; of silent ones, that of their neighbours."""
-    loud = LoudKeys(patch, Ear(tuple(patch.pickup.points), patch.pickup.kind), preset)
-    known = dict(_known(loud, patch))
+    if isinstance(patch.strings, Drums):
+        known = {key: 20 * math.log10(found.gain) for key, found in drum_keys(patch)}
+    else:
+        known = dict(_known(LoudKeys(patch, _ear(patch), preset), patch))
     keys = sorted(known) or [0]
     return np.interp(np.arange(KEYS), keys, [known.get(key, 0.0) for key in keys])
+
+
+def drum_keys(patch: Patch) -> Iterator[tuple[int, DrumKey]]:
+    """The drums of an instrument by their keys, as far as they are possible."""
+    drums = DrumKeys(patch, _ear(patch))
+    low, high = patch.range
+    for key in range(low, high + 1):
+        with contextlib.suppress(ValueError):
+            if (found := drums.of_key(key)) is not None:
+                yield key, found
+
+
+def losses(patch: Patch, key: DrumKey) -> NDArray[np.float64]:
+    """What a knob of decay, and one of brightness decay, at 1 add to decay rates, in 1/s: (2, modes)."""
+    drum, knobs = key.modes.drum, patch.knobs
+    added = (
+        key.modes.damped(drum.damping_d1_kg_m2_s + drum.damping_d1_kg_m2_s / knobs.decay, drum.damping_d3_kg_s),
+        key.modes.damped(drum.damping_d1_kg_m2_s, drum.damping_d3_kg_s * (1 + 1 / knobs.brightness_decay)),
+    )
+    return np.stack([each.sigma - key.modes.sigma for each in added])
+
+
+def _ear(patch: Patch) -> Ear:
+    return Ear(tuple(patch.pickup.points), patch.pickup.kind)
 
 
 def _known(loud: LoudKeys, patch: Patch) -> Iterator[tuple[int, float]]:

@@ -52,7 +52,7 @@ MENUS: dict[str, tuple[Entry, ...]] = {
         Entry("redo", "Redo", "Ctrl+Shift+Z", "redo"),
     ),
     "&Play": (
-        Entry("play", "Play or stop", "Space", "play from the pluck, or stop"),
+        Entry("play", "Pluck or stop", "Space", "pluck, or stop"),
         Entry("pluck", "Pluck", "Return", "pluck"),
         Entry("loop", "Loop", "Ctrl+L", "loop"),
         Entry("instruments", "Instruments …", "Ctrl+I", "browse the instruments"),

@@ -254,7 +254,7 @@ class NotePage(ExportPage):
 class PerformancePage(ExportPage):
     """What was played, to a WAV and a MIDI file of one name."""
 
-    title, missing = "Performance", "Nothing was recorded: click Record, play, and click it again."
+    title, missing = "Recording", "Nothing was recorded: click Record, play, and click it again."
 
     def __init__(self, export: ExportChoices, wav: WavForm) -> None:
         super().__init__()

@@ -184,7 +184,7 @@ class PatchBar(QFrame):
         self.body = combo_box("Body", [("No body", "")])
         self.body.setToolTip("The body of the instrument, which colours the sound of the strings")
         self.body.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.body.setMinimumWidth(104)
+        self.body.setMinimumWidth(124)
         self.body.activated.connect(lambda row: self.body_chosen.emit(str(self.body.itemData(row))))
         head = Label("BODY TYPE")
         head.setObjectName("knob")

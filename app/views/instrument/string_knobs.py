@@ -29,7 +29,7 @@ WIDTHS = {  # in pixels, by the longest name or value
 NO_A4 = (
     "The Scala keyboard mapping of this instrument has a reference pitch of its own, so that A4 would change nothing"
 )
-NO_STRING = "The instrument has drums, and no string that this could change"
+NO_STRING = "This instrument has drums, and no string that this could change"
 OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "knobs.modulus", "pluck.curve")
 LETS_RING = "Release off (let ring)"
 

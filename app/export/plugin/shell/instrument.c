@@ -239,10 +239,26 @@ static void follow_levels(instrument *own, int32_t moved, double value) {
   }
 }
 
+/* Drums that are struck from now on decay as a knob says. */
+static void follow_losses(instrument *own, int64_t knob, double value) {
+  const image *of = own->of;
+  double by = value - ((const slot *)of)[of->table + TABLE_VALUES + knob].real; /* of the instrument's own */
+  own->added[knob == BRIGHTNESS_DECAY] = by;
+  const slot *before = (const slot *)of + of->table, *slots = (const slot *)of + of->losses;
+  const slot *drums = own->table + own->table[TABLE_DRUMS].whole;
+  for (int32_t key = 0; key < KEYS; key++) {
+    int64_t drum = drums[key].whole, modes = drum ? own->table[drum + DRUM_MODES].whole : 0;
+    const double *rows = (const double *)of + slots[key].whole;
+    for (int64_t mode = 0, first = drum + DRUM_HEADER + modes; mode < modes; mode++)
+      own->table[first + mode].real = before[first + mode].real + own->added[0] * rows[mode] + own->added[1] * rows[modes + mode];
+  }
+}
+
 static void apply(instrument *own, int32_t place, double value, int64_t frame) {
   const parameter *of = &parameters_of(own->of)[place];
   if (of->kind == KIND_VALUE) {
     pushed(own, frame, PARAMETER, 0, of->index, value);
+    if (own->of->losses && (of->index == DECAY || of->index == BRIGHTNESS_DECAY)) follow_losses(own, of->index, value);
   } else if (of->kind == KIND_POINT) {
     own->table[TABLE_POINT + of->index].real = value;
   } else if (of->kind == KIND_VOLUME) {
@@ -306,6 +322,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
   if (own->convolver && begin_mix(own)) mix_on(own, own->mix_slots);
   own->waiting = 0;
   own->read = 0;
+  own->added[0] = own->added[1] = 0;
   slot *event = pushed(own, 0, TABLE, 0, 0, 0);
   event[EVENT_TABLE].whole = number_of(own->table);
   for (int32_t place = 0; place < of->parameter_count; place++) {

@@ -35,6 +35,7 @@ typedef struct {
   int64_t impulse, impulse_frames, impulse_channels;                 /* a body that is a response: 32-bit whole numbers */
   double body_s, body_subsonic_hz, impulse_hz, impulse_unit, room_t60_s; /* no time: no room */
   int64_t levels, level_steps; /* dB: of each macro, step and key */
+  int64_t losses;              /* of drums: of each key the slot of two rows, 1/s that knobs of decay add at 1; 0: strings */
   int64_t wheel_mix;           /* which mix the modulation wheel moves, -1: none */
   int64_t modes, most_notes;
   double longest_s, wheel_goal;
@@ -54,6 +55,7 @@ typedef struct {
   int64_t frames_of_parts, mix_slots, mixing_at; /* the next slot of the response that is being mixed, -1: none is */
   double mix[2], mixing[2], weights[1 + MIX_PARTS]; /* of body and room: the latest, and those of that one */
   double values[MOST_PARAMETERS];
+  double added[2]; /* knobs of decay and of brightness decay beyond the instrument's own, which drums follow */
   double positions[MOST_PARAMETERS], standards[MOST_PARAMETERS]; /* of macros: as levels follow them */
   change changes[MOST_CHANGES];
   int32_t waiting;

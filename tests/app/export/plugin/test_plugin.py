@@ -20,6 +20,7 @@ from app.instrument.events import Controller, PatchTurned, TimedEvent
 from tests.app.export.plugin import host
 from tests.app.export.plugin.host import Event, Instance, Library, choke, midi, note_off, note_on, param, tune
 from tests.app.export.plugin.pieces import (
+    BARS,
     EQUAL_DB,
     LONG,
     MOVED,
@@ -65,10 +66,11 @@ def test_it_sounds_so_at_other_rates(bank: Library, name: str, rate_hz: int) -> 
     instance.destroy()
 
 
-def test_the_source_may_be_the_truth_or_the_difference(bank: Library) -> None:
-    patch = patch_of("electric_bass")
+@pytest.mark.parametrize("name", ("electric_bass", "timpani"))
+def test_the_source_may_be_the_truth_or_the_difference(bank: Library, name: str) -> None:
+    patch = patch_of(name)
     for value, source in ((1, "truth"), (2, "difference")):
-        instance = instance_of(bank, "electric_bass")
+        instance = instance_of(bank, name)
         id = instance.parameters["Source"].id
         instance.block(512, [param(0, id, value)])
         instance.deactivate()
@@ -146,6 +148,14 @@ def test_macros_move_body_and_room_and_keys_stay_as_loud(bank: Library) -> None:
     for macro, value in ((room, 0.0), (room, 0.7), (body, 0.0), (body, 0.5), (place, 0.25), (place, 1.0)):
         wanted = rendered(patch.turned(macro, value), 48_000)
         assert difference_db(played(with_macro(bank, MOVED, macro, value), patch, 48_000), wanted) < EQUAL_DB
+
+
+def test_decay_of_drums_follows_a_macro(bank: Library) -> None:
+    patch = patch_of(BARS)
+    decay = [macro.targets[0].field for macro in patch.macros].index("knobs.decay")
+    sound = played(with_macro(bank, BARS, decay, 0.0), patch, 48_000)
+    assert difference_db(sound, rendered(patch, 48_000)) > -40
+    assert difference_db(sound, rendered(patch.turned(decay, 0.0), 48_000)) < EQUAL_DB
 
 
 def test_body_and_room_follow_macros_and_the_wheel_while_it_plays(bank: Library) -> None:
