@@ -18,7 +18,7 @@ from app.export.files import ExportError
 from app.export.job import EXPECTED, ExportJob
 from app.export.sampled.choices import SampledChoices
 from app.views.background import Background
-from app.views.controls.parts import label
+from app.views.controls.parts import filled, label
 from app.views.dialogs.export_pages import (
     PAGES,
     ExportPage,
@@ -95,20 +95,9 @@ class ExportDialog(QDialog):
         self.close_button = QPushButton("Close")
         self.close_button.setToolTip("Close, or cancel the rendering (Escape)")
         self.close_button.clicked.connect(self.reject)
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.show_folder)
-        buttons.addStretch(1)
-        buttons.addWidget(self.close_button)
-        buttons.addWidget(self.save)
+        buttons = filled(QHBoxLayout(), self.show_folder, None, self.close_button, self.save)
         self._choosers = (self.tabs, *self.pages.values(), self.wav)
-        column = QVBoxLayout(self)
-        column.setSpacing(12)
-        for part in self._choosers:
-            column.addWidget(part)
-        column.addStretch(1)
-        column.addWidget(self.bar)
-        column.addWidget(self.state)
-        column.addLayout(buttons)
+        filled(QVBoxLayout(self), *self._choosers, None, self.bar, self.state, buttons).setSpacing(12)
         self.bar.hide()
         self.show_folder.hide()
 
