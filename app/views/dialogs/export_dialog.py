@@ -14,7 +14,6 @@ from PySide6.QtGui import QDesktopServices, QKeyEvent
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QPushButton, QTabBar, QVBoxLayout, QWidget
 
 from app.export.choices import ExportChoices
-from app.export.files import ExportError
 from app.export.job import EXPECTED, ExportJob
 from app.export.sampled.choices import SampledChoices
 from app.views.background import Background
@@ -30,6 +29,7 @@ from app.views.dialogs.export_pages import (
     WavForm,
 )
 from engine.plain_text import duration
+from engine.result_file import WriteError
 
 KINDS = tuple(PAGES)
 SETTLE_MS = 150  # after the last change: a knob that is turned changes the patch at each step
@@ -153,7 +153,7 @@ class ExportDialog(QDialog):
         self.show_folder.hide()
         try:
             text, words = self.page.offer()
-        except (ValueError, ExportError) as error:
+        except (ValueError, WriteError) as error:
             self._tell(str(error), failed=True)
             self.save.setEnabled(False)
             return
@@ -212,7 +212,7 @@ class ExportDialog(QDialog):
         assert self._job is not None
         try:
             self._end(f"Cancelled; {self._job.cancelled()}")
-        except ExportError as error:
+        except WriteError as error:
             self._end(str(error), failed=True)
 
     def _end(self, text: str, failed: bool = False) -> None:

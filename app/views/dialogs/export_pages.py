@@ -20,7 +20,6 @@ from PySide6.QtWidgets import (
 )
 
 from app.export.choices import Chosen, ExportChoices
-from app.export.files import ExportError
 from app.export.job import ExportJob
 from app.export.note import HeardNote, Note, NoteExport
 from app.export.played import Played, PlayedExport, recorded_files
@@ -43,7 +42,7 @@ from app.views.controls.form import FilePicker, check_box, count_box, form_label
 from app.views.controls.note_box import NoteBox
 from app.views.controls.parts import combo_box, faint, label
 from engine.presets import PresetError, preset_digest
-from engine.result_file import explain
+from engine.result_file import WriteError, explain
 
 Rows = dict[str, QWidget | QLayout]
 Kind = Literal["note", "performance", "sampler", "plugin"]
@@ -139,7 +138,7 @@ class ExportPage(QWidget):
         raise NotImplementedError
 
     def offer(self) -> tuple[str, str]:
-        """The button's text, and a note on what will be written. Raises ValueError, ExportError or OSError."""
+        """The button's text, and a note on what will be written. Raises ValueError, WriteError or OSError."""
         raise NotImplementedError
 
 
@@ -401,7 +400,7 @@ class SamplerPage(ExportPage):
         try:
             kept, free = kept_samples(plan, out), disk_usage(out.parent).free
         except OSError as error:
-            raise ExportError(explain(out.parent, error)) from error
+            raise WriteError(explain(out.parent, error)) from error
         short = f"; {megabytes(free)} are free there" if needed_bytes(plan, soundfont) > free else ""
         pitch = pitch_words(plan.pitch_error_cents)
         self.size_text.setText(f"{counted(plan)}, {size_words(plan, soundfont)}{short}; {pitch}")
