@@ -29,6 +29,7 @@ MOST_SHOWN = 160  # modes in a picture: their waves are wider than three points 
 GRID = 57  # points of a picture along the longer side; odd: one is the centre
 MOST_HEADS = 24  # that are kept, of 2 MB at most
 RATE_HZ = 48_000
+FULL_SCALE_PA = 20.0  # as `app.instrument.drum_keys` has it
 WINDOW_PERIODS = 2.0  # of the lowest mode, in which the error is measured
 
 
@@ -140,7 +141,7 @@ class BlowErrors:
     def __init__(self, frames: int, lowest_hz: float) -> None:
         self.window_frames = max(round(WINDOW_PERIODS * RATE_HZ / lowest_hz), 1)
         self.windows, self.ready = frames // self.window_frames, 0
-        self.middle_s = (np.arange(self.windows) + 0.5) * self.window_s
+        self.middle_s: NDArray[np.float64] = (np.arange(self.windows, dtype=np.float64) + 0.5) * self.window_s
         self.curves = {name: np.full(self.windows, np.nan) for name in ("rmse", "level_db")}
         self._sums = np.zeros((3, self.windows + 1))  # of error, model and truth
         self._total = np.zeros(2)
@@ -155,6 +156,14 @@ class BlowErrors:
         """Of all frames so far; not a number where the truth rests."""
         wrong, true = self._total
         return float(wrong / true) if true > 0 else math.nan
+
+    @property
+    def complete(self) -> bool:
+        return self.ready == self.windows
+
+    def advance(self) -> bool:
+        """The render worker adds what is new; here there is nothing to compute."""
+        return False
 
     def add(self, model_m: Array, truth_m: Array, weight: Array) -> None:
         """The next frames, (frames, modes) each; `weight` (modes,) is that of a square in the mean."""
@@ -197,6 +206,25 @@ class BlowTake:
     @property
     def complete(self) -> bool:
         return self.ready_frames == self.frames
+
+    @property
+    def rate_hz(self) -> int:
+        return RATE_HZ
+
+    @property
+    def horizon_s(self) -> float:
+        """All of it: the model was trained on no drum."""
+        return self.seconds
+
+    @property
+    def partials_hz(self) -> Array:
+        """At rest, (modes,)."""
+        return np.asarray(self.request.modes.omega / math.tau)
+
+    @property
+    def full_scale(self) -> float:
+        """What is 0 dB, in Pa."""
+        return FULL_SCALE_PA
 
     @property
     def progress(self) -> tuple[object, ...]:

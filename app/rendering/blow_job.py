@@ -108,7 +108,9 @@ class BlowJob:
         """The next frames, (frames, modes) each, of the modes up to the last that moves; one source in the helper."""
         truth = self._helper.submit(movers["truth"].advance, frames)
         blocks = {"model": movers["model"].advance(frames), "truth": truth.result()}
-        moving = 1 + max((int(part.any(0).nonzero()[0].max(initial=0)) for part in blocks.values()), default=0)
+        moving = 1 + max(
+            (int(np.flatnonzero(part.any(axis=0)).max(initial=0)) for part in blocks.values()), default=0
+        )
         return {name: np.ascontiguousarray(part[:, :moving]) for name, part in blocks.items()}
 
     def _render(self, take: BlowTake) -> None:

@@ -417,7 +417,7 @@ class StringView(QWidget):
             if not self._plain:
                 paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
             elif self._warning:
-                paint_remark(painter, axes, self._warning)
+                paint_remark(painter, axes.width, self._warning)
             if self.hasFocus():
                 painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
                 painter.setBrush(Qt.BrushStyle.NoBrush)
