@@ -7,6 +7,9 @@ import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from app.instrument import events
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
@@ -16,6 +19,7 @@ from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.kernels import playing_layout as of
 from engine.presets import Preset
+from engine.resonators.string import StringParameters
 from engine.voices import CompiledPlayer, Ear
 from engine.voices.player import Report, Ringing, Table
 
@@ -56,11 +60,19 @@ def event_of(record: Record) -> NoteOn | NoteOff | Bend | Controller:
     raise ValueError(f"a record of kind {record.kind} is no event of a player; give one of `record_of`")
 
 
+@dataclass(frozen=True, eq=False)
+class Tabled:
+    """Keys with the table that the kernels read of them: what `InstrumentPlayer.take` plays."""
+
+    keys: LoudKeys | DrumKeys
+    table: Table
+
+
 class InstrumentPlayer:
-    """Plays one patch, as `Player` does, but with the mixer's next quantum; what began is reported then.
+    """Plays one patch with the mixer's next quantum; what began is reported then.
 
     Every public method may be called from any thread. Strings that ring follow a patch that is taken.
-    A mixer of another rate needs another player.
+    A mixer of another rate needs another player: see `again`.
 
     Args:
         preset: a preset of many strings.
@@ -69,6 +81,7 @@ class InstrumentPlayer:
         ear: where strings are heard; None: at the patch's own points.
         most_notes: that ring at once; the oldest makes room.
         varied: whether plucks vary from stroke to stroke, as the patch says; the same strokes vary alike.
+        keys: of this patch and ear, where they are there already.
 
     Raises:
         ValueError: the preset learned one string only, or the tuning is impossible.
@@ -83,26 +96,35 @@ class InstrumentPlayer:
         ear: Ear | None = None,
         most_notes: int = 40,
         varied: bool = True,
+        keys: LoudKeys | DrumKeys | None = None,
     ) -> None:
         if not preset.info.of_many_strings:
             raise ValueError(
                 f"{preset.path}: its model learned one string only; choose a preset of many, as studio_any_string"
             )
-        if preset.info.recorded is not None:
-            raise ValueError(f"{preset.path}: its string was learned from a recording; `Player` plays it")
-        self._info, self.grid_points = preset.info, preset.info.grid_points
+        self._preset, self.grid_points, self.most_notes = preset, preset.info.grid_points, most_notes
         self._sources = tuple(gains)
         self._programs = programs_of(preset, rate_hz, self._sources)
         self._lock, self._varied = threading.Lock(), varied
         self._serial = self._instrument = 0
+        self._wheel = 0, 0  # the modulation wheel as events have left it, and the channel that moved it
         self.table: Table | None = None
         self._of_drums = isinstance(patch.strings, Drums)
         modes = of.MOST_DRUM_MODES if self._of_drums else min(of.MOST_MODES, self.grid_points - 2)
         self.compiled = CompiledPlayer(rate_hz, modes, most_notes)
-        self.compiled.set_source_gains(gains.values())
+        self.set_gains(gains)
         heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        self._loud = self._keys(patch, heard)
-        self.take(self._loud)
+        self._loud = self._keys(patch, heard) if keys is None else keys
+        self.take(self.tabled(self._loud))
+
+    def again(self, rate_hz: int) -> InstrumentPlayer:
+        """The same for another mixer, with wheels and pedals as they stand. Its keys are taken over."""
+        gains = {source: self.compiled.source_gain(place) for place, source in enumerate(self._sources)}
+        patch, ear, most, keys = self.patch, self.ear, self.most_notes, self._loud
+        made = InstrumentPlayer(patch, self._preset, rate_hz, gains, ear, most, self._varied, keys)
+        for event in self.at_hand:
+            made.handle(event)
+        return made
 
     # What is played
 
@@ -111,14 +133,31 @@ class InstrumentPlayer:
         return self._loud.patch
 
     @property
+    def keys(self) -> LoudKeys | DrumKeys:
+        return self._loud
+
+    @property
+    def preset(self) -> Preset:
+        return self._preset
+
+    @property
+    def of_drums(self) -> bool:
+        """Whether it can hold drums; else it holds strings."""
+        return self._of_drums
+
+    @property
     def ear(self) -> Ear:
         """Where strings are heard that are struck now."""
         return self._loud.ear
 
     @property
+    def rate_hz(self) -> int:
+        return self.compiled.rate_hz
+
+    @property
     def heard_through(self) -> Patch:
         """With the body and the room as the modulation wheel turns them."""
-        return wheeled(self.patch, self.compiled.wheel[0], "body.", "room.")
+        return wheeled(self.patch, self._wheel[0], "body.", "room.")
 
     @property
     def at_hand(self) -> list[Event]:
@@ -143,53 +182,53 @@ class InstrumentPlayer:
                 found.append(Controller(events.SUSTAIN, 127, number))
             if channel.slide is not None:
                 found.append(Controller(events.SLIDE, channel.slide, number))
-        wheel, moved_by = self.compiled.wheel
+        wheel, moved_by = self._wheel
         if wheel:
             found.append(Controller(events.MOD_WHEEL, wheel, moved_by))
         return found
 
+    def set_gains(self, gains: Mapping[str, float]) -> None:
+        """The factor of each of its sources; notes that ring fade to it."""
+        self.compiled.set_source_gains(gains[source] for source in self._sources)
+
     def _keys(self, patch: Patch, ear: Ear, near: LoudKeys | DrumKeys | None = None) -> LoudKeys | DrumKeys:
         if not isinstance(patch.strings, Drums):
-            return LoudKeys(patch, ear, self._info, near if isinstance(near, LoudKeys) else None)
+            if self._of_drums:
+                raise ValueError(f"{patch.name} has strings, and this player plays drums")
+            return LoudKeys(patch, ear, self._preset.info, near if isinstance(near, LoudKeys) else None)
         if not self._of_drums:
             raise ValueError(f"{patch.name} has drums, of which this player of strings cannot hold the modes")
         return DrumKeys(patch, ear, near if isinstance(near, DrumKeys) else None)
 
     def loud_keys(self, patch: Patch, ear: Ear | None = None, nearly: bool = False) -> LoudKeys | DrumKeys:
-        """What `take` needs of a patch. It takes milliseconds, in which keys are played.
+        """What `tabled` needs of a patch. It takes milliseconds, in which keys are played.
 
         Args:
             nearly: whether body and peaks may be those of the present patch, for which it takes no time.
 
         Raises:
-            ValueError: the tuning is impossible.
+            ValueError: the tuning is impossible, or the patch has drums for a player of strings.
         """
         heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
         return self._keys(patch, heard, self._loud if nearly else None)
 
-    def take(self, loud: LoudKeys | DrumKeys, frame: int = 0) -> None:
-        """Plays these keys from a frame on; strings that ring glide to them.
+    def tabled(self, keys: LoudKeys | DrumKeys) -> Tabled:
+        """The table of keys, which takes milliseconds, of drums more."""
+        return Tabled(keys, table_of(keys, self.grid_points, self._sources, self._programs, self.table, self._varied))
+
+    def take(self, made: Tabled, frame: int = 0) -> None:
+        """Plays these keys from a frame on, at once; strings that ring glide to them.
 
         Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
         """
         with self._lock:
-            before = self.table
-            if before is None or is_another(loud.patch, self._loud.patch):
+            if self.table is None or is_another(made.keys.patch, self._loud.patch):
                 self._instrument += 1
+                self._wheel = 0, 0
             self._serial += 1
-            self._loud, self.table = (
-                loud,
-                table_of(
-                    loud,
-                    self.grid_points,
-                    self._sources,
-                    self._programs,
-                    self._serial,
-                    self._instrument,
-                    before,
-                    self._varied,
-                ),
-            )
+            counts = made.table.memory.view(np.int64)
+            counts[of.TABLE_SERIAL], counts[of.TABLE_INSTRUMENT] = self._serial, self._instrument
+            self._loud, self.table = made.keys, made.table
             self.compiled.take(self.table, frame)
 
     def prepare(self, keys: Sequence[int] | None = None) -> None:
@@ -207,7 +246,28 @@ class InstrumentPlayer:
         assert table is not None
         fill_gain(table, loud, key, string)
 
+    def gain_of(self, key: int, string: int | None, parameters: StringParameters, known: float) -> float:
+        """The factor that a string would be struck with now; `known` where its key has another string now.
+
+        Raises:
+            ValueError: the key has no possible string.
+        """
+        keys = self._loud
+        if isinstance(keys, DrumKeys):
+            return known
+        own = keys.string_of(key, string)
+        if own is None or own.parameters != parameters:
+            return known
+        found = keys.of_key(key, string)
+        return known if found is None else found.gain
+
     # Events
+
+    def silent(self, key: int) -> bool:
+        """Whether a key has nothing that sounds. Raises ValueError: it has an impossible string."""
+        if isinstance(self._loud, DrumKeys):
+            return self._loud.of_key(key) is None
+        return self._loud.strings.pitch_hz(key) is None
 
     def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
         """Hands an event over; its number, which the reports of a note carry. 0 for a pluck at a place: no key's.
@@ -221,14 +281,20 @@ class InstrumentPlayer:
             ValueError: a key has no possible string.
         """
         if isinstance(event, PatchTurned):
-            self.take(self.loud_keys(event.patch), frame)
+            self.take(self.tabled(self.loud_keys(event.patch)), frame)
             return 0
         if isinstance(event, PluckAt):
             return 0
+        struck = None
         if isinstance(event, NoteOn) and event.velocity > 0:
             self._make_ready(event)
+            struck = self._struck(event)
+        elif isinstance(event, Controller):
+            self._follow_wheel(event)
         record = record_of(event)
-        return self.compiled.give(record.kind, record.channel, record.key, record.value, frame, struck_s=struck_s)
+        return self.compiled.give(
+            record.kind, record.channel, record.key, record.value, frame, struck_s=struck_s, struck=struck
+        )
 
     def _make_ready(self, event: NoteOn) -> None:
         """The gains of a key on the strings on which the event may play it."""
@@ -240,13 +306,33 @@ class InstrumentPlayer:
         with contextlib.suppress(ValueError) if played else contextlib.nullcontext():
             self._fill(event.key, None)
 
-    def cancel(self) -> None:
-        """Forgets the events whose frames are to come."""
-        self.compiled.give(of.CANCEL)
+    def _struck(self, event: NoteOn) -> NDArray[np.float64] | None:
+        """What a blow at a place of its own gives a drum's modes; None: its own place."""
+        if event.place is None or not isinstance(self._loud, DrumKeys):
+            return None
+        found = self._loud.of_key(event.key)
+        return None if found is None else found.struck(event.place)
+
+    def _follow_wheel(self, event: Controller) -> None:
+        moved_by = self._wheel[1]
+        if event.number == events.MOD_WHEEL:
+            self._wheel = event.value, event.channel
+        elif event.number == events.RESET:
+            master = self.patch.mode == "mpe" and event.channel == of.FIRST and moved_by != events.KEYS
+            if event.channel == moved_by or master:
+                self._wheel = 0, moved_by
+
+    def cancel(self, note: int = 0) -> None:
+        """Forgets the events whose frames are to come, or those of one note, by its number."""
+        self.compiled.give(of.CANCEL, note=note)
 
     def stop(self, seconds: float = STOP_S) -> None:
         """Lets all strings fade out."""
         self.compiled.give(of.STOP, value=seconds)
+
+    def release(self, note: int, seconds: float = STOP_S, frame: int = 0) -> None:
+        """Lets one note fade out, by its number, from a frame on."""
+        self.compiled.give(of.CHOKE, of.ANY, of.ANY, seconds, frame, note=note)
 
     # What became of them
 

@@ -28,6 +28,7 @@ TUNINGS = 6  # rounds of a secant method
 NEAR = 1e-4  # of a frequency, where it ends
 LOW_HZ, LOW_MODES = 1_500.0, 6  # among which its pitch is
 LOUDEST_S = 0.03  # after the blow: the peak is looked for there
+NEAREST_RIM = 0.98  # of half a drum: at the rim itself nothing moves
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,17 @@ class DrumKey:
     modes: DrumModes
     heard: Array
     gain: float = 1.0
+
+    def struck(self, place: tuple[float, float]) -> Array:
+        """The speeds (modes,) that 1 N s of its mallet gives at a place, in half-lengths from the centre.
+
+        A place beyond the rim is taken as the nearest one within.
+        """
+        x, y = place
+        away = math.hypot(x, y) if self.played.drum.shape == "circle" else max(abs(x), abs(y))
+        if away > NEAREST_RIM:
+            place = x * NEAREST_RIM / away, y * NEAREST_RIM / away
+        return np.ascontiguousarray(self.modes.struck(place, self.played.mallet.mallet.radius_m))
 
     def strike(self, velocity: float, curve: float = 0.0) -> Strike:
         """The blow of a velocity in 1 … 127."""
@@ -81,9 +93,15 @@ class DrumKeys:
         self.patch, self.ear, self.drums = patch, ear, patch.strings
         self._tuning = Tuning(patch.tuning)
         self._response: Response | None = body_response(patch) if near is None else near._response
+        self._known: dict[int, DrumKey | None] = {}
 
     def of_key(self, key: int, string: int | None = None) -> DrumKey | None:
-        """None for a key that is silent. Raises ValueError: the key has no possible drum."""
+        """None for a key that is silent; remembered. Raises ValueError: the key has no possible drum."""
+        if key not in self._known:
+            self._known[key] = self._of_key(key)
+        return self._known[key]
+
+    def _of_key(self, key: int) -> DrumKey | None:
         low, high = self.patch.range
         played = self.drums.of_key(key)
         if played is None or not low <= key <= high or not self._tuning.mapped(key):
@@ -180,7 +198,7 @@ def block_of(found: DrumKey) -> Array:
     block[of.DRUM_MALLET_KG], block[of.DRUM_CONTACT_S] = mallet.mass_kg, mallet.contact_s
     block[of.DRUM_MASS_KG] = found.modes.mass_kg
     block[of.DRUM_SOFTEST_M_S], block[of.DRUM_HARDEST_M_S] = found.played.softest_m_s, found.played.hardest_m_s
-    struck = found.modes.struck(found.played.place, mallet.radius_m)
+    struck = found.struck(found.played.place)
     rows = [resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch, struck]
     for row, values in enumerate([*rows, *found.heard]):
         first = of.DRUM_HEADER + row * n

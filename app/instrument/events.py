@@ -23,11 +23,16 @@ KEYS = 16  # what is played on the computer's keys and on the screen: no channel
 
 @dataclass(frozen=True)
 class NoteOn:
-    """A key is struck; velocity 1 … 127 (0 is a release)."""
+    """A key is struck; velocity 1 … 127 (0 is a release).
+
+    Attributes:
+        place: where a drum is struck, from its centre in half-lengths, x and y; None: at its own place.
+    """
 
     key: int
     velocity: int
     channel: int = 0
+    place: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

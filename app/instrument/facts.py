@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from app.instrument.strings import KeyString, Strings
+from app.patches.drums import PlayedDrum
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from app.shared.parameters import OF_PATCHES
@@ -61,6 +62,16 @@ def facts_of(string: KeyString) -> dict[str, str]:
         "mass": told(1000 * parameters.mass_per_length_kg_m, "g/m"),
         "stress": told(parameters.tension_n / parameters.area_m2 / 1e6, "MPa"),
     }
+
+
+def facts_of_drum(played: PlayedDrum) -> dict[str, str]:
+    """A drum in figures: values with their units, by name."""
+    drum = played.drum
+    size = told(100 * drum.length_m, "cm")
+    if drum.shape != "circle":
+        size = f"{told(100 * drum.length_m, '')} × {told(100 * drum.width_m, 'cm')}"
+    tension = told(drum.tension_n_m / 1000, "kN/m") if drum.tension_n_m else "stiff, without tension"
+    return {"drum": played.name, "key": note_name(played.note), "size": size, "tension": tension}
 
 
 def figures_of(string: StringParameters) -> dict[str, str]:

@@ -50,7 +50,7 @@ class LoudKeys:
         self._whole, self._preset = replace(ear, solo=0), preset
         self.strings = Strings(patch)
         self._release_s = patch.pluck.release_s(REFERENCE_VELOCITY)
-        self.polarisations = polarisations_of(patch, preset)
+        self.polarisations, self.recorded = polarisations_of(patch, preset), preset.recorded
         self._response: Response | None = body_response(patch) if near is None else near._response
         self._over_db: float = self._peaks_over_db() if near is None else near._over_db
 

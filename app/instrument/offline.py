@@ -20,7 +20,6 @@ from app.instrument.events import (
     TimedEvent,
     moves_effects,
 )
-from app.instrument.player import Player, Struck
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.layout import AHEAD, QUANTUM
@@ -59,7 +58,6 @@ class _Stage:
     def handle(self, event: Event, frame: int) -> None:
         self.player.handle(event, frame)
         if moves_effects(event, self.player.patch):
-            self.player.compiled.catch_up(self.mixer)
             self._set_effects()
 
     def render(self, frames: int) -> NDArray[np.float32]:
@@ -81,44 +79,6 @@ class _Stage:
     def silent(self) -> bool:
         """Whether nothing rings any more."""
         return not self.mixer.active
-
-
-class _VoicedStage(_Stage):
-    """The same for a string learned from a recording, whose modes the compiled player does not compute."""
-
-    def __init__(
-        self, patch: Patch, preset: Preset, rate_hz: int, gains: Mapping[str, float], limited: bool, varied: bool
-    ) -> None:
-        self.mixer = Mixer(rate_hz, limited=limited)
-        self._gains = gains
-        self._struck: list[Struck] = []
-        self.voiced = Player(patch, preset, rate_hz, self._take, tuple(gains))
-        self._dry = len(gains) > 1
-        self.tail_s = 0.0
-        self._set_effects()
-
-    def _take(self, struck: Struck) -> None:
-        self._struck = [each for each in self._struck if not each.over]
-        for each in self._struck[: max(0, len(self._struck) + 1 - MOST_RINGING)]:
-            for voice in each.voices.values():
-                voice.release(STOLEN_S)
-        for source, voice in struck.voices.items():
-            voice.start_with_gain(self._gains[source] * struck.gain)
-        self._struck.append(struck)
-        self.mixer.add(*struck.voices.values())
-
-    def handle(self, event: Event, frame: int) -> None:
-        self.voiced.handle(event, frame)
-        if moves_effects(event, self.voiced.patch):
-            self._set_effects()
-
-    def _heard_through(self) -> Patch:
-        return self.voiced.heard_through
-
-    @property
-    def silent(self) -> bool:
-        self.mixer.forget_ended()
-        return not self.mixer.voices
 
 
 def render_events(
@@ -147,8 +107,7 @@ def render_events(
     Raises:
         ValueError: a key has no possible string, or there is no such `source`.
     """
-    kind = _Stage if preset.info.recorded is None else _VoicedStage
-    stage = kind(patch, preset, rate_hz, _gains(source, difference_gain_db), limited, varied)
+    stage = _Stage(patch, preset, rate_hz, _gains(source, difference_gain_db), limited, varied)
     channels = channels_played(patch, timed)
     skipped = AHEAD if limited else 0  # the delay of the limiter
     done, events = 0, sorted(timed, key=lambda each: each.time_s)

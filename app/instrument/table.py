@@ -19,6 +19,7 @@ from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.presets import Preset
 from engine.resonators.polarised import PAIRS
+from engine.resonators.recorded import OF_PARTIALS, RecordedString
 from engine.voices.player import Table
 from engine.voices.programs import solver_memory, tension_memory
 
@@ -77,22 +78,17 @@ def table_of(
     grid_points: int,
     sources: Iterable[str],
     programs: tuple[NDArray[np.float64], ...],
-    serial: int,
-    instrument: int,
     near: Table | None = None,
     varied: bool = True,
 ) -> Table:
-    """The table of a patch. Gains of keys are filled in by `fill_gain`; until then they are those of `near`.
+    """The table of a patch, without its number. `fill_gain` adds gains of keys; until then they are those of `near`.
 
     Args:
-        serial: above that of all tables before.
-        instrument: the same for the same instrument with a knob turned.
         varied: whether plucks vary from stroke to stroke, as the patch says.
     """
     patch, ear = loud.patch, loud.ear
     memory = np.zeros(of.table_slots(grid_points))
     counts = memory.view(np.int64)
-    counts[of.TABLE_SERIAL], counts[of.TABLE_INSTRUMENT] = serial, instrument
     counts[of.TABLE_MODE], counts[of.TABLE_BEND_BY] = MODES[patch.mode], BENDS[patch.bend_by]
     counts[of.TABLE_LOW], counts[of.TABLE_HIGH] = patch.range
     counts[of.TABLE_SHAPE], counts[of.TABLE_STOPS] = SHAPES[patch.pluck.shape], patch.pluck.stops
@@ -130,6 +126,9 @@ def table_of(
     memory[of.TABLE_VALUES : of.TABLE_VALUES + of.VALUES] = [_value(patch, name) for name in VALUES]
     if isinstance(loud, DrumKeys):
         return Table(_with_drums(memory, loud), programs)
+    if loud.recorded is not None:
+        memory = _with_recorded(memory, loud.recorded, grid_points)
+        counts = memory.view(np.int64)
     for key in range(of.KEYS):
         memory[of.TABLE_PITCHES + key] = loud.strings.pitch_hz(key) or 0.0
     strings = patch.strings
@@ -165,6 +164,19 @@ def _with_drums(memory: NDArray[np.float64], loud: DrumKeys) -> NDArray[np.float
                 first += len(blocks[-1])
     memory.view(np.int64)[of.TABLE_DRUMS] = len(memory)
     return np.concatenate([memory, slots.view(np.float64), *blocks])
+
+
+def _with_recorded(memory: NDArray[np.float64], own: RecordedString, grid_points: int) -> NDArray[np.float64]:
+    """The table with what a recording adds to strings."""
+    header = np.zeros(of.RECORDED_HEADER)
+    header[of.RECORDED_HZ] = own.pitch_hz
+    header[of.RECORDED_REST : of.RECORDED_REST + len(OF_PARTIALS)] = [own.rest(name) for name in OF_PARTIALS]
+    counts = header.view(np.int64)
+    counts[of.RECORDED_SMOOTH], counts[of.RECORDED_PARTIALS] = len(own.smooth_hz), len(own.cents)
+    counts[of.RECORDED_MODES] = grid_points - 2
+    memory.view(np.int64)[of.TABLE_RECORDED] = len(memory)
+    rows = [getattr(own, name) for name in OF_PARTIALS]
+    return np.concatenate([memory, header, np.log(own.smooth_hz), np.log(own.smooth_ratio), *rows])
 
 
 def fill_gain(table: Table, loud: LoudKeys | DrumKeys, key: int, string: int | None = None) -> None:

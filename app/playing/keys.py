@@ -1,23 +1,27 @@
-"""What the keys of a patch sound with, prepared in the background: the patch's preset, its strings, body and room."""
+"""What the keys of a patch sound with, prepared in the background: the patch's preset, its table, body and room.
+
+Events go to the compiled player as numbers, which the device's next quantum takes up; its reports come back.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from app.instrument.compiled import InstrumentPlayer, is_another
 from app.instrument.effects import body_problem, effects_of
-from app.instrument.events import Controller, Event, PatchTurned, moves_effects
-from app.instrument.player import SOURCES, Player, Struck, is_another
+from app.instrument.events import Controller, Event, NoteOn, PatchTurned, moves_effects
+from app.patches.drums import Drums
 from app.patches.patch import Patch, Pickup
 from app.playing.due import Due
-from app.playing.note import Note
+from app.playing.key_note import AS_THEY_ARE, KeyNote
 from app.playing.recorder import EventRecorder
 from app.playing.sources import Sources
-from app.rendering.subject import StringOf
 from engine.effects import Effects
+from engine.kernels.playing_layout import BEGAN
 from engine.presets import PresetError
 from engine.resonators.string import StringParameters
 from engine.voices import Ear, Mixer
@@ -63,28 +67,33 @@ class Keys:
         self._in_background, self._report, self._set_effects = in_background, report, set_effects
         self.recorder = EventRecorder(report)
         self._lock = threading.RLock()
-        self._player: Player | None = None
+        self._player: InstrumentPlayer | None = None
+        self._in: Mixer | None = None  # where the player's events are played
+        self._playing: list[InstrumentPlayer] = []  # with those before, whose notes may ring
+        self._gains: Mapping[str, float] = AS_THEY_ARE
+        self._notes: dict[tuple[InstrumentPlayer, int], KeyNote] = {}
         self._wanted: _Wanted | None = None
         self._completed: _Wanted | None = None  # the latest wish for which all is computed, or tried
         self._path = Path()
-        self._struck: Struck | None = None  # the last one
+        self._latest: KeyNote | None = None
         self._effects: Effects | None = None  # as set
         self._dry = False
         self._told_body = ""  # the fault of the body that was reported last
 
     @property
-    def player(self) -> Player | None:
+    def player(self) -> InstrumentPlayer | None:
         """None: no patch, or its preset is not loaded yet."""
         return self._player
 
     def set_patch(self, patch: Patch | None, ear: Ear) -> None:
         """What keys play from now on, and where it is heard. Strings that ring follow, if the preset is the same.
 
-        Another preset is loaded in the background; until then keys are silent. None: no patch.
+        Another preset, and drums after strings, are loaded in the background; until then keys are silent. None: no
+        patch.
         """
         with self._lock:
             player = self._player
-            if patch is None or (player is not None and player.patch.preset != patch.preset):
+            if patch is None or (player is not None and not _holds(player, patch)):
                 self._player = None
             self._wanted = None if patch is None else _Wanted(patch, ear)
         self._follow_wish()
@@ -99,30 +108,61 @@ class Keys:
                 return
         self._follow_wish()
 
-    def handle(self, event: Event, due: Due | None, ring: Callable[[Struck, StringOf], Note]) -> Note | None:
-        """Plays an event, at once or when it is due; the note of what it struck, or None.
+    def set_gains(self, gains: Mapping[str, float]) -> None:
+        """The factor of each source; notes that ring fade to it."""
+        with self._lock:
+            self._gains = gains
+            for player in self._playing:
+                player.set_gains(gains)
+
+    def handle(
+        self, event: Event, due: Due | None, struck_s: float, begun: Callable[[KeyNote], None]
+    ) -> KeyNote | None:
+        """Plays an event, at once or when it is due; the note of a key that is struck, or None.
 
         Args:
-            ring: makes the note; called under the lock, so that notes of a key keep their order.
+            struck_s: the device clock's time of the gesture; 0: it is none.
+            begun: is called with the note; under the lock, so that notes of a key keep their order.
         """
         with self._lock:
-            player, mixer = self._player, self._mixer()
+            player, mixer = self._present(), self._mixer()
             if player is None:
                 return None
-            if player.rate_hz != mixer.rate_hz:
-                player.set_rate(mixer.rate_hz)
             self.recorder.take(event, None if due is None else due.time_s)
-            struck = None
+            frame, id = 0 if due is None else due.frame_in(mixer), 0
+            struck = event if isinstance(event, NoteOn) and event.velocity > 0 else None
             try:
-                struck = player.handle(event, 0 if due is None else due.frame_in(mixer))
+                if struck is None or not player.silent(struck.key):
+                    id = player.handle(event, frame, struck_s)
             except (ValueError, PresetError) as error:
                 self._report(str(error), "")
             if isinstance(event, Controller) and moves_effects(event, player.patch):
                 self._in_background(self._set_present_effects)
-            if struck is None:
+            if struck is None or not id:
                 return None
-            self._struck = struck
-            return ring(struck, StringOf(self._path, struck.key.string.parameters))
+            note = self._notes[player, id] = KeyNote(player, mixer, id, struck, self._path, frame)
+            self._latest = note
+            begun(note)
+            return note
+
+    def look(self) -> list[KeyNote]:
+        """Follows the player's reports; the notes that began since it was asked for the last time. Any thread."""
+        found = []
+        with self._lock:  # a note is known before its report is read
+            for player in self._playing:
+                for report in player.reports():
+                    note = self._notes.get((player, report.id))
+                    if note is None:
+                        continue
+                    note.take(report)
+                    if note.over:
+                        del self._notes[player, report.id]
+                    elif report.kind == BEGAN:
+                        found.append(note)
+            self._notes = {key: note for key, note in self._notes.items() if not note.over}
+            held = {player for player, _ in self._notes}
+            self._playing = [each for each in self._playing if each is self._player or each in held]
+        return found
 
     def cancel(self) -> None:
         """What was handed over and is not due yet is not played."""
@@ -131,13 +171,19 @@ class Keys:
                 self._player.cancel()
             self.recorder.cancel()
 
+    def stop(self, seconds: float) -> None:
+        """Lets all strings fade out, also those that ring in sympathy."""
+        with self._lock:
+            for player in self._playing:
+                player.stop(seconds)
+
     def sounding(self) -> dict[int, float]:
         """Key -> how loud its string rings: 0 at SEEN_DB below full scale, 1 at full scale."""
         found: dict[int, float] = {}
-        for struck in self._player.sounding() if self._player is not None else ():
-            level = max(voice.level_db for voice in struck.voices.values())
-            share = min(max(1 + level / SEEN_DB, 0.0), 1.0)
-            found[struck.event.key] = max(found.get(struck.event.key, 0.0), share)
+        player = self._player
+        for each in player.ringing() if player is not None and self._in is self._mixer() else ():
+            share = min(max(1 + each.level_db / SEEN_DB, 0.0), 1.0)
+            found[each.key] = max(found.get(each.key, 0.0), share)
         return found
 
     @property
@@ -150,12 +196,12 @@ class Keys:
 
     def gain_of(self, string: StringParameters | None) -> float:
         """The factor of the string that a key played last, so that a pluck by hand is as loud; 1 for any other."""
-        struck, player = self._struck, self._player
-        if struck is None or struck.key.string.parameters != string:
+        note, player = self._latest, self._player
+        if note is None or string is None or note.parameters != string:
             return 1.0
         with contextlib.suppress(ValueError):  # reported when it is struck
-            return struck.gain if player is None else player.gain_of(struck)
-        return struck.gain
+            return note.gain if player is None else player.gain_of(note.event.key, note.string, string, note.gain)
+        return note.gain
 
     def begin_recording(self) -> None:
         """Records events from now on, wheels and pedals as they stand; an earlier recording is discarded."""
@@ -183,10 +229,24 @@ class Keys:
         if problem and problem != told:
             self._report(problem, "")
 
+    def _present(self) -> InstrumentPlayer | None:
+        """The player in the present mixer; in a new one its strings are at rest. Under the lock."""
+        player, mixer = self._player, self._mixer()
+        if player is not None and mixer is not self._in:
+            self._give(player.again(mixer.rate_hz), mixer)
+        return self._player
+
+    def _give(self, player: InstrumentPlayer, mixer: Mixer) -> None:
+        """Lets keys play a player. Under the lock."""
+        player.set_gains(self._gains)
+        mixer.set_player(player.compiled)
+        self._player, self._in = player, mixer
+        self._playing.append(player)
+
     def _follow_wish(self) -> None:
         """Plays what is wanted; what takes milliseconds of it, in the background."""
         wanted, player = self._wanted, self._player
-        if wanted is not None and player is not None:
+        if wanted is not None and player is not None and not player.of_drums:
             self._bring(player, wanted, nearly=not is_another(wanted.patch, player.patch))
         self._in_background(self._complete)
 
@@ -198,7 +258,6 @@ class Keys:
             if player is None:
                 self._begin(wanted)
             else:
-                player.glide()
                 self._bring(player, wanted)
         self._set_present_effects()
         self._prepare()
@@ -214,10 +273,10 @@ class Keys:
                 return
             player.prepare([key])
 
-    def _bring(self, player: Player, wanted: _Wanted, nearly: bool = False) -> None:
-        """Lets keys play what is wanted, unless something else is by now. `nearly`: as in `Player.loud_keys`."""
+    def _bring(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
+        """Lets keys play what is wanted, unless something else is by now. `nearly`: as of `loud_keys`."""
         try:
-            keys = player.loud_keys(wanted.patch, wanted.ear, nearly)
+            made = player.tabled(player.loud_keys(wanted.patch, wanted.ear, nearly))
         except ValueError as error:
             with self._lock:
                 if wanted is self._wanted:  # what is played stays
@@ -227,7 +286,7 @@ class Keys:
         with self._lock:
             if wanted is self._wanted and player is self._player:
                 turned = (player.patch, player.ear) != (wanted.patch, wanted.ear)
-                player.take(keys)
+                player.take(made)
                 if turned:
                     self.recorder.take(_turned(player))
 
@@ -239,21 +298,29 @@ class Keys:
             return
         try:
             preset, rate_hz = self._sources.load(path).preset, self._mixer().rate_hz
-            player = Player(patch, preset, rate_hz, lambda struck: None, SOURCES, wanted.ear)
+            player = InstrumentPlayer(patch, preset, rate_hz, self._gains, wanted.ear)
         except (ValueError, PresetError) as error:
             self._report(str(error), "")
             return
         with self._lock:
-            now = self._wanted
+            now, mixer = self._wanted, self._mixer()
             if now is None or now.patch is not patch:
                 return
-            self._path, self._player = path, player
+            if mixer.rate_hz != rate_hz:  # the device has changed meanwhile
+                player = player.again(mixer.rate_hz)
+            self._path = path
+            self._give(player, mixer)
             self.recorder.take(_turned(player))
         if now is not wanted:  # it is heard elsewhere by now
             self._bring(player, now)
 
 
-def _turned(player: Player) -> PatchTurned:
+def _holds(player: InstrumentPlayer, patch: Patch) -> bool:
+    """Whether a player can play a patch too."""
+    return player.patch.preset == patch.preset and player.of_drums == isinstance(patch.strings, Drums)
+
+
+def _turned(player: InstrumentPlayer) -> PatchTurned:
     """With the pick-up through which it is heard, which is not its own where a single string is played."""
     pickup = Pickup(points=player.ear.points, kind=player.ear.pickup)
     return PatchTurned(player.patch.model_copy(update={"pickup": pickup}))

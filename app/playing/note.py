@@ -1,10 +1,9 @@
-"""A note: what rings since an event, as voices of several sources."""
+"""A note: what rings since a pluck at a place, as voices of several sources."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from app.instrument.player import Struck
 from app.playing.ahead import AheadVoice
 from app.rendering import RenderRequest
 from app.rendering.subject import Subject
@@ -22,7 +21,6 @@ class Note:
         gain: a factor for all its sources, besides the monitor's.
         from_s: where in its motion it begins.
         begin_frame: the frame of the mixer at which it begins; 0: at once.
-        struck: of a key of a patch, the string, whose voices the player changes; None: of any other pluck.
 
     Attributes:
         voices: by source.
@@ -41,12 +39,11 @@ class Note:
         gain: float = 1.0,
         from_s: float = 0.0,
         begin_frame: int = 0,
-        struck: Struck | None = None,
     ) -> None:
         self.request, self.sources, self.gain = request, sources, gain
-        self.from_s, self.begin_frame, self.struck = from_s, begin_frame, struck
-        self.voices: dict[str, Voice] = {} if struck is None else dict(struck.voices)
-        self.match: Mapping[str, float] | None = None if struck is None else dict.fromkeys(struck.voices, 1.0)
+        self.from_s, self.begin_frame = from_s, begin_frame
+        self.voices: dict[str, Voice] = {}
+        self.match: Mapping[str, float] | None = None
         self.ahead: list[AheadVoice] = []
         self.pending = True
         self.handed_over = False  # or about to be
@@ -96,6 +93,11 @@ class Note:
     def began_frame(self) -> int:
         """The frame of the mixer at which it began; 0 before that."""
         return max((voice.began_frame for voice in self.voices.values()), default=0)
+
+    @property
+    def latency_s(self) -> float | None:
+        """From the gesture to the callback that gave the device its first samples; None: not known, or not begun."""
+        return next(iter(self.voices.values())).struck_to_began_s if self.voices else None
 
     def frame_at(self, seconds: float) -> int:
         """The frame of its mixer at which its motion reaches a time; only once it has begun."""

@@ -1,7 +1,8 @@
 """The notes that ring: begun by events, switched between sources, heard from other points, and ended.
 
 All that plays is an event: a key, a message of MIDI or of a file, a pluck at a place. `Notes.handle` turns it into a
-note in the thread it comes in: its voices are handed to the mixer at once, before anything is drawn.
+note in the thread it comes in, and hands it to the mixer at once, before anything is drawn. Keys of a patch go to the
+compiled player as numbers. A pluck of a single string has voices that are made here, for models of every kind.
 """
 
 from __future__ import annotations
@@ -20,11 +21,11 @@ from numpy.typing import NDArray
 
 from app.audio.sound import Sound, SoundStatus
 from app.instrument.events import Event, NoteOn, PluckAt
-from app.instrument.player import SOURCES, Struck
 from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
 from app.playing.due import Due
+from app.playing.key_note import SOURCES, KeyNote
 from app.playing.keyboard import Reach
 from app.playing.keys import Keys
 from app.playing.levels import Levels
@@ -32,7 +33,7 @@ from app.playing.note import Note
 from app.playing.sources import Sources
 from app.presets.library import PresetEntry
 from app.rendering import RenderRequest
-from app.rendering.subject import StringOf, Subject, path_of, string_of
+from app.rendering.subject import Subject, path_of, string_of
 from app.session.monitor import Monitor
 from app.shared.thread_priority import Rank, step_back
 from app.shared.vocabulary import OTHER
@@ -76,10 +77,10 @@ class Notes:
     ) -> None:
         self._sound, self._sources, self._find, self._report = sound, sources, find, report
         self._lock = threading.RLock()
-        self._notes: list[Note] = []
+        self._notes: list[Note | KeyNote] = []
         self._monitor = Monitor()
         self._ear: Ear | None = None
-        self.latest: Note | None = None
+        self.latest: Note | KeyNote | None = None
         self._chosen: RenderRequest | None = None
         self._reach: Reach | None = None  # of a single string, which is played; None: a patch is
         self._dry = False
@@ -127,9 +128,10 @@ class Notes:
         """Sets the sources of all notes; those that ring are cross-faded."""
         with self._lock:
             self._monitor = monitor
-            notes = list(self._notes)
+            notes = self._plucks()
             for note in notes:
                 self._apply_monitor(note)
+        self.keys.set_gains({source: monitor.gain(source, SOURCES, None) for source in SOURCES})
         for note in notes:
             if not note.pending and not note.over:
                 self._ask_match(note)
@@ -144,7 +146,7 @@ class Notes:
 
     # Events
 
-    def handle(self, event: Event, due: Due | None = None) -> Note | None:
+    def handle(self, event: Event, due: Due | None = None) -> Note | KeyNote | None:
         """Plays an event, at once or when it is due; the note that it began, or None.
 
         Keys of a single string are places along it. Its note sounds with the next quantum of the device, unless
@@ -153,15 +155,15 @@ class Notes:
         struck_s = self._sound.now_s() if due is None else 0.0  # only gestures are timed
         placed = self._place(event)
         if not isinstance(placed, PluckAt):
-            note = self.keys.handle(placed, due, lambda struck, string: self._adopt(struck, string, struck_s, due))
-        else:
-            with self._lock:
-                if self._chosen is None:
-                    return None
-                chosen = self._chosen = replace(self._chosen, pluck=placed.pluck)
-            frame = 0 if due is None else due.frame_in(self._sound.mixer)
-            note = self._ring(chosen, 0.0, frame, struck_s, due is not None)
-        self.latest = note or self.latest
+            begun = self.keys.handle(placed, due, struck_s, self._adopt)
+            self.latest = begun or self.latest
+            return begun
+        with self._lock:
+            if self._chosen is None:
+                return None
+            chosen = self._chosen = replace(self._chosen, pluck=placed.pluck)
+        frame = 0 if due is None else due.frame_in(self._sound.mixer)
+        self.latest = note = self._ring(chosen, 0.0, frame, struck_s, due is not None)
         return note
 
     def _place(self, event: Event) -> Event:
@@ -198,7 +200,7 @@ class Notes:
             self._guarded(begin, note)()
         return note
 
-    def turn(self, note: Note, seconds: float) -> Note | None:
+    def turn(self, note: Note | KeyNote, seconds: float) -> Note | None:
         """Hands the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early."""
         mixer, frame = self._sound.mixer, note.frame_at(seconds)
         if self._chosen is None or frame > (mixer.seconds + LOOP_AHEAD_S) * mixer.rate_hz:
@@ -210,7 +212,7 @@ class Notes:
         """What was handed over and is not due yet is not played."""
         self.keys.cancel()
         with self._lock:
-            for note in self._notes:
+            for note in self._plucks():
                 if note.ahead_of_event and not note.began:
                     note.release(0.0)
 
@@ -219,6 +221,7 @@ class Notes:
         with self._lock:
             for note in self._notes:
                 note.release(seconds)
+        self.keys.stop(seconds)
 
     # Ahead of events
 
@@ -293,15 +296,16 @@ class Notes:
 
     def poll(self) -> None:
         """Forgets notes that ended, and moves listening points. The window calls it at each frame."""
+        self.look()
         with self._lock:
             self._carry()
             self._notes = [note for note in self._notes if not note.over]
-            for note in self._notes:
-                if not note.timed and not note.ahead and note.voices:
-                    latency_s = next(iter(note.voices.values())).struck_to_began_s
-                    if latency_s is not None:
-                        note.timed = True
-                        self._latencies_s.append(latency_s)
+            for each in self._notes:
+                ahead = isinstance(each, Note) and each.ahead
+                if not each.timed and not ahead and (latency_s := each.latency_s) is not None:
+                    each.timed = True
+                    self._latencies_s.append(latency_s)
+            for note in self._plucks():
                 if note.ahead and note.match is None and not note.pending:
                     self._ask_match(note)
                 if self._ear is not None:
@@ -315,6 +319,18 @@ class Notes:
         self._ahead.close()
 
     # How it is done
+
+    def _plucks(self) -> list[Note]:
+        """The notes whose voices are made here."""
+        return [note for note in self._notes if isinstance(note, Note)]
+
+    def look(self) -> None:
+        """Follows what the player reports of notes of keys: the latest that began is the string that is shown."""
+        for note in self.keys.look():
+            with self._lock:
+                if note.request is not None and note is self.latest and self._chosen is not None:
+                    request = note.request
+                    self._chosen = replace(self._chosen, preset=request.preset, pluck=request.pluck)
 
     def _path_of(self, preset: str) -> Path | None:
         entry = self._find(preset)
@@ -350,30 +366,20 @@ class Notes:
         """When the device has changed its rate, the latest plucks ring on in its new mixer; keys' notes end."""
         mixer = self._sound.mixer
         left = [note for note in self._notes if note.mixer not in (None, mixer) and not note.over]
-        ringing = [note for note in left if note.seconds and not note.released and note.struck is None][
-            -MOST_CARRIED:
-        ]
+        plucks = [note for note in left if isinstance(note, Note) and note.seconds and not note.released]
         for note in left:
-            if note in ringing:
+            if isinstance(note, Note) and note in plucks[-MOST_CARRIED:]:
                 note.from_s, note.begin_frame, note.mixer = note.seconds, 0, None
                 note.pending, note.handed_over = True, False
                 self.in_background(partial(self._begin, note, 0.0), note)
             else:
                 note.end()
 
-    def _adopt(self, struck: Struck, string: StringOf, struck_s: float, due: Due | None) -> Note:
-        """The note of a key's string, whose voices have the rate of the present mixer."""
-        mixer, request = self._sound.mixer, RenderRequest(string, struck.pluck, 0.0, struck.ear)
-        begin_frame = 0 if due is None else due.frame_in(mixer)
-        note = Note(request, SOURCES, struck.gain, begin_frame=begin_frame, struck=struck)
-        note.set_begin(struck_s)
+    def _adopt(self, note: KeyNote) -> None:
+        """Keeps the note of a key, which the player has been given."""
         with self._lock:
             self._notes.append(note)
-            if self._chosen is not None:  # the string that is shown from now on
-                self._chosen = replace(self._chosen, preset=string, pluck=struck.pluck)
-        if not self._hand_over(note, mixer):
-            note.end()
-        return note
+            self._make_room(MOST_NOTES)
 
     def _begin(self, note: Note, struck_s: float) -> None:
         """Makes the voices and hands them over; again where the device changes its rate meanwhile."""
@@ -464,6 +470,7 @@ class Notes:
     def _bound_load(self, status: SoundStatus) -> None:
         """Ends the oldest notes where the device has no time for all. In the caretaker's thread of the sound."""
         if status.load > BUSY:
+            self.look()
             with self._lock:
                 ringing = self.ringing
                 self._make_room(max(1, min(ringing - LEAST_RELIEF, int(ringing * BUSY / status.load))))
@@ -487,7 +494,7 @@ class Notes:
 
     def _take_match(self, key: tuple[object, ...], match: Mapping[str, float]) -> None:
         with self._lock:
-            for note in self._notes:
-                if note.matching_key == key and note.struck is None:
+            for note in self._plucks():
+                if note.matching_key == key:
                     note.match = match
                     self._apply_monitor(note)

@@ -11,6 +11,7 @@ from typing import Any
 from psygnal import Signal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from app.patches.drums import Drums
 from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch, PhysicalString
 from app.session.listener import Listener, points_of
@@ -92,6 +93,12 @@ class Choices(Monitor, Listener, PluckedString):
     def plays_patch(self) -> bool:
         """Whether the instrument is a patch, whose keys are pitches; otherwise they are places along a string."""
         return isinstance(self.instrument, Patch)
+
+    @property
+    def drums(self) -> Drums | None:
+        """The drums that are played; None: a string or an instrument of strings is."""
+        patch = self.instrument
+        return patch.strings if isinstance(patch, Patch) and isinstance(patch.strings, Drums) else None
 
     def changed(self, changes: Mapping[str, Any]) -> Choices:
         """These choices with other values: the one way to change them. Another preset resets `string`, unless given.

@@ -47,9 +47,12 @@ def subject_of(choices: Choices, preset: Path) -> Subject:
 
 
 def request_of(choices: Choices, library: Library) -> RenderRequest | None:
-    """The chosen pluck, with the other presets that slots hold; None where its preset is not in the library."""
+    """The chosen pluck, with the other presets that slots hold.
+
+    None where its preset is not in the library, and where drums are played: no string is plucked then.
+    """
     entry = library.find(choices.preset)
-    if entry is None:
+    if entry is None or choices.drums is not None:
         return None
     others = [library.find(name) for name in dict.fromkeys(map(other_preset, (choices.a, choices.b)))]
     paths = tuple(other.path for other in others if other is not None)

@@ -23,6 +23,7 @@ from app.audio.problems import AudioProblem
 from app.audio.sound import Sound
 from app.instrument.events import Event, NoteOn, PluckAt
 from app.playing.due import Due
+from app.playing.key_note import KeyNote
 from app.playing.note import Note
 from app.presets.library import Library, PresetEntry
 from app.session.choices import OBSERVED, Session
@@ -64,6 +65,7 @@ FACTS_S = 0.1  # between two updates of gains and of the audio state
 LIVELY_S = 1.0  # at the full rate after the last movement
 METER_FALL_DB_PER_S = 20.0
 METER_FLOOR_DB = -120.0
+DRUMS_PLAYED = "This view shows a plucked string, and drums are played.\nThey are heard, recorded and exported."
 ProblemListener = Callable[[AudioProblem], None]
 
 
@@ -125,7 +127,13 @@ class Controller(QObject):
         self.history = History(self.session, held=lambda: bool(QGuiApplication.mouseButtons()))
         self._connect_history()
         self.instruments = Instruments(
-            window, self.session, self.library, settings.midi, self._handle, self.performance.play_preset
+            window,
+            self.session,
+            self.library,
+            settings.midi,
+            self._handle,
+            self.performance.play_preset,
+            self.performance.notes.look,
         )
         self.instruments.played.connect(self.performance.follow)
         self.instruments.told.connect(window.notices.tell)
@@ -182,6 +190,7 @@ class Controller(QObject):
         for panel in self.panels:
             panel.seek_asked.connect(self.performance.seek)
             panel.pluck_asked.connect(self.pluck)
+            panel.strike_asked.connect(self.strike)
             panel.told.connect(window.notices.tell)
         self.presets.browser.played.connect(lambda name: self.pluck())
         self.presets.told.connect(window.notices.tell)
@@ -252,10 +261,19 @@ class Controller(QObject):
         self.window.say_briefly(f"Redone: {words}" if words else "Nothing to redo")
 
     def pluck(self) -> None:
-        if self._abx is None:
+        """Plucks the string as chosen, or strikes the drum that is shown."""
+        if self._abx is not None:
+            return
+        if self.session.choices.drums is None:
             self.performance.pluck()
+        else:
+            self.instruments.strike()
 
-    def _handle(self, event: Event, due: Due | None) -> Note | None:
+    def strike(self, x: float, y: float, velocity: float) -> None:
+        """Strikes the drum at a place, in half-lengths from its centre."""
+        self.instruments.strike(x, y, velocity)
+
+    def _handle(self, event: Event, due: Due | None) -> Note | KeyNote | None:
         """An event of the instrument; called in the thread of the event."""
         if self._abx is not None and isinstance(event, NoteOn | PluckAt):
             return None  # all else is heard: a pedal that is lifted meanwhile is up afterwards
@@ -265,13 +283,21 @@ class Controller(QObject):
         if self._abx is None:
             played = self.patches.playing
             self.patches.stop()
-            if self.performance.playing or not played:  # in a rest of a file nothing rings
-                self.performance.play_or_stop()
+            if self.performance.playing:
+                self.performance.stop()
+            elif not played:  # in a rest of a file nothing rings
+                self.pluck()
             self.window.transport.show_playing(self.performance.playing)
 
     def listening_test(self) -> None:
         """Opens the ABX test of the chosen pluck; until it is closed nothing else plays."""
         entry = self.entry
+        if self.session.choices.drums is not None:
+            self.window.notices.tell(
+                "The listening test compares model and truth of a plucked string, and drums are played: choose an "
+                "instrument of strings first. The slots A and B compare drums while you play."
+            )
+            return
         if entry is None:
             self.window.notices.tell("The listening test needs a preset that can be plucked: choose one first.")
             return
@@ -412,6 +438,11 @@ class Controller(QObject):
         window.right.show_key(choices.right_view)
         for panel in self.panels:
             panel.choices_changed(names)
+        if "instrument" in names:
+            words = "" if choices.drums is None else DRUMS_PLAYED
+            for panel in self.panels:
+                if panel.of_strings:
+                    panel.cover(words)
         window.show_solo(choices.solo)
         self.patches.choices_changed(names)
         self.exports.choices_changed(names)

@@ -26,6 +26,7 @@ from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerforma
 from app.window.recordings import Recordings
 
 PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "patch"}
+NO_PLUGIN = "Drums cannot be exported as a plug-in yet: export samples, or what was recorded."
 HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "difference_gain_db"}
 
 
@@ -62,9 +63,11 @@ class Exports(QObject):
 
     def open(self, kind: Kind) -> None:
         """Opens the dialog at a page, or brings it to the front."""
-        subjects = self._subjects()
+        subjects, drums = self._subjects(), self._session.choices.drums is not None
+        if kind == "note" and drums:  # of a drum
+            kind = "sampler" if subjects["performance"] is None else "performance"
         if subjects[kind] is None:
-            self.told.emit(PAGES[kind].missing)
+            self.told.emit(NO_PLUGIN if kind == "plugin" and drums else PAGES[kind].missing)
             return
         if self.dialog is None:
             self.dialog = ExportDialog(*self._choices, self._window)
@@ -98,7 +101,7 @@ class Exports(QObject):
             "note": heard_note(choices, self._library, self._through(choices)),
             "performance": played and HeardPerformance(played, None if preset is None else preset.path),
             "sampler": instrument,
-            "plugin": instrument,
+            "plugin": None if instrument is None or instrument.patch.strings.kind == "drums" else instrument,
         }
 
     def _exported(self, job: object) -> None:
@@ -113,7 +116,12 @@ class Exports(QObject):
 
 
 def heard_note(choices: Choices, library: Library, through: Through | None) -> HeardNote | None:
-    """The chosen pluck as it is heard, of another preset where that is heard; None: there is no preset."""
+    """The chosen pluck as it is heard, of another preset where that is heard.
+
+    None: there is no preset, or drums are played.
+    """
+    if choices.drums is not None:
+        return None
     source, another = choices.source_heard, library.find(other_preset(choices.source_heard) or "")
     if another is not None:
         choices = choices.changed({"preset": another.name})

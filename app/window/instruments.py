@@ -7,16 +7,18 @@ from collections.abc import Callable
 from dataclasses import asdict, replace
 from typing import Any
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
 from app.patches.instrument import SingleString
 from app.patches.patch import PhysicalString
 from app.playing.due import Due
+from app.playing.key_note import KeyNote
 from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, Reach, place_of, semitone_of, turn
 from app.playing.midi import MidiChoices
 from app.playing.note import Note
 from app.presets.library import Library
+from app.rendering import RenderRequest
 from app.rendering.subject import string_of
 from app.session.choices import Session
 from app.views.controls.playing_keys import PlayingKeys
@@ -24,6 +26,7 @@ from app.window.main_window import MainWindow
 from app.window.midi_control import MidiControl
 
 HIGHEST_KEY = 127
+LOOK_MS = 8  # until the player has reported the note of a key, between two looks
 
 
 class Instruments(QObject):
@@ -32,10 +35,11 @@ class Instruments(QObject):
     Args:
         handle: plays an event and returns the note that it began; called in the event's thread.
         play_preset: lets events pluck the string of a preset, by its name; called in the event's thread.
+        look: follows what the player reports of notes of keys.
 
     Attributes:
         latest: the note that was begun last; None before the first.
-        latest_key: the key of a patch that was struck last, and on which string of its set, as in `Struck`; None
+        latest_key: the key of a patch that was struck last, and on which string of its set, as in `KeyNote`; None
             before the first.
     """
 
@@ -50,17 +54,21 @@ class Instruments(QObject):
         session: Session,
         library: Library,
         midi: MidiChoices,
-        handle: Callable[[Event, Due | None], Note | None],
+        handle: Callable[[Event, Due | None], Note | KeyNote | None],
         play_preset: Callable[[str], None],
+        look: Callable[[], None],
     ) -> None:
         super().__init__(window)
         self._session = session
         self._library = library
-        self._handle, self._play_preset = handle, play_preset
+        self._handle, self._play_preset, self._look = handle, play_preset, look
         self.latest_key: tuple[int, int | None] | None = None
         self._lock = threading.Lock()
         self._told: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
-        self.latest: Note | None = None
+        self.latest: Note | KeyNote | None = None
+        self._unknown: KeyNote | None = None  # the latest, which the player has not reported yet
+        self._look_timer = QTimer(self, interval=LOOK_MS)
+        self._look_timer.timeout.connect(self._look_at_key)
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
         self._begun.connect(self._tell_session, Qt.ConnectionType.QueuedConnection)
         self._keys = PlayingKeys(window)
@@ -75,6 +83,7 @@ class Instruments(QObject):
         self.midi.start()
 
     def close(self) -> None:
+        self._look_timer.stop()
         self.midi.close()
 
     @property
@@ -93,13 +102,42 @@ class Instruments(QObject):
         if note is None:
             return
         self.latest = note
-        if note.struck is not None:
-            self.latest_key = note.struck.event.key, note.struck.string
-        string = string_of(note.request.preset)
-        shown = {"string": None if string is None else PhysicalString(**asdict(string)), **asdict(note.request.pluck)}
+        if isinstance(note, KeyNote):
+            self._unknown, self.latest_key = note, (note.event.key, None)
+        else:
+            self._unknown = None
+            self._tell(note.request)
+        self._begun.emit()
+
+    def _tell(self, request: RenderRequest) -> None:
+        """The session is to show this string and its pluck."""
+        string = string_of(request.preset)
+        shown = {"string": None if string is None else PhysicalString(**asdict(string)), **asdict(request.pluck)}
         with self._lock:
             self._told |= shown
-        self._begun.emit()
+
+    @property
+    def drum_key(self) -> int | None:
+        """The key of the drum that is shown and struck: the latest, or the lowest; None: no drum is played."""
+        drums = self._session.choices.drums
+        if drums is None:
+            return None
+        latest = None if self.latest_key is None else self.latest_key[0]
+        return latest if latest is not None and drums.of_key(latest) is not None else drums.drums[0].note
+
+    def strike(self, x: float | None = None, y: float | None = None, velocity: float | None = None) -> None:
+        """Strikes the drum that is shown.
+
+        Args:
+            x, y: where, from its centre in half-lengths; None: at its own place.
+            velocity: 1 … 127; None: that of the computer's keys.
+        """
+        key = self.drum_key
+        if key is not None:
+            place = None if x is None or y is None else (x, y)
+            struck = self._session.choices.velocity if velocity is None else round(min(max(velocity, 1.0), 127.0))
+            self.play(NoteOn(key, struck, KEYS, place))
+            self.play(NoteOff(key, KEYS))
 
     def _play_note(self, event: NoteOn, mode: str) -> None:
         """Plays a note of MIDI that says where the string is plucked, or which preset. In the input's thread."""
@@ -114,8 +152,28 @@ class Instruments(QObject):
                 self._told |= {"instrument": SingleString(preset=name)}
         self.play(PluckAt(pluck))
 
+    def _look_at_key(self) -> None:
+        """Takes the string and the pluck of a key from the player's report, within a quantum of the device."""
+        self._look()
+        note = self._unknown
+        if note is not None and not note.known:
+            return
+        self._unknown = None
+        self._look_timer.stop()
+        if note is None or note is not self.latest:  # another pluck was begun meanwhile
+            return
+        self.latest_key = note.event.key, note.string
+        if note.request is not None:
+            self._tell(note.request)
+            self._tell_session()
+        elif note.of_drum:
+            self.played.emit()
+
     def _tell_session(self) -> None:
         """Updates the session, once for all notes that have begun meanwhile."""
+        if self._unknown is not None and not self._look_timer.isActive():
+            self._look_timer.start()
+            self._look_at_key()
         with self._lock:
             told = self._told
             self._told = {}

@@ -12,11 +12,12 @@ from PySide6.QtWidgets import QInputDialog
 
 from app.instrument.beyond_training import outside_of_key, outside_of_string
 from app.instrument.bodies import body_titles
+from app.instrument.compiled import is_another
 from app.instrument.events import KEYS, NoteOff, NoteOn, TimedEvent
-from app.instrument.facts import facts_of, figures_of, knob_for
+from app.instrument.facts import facts_of, facts_of_drum, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
-from app.instrument.player import is_another
 from app.instrument.strings import KeyString, Strings
+from app.patches.drums import Drums
 from app.patches.fields import explained
 from app.patches.instrument import SingleString
 from app.patches.library import (
@@ -31,6 +32,7 @@ from app.patches.library import (
 )
 from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet
 from app.patches.tuning import SCALA_FILES, TuningChoice, read_scala
+from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octaves_of
 from app.playing.playback import Playback
 from app.presets.library import Library
@@ -155,9 +157,7 @@ class PatchDesk(QObject):
         """Reads patches and bodies again: the user may have added files."""
         if self._panel.bar.compare.isChecked():  # the saved patch may have changed
             self.compare(False)
-        entries, problems = list_patches()
-        # drums are played by files and commands: the player of the window's keys holds strings alone
-        self._entries = [each for each in entries if each.patch.strings.kind != "drums"]
+        self._entries, problems = list_patches()
         for problem in problems:
             self.told.emit(problem)
         self._panel.bar.set_bodies(body_titles())
@@ -178,7 +178,8 @@ class PatchDesk(QObject):
             self.choose(name)
         self._session.play_patch()
         if self.patch is not None:
-            key = sum(self.patch.range) // 2
+            drum = self._instruments.drum_key
+            key = sum(self.patch.range) // 2 if drum is None else drum
             self._song.stop()
             self._playback.play(_note(key))
 
@@ -462,9 +463,8 @@ class PatchDesk(QObject):
         entry = self._library.find(choices.preset)
         if entry is None:
             return []
-        struck = None if latest is None else latest.struck
-        if struck is not None and patch is not None and struck.key.patch != patch:
-            return outside_of_key(entry.info, patch, struck.event, struck.string)
+        if isinstance(latest, KeyNote) and patch is not None and latest.patch != patch:
+            return outside_of_key(entry.info, patch, latest.event, latest.string)
         if choices.string is None:
             return []
         return outside_of_string(entry.info, choices.string.parameters, choices.pluck)
@@ -478,11 +478,17 @@ class PatchDesk(QObject):
         """Shows that string in figures, or why there is none; None where it is silent or impossible."""
         found: KeyString | None = None
         facts: dict[str, str] = {}
+        knobs = self._panel.knobs
+        if isinstance(patch.strings, Drums):
+            key = self._instruments.drum_key
+            played = (None if key is None else patch.strings.of_key(key)) or patch.strings.drums[0]
+            knobs.show_facts(facts_of_drum(played))
+            knobs.show_figures({})
+            return None
         try:
             found = Strings(patch).of_key(*self._shown_key(patch))
         except ValueError as error:
             facts = {"string": str(error)}
-        knobs = self._panel.knobs
         knobs.show_facts(facts if found is None else facts_of(found))
         knobs.show_figures({} if found is None else figures_of(found.parameters))
         return found
@@ -516,6 +522,8 @@ class PatchDesk(QObject):
         strings = patch.strings
         if isinstance(strings, StringSet):
             panel.neck.set_strings([(note_name(each.note), each.note) for each in strings.strings])
+        elif isinstance(strings, Drums):
+            panel.neck.set_strings([(each.name, each.note) for each in strings.drums])
         else:
             panel.neck.set_strings([(note_name(patch.range[0]), patch.range[0])])
         self.desk.show_chosen()

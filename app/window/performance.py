@@ -20,6 +20,7 @@ from app.export.sound import Through
 from app.instrument.events import PluckAt
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch
+from app.playing.key_note import KeyNote
 from app.playing.keyboard import Reach
 from app.playing.note import Note
 from app.playing.notes import Notes
@@ -48,7 +49,7 @@ class _Shown:
     """What the views show: a motion, and the note whose time it follows; without a note it stands at `parked_s`."""
 
     take: Take | None = None
-    note: Note | None = None
+    note: Note | KeyNote | None = None
     parked_s: float = 0.0
 
 
@@ -148,13 +149,6 @@ class Performance(QObject):
             self._forget_turn()
             self._shown.note, self._shown.parked_s = latest, latest.from_s
 
-    def play_or_stop(self) -> None:
-        """Stops what rings; where nothing does, plucks."""
-        if self.playing:
-            self.stop()
-        else:
-            self.pluck()
-
     def stop(self) -> None:
         """Everything fades out; the playhead stays."""
         self._forget_turn()
@@ -191,7 +185,12 @@ class Performance(QObject):
         if asked != self._asked:  # else an event may have chosen another pluck, which the session takes later
             self._asked = asked
             self.notes.choose(asked)
-            if asked is not None:
+            if asked is None:
+                self._forget_turn()
+                self._shown.note = None
+                self._tell("")
+                self._window.show_growth("")
+            else:
                 self.notes.prepare(asked.preset, *asked.others)
                 self._worker.submit(asked)
         self.follow()
@@ -250,7 +249,7 @@ class Performance(QObject):
     def _waiting(self) -> str:
         """When a model that is rendered before it is heard will sound; "" where none waits."""
         latest = self.notes.latest
-        if latest is None or not latest.waits_s:
+        if not isinstance(latest, Note) or not latest.waits_s:
             return ""
         entry = self._library.find(path_of(latest.request.preset).stem)
         name = model_word(entry.info.model) if entry else "model"
@@ -260,7 +259,7 @@ class Performance(QObject):
         """Hands the next turn of the loop to the mixer, shortly before it begins."""
         # once another pluck is chosen, the note that rings is not the shown one, and its turn is the new pluck's
         note, take, turn = self._shown.note or self.notes.latest, self._shown.take, self._next_turn
-        if note is None or take is None or not note.began:
+        if note is None or take is None or note.request is None or not note.began:
             return
         if turn is not None:
             if turn.began and not turn.cut:
@@ -322,10 +321,14 @@ class Performance(QObject):
         """In the header: how long a model is still waited for, or the error."""
         self._window.error_label.setText(self._waiting_words or self._error_words)
 
-    def _is_chosen(self, note: Note) -> bool:
+    def _is_chosen(self, note: Note | KeyNote) -> bool:
         """Whether a note is of the chosen pluck."""
-        asked = self._asked
-        return asked is not None and (note.request.preset, note.request.pluck) == (asked.preset, asked.pluck)
+        asked, request = self._asked, note.request
+        return (
+            asked is not None
+            and request is not None
+            and (request.preset, request.pluck) == (asked.preset, asked.pluck)
+        )
 
     def _is_of_chosen(self, take: Take) -> bool:
         """Whether a take is of the chosen pluck."""

@@ -45,6 +45,10 @@ def strike(
         return False
     if gain == 0.0:
         gain = 1.0
+    modes, elsewhere = tables[drum + of.DRUM_MODES], players[event + of.EVENT_STRUCK]
+    struck = table[drum + of.DRUM_HEADER + 4 * modes : drum + of.DRUM_HEADER + 5 * modes]
+    if elsewhere != 0 and players[event + of.EVENT_STRUCK_MODES] == modes:
+        struck = carray(pointer(elsewhere), (1 << 40,), np.float64)[:modes]
     curve, soft = player[of.PLAYER_VALUES + of.CURVE], table[drum + of.DRUM_SOFTEST_M_S]
     share = min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve)
     speed = soft * (table[drum + of.DRUM_HARDEST_M_S] / soft) ** share
@@ -53,7 +57,7 @@ def strike(
         address = players[of.PLAYER_HERE] + 8 * slot
         voice = carray(pointer(address), (stride,), np.float64)
         begun = gain * player[of.PLAYER_SOURCE_GAINS + source]
-        _make(player, table, tables, voice, drum, speed, tables[of.TABLE_KINDS + source])
+        _make(player, table, tables, voice, drum, struck, speed, tables[of.TABLE_KINDS + source])
         voice.view(np.int64)[at.PROGRAM] = tables[of.TABLE_PROGRAMS + source]
         voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
         players[event + of.EVENT_VOICES + source] = address
@@ -62,9 +66,16 @@ def strike(
 
 @njit(**COMPILED)
 def _make(
-    player: np.ndarray, table: np.ndarray, tables: np.ndarray, voice: np.ndarray, drum: int, speed: float, kind: int
+    player: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    voice: np.ndarray,
+    drum: int,
+    struck: np.ndarray,
+    speed: float,
+    kind: int,
 ) -> None:
-    """A voice that sets out from the speeds that a blow gives its modes."""
+    """A voice that sets out from the speeds that a blow gives its modes; `struck`: those that 1 N s gives."""
     counts, n, rate_hz = voice.view(np.int64), tables[drum + of.DRUM_MODES], player[of.PLAYER_RATE]
     for slot in range(at.state(n) + at.TRUTH_ROWS * n):
         voice[slot] = 0.0
@@ -88,7 +99,7 @@ def _make(
             pulse = 1.0
         elif abs(turns - 1) > 1e-6:
             pulse = math.sin(math.pi * turns) / (math.pi * turns * (1 - turns * turns))
-        voice[first + n + mode] = table[rows + 4 * n + mode] * pulse
+        voice[first + n + mode] = struck[mode] * pulse
         energy += 0.5 * table[drum + of.DRUM_MASS_KG] * voice[first + n + mode] ** 2
     impulse = speed / (energy + 0.5 / table[drum + of.DRUM_MALLET_KG])
     for mode in range(n):

@@ -232,6 +232,7 @@ M_EFFECTS_NOW = 27  # W of the one that is heard
 M_EFFECTS_NEXT = 28  # W of the one that is being faded to; 0: none is, or to none
 M_PLAYER = 29  # W address of the player whose events are played; 0: none
 M_HERE = 30  # W its own address
+M_PLAYER_BEFORE = 31  # W address of the player before, whose notes ring on; 0: none
 M_VOICES = 32  # W addresses
 M_RING = M_VOICES + MOST_VOICES  # W addresses
 M_GAP_LIST = M_RING + RING  # R

@@ -55,8 +55,12 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     counts = mixer.view(np.int64)
     mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM] = 0.0
     _take_up(counts)
-    player = counts[at.M_PLAYER]
+    player, before = counts[at.M_PLAYER], counts[at.M_PLAYER_BEFORE]
     fence()
+    if before == player:
+        before = 0
+    if before != 0:
+        play(before, counts[at.M_HERE])
     if player != 0:
         play(player, counts[at.M_HERE])
     for place in range(counts[at.M_ACTIVE]):  # before any sounds on
@@ -77,6 +81,8 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
             kept += 1
     fence()
     counts[at.M_ACTIVE] = kept
+    if before != 0:
+        sympathise(before, counts[at.M_HERE])
     if player != 0:
         sympathise(player, counts[at.M_HERE])
     convolve(mixer)

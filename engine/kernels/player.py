@@ -26,7 +26,7 @@ import math
 import numpy as np
 from numba import carray, njit
 
-from engine.kernels import drums, strings
+from engine.kernels import drums, recorded, strings
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
@@ -476,6 +476,8 @@ def _fill(
         inside * player[note + of.NOTE_LOSSES + 2],
         out,
     )
+    if tables[of.TABLE_RECORDED] != 0:
+        recorded.correct(table, tables, string, players[note + of.NOTE_MODES], out)
 
 
 @njit(**COMPILED)
@@ -858,8 +860,13 @@ def _note_on(
             turned = varies * VARIES_ANGLE * _varied(stroke, key, 4)
         highest_m = _pull(player, table, tables, modes, position, amplitude_mm / 1000, width)
         _release_pluck(player, own, modes, release_s)
-        pairs = _split(player, table, tables, modes, turned)
-        modes += pairs
+        if tables[of.TABLE_RECORDED] != 0:
+            modes = recorded.modes_of(tables, modes)
+            pairs = (modes + 1) // 2
+            recorded.split(table, tables, own, modes, player[of.PLAYER_AMPLITUDES : of.PLAYER_AMPLITUDES + modes])
+        else:
+            pairs = _split(player, table, tables, modes, turned)
+            modes += pairs
     number = _free_note(player, players, mixers)
     note = _note(number)
     for slot in range(of.NOTE_SLOTS):
@@ -880,7 +887,8 @@ def _note_on(
         player[note + of.NOTE_LOSSES + each] = table[of.TABLE_LOSSES + each]
     player[note + of.NOTE_DETUNING] = table[of.TABLE_DETUNING]
     for each in range(2):
-        player[note + of.NOTE_HEARD + each] = table[of.TABLE_HEARD + each] if pairs > 0 else 1.0
+        polarised = pairs > 0 and tables[of.TABLE_RECORDED] == 0
+        player[note + of.NOTE_HEARD + each] = table[of.TABLE_HEARD + each] if polarised else 1.0
         player[note + of.NOTE_CONDUCTANCE + each] = table[of.TABLE_CONDUCTANCE + each]
     players[note + of.NOTE_FRAME] = frame
     player[note + of.NOTE_GAIN] = gain
@@ -991,10 +999,11 @@ def _tune(
 @njit(**COMPILED)
 def _choke(player: np.ndarray, players: np.ndarray, event: int, frame: int) -> None:
     """Lets single notes fade out fast, though their instrument lets them ring."""
+    seconds = player[event + of.EVENT_VALUE] if player[event + of.EVENT_VALUE] > 0.0 else STOP_S
     for number in range(of.MOST_NOTES):
         note = _note(number)
         if _is_meant(players, event, note):
-            _release_note(player, players, note, STOP_S, frame)
+            _release_note(player, players, note, seconds, frame)
             players[note + of.NOTE_HAS_PLACE] = 0
 
 
@@ -1036,12 +1045,13 @@ def _glide(
 
 @njit(**COMPILED)
 def _stop(player: np.ndarray, players: np.ndarray, seconds: float, frame: int) -> None:
-    """Lets all strings fade out, and forgets their places."""
+    """Lets all strings fade out, those too that nobody plays, and forgets their places."""
     for number in range(of.MOST_NOTES):
         note = _note(number)
         if players[note + of.NOTE_STATE] == of.RINGS:
             _release_note(player, players, note, seconds, frame)
             players[note + of.NOTE_HAS_PLACE] = 0
+    players[of.PLAYER_SYMPATHY_STOPS] = _quanta(player, max(seconds, STOP_S)) + 2
 
 
 @njit(**COMPILED)
@@ -1111,15 +1121,24 @@ def _take_table(player: np.ndarray, players: np.ndarray, address: int, frame: in
 
 
 @njit(**COMPILED)
-def _cancel(player: np.ndarray, players: np.ndarray, now: int) -> None:
-    """Forgets the events whose frames are to come; but a table counts at once, for later events go by it."""
+def _cancel(player: np.ndarray, players: np.ndarray, id: int, now: int) -> None:
+    """Forgets the events whose frames are to come; but a table counts at once, for later events go by it.
+
+    Args:
+        id: of a note, of which alone events are forgotten; 0: all are.
+    """
+    kept = 0
     for place in range(players[of.PLAYER_QUEUED]):
         event = of.PLAYER_QUEUE + place * of.EVENT_SLOTS
-        if players[event + of.EVENT_KIND] == of.NOTE_ON:
+        if id != 0 and players[event + of.EVENT_ID] != id:
+            for each in range(of.EVENT_SLOTS):
+                players[of.PLAYER_QUEUE + kept * of.EVENT_SLOTS + each] = players[event + each]
+            kept += 1
+        elif players[event + of.EVENT_KIND] == of.NOTE_ON:
             _refuse(player, players, event)
         elif players[event + of.EVENT_KIND] == of.TABLE:
             _take_table(player, players, players[event + of.EVENT_TABLE], 0, now)
-    players[of.PLAYER_QUEUED] = 0
+    players[of.PLAYER_QUEUED] = kept
 
 
 # Events
@@ -1135,7 +1154,7 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
         _take_table(player, players, players[event + of.EVENT_TABLE], frame, now)
         return
     if kind == of.CANCEL:
-        _cancel(player, players, now)
+        _cancel(player, players, players[event + of.EVENT_ID], now)
         return
     if kind == of.STOP:
         _stop(player, players, value, frame)

@@ -34,14 +34,16 @@ EVENT_FRAME = 0  # W of the mixer, at which it counts; 0: at once
 EVENT_KIND = 1  # W
 EVENT_CHANNEL = 2  # W 0 … 16
 EVENT_KEY = 3  # W of a note; the number of a controller, or of one of the values
-EVENT_VALUE = 4  # R velocity, bend in -1 … 1, value of a controller or a parameter, semitones, seconds of a stop
-EVENT_ID = 5  # W which reports of a note carry; of the notes that are tuned or choked; 0: any
+EVENT_VALUE = 4  # R velocity, bend in -1 … 1, value of a controller or a parameter, semitones, seconds of a fade
+EVENT_ID = 5  # W which reports of a note carry; of the notes that are tuned, choked or cancelled; 0: any
 EVENT_POSITION = 6  # R of the pluck; not a number: the instrument's
 EVENT_PITCH_HZ = 7  # R not a number: the key's
 EVENT_TABLE = 8  # W address of a table
 EVENT_STRUCK_S = 9  # R the device clock's time of the gesture
 EVENT_VOICES = 10  # W four addresses of voices that were prepared; 0: none
 MOST_SOURCES = 4
+EVENT_STRUCK = 14  # W address of the speeds (modes,) that 1 N s gives a drum at another place; 0: its own place
+EVENT_STRUCK_MODES = 15  # W how many they are
 EVENT_SLOTS = 16
 
 # Slots of an instrument's table
@@ -84,6 +86,7 @@ NO_SYMPATHY, EVERY_KEY, OPEN_STRINGS = 0, 1, 2
 TABLE_SYMPATHY_S_KG = 39  # R conductance of the bridge that drives them
 TABLE_LOSSES = 40  # R three: to the air, by friction, by bending
 TABLE_DRUMS = 43  # W slot of the slots of drums of all keys (KEYS,), 0 where a key has none; 0: strings are played
+TABLE_RECORDED = 44  # W slot of what a recording adds to the law of strings; 0: nothing
 TABLE_VALUES = 48  # R
 TABLE_PITCHES = TABLE_VALUES + VALUES  # R of keys in Hz; 0: silent
 TABLE_GAINS = TABLE_PITCHES + KEYS  # R (KEYS, GAINS); below 0: a guess; 0: none is known; not a number: impossible
@@ -105,6 +108,15 @@ DRUM_MASS_KG = 5  # R of each mode
 DRUM_HEADER = 8
 DRUM_ROWS = 7
 MOST_DRUM_MODES = 1_600
+
+# Slots of what a recording adds to strings: the fields of `RecordedString`, of which five are of each partial
+RECORDED_HZ = 0  # R pitch of the recorded note
+RECORDED_SMOOTH = 1  # W points of the decay over that of the law
+RECORDED_PARTIALS = 2  # W of the note
+RECORDED_MODES = 3  # W at most
+RECORDED_REST = 4  # R five: what each fades to with the distance in pitch
+CENTS, RATIO, SECOND_CENTS, SECOND_RATIO, SECOND_SHARE = range(5)
+RECORDED_HEADER = RECORDED_REST + 5  # R log of frequencies and of ratios (points,), then five rows (partials,)
 
 
 def table_slots(grid_points: int) -> int:
@@ -210,9 +222,10 @@ PLAYER_SYMPATHETIC = PLAYER_PULLED + MOST_GRID  # W partials of strings that rin
 PLAYER_TUNED = PLAYER_SYMPATHETIC + 1  # W instrument and kind for which they were tuned
 PLAYER_TUNED_BY = PLAYER_SYMPATHETIC + 2  # W
 PLAYER_SYMPATHY_RINGS = PLAYER_SYMPATHETIC + 3  # W whether any can be heard
+PLAYER_SYMPATHY_STOPS = PLAYER_SYMPATHETIC + 4  # W quanta in which all of them are still touched
 MOST_SYMPATHETIC = 512
 SYMPATHY_OWNER, SYMPATHY_COSINE, SYMPATHY_SINE, SYMPATHY_GAIN, SYMPATHY_X, SYMPATHY_Y, SYMPATHY_PLAYED = range(7)
-PLAYER_SYMPATHY = PLAYER_SYMPATHETIC + 4  # rows (MOST_SYMPATHETIC,), as above
+PLAYER_SYMPATHY = PLAYER_SYMPATHETIC + 5  # rows (MOST_SYMPATHETIC,), as above
 PLAYER_VOICES = PLAYER_SYMPATHY + 7 * MOST_SYMPATHETIC
 BLOCKS = 4  # of modes that a voice is to have
 

@@ -11,7 +11,7 @@ strings to those that are played, or to one another. So all that is given is bou
 largest input.
 
 A string that is played leaves the bank until its note has ended: its voice has its modes. What other strings would
-add to it is left out.
+add to it is left out. A stop touches all strings.
 """
 
 from __future__ import annotations
@@ -134,12 +134,16 @@ def sympathise(player_address: int, mixer_address: int) -> None:
         heard = heard or abs(given) > NOTHING
         out[frame] = 0.0
     if not heard and players[of.PLAYER_SYMPATHY_RINGS] == 0:
+        players[of.PLAYER_SYMPATHY_STOPS] = 0
         return
     everyone = tables[of.TABLE_SYMPATHY] == of.EVERY_KEY
     first = of.PLAYER_SYMPATHY
     owners = players[first + of.SYMPATHY_OWNER * size : first + of.SYMPATHY_OWNER * size + count]
     played = player[first + of.SYMPATHY_PLAYED * size : first + of.SYMPATHY_PLAYED * size + count]
     played[:] = 0.0
+    if players[of.PLAYER_SYMPATHY_STOPS] > 0:
+        players[of.PLAYER_SYMPATHY_STOPS] -= 1
+        played[:] = 1.0
     for number in range(of.MOST_NOTES):
         note = of.PLAYER_NOTES + number * of.NOTE_SLOTS
         if players[note + of.NOTE_STATE] != of.RINGS:

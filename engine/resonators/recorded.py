@@ -179,11 +179,14 @@ class RecordedString:
             mirror=None if law.mirror is None else law.mirror[partial],
         )
 
+    def rest(self, name: str) -> float:
+        """To what a value of `OF_PARTIALS` fades with the distance in pitch."""
+        shared = _SHARED.get(name)
+        return float(np.median(np.asarray(getattr(self, name)))) if shared is None else shared
+
     def _faded(self, name: str, partials: int, fade: float) -> Array:
         """The note's own values for so many partials, faded to the value that all of its partials share."""
-        known = np.asarray(getattr(self, name), float)[:partials]
-        shared = _SHARED.get(name)
-        rest = float(np.median(np.asarray(getattr(self, name)))) if shared is None else shared
+        known, rest = np.asarray(getattr(self, name), float)[:partials], self.rest(name)
         padded = np.concatenate([known, np.full(partials - len(known), rest)])
         if name.endswith("ratio"):
             return np.exp(fade * np.log(padded) + (1 - fade) * math.log(rest))

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 LIMITER_RELEASE_S = 0.08
 VOLUME_SMOOTHING_S = 0.015
+LEFT_S = 0.03  # of the fade of a player's notes when two others have taken its place
+LEFT_FRAMES = 16_384  # after which no quantum can hold it: more than a device takes at once
 CAUSES = {at.CAUSE_DEVICE: "device", at.CAUSE_STARVED: "rendering", at.CAUSE_RUNAWAY: "runaway"}
 
 
@@ -53,7 +55,7 @@ class Mixer:
         self.effects = Effects()
         self._convolver: NDArray[np.float64] | None = None
         self._impulses: dict[int, NDArray[np.float64]] = {}  # by address: those that may be in use
-        self._players: list[CompiledPlayer] = []  # whose memory may be in use
+        self._players: list[tuple[CompiledPlayer, int]] = []  # whose memory may be in use, from which frame on
         memory[at.M_RATE] = rate_hz
         counts[at.M_CHANNELS], counts[at.M_LIMITING] = channels, limited
         counts[at.M_HERE] = memory.ctypes.data
@@ -95,7 +97,9 @@ class Mixer:
             publish(counts, at.M_PUSHED, pushed + min(len(voices), room))
 
     def set_player(self, player: CompiledPlayer) -> None:
-        """The events of this player are played from the next quantum on; what another has struck rings on.
+        """The events of this player are played from the next quantum on; what the one before has struck rings on.
+
+        The notes of one before that fade out.
 
         Raises:
             ValueError: it is of another rate.
@@ -103,8 +107,31 @@ class Mixer:
         if player.rate_hz != self.rate_hz:
             raise ValueError(f"the player has {player.rate_hz} Hz, the mixer {self.rate_hz} Hz")
         with self._lock:
-            self._players.append(player)
+            present, before = (int(self._counts[slot]) for slot in (at.M_PLAYER, at.M_PLAYER_BEFORE))
+            if present == player.address:
+                return
+            self._players = [(each, self.frames) for each, _ in self._players if each is not player]
+            publish(self._counts, at.M_PLAYER_BEFORE, present)
             publish(self._counts, at.M_PLAYER, player.address)
+            for each, _ in self._players:
+                if each.address == before:
+                    each.release(LEFT_S)
+            self._players.append((player, self.frames))
+
+    def _forget_players(self) -> None:
+        """Frees those that play nothing any more. Under the lock."""
+        counts = self._counts
+        for each, _ in self._players:
+            if each.address == int(counts[at.M_PLAYER_BEFORE]) and each.rests:
+                publish(counts, at.M_PLAYER_BEFORE, 0)
+                self._players = [(one, self.frames if one is each else frame) for one, frame in self._players]
+        held = [int(counts[slot]) for slot in (at.M_PLAYER, at.M_PLAYER_BEFORE)]
+        # a quantum that has begun may still play one that was taken out
+        self._players = [
+            (each, frame)
+            for each, frame in self._players
+            if each.address in held or self.frames <= frame + LEFT_FRAMES or not each.over
+        ]
 
     def set_effects(self, effects: Effects | None) -> None:
         """All voices sound through these from now on: body and room, before the volume. Any thread.
@@ -140,6 +167,7 @@ class Mixer:
         """Frees what is over. Any thread, now and then."""
         with self._lock:
             self._voices = [voice for voice in self._voices if not voice.over]
+            self._forget_players()
         with self._effects_lock:
             self._forget_impulses()
 

@@ -36,7 +36,8 @@ EVENT = np.dtype(
         ("table", np.int64),
         ("struck_s", np.float64),
         ("voices", np.int64, of.MOST_SOURCES),
-        ("spare", np.int64, of.EVENT_SLOTS - of.EVENT_VOICES - of.MOST_SOURCES),
+        ("struck", np.int64),
+        ("struck_modes", np.int64),
     ]
 )
 REPORT = np.dtype(
@@ -126,6 +127,20 @@ class Ringing:
 
 
 @dataclass(frozen=True)
+class Playing:
+    """How far a note is that was begun.
+
+    Attributes:
+        began_frame: of the mixer; 0 until its voices have begun.
+        struck_to_began_s: from the gesture to the callback that gave its first samples; None: not known.
+    """
+
+    seconds: float
+    began_frame: int
+    struck_to_began_s: float | None
+
+
+@dataclass(frozen=True)
 class Channel:
     """Where the wheels and pedals of a channel stand; `slide` and `range_semitones`: None where never moved."""
 
@@ -165,6 +180,7 @@ class CompiledPlayer:
         self._backlog: deque[tuple[object, ...]] = deque()  # for which the ring has no room
         self._tables: deque[Table] = deque()  # which the kernel may be reading, or will
         self._prepared: list[_Prepared] = []
+        self._struck: dict[int, NDArray[np.float64]] = {}  # by event, until it is reported
         self._read = 0
         memory[of.PLAYER_RATE] = rate_hz
         counts[of.PLAYER_MODES], counts[of.PLAYER_MOST] = modes + of.MOST_PAIRS, most_notes
@@ -193,6 +209,8 @@ class CompiledPlayer:
         pitch_hz: float = NONE,
         struck_s: float = 0.0,
         voices: Sequence[Voice] = (),
+        note: int = 0,
+        struck: NDArray[np.float64] | None = None,
     ) -> int:
         """Hands an event over; its number, which reports of a note carry. Any thread, at once; none is lost.
 
@@ -200,14 +218,22 @@ class CompiledPlayer:
             kind: one of `playing_layout`, as all that follows.
             frame: of the mixer, at which it counts; 0: at once.
             voices: of a note, which were built elsewhere, with their gains; they are in use until they are over.
+            note: the number of the note that is tuned, choked or cancelled; 0: all.
+            struck: speeds (modes,) that 1 N s gives to a drum where it is struck; None: at its own place.
         """
         addresses = [voice.address for voice in voices] + [0] * (of.MOST_SOURCES - len(voices))
+        row, modes = (0, 0) if struck is None else (int(struck.ctypes.data), len(struck))
         with self._lock:
             number = next(self._ids)
+            id = note if kind in (of.TUNE, of.CHOKE, of.CANCEL) else number
+            if struck is not None:
+                self._struck[number] = struck
+                while len(self._struck) > of.EVENTS + of.QUEUED:
+                    del self._struck[next(iter(self._struck))]
             if voices:
                 self._prepared = [each for each in self._prepared if not each.over]
                 self._prepared.append(_Prepared(tuple(voices)))
-            self._push((frame, kind, channel, key, value, number, position, pitch_hz, 0, struck_s, addresses, 0))
+            self._push((frame, kind, channel, key, value, id, position, pitch_hz, 0, struck_s, addresses, row, modes))
         return number
 
     def take(self, table: Table, frame: int = 0) -> None:
@@ -216,7 +242,7 @@ class CompiledPlayer:
             self._tables.append(table)
             while self._tables[0].serial < int(self._counts[of.PLAYER_SERIAL]):
                 self._tables.popleft()
-            self._push((frame, of.TABLE, 0, 0, 0.0, 0, NONE, NONE, table.address, 0.0, [0] * of.MOST_SOURCES, 0))
+            self._push((frame, of.TABLE, 0, 0, 0.0, 0, NONE, NONE, table.address, 0.0, [0] * of.MOST_SOURCES, 0, 0))
 
     def _push(self, record: tuple[object, ...]) -> None:
         self._backlog.append(record)
@@ -256,6 +282,10 @@ class CompiledPlayer:
         for source, gain in enumerate(gains):
             self.memory[of.PLAYER_SOURCE_GAINS + source] = gain
 
+    def source_gain(self, source: int) -> float:
+        """As it was set."""
+        return float(self.memory[of.PLAYER_SOURCE_GAINS + source])
+
     # What there is
 
     def reports(self) -> list[Report]:
@@ -273,30 +303,71 @@ class CompiledPlayer:
             parameters = StringParameters(*record["own"].tolist()) if struck else None
             found.append(Report(**known, parameters=parameters))
         self._read = total
+        with self._lock:
+            for each in found:
+                self._struck.pop(each.id, None)
         return found
 
     def ringing(self) -> list[Ringing]:
         """The notes that have their places and ring. Any thread; the levels are those of the latest quantum."""
         found = []
-        stride = of.voice_slots(int(self._counts[of.PLAYER_MODES]))
-        notes = self._counts[of.PLAYER_NOTES : of.PLAYER_NOTES + of.MOST_NOTES * of.NOTE_SLOTS].copy()
-        for number, note in enumerate(notes.reshape(of.MOST_NOTES, of.NOTE_SLOTS)):
+        for number, note in enumerate(self._notes()):
             if note[of.NOTE_STATE] != of.RINGS or not note[of.NOTE_HAS_PLACE]:
                 continue
-            voices = []
-            for source in range(of.MOST_SOURCES):
-                address = int(note[of.NOTE_VOICES + source])
-                own = of.PLAYER_VOICES + (number * of.MOST_SOURCES + source) * stride
-                if address == self.address + 8 * own:
-                    voices.append(self.memory[own : own + at.HEADER])
-                elif address:
-                    voices += [each for each in self._memories() if int(each.ctypes.data) == address]
-            alive = [v for v in voices if v.view(np.int64)[at.STATE] in (at.WAITING, at.SOUNDING)]
+            alive = _alive(self._voices(number, note))
             if alive:
                 level = max(float(voice[at.LOUDNESS]) for voice in alive) * LOG_DB
                 frames = max(int(voice.view(np.int64)[at.FRAME]) for voice in alive)
                 id, channel, key = (int(note[of.NOTE_ID + place]) for place in (0, 2, 3))
                 found.append(Ringing(id, channel, key, level, frames / self.rate_hz))
+        return found
+
+    def playing(self, report: Report) -> Playing | None:
+        """How far a note is that `report` says to have begun; None: it has ended. Any thread."""
+        note = self._notes()[report.note]
+        if note[of.NOTE_STATE] != of.RINGS or note[of.NOTE_ID] != report.id:
+            return None
+        voices = self._voices(report.note, note)
+        counts = [voice.view(np.int64) for voice in voices]
+        frames = max((int(each[at.FRAME]) for each in counts), default=0)
+        began = max((int(each[at.BEGAN_FRAME]) for each in counts), default=0)
+        known = began > 0 and bool(voices[0][at.STRUCK_S])
+        took_s = float(voices[0][at.BEGAN_S] - voices[0][at.STRUCK_S]) if known else None
+        return Playing(frames / self.rate_hz, max(0, began), took_s)
+
+    @property
+    def rests(self) -> bool:
+        """Whether it has nothing to play, and nothing rings."""
+        rings = any(note[of.NOTE_STATE] == of.RINGS for note in self._notes())
+        return not (rings or self._counts[of.PLAYER_SYMPATHY_RINGS] or self.waiting)
+
+    @property
+    def over(self) -> bool:
+        """Whether all its voices are, also where no mixer plays its events any more."""
+        return not any(_alive(self._voices(number, note)) for number, note in enumerate(self._notes()))
+
+    def release(self, seconds: float) -> None:
+        """Lets all voices fade out, where no mixer plays its events any more; one of them may still have them."""
+        for number, note in enumerate(self._notes()):
+            for voice in _alive(self._voices(number, note)):
+                if voice.view(np.int64)[at.RELEASE] == 0:
+                    voice.view(np.int64)[at.RELEASE] = max(1, round(seconds * self.rate_hz))
+
+    def _notes(self) -> NDArray[np.int64]:
+        """(MOST_NOTES, NOTE_SLOTS) as they are now."""
+        notes = self._counts[of.PLAYER_NOTES : of.PLAYER_NOTES + of.MOST_NOTES * of.NOTE_SLOTS].copy()
+        return notes.reshape(of.MOST_NOTES, of.NOTE_SLOTS)
+
+    def _voices(self, number: int, note: NDArray[np.int64]) -> list[NDArray[np.float64]]:
+        """The headers of a note's voices; none where it is free."""
+        found, stride = [], of.voice_slots(int(self._counts[of.PLAYER_MODES]))
+        for source in range(of.MOST_SOURCES if note[of.NOTE_STATE] == of.RINGS else 0):
+            address = int(note[of.NOTE_VOICES + source])
+            own = of.PLAYER_VOICES + (number * of.MOST_SOURCES + source) * stride
+            if address == self.address + 8 * own:
+                found.append(self.memory[own : own + at.HEADER])
+            elif address:
+                found += [each for each in self._memories() if int(each.ctypes.data) == address]
         return found
 
     def _memories(self) -> list[NDArray[np.float64]]:
@@ -319,3 +390,8 @@ class CompiledPlayer:
             slide if slide >= 0 else None,
             wide if wide >= 0 else None,
         )
+
+
+def _alive(voices: Iterable[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
+    """Those that are not over."""
+    return [voice for voice in voices if voice.view(np.int64)[at.STATE] in (at.WAITING, at.SOUNDING)]

@@ -27,6 +27,8 @@ WIDTHS = {  # in pixels, by the longest name or value
     "pluck.width_hard": 66,
 }  # the others are narrow
 NO_A4 = "The Scala keyboard mapping of this patch has a reference pitch of its own, so that A4 would change nothing"
+NO_STRING = "The patch has drums, and no string that this could change"
+OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "knobs.modulus", "pluck.curve")
 LETS_RING = "The patch lets its strings ring: no key damps them"
 
 
@@ -159,6 +161,8 @@ class StringKnobs(QWidget):
 
 def _why_barred(patch: Patch, field: str) -> str:
     """Why a field means nothing in this patch; "" where it does."""
+    if patch.strings.kind == "drums" and field.startswith(("knobs.", "pluck.")) and field not in OF_DRUMS:
+        return NO_STRING
     if field in SHAPED and patch.pluck.shape == "triangular":
         return NO_WIDTH
     if field == "damping.release_t60_s" and patch.damping.let_ring:

@@ -15,7 +15,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import ClassVar
 
-from PySide6.QtCore import Signal
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from app.presets.library import Library
@@ -23,6 +24,7 @@ from app.rendering import Take
 from app.session.choices import Choices, Session
 from app.shared.worker import Job, Work
 from app.views.background import Background
+from app.views.controls.plain import Label
 from engine.metrics import ErrorSums
 
 LEAST_HEIGHT = 84  # pixels
@@ -58,9 +60,11 @@ class Panel(QWidget):
     title: ClassVar[str]  # on its tab
     help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
     on_the_left = False  # in which deck
+    of_strings: ClassVar[bool] = True  # it shows a string: while a drum is played it says that it does not show it
 
     seek_asked = Signal(float)  # move the playhead to this time in s
     pluck_asked = Signal()
+    strike_asked = Signal(float, float, float)  # the drum at a place, in half-lengths from its centre; velocity
     told = Signal(str, str)  # a notice for the user, and its details
 
     def __init__(self, session: Session, library: Library) -> None:
@@ -69,9 +73,29 @@ class Panel(QWidget):
         self.library = library
         self.background = Background(self.key, self, rests=self._rests)
         self.background.failed.connect(self.told)
+        self._cover = Label(self)
+        self._cover.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self._cover.setWordWrap(True)
+        self._cover.setAutoFillBackground(True)
+        self._cover.hide()
         self._seen_s = time.monotonic()
         self._growing: Take | None = None  # jobs rest while it is rendered
         self._grown = (-1, 0.0)  # its frames when it last grew, and when that was
+
+    def cover(self, words: str) -> None:
+        """Shows these words instead of the view; "": the view again."""
+        self._cover.setText(words)
+        self._cover.setVisible(bool(words))
+        self._cover.raise_()
+
+    @property
+    def covered(self) -> str:
+        """The words that cover it; "": none do."""
+        return self._cover.text() if self._cover.isVisibleTo(self) else ""
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        super().resizeEvent(event)
+        self._cover.setGeometry(self.rect())
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Called with the fields of `Choices` that have new values; at the start with all of them."""

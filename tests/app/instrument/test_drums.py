@@ -1,5 +1,6 @@
 """Drums are played: by the same events and player as strings, softly and hard, alone and in rolls."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,33 @@ def test_the_kernel_strikes_as_the_engine_does() -> None:
     n = len(found.modes)
     place = first + at.state(n) + n
     assert np.allclose(player.compiled.memory[place : place + n], found.strike(90).speeds(found.modes), rtol=1e-9)
+
+
+def test_a_blow_at_a_place_of_its_own_moves_the_modes_of_that_place() -> None:
+    """As the engine says; at its own place it is the same blow as without a place."""
+    from engine.kernels import layout as at
+
+    found = DrumKeys(KIT, Ear((0.5,))).of_key(47)
+    assert found is not None
+    n = len(found.modes)
+    place = of.PLAYER_VOICES + at.state(n) + n
+
+    def speeds(where: tuple[float, float] | None) -> np.ndarray:
+        player, mixer = InstrumentPlayer(KIT, PRESET, RATE_HZ, {"truth": 1.0}), Mixer(RATE_HZ)
+        player.handle(NoteOn(47, 90, place=where))
+        player.compiled.catch_up(mixer)
+        assert len(player.compiled._struck) == (where is not None)
+        player.reports()
+        assert not player.compiled._struck, "its memory is free"
+        return player.compiled.memory[place : place + n].copy()
+
+    own = speeds(None)
+    np.testing.assert_array_equal(speeds(found.played.place), own)
+    centre = speeds((0.0, 0.0))
+    wanted = replace(found.strike(90), place=(0.0, 0.0)).speeds(found.modes)
+    np.testing.assert_allclose(centre, wanted, rtol=1e-9, atol=1e-12)
+    assert np.abs(centre[found.modes.surface.m > 0]).max() < 1e-9 * np.abs(centre).max()
+    assert np.isfinite(speeds((2.0, 2.0))).all(), "beyond the rim it is the nearest place"
 
 
 def test_every_pad_has_a_drum_and_others_are_refused() -> None:

@@ -5,8 +5,10 @@ from __future__ import annotations
 from dataclasses import replace
 from math import log2
 
+import numpy as np
 import pytest
 
+from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import (
     FINE_OTHER,
     FINE_REGISTERED,
@@ -27,12 +29,16 @@ from app.instrument.events import (
     NoteOn,
     let_go,
 )
-from app.instrument.hands import WIDEST_SEMITONES
-from app.instrument.player import Player, Struck
 from app.instrument.strings import pitch_hz_of
 from app.patches.patch import Knobs, OpenString, Patch, StringSet
+from engine.kernels.player import WIDEST_SEMITONES
+from engine.kernels.playing_layout import BEGAN, GAINS, TABLE_GAINS
+from engine.kernels.playing_layout import KEYS as KEY_COUNT
 from engine.presets import Preset
+from engine.voices import Mixer
+from engine.voices.player import Report
 from tests.app.instrument.conftest import STEEL, physical
+from tests.app.instrument.seen import Seen, seen, sounding, taken_up
 
 RATE_HZ = 48_000
 OPEN = (40, 45, 50, 55, 59, 64)
@@ -48,27 +54,52 @@ def range_of_bends(semitones: int, cents: int = 0, channel: int = 0) -> list[Eve
     return [Controller(number, value, channel) for number, value in messages]
 
 
+class Note:
+    """A note that was struck, as it is now, or was when it rang last."""
+
+    def __init__(self, hand: Hand, seen: Seen) -> None:
+        self._hand, self._seen = hand, seen
+
+    @property
+    def now(self) -> Seen:
+        self._seen = next((each for each in seen(self._hand.player) if each.id == self._seen.id), self._seen)
+        return self._seen
+
+    @property
+    def semitones(self) -> float:
+        """By how many its string is bent."""
+        return 12 * log2(pitch_hz_of(self.now.now) / pitch_hz_of(self.now.own))
+
+    @property
+    def area_m2(self) -> float:
+        return self.now.now.area_m2
+
+
 class Hand:
     """Plays events; what was struck is seen, not heard."""
 
     def __init__(self, patch: Patch, preset: Preset) -> None:
-        self.struck: list[Struck] = []
-        self.player = Player(patch, preset, RATE_HZ, self.struck.append, ("model",))
+        self.mixer = Mixer(RATE_HZ)
+        self.player = InstrumentPlayer(patch, preset, RATE_HZ, {"model": 1.0})
+        self.struck: list[Note] = []
+        self.reports: list[Report] = []
 
-    def play(self, *played: Event) -> Struck:
+    def play(self, *played: Event) -> Note:
         """The last that was struck."""
         for event in played:
-            self.player.handle(event)
+            number = self.player.handle(event)
+            found = taken_up(self.player, self.mixer)
+            self.struck += [Note(self, each) for each in found if each.id == number and isinstance(event, NoteOn)]
+        self.reports += self.player.reports()
         return self.struck[-1]
+
+    def take(self, patch: Patch) -> None:
+        """Another patch, or the same with a knob turned."""
+        self.player.take(self.player.tabled(self.player.loud_keys(patch)))
 
     @property
     def sounding(self) -> list[int]:
-        return [each.event.key for each in self.player.sounding()]
-
-
-def semitones(struck: Struck) -> float:
-    """By how many its string is bent."""
-    return 12 * log2(pitch_hz_of(struck.parameters) / struck.key.string.pitch_hz)
+        return [each.key for each in sounding(self.player)]
 
 
 @pytest.fixture
@@ -97,91 +128,92 @@ def area_m2(patch: Patch, channel: int) -> float:
 
 def test_reset_leaves_the_next_key_and_the_ringing_one_in_tune_and_lifts_the_pedal(hand: Hand) -> None:
     held = hand.play(Bend(1.0), Controller(SUSTAIN, 127), Controller(MOD_WHEEL, 127), NoteOn(57, 60))
-    assert semitones(held) == pytest.approx(2)
+    assert held.semitones == pytest.approx(2)
     hand.play(NoteOff(57))
-    assert held.kept
+    assert held.now.kept
     hand.play(Controller(RESET, 0))
-    assert not held.kept
-    assert held.damped
+    assert not held.now.kept
+    assert held.now.damped
     fresh = hand.play(NoteOn(52, 60))
-    assert fresh.parameters == fresh.key.string.parameters
+    assert fresh.now.now == fresh.now.own
 
 
 def test_what_a_file_leaves_behind_does_not_bend_the_keys_of_the_computer(hand: Hand) -> None:
     hand.play(NoteOn(45, 60), Bend(1.0))
-    for event in let_go([0]):
-        hand.player.handle(event)
-    assert semitones(hand.play(NoteOn(57, 60, KEYS))) == pytest.approx(0, abs=1e-6)
-    assert hand.struck[0].damped
+    hand.play(*let_go([0]))
+    assert hand.play(NoteOn(57, 60, KEYS)).semitones == pytest.approx(0, abs=1e-6)
+    assert hand.struck[0].now.damped
 
 
 def test_a_channels_reset_leaves_the_others(hand: Hand) -> None:
     one = hand.play(NoteOn(45, 60, 0), Bend(1.0, 0))
     other = hand.play(NoteOn(57, 60, 1), Bend(1.0, 1))
     hand.play(*let_go([0]))
-    assert (one.damped, other.damped) == (True, False)
-    assert (semitones(other), other.held) == (pytest.approx(2), True)
+    assert (one.now.damped, other.now.damped) == (True, False)
+    assert (other.semitones, other.now.held) == (pytest.approx(2), True)
 
 
 def test_the_first_channels_wheel_and_pedal_hold_for_the_keys_of_the_computer(hand: Hand) -> None:
     struck = hand.play(NoteOn(57, 60, KEYS), Bend(0.5), Controller(SUSTAIN, 127), NoteOff(57, KEYS))
-    assert semitones(struck) == pytest.approx(1)
-    assert struck.kept
+    assert struck.semitones == pytest.approx(1)
+    assert struck.now.kept
     hand.play(Controller(NOTES_OFF, 0))
-    assert struck.kept  # the input's keys, not these
+    assert struck.now.kept  # the input's keys, not these
     hand.play(Controller(SUSTAIN, 0))
-    assert struck.damped
+    assert struck.now.damped
 
 
 def test_another_patch_begins_with_wheels_at_rest_and_the_foot_on_the_pedal(hand: Hand) -> None:
     hand.play(NoteOn(40, 60), *range_of_bends(12), Bend(1.0), Controller(MOD_WHEEL, 127), Controller(SUSTAIN, 127))
     patch = hand.player.patch
-    hand.player.set_patch(changed(patch, knobs=Knobs(decay=1.1)))
-    hand.player.set_patch(changed(hand.player.patch, name="the same"))
-    assert semitones(hand.play(NoteOn(45, 60))) == pytest.approx(12)
-    hand.player.set_patch(changed(patch, name="another", damping={"release_t60_s": 0.2}))
+    hand.take(changed(patch, knobs=Knobs(decay=1.1)))
+    hand.take(changed(hand.player.patch, name="the same"))
+    assert hand.play(NoteOn(45, 60)).semitones == pytest.approx(12)
+    hand.take(changed(patch, name="another", damping={"release_t60_s": 0.2}))
     fresh = hand.play(NoteOn(57, 60), NoteOff(57))
-    assert fresh.kept
-    assert fresh.parameters == fresh.key.string.parameters
-    assert semitones(hand.play(Bend(0.5), NoteOn(52, 60))) == pytest.approx(1)
+    assert fresh.now.kept
+    assert fresh.now.now == fresh.now.own
+    assert hand.play(Bend(0.5), NoteOn(52, 60)).semitones == pytest.approx(1)
 
 
 def test_slide_is_forgotten(patch: Patch, preset: Preset) -> None:
     hand = Hand(changed(patch, mode="mpe"), preset)
-    slid = hand.play(Controller(SLIDE, 127, 1), NoteOn(57, 60, 1)).pluck.position
-    assert slid == pytest.approx(0.5)
-    assert hand.play(Controller(RESET, 0, 1), NoteOn(57, 60, 1)).pluck.position == patch.pluck.position
+    hand.play(Controller(SLIDE, 127, 1), NoteOn(57, 60, 1))
+    assert hand.reports[-1].position == pytest.approx(0.5)
+    hand.play(Controller(RESET, 0, 1), NoteOn(57, 60, 1))
+    positions = [each.position for each in hand.reports if each.kind == BEGAN]
+    assert positions[-1] == patch.pluck.position
 
 
 # The range of bends
 
 
 def test_messages_set_the_range_of_bends_of_their_channel(hand: Hand) -> None:
-    assert semitones(hand.play(*range_of_bends(12), Bend(0.5), NoteOn(45, 60))) == pytest.approx(6)
-    assert semitones(hand.play(Bend(0.5, 1), NoteOn(57, 60, 1))) == pytest.approx(1)
-    assert semitones(hand.play(*range_of_bends(1, 50))) == pytest.approx(1)  # that of the string of channel 1
-    assert semitones(hand.struck[0]) == pytest.approx(0.75)  # it follows while it rings
-    assert semitones(hand.play(Controller(RESET, 0), Bend(0.5), NoteOn(52, 60))) == pytest.approx(1)
+    assert hand.play(*range_of_bends(12), Bend(0.5), NoteOn(45, 60)).semitones == pytest.approx(6)
+    assert hand.play(Bend(0.5, 1), NoteOn(57, 60, 1)).semitones == pytest.approx(1)
+    assert hand.play(*range_of_bends(1, 50)).semitones == pytest.approx(1)  # that of the string of channel 1
+    assert hand.struck[0].semitones == pytest.approx(0.75)  # it follows while it rings
+    assert hand.play(Controller(RESET, 0), Bend(0.5), NoteOn(52, 60)).semitones == pytest.approx(1)
 
 
 def test_another_parameter_sets_no_range_and_none_is_beyond_its_bound(hand: Hand) -> None:
     other = [Controller(OTHER, 0), Controller(FINE_OTHER, 0), Controller(VALUE, 24)]
     tuning = [Controller(REGISTERED, 0), Controller(FINE_REGISTERED, 2), Controller(VALUE, 24)]
     none = [Controller(REGISTERED, 127), Controller(FINE_REGISTERED, 127), Controller(VALUE, 24)]
-    assert semitones(hand.play(Controller(VALUE, 24), Bend(1.0), NoteOn(45, 60))) == pytest.approx(2)
+    assert hand.play(Controller(VALUE, 24), Bend(1.0), NoteOn(45, 60)).semitones == pytest.approx(2)
     for messages in (other, tuning, none):
-        assert semitones(hand.play(*range_of_bends(3), *messages, Bend(1.0), NoteOn(45, 60))) == pytest.approx(3)
+        assert hand.play(*range_of_bends(3), *messages, Bend(1.0), NoteOn(45, 60)).semitones == pytest.approx(3)
     hand.play(*range_of_bends(127, 127))
-    assert hand.player._hands.of(0).range_semitones == WIDEST_SEMITONES
+    assert hand.player.compiled.channel(0).range_semitones == WIDEST_SEMITONES
 
 
 def test_in_mpe_members_bend_by_48_semitones_unless_messages_say_other(patch: Patch, preset: Preset) -> None:
     hand = Hand(changed(patch, mode="mpe"), preset)
-    assert semitones(hand.play(Bend(1 / 8, 1), NoteOn(45, 60, 1))) == pytest.approx(6)
-    assert semitones(hand.play(*range_of_bends(24, 0, 1))) == pytest.approx(3)
-    assert semitones(hand.play(Bend(0.5, 0))) == pytest.approx(4)
-    assert semitones(hand.play(*range_of_bends(4, 0, 0))) == pytest.approx(5)
-    assert semitones(hand.play(NoteOn(57, 60, KEYS))) == pytest.approx(2)
+    assert hand.play(Bend(1 / 8, 1), NoteOn(45, 60, 1)).semitones == pytest.approx(6)
+    assert hand.play(*range_of_bends(24, 0, 1)).semitones == pytest.approx(3)
+    assert hand.play(Bend(0.5, 0)).semitones == pytest.approx(4)
+    assert hand.play(*range_of_bends(4, 0, 0)).semitones == pytest.approx(5)
+    assert hand.play(NoteOn(57, 60, KEYS)).semitones == pytest.approx(2)
 
 
 # A guitar
@@ -194,7 +226,7 @@ def test_on_a_guitars_patch_the_computers_keys_sound_together_each_on_the_string
     chord = (60, 62, 64, 67)  # all but one on two strings
     hand.play(*(NoteOn(key, 90, KEYS) for key in chord))
     assert hand.sounding == list(chord)
-    assert [each.parameters.area_m2 for each in hand.struck] == [
+    assert [each.area_m2 for each in hand.struck] == [
         pytest.approx(area_m2(strung, channel)) for channel in (B, B, HIGH_E, HIGH_E)
     ]
 
@@ -209,18 +241,18 @@ def test_a_guitars_channel_is_its_string_wherever_it_is_fretted(strung: Patch, p
     hand = Hand(strung, preset)
     for key, channel in ((64, B), (64, HIGH_E), (64, G), (52, LOW_E), (57, B)):
         struck = hand.play(NoteOn(key, 90, channel))
-        assert struck.parameters.area_m2 == pytest.approx(area_m2(strung, channel)), channel
-        assert pitch_hz_of(struck.parameters) == pytest.approx(440 * 2 ** ((key - 69) / 12), rel=1e-6)
-    assert hand.sounding == [57, 64, 64, 52]  # of the string B the last, which is tuned lower and slackened
+        assert struck.area_m2 == pytest.approx(area_m2(strung, channel)), channel
+        assert pitch_hz_of(struck.now.now) == pytest.approx(440 * 2 ** ((key - 69) / 12), rel=1e-6)
+    assert hand.sounding == [64, 64, 52, 57]  # of the string B the last, which is tuned lower and slackened
     bent = hand.play(Bend(1.0, B))
-    assert bent.parameters.area_m2 == pytest.approx(area_m2(strung, B))
+    assert bent.area_m2 == pytest.approx(area_m2(strung, B))
 
 
 def test_far_below_a_string_and_beyond_the_set_the_key_chooses(strung: Patch, preset: Preset) -> None:
     hand = Hand(strung, preset)
-    assert hand.play(NoteOn(47, 90, B)).parameters.area_m2 == pytest.approx(area_m2(strung, 4))
-    assert hand.play(NoteOn(65, 90, 6)).parameters.area_m2 == pytest.approx(area_m2(strung, HIGH_E))
-    assert hand.play(NoteOn(66, 90, 6)).place != hand.struck[-2].place
+    assert hand.play(NoteOn(47, 90, B)).area_m2 == pytest.approx(area_m2(strung, 4))
+    assert hand.play(NoteOn(65, 90, 6)).area_m2 == pytest.approx(area_m2(strung, HIGH_E))
+    assert hand.play(NoteOn(66, 90, 6)).now.place != hand.struck[-2].now.place
 
 
 def test_with_its_input_at_rest_a_guitar_is_forgotten(strung: Patch, preset: Preset) -> None:
@@ -235,6 +267,10 @@ def test_with_its_input_at_rest_a_guitar_is_forgotten(strung: Patch, preset: Pre
 def test_what_a_guitar_may_fret_is_prepared(strung: Patch, preset: Preset) -> None:
     hand = Hand(strung, preset)
     hand.player.prepare([64])
-    misses = hand.player._key.cache_info().misses  # type: ignore[attr-defined]
+    table = hand.player.table
+    assert table is not None
+    gains = table.memory[TABLE_GAINS : TABLE_GAINS + KEY_COUNT * GAINS].reshape(KEY_COUNT, GAINS)
+    before = gains.copy()
+    assert (before[64][: 1 + len(OPEN)] > 0).all() and not (before[63] > 0).any()
     hand.play(NoteOn(64, 90, KEYS), *(NoteOn(64, 90, channel) for channel in (B, G, LOW_E, HIGH_E)))
-    assert hand.player._key.cache_info().misses == misses  # type: ignore[attr-defined]
+    np.testing.assert_array_equal(gains, before)

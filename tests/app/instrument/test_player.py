@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import butter, sosfilt
 
+from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import (
     MOD_WHEEL,
     SOUND_OFF,
@@ -24,15 +25,18 @@ from app.instrument.events import (
 )
 from app.instrument.loudness import WANTED_DB, k_weight
 from app.instrument.offline import channels_played, render_events, render_note
-from app.instrument.player import PLUCK_STOPS_S, Player, Struck
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, PluckChoices, Room
+from engine.kernels import playing_layout as of
 from engine.kernels.layout import QUANTUM
+from engine.kernels.player import PLUCK_STOPS_S
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters
 from engine.voices import Mixer
+from engine.voices.player import Report
+from tests.app.instrument.seen import Seen, seen, sounding, taken_up
 
 RATE_HZ = 48_000
 STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
@@ -52,6 +56,32 @@ def play(
     timed = [TimedEvent(time_s, event) for time_s, event in events]
     blocks = list(render_events(patch, preset, timed, RATE_HZ, source, seconds, limited=False))
     return np.concatenate(blocks)[:, 0].astype(np.float64)
+
+
+class Stage:
+    """A patch that is played without a device; what was struck is seen as well as heard."""
+
+    def __init__(self, patch: Patch, preset: Preset, sources: tuple[str, ...] = ("model",)) -> None:
+        self.mixer = Mixer(RATE_HZ, limited=False)
+        self.player = InstrumentPlayer(patch, preset, RATE_HZ, dict.fromkeys(sources, 1.0), varied=False)
+        self.mixer.set_player(self.player.compiled)
+
+    def play(self, *played: Event) -> list[Seen]:
+        """What rings then, the oldest first."""
+        for event in played:
+            self.player.handle(event)
+        return taken_up(self.player, self.mixer)
+
+    def take(self, patch: Patch) -> None:
+        """Another patch, or the same with a knob turned."""
+        self.player.take(self.player.tabled(self.player.loud_keys(patch)))
+
+    def render(self, frames: int) -> NDArray[np.float64]:
+        """(frames,), left."""
+        return self.mixer.render(frames)[:, 0].astype(np.float64)
+
+    def begun(self) -> list[Report]:
+        return [each for each in self.player.reports() if each.kind == of.BEGAN]
 
 
 def level_db(sound: NDArray[np.float64], begin_s: float, end_s: float) -> float:
@@ -113,11 +143,9 @@ def test_a_harder_key_is_narrower_and_brighter_however_far_it_pulls(
 ) -> None:
     widths = {"width": wide, "width_hard": narrow, "softest_mm": 0.1, "hardest_mm": 0.1}
     shaped = changed(patch, pluck=PluckChoices(shape=shape, **widths))
-    struck: list[Struck] = []
-    player = Player(shaped, preset, RATE_HZ, struck.append, (source,))
-    for velocity in (1, 64, 127):
-        player.handle(NoteOn(45, velocity))
-    assert [each.pluck.width for each in struck] == pytest.approx([wide, (wide * narrow) ** 0.5, narrow])
+    stage = Stage(shaped, preset, (source,))
+    stage.play(*(NoteOn(45, velocity) for velocity in (1, 64, 127)))
+    assert [each.width for each in stage.begun()] == pytest.approx([wide, (wide * narrow) ** 0.5, narrow])
     heard_hz = [brightness_hz(play(shaped, preset, 0.3, (0.0, NoteOn(45, v)), source=source)) for v in (1, 64, 127)]
     assert heard_hz[0] < heard_hz[1] < heard_hz[2]
     assert heard_hz[2] > 1.3 * heard_hz[0]
@@ -199,14 +227,16 @@ def test_a_key_that_is_struck_again_sounds_as_soon_as_one_at_rest(patch: Patch, 
     """Whatever the pick-up, and for model and truth in the same frame."""
     for kind in ("displacement", "velocity"):
         heard = changed(patch, pickup=Pickup(points=(0.3,), kind=kind))
-        struck: list[Struck] = []
-        player, mixer = Player(heard, preset, RATE_HZ, struck.append), Mixer(RATE_HZ, limited=False)
+        stage = Stage(heard, preset, ("model", "truth"))
+        begun = []
         for frames in (4_800, 640):
-            player.handle(NoteOn(45, 90))
-            mixer.add(*struck[-1].voices.values())
-            mixer.render(frames)
-        assert [{voice.began_frame for voice in each.voices.values()} for each in struck] == [{0}, {4_800}]
-        assert [each.over for each in struck] == [True, False]
+            stage.play(NoteOn(45, 90))
+            stage.render(frames)
+            begun += stage.begun()
+        first, again = (stage.player.compiled.playing(each) for each in begun)
+        assert first is None, "it is over"
+        assert again is not None and again.began_frame == 4_800
+        assert again.seconds == pytest.approx(640 / RATE_HZ)
 
 
 def test_a_string_that_is_hammered_again_keeps_the_loud_tail(patch: Patch, preset: Preset) -> None:
@@ -285,17 +315,13 @@ def test_notes_of_a_file_begin_at_their_frames(patch: Patch, preset: Preset, sou
 
 
 def test_in_guitar_mode_a_channel_is_one_string(guitar: Patch, preset: Preset) -> None:
-    struck: list[Struck] = []
-    player = Player(guitar, preset, RATE_HZ, struck.append)
-    mixer = Mixer(RATE_HZ)
-    player.handle(NoteOn(60, 100, channel=1))
-    mixer.add(*struck[-1].voices.values())
+    stage = Stage(guitar, preset)
+    stage.play(NoteOn(60, 100, channel=1))
     for key in (64, 67, 71):
-        player.handle(NoteOn(key, 100, channel=0))
-        mixer.add(*struck[-1].voices.values())
-        mixer.render(4800)
-    assert [each.event.key for each in player.sounding()] == [60, 71]
-    assert [each.over for each in struck] == [False, True, True, False]
+        stage.play(NoteOn(key, 100, channel=0))
+        stage.render(4800)
+    assert [each.key for each in sounding(stage.player)] == [60, 71]
+    assert [each.key for each in seen(stage.player)] == [60, 71], "the others are over"
 
 
 def test_in_mpe_each_note_bends_alone(patch: Patch, preset: Preset) -> None:
@@ -307,17 +333,14 @@ def test_in_mpe_each_note_bends_alone(patch: Patch, preset: Preset) -> None:
 
 
 def test_a_knob_changes_strings_that_ring(patch: Patch, preset: Preset) -> None:
-    struck: list[Struck] = []
-    player = Player(patch, preset, RATE_HZ, struck.append, ("model",))
-    mixer = Mixer(RATE_HZ, limited=False)
-    player.handle(NoteOn(57, 60))
-    mixer.add(*struck[0].voices.values())
-    before = mixer.render(RATE_HZ // 2)[:, 0]
-    player.set_patch(changed(patch, knobs=Knobs(decay=10.0)))
-    after = mixer.render(RATE_HZ)[:, 0]
+    stage = Stage(patch, preset)
+    stage.play(NoteOn(57, 60))
+    before = stage.render(RATE_HZ // 2)
+    stage.take(changed(patch, knobs=Knobs(decay=10.0)))
+    after = stage.render(RATE_HZ)
     assert float(np.abs(np.diff(after, 2)[:4000]).max()) <= float(np.abs(np.diff(before, 2)).max())
-    free = play(patch, preset, 1.5, (0.0, NoteOn(57, 60))) / struck[0].gain
-    fallen = level_db(after.astype(np.float64), 0.8, 0.9) - level_db(free, 1.3, 1.4)
+    free = play(patch, preset, 1.5, (0.0, NoteOn(57, 60)))
+    fallen = level_db(after, 0.8, 0.9) - level_db(free, 1.3, 1.4)
     assert fallen < -3
 
 
@@ -346,17 +369,12 @@ def test_every_knob_turned_while_it_rings_changes_model_and_truth_alike_without_
     part = getattr(patch, section).model_copy(update={name: TURNS[field]})
     sounds = {}
     for turned in (changed(patch, **{section: part}), patch):
-        struck: list[Struck] = []
-        player = Player(patch, preset, RATE_HZ, struck.append)
-        player.handle(NoteOn(57, 100))
-        mixers = {source: Mixer(RATE_HZ, limited=False) for source in ("model", "truth")}
-        for source, mixer in mixers.items():
-            mixer.add(struck[0].voices[source])
-        before = {source: mixer.render(RATE_HZ // 2) for source, mixer in mixers.items()}
-        player.set_patch(turned)
-        for source, mixer in mixers.items():
-            whole = np.concatenate([before[source], mixer.render(RATE_HZ // 2)])[:, 0]
-            sounds[source, turned is patch] = whole.astype(np.float64)
+        for source in ("model", "truth"):
+            stage = Stage(patch, preset, (source,))
+            stage.play(NoteOn(57, 100))
+            before = stage.render(RATE_HZ // 2)
+            stage.take(turned)
+            sounds[source, turned is patch] = np.concatenate([before, stage.render(RATE_HZ // 2)])
     at, glide = RATE_HZ // 2, round(0.1 * RATE_HZ)
     for source in ("model", "truth"):
         sound, free = sounds[source, False], sounds[source, True]
@@ -371,25 +389,20 @@ def test_every_knob_turned_while_it_rings_changes_model_and_truth_alike_without_
 
 
 def test_an_impossible_knob_leaves_what_rings_and_is_told_by_the_next_key(patch: Patch, preset: Preset) -> None:
-    struck: list[Struck] = []
-    player = Player(patch, preset, RATE_HZ, struck.append, ("model",))
-    player.handle(NoteOn(57, 60))
-    before = struck[0].parameters
+    stage = Stage(patch, preset)
+    (before,) = stage.play(NoteOn(57, 60))
     thin = changed(patch, strings=Fretted(string=physical(replace(STEEL, density_kg_m3=90_000.0))))
-    player.set_patch(changed(thin, knobs=Knobs(density=3.0)))
-    assert struck[0].parameters == before
+    stage.take(changed(thin, knobs=Knobs(density=3.0)))
+    (after,) = stage.play()
+    assert after.now == before.now
     with pytest.raises(ValueError, match="density_kg_m3"):
-        player.handle(NoteOn(57, 60))
+        stage.player.handle(NoteOn(57, 60))
 
 
 def test_the_wheel_turns_what_the_patch_says(patch: Patch, preset: Preset) -> None:
-    wheel = changed(patch, mod_wheel="pluck.position")
-    struck: list[Struck] = []
-    player = Player(wheel, preset, RATE_HZ, struck.append)
-    player.handle(NoteOn(50, 90))
-    player.handle(Controller(MOD_WHEEL, 127))
-    player.handle(NoteOn(52, 90))
-    assert [each.pluck.position for each in struck] == [pytest.approx(0.2), pytest.approx(0.5)]
+    stage = Stage(changed(patch, mod_wheel="pluck.position"), preset)
+    stage.play(NoteOn(50, 90), Controller(MOD_WHEEL, 127), NoteOn(52, 90))
+    assert [each.position for each in stage.begun()] == [pytest.approx(0.2), pytest.approx(0.5)]
 
 
 @pytest.mark.parametrize("field", WHEEL)
@@ -397,14 +410,13 @@ def test_the_wheel_turns_whatever_it_may(patch: Patch, preset: Preset, field: st
     """Softly and hard, held and released: something of the next note, or of what it is heard through, is another."""
 
     def heard(value: int) -> object:
-        struck: list[Struck] = []
         wheel = changed(patch, mod_wheel=field, body=Body(name="guitar"), room=Room(mix=0.1))
-        player = Player(wheel, preset, RATE_HZ, struck.append)
-        player.handle(Controller(MOD_WHEEL, value))
+        stage = Stage(wheel, preset)
+        stage.play(Controller(MOD_WHEEL, value))
         for key, velocity in ((50, 20), (52, 110)):
-            player.handle(NoteOn(key, velocity))
-            player.handle(NoteOff(key))
-        return [(each.pluck, each.parameters) for each in struck], player.heard_through
+            stage.play(NoteOn(key, velocity), NoteOff(key))
+        plucks = [(each.position, each.amplitude_mm, each.width) for each in stage.begun()]
+        return plucks, [each.now for each in seen(stage.player)], stage.player.heard_through
 
     assert heard(0) != heard(127)
 
@@ -451,7 +463,7 @@ def test_a_note_can_be_stopped_while_it_is_rendered(patch: Patch, preset: Preset
 
 def test_a_preset_of_one_string_is_refused(patch: Patch) -> None:
     with pytest.raises(ValueError, match="learned one string only"):
-        Player(patch, load_preset(SHIPPED / "studio_nylon_b3.safetensors"), RATE_HZ, lambda struck: None)
+        Stage(patch, load_preset(SHIPPED / "studio_nylon_b3.safetensors"))
 
 
 def test_a_string_that_rings_is_heard_at_a_point_that_moves(patch: Patch, preset: Preset) -> None:
@@ -488,37 +500,24 @@ def test_the_difference_is_that_of_model_and_truth_with_its_gain(patch: Patch, p
 
 
 def test_a_ringing_string_stays_as_it_is_where_a_knob_would_overdamp_it(patch: Patch, preset: Preset) -> None:
-    struck: list[Struck] = []
-    player = Player(patch, preset, RATE_HZ, struck.append, ("model",))
-    player.handle(NoteOn(45, 90))
-    before = struck[0].parameters
+    stage = Stage(patch, preset)
+    (before,) = stage.play(NoteOn(45, 90))
     heavy = replace(STEEL, damping_d3_kg_m_s=2e-2)  # of its highest modes
-    player.set_patch(changed(patch, strings=Fretted(string=physical(heavy))))
-    assert struck[0].parameters == before
+    stage.take(changed(patch, strings=Fretted(string=physical(heavy))))
+    (after,) = stage.play()
+    assert after.now == before.now
     with pytest.raises(ValueError, match="overdamped"):
-        player.handle(NoteOn(45, 90))
-    player.set_patch(changed(patch, knobs=Knobs(decay=2.0)))
-    assert struck[0].parameters.damping_d1_kg_m_s == pytest.approx(2 * before.damping_d1_kg_m_s)
+        stage.player.handle(NoteOn(45, 90))
+    stage.take(changed(patch, knobs=Knobs(decay=2.0)))
+    (after,) = stage.play()
+    assert after.now.damping_d1_kg_m_s == pytest.approx(2 * before.now.damping_d1_kg_m_s)
 
 
-def test_a_wheel_that_moves_while_strings_glide_is_followed(
-    patch: Patch, preset: Preset, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Whichever is computed first: in the end each string has the patch and the wheel."""
-    struck: list[Struck] = []
-    player = Player(patch, preset, RATE_HZ, struck.append, ("model",))
-    for key in (45, 50):
-        player.handle(NoteOn(key, 90))
-    retune = Struck.retune
-
-    def late(self: Struck, parameters: StringParameters, seconds: float, frame: int = 0) -> None:
-        monkeypatch.setattr(Struck, "retune", retune)
-        player.handle(Bend(1.0))  # as in another thread
-        retune(self, parameters, seconds, frame)
-
-    monkeypatch.setattr(Struck, "retune", late)
-    player.set_patch(changed(patch, knobs=Knobs(decay=2.0)))
-    for each in struck:
-        own = each.key.string.parameters
-        assert each.parameters.damping_d1_kg_m_s == pytest.approx(2 * own.damping_d1_kg_m_s)
-        assert each.parameters.tension_n > 1.2 * own.tension_n
+def test_a_wheel_that_moves_while_a_knob_is_turned_is_followed(patch: Patch, preset: Preset) -> None:
+    """In the end each string has the patch and the wheel."""
+    stage = Stage(patch, preset)
+    stage.play(NoteOn(45, 90), NoteOn(50, 90))
+    stage.take(changed(patch, knobs=Knobs(decay=2.0)))
+    for each in stage.play(Bend(1.0)):
+        assert each.now.damping_d1_kg_m_s == pytest.approx(2 * each.own.damping_d1_kg_m_s)
+        assert each.now.tension_n > 1.2 * each.own.tension_n

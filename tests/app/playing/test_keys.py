@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import (
     KEYS,
     NOTES_OFF,
@@ -24,19 +25,20 @@ from app.instrument.events import (
     TimedEvent,
 )
 from app.instrument.loudness import peak_db
-from app.instrument.player import Player, Struck
 from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Body, Patch
 from app.playing.due import Due
-from app.playing.note import Note
+from app.playing.key_note import KeyNote
 from app.playing.notes import Notes
 from app.playing.playback import Playback
 from app.playing.sources import Sources
 from engine.effects import Effects
+from engine.kernels import playing_layout as of
 from engine.voices import Ear, Mixer
 from engine.voices.voice import FADE_S
+from tests.app.instrument.seen import Seen, taken_up
 from tests.app.monitors import find_shipped, hears
 
 Wait = Callable[[Callable[[], bool]], None]
@@ -45,7 +47,10 @@ EAR = Ear((0.3,))
 
 @pytest.fixture
 def patch() -> Patch:
-    return read_patch(PATCHES / "steel_string_acoustic.json").model_copy(update={"body": Body()})
+    """Its other strings stay silent, so that silence can be heard."""
+    shipped = read_patch(PATCHES / "steel_string_acoustic.json")
+    pluck = shipped.pluck.model_copy(update={"variation": 0.0})
+    return shipped.model_copy(update={"body": Body(), "sympathy_s_kg": 0.0, "pluck": pluck})
 
 
 @pytest.fixture
@@ -69,16 +74,23 @@ def played(sound: Any, patch: Patch, wait: Wait, wishes: list[Effects | None], t
     made.close()
 
 
-def player_of(notes: Notes) -> Player:
+def player_of(notes: Notes) -> InstrumentPlayer:
     assert notes.keys.player is not None
     return notes.keys.player
 
 
-def strike(notes: Notes, event: NoteOn, due: Due | None = None) -> tuple[Struck, Note]:
-    """The string of a key, and its note."""
+def strike(notes: Notes, event: NoteOn, due: Due | None = None) -> KeyNote:
+    """The note of a key, which the player has taken up."""
     note = notes.handle(event, due)
-    assert note is not None and note.struck is not None
-    return note.struck, note
+    assert isinstance(note, KeyNote)
+    note.player.compiled.catch_up(notes.mixer)
+    notes.look()
+    return note
+
+
+def now(notes: Notes, note: KeyNote) -> Seen:
+    """It, as it rings."""
+    return next(each for each in taken_up(note.player, notes.mixer) if each.id == note.id)
 
 
 def settle(notes: Notes, wait: Wait) -> None:
@@ -90,8 +102,8 @@ def settle(notes: Notes, wait: Wait) -> None:
 
 def test_a_key_waits_for_no_knob(played: Notes, patch: Patch, wait: Wait, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the loudness of the turned patch takes: here it takes until the key has sounded."""
-    struck, _ = strike(played, NoteOn(45, 60))
-    before = struck.parameters
+    struck = strike(played, NoteOn(45, 60))
+    before = now(played, struck).now
     begun, held = Event(), Event()
 
     def slow(*args: Any) -> float:
@@ -114,25 +126,26 @@ def test_a_key_waits_for_no_knob(played: Notes, patch: Patch, wait: Wait, monkey
         held.set()
         knob.join()
         key.join()
-    wait(lambda: struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4))
+    wait(lambda: now(played, struck).now.second_moment_m4 == pytest.approx(3 * before.second_moment_m4))
 
 
 def test_the_last_of_many_turns_counts(played: Notes, patch: Patch, wait: Wait) -> None:
-    struck, _ = strike(played, NoteOn(45, 60))
-    before = struck.parameters
+    struck = strike(played, NoteOn(45, 60))
+    before = now(played, struck).now
     played.keys.begin_recording()
     for stiffness in np.linspace(1.1, 3.0, 20):
         played.set_instrument(patch.with_value("knobs.stiffness", float(stiffness)), EAR)
     played.listen(Ear((0.1,)))
     made = strike(played, NoteOn(50, 60))
-    assert made[0].ear.points == (0.1,)
-    assert made[0].key.patch.knobs.stiffness == 3.0
+    assert made.ear.points == (0.1,)
+    assert made.patch.knobs.stiffness == 3.0
     settle(played, wait)
-    assert struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4)
-    exact = played.keys.player
-    assert exact is not None
-    fresh = Player(exact.patch, exact.preset, 48_000, lambda struck: None, ear=exact.ear)
-    assert exact.gain_of(struck) == fresh.gain_of(struck) != made[0].gain
+    assert now(played, struck).now.second_moment_m4 == pytest.approx(3 * before.second_moment_m4)
+    exact = player_of(played)
+    fresh = InstrumentPlayer(exact.patch, exact.preset, 48_000, {"model": 1.0}, exact.ear)
+    assert struck.parameters is not None
+    gains = [each.gain_of(45, None, now(played, struck).own, made.gain) for each in (exact, fresh)]
+    assert gains[0] == gains[1]
     turned = [each.event.patch for each in played.keys.recorder.end() if isinstance(each.event, PatchTurned)]
     assert (turned[-1].knobs.stiffness, turned[-1].pickup.points) == (3.0, (0.1,)), "it is recorded as it was played"
 
@@ -145,7 +158,7 @@ def test_another_patch_is_played_at_once(played: Notes, patch: Patch) -> None:
     made = strike(played, NoteOn(45, 60))
     played.set_instrument(patch, EAR)
     again = strike(played, NoteOn(45, 60))
-    assert made[0].key.string.parameters != again[0].key.string.parameters
+    assert None is not made.parameters != again.parameters
 
 
 def test_an_impossible_tuning_is_reported_and_what_was_played_stays(
@@ -158,8 +171,8 @@ def test_an_impossible_tuning_is_reported_and_what_was_played_stays(
     played.listen(Ear((0.1,)))
     settle(played, wait)
     again = strike(played, NoteOn(45, 60))
-    assert again[0].parameters == made[0].parameters
-    assert again[0].ear == Ear((0.1,))
+    assert again.parameters == made.parameters
+    assert again.ear == Ear((0.1,))
     assert len(told) == 1
 
 
@@ -182,16 +195,15 @@ def test_a_patch_that_is_left_before_it_is_loaded_does_not_come_back(played: Not
 
 
 def test_a_key_sounds_with_the_next_frame_and_is_damped_when_let_go(played: Notes, sound: Any) -> None:
-    struck, note = strike(played, NoteOn(45, 100))
-    assert not note.pending
-    assert set(note.voices) == {"model", "truth"}
+    note = played.handle(NoteOn(45, 100))
     heard = sound.mixer.render(24_000)[:, 0]
     assert np.abs(heard[:200]).max() > 1e-4
+    played.poll()
+    assert isinstance(note, KeyNote) and note.began and note.began_frame == 64
     assert played.keys.sounding()[45] > 0.2
     played.handle(NoteOff(45))
     sound.mixer.render(48_000)
     assert np.abs(sound.mixer.render(4_800)).max() < 1e-3 * np.abs(heard).max()
-    assert struck.damped
 
 
 def test_model_truth_and_difference_are_of_one_moment(played: Notes, sound: Any) -> None:
@@ -204,21 +216,38 @@ def test_model_truth_and_difference_are_of_one_moment(played: Notes, sound: Any)
     assert np.abs(sound.mixer.render(4_800)).max() < 1e-4 * loud
 
 
+def test_a_stop_ends_strings_that_ring_in_sympathy_too(played: Notes, sound: Any, wait: Wait) -> None:
+    sitar = read_patch(PATCHES / "concert_harp.json").model_copy(update={"sympathy_s_kg": 1e-3})
+    played.set_instrument(sitar, EAR)
+    settle(played, wait)
+    low, high = sitar.range
+    strike(played, NoteOn((low + high) // 2, 120))
+    sound.mixer.render(48_000)
+    player = player_of(played)
+    assert player.compiled.memory.view(np.int64)[of.PLAYER_SYMPATHETIC] > 100
+    assert player.compiled.memory.view(np.int64)[of.PLAYER_SYMPATHY_RINGS]
+    played.stop()
+    sound.mixer.render(4_800)
+    assert np.abs(sound.mixer.render(4_800)).max() < 1e-6
+    strike(played, NoteOn((low + high) // 2, 120))
+    assert np.abs(sound.mixer.render(9_600)).max() > 1e-3, "they ring again with the next note"
+
+
 def test_pedal_bend_and_another_patch_reach_strings_that_ring(
     played: Notes, sound: Any, patch: Patch, wishes: list[Effects | None], wait: Wait
 ) -> None:
     played.handle(Controller(SUSTAIN, 127))
-    struck, _ = strike(played, NoteOn(45, 60))
+    struck = strike(played, NoteOn(45, 60))
     played.handle(NoteOff(45))
-    assert not struck.damped
-    before = struck.parameters
+    assert not now(played, struck).damped
+    before = now(played, struck).now
     played.handle(Bend(1.0))
-    assert struck.parameters.tension_n > before.tension_n
+    assert now(played, struck).now.tension_n > before.tension_n
     played.handle(Controller(SUSTAIN, 0))
-    assert struck.damped
+    assert now(played, struck).damped
     stiff = patch.with_value("knobs.stiffness", 3.0).model_copy(update={"body": Body(name="guitar", mix=0.5)})
     played.set_instrument(stiff, EAR)
-    wait(lambda: struck.parameters.second_moment_m4 == pytest.approx(3 * before.second_moment_m4))
+    wait(lambda: now(played, struck).now.second_moment_m4 == pytest.approx(3 * before.second_moment_m4))
 
     def hears_guitar() -> bool:
         """The room that the patch begins with, which has no body, may come late."""
@@ -246,40 +275,39 @@ def test_a_recording_begins_and_ends_as_the_hands_are(played: Notes) -> None:
     """With the pedal down and a wheel turned; and no key of it is down for ever."""
     for event in (Controller(SUSTAIN, 127), Bend(0.5), Controller(101, 0), Controller(100, 0), Controller(6, 12)):
         played.handle(event)
-    heard = played.handle(NoteOn(50, 60))
-    assert heard is not None
+    strike(played, NoteOn(50, 60))
     played.keys.begin_recording()
     played.handle(NoteOn(45, 60))
     played.handle(NoteOff(45))
     played.handle(NoteOn(52, 60))
     events = played.keys.recorder.end()
     assert [each.event for each in events[-2:]] == [Controller(SUSTAIN, 0), NoteOff(52)]
-    assert played.keys.player is not None
-    again = Player(played.keys.player.patch, played.keys.player.preset, 48_000, lambda struck: None)
+    heard = player_of(played)
+    again = InstrumentPlayer(heard.patch, heard.preset, 48_000, {"model": 1.0, "truth": 0.0}, heard.ear)
     for each in events[:-2]:
         again.handle(each.event)
-    as_heard, played = (
-        {struck.event.key: struck for struck in one.sounding()} for one in (played.keys.player, again)
+    as_heard, as_recorded = (
+        {each.key: each for each in taken_up(one, mixer)}
+        for one, mixer in ((heard, played.mixer), (again, Mixer(48_000)))
     )
-    assert played.keys() == {45, 52}
-    for key, struck in played.items():
-        assert (struck.parameters, struck.damped) == (as_heard[key].parameters, False)
-    assert played[45].parameters.tension_n > played[45].key.string.parameters.tension_n
+    assert as_recorded.keys() == {45, 52}
+    for key, struck in as_recorded.items():
+        assert (struck.now, struck.damped) == (as_heard[key].now, False)
+    assert as_recorded[45].now.tension_n > as_recorded[45].own.tension_n
 
 
 def test_a_soloed_mode_is_as_loud_as_in_the_note(played: Notes, sound: Any, wait: Wait) -> None:
     """So that the other modes do not thunder when the solo ends, and a pluck by hand does not either."""
     made = strike(played, NoteOn(45, 100))
-    whole = made[0].gain
+    whole = made.gain
     played.listen(replace(EAR, solo=5))
-    made = strike(played, NoteOn(45, 100))
-    assert made[0].gain == pytest.approx(whole)
+    assert strike(played, NoteOn(45, 100)).gain == pytest.approx(whole)
     played.listen(Ear((0.0,)))
-    made = strike(played, NoteOn(45, 100))
-    assert made[0].gain <= 1, "nothing is heard of it: no gain would help"
+    assert strike(played, NoteOn(45, 100)).gain <= 1, "nothing is heard of it: no gain would help"
     played.listen(EAR)
     settle(played, wait)
-    assert played.keys.gain_of(made[0].key.string.parameters) == pytest.approx(whole)
+    made = strike(played, NoteOn(45, 100))
+    assert played.keys.gain_of(made.parameters) == pytest.approx(whole)
 
 
 @pytest.mark.parametrize(("rate_hz", "channels"), [(48_000, 1), (44_100, 2)])
@@ -301,11 +329,14 @@ def test_keys_of_a_device_that_is_gone_go_out_and_leave_no_motion(
 
 def test_the_strings_end_with_the_devices_rate_and_new_ones_sound(played: Notes, sound: Any) -> None:
     made = strike(played, NoteOn(45, 60))
+    played.handle(Controller(SUSTAIN, 127))
+    sound.mixer.render(64)
     sound.mixer = type(sound.mixer)(44_100)
     strike(played, NoteOn(45, 60))
     assert np.abs(sound.mixer.render(4_410)).max() > 1e-4
     played.poll()
-    assert made[1].cut
+    assert made.cut
+    assert player_of(played).compiled.channel(0).pedal, "the foot is still on it"
 
 
 def test_a_preset_that_is_not_there_is_told(played: Notes, patch: Patch, wait: Wait, told: list[str]) -> None:
@@ -357,23 +388,24 @@ def test_the_notes_of_a_file_begin_with_their_frames(
     """Exactly, model and truth, also where Python is late and keys are struck again."""
     times_s = [0.0, 0.0101, 0.05, 0.1, 0.1, 0.15003, 0.2]
     keys = [45, 52, 57, 45, 60, 45, 52]
-    made: list[Note] = []
+    made: list[KeyNote] = []
     ended = Event()
 
     def handle(event: Any, due: Due | None) -> None:
         if len(made) in (2, 5):
             sound.mixer.render(round(late_s * 48_000))
-        if (found := played.handle(event, due)) is not None:
+        played.look()  # as the window's timer does
+        if isinstance(found := played.handle(event, due), KeyNote):
             made.append(found)
 
     playback = Playback(handle, TurnedClock(sound), played.cancel, ended.set)
     playback.play([TimedEvent(t, NoteOn(key, 90)) for t, key in zip(times_s, keys, strict=True)])
     assert ended.wait(30)
     sound.mixer.render(4_800)
-    begins = [{voice.began_frame for voice in note.voices.values()} for note in made]
-    assert all(len(each) == 1 for each in begins)
-    first = min(begins[0])
-    assert [min(each) - first for each in begins] == [round(t * 48_000) for t in times_s]
+    played.look()
+    begins = [note.began_frame for note in made]
+    assert all(begins)
+    assert [each - begins[0] for each in begins] == [round(t * 48_000) for t in times_s]
 
 
 def test_releases_and_bends_of_a_file_count_at_their_frames(played: Notes, sound: Any, patch: Patch) -> None:
@@ -387,54 +419,78 @@ def test_releases_and_bends_of_a_file_count_at_their_frames(played: Notes, sound
         played.handle(event, Due(sound.mixer, begin + frame, 0.0))
     assert sound.mixer.frames == 64
     heard = sound.mixer.render(begin - 64 + 28_800)[begin - 64 :, 0]
-    assert played.keys.player is not None
-    mixer, struck = Mixer(48_000), list[Struck]()
+    mixer = Mixer(48_000)
+    player = InstrumentPlayer(patch, player_of(played).preset, 48_000, {"model": 1.0, "truth": 0.0}, EAR)
+    mixer.set_player(player.compiled)
     mixer.render(begin)
-    player = Player(patch, played.keys.player.preset, 48_000, struck.append, ("model",), EAR)
     expected = []
     for frame, event, end in zip(frames, events, (*frames[1:], 28_800), strict=True):
         if isinstance(event, Controller):  # it fades in 20 ms, where one at once fades in 30
-            struck[-1].voices["model"].release(FADE_S)
-        elif (made := player.handle(event)) is not None:
-            made.voices["model"].start_with_gain(made.gain)
-            mixer.add(made.voices["model"])
+            player.stop(FADE_S)
+        else:
+            player.handle(event)
         expected.append(mixer.render(end - frame)[:, 0])
     np.testing.assert_allclose(heard, np.concatenate(expected), atol=1e-6)
 
 
 def test_a_file_that_is_stopped_ends_what_was_handed_over(played: Notes, sound: Any, wait: Wait) -> None:
-    ringing, _ = strike(played, NoteOn(45, 90))
+    ringing = strike(played, NoteOn(45, 90))
     sound.mixer.render(4_800)
     played.keys.begin_recording()
     soon = Due(sound.mixer, sound.mixer.frames + 2_000, time.monotonic() + 0.04)
-    later = [strike(played, NoteOn(key, 127), soon)[1] for key in (45, 50)]
+    later = [strike(played, NoteOn(key, 127), soon) for key in (45, 50)]
     played.cancel()
     played.handle(Controller(NOTES_OFF, 0))
     sound.mixer.render(2_000)
+    played.look()
     assert all(each.over and each.began_frame == 0 for each in later)
-    assert ringing.damped, "it has its place again"
+    assert now(played, ringing).damped, "it has its place again"
     assert not ringing.over
     assert NoteOn(50, 127) not in [each.event for each in played.keys.recorder.end()]
     sound.mixer.render(24_000)
     assert np.abs(sound.mixer.render(4_800)).max() < 1e-4
 
 
-def test_a_key_that_is_struck_while_its_next_note_waits_sounds_at_once(played: Notes, sound: Any) -> None:
-    """And not twice."""
+def test_a_note_that_waits_and_is_released_never_begins_and_others_do(played: Notes, sound: Any) -> None:
     soon = Due(sound.mixer, sound.mixer.frames + 2_000, 0.0)
-    (_, waits), (_, struck) = strike(played, NoteOn(45, 90), soon), strike(played, NoteOn(45, 90))
+    one, other = (strike(played, NoteOn(key, 90), soon) for key in (45, 50))
+    one.release(0.01)
     sound.mixer.render(4_800)
+    played.look()
+    assert one.over and not one.began_frame
+    assert other.began_frame == soon.frame
+    other.release_at(sound.mixer.frames + 1_000)
+    other.release_at(0)
+    sound.mixer.render(9_600)
+    played.look()
+    assert not other.over
+    other.release_at(sound.mixer.frames + 1_000)
+    sound.mixer.render(4_800)
+    played.look()
+    assert other.over
+
+
+def test_a_key_that_is_struck_while_its_next_note_waits_sounds_at_once(played: Notes, sound: Any) -> None:
+    """And again when that is due."""
+    soon = Due(sound.mixer, sound.mixer.frames + 2_000, 0.0)
+    waits, struck = strike(played, NoteOn(45, 90), soon), strike(played, NoteOn(45, 90))
+    sound.mixer.render(1_000)
+    played.look()
     assert struck.began_frame == 64
-    assert (waits.over, waits.began_frame) == (True, 0)
+    assert not waits.began_frame
+    sound.mixer.render(4_800)
+    played.look()
+    assert waits.began_frame == soon.frame and struck.over
 
 
 def test_of_another_device_an_event_counts_at_once(played: Notes, sound: Any) -> None:
     gone = Due(Mixer(48_000), 10_000_000, 0.0)
     made = strike(played, NoteOn(45, 90), gone)
     played.handle(NoteOff(45), gone)
-    assert made[0].begin_frame == 0
+    assert made.begin_frame == 0
     sound.mixer.render(64)
-    assert made[1].began_frame == 64
+    played.look()
+    assert made.began_frame == 64
 
 
 def test_a_recording_has_the_events_of_a_file_when_they_are_heard(played: Notes, sound: Any) -> None:
@@ -456,11 +512,16 @@ def test_after_a_file_that_was_stopped_within_a_bend_keys_are_in_tune(played: No
     playback = Playback(played.handle, played, played.cancel)
     bent = [TimedEvent(0.0, NoteOn(45, 60)), TimedEvent(0.0, Bend(1.0)), TimedEvent(600.0, NoteOff(45))]
     playback.play(bent)
-    wait(lambda: played.keys.player is not None and played.keys.player._hands.of(0).bend == 1.0)
+
+    def bend() -> float:
+        played.mixer.render(64)
+        return player_of(played).compiled.channel(0).bend
+
+    wait(lambda: bend() == 1.0)
     playback.stop()
     for channel in (0, KEYS):
-        struck, _ = strike(played, NoteOn(57, 60, channel))
-        assert struck.parameters == struck.key.string.parameters
+        struck = now(played, strike(played, NoteOn(57, 60, channel)))
+        assert struck.now == struck.own
 
 
 def test_a_patch_that_is_kept_beside_a_single_string_sounds_when_it_is_played_again_and_not_before(

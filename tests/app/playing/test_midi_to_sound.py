@@ -105,6 +105,7 @@ def patch() -> Patch:
     shipped = read_patch(PATCHES / "steel_string_acoustic.json")
     dry = {
         "polarisations": None,
+        "sympathy_s_kg": 0.0,  # or the other strings would ring on
         "mode": "poly",
         "bend_semitones": 2.0,
         "damping": Damping(release_t60_s=RELEASE_T60_S),

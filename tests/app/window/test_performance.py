@@ -112,7 +112,7 @@ def test_stop_keeps_the_playhead_whatever_else_is_chosen(
         window.session.update(**changes)
         assert performance.position_s == stopped_s
     assert not performance.moving
-    performance.play_or_stop()
+    performance.pluck()
     assert performance.playing
     assert performance.position_s < stopped_s
 

@@ -63,7 +63,7 @@ def test_the_patch_is_exported_while_the_window_plays(qtbot: QtBot, patched: Con
     qtbot.waitUntil(lambda: patched.performance.notes.keys.player is not None)
     dialog.save.click()
     qtbot.keyPress(patched.window, Qt.Key.Key_A)
-    assert patched.performance.notes.keys.sounding()
+    qtbot.waitUntil(lambda: bool(patched.performance.notes.keys.sounding()))
     qtbot.keyRelease(patched.window, Qt.Key.Key_A)
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert "Concert_harp.sfz" in dialog.state.text()
@@ -106,7 +106,7 @@ def test_keys_play_and_shortcuts_work_while_it_runs(
     assert active is not None
     focused = active.focusWidget() or active
     qtbot.keyPress(focused, Qt.Key.Key_A)
-    assert patched.performance.notes.keys.sounding()
+    qtbot.waitUntil(lambda: bool(patched.performance.notes.keys.sounding()))
     qtbot.keyRelease(focused, Qt.Key.Key_A)
     looped = patched.session.choices.loop
     qtbot.keyClick(focused, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)

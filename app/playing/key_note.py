@@ -1,0 +1,147 @@
+"""A note that a key began: the compiled player has its voices, and reports what becomes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from app.instrument.compiled import InstrumentPlayer
+from app.instrument.events import NoteOn
+from app.patches.drums import Drums
+from app.rendering import RenderRequest
+from app.rendering.subject import StringOf
+from engine.kernels import playing_layout as of
+from engine.pluck import Pluck
+from engine.resonators.string import StringParameters
+from engine.voices import Mixer
+from engine.voices.player import Playing, Report
+
+SOURCES = ("model", "truth")
+AS_THEY_ARE: Mapping[str, float] = dict.fromkeys(SOURCES, 1.0)
+
+
+class KeyNote:
+    """What is known of it, as of the latest `take` and `look`.
+
+    Args:
+        player: whose voices it has, in `mixer`.
+        id: of its event, which reports carry.
+        path: of the preset.
+        begin_frame: the frame of the mixer at which it begins; 0: at once.
+
+    Attributes:
+        patch: with which it was struck.
+        ear: where it was heard then.
+        request: the string and how it was plucked, once the player has reported them; None before, and of a drum.
+        string: on which of a set it is played, as of `Strings.of_key`; None: the key chooses it.
+        gain: the factor of its voices.
+        match: by source, the factor of the level match: both sources are the same string, and stay as they are.
+        released: whether it was asked to fade out.
+        cut: it is not heard any more: its mixer was replaced, or no string could play it.
+        timed: its latency has been noted.
+    """
+
+    from_s, waits_s, pending = 0.0, 0.0, False
+
+    def __init__(
+        self, player: InstrumentPlayer, mixer: Mixer, id: int, event: NoteOn, path: Path, begin_frame: int = 0
+    ) -> None:
+        self.player, self.mixer, self.id, self.event, self._path = player, mixer, id, event, path
+        self.begin_frame, self.patch, self.ear = begin_frame, player.patch, player.ear
+        self.request: RenderRequest | None = None
+        self.string: int | None = None
+        self.gain = 1.0
+        self.match = AS_THEY_ARE
+        self.released = self.cut = self.timed = False
+        self._ended = False
+        self._begun: Report | None = None
+        self._playing = Playing(0.0, 0, None)
+
+    def take(self, report: Report) -> None:
+        """Follows a report of the player."""
+        if report.kind == of.BEGAN:
+            self._begun, self.gain = report, report.gain
+            self.string = report.string if report.string >= 0 else None
+            if report.parameters is not None:
+                pluck = self.patch.pluck.pluck(self.event.velocity)
+                pluck = pluck.moved(position=report.position, amplitude_mm=report.amplitude_mm)
+                if pluck.shape != "triangular":
+                    pluck = pluck.moved(width=report.width)
+                self.request = RenderRequest(StringOf(self._path, report.parameters), pluck, 0.0, self.ear)
+            self.look()
+        else:
+            self._ended = True
+            self.cut = self.cut or report.kind == of.REFUSED
+
+    def look(self) -> None:
+        """Reads how far it is. Any thread."""
+        if self._begun is not None and not self.over:
+            self._playing = self.player.compiled.playing(self._begun) or self._playing
+
+    @property
+    def parameters(self) -> StringParameters | None:
+        """Of its string as its key had it; None before it began, and of a drum."""
+        return None if self._begun is None else self._begun.parameters
+
+    @property
+    def pluck(self) -> Pluck | None:
+        """How its string was plucked; None as for `parameters`."""
+        return None if self.request is None else self.request.pluck
+
+    @property
+    def of_drum(self) -> bool:
+        """Whether it is a drum's."""
+        return isinstance(self.patch.strings, Drums)
+
+    @property
+    def known(self) -> bool:
+        """Whether the player has reported it."""
+        return self._begun is not None or self.over
+
+    @property
+    def over(self) -> bool:
+        """Whether it has ended: nothing of it will be heard any more."""
+        return self._ended or self.cut
+
+    @property
+    def seconds(self) -> float:
+        """The time since it began up to which the device has its samples."""
+        self.look()
+        return self._playing.seconds
+
+    @property
+    def began(self) -> bool:
+        """Whether the device has any of its samples, or it was cut."""
+        return self.cut or self.seconds > 0
+
+    @property
+    def began_frame(self) -> int:
+        """The frame of the mixer at which it began; 0 before that."""
+        self.look()
+        return self._playing.began_frame
+
+    @property
+    def latency_s(self) -> float | None:
+        """From the gesture to the callback that gave the device its first samples; None: not known."""
+        self.look()
+        return self._playing.struck_to_began_s
+
+    def frame_at(self, seconds: float) -> int:
+        """The frame of its mixer at which its motion reaches a time; only once it has begun."""
+        return self.began_frame + round(seconds * self.mixer.rate_hz)
+
+    def release_at(self, frame: int) -> None:
+        """Lets it fade out from a frame of the mixer on; 0: not any more."""
+        self.player.cancel(self.id)
+        if frame > 0:
+            self.player.release(self.id, frame=frame)
+
+    def release(self, seconds: float) -> None:
+        """Lets it fade out within so many seconds, from now on; one that waits for its frame never begins."""
+        self.released = True
+        self.player.cancel(self.id)
+        self.player.release(self.id, max(seconds, 1e-3))
+
+    def end(self) -> None:
+        """Marks it as cut, where no device plays its voices any more."""
+        self.cut = True

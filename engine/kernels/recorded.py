@@ -1,0 +1,91 @@
+"""What a recording adds to the string of a key: as `engine.resonators.recorded.RecordedString.resonator`.
+
+Each partial has two modes, side by side, of the first and of the second polarisation. What single partials of the
+recorded note add to the law fades with the distance of the string in pitch.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from engine.kernels import playing_layout as of
+from engine.kernels import strings
+from engine.kernels.strings import EXACT
+from engine.resonators.recorded import FADES_SEMITONES
+
+
+@njit(**EXACT)
+def modes_of(tables: np.ndarray, partials: int) -> int:
+    """How many modes so many partials have: as `PresetInfo.modes_of`."""
+    return min(2 * partials, tables[tables[of.TABLE_RECORDED] + of.RECORDED_MODES])
+
+
+@njit(**EXACT)
+def _near(table: np.ndarray, tables: np.ndarray, string: np.ndarray) -> float:
+    """How much of the note's own a string has: 1 at the recorded pitch."""
+    hz = math.sqrt(strings.omega_squared(string, 1)) / (2 * math.pi)
+    away = 12 * math.log2(hz / table[tables[of.TABLE_RECORDED] + of.RECORDED_HZ]) / FADES_SEMITONES
+    return math.exp(-away * away)
+
+
+@njit(**EXACT)
+def _own(table: np.ndarray, tables: np.ndarray, which: int, partial: int, near: float) -> float:
+    """One of the five values of a partial, from 0; ratios fade by their logarithms."""
+    first = tables[of.TABLE_RECORDED]
+    rest, known = table[first + of.RECORDED_REST + which], tables[first + of.RECORDED_PARTIALS]
+    value = rest
+    if partial < known:
+        value = table[first + of.RECORDED_HEADER + 2 * tables[first + of.RECORDED_SMOOTH] + which * known + partial]
+    if which == of.RATIO or which == of.SECOND_RATIO:
+        return math.exp(near * math.log(value) + (1 - near) * math.log(rest))
+    return near * value + (1 - near) * rest
+
+
+@njit(**EXACT)
+def _smooth(table: np.ndarray, tables: np.ndarray, hz: float) -> float:
+    """The decay over that of the law at a frequency: even between points, in logarithms."""
+    first, count = (
+        tables[of.TABLE_RECORDED] + of.RECORDED_HEADER,
+        tables[tables[of.TABLE_RECORDED] + of.RECORDED_SMOOTH],
+    )
+    wanted, place = math.log(hz), 0
+    while place < count and table[first + place] <= wanted:
+        place += 1
+    if place == 0:
+        return math.exp(table[first + count])
+    if place == count:
+        return math.exp(table[first + 2 * count - 1])
+    low, high = table[first + place - 1], table[first + place]
+    share = (wanted - low) / (high - low)
+    below, above = table[first + count + place - 1], table[first + count + place]
+    return math.exp(below + share * (above - below))
+
+
+@njit(**EXACT)
+def split(table: np.ndarray, tables: np.ndarray, string: np.ndarray, modes: int, amplitudes: np.ndarray) -> None:
+    """Splits a pluck's partials, the first of `amplitudes` (modes,), into the modes of both polarisations."""
+    near = _near(table, tables, string)
+    for mode in range(modes - 1, -1, -1):
+        share = _own(table, tables, of.SECOND_SHARE, mode // 2, near)
+        amplitudes[mode] = amplitudes[mode // 2] * (share if mode % 2 == 1 else 1 - share)
+
+
+@njit(**EXACT)
+def correct(table: np.ndarray, tables: np.ndarray, string: np.ndarray, modes: int, rows: np.ndarray) -> None:
+    """Changes ω² and σ of the law, the first two rows of `rows` (4 modes,), to those of the recorded string."""
+    near, highest = _near(table, tables, string), 0.0
+    for mode in range(modes):
+        partial = mode // 2
+        omega, sigma = math.sqrt(rows[mode]), rows[modes + mode]
+        first = omega * 2.0 ** (_own(table, tables, of.CENTS, partial, near) / 1200)
+        sigma *= _smooth(table, tables, omega / (2 * math.pi)) * _own(table, tables, of.RATIO, partial, near)
+        sigma = min(sigma, of.HIGHEST_SIGMA * first)
+        if mode % 2 == 1:
+            first *= 2.0 ** (_own(table, tables, of.SECOND_CENTS, partial, near) / 1200)
+            sigma = min(sigma * _own(table, tables, of.SECOND_RATIO, partial, near), of.HIGHEST_SIGMA * first)
+        highest = max(highest, first)  # the order of modes stays
+        rows[mode] = highest * highest
+        rows[modes + mode] = sigma

@@ -1,0 +1,211 @@
+"""Drums in the window: chosen, struck by keys, pads and at places, lit, heard, recorded and exported."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import mido
+import numpy as np
+import pytest
+import soundfile
+from PySide6.QtCore import Qt
+from pytestqt.qtbot import QtBot
+
+from app.export.choices import ExportChoices
+from app.instrument.events import NoteOff, NoteOn, TimedEvent
+from app.instrument.midi_file import midi_bytes
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
+from app.playing.key_note import KeyNote
+from app.window.controller import DRUMS_PLAYED, Controller
+from tests.app.instrument.seen import seen
+
+PADS = range(36, 52)
+DRUMS = sorted(path.stem for path in PATCHES.glob("*.json") if read_patch(path).strings.kind == "drums")
+
+
+def ready(qtbot: QtBot, controller: Controller) -> None:
+    """Until keys play what is chosen."""
+
+    def plays() -> bool:
+        player = controller.performance.notes.keys.player
+        return player is not None and player.patch == controller.session.choices.patch
+
+    qtbot.waitUntil(plays, timeout=30_000)
+
+
+def heard_db(controller: Controller) -> float:
+    return controller.window.transport.meter._peak_db
+
+
+def told(controller: Controller) -> list[str]:
+    """Notices, without the one that there is no device here."""
+    return [each.message for each in controller.window.notices.notices if "No sound output" not in each.message]
+
+
+@pytest.fixture
+def kit(qtbot: QtBot, played: Controller) -> Controller:
+    played.patches.choose("concert_toms")
+    ready(qtbot, played)
+    return played
+
+
+def test_the_browser_lists_all_shipped_drums(played: Controller) -> None:
+    assert len(DRUMS) == 7
+    assert set(DRUMS) <= {entry.path.stem for entry in played.patches._entries}
+
+
+def test_pads_sound_light_and_ring(qtbot: QtBot, kit: Controller) -> None:
+    assert kit.session.choices.drums is not None
+    for key in (38, 45):
+        kit.window.instrument.pressed.emit(key, 110)
+        kit.window.instrument.released.emit(key)
+    qtbot.waitUntil(lambda: {38, 45} <= kit.performance.notes.keys.sounding().keys())
+    qtbot.waitUntil(lambda: heard_db(kit) > -40)
+    qtbot.waitUntil(lambda: kit.window.instrument.keys.level(45) > 0.1)
+    assert kit.instruments.drum_key == 45
+    assert kit.performance.notes.ringing == 2
+    kit.window.instrument.pressed.emit(60, 110)  # no pad
+    assert kit.performance.notes.ringing == 2
+    kit.play_or_stop()
+    qtbot.waitUntil(lambda: not kit.performance.notes.keys.sounding())
+    assert told(kit) == []
+
+
+def test_pads_of_a_midi_input_strike_by_channel_ten(qtbot: QtBot, kit: Controller) -> None:
+    for key in PADS:
+        kit.instruments.midi._receive(NoteOn(key, 90, 9))
+    qtbot.waitUntil(lambda: set(PADS) <= kit.performance.notes.keys.sounding().keys())
+    note = kit.instruments.latest
+    assert isinstance(note, KeyNote)
+    assert (note.event.key, note.of_drum, note.request) == (51, True, None)
+
+
+def test_model_and_truth_are_switched_while_a_drum_rings(qtbot: QtBot, kit: Controller) -> None:
+    kit.session.update(a="model", b="truth")
+    kit.window.instrument.pressed.emit(36, 127)
+    player = kit.performance.notes.keys.player
+    assert player is not None
+    qtbot.waitUntil(lambda: bool(seen(player)))
+    kit.session.update(heard="b")
+    assert [player.compiled.source_gain(source) for source in (0, 1)] == [0.0, 1.0]
+    kit.session.update(b="difference")
+    assert player.compiled.source_gain(0) == -player.compiled.source_gain(1) > 0
+
+
+def test_views_of_a_string_say_that_drums_are_played(qtbot: QtBot, kit: Controller) -> None:
+    """And show strings again when one is chosen."""
+    assert [panel.covered for panel in kit.panels if panel.of_strings] == [
+        DRUMS_PLAYED for panel in kit.panels if panel.of_strings
+    ]
+    assert not kit.performance.ready, "no string is plucked"
+    for panel in kit.panels:  # none of them breaks while it is open
+        if panel is not kit.panels[0]:
+            side = "left_view" if panel.on_the_left else "right_view"
+            kit.session.update(face="lab", **{side: panel.key})
+            kit._tick()
+            kit._show_deck()
+    kit.session.update(loop=True, solo=3, pickup="bridge", listen=0.7, volume_db=-3.0)
+    kit.window.instrument.pressed.emit(40, 90)
+    qtbot.waitUntil(lambda: 40 in kit.performance.notes.keys.sounding())
+    kit._tick()
+    kit.patches.choose("steel_string_acoustic")
+    assert all(not panel.covered for panel in kit.panels)
+    qtbot.waitUntil(lambda: kit.performance.ready)
+    assert told(kit) == []
+
+
+def test_space_and_a_click_strike_the_drum_that_was_struck_last(qtbot: QtBot, kit: Controller) -> None:
+    notes = kit.performance.notes
+    kit.play_or_stop()
+    qtbot.waitUntil(lambda: notes.keys.sounding().keys() == {36})
+    kit.play_or_stop()
+    qtbot.waitUntil(lambda: not notes.keys.sounding())
+    kit.window.instrument.pressed.emit(43, 90)
+    kit.strike(0.1, -0.2, 100.0)
+    note = kit.instruments.latest
+    assert isinstance(note, KeyNote)
+    assert (note.event.key, note.event.velocity, note.event.place) == (43, 100, (0.1, -0.2))
+    qtbot.waitUntil(lambda: note.began)
+
+
+def test_the_listening_test_says_that_it_needs_a_string(kit: Controller) -> None:
+    kit.listening_test()
+    assert kit._abx is None
+    assert "drums are played" in kit.window.notices.text
+
+
+def test_keys_of_the_computer_tune_a_drum_in_pitch(qtbot: QtBot, played: Controller) -> None:
+    played.patches.choose("tuned_toms")
+    ready(qtbot, played)
+    qtbot.keyPress(played.window, Qt.Key.Key_A)
+    qtbot.waitUntil(lambda: len(played.performance.notes.keys.sounding()) == 1)
+    qtbot.keyRelease(played.window, Qt.Key.Key_A)
+
+
+def test_strings_and_drums_follow_one_another_without_a_leftover(qtbot: QtBot, kit: Controller) -> None:
+    """Each needs a player of its own; what the one before has struck rings on, and stops."""
+    kit.window.instrument.pressed.emit(36, 127)
+    qtbot.waitUntil(lambda: 36 in kit.performance.notes.keys.sounding())
+    kit.patches.choose("steel_string_acoustic")
+    ready(qtbot, kit)
+    kit.window.instrument.pressed.emit(52, 100)
+    qtbot.waitUntil(lambda: kit.performance.notes.keys.sounding().keys() == {52})
+    kit.performance.stop()
+    qtbot.waitUntil(lambda: kit.sound.mixer.active == 0)
+    kit.patches.choose("timpani")
+    ready(qtbot, kit)
+    key = kit.instruments.drum_key
+    assert key is not None
+    kit.window.instrument.pressed.emit(key, 100)
+    qtbot.waitUntil(lambda: key in kit.performance.notes.keys.sounding())
+
+
+def test_a_patch_of_drums_that_is_dropped_is_played(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
+    mine = Path(shutil.copy(PATCHES / "frame_drum.json", tmp_path / "mine.json"))
+    played.take_file(mine)
+    ready(qtbot, played)
+    assert played.session.choices.drums is not None
+    played.pluck()
+    qtbot.waitUntil(lambda: bool(played.performance.notes.keys.sounding()))
+
+
+def test_drums_of_a_midi_file_are_played(qtbot: QtBot, kit: Controller, tmp_path: Path) -> None:
+    song = tmp_path / "song.mid"
+    song.write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(40, 90, 9)), TimedEvent(30.0, NoteOff(40, 9))]))
+    kit.take_file(song)
+    qtbot.waitUntil(lambda: 40 in kit.performance.notes.keys.sounding())
+
+
+def test_what_is_drummed_is_recorded_and_exported(qtbot: QtBot, kit: Controller, tmp_path: Path) -> None:
+    kit.exports._choices = ExportChoices(folder=str(tmp_path)), kit.exports.choices[1]
+    kit.patches.recordings.record()
+    for key in (36, 38, 41):
+        kit.window.instrument.pressed.emit(key, 110)
+        kit.window.instrument.released.emit(key)
+    kit.patches.recordings.record()
+    played = kit.patches.recordings.latest
+    assert played is not None
+    kit.exports.open("note")  # of drums: what was recorded
+    dialog = kit.exports.dialog
+    assert dialog is not None
+    dialog.save.click()
+    qtbot.waitUntil(lambda: "Saved" in dialog.state.text(), timeout=30_000)
+    sound, rate_hz = soundfile.read(next(iter(tmp_path.rglob("*.wav"))))
+    assert np.abs(sound[: rate_hz // 2]).max() > 0.01
+    midi = mido.MidiFile(next(iter(tmp_path.rglob("*.mid"))))
+    assert {message.note for message in midi if message.type == "note_on" and message.velocity} == {36, 38, 41}
+
+
+def test_a_plug_in_of_drums_is_not_promised(kit: Controller) -> None:
+    kit.exports.open("plugin")
+    assert kit.exports.dialog is None
+    assert "Drums cannot be exported as a plug-in yet" in kit.window.notices.text
+
+
+def test_knobs_say_which_drum_is_meant_and_which_of_them_do_nothing(kit: Controller) -> None:
+    knobs = kit.window.instrument.knobs
+    assert knobs.facts._facts["drum"] == "Bass drum 22 inch"
+    assert not knobs.knobs["knobs.gauge"].isEnabled()
+    assert knobs.knobs["knobs.decay"].isEnabled()
