@@ -26,7 +26,8 @@ from engine.voices import Ear
 FULL_SCALE_PA = 20.0  # the sound pressure at 1 m that is 0 dBFS, before the gain of a key
 TUNINGS = 6  # rounds of a secant method
 NEAR = 1e-4  # of a frequency, where it ends
-LOW_HZ, LOW_MODES = 1_500.0, 6  # among which its pitch is
+LOW_MODES_HZ, LOW_MODES = 3.0, 6  # among which its pitch is: below so many times the lowest, without air
+J01 = 2.404825557695773  # the first zero of J₀
 LOUDEST_S = 0.03  # after the blow: the peak is looked for there
 NEAREST_RIM = 0.98  # of half a drum: at the rim itself nothing moves
 
@@ -184,7 +185,13 @@ def tuned(drum: DrumParameters, ratio: float, highest_hz: float) -> DrumModes:
 
 def _principal(drum: DrumParameters) -> float:
     """ω of the mode that gives a drum its pitch: over a kettle (1,1), for (0,1) dies away at once; else the first."""
-    modes = drum.modes(LOW_HZ, LOW_MODES)
+    across = (
+        2 * J01 / drum.length_m
+        if drum.shape == "circle"
+        else math.hypot(math.pi / drum.length_m, math.pi / drum.width_m)
+    )
+    in_vacuo_hz = across * math.sqrt((drum.tension_n_m + drum.bending_nm * across**2) / drum.mass_kg_m2) / math.tau
+    modes = drum.modes(LOW_MODES_HZ * in_vacuo_hz, LOW_MODES)
     place = int(np.argmax(modes.surface.m == 1)) if drum.cavity_m3 and isinstance(modes.surface, Circle) else 0
     return float(modes.omega[place])
 

@@ -159,6 +159,9 @@ class Keys:
                         del self._notes[player, report.id]
                     elif report.kind == BEGAN:
                         found.append(note)
+                own = [id for each, id in self._notes if each is player]
+                for id in player.compiled.missing(own):
+                    self._notes.pop((player, id)).end()
             self._notes = {key: note for key, note in self._notes.items() if not note.over}
             held = {player for player, _ in self._notes}
             self._playing = [each for each in self._playing if each is self._player or each in held]

@@ -468,9 +468,12 @@ class Notes:
         return True
 
     def _bound_load(self, status: SoundStatus) -> None:
-        """Ends the oldest notes where the device has no time for all. In the caretaker's thread of the sound."""
+        """Ends the oldest notes where the device has no time for all. In the caretaker's thread of the sound.
+
+        It looks at the keys' notes too, so that they are known to end while the window is busy.
+        """
+        self.look()
         if status.load > BUSY:
-            self.look()
             with self._lock:
                 ringing = self.ringing
                 self._make_room(max(1, min(ringing - LEAST_RELIEF, int(ringing * BUSY / status.load))))

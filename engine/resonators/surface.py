@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -44,6 +45,17 @@ class Surface(Protocol):
         """The same with some of the modes."""
 
 
+def _zeros(m: int, count: int) -> Array:
+    """The first zeros of J_m, at least so many; remembered."""
+    return _known_zeros(m, 1 << (count - 1).bit_length())
+
+
+@lru_cache(maxsize=1024)
+def _known_zeros(m: int, count: int) -> Array:
+    found: Array = jn_zeros(m, count)
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class Circle:
     """J_m(κr)·cos mθ or sin mθ, κ = j_mn/a; see `Surface`."""
@@ -59,7 +71,7 @@ class Circle:
         highest, rows = wavenumber * radius_m, []
         m = 0
         while True:
-            zeros = jn_zeros(m, max(1, math.ceil((highest - m) / math.pi) + 2))
+            zeros = _zeros(m, max(1, math.ceil((highest - m) / math.pi) + 2))
             zeros = zeros[zeros <= highest]
             if len(zeros) == 0:
                 break

@@ -167,6 +167,9 @@ class CompiledPlayer:
     Args:
         modes: partials that a voice has at most.
         most_notes: that ring at once; the oldest makes room.
+
+    Attributes:
+        missed: whether reports came faster than they were asked for, since `missing` was asked.
     """
 
     def __init__(self, rate_hz: int, modes: int = of.MOST_MODES, most_notes: int = 40) -> None:
@@ -182,6 +185,7 @@ class CompiledPlayer:
         self._prepared: list[_Prepared] = []
         self._struck: dict[int, NDArray[np.float64]] = {}  # by event, until it is reported
         self._read = 0
+        self.missed = False
         memory[of.PLAYER_RATE] = rate_hz
         counts[of.PLAYER_MODES], counts[of.PLAYER_MOST] = modes + of.MOST_PAIRS, most_notes
         memory[of.PLAYER_SOURCE_GAINS : of.PLAYER_SOURCE_GAINS + of.MOST_SOURCES] = 1.0
@@ -294,10 +298,12 @@ class CompiledPlayer:
             self._flush()
             self._prepared = [each for each in self._prepared if not each.over]
         total, found = int(self._counts[of.PLAYER_REPORTED]), []
+        self.missed |= total > self._read + of.REPORTS
         for number in range(max(self._read, total - of.REPORTS), total):
             record = self._reports[number % of.REPORTS].copy()
             if int(self._counts[of.PLAYER_REPORTED]) - number >= of.REPORTS:
-                continue  # written again meanwhile
+                self.missed = True  # it was written again meanwhile
+                continue
             known = {name: record[name].item() for name in REPORTED}
             struck = record["kind"] == of.BEGAN and record["modes"] > 0
             parameters = StringParameters(*record["own"].tolist()) if struck else None
@@ -322,9 +328,18 @@ class CompiledPlayer:
                 found.append(Ringing(id, channel, key, level, frames / self.rate_hz))
         return found
 
+    def missing(self, ids: Iterable[int]) -> list[int]:
+        """Which of these notes have ended, where reports were missed; empty while events wait, or where none were."""
+        if not self.missed or self.waiting:
+            return []
+        self.missed = False
+        rings = {int(note[of.NOTE_ID]) for note in self._notes() if note[of.NOTE_STATE] == of.RINGS}
+        return [id for id in ids if id not in rings]
+
     def playing(self, report: Report) -> Playing | None:
         """How far a note is that `report` says to have begun; None: it has ended. Any thread."""
-        note = self._notes()[report.note]
+        first = of.PLAYER_NOTES + report.note * of.NOTE_SLOTS
+        note = self._counts[first : first + of.NOTE_SLOTS].copy()
         if note[of.NOTE_STATE] != of.RINGS or note[of.NOTE_ID] != report.id:
             return None
         voices = self._voices(report.note, note)

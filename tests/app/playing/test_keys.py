@@ -38,7 +38,7 @@ from engine.effects import Effects
 from engine.kernels import playing_layout as of
 from engine.voices import Ear, Mixer
 from engine.voices.voice import FADE_S
-from tests.app.instrument.seen import Seen, taken_up
+from tests.app.instrument.seen import Seen, seen, taken_up
 from tests.app.monitors import find_shipped, hears
 
 Wait = Callable[[Callable[[], bool]], None]
@@ -468,6 +468,23 @@ def test_a_note_that_waits_and_is_released_never_begins_and_others_do(played: No
     sound.mixer.render(4_800)
     played.look()
     assert other.over
+
+
+def test_notes_end_though_their_reports_were_missed(played: Notes, sound: Any) -> None:
+    """A window that hangs while a dense file is played asks too late."""
+    notes = []
+    for number in range(of.REPORTS):
+        notes.append(played.handle(NoteOn(45 + number % 20, 90)))
+        sound.mixer.render(64)
+    sound.mixer.render(4_800)
+    played.poll()
+    ringing = {each.id for each in seen(player_of(played))}
+    assert all(isinstance(note, KeyNote) and note.over == (note.id not in ringing) for note in notes)
+    assert 0 < played.ringing <= 20
+    played.stop()
+    sound.mixer.render(4_800)
+    played.poll()
+    assert played.ringing == 0
 
 
 def test_a_key_that_is_struck_while_its_next_note_waits_sounds_at_once(played: Notes, sound: Any) -> None:
