@@ -111,6 +111,7 @@ class Controller(QObject):
         self._facts_due_s = 0.0
         self._decks_shown_s = dict.fromkeys((True, False), self._last_tick_s)  # True: of the left one
         self._peak_db = METER_FLOOR_DB
+        self._struck: KeyNote | None = None  # the blow whose drum was shown last
         self._abx: AbxDialog | None = None  # while it is open, nothing else plays
         self._help: HelpDialog | None = None
         self._learning: LearnDialog | None = None
@@ -460,16 +461,18 @@ class Controller(QObject):
         drums = self.session.choices.drums
         if (key := self.instruments.drum_key) is not None:
             self.drum.show_key(key)
-        self.window.show_on_stage(self.string if drums is None else self.drum)
+        shown = self.string if drums is None else self.drum
+        self.window.show_on_stage(shown, shown.view)
         for panel in self.panels:
-            if panel.of_strings and not panel.on_stage:
+            if panel.of_strings:
                 panel.cover("" if drums is None else DRUMS_PLAYED)
 
     def _show_struck(self) -> None:
         """Shows the drum that was struck last, and where."""
         latest, drums = self.instruments.latest, self.session.choices.drums
-        if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum:
+        if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum or latest is self._struck:
             return
+        self._struck = latest
         if (played := drums.of_key(latest.event.key)) is not None:
             self.drum.show_key(latest.event.key, latest.event.place or played.place)
 

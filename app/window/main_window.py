@@ -221,8 +221,8 @@ class MainWindow(QMainWindow):
         self._stage.setSizes([310, 0, 300])
         self._set_alive(True)
 
-    def show_on_stage(self, view: QWidget) -> None:
-        """Shows one of these; it gets the focus that the other had."""
+    def show_on_stage(self, view: QWidget, focus: QWidget) -> None:
+        """Shows one of these; `focus` in it gets the focus that the other had."""
         before = self._shown.currentWidget()
         if view is before:
             return
@@ -230,7 +230,7 @@ class MainWindow(QMainWindow):
         held = before is not None and focused is not None and before.isAncestorOf(focused)
         self._shown.setCurrentWidget(view)
         if held:
-            view.setFocus()
+            focus.setFocus()
 
     def show_failed(self) -> None:
         """Says, in the place of the string, that the models cannot be loaded."""

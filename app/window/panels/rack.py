@@ -25,8 +25,6 @@ RIGHT: tuple[type[Panel], ...] = (WaveformPanel, SpaceTimePanel, ErrorTimePanel,
 def fill(window: MainWindow, session: Session, library: Library) -> list[Panel]:
     """The panels: of string and drum, then of the left and the right deck. Connects decks and session."""
     string, drum = StringPanel(session, library), DrumPanel(session, library)
-    string.setFocusProxy(string.view)
-    drum.setFocusProxy(drum.view)
     window.show_stage(string, drum)
     string.view.setFocus()
     panels: list[Panel] = [string, drum]

@@ -334,8 +334,8 @@ def test_in_a_low_play_face_the_knobs_take_the_place_of_the_keys(alive: MainWind
 
 
 AREAS = {  # by face: what is shown of it, and what is not
-    "play": ("instrument.bar", "instrument.keys", "_string", "transport.meter"),
-    "lab": ("presets", "left", "right", "transport.slots", "_facts", "_test_button", "_string", "transport.meter"),
+    "play": ("instrument.bar", "instrument.keys", "_shown", "transport.meter"),
+    "lab": ("presets", "left", "right", "transport.slots", "_facts", "_test_button", "_shown", "transport.meter"),
 }
 
 
