@@ -39,7 +39,7 @@ STEP, FINE_STEP = 0.05, 0.01  # of the arrow keys, in half-lengths; the listenin
 MARK_TIP = "Drag to hear the drum from another side; double-click resets. Shift and arrow keys move it"
 TIPS: dict[str | None, str] = {  # by what the pointer is on
     None: "Click to strike the drum with the velocity of the keys; with Shift as hard as it goes.\n"
-    "Arrow keys move the place, Enter strikes there; Page Up and Page Down choose another drum of a kit",
+    "Arrow keys move the place, Enter strikes there; with Ctrl Up and Down choose another drum of a kit",
     "left": MARK_TIP,
     "right": MARK_TIP.replace("Shift", "Ctrl, Shift"),
 }
@@ -197,7 +197,6 @@ class DrumView(QWidget):
         key, held = _Key(event.key()), event.modifiers() & (_Shift | _Control)
         sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key, 0)
         upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key, 0)
-        pages = {_Key.Key_PageUp: 1, _Key.Key_PageDown: -1}.get(key, 0)
         if sideways and held & _Shift:
             side = "right" if held & _Control else "left"
             if side in self._listening:
@@ -208,8 +207,8 @@ class DrumView(QWidget):
             place = self._place[0] + step * sideways, self._place[1] + step * upwards
             if self.axes.holds(place):
                 self.place_moved.emit(*place)
-        elif pages:
-            self.drum_stepped.emit(pages)
+        elif upwards:
+            self.drum_stepped.emit(upwards)
         elif key == _Key.Key_Delete and held & _Shift:
             for side in self._listening:
                 self.listening_point_reset.emit(side)
