@@ -26,7 +26,7 @@ class Runaway(RuntimeError):
     """A model's output stopped being a string's: not finite, or far beyond its initial displacement."""
 
     def __init__(self, time_s: float) -> None:
-        super().__init__(f"the model's output runs away {time_s:.3f} s after the pluck; shorten it or play the truth")
+        super().__init__(f"the model's output diverges {time_s:.3f} s after the pluck; shorten it or play the truth")
         self.time_s = time_s
 
 

@@ -42,7 +42,7 @@ def test_a_wheel_has_presets_recipes_and_pictures(tmp_path: Path) -> None:
     shipped = sorted(path.stem for path in (ROOT / "presets").glob("*.safetensors"))
     assert sorted(each["name"] for each in listed) == shipped
     patches = json.loads(
-        run(*command, start + "from app.commands import cli; cli.main(['patches', '--json'])", folder=elsewhere)
+        run(*command, start + "from app.commands import cli; cli.main(['instruments', '--json'])", folder=elsewhere)
     )
     assert {each["name"] for each in patches} == {path.stem for path in (ROOT / "presets/patches").glob("*.json")}
     looked_up = start + "from training.cell import load; from app.views.theme import SIGNS; "

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PROSE = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
+PROSE = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), *ROOT.glob("app/**/*.md")])
 CODE = sorted(
     [
         *(path for name in ("app", "engine", "training", "docs", "tests") for path in ROOT.glob(f"{name}/**/*.py")),

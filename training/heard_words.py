@@ -17,8 +17,8 @@ NOTICED_DISTANCE_DB = 1.0
 NOTICED_HUM_DB = -80.0  # of full scale: 40 dB below a soft pluck; a quiet room hides what is softer
 UNMEASURED = "not measured"
 HEARD_TIP = (
-    f"How true it sounds beside the solved string, rung out past its training: true, where the spectra are less than "
-    f"{NOTICED_DISTANCE_DB:g} dB apart and no fault can be heard; else the worst fault, or that distance"
+    f"How true it sounds compared with the solved string, rung out past its training: true, where the spectra are "
+    f"less than {NOTICED_DISTANCE_DB:g} dB apart and no fault can be heard; else the worst fault, or that distance"
 )
 
 
@@ -45,10 +45,10 @@ def faults(heard: Heard) -> list[str]:
     """Every fault above its threshold, in words; first the one that exceeds its threshold by the largest factor."""
     found = []
     if heard.runs_away_s is not None:
-        found.append((math.inf, f"runs away after {heard.runs_away_s:.1f} s"))
+        found.append((math.inf, f"diverges after {heard.runs_away_s:.1f} s"))
     if abs(heard.level_db) >= NOTICED_CHANGE_DB:
         louder = "grows" if heard.rise_db >= NOTICED_CHANGE_DB else "fades too slowly"
-        what = louder if heard.level_db > 0 else "dies early"
+        what = louder if heard.level_db > 0 else "decays too fast"
         found.append((abs(heard.level_db) / NOTICED_CHANGE_DB, f"{what}, {_signed(heard.level_db)} dB"))
     if heard.split_cents is not None:
         found.append((heard.split_cents / NOTICED_CENTS, f"two pitches, {heard.split_cents:.0f} cents apart"))
@@ -56,7 +56,7 @@ def faults(heard: Heard) -> list[str]:
         found.append((abs(heard.pitch_cents) / NOTICED_CENTS, f"pitch {_signed(heard.pitch_cents)} cents"))
     if heard.hum_db is not None and heard.hum_db >= NOTICED_HUM_DB:
         loudness = 10 ** ((heard.hum_db - NOTICED_HUM_DB) / 20)
-        found.append((loudness, f"hums on at {_signed(heard.hum_db)} dB"))
+        found.append((loudness, f"residual hum at {_signed(heard.hum_db)} dB"))
     return [text for _, text in sorted(found, key=lambda fault: -fault[0])]
 
 

@@ -41,7 +41,7 @@ class Row:
         start_…: of the untrained model, over the validation set; the result is never worse.
         test_…: the same of the test set, which chose neither weights nor recipes.
         …_se: standard error of a figure over the split's trajectories; see `ErrorSums.standard_error`. None
-            in rows older than the measurement; `learned-strings results measure` fills them from a kept preset.
+            in rows older than the measurement.
         seconds: of training, what it starts from among it; in rows without start_… the optimiser alone.
         commit: of the code, "" where it is not known.
         finished: UTC, ISO 8601.

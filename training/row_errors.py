@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 from engine.metrics import ErrorSums
 from engine.models.base import StringModel
-from engine.presets import Preset, PresetError, PresetInfo, load_preset
+from engine.presets import Preset, PresetError, PresetInfo
 from engine.schema import SchemaError
 from training.configuration import DatasetConfiguration, TrainingConfiguration, read_configuration
-from training.data.dataset import Dataset, load_dataset
+from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
-from training.results import SHORT_HORIZON, Row
+from training.results import SHORT_HORIZON
 
 PREFIXES = {"validation": "", "test": "test_"}
 REPEATED = ("rel_mse", "rel_mae", "test_rel_mse", "test_rel_mae")
-SAME = 1e-3  # relative; on another processor a float32 error of 1e-13 moves by less
 
 
 def row_errors(
@@ -66,28 +63,6 @@ def data_of(preset: Preset) -> DatasetConfiguration:
                 f"{preset.path}: metadata.training.data.{name} is {mine}, the model's is {its}; get the preset again"
             )
     return data
-
-
-def filled(row: Row, preset: Path, cache: Path | None = None) -> Row:
-    """The row with the errors that it lacks, measured with its preset; what it has stays as it is.
-
-    Raises:
-        ValueError: the preset's errors are not the row's, so that it is of another run.
-        PresetError, SchemaError, OSError: see `load_preset` and `load_dataset`.
-    """
-    loaded = load_preset(preset)
-    configuration = configuration_of(loaded.info, str(preset))
-    dataset = load_dataset(configuration.data, cache)
-    whole = {split: evaluate_model(loaded.model, dataset, split, configuration.steps) for split in PREFIXES}
-    measured = row_errors(loaded.model, dataset, whole, configuration.steps)
-    for name in REPEATED:
-        stored, again = getattr(row, name), measured[name]
-        if stored is not None and (again is None or not math.isclose(stored, again, rel_tol=SAME)):
-            raise ValueError(
-                f"{preset}: its {name} is {again}, that of row {row.name} {stored}; it is of another run"
-            )
-    lacking: dict[str, Any] = {name: value for name, value in measured.items() if getattr(row, name) is None}
-    return replace(row, **lacking)
 
 
 def _columns(prefix: str, suffix: str, sums: ErrorSums) -> dict[str, float | None]:

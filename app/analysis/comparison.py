@@ -132,7 +132,7 @@ def _compare_one(
             first, work_s = first + predicted.shape[1], work_s + spent_s
             job.report(before + share * first / steps)
     except Runaway as error:
-        note = f"runs away {error.time_s:.2f} s after the pluck"
+        note = f"diverges {error.time_s:.2f} s after the pluck"
         for start in range(first, steps, FRAMES_AT_ONCE):
             block = (true[start : start + FRAMES_AT_ONCE] @ synthesis)[None]
             string.add(np.full_like(block, np.nan), block, start)

@@ -40,9 +40,11 @@ class StringFrame:
     past_horizon: bool = False
     envelopes: Mapping[str, Band] = field(default_factory=dict)
 
-    def largest_mm(self) -> float:
-        """The largest displacement, in mm, of the motion without its envelopes; 0 where nothing is drawn yet."""
+    def largest_mm(self, with_envelopes: bool = False) -> float:
+        """The largest displacement, in mm, of the motion; 0 where nothing is drawn yet."""
         bands = [*self.lowest.values(), *self.highest.values()]
+        if with_envelopes:
+            bands += [edge for band in self.envelopes.values() for edge in band]
         return max((float(np.abs(band).max()) for band in bands), default=0.0)
 
 

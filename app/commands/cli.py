@@ -25,7 +25,6 @@ from app.commands import (
     learn,
     listing,
     motion,
-    patches,
     play,
     plugin,
     render,
@@ -74,12 +73,11 @@ def start(
 for command in (
     listing.presets,
     listing.models,
-    patches.patches,
+    instruments.instruments,
     motion.simulate,
     motion.predict,
     render.render,
     learn.learn,
-    learn.judge,
     play.play,
     batch.batch,
     sampled.sampled,
@@ -96,7 +94,6 @@ for command in (
     cli.command()(command)
 cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
-cli.add_typer(instruments.instruments, name="instruments")
 cli.add_typer(family.family, name="family")
 cli.add_typer(drums.drums, name="drums")
 

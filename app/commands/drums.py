@@ -170,25 +170,19 @@ def _strike_of(struck: DrumKey, velocity: int, place: tuple[float, float] | None
 def _of_file(path: Path, count: int) -> DrumModes:
     from engine.presets.of_string import read_drum
 
-    try:
-        return read_drum(path)[0].modes(HIGHEST_HZ, count)
-    except (ValueError, OSError) as error:
-        raise Failure(str(error)) from error
+    return read_drum(path)[0].modes(HIGHEST_HZ, count)
 
 
 def _key_of(name: str, key: int) -> tuple[Patch, DrumKey]:
     from app.instrument.drum_keys import DrumKeys
     from app.patches.drums import Drums
-    from app.patches.library import PatchError, find_patch
+    from app.patches.library import find_patch
     from engine.voices import Ear
 
-    try:
-        patch = find_patch(name).patch
-        if not isinstance(patch.strings, Drums):
-            raise Failure(f"{patch.name} has no drums; choose one of those that `patches` lists under drums")
-        found = DrumKeys(patch, Ear(tuple(patch.pickup.points))).of_key(key)
-    except (PatchError, ValueError) as error:
-        raise Failure(str(error)) from error
+    patch = find_patch(name).patch
+    if not isinstance(patch.strings, Drums):
+        raise Failure(f"{patch.name} has no drums; choose one of those that `instruments` lists under drums")
+    found = DrumKeys(patch, Ear(tuple(patch.pickup.points))).of_key(key)
     if found is None:
         played = ", ".join(str(each.note) for each in patch.strings.drums)
         raise Failure(f"{patch.name} has no drum on key {key}; its drums have the keys {played}")

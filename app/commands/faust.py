@@ -1,4 +1,4 @@
-"""faust: a patch's quiet string as a Faust program."""
+"""faust: an instrument's quiet string as a Faust program."""
 
 from __future__ import annotations
 
@@ -8,27 +8,28 @@ from typing import Annotated
 import typer
 
 from engine.plain_text import one_line
-from training.cli.console import Failure, say
+from training.cli.console import say
 
 
 def faust(
-    patch: Annotated[str, typer.Argument(metavar="PATCH", help="A patch's name or the path of its file.")],
+    instrument: Annotated[
+        str, typer.Argument(metavar="INSTRUMENT", help="An instrument's name or the path of its file.")
+    ],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="OUT.dsp", help="The program.")],
     modes: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="The lowest so many alone; default all below 20 kHz.")
     ] = None,
 ) -> None:
-    """Write a patch's quiet string as a Faust program: a bank of its modes, for plug-ins, Max, the web and more."""
+    """Write an instrument's quiet string as a Faust program.
+
+    A bank of its modes, for plug-ins, Max, the web and more.
+    """
     from app.export.faust import write_faust
-    from app.patches.library import PatchError, find_patch
-    from engine.result_file import WriteError
+    from app.patches.library import find_patch
     from training.cli.arguments import open_preset
 
-    try:
-        chosen = find_patch(patch).patch
-        written = write_faust(out, chosen, open_preset(chosen.preset).info, modes)
-    except (PatchError, ValueError, WriteError) as error:
-        raise Failure(str(error)) from error
+    chosen = find_patch(instrument).patch
+    written = write_faust(out, chosen, open_preset(chosen.preset).info, modes)
     if chosen.body.name or chosen.room.mix:
-        say("note: without the patch's body and room")
+        say("note: without the instrument's body and room")
     print(f"{one_line(str(out))}: {written} modes")

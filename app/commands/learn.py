@@ -1,4 +1,4 @@
-"""learn: recordings of a string to an instrument; judge: the errors of a folder of recordings in one table."""
+"""learn: recordings of a string to an instrument."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import typer
 
 from training.cli import arguments
 from training.cli.arguments import Json
-from training.cli.console import Failure, print_json, print_table, progress, say
+from training.cli.console import print_json, progress, say
 
 Instrument = Literal["guitar", "bass", "harp", "piano"]
 InstrumentOption = Annotated[Instrument, typer.Option(help="What it was: for what a sound does not give.")]
@@ -32,26 +32,19 @@ def learn(
     Of more files, takes of the same pitch share the partials, all of them the damping. Interrupt it at any time:
     nothing is written before the end.
     """
-    from app.audio.note_file import NoteFileError
     from app.instrument.learned import check_name, keep, learn_files
-    from app.patches.library import PatchError
-    from engine.result_file import WriteError
-    from training.recording.note import RecordingError
     from training.recording.table import as_data, as_text
 
     if scale_length is not None:
         arguments.check_range("--scale-length", scale_length, 0.05, 5.0, "m")
     if gauge is not None:
         arguments.check_range("--gauge", gauge, 0.05, 10.0, "mm")
-    try:
-        check_name(name)
-        with progress("learn") as report:
-            learned = learn_files(
-                notes, kind=instrument, length_m=scale_length, gauge_mm=gauge, anyway=anyway, progress=report
-            )
-        kept = keep(name, learned, instrument)
-    except (NoteFileError, RecordingError, PatchError, WriteError) as error:
-        raise Failure(str(error)) from error
+    check_name(name)
+    with progress("learn") as report:
+        learned = learn_files(
+            notes, kind=instrument, length_m=scale_length, gauge_mm=gauge, anyway=anyway, progress=report
+        )
+    kept = keep(name, learned, instrument)
     if json:
         files = {
             "preset": str(kept.preset),
@@ -66,54 +59,3 @@ def learn(
             print(line)
     say(f"note: hear it again by: learned-strings render {kept.preset.stem} out.wav --as-recorded")
     print(f"{kept.preset}, {kept.patch}")
-
-
-def judge(
-    folder: Annotated[Path | None, typer.Argument(metavar="FOLDER", help="Of recordings, one note each.")] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Only the own note, without baselines and halves.")] = False,
-    most: Annotated[int | None, typer.Option("--most", min=1, metavar="N", help="The first N files alone.")] = None,
-    synthetic: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Instead: N synthetic notes, and how intervals hold them.")
-    ] = None,
-    json: Json = False,
-) -> None:
-    """Print how well a folder's recordings are learned: own note, baselines, unseen half, takes, gate.
-
-    Names show takes: files whose names differ in the last letter alone are takes of one note.
-    """
-    from app.audio.note_file import NoteFileError, read_note
-    from training.recording.coverage import FIRST_SEED, coverage
-    from training.recording.evaluate import evaluate, table
-
-    if synthetic is not None:
-        with progress("judge") as report:
-            held = coverage(range(FIRST_SEED, FIRST_SEED + synthetic), lambda done: report(done / synthetic))
-        print_json(held) if json else print_table(tuple(held), [tuple(held.values())])
-        return
-    if folder is None or not folder.is_dir():
-        raise typer.BadParameter("give a folder of recordings, or --synthetic", param_hint="FOLDER")
-
-    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".wav", ".flac", ".aif", ".aiff"))
-    if not files:
-        raise Failure(f"{folder}: no WAV, FLAC or AIFF file; give a folder of recordings")
-    recordings = {}
-    for path in files[:most]:
-        try:
-            read = read_note(path)
-        except NoteFileError as error:
-            say(f"note: {error}")
-            continue
-        recordings[path.stem] = (read.samples, read.rate_hz)
-    with progress("judge") as report:
-        results = evaluate(recordings, quick=quick, progress=report)
-    if json:
-        print_json(results)
-        return
-    print_table(
-        ("recording", "gate", "ESR", "from 50 ms", "LSD dB", "1 pole", "2 poles", "half", "half, 2 poles"),
-        results["rows"],
-    )
-    print_table(("figure", "median", "90 %", "N"), table(results))
-    print(
-        f"N = {len(recordings)} recordings of {folder}; learned-strings judge {folder}{' --quick' if quick else ''}"
-    )

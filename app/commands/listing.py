@@ -12,22 +12,6 @@ if TYPE_CHECKING:
 
     from training.heard_file import Heard
 
-PRESET_FIELDS = (
-    "name",
-    "model",
-    "string",
-    "initial",
-    "rate_hz",
-    "horizon_steps",
-    "parameters",
-    "rel_mse",
-    "rel_mae",
-    "test_rel_mse",
-    "test_rel_mae",
-    "heard",
-    "file",
-)
-
 
 def presets(json: Json = False) -> None:
     """List the presets, shipped and your own. Files that cannot be used are reported on standard error."""
@@ -50,10 +34,7 @@ def presets(json: Json = False) -> None:
             say(str(error))
         except Exception as error:  # no fault of one file may keep the others from being listed
             say(f"{path}: cannot be used ({type(error).__name__} {error}); remove the file")
-    if json:
-        print_json(found)
-    else:
-        print_table(PRESET_FIELDS, [list(facts.values()) for facts in found])
+    _show(found, json)
 
 
 def models(json: Json = False) -> None:
@@ -67,10 +48,14 @@ def models(json: Json = False) -> None:
     with torch.device("meta"):  # sizes without memory
         for name in MODELS:
             found.append({"name": name, "parameters": count_parameters(build_model(name))})
+    _show(found, json)
+
+
+def _show(found: list[dict[str, Any]], json: bool) -> None:
     if json:
         print_json(found)
-    else:
-        print_table(("name", "parameters"), [list(facts.values()) for facts in found])
+    elif found:
+        print_table(list(found[0]), [list(facts.values()) for facts in found])
 
 
 def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
@@ -78,19 +63,18 @@ def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
     from training.heard_words import heard_word
 
     info = read_info(path)
-    values = (
-        path.stem,
-        info.model,
-        info.string_kind,
-        info.initial,
-        info.rate_hz,
-        info.horizon_steps,
-        described_parameters(path, info),
-        info.rel_mse,
-        info.rel_mae,
-        info.test_rel_mse,
-        info.test_rel_mae,
-        heard_word(known.get(preset_digest(path))),
-        str(path),
-    )
-    return dict(zip(PRESET_FIELDS, values, strict=True))
+    return {
+        "name": path.stem,
+        "model": info.model,
+        "string": info.string_kind,
+        "initial": info.initial,
+        "rate_hz": info.rate_hz,
+        "horizon_steps": info.horizon_steps,
+        "parameters": described_parameters(path, info),
+        "rel_mse": info.rel_mse,
+        "rel_mae": info.rel_mae,
+        "test_rel_mse": info.test_rel_mse,
+        "test_rel_mae": info.test_rel_mae,
+        "heard": heard_word(known.get(preset_digest(path))),
+        "file": str(path),
+    }

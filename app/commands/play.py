@@ -1,4 +1,4 @@
-"""play: a MIDI file, played by a patch, to a WAV file."""
+"""play: a MIDI file, played by an instrument, to a WAV file."""
 
 from __future__ import annotations
 
@@ -11,14 +11,16 @@ import typer
 from app.commands.render import SILENT_DB, BitsOption
 from engine.plain_text import one_line
 from training.cli import arguments
-from training.cli.console import Failure, progress, say
+from training.cli.console import progress, say
 
 DEFAULT_RATE_HZ = 48_000
 
 
 def play(
     midi: Annotated[Path, typer.Argument(metavar="FILE.mid", help="The MIDI file to play.")],
-    patch: Annotated[str, typer.Option(metavar="PATCH", help="A patch's name, or the path of its file.")],
+    instrument: Annotated[
+        str, typer.Option(metavar="INSTRUMENT", help="An instrument's name, or the path of its file.")
+    ],
     out: Annotated[Path, typer.Option(metavar="OUT.wav", help="The file to write.")],
     source: Annotated[
         Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
@@ -30,24 +32,22 @@ def play(
     ] = None,
     normalise: Annotated[bool, typer.Option("--normalise", help="Normalise to -1 dBFS.")] = False,
 ) -> None:
-    """Render a MIDI file, played by a patch, to WAV.
+    """Render a MIDI file, played by an instrument, to WAV.
 
-    The same files give the same samples. Drums (channel 10) are left out, except with a patch for MPE.
+    The same files give the same samples. Drums (channel 10) are left out, except with an instrument for MPE.
     """
     from app.export.files import LONGEST_S, RATE_RANGE_HZ
 
+    arguments.check_suffix("--out", out, ".wav")
     arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")
     if seconds is not None:
         arguments.check_range("--seconds", seconds, 0.001, LONGEST_S, "s")
-    from app.instrument.midi_file import MidiFileError, read_song
-    from app.patches.library import PatchError, find_patch
-
-    try:
-        chosen = find_patch(patch).patch
-        song = read_song(midi, chosen)
-    except (MidiFileError, PatchError) as error:
-        raise Failure(str(error)) from error
     from app.instrument.effects import body_problem
+    from app.instrument.midi_file import read_song
+    from app.patches.library import find_patch
+
+    chosen = find_patch(instrument).patch
+    song = read_song(midi, chosen)
 
     if song.left_out:
         say(song.left_out)
@@ -57,25 +57,21 @@ def play(
     from app.export.played import write_played
     from app.export.wav import WavSettings
     from app.instrument.offline import LONGEST_TAIL_S
-    from engine.result_file import WriteError
 
     began_s = time.monotonic()
     whole_s = seconds if seconds is not None else song.events[-1].time_s + LONGEST_TAIL_S / 10
-    try:
-        with progress(f"{midi.name} by {chosen.name}") as report:
-            written = write_played(
-                out,
-                chosen,
-                loaded,
-                song.events,
-                midi.name,
-                source,
-                WavSettings(bits, rate, normalise),
-                seconds,
-                lambda done_s: report(min(0.99, done_s / whole_s)),
-            )
-    except (ValueError, WriteError) as error:
-        raise Failure(str(error)) from error
+    with progress(f"{midi.name} by {chosen.name}") as report:
+        written = write_played(
+            out,
+            chosen,
+            loaded,
+            song.events,
+            midi.name,
+            source,
+            WavSettings(bits, rate, normalise),
+            seconds,
+            lambda done_s: report(min(0.99, done_s / whole_s)),
+        )
     if written.level.peak_db < SILENT_DB:
         say("note: the file is silent")
     took_s, level = time.monotonic() - began_s, written.level

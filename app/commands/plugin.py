@@ -39,7 +39,6 @@ def plugin(
     from app.export.plugin.build import build_plugin
     from app.export.plugin.formats import FORMATS, TARGETS, install_folder, this_target
     from app.export.plugin.image import image_of
-    from app.patches.drums import Drums
     from app.patches.library import SHIPPED, find_patch, list_patches
     from engine.kernels import cache
     from training.cli.arguments import open_preset
@@ -48,8 +47,7 @@ def plugin(
         raise typer.BadParameter("leave out --out and --for: --install puts the plug-in of this system in its place")
     try:
         if instruments == [ALL]:
-            chosen = [entry.patch for entry in list_patches(SHIPPED)[0] if not isinstance(entry.patch.strings, Drums)]
-            say("note: drums are left out, for plug-ins cannot play them yet")
+            chosen = [entry.patch for entry in list_patches(SHIPPED)[0]]
         else:
             chosen = [find_patch(name).patch for name in instruments]
         images = []

@@ -100,6 +100,8 @@ def render(
             )
         _render_again(recipe, Path(preset) if preset else None)
         return
+    if out is not None:
+        arguments.check_suffix("OUT.wav", out, ".wav")
     if as_recorded:
         _render_as_recorded(_given("PRESET", preset), _given("OUT.wav", out), bits)
         return

@@ -1,4 +1,4 @@
-"""sampled: a patch as an instrument for samplers, in SFZ or SoundFont 2."""
+"""sampled: an instrument for samplers, in SFZ or SoundFont 2."""
 
 from __future__ import annotations
 
@@ -15,10 +15,13 @@ ASKED_ABOVE_BYTES = 2**30  # refused without --yes
 
 
 def sampled(
-    patch: Annotated[str, typer.Argument(metavar="PATCH", help="A patch's name or the path of its file.")],
+    instrument: Annotated[
+        str, typer.Argument(metavar="INSTRUMENT", help="An instrument's name or the path of its file.")
+    ],
     out: Annotated[Path, typer.Argument(metavar="OUT.sfz|OUT.sf2", help="An SFZ has a folder of samples beside it.")],
     keys: Annotated[
-        str | None, typer.Option(metavar="LOW-HIGH", help="Keys, as in E2-E5 or 40-76; default all of the patch.")
+        str | None,
+        typer.Option(metavar="LOW-HIGH", help="Keys, as in E2-E5 or 40-76; default all of the instrument."),
     ] = None,
     every: Annotated[
         int, typer.Option(metavar="N", help="Sample one of every N keys; the others transpose its samples.")
@@ -38,15 +41,16 @@ def sampled(
         Literal["model", "truth"], typer.Option(help="The learned model, or the truth: the solved physics.")
     ] = "model",
     dry: Annotated[
-        bool, typer.Option("--dry", help="Leave out the patch's room, whose tail would end at each key's release.")
+        bool,
+        typer.Option("--dry", help="Leave out the instrument's room, whose tail would end at each key's release."),
     ] = False,
     size_only: Annotated[bool, typer.Option("--size-only", help="Print the size, and render nothing.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Allow more than 1 GiB.")] = False,
 ) -> None:
-    """Render a patch as an instrument for samplers.
+    """Render an instrument for samplers.
 
     Each key is rendered at several velocities, without loops. The same command continues an export that was stopped:
-    whole samples are kept as long as the patch is the same.
+    whole samples are kept as long as the instrument is the same.
     """
     from app.export.sampled.job import export_sampled, note_renderer, planned
     from app.export.sampled.plan import SampledPlan
@@ -62,7 +66,7 @@ def sampled(
         raise typer.BadParameter(
             "--format and --bits are of an SFZ's samples; a SoundFont holds 16 bits", param_hint="OUT.sf2"
         )
-    chosen = find_patch(patch).patch
+    chosen = find_patch(instrument).patch
     if dry:
         chosen = chosen.with_value("room.mix", 0.0)
     if problem := body_problem(chosen):

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from app.export.batch_index import INDEX, BatchIndex, BatchRow
-from app.export.files import ExportError, WavReport, default_file_name, export_sounds, settings_of
+from app.export.files import ExportError, default_file_name, export_sounds, settings_of
 from app.export.recipe import Recipe, RecipeError, read_recipe
 from app.export.recording import blocks
 from app.export.sound import SoundRequest, Voices
@@ -135,15 +135,6 @@ class BatchPlan:
         )
 
 
-@dataclass(frozen=True)
-class _Job:
-    """One pluck of one instrument: what is to be rendered of it."""
-
-    instrument: Instrument
-    pluck: Pluck
-    sources: tuple[Source, ...]
-
-
 def run_batch(plan: BatchPlan, progress: Progress = lambda *_: None) -> list[BatchRow]:
     """Renders the files and writes the index, in the plan's folder, which is made if needed.
 
@@ -161,45 +152,35 @@ def run_batch(plan: BatchPlan, progress: Progress = lambda *_: None) -> list[Bat
     except OSError as error:
         raise ExportError(f"{plan.folder}: cannot be made ({error.strerror}); choose another folder") from error
     index = BatchIndex(plan.folder / INDEX)
-    jobs, rows = _sorted_out(plan, index)
-    index.add(rows)
-    loaded: Instrument | None = None
-    for done, job in enumerate(jobs):
-        if job.instrument != loaded:
-            preset, loaded = plan.load(job.instrument), job.instrument
-        text = f"{job.instrument.name}, position {job.pluck.position:g}, {job.pluck.amplitude_mm:g} mm"
-
-        def part(share: float, *_: object, done: int = done, text: str = text) -> None:
-            progress((done + share) / len(jobs), text)
-
-        part(0.0)
-        made = _rendered(plan, preset, job, part)
-        rows += made
-        index.add(made)
-    return rows
-
-
-def _sorted_out(plan: BatchPlan, index: BatchIndex) -> tuple[list[_Job], list[BatchRow]]:
-    """What is to be rendered, and the rows of all else: files that are kept, or a preset that cannot be used."""
-    jobs, rows = [], []
-    for instrument in plan.instruments():
+    instruments, plucks = list(plan.instruments()), list(plan.plucks())
+    rows: list[BatchRow] = []
+    for number, instrument in enumerate(instruments):
         try:
             preset = plan.load(instrument)
             plan.request(preset, plan.pluck, plan.sources[0])
         except ValueError as error:
-            string = instrument.string
-            message = f"{string.name}: {error}" if string else str(error)
-            rows += [_row(plan, instrument, 0, pluck, s, message) for pluck in plan.plucks() for s in plan.sources]
+            message = f"{instrument.string.name}: {error}" if instrument.string else str(error)
+            rows += [_row(plan, instrument, 0, pluck, s, message) for pluck in plucks for s in plan.sources]
+            index.add(rows)
             continue
-        for pluck in plan.plucks():
-            sources = []
+        for place, pluck in enumerate(plucks):
+            done = number * len(plucks) + place
+            text = f"{instrument.name}, position {pluck.position:g}, {pluck.amplitude_mm:g} mm"
+
+            def part(share: float, *_: object, done: int = done, text: str = text) -> None:
+                progress((done + share) / (len(instruments) * len(plucks)), text)
+
+            part(0.0)
+            made, sources = [], []
             for source in plan.sources:
                 row = None if plan.overwrite else _kept(plan, instrument, preset, pluck, source, index)
-                rows += [row] if row else []
+                made += [row] if row else []
                 sources += [] if row else [source]
             if sources:
-                jobs.append(_Job(instrument, pluck, tuple(sources)))
-    return jobs, rows
+                made += _rendered(plan, instrument, preset, pluck, sources, part)
+            index.add(made)
+            rows += made
+    return rows
 
 
 def _kept(
@@ -228,44 +209,37 @@ def _essence(recipe: Recipe) -> dict[str, object]:
     return recipe.model_dump(exclude={"program", "version"})
 
 
-def _rendered(plan: BatchPlan, preset: Preset, job: _Job, progress: Progress) -> list[BatchRow]:
-    blank = {s: _row(plan, job.instrument, preset.info.rate_hz, job.pluck, s) for s in job.sources}
+def _rendered(
+    plan: BatchPlan, instrument: Instrument, preset: Preset, pluck: Pluck, sources: list[Source], progress: Progress
+) -> list[BatchRow]:
+    blank = {source: _row(plan, instrument, preset.info.rate_hz, pluck, source) for source in sources}
     paths = {source: plan.folder / row.file for source, row in blank.items()}
-    request = plan.request(preset, job.pluck, job.sources[0])
+    request = plan.request(preset, pluck, sources[0])
     try:
         reports, voices = export_sounds(request, paths, plan.settings, measured=True, progress=progress)
     except Runaway as error:
         failed = [replace(row, message=str(error)) for source, row in blank.items() if source != "truth"]
         if "truth" not in blank:
             return failed
-        truth = replace(job, sources=("truth",))
-        return [*failed, *_rendered(plan, preset, truth, progress)]
+        return [*failed, *_rendered(plan, instrument, preset, pluck, ["truth"], progress)]
     except ExportError as error:
         return [replace(row, message=str(error)) for row in blank.values()]
-    errors, told = _errors(preset, voices), _outside(job, preset)
+    words = outside_training(preset.info, pluck) if preset.info.family else []
+    warning = f"warning: {instrument.name}: {'; '.join(words)}" if words else ""
+    errors = _errors(preset, voices)
     return [
-        _measured(blank[source], report, *(((None, None), "") if source == "truth" else (errors, told)))
+        replace(
+            blank[source],
+            status="written",
+            seconds=report.seconds,
+            peak_db=round(report.peak_db, 2),
+            clipped=report.clipped,
+            rel_mae_trained=None if source == "truth" else errors[0],
+            rel_mae=None if source == "truth" else errors[1],
+            message="" if source == "truth" else warning,
+        )
         for source, report in zip(blank, reports, strict=True)
     ]
-
-
-def _outside(job: _Job, preset: Preset) -> str:
-    """A warning that string or pluck lie outside what a model of many strings has learned; "" where they do not."""
-    words = outside_training(preset.info, job.pluck) if preset.info.family else []
-    return f"warning: {job.instrument.name}: {'; '.join(words)}" if words else ""
-
-
-def _measured(row: BatchRow, report: WavReport, errors: tuple[float | None, float | None], message: str) -> BatchRow:
-    return replace(
-        row,
-        status="written",
-        seconds=report.seconds,
-        peak_db=round(report.peak_db, 2),
-        clipped=report.clipped,
-        rel_mae_trained=errors[0],
-        rel_mae=errors[1],
-        message=message,
-    )
 
 
 def _errors(preset: Preset, voices: Voices) -> tuple[float | None, float | None]:

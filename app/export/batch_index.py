@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 from filelock import FileLock
 
 from app.export.files import ExportError
 from engine import bounds
-from engine.read_file import read_bounded
-from engine.result_file import WriteError, explain, whole_file
+from engine.result_file import explain
+from engine.schema import SchemaError
+from engine.table import read_table, write_table
 
 INDEX = "index.csv"
 Status = Literal["written", "kept", "failed"]
-_BEGINNING = b"file,status,"  # of every index
-STATUSES: tuple[Status, ...] = get_args(Status)
 
 
 @dataclass(frozen=True)
@@ -59,7 +56,7 @@ class BatchIndex:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self.rows = _read_rows(path)
+        self.rows = read_rows(path)
 
     def add(self, rows: Sequence[BatchRow]) -> None:
         """Adds rows to the file as it is now, as another batch may write into the same folder; none: does nothing.
@@ -73,9 +70,9 @@ class BatchIndex:
             return
         try:
             with FileLock(self._path.with_name(f".{self._path.name}.lock")):
-                self.rows |= _read_rows(self._path)
+                self.rows |= read_rows(self._path)
                 self.rows |= {row.file: row for row in rows if row.status != "failed" or not self._have(row.file)}
-                self._write()
+                write_table(self._path, BatchRow, self.rows.values())
         except OSError as error:
             raise ExportError(explain(self._path, error)) from error
 
@@ -83,57 +80,19 @@ class BatchIndex:
         row = self.rows.get(file)
         return row is not None and row.status != "failed" and (self._path.parent / file).exists()
 
-    def _write(self) -> None:
-        text = io.StringIO()
-        table = csv.DictWriter(text, [one.name for one in fields(BatchRow)], lineterminator="\n")
-        table.writeheader()
-        table.writerows(asdict(row) for row in self.rows.values())
-        try:
-            with whole_file(self._path) as file:
-                file.write(text.getvalue().encode())
-        except WriteError as error:
-            raise ExportError(str(error)) from error
 
-
-def _read_rows(path: Path) -> dict[str, BatchRow]:
-    """By file name; empty where there is no index, or a damaged one, which will be replaced.
+def read_rows(path: Path) -> dict[str, BatchRow]:
+    """By file name, without damaged lines; empty where there is no index.
 
     Raises:
-        ExportError: it is another table.
+        ExportError: it is another table, or cannot be read.
     """
     try:
-        raw = read_bounded(path, bounds.LARGEST_TABLE_BYTES)
+        rows = list(read_table(BatchRow, path, "index of a batch", bounds.LARGEST_TABLE_BYTES))
     except FileNotFoundError:
         return {}
+    except SchemaError as error:
+        raise ExportError(f"{path}: is there already, and no index of a batch; choose another folder") from error
     except OSError as error:
         raise ExportError(explain(path, error)) from error
-    if not _BEGINNING.startswith(raw[: len(_BEGINNING)]):
-        raise ExportError(f"{path}: is there already, and no index of a batch; choose another folder")
-    try:
-        text = raw.decode("utf-8")
-        return {row.file: row for row in map(_read_row, csv.DictReader(io.StringIO(text, newline="")))}
-    except (ValueError, KeyError, TypeError, StopIteration, csv.Error):
-        return {}
-
-
-def _read_row(cells: dict[str, str]) -> BatchRow:
-    def number(name: str) -> float | None:
-        return float(cells[name]) if cells[name] else None
-
-    status = next(status for status in STATUSES if status == cells["status"])
-    return BatchRow(
-        cells["file"],
-        status,
-        cells["preset"],
-        float(cells["position"]),
-        float(cells["amplitude_mm"]),
-        cells["source"],
-        int(cells["rate_hz"]),
-        number("seconds"),
-        number("peak_db"),
-        int(cells["clipped"]) if cells["clipped"] else None,
-        number("rel_mae_trained"),
-        number("rel_mae"),
-        cells["message"],
-        cells.get("string", ""),  # a column that earlier versions did not write
-    )
+    return {row.file: row for row in rows if isinstance(row, BatchRow)}

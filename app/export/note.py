@@ -138,7 +138,8 @@ def _words(reports: list[WavReport]) -> list[str]:
         level = f"peak {report.peak_db:.1f} dBFS, {report.clipped} clipped"
         lines.append(f"Saved {report.path} ({report.seconds:.2f} s, {level}).")
     if past_s := max(report.past_training_s for report in reports):
-        lines.append(f"The last {past_s:.2f} s lie past the model's training; a marker says where it ends.")
+        trained_s = max(report.seconds for report in reports) - past_s
+        lines.append(f"The model was trained on the first {trained_s:.2f} s; a marker is at their end.")
     if not reports[0].decayed:
         lines.append("Not decayed at the maximum length: faded out there.")
     if any(report.clipped for report in reports):

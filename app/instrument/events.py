@@ -12,7 +12,7 @@ SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 12
 VALUE, FINE_VALUE = 6, 38  # of the parameter that these choose: registered ones (RPN), and others
 REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER = 101, 100, 99, 98
 PEDAL_DOWN = 64  # from this value on
-_PARAMETER = "chooses or sets a parameter, as the range of bends"
+_PARAMETER = "chooses or sets a parameter, as the bend range"
 _FIXED = {  # functions of controllers that no patch changes; those from 120 on are MIDI's channel mode messages
     SUSTAIN: "is the sustain pedal",
     **dict.fromkeys((VALUE, FINE_VALUE, REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER), _PARAMETER),

@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 import unicodedata
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 
 from app.patches.fields import LONGEST_NAME, explained
@@ -70,12 +71,12 @@ def read_patch(path: Path) -> Patch:
             raise PatchError(f"{path}: version: made by a newer version of the program; update it")
         return Patch.model_validate(data)
     except SchemaError as error:
-        raise PatchError(f"{error}; give the JSON of a patch") from error
+        raise PatchError(f"{error}; give the JSON of an instrument") from error
     except PatchError:
         raise
     except (ValueError, OverflowError) as error:
         told = explained(error) if isinstance(error, ValueError) else str(error)
-        raise PatchError(f"{path}: {one_line(told, 300)}; mend this field, or save the patch again") from error
+        raise PatchError(f"{path}: {one_line(told, 300)}; mend this field, or save the instrument again") from error
 
 
 def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
@@ -99,7 +100,7 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
             try:
                 patch = read_patch(path)
                 if path.stem in entries:
-                    raise PatchError(f"{path}: a patch of this name exists already; rename the file to use it")
+                    raise PatchError(f"{path}: an instrument of this name exists already; rename the file to use it")
                 name = _other_than(names, patch.name)
                 names.add(name.casefold())
                 entries[path.stem] = PatchEntry(path, patch.model_copy(update={"name": name}))
@@ -123,7 +124,7 @@ def find_patch(name_or_path: str) -> PatchEntry:
     """A patch by the name it is known by, by its title, or by its file's path.
 
     Raises:
-        PatchError: there is none, or its file cannot be used; the message lists the names.
+        PatchError: there is none, or its file cannot be used; the message lists like names, else all.
     """
     entries, _ = list_patches()
     wanted = name_or_path.casefold()
@@ -133,8 +134,11 @@ def find_patch(name_or_path: str) -> PatchEntry:
     path = Path(name_or_path)
     if path.suffix == SUFFIX:
         return PatchEntry(path, read_patch(path))
-    known = ", ".join(entry.name for entry in entries) or "none is installed"
-    raise PatchError(f"no patch {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {known}")
+    names = [entry.name for entry in entries]
+    if close := get_close_matches(file_stem(wanted), names, cutoff=0.55):
+        raise PatchError(f"no instrument {bounds.brief(name_or_path)}; did you mean {' or '.join(close)}?")
+    known = ", ".join(names) or "none is installed"
+    raise PatchError(f"no instrument {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {known}")
 
 
 def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
@@ -149,9 +153,9 @@ def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
     """
     path = replace or own_patches() / f"{file_stem(patch.name)}{SUFFIX}"
     if (SHIPPED / path.name).exists():
-        raise PatchError(f"{patch.name}: a shipped patch has this name; choose another")
+        raise PatchError(f"{patch.name}: a factory instrument has this name; choose another")
     if replace is None and path.exists():
-        raise PatchError(f"{patch.name}: a patch of this name or a like one exists already; choose another")
+        raise PatchError(f"{patch.name}: an instrument of this name or a like one exists already; choose another")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:

@@ -24,15 +24,15 @@ CHOICES = {  # fields of `Choices`
     "string": "string",
 }
 PATCH = {  # other fields of a patch than parameters, by their path; the rest are named by the last part of theirs
-    "name": "name of the patch",
+    "name": "name of the instrument",
     "preset": "model",
     "range": "range of keys",
     "pluck.shape": "pluck shape",
     "pickup.points": "listening point",
     "pickup.kind": "pick-up",
     "mode": "playing mode",
-    "bend_semitones": "range of bends",
-    "bend_by": "kind of bends",
+    "bend_semitones": "bend range",
+    "bend_by": "bend mode",
     "mod_wheel": "modulation wheel",
     "tuning.keymap": "keyboard mapping",
     "body.name": "body",
@@ -52,7 +52,7 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
         if not isinstance(new, Patch):
             return f"preset {new.preset}"
         if not isinstance(old, Patch):
-            return f"patch {new.name}"
+            return f"instrument {new.name}"
         return _of_ears(changed, old, new) or _of_patch(old, new)
     if "kept" in changed:
         return _of_patch(before["kept"], after["kept"])
@@ -78,12 +78,12 @@ def _of_ears(changed: list[str], before: Patch, after: Patch) -> str:
 
 def _of_patch(before: Patch | None, after: Patch | None) -> str:
     if after is None:
-        return "no patch"
+        return "no instrument"
     if before is None:
-        return f"patch {after.name}"
+        return f"instrument {after.name}"
     fields = list(_changed(before, after))
     if "name" in fields and len(fields) > 1:
-        return f"patch {after.name}"
+        return f"instrument {after.name}"
     if "macros" in fields:
         turned = [new.name for old, new in zip(before.macros, after.macros, strict=False) if old != new]
         return _together(turned or ["macros"])

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from app.shared.log import log_file
 from app.shared.version import PROGRAM, program_version
-from app.views.dialogs.help_text import CITATION
 from engine.folders import user_folder
 
 LIBRARIES = (
@@ -23,6 +22,12 @@ LIBRARIES = (
     "sounddevice",
     "soundfile",
     "pydantic",
+)
+
+CITATION = (
+    "R. Diaz, C. De La Vega Martin and M. Sandler, “Towards Efficient Modelling of String Dynamics: A Comparison "
+    "of State Space and Koopman based Deep Learning Methods”, Proceedings of the 27th International Conference "
+    "on Digital Audio Effects (DAFx24), 2024."
 )
 
 

@@ -30,6 +30,7 @@ from app.session.choices import OBSERVED, Session
 from app.session.history import History
 from app.session.slots import missing_presets
 from app.shared.log import log_file
+from app.shared.vocabulary import Face
 from app.views.controls.app_menu import ENTRIES
 from app.views.controls.knob import Knob
 from app.views.controls.slot_buttons import SLOTS
@@ -195,7 +196,7 @@ class Controller(QObject):
     # Connections
 
     def _connect(self) -> None:
-        window, session = self.window, self.session
+        window, _session = self.window, self.session
         for panel in self.panels:
             panel.seek_asked.connect(self.performance.seek)
             panel.pluck_asked.connect(self.pluck)
@@ -209,7 +210,13 @@ class Controller(QObject):
         window.transport.change_asked.connect(self._change)
         window.transport.play_asked.connect(self.play_or_stop)
         window.pluck_asked.connect(self.pluck)
-        window.face_asked.connect(lambda face: session.update(face=face))
+        window.face_asked.connect(self.show_face)
+
+    def show_face(self, face: Face) -> None:
+        """Play returns to the instrument, which a preset of the Lab may have replaced."""
+        self.session.update(face=face)
+        if face == "play":
+            self.session.play_patch()
 
     def _connect_actions(self) -> None:
         """What the menu and its shortcuts do; the window itself does the rest."""

@@ -47,7 +47,7 @@ def receive(file: Path, library: Library) -> Dropped:
         return _other_sound(file)
     except (InstallError, RecipeError, WriteError) as error:
         return Dropped(notice=str(error))
-    kinds = f"a preset ({SUFFIX}), a patch, a string, a scale, a MIDI file, an exported WAV, a note, a body"
+    kinds = f"a preset ({SUFFIX}), an instrument, a string, a scale, a MIDI file, an exported WAV, a note, a body"
     return Dropped(notice=f"{file}: not a file that is used here; drop one of these: {kinds}")
 
 

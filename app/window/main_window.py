@@ -80,7 +80,7 @@ PLAYED_KEYS = (  # see `app/playing/keyboard.py`
     ("C   V", "softer, harder"),
     (
         "A S D F G H J K L ;",
-        "where keys choose the place, or without a patch: pluck at ten places, left to right",
+        "where keys choose the place, or without an instrument: pluck at ten places, left to right",
     ),
 )
 

@@ -69,7 +69,7 @@ class MidiControl(QObject):
         """Opens the dialog, which does not block the window, or brings it to the front."""
         if self._dialog is None:
             dialog = self._dialog = MidiDialog(
-                {id: f"patch: {each.name}" if id in OF_PATCHES else each.name for id, each in LEARNABLE.items()},
+                {id: f"instrument: {each.name}" if id in OF_PATCHES else each.name for id, each in LEARNABLE.items()},
                 {each.id: each.name for each in modulated_by("wheel")},
                 window,
             )

@@ -59,7 +59,7 @@ SHOWN_EVERY_S = 0.04
 NOTE_TOLD_AFTER_MS = 150
 MANY_STRINGS = "studio_any_string"
 C_OF_OCTAVE_0 = LOWEST_C // 12 - 1  # C3 is the lowest of the computer's keys at octave 0
-NO_PATCH = "The computer's keys pluck the chosen preset at ten places; choose a patch to play pitches"
+NO_PATCH = "The computer's keys pluck the chosen preset at ten places; choose an instrument to play pitches"
 MIDI_FILES = (".mid", ".midi")
 STRING_FILE = ".toml"
 TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES, STRING_FILE)
@@ -218,7 +218,12 @@ class PatchDesk(QObject):
         if entry is not None and entry.own:
             self._save(patch, entry.path)
         else:
-            self._ask("Save patch", "Name of the patch:", f"{patch.name} 2", lambda name: self._save_as(patch, name))
+            self._ask(
+                "Save instrument",
+                "Name of the instrument:",
+                f"{patch.name} 2",
+                lambda name: self._save_as(patch, name),
+            )
 
     def _ask(self, title: str, question: str, name: str, do: Callable[[str], None]) -> None:
         """Asks for a name and does what it is for; again, with the reason, where the name is impossible."""
@@ -252,9 +257,9 @@ class PatchDesk(QObject):
         """Asks for a new name of one of the user's own patches, by default the present one."""
         entry = next((each for each in self._entries if each.name == name), self.entry)
         if entry is None or not entry.own:
-            self.told.emit("Only patches of your own can be renamed: save this one first.")
+            self.told.emit("Only instruments of your own can be renamed: save this one first.")
             return
-        self._ask("Rename patch", "New name:", entry.patch.name, lambda new: self._rename(entry, new))
+        self._ask("Rename instrument", "New name:", entry.patch.name, lambda new: self._rename(entry, new))
 
     def _rename(self, entry: PatchEntry, name: str) -> None:
         """Raises ValueError: the name is impossible or taken."""
@@ -335,7 +340,7 @@ class PatchDesk(QObject):
         """Tunes the patch by a Scala file. Where scale and mapping do not fit each other, the new one stays."""
         patch, text = self.patch, read_scala(file)
         if patch is None:
-            self.told.emit(f"{file.name} tunes a patch, and none is chosen; choose one first.")
+            self.told.emit(f"{file.name} tunes an instrument, and none is chosen; choose one first.")
             return
         field, other = ("keymap", "scale") if file.suffix.lower() == ".kbm" else ("scale", "keymap")
         tuned, left_out = {**dict(patch.tuning), field: text}, ""
@@ -358,7 +363,7 @@ class PatchDesk(QObject):
         """Gives the patch one of the user's own bodies, which was just installed."""
         self._panel.bar.set_bodies(body_titles())
         if self.patch is None:
-            self.informed.emit(f"The body {name} was added; choose a patch, then this body in its bar.")
+            self.informed.emit(f"The body {name} was added; choose an instrument, then this body in its bar.")
             return
         if self.patch.body.name == name:  # its file was missing
             self._performance.choices_changed(frozenset({"patch"}))
@@ -423,7 +428,7 @@ class PatchDesk(QObject):
         self._panel.show_source("model" if other else heard)
         if other and other != self._told_other:
             self.informed.emit(
-                f"Keys sound with the model of their patch, not with {source_title(other, self._library)}: that "
+                f"Keys sound with the model of their instrument, not with {source_title(other, self._library)}: that "
                 "preset is heard when you pluck the string by hand, or where keys choose the place."
             )
             self._told_other = other
@@ -520,10 +525,9 @@ class PatchDesk(QObject):
         self._show_string(patch)
         panel.set_range(*patch.range)
         strings = patch.strings
+        panel.set_drums(isinstance(strings, Drums))
         if isinstance(strings, StringSet):
             panel.neck.set_strings([(note_name(each.note), each.note) for each in strings.strings])
-        elif isinstance(strings, Drums):
-            panel.neck.set_strings([(each.name, each.note) for each in strings.drums])
         else:
             panel.neck.set_strings([(note_name(patch.range[0]), patch.range[0])])
         self.desk.show_chosen()

@@ -50,7 +50,7 @@ class Recordings(QObject):
         else:
             self._keys.begin_recording()
             if not self._session.choices.plays_patch:
-                self.informed.emit("Keys of a patch are recorded; plucks of a single string are not.")
+                self.informed.emit("Keys of an instrument are recorded; plucks of a single string are not.")
             self._began_s, self._began = time.monotonic(), datetime.now().astimezone()
 
     def discard(self) -> None:
@@ -83,7 +83,7 @@ class Recordings(QObject):
         patches = [each.event.patch for each in events if isinstance(each.event, PatchTurned)]
         patch = patches[0] if patches else self._session.choices.patch
         if not events or patch is None:
-            self.told.emit("Nothing was played, so nothing was recorded.")
+            self.informed.emit("Nothing was played, so nothing was recorded.")
             return
         choices = self._session.choices
         heard = choices.source_heard

@@ -26,7 +26,7 @@ def main() -> None:
             convert(wav, HERE / f"pluck_{source}.flac")
         write_melody(melody)
         for name in INSTRUMENTS:
-            run("play", melody, "--patch", name, "--out", wav, "--seconds", "7", "--normalise")
+            run("play", melody, "--instrument", name, "--out", wav, "--seconds", "7", "--normalise")
             convert(wav, HERE / f"{name}.opus")
 
 

@@ -24,8 +24,8 @@ from engine.effects.impulse import as_loud, faded, resampled, room_for, without_
 RATE_HZ = 48_000  # at which it is made, so that it is the same room at any rate
 SPEED_M_S = 343.0
 SIDES_M = np.array([5.6, 4.3, 2.8])  # at a T60 of half a second; they grow with its root
-_SOURCE, _LISTENER = np.array([0.36, 0.42, 0.43]), np.array([0.61, 0.55, 0.50])  # in sides
-_APART_M = 0.35  # of the two microphones
+SOURCE, LISTENER = np.array([0.36, 0.42, 0.43]), np.array([0.61, 0.55, 0.50])  # in sides
+APART_M = 0.35  # of the two microphones
 MIXING_S = 3e-3  # times the root of the volume in m³
 BANDS_HZ = (125.0, 500.0, 2_000.0, 8_000.0)
 BANDS_T60 = (1.15, 1.0, 0.8, 0.4)  # times the T60
@@ -65,8 +65,7 @@ def _response(t60_s: float, rate_hz: int) -> NDArray[np.float64]:
     frames = round(t60_s * RATE_HZ)
     time_s = np.arange(frames) / RATE_HZ
     early, direct_m = _images(sides_m, mixing_s, frames)
-    noise = np.random.default_rng(_SEED).standard_normal((round(bounds.ROOM_T60_S[1] * RATE_HZ), 2))[:frames]
-    late = noise * direct_m * math.sqrt(4 * math.pi * SPEED_M_S / volume_m3 / RATE_HZ)
+    late = room_noise(frames) * direct_m * math.sqrt(4 * math.pi * SPEED_M_S / volume_m3 / RATE_HZ)
     turn = np.clip(2 * time_s / mixing_s - 1, 0.0, 1.0)[:, None] * (np.pi / 2)
     found = _decayed(early * np.cos(turn) + late * np.sin(turn), time_s, t60_s)
     found = without_subsonic(found, SUBSONIC_HZ, RATE_HZ)
@@ -75,9 +74,14 @@ def _response(t60_s: float, rate_hz: int) -> NDArray[np.float64]:
     return found
 
 
+def room_noise(frames: int) -> NDArray[np.float64]:
+    """What late reflections are before their decay, (frames, 2), of power 1: the same in every room."""
+    return np.random.default_rng(_SEED).standard_normal((round(bounds.ROOM_T60_S[1] * RATE_HZ), 2))[:frames]
+
+
 def _images(sides_m: NDArray[np.float64], until_s: float, frames: int) -> tuple[NDArray[np.float64], float]:
     """Of walls that reflect all, (frames, 2), from when the direct sound arrives as 1; and its way in m."""
-    source_m, listener_m = _SOURCE * sides_m, _LISTENER * sides_m
+    source_m, listener_m = SOURCE * sides_m, LISTENER * sides_m
     direct_m = float(np.linalg.norm(source_m - listener_m))
     furthest = math.ceil((until_s * SPEED_M_S + direct_m) / (2 * float(sides_m.min()))) + 1
     turns = np.arange(-furthest, furthest + 1)
@@ -86,7 +90,7 @@ def _images(sides_m: NDArray[np.float64], until_s: float, frames: int) -> tuple[
     images_m = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
     images_m = images_m[np.linalg.norm(images_m - source_m, axis=1) > 1e-6]
     found = np.zeros((frames + 1, 2))
-    for side, offset_m in enumerate((-_APART_M / 2, _APART_M / 2)):
+    for side, offset_m in enumerate((-APART_M / 2, APART_M / 2)):
         ways_m = np.linalg.norm(images_m - listener_m - np.array([0.0, offset_m, 0.0]), axis=1)
         place = (ways_m - direct_m) / SPEED_M_S * RATE_HZ
         heard = (place >= 0) & (place < min(frames, until_s * RATE_HZ))

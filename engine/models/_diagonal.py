@@ -9,13 +9,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import torch
 from torch import Tensor, nn
 
 from engine.models import eigenvalues
 from engine.models._dense import Dense, linear
-from engine.models.base import AnyFrameModel, Physics
+from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics
 
 FRAMES_AT_ONCE = 4096  # bounds the memory of a long advance
 SEGMENT = 64  # frames of the fine table of powers
@@ -79,6 +80,22 @@ class DiagonalModel(AnyFrameModel[KoopmanState]):
     def coarse_latents(self, origin: Tensor, frames: Tensor) -> Tensor:
         """As `latents`, with the product in float64."""
         return (origin[:, None] * self.powers(frames)).to(origin.dtype)
+
+
+class LearnedEigenvalues(DiagonalModel):
+    """A diagonal model whose eigenvalues are two parameters: λ = exp(-exp(ν_log) + i exp(θ_log)), a latent each."""
+
+    initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
+    eigenvalue_parameters: ClassVar = eigenvalues.STORED
+    nu_log: nn.Parameter  # (state_size,)
+    theta_log: nn.Parameter
+
+    def powers(self, frames: Tensor) -> Tensor:
+        return eigenvalues.powers(eigenvalues.log_eigenvalues(self.nu_log, self.theta_log), frames)
+
+    @torch.no_grad()
+    def log_eigenvalues(self) -> list[Tensor]:
+        return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
 
 
 def energy(latents: Tensor) -> Tensor:

@@ -10,16 +10,13 @@ where φ and φ⁻¹ are MLPs.
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import torch
 from torch import Tensor, nn
 
-from engine.models import eigenvalues
 from engine.models._dense import Dense, linear
 from engine.models._diagonal import (
-    DiagonalModel,
     KoopmanState,
+    LearnedEigenvalues,
     dense,
     dense_layers,
     initialise_orthogonal,
@@ -30,7 +27,7 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import LINEAR_STRING, Physics, check_initialisation
+from engine.models.base import Physics, check_initialisation
 from engine.models.configurations import KoopmanConfiguration
 from engine.models.eigenvalues import pack
 
@@ -41,11 +38,8 @@ HELD_AT_EXACT = 12.0  # the same for `store_basis`: the strongest plucks stay ab
 SPARE_WEIGHT = 1e-3  # "physics": size of the decoder's weights for the latents that are to spare
 
 
-class Koopman(DiagonalModel):
+class Koopman(LearnedEigenvalues):
     """See the module."""
-
-    initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
-    eigenvalue_parameters: ClassVar = eigenvalues.STORED
 
     def __init__(self, configuration: KoopmanConfiguration) -> None:
         super().__init__()
@@ -62,9 +56,6 @@ class Koopman(DiagonalModel):
     def encode(self, displacement: Tensor) -> KoopmanState:
         return KoopmanState(pack(self.encoder(displacement)), 0)
 
-    def powers(self, frames: Tensor) -> Tensor:
-        return eigenvalues.powers(eigenvalues.log_eigenvalues(self.nu_log, self.theta_log), frames)
-
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         first, *others = dense_layers(self.decoder)
         if not others:
@@ -76,10 +67,6 @@ class Koopman(DiagonalModel):
 
     def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
         return self.decode(self.successive_latents(origin, first, count), readout)
-
-    @torch.no_grad()
-    def log_eigenvalues(self) -> list[Tensor]:
-        return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
 
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.

@@ -13,18 +13,15 @@ cannot be known before. Intervals are therefore halved until a line through thei
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import torch
 from torch import Tensor, nn
 
-from engine.models import eigenvalues
 from engine.models._dense import Dense
 from engine.models._diagonal import (
     FRAMES_AT_ONCE,
     SEGMENT,
-    DiagonalModel,
     KoopmanState,
+    LearnedEigenvalues,
     dense,
     dense_layers,
     energy,
@@ -36,7 +33,7 @@ from engine.models._diagonal import (
     store_eigenvalues,
     store_ring,
 )
-from engine.models.base import LINEAR_STRING, Physics, check_initialisation
+from engine.models.base import Physics, check_initialisation
 from engine.models.configurations import KoopmanVarConfiguration
 from engine.models.eigenvalues import pack
 
@@ -44,7 +41,7 @@ LONG = 4 * FRAMES_AT_ONCE  # frames, times the batch, of a block with interpolat
 SHORT = 512  # frames of a block of which every multiplier is computed: to look for fewer takes as long
 
 
-class KoopmanVar(DiagonalModel):
+class KoopmanVar(LearnedEigenvalues):
     """See the module.
 
     Attributes:
@@ -52,9 +49,6 @@ class KoopmanVar(DiagonalModel):
             lie from the computed one, at the middle of its interval, as a share of the latents' norm there. 0
             computes every frame, as training does. The default leaves the displacement within 1e-5 of its peak.
     """
-
-    initialisations: ClassVar = {"paper": "", "physics": LINEAR_STRING}
-    eigenvalue_parameters: ClassVar = eigenvalues.STORED
 
     def __init__(self, configuration: KoopmanVarConfiguration) -> None:
         super().__init__()
@@ -70,9 +64,6 @@ class KoopmanVar(DiagonalModel):
 
     def encode(self, displacement: Tensor) -> KoopmanState:
         return KoopmanState(pack(self.encoder(displacement)), 0)
-
-    def powers(self, frames: Tensor) -> Tensor:
-        return eigenvalues.powers(eigenvalues.log_eigenvalues(self.nu_log, self.theta_log), frames)
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         return dense(latents * self._multipliers(latents), *read_layer(self.decoder, readout))
@@ -138,10 +129,6 @@ class KoopmanVar(DiagonalModel):
             )
         fill(left, width, z, m_left, m_right)
         return out
-
-    @torch.no_grad()
-    def log_eigenvalues(self) -> list[Tensor]:
-        return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
 
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.

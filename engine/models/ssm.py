@@ -122,19 +122,7 @@ class _Recurrence(torch.autograd.Function):
 
 
 def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-    """x_k = λ x_{k-1} + v_k as in `accumulate`, by the route that suits.
-
-    Without gradients on a CPU a compiled loop over time is taken: for a block of 64 steps the chunks cost 25 times as
-    much, nearly all of it in calls.
-    """
-    if inputs.device.type == "cpu" and not torch.is_grad_enabled():
-        from engine.models._ssm_kernel import stream  # Numba only when it is needed
-
-        last = state.clone()
-        apart = torch.stack([inputs.real, inputs.imag], dim=-2)
-        eigenvalues = torch.view_as_real(log_eigenvalues.exp())
-        stream(apart.numpy(), eigenvalues.numpy(), torch.view_as_real(last).numpy())
-        return torch.complex(*apart.unbind(-2)), last
+    """x_k = λ x_{k-1} + v_k as in `accumulate`, with its adjoint. Rendering on a CPU takes `FoldedBlock` instead."""
     states, last = _Recurrence.apply(inputs, log_eigenvalues, state)
     return states, last
 

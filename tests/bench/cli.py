@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from app.commands.cli import carry_out
+from tests.bench.baselines.command import baseline
+from tests.bench.instruments import timbre
 from tests.bench.printing import show
+from tests.bench.recordings.command import recordings
 from training.cli.arguments import Json
 from training.cli.console import Failure, progress
 
@@ -31,7 +34,7 @@ bench = typer.Typer(
 BufferName = Annotated[
     str, typer.Option("--buffer", help="The device's: low, medium, high, or 128, 256, 512, 1024 or 2048 frames.")
 ]
-PatchName = Annotated[str, typer.Option("--patch", metavar="PATCH", help="The patch that is played.")]
+PatchName = Annotated[str, typer.Option("--instrument", metavar="INSTRUMENT", help="The instrument that is played.")]
 Seed = Annotated[int, typer.Option(min=0, help="Of the random keys and changes.")]
 
 
@@ -97,7 +100,7 @@ def train(json: Json = False) -> None:
 @bench.command()
 def tune(
     patch: Annotated[
-        list[str] | None, typer.Argument(metavar="PATCH", help="Names or files of patches; default: all.")
+        list[str] | None, typer.Argument(metavar="INSTRUMENT", help="Names or files of instruments; default: all.")
     ] = None,
     every: Annotated[int, typer.Option(min=1, max=24, help="Semitones from one measured key to the next.")] = 6,
     json: Json = False,
@@ -115,6 +118,11 @@ def tune(
     with progress("bench tune") as report:
         found = measure([(each, presets[each.preset]) for each in chosen], every, report)
     show(found, json)
+
+
+bench.command()(timbre)
+bench.command()(recordings)
+bench.command()(baseline)
 
 
 @bench.command()

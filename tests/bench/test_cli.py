@@ -63,7 +63,7 @@ def test_bench_notes_says_what_is_missing(run, monkeypatch: pytest.MonkeyPatch) 
     assert (by_midi.status, by_keys.status) == (1, 1)
     assert "jackd2" in by_midi.err and "apt install" in by_midi.err
     assert "jackd" not in by_keys.err and "xvfb" in by_keys.err
-    rings = run("notes", "--patch", "concert_harp")
+    rings = run("notes", "--instrument", "concert_harp")
     assert rings.status == 1 and "ring on" in rings.err
     assert run("notes", "--buffer", "huge").status == 2
 

@@ -67,7 +67,7 @@ def test_runaway_output_is_detected_with_its_time(
     monkeypatch.setattr(preset.model, "decode", faulty)
     source = ModelSource(preset)
     state = source.start(project(Pluck().displacement(101), 10)[None])
-    with pytest.raises(Runaway, match=r"runs away 0\.008 s after the pluck") as caught:
+    with pytest.raises(Runaway, match=r"diverges 0\.008 s after the pluck") as caught:
         source.advance(state, 64)
     assert caught.value.time_s == pytest.approx(31 / 4_000), what
 

@@ -17,7 +17,7 @@ import pytest
 from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.commands.arrays import read_displacements
-from app.export.batch_index import _read_rows
+from app.export.batch_index import read_rows
 from app.export.files import ExportError
 from app.export.recipe import RecipeError, read_recipe
 from app.export.sampled.store import read_index
@@ -154,9 +154,9 @@ def test_tables_of_nothing(text: str, tmp_path: Path) -> None:
     path = tmp_path / "rows.csv"
     path.write_text(text)
     refused(read_results, path, SchemaError)
-    refused(_read_rows, path, ExportError)
+    refused(read_rows, path, ExportError)
     path.write_text("file,status,\n" + text[:-100])
-    cheap(lambda: _read_rows(path))
+    refused(read_rows, path, ExportError)
 
 
 def test_an_array_that_is_larger_than_its_file_tells(tmp_path: Path) -> None:

@@ -19,16 +19,16 @@ TRUE = Heard("x", "0" * 64, 4.0, 0.2, 0.5, 0.0, 1.0)
         ({"level_db": 1.9, "rise_db": 5.0, "pitch_cents": -2.9}, []),  # a beat alone does not grow
         ({"level_db": 5.2, "rise_db": 3.0}, ["grows, +5 dB"]),
         ({"level_db": 5.2}, ["fades too slowly, +5 dB"]),
-        ({"level_db": -7.6}, ["dies early, −8 dB"]),
+        ({"level_db": -7.6}, ["decays too fast, −8 dB"]),
         ({"pitch_cents": 13.1}, ["pitch +13 cents"]),
         ({"pitch_cents": -13.1}, ["pitch −13 cents"]),
         ({"pitch_cents": None}, []),
         ({"split_cents": 22.2, "pitch_cents": 7.0}, ["two pitches, 22 cents apart", "pitch +7 cents"]),
-        ({"pitch_cents": 12.0, "level_db": -3.0}, ["pitch +12 cents", "dies early, −3 dB"]),
-        ({"hum_db": -66.0}, ["hums on at −66 dB"]),
-        ({"hum_db": -66.0, "level_db": 3.0}, ["hums on at −66 dB", "fades too slowly, +3 dB"]),
+        ({"pitch_cents": 12.0, "level_db": -3.0}, ["pitch +12 cents", "decays too fast, −3 dB"]),
+        ({"hum_db": -66.0}, ["residual hum at −66 dB"]),
+        ({"hum_db": -66.0, "level_db": 3.0}, ["residual hum at −66 dB", "fades too slowly, +3 dB"]),
         ({"hum_db": -90.0}, []),
-        ({"runs_away_s": 3.21, "pitch_cents": 400.0}, ["runs away after 3.2 s", "pitch +400 cents"]),
+        ({"runs_away_s": 3.21, "pitch_cents": 400.0}, ["diverges after 3.2 s", "pitch +400 cents"]),
     ],
 )
 def test_faults_by_name(changes: dict[str, float | None], named: list[str]) -> None:

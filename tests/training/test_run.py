@@ -2,9 +2,8 @@ from __future__ import annotations
 
 import csv
 import json
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -19,8 +18,6 @@ from training.evaluate import evaluate_model
 from training.fitting.fit import Progress
 from training.fitting.log import Epoch, TrainingLog
 from training.migration import earlier_digest
-from training.results import Row
-from training.row_errors import filled
 from training.run import run_row, trained_range
 
 
@@ -110,23 +107,6 @@ def test_a_row_tells_what_its_preset_measures(tmp_path: Path) -> None:
     )
     assert preset.info.horizon_steps == 420
     assert (tmp_path / "runs" / CELL.name / "log.png").stat().st_size > 10_000
-
-
-def test_what_an_earlier_row_lacks_is_measured_with_its_preset(tmp_path: Path) -> None:
-    row = run_row(CELL.name, "ours", configuration(), tmp_path / "runs", cache=tmp_path / "cache")
-    preset = tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors"
-    newer = [
-        f.name for f in fields(Row) if f.name.endswith("_se") or f.name in ("test_rel_mse_400", "test_rel_mae_400")
-    ]
-    assert len(newer) == 10
-    nothing: dict[str, Any] = dict.fromkeys(newer)
-    earlier = replace(row, rel_mse=(row.rel_mse or 0) * (1 + 1e-5), **nothing)
-    again = filled(earlier, preset, tmp_path / "cache")
-    assert again.rel_mse == earlier.rel_mse  # what it has stays, to the last digit
-    assert replace(again, **nothing) == earlier
-    assert [getattr(again, name) for name in newer] == pytest.approx([getattr(row, name) for name in newer])
-    with pytest.raises(ValueError, match=r"its rel_mae is .* 0\.5; it is of another run"):
-        filled(replace(row, rel_mae=0.5), preset, tmp_path / "cache")
 
 
 def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_path: Path) -> None:

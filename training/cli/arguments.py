@@ -59,6 +59,12 @@ def check_range(option: str, value: float, low: float, high: float, unit: str = 
         raise typer.BadParameter(f"must lie in {low:.10g} … {high:.10g}{text}, not {value:.10g}", param_hint=option)
 
 
+def check_suffix(option: str, path: Path, suffix: str) -> None:
+    """Raises typer.BadParameter: the name of a file that is written does not end with `suffix`."""
+    if path.suffix.lower() != suffix:
+        raise typer.BadParameter(f"must end with {suffix}, not {path.suffix or 'nothing'}", param_hint=option)
+
+
 def open_preset(name_or_path: str) -> Preset:
     """Loads a preset by its name, of the shipped ones and the user's own, or by its path. Raises PresetError."""
     from engine.folders import usable_files

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
-import math
-from contextlib import nullcontext
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
@@ -34,8 +29,6 @@ TOLD = {
     "spread": "spread over the trajectories",
     "400": "first 400 frames",
 }
-PLACE = ("start_s", "stop_s", "past_horizon")  # of a figure
-CSV_COLUMNS = ("preset", "split", *PLACE, "mode", "quantity", "value")
 
 
 def evaluate(
@@ -51,9 +44,6 @@ def evaluate(
     ] = False,
     trajectories: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Only the first N of a split; default all.")
-    ] = None,
-    table: Annotated[
-        Path | None, typer.Option("--csv", metavar="FILE", help="Write all figures to a CSV file, one per row.")
     ] = None,
     fresh: Annotated[
         int | None,
@@ -93,7 +83,6 @@ def evaluate(
         ("--past", past),
         ("--partials", partials),
         ("--trajectories", trajectories),
-        ("--csv", table),
         ("--held-out", fresh),
         ("--on", on),
         *of_string,
@@ -123,23 +112,19 @@ def evaluate(
     if fresh is not None:
         splits, configuration = ("all",), replace(configuration, count=fresh)
     _check_trajectories(trajectories, configuration, splits)
-    from engine.result_file import whole_file
     from training.evaluate import held_out
 
-    with nullcontext() if table is None else whole_file(table) as file:
-        if fresh is None:
-            data = replace(load_data(configuration, cache), scale_m=info.scale_m)
-        else:
-            try:
-                data = held_out(configuration, info.scale_m, fresh, seed)
-            except ValueError as error:
-                raise typer.BadParameter(str(error), param_hint="--seed") from error
-        with progress("evaluate") as report:
-            shares = Shares(report, len(splits) * (2 if partials else 1))
-            measurement = _Measurement(loaded, data, past, partials, trajectories, shares)
-            measured = {HELD_OUT if name == "all" else name: measurement.of(name) for name in splits}
-        if file is not None:
-            file.write(_csv(loaded.name, measured).encode())
+    if fresh is None:
+        data = replace(load_data(configuration, cache), scale_m=info.scale_m)
+    else:
+        try:
+            data = held_out(configuration, info.scale_m, fresh, seed)
+        except ValueError as error:
+            raise typer.BadParameter(str(error), param_hint="--seed") from error
+    with progress("evaluate") as report:
+        shares = Shares(report, len(splits) * (2 if partials else 1))
+        measurement = _Measurement(loaded, data, past, partials, trajectories, shares)
+        measured = {HELD_OUT if name == "all" else name: measurement.of(name) for name in splits}
     for words in info.family.warnings(info.string) if info.family is not None and on is None else ():
         say(f"warning: {words}")
     if json:
@@ -391,26 +376,3 @@ def _print_partials(split: str, found: dict[str, Any]) -> None:
         w["glide_error_cents"],
     ]
     print_table(columns, [*rows, mean])
-
-
-def _csv(preset: str, measured: dict[str, dict[str, Any]]) -> str:
-    """One figure a row; `mode` is empty for the whole string, and for the mean over modes "all"."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(CSV_COLUMNS)
-    for split, errors in measured.items():
-        stop_s = max(w["stop_s"] for w in errors["windows"] if not w["past_horizon"])
-        whole = {"start_s": 0.0, "stop_s": stop_s, "past_horizon": False}
-        parts: list[tuple[dict[str, Any], object]] = [(errors | whole, "")]
-        for place, group in enumerate(errors.get("by_rise", ()), 1):
-            parts.append(({f"rise{place}_{name}": value for name, value in group.items()} | whole, ""))
-        parts += [(window, "") for window in errors["windows"]]
-        for window in errors.get("partials", ()):
-            parts += [(window | mode, mode["mode"]) for mode in window["modes"]]
-            parts.append((window | window["weighted"], "all"))
-        for facts, mode in parts:
-            where = (preset, split, *(facts[name] for name in PLACE), mode)
-            for quantity, value in facts.items():
-                if quantity not in (*PLACE, "mode") and isinstance(value, int | float):
-                    writer.writerow((*where, quantity, value if math.isfinite(value) else "inf"))
-    return text.getvalue()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -22,7 +21,6 @@ if TYPE_CHECKING:
 family = typer.Typer(help="Train and measure one model of many strings.", no_args_is_help=True)
 DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "processor s a second", "worst at")
 RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
-INHARMONICITIES = (2e-6, 1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3)  # the first and the last range are beyond the family
 PARTIALS = {  # figures of `_partials_facts`
     "quiet_first_cents": "quiet pluck, the first mode's pitch, cents",
     "quiet_cents_largest": "quiet pluck, any partial, cents",
@@ -86,11 +84,8 @@ def evaluate(
         bool, typer.Option("--baselines", help="Measure what knows the physics alone, too.")
     ] = False,
     runs: Annotated[
-        Path | None, typer.Option(help="Measure the baselines that were trained in this folder, too.")
+        Path | None, typer.Option(help="Folder of the errors on drums: a stopped measurement continues there.")
     ] = None,
-    error_map: Annotated[
-        bool, typer.Option("--map", help="Print errors by rise of tension and inharmonicity, too.")
-    ] = False,
     picture: Annotated[
         Path | None,
         typer.Option(
@@ -116,7 +111,7 @@ def evaluate(
     """
     import torch
 
-    from training.family.errors import Player, in_ranges, measure, player
+    from training.family.errors import Player, by_rise, measure, player
 
     torch.set_num_threads(1)
     if drums:
@@ -134,29 +129,21 @@ def evaluate(
         from training.research.players import knowing_physics
 
         players |= knowing_physics()
-    players |= _trained(runs) if runs else {}
-    own: list[Any] = []  # errors of the preset, both columns
     with progress("family evaluate") as report:
         shares = Shares(report, 2 * (1 + (tenth > 0)))
-        measured = _measured(players, strings, rate, seed, shares)
-        found = {column: {name: _facts(one) for name, one in errors.items()} for column, errors in measured.items()}
+        measured = measured_errors(players, strings, rate, seed, shares)
+        found = {column: {name: facts_of(one) for name, one in errors.items()} for column, errors in measured.items()}
         for column, errors in measured.items():
             of_preset, facts = errors[loaded.name].strings, found[column][loaded.name]
-            own += of_preset
             facts["by_rise"] = [
-                {"from": low, "to": high, "strings": len(part.strings), **_facts(part)}
-                for ((low, high),), part in in_ranges(of_preset, tension_rise=RISES)
+                {"from": low, "to": high, "strings": len(part.strings), **facts_of(part)}
+                for (low, high), part in by_rise(of_preset, RISES)
             ]
             if tenth:
                 alone = {loaded.name: players[loaded.name]}
                 span_s, told = (9.0, 10.0), shares.next()
                 last = measure(alone, column, "test", tenth, rate, span_s, seed=seed, report=told)[loaded.name]
                 facts["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
-    cells = [
-        {"rise": rises, "inharmonicity": edges, "strings": len(part.strings), **_facts(part)}
-        for (rises, edges), part in in_ranges(own, tension_rise=RISES, inharmonicity=INHARMONICITIES)
-        if error_map
-    ]
     if picture is not None:
         from training.figures.family_errors import family_errors
         from training.figures.style import save_figure
@@ -164,11 +151,10 @@ def evaluate(
         columns: dict[str, Sequence[StringError]] = {c: errors[loaded.name].strings for c, errors in measured.items()}
         save_figure(family_errors(columns, loaded.name), picture)
     if json:
-        told_map = {"map": cells} if error_map else {}
-        print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **found, **told_map})
+        print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **found})
         return
     for column_name, of_column in found.items():
-        _print_column(column_name, of_column, strings, rate)
+        print_column(column_name, of_column, strings, rate)
         facts = of_column[loaded.name]
         rows = [
             [f"{p['from']:g} … {p['to']:g}", p["strings"], number(p["geometric_mean"]), number(p["worst"])]
@@ -182,8 +168,6 @@ def evaluate(
                 f"{number(last.get('geometric_mean'))}, worst {number(last.get('worst'))}; "
                 f"{number(last.get('over_first'))} times their first"
             )
-    if error_map:
-        _print_map(cells)
 
 
 @family.command()
@@ -228,67 +212,6 @@ def partials(
     for column_name, figures in found.items():
         rows = [[text, *figures[name].values()] for name, text in PARTIALS.items()]
         print_table((column_name, "median", "worst", "worst at"), rows)
-
-
-@family.command()
-def baseline(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="koopman_var or dmsp, made to take any string.")],
-    minutes: Annotated[float, typer.Option(min=0.01, max=10_000, help="Processor minutes of one core.")] = 40.0,
-    train_strings: Annotated[
-        int | None,
-        typer.Option(min=1, max=100_000, help="Strings to learn from; default as studio_any_string."),
-    ] = None,
-    runs: Annotated[Path | None, typer.Option(help="Folder of runs: a stopped one continues there.")] = None,
-    strings: Strings = 40,
-    rate: Rate = 48_000,
-    seed: Seed = 0,
-    json: Json = False,
-) -> None:
-    """Train and measure a model by others on the same strings.
-
-    A stopped training continues. It is measured as `evaluate` does, and no preset is written.
-    """
-    import torch
-
-    from training.family.preset import read_configuration
-    from training.research.baselines import BASELINES, baseline_player
-    from training.research.fit_baseline import FRAMES, ROWS, checkpoint_file, fit_baseline
-    from training.run import default_runs
-
-    torch.set_num_threads(1)
-    if name not in BASELINES:
-        raise typer.BadParameter(f"{name!r} is not one of {', '.join(BASELINES)}", param_hint="NAME")
-    with progress(f"family baseline {name}") as report:
-        fitted = fit_baseline(
-            name,
-            read_configuration(),
-            checkpoint_file(runs or default_runs(), name),
-            minutes,
-            strings=train_strings,
-            made=lambda share: report(0.0, f"{share:.0%} of the true motions"),
-            report=lambda p: report(
-                p.share, f"step {p.steps}, train {p.train:.3g}, validation {p.validation:.3g}", p.left_s
-            ),
-        )
-    with progress("family evaluate") as report:
-        measured = _measured({name: baseline_player(fitted.model)}, strings, rate, seed, Shares(report, 2))
-    found = {column: {name: _facts(errors[name])} for column, errors in measured.items()}
-    told = {
-        "parameters": sum(parameter.numel() for parameter in fitted.model.parameters()),
-        "steps": fitted.steps,
-        "train": fitted.train,
-        "validation": fitted.validation,
-    }
-    if json:
-        facts = {"baseline": name, "minutes": minutes, "strings": strings, "rate_hz": rate, "seed": seed}
-        print_json({**facts, **told, **found})
-        return
-    print(
-        f"{name}: {told['parameters']:,} numbers, {fitted.steps:,} steps of {ROWS} strings and {FRAMES} "
-        f"frames; geometric mean {number(fitted.train)} in training, {number(fitted.validation)} in validation"
-    )
-    for column_name, of_column in found.items():
-        _print_column(column_name, of_column, strings, rate)
 
 
 @family.command()
@@ -361,7 +284,7 @@ def _open_preset_of_many(name_or_path: str) -> Preset:
     return loaded
 
 
-def _measured(
+def measured_errors(
     players: dict[str, Any], strings: int, rate_hz: int, seed: int, shares: Shares
 ) -> dict[Column, dict[str, FamilyErrors]]:
     """Errors of the first second by column and player."""
@@ -374,19 +297,7 @@ def _measured(
     }
 
 
-def _trained(runs: Path) -> dict[str, Any]:
-    """Players of the baselines that were trained in a folder."""
-    from training.research.baselines import BASELINES, baseline_player
-    from training.research.fit_baseline import checkpoint_file, trained_baseline
-
-    files = {name: checkpoint_file(runs, name) for name in BASELINES}
-    found = {name: baseline_player(trained_baseline(file).model) for name, file in files.items() if file.exists()}
-    if not found:
-        raise Failure(f"{runs}: no baseline was trained here; `family baseline NAME --runs {runs}` does")
-    return {f"{name}, trained": play for name, play in found.items()}
-
-
-def _print_column(column: str, of_column: dict[str, Any], strings: int, rate_hz: int) -> None:
+def print_column(column: str, of_column: dict[str, Any], strings: int, rate_hz: int) -> None:
     print(f"{column}, {strings} strings, first second at {rate_hz} Hz, rel. MSE over the whole string")
     figures = ("geometric_mean", "worst", "share_large", "processor_s")
     rows = [[who, *(number(f[name]) for name in figures), f["worst_at"]] for who, f in of_column.items()]
@@ -401,7 +312,7 @@ def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) ->
     if not pairs:
         return {"strings": 0}
     early, late = (FamilyErrors(tuple(part)) for part in zip(*pairs, strict=True))
-    return {"strings": len(pairs), **_facts(late), "over_first": late.geometric_mean / early.geometric_mean}
+    return {"strings": len(pairs), **facts_of(late), "over_first": late.geometric_mean / early.geometric_mean}
 
 
 def _partials_facts(strings: list[StringPartials]) -> dict[str, Any]:
@@ -419,28 +330,11 @@ def _partials_facts(strings: list[StringPartials]) -> dict[str, Any]:
     return facts
 
 
-def _print_map(cells: list[dict[str, Any]]) -> None:
-    print("both columns: geometric mean; worst (strings), by rise of tension and inharmonicity B")
-    told = {
-        (
-            cell["rise"],
-            cell["inharmonicity"],
-        ): f"{cell['geometric_mean']:.1e}; {cell['worst']:.1e} ({cell['strings']})"
-        for cell in cells
-    }
-    edges = list(pairwise(INHARMONICITIES))
-    rows = [
-        [f"{low:g} … {high:g}", *(told.get(((low, high), edge), "") for edge in edges)]
-        for low, high in pairwise(RISES)
-    ]
-    print_table(("rise", *(f"B {low:g} … {high:g}" for low, high in edges)), rows)
-
-
 def _place(string: StringError | StringPartials) -> str:
     return f"{string.pitch_hz:.0f} Hz, B {string.inharmonicity:.1e}, rise {string.tension_rise:.2f}"
 
 
-def _facts(errors: FamilyErrors) -> dict[str, Any]:
+def facts_of(errors: FamilyErrors) -> dict[str, Any]:
     worst = errors.worst
     return {
         "geometric_mean": errors.geometric_mean,

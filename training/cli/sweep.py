@@ -1,11 +1,9 @@
-"""sweep, results merge, results measure: many runs, and the results file with their rows."""
+"""sweep, results merge: many runs, and the results file with their rows."""
 
 from __future__ import annotations
 
-import contextlib
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import astuple
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -119,50 +117,6 @@ def merge(
     rows = migrated(row for other in others for row in read_results(other))
     after = len(add_rows(file, rows))
     print(f"{one_line(str(file))}: {after} rows, {after - before} of them new")
-
-
-@results.command()
-def measure(
-    presets: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="PRESET...", help="Names or files; default all that have a row."),
-    ] = None,
-    results: Results = None,
-    cache: Cache = None,
-) -> None:
-    """Add the standard errors that earlier rows lack.
-
-    Their presets are measured again. Nothing is trained, and no figure that a row has is changed.
-    """
-    from engine.presets import find_preset, preset_files, read_info
-    from training.results import RESULTS, add_rows, read_results
-    from training.row_errors import configuration_of, filled
-
-    file = results or RESULTS
-    rows = {row.digest: row for row in read_results(file)}
-    found = [find_preset(name) for name in presets] if presets else _of_one_string(preset_files())
-    pairs = [(path, rows.get(configuration_of(read_info(path), str(path)).digest)) for path in found]
-    for path, row in pairs:
-        if row is None:
-            if presets:
-                raise Failure(f"{path}: {file} has no row of its run; train it, or give another preset")
-            continue
-        whole = filled(row, path, cache)
-        add_rows(file, [whole])
-        gained = sum(old is None and new is not None for old, new in zip(astuple(row), astuple(whole), strict=True))
-        print(one_line(f"{row.name}: {gained} figures added"))
-
-
-def _of_one_string(files: list[Path]) -> list[Path]:
-    """Those that can be read and are no model of many strings, which has no row."""
-    from engine.presets import PresetError, read_info
-
-    found = []
-    for file in files:
-        with contextlib.suppress(PresetError):
-            if read_info(file).family is None:
-                found.append(file)
-    return found
 
 
 def _list(plan: Plan, known: list[Row], json: bool) -> None:

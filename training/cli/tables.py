@@ -35,13 +35,11 @@ def table(
         typer.Option(help="Only runs of this recipe of training/recipes."),
     ] = "all",
     format: Annotated[
-        Literal["compact", "full", "csv"],
-        typer.Option(
-            help="compact and full are Markdown, full with deviations; csv has a line per cell (tidy data)."
-        ),
+        Literal["compact", "csv"],
+        typer.Option(help="compact is Markdown; csv has a line per cell, with deviations and the test split."),
     ] = "compact",
     metric: Annotated[
-        Literal["mse", "mae"], typer.Option(help="Relative error of the compact tables; the others have both.")
+        Literal["mse", "mae"], typer.Option(help="Relative error of the compact tables; csv has both.")
     ] = "mse",
     output: Annotated[Path | None, typer.Option(help="Write to this file instead of standard output.")] = None,
     into: Annotated[
@@ -54,16 +52,12 @@ def table(
         raise typer.BadParameter("takes Markdown and excludes --output", param_hint="--into")
     from training.results import RESULTS, read_results
     from training.tables.compact import as_compact
-    from training.tables.markdown import as_markdown
     from training.tables.tidy_csv import as_csv
 
     found = read_results(results or RESULTS)
     if not found:
         say(f"note: {results or RESULTS} has no rows; the tables hold the paper's figures only")
-    if format == "compact":
-        text = as_compact(found, recipe, f"rel_{metric}")
-    else:
-        text = as_csv(found, recipe) if format == "csv" else as_markdown(found, recipe)
+    text = as_csv(found, recipe) if format == "csv" else as_compact(found, recipe, f"rel_{metric}")
     if into is not None:
         text, output = _before(into) + text, into
     if output is None:

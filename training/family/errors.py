@@ -126,26 +126,13 @@ def rollout(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tens
     return torch.cat(blocks)
 
 
-Edges = tuple[float, float]
-
-
-def in_ranges(
-    errors: Sequence[StringError], **edges: Sequence[float]
-) -> list[tuple[tuple[Edges, ...], FamilyErrors]]:
-    """Errors in ranges of one or several figures of the strings, each given by its edges.
-
-    Of a figure's ranges the last has both ends; ranges without a string are left out.
-    """
-    found: list[tuple[tuple[Edges, ...], tuple[StringError, ...]]] = [((), tuple(errors))]
-    for figure, of_figure in edges.items():
-        found = [
-            ((*ranges, (low, high)), inside)
-            for ranges, part in found
-            for low, high in pairwise(of_figure)
-            if (inside := tuple(one for one in part if _inside(getattr(one, figure), low, high, of_figure[-1])))
-        ]
-    return [(ranges, FamilyErrors(part)) for ranges, part in found]
-
-
-def _inside(value: float, low: float, high: float, last: float) -> bool:
-    return low <= value < high or value == high == last
+def by_rise(errors: Sequence[StringError], edges: Sequence[float]) -> list[tuple[tuple[float, float], FamilyErrors]]:
+    """Errors in ranges of the rise of tension; the last has both ends, and ranges without a string are left out."""
+    found = []
+    for low, high in pairwise(edges):
+        inside = tuple(
+            one for one in errors if low <= one.tension_rise < high or one.tension_rise == high == edges[-1]
+        )
+        if inside:
+            found.append(((low, high), FamilyErrors(inside)))
+    return found

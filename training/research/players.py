@@ -11,7 +11,6 @@ from engine.models import build_model
 from engine.models.base import Physics, StringModel
 from training.family.errors import SCALE_M, Player, rollout
 from training.family.strings import PluckedString
-from training.research.slow_flow import slow_flow
 
 
 def linear_string(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
@@ -38,11 +37,6 @@ def averaging(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
     return rollout(_started("koopman_integrated", sizes, "averaging", plucked, rate_hz), plucked, steps)
 
 
-def averaged_flow(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
-    """`slow_flow`: averaging to third order, in which modes trade energy."""
-    return slow_flow(plucked.resonator, plucked.amplitudes_m, rate_hz, steps)
-
-
 def untrained(how: str) -> Player:
     """`koopman_tension` as its start of this name leaves it."""
 
@@ -59,7 +53,6 @@ def knowing_physics() -> dict[str, Player]:
     return {
         "kicks without corrections": untrained("kicks"),
         "backward error analysis (1/12)": untrained("series"),
-        "slow flow, third order": averaged_flow,
         "averaging": averaging,
         "linear string": linear_string,
     }

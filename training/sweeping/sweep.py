@@ -71,22 +71,6 @@ class Watch(Protocol):
         """A run has ended, and its row is in the results file."""
 
 
-class Unwatched:
-    """Shows nothing."""
-
-    def started(self, run: Run) -> None:
-        pass
-
-    def progressed(self, event: Progressed) -> None:
-        pass
-
-    def noted(self, event: Noted) -> None:
-        pass
-
-    def finished(self, row: Row) -> None:
-        pass
-
-
 def group_of(plan: Plan) -> str:
     """A trial's runs have cells' names and are other runs: they lie in a folder of their own."""
     return plan.name if plan.trial else ""
@@ -108,7 +92,7 @@ def unfinished(plan: Plan, rows: Iterable[Row]) -> list[Run]:
     return [run for run in plan.runs if not is_finished(known.get(run.digest))]
 
 
-def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch | None = None) -> list[Row]:
+def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[Row]:
     """Does what is unfinished of a plan, the most valuable first.
 
     Returns:
@@ -119,7 +103,6 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch | None = 
             runs' folders too.
         WorkersError: the workers are gone.
     """
-    watch = watch or Unwatched()
     file = options.results or results_of(plan, options.runs)
     rows = {row.digest: row for row in add_rows(file, ())}  # fails before the work where it cannot be written
     waiting = deque(unfinished(plan, rows.values()))

@@ -3,6 +3,5 @@
 `paper`     what stands where, the paper's figures, and how one of ours compares
 `sections`  our figures, from the rows of the results file
 `compact`   both in one table per horizon, for RESULTS.md
-`markdown`  both in full, with deviations and the test split
 `tidy_csv`  both, to be computed with
 """

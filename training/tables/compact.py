@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from training.cell import MODEL_NAMES
 from training.results import Row
-from training.tables.markdown import markdown_table
 from training.tables.paper import COLUMNS, HORIZONS, Column, Figure, factor, mark
 from training.tables.sections import NOT_RUN, Line, RecipeChoice, Section, rows_of, sections
 
@@ -113,3 +112,12 @@ def _missing(found: Sequence[Section]) -> str:
                 where = "no cell" if not ran else "not " + ", ".join(left)
                 lines.append(f"- {MODEL_NAMES[model]}, {section.string} string, {section.horizon} frames: {where}.")
     return "\n".join(lines) or "None."
+
+
+def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A Markdown table whose cells are padded to the width of their column."""
+    table = [[cell.replace("|", "\\|") for cell in row] for row in (head, *rows)]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    lines = ["| " + " | ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)) + " |" for row in table]
+    lines.insert(1, "|" + "|".join("-" * (w + 2) for w in widths) + "|")
+    return "\n".join(lines)

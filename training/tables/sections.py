@@ -48,16 +48,6 @@ class Line:
     trained: int
     hints: str
 
-    @property
-    def label(self) -> str:
-        """What is said of it beside the model's name."""
-        words = f"{self.recipe} recipe" if self.recipe != "ours" else "our recipe"
-        if self.hints:
-            words += " §"
-        if self.structured:
-            words += f", prior knowledge ({self.initialisation})"
-        return words
-
 
 @dataclass(frozen=True)
 class Entry(Errors):
@@ -101,17 +91,6 @@ class Section:
         """What the paper has there; None where it has nothing."""
         found = paper_errors().get((self.string, self.horizon, model, column))
         return found.figure(metric) if found else None
-
-    def paper_best(self, column: Column, metric: str) -> tuple[str, Figure]:
-        """The model of the paper with the lowest mean, and its figure; the first of equals in the paper's order."""
-        found = [(model, self.paper(model, column, metric)) for model in MODEL_ORDER]
-        return min(((model, figure) for model, figure in found if figure), key=lambda pair: pair[1].mean)
-
-    def best(self, column: Column, metric: str, structured: bool) -> tuple[Line, Figure] | None:
-        """Our learned model (DMD is fitted) with the lowest mean, with prior knowledge or without."""
-        lines = [line for line in self.lines if line.model != "dmd" and line.structured == structured]
-        found = [(line, entry.figure(metric)) for line in lines if (entry := self.lines[line].get(column))]
-        return min(((line, figure) for line, figure in found if figure), key=lambda pair: pair[1].mean, default=None)
 
 
 def sections(rows: Iterable[Row], recipe: RecipeChoice = "all") -> list[Section]:

@@ -11,13 +11,16 @@ from pathlib import Path
 from urllib.parse import quote
 from xml.sax.saxutils import escape
 
+import numpy as np
+
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, check_compiler
-from app.export.plugin.image import MAKER, Image, layout_header
+from app.export.plugin.image import MAKER, NOISE_UNIT, Image, layout_header
 from app.export.plugin.objects import STUBS, object_of, run_waiting
 from app.shared.version import program_version
+from engine.effects.room import room_noise
 from engine.whole_file import whole_file
 
-COMMON = ("instrument.c",)
+COMMON = ("instrument.c", "responses.c")
 LIBRARY_ENDINGS = {"linux": ".so", "windows": ".dll", "macos": ".dylib"}
 VST3_ENDINGS = {"linux": ".so", "windows": ".vst3"}
 VST3_FOLDERS = {"linux-x64": "x86_64-linux", "linux-arm64": "aarch64-linux", "windows-x64": "x86_64-win"}
@@ -107,6 +110,13 @@ def _images(images: Sequence[Image], folder: Path) -> str:
         (folder / f"image{number}.bin").write_bytes(image.content)
         lines.append(f"_Alignas(64) static const unsigned char image{number}[] = {{")
         lines += [f'#embed "image{number}.bin"', "};"]
+    frames = max(1, *(image.noise_frames for image in images))
+    noise = np.rint(room_noise(frames) / NOISE_UNIT).astype(np.int32)  # finer than single precision
+    (folder / "noise.bin").write_bytes(noise.tobytes())
+    lines += [
+        f"static const union {{ unsigned char bytes[{noise.nbytes}]; int32_t samples[{noise.size}]; }} noise_bytes ="
+    ]
+    lines += ["{{", '#embed "noise.bin"', "}};", "const int32_t *const noise = noise_bytes.samples;"]
     entries = ", ".join(f"(const image *)image{number}" for number in range(len(images)))
     lines += [f"const image *const images[] = {{{entries}}};", f"const int32_t image_count = {len(images)};"]
     return "\n".join(lines) + "\n"

@@ -1,8 +1,8 @@
 """An instrument as one block of bytes, and the header from which the shell has all places in memory.
 
 It holds the sound of an instrument: the table of its keys with their gains, the model's and the solver's
-programs, impulse responses of its body and room at several rates, its macros and parameters. Nothing depends on the
-rate but the responses: the shell sets it when the host does.
+programs, the modes of its body, its macros and parameters. Nothing depends on the rate, which the shell sets when
+the host does. The shell computes the responses of body and room then.
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from app.export.plugin.parts import MIXES, STEPS, levels, mixed, parts_of
+from app.export.plugin.parts import MIXES, STEPS, drum_keys, levels, losses, mixed, parts_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.table import VALUES, wheel_goal
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
+from engine import bounds
+from engine.effects import body, impulse, room
 from engine.effects.partitions import FADE_S
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
@@ -30,17 +31,17 @@ from engine.presets import Preset
 from engine.voices.derivative import differentiator_taps
 from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S
 
-RATES_HZ = (44_100, 48_000, 96_000)  # of responses; at others they are converted
 PREPARED_HZ = 48_000
 MAKER = "Learned Strings"
 MOST_NOTES = 40
 MOST_PARAMETERS, MOST_TARGETS = 64, 8  # of the shell
 MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
 LARGEST_WHOLE = 2**31 - 1
+NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
 SOURCE, VOLUME, VALUE, POINT, MACRO, MIX = range(6)  # kinds of the shell's parameters
 SOURCE_ID = "source"
 SOURCES = ("model", "truth", "difference")
-FEATURES = {"guitar": "guitar", "bass": "guitar", "keys": "piano"}  # of CLAP, by category
+OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "pluck.curve", "damping.release_t60_s")  # that drums follow
 
 
 class _Parameter(ctypes.Structure):
@@ -71,19 +72,6 @@ class _Macro(ctypes.Structure):
     _fields_ = (("count", ctypes.c_int32), ("spare", ctypes.c_int32), ("targets", _Target * MOST_TARGETS))
 
 
-class _Part(ctypes.Structure):
-    _fields_ = (*((name, ctypes.c_int64) for name in ("frames", "channels", "first")), ("unit", ctypes.c_double))
-
-
-class _Response(ctypes.Structure):
-    _fields_ = (
-        ("rate_hz", ctypes.c_int64),
-        ("body", _Part),
-        ("room", _Part),
-        ("powers", ctypes.c_double * 16),
-    )
-
-
 class _Header(ctypes.Structure):
     _fields_ = (
         ("magic", ctypes.c_char * 8),
@@ -103,10 +91,23 @@ class _Header(ctypes.Structure):
                 "macros",
                 "macro_count",
                 "taps",
-                "responses",
-                "response_count",
+                "body",
+                "body_modes",
+                "impulse",
+                "impulse_frames",
+                "impulse_channels",
+            )
+        ),
+        *(
+            (name, ctypes.c_double)
+            for name in ("body_s", "body_subsonic_hz", "impulse_hz", "impulse_unit", "room_t60_s")
+        ),
+        *(
+            (name, ctypes.c_int64)
+            for name in (
                 "levels",
                 "level_steps",
+                "losses",
                 "wheel_mix",
                 "modes",
                 "most_notes",
@@ -143,6 +144,7 @@ class Image:
         id: of the plug-in, the same for every version of the instrument.
         parameters: in the shell's order.
         left_out: targets of macros that the plug-in cannot move.
+        noise_frames: of the noise that its room needs.
     """
 
     id: str
@@ -150,21 +152,24 @@ class Image:
     content: bytes
     parameters: tuple[Control, ...]
     left_out: tuple[str, ...]
+    noise_frames: int = 0
 
 
 def image_of(patch: Patch, preset: Preset) -> Image:
     """The image of an instrument.
 
     Raises:
-        ValueError: it has drums, its model learned one string only, or its tuning is impossible.
+        ValueError: its model learned one string only, or its tuning is impossible.
     """
-    if isinstance(patch.strings, Drums):
-        raise ValueError(f"{patch.name} has drums, which plug-ins cannot play yet; choose an instrument of strings")
+    drums = isinstance(patch.strings, Drums)
     player = InstrumentPlayer(patch, preset, PREPARED_HZ, {"model": 1.0, "truth": 1.0})
     player.prepare()
     table = player.table
     assert table is not None
     header = _Header(magic=b"LSPLUGIN", version=1, modes=min(of.MOST_MODES, player.grid_points - 2) + of.MOST_PAIRS)
+    struck = dict(drum_keys(patch)) if drums else {}
+    if drums:
+        header.modes = max((len(each.modes.omega) for each in struck.values()), default=1)
     header.most_notes = MOST_NOTES
     whole = bytearray(bytes(header))
 
@@ -189,40 +194,38 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     macros, left_out = _macros(patch, ids)
     header.macros, header.macro_count = put(b"".join(bytes(each) for each in macros)), len(macros)
     heights = levels(patch, preset.info)
-    header.levels, header.level_steps = put(heights.tobytes()) // 4, STEPS
+    header.levels, header.level_steps = put(heights.tobytes()) // 8, STEPS
     header.wheel_mix = MIXES.index(patch.mod_wheel) if patch.mod_wheel in MIXES else -1
     header.wheel_goal = wheel_goal(patch) or 0.0
 
-    def part(samples: NDArray[np.float64]) -> _Part:
-        unit = (
-            float(np.abs(samples).max(initial=0.0)) / LARGEST_WHOLE or 1.0
-        )  # where it is loud, finer than single precision
-        return _Part(
-            len(samples), samples.shape[1], put(np.rint(samples / unit).astype(np.int32).tobytes()) // 4, unit
-        )
-
-    records, tail_s = [], 0.0
-    for rate_hz in RATES_HZ:
-        parts = parts_of(patch, rate_hz)
-        if parts is not None:
-            record = _Response(rate_hz, part(parts.body), part(parts.room))
-            record.powers[:] = parts.powers.ravel().tolist()
-            records.append(record)
-            tail_s = max(tail_s, (len(parts.body) + len(parts.room)) / rate_hz)
-    header.responses, header.response_count = put(b"".join(bytes(each) for each in records)), len(records)
-    header.longest_s = tail_s + MOST_LOUD_S
+    if drums:
+        slots = np.zeros(of.KEYS, np.int64)
+        for key, each in struck.items():
+            slots[key] = put(losses(patch, each).tobytes()) // 8
+        header.losses = put(slots.tobytes()) // 8
+    parts = parts_of(patch)
+    if parts.modes is not None:
+        header.body, header.body_modes = put(parts.modes.tobytes()) // 8, parts.modes.shape[1]
+        header.body_s, header.body_subsonic_hz = parts.body_s, parts.subsonic_hz
+    if parts.impulse is not None:  # where it is loud, finer than single precision
+        unit = float(np.abs(parts.impulse).max()) / LARGEST_WHOLE
+        header.impulse = put(np.rint(parts.impulse / unit).astype(np.int32).tobytes()) // 4
+        header.impulse_frames, header.impulse_channels = parts.impulse.shape
+        header.impulse_hz, header.impulse_unit = parts.impulse_hz, unit
+    header.room_t60_s = parts.room_t60_s
+    header.longest_s = parts.seconds + MOST_LOUD_S
     id = f"org.learned-strings.{''.join(c if c.isalnum() else '-' for c in patch.name.lower())}"
     header.id, header.name, header.maker = id.encode()[:127], _bytes(patch.name, 63), MAKER.encode()
     header.uid[:] = uuid.uuid5(uuid.NAMESPACE_URL, f"urn:{id}").bytes
     header.description = _bytes(patch.description, 511)
-    header.features = " ".join(("instrument", "synthesizer", "stereo")).encode()
+    header.features = f"instrument {'drum' if drums else 'synthesizer'} stereo".encode()
     header.bytes = len(whole)
     whole[: ctypes.sizeof(_Header)] = bytes(header)
     controls = (
         Control(id, each.name.decode(), each.low, each.high, each.standard, SOURCES if each.stepped else ())
         for id, each in parameters
     )
-    return Image(id, patch.name, bytes(whole), tuple(controls), left_out)
+    return Image(id, patch.name, bytes(whole), tuple(controls), left_out, round(parts.room_t60_s * room.RATE_HZ))
 
 
 def _bytes(text: str, most: int) -> bytes:
@@ -259,13 +262,15 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
         yield _record(id, MACRO, number, macro.value, MACROS[id], "Macros", macro.name)
     yield SOURCE_ID, _Parameter(_id(SOURCE_ID), SOURCE, 0, 1, 0.0, 2.0, 0.0, b"Source", b"", b"")
     yield _record("volume_db", VOLUME, 0, 0.0, OF_CHOICES["volume_db"], "")
+    drums = isinstance(patch.strings, Drums)
     for index, id in enumerate(VALUES):
-        if id in OF_PATCHES:
+        if id in (OF_DRUMS if drums else OF_PATCHES):
             yield _record(id, VALUE, index, patch.value(id), OF_PATCHES[id], OF_PATCHES[id].group.capitalize())
     for id in mixed(patch):
         parameter = OF_PATCHES[id]
         yield _record(id, MIX, MIXES.index(id), patch.value(id), parameter, parameter.group.capitalize())
-    points = () if patch.pickup.kind == "bridge" else patch.pickup.points  # at the bridge there is no place to choose
+    fixed = drums or patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
+    points = () if fixed else patch.pickup.points
     for index, point in enumerate(points):
         id = f"pickup.points.{index}"
         yield _record(id, POINT, index, point, OF_PATCHES[id], OF_PATCHES[id].group.capitalize())
@@ -297,12 +302,16 @@ def layout_header(version: str) -> str:
         "CHANNELS CHANNEL_SLOTS CHANNEL_RANGE BEND_SEMITONES PLAYER_MOST PLAYER_MODES PLAYER_PUSHED "
         "PLAYER_TAKEN PLAYER_QUEUED PLAYER_REPORTED PLAYER_RATE PLAYER_SOURCE_GAINS PLAYER_VALUES "
         "PLAYER_CHANNELS PLAYER_EVENTS PLAYER_REPORTS PLAYER_VOICES BEGAN REPORT_KIND REPORT_ID "
-        "REPORT_CHANNEL REPORT_KEY REPORT_SLOTS TABLE_GAINS GAINS TABLE_LOW TABLE_HIGH PLAYER_WHEEL",
+        "REPORT_CHANNEL REPORT_KEY REPORT_SLOTS TABLE_GAINS GAINS TABLE_LOW TABLE_HIGH PLAYER_WHEEL "
+        "TABLE_DRUMS TABLE_VALUES DRUM_MODES DRUM_HEADER DECAY BRIGHTNESS_DECAY",
     }
     lines = [f'#define LS_VERSION "{version}"']
     for module, names in wanted.items():
         lines += [f"#define {name} {getattr(module, name)}" for name in names.split()]
     none = of.voice_slots(0)
+    records = {"IMAGE": _Header, "PARAMETER": _Parameter, "MACRO": _Macro}
+    lines += [f"#define {name}_BYTES {ctypes.sizeof(record)}" for name, record in records.items()]
+    lines += [f"#define {name} {_in_c(value)}" for name, value in _RESPONSES.items()]
     lines += [
         f"#define VOICE_SLOTS_FIXED {none}",
         f"#define VOICE_SLOTS_A_MODE {of.voice_slots(1) - none}",
@@ -311,3 +320,29 @@ def layout_header(version: str) -> str:
         f"#define VOLUME_SMOOTHING_S {VOLUME_SMOOTHING_S}",
     ]
     return "\n".join(lines) + "\n"
+
+
+_RESPONSES = {
+    "LOUDNESS_LOW_HZ": impulse.LOUDNESS_HZ[0],
+    "LOUDNESS_HIGH_HZ": impulse.LOUDNESS_HZ[1],
+    "FADE_SHARE": impulse.FADE_SHARE,
+    "LONGEST_IMPULSE_S": bounds.LONGEST_IMPULSE_S,
+    "BODY_HIGHEST_HZ": body.HIGHEST_HZ,
+    "NOISE_UNIT": NOISE_UNIT,
+    "ROOM_HZ": room.RATE_HZ,
+    "SOUND_M_S": room.SPEED_M_S,
+    "ROOM_SIDES_M": room.SIDES_M,
+    "ROOM_SOURCE": room.SOURCE,
+    "ROOM_LISTENER": room.LISTENER,
+    "ROOM_APART_M": room.APART_M,
+    "ROOM_MIXING_S": room.MIXING_S,
+    "ROOM_BANDS_HZ": room.BANDS_HZ,
+    "ROOM_BANDS_T60": room.BANDS_T60,
+    "ROOM_SUBSONIC_HZ": room.SUBSONIC_HZ,
+}
+
+
+def _in_c(value: object) -> str:
+    if isinstance(value, tuple | np.ndarray):
+        return "{" + ", ".join(_in_c(float(each)) for each in value) + "}"
+    return repr(float(value))  # type: ignore[arg-type]

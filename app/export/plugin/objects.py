@@ -14,14 +14,13 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
 from importlib.metadata import version
 from pathlib import Path
 
+from app.export.plugin import texts
 from app.export.plugin.formats import TARGETS, Target
 from engine.whole_file import whole_file
 
-ENTRIES = ("render", "begin", "partition")
 PREFIX = "ls_"
 WAIT_S = 0.1
 # What the code may ask of the shell and of the C library; all else would be a reference to Python.
@@ -40,22 +39,6 @@ numba_runtime_build_excinfo_struct numba_unpickle numba_unpickle_no_gil
 ALLOWED, STUBS = frozenset(_LIBRARY.split()), frozenset(_ERROR_PATHS.split())  # the shell answers with stubs
 
 
-_TEXTS = """
-import sys
-from pathlib import Path
-from numba import njit
-from engine.kernels import compiled
-compiled.COMPILED["cache"] = False
-from engine.kernels import plugin
-for argument in sys.argv[1:]:
-    name, _, path = argument.partition("=")
-    entry = njit(getattr(plugin, name.upper()), **compiled.COMPILED)(getattr(plugin, name).py_func)
-    overload = entry.overloads[entry.signatures[0]]
-    text = overload.library.get_llvm_str()
-    Path(path).write_text(f"; entry {overload.fndesc.llvm_func_name}\\n{text}", encoding="utf-8")
-"""
-
-
 class ObjectError(ValueError):
     """The kernels cannot be compiled for a target; the message names it and what is in the way."""
 
@@ -64,7 +47,7 @@ def digest() -> str:
     """Of the kernels and of what compiles them: it changes with either."""
     kernels = Path(sys.modules["engine"].__file__ or "").parent / "kernels"
     found = hashlib.sha256()
-    for source in (*sorted(kernels.glob("*.py")), Path(__file__)):
+    for source in (*sorted(kernels.glob("*.py")), Path(__file__), Path(texts.__file__)):
         found.update(source.read_bytes())
     for package in ("numba", "llvmlite"):
         found.update(version(package).encode())
@@ -85,23 +68,21 @@ def object_of(target: str, folder: Path, waiting: Callable[[], None] = lambda: N
     path = folder / f"kernels-{digest()}-{target}.o"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        compiled = _compiled(_texts(folder, waiting), TARGETS[target])
+        compiled = _compiled(_text(folder, waiting), TARGETS[target])
         with whole_file(path) as part:
             part.write_bytes(compiled)
     return path
 
 
-def _texts(folder: Path, waiting: Callable[[], None]) -> dict[str, str]:
-    """LLVM code of the entries, compiled by a process of its own, for Numba's options hold for a whole process."""
-    paths = {name: folder / f"kernels-{digest()}-{name}.ll" for name in ENTRIES}
-    if not all(path.exists() for path in paths.values()):
-        with ExitStack() as whole:
-            parts = [f"{name}={whole.enter_context(whole_file(path))}" for name, path in paths.items()]
-            command = [sys.executable, "-c", _TEXTS, *parts]
-            code, said = run_waiting(command, _environment(), waiting)
+def _text(folder: Path, waiting: Callable[[], None]) -> str:
+    """LLVM code of the entries, made by a process of its own, for Numba's settings hold for a whole process."""
+    path = folder / f"kernels-{digest()}.ll"
+    if not path.exists():
+        with whole_file(path) as part:
+            code, said = run_waiting([sys.executable, "-m", texts.__name__, str(part)], _environment(), waiting)
             if code:
                 raise ObjectError(f"the kernels cannot be compiled: {said.strip()[-400:]}")
-    return {name: path.read_text(encoding="utf-8") for name, path in paths.items()}
+    return path.read_text(encoding="utf-8")
 
 
 def run_waiting(
@@ -125,10 +106,11 @@ def run_waiting(
 def _environment() -> dict[str, str]:
     root = str(Path(sys.modules["engine"].__file__ or "").parents[1])
     kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
-    return {**kept, "NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "PYTHONPATH": root}
+    processor = {"NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    return {**kept, **processor, "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1", "PYTHONPATH": root}
 
 
-def _compiled(texts: Mapping[str, str], target: Target) -> bytes:
+def _compiled(text: str, target: Target) -> bytes:
     """The object file: entries by their names with `PREFIX`, all else internal, nothing left of Python."""
     import llvmlite.binding as llvm
 
@@ -137,19 +119,13 @@ def _compiled(texts: Mapping[str, str], target: Target) -> bytes:
     machine = llvm.Target.from_triple(target.triple).create_target_machine(
         cpu=target.cpu, opt=3, reloc="pic", codemodel="default"
     )
-    whole = None
-    for name, text in texts.items():
-        entry = text[: text.index("\n")].removeprefix("; entry ")
+    names = dict(re.findall(r"^; (\w+) (\S+)$", text, flags=re.M)[: len(texts.ENTRIES)])
+    for name, entry in names.items():
         text = text.replace(f"@{entry}(", f"@{PREFIX}{name}(")
-        text = re.sub(r"^target datalayout = .*$", f'target datalayout = "{machine.target_data}"', text, flags=re.M)
-        text = re.sub(r"^target triple = .*$", f'target triple = "{target.triple}"', text, flags=re.M)
-        module = llvm.parse_assembly(_without_counts(text))
-        if whole is None:
-            whole = module
-        else:
-            whole.link_in(module)
-    assert whole is not None
-    kept = {f"{PREFIX}{name}" for name in texts}
+    text = re.sub(r"^target datalayout = .*$", f'target datalayout = "{machine.target_data}"', text, flags=re.M)
+    text = re.sub(r"^target triple = .*$", f'target triple = "{target.triple}"', text, flags=re.M)
+    whole = llvm.parse_assembly(_without_counts(text))
+    kept = {f"{PREFIX}{name}" for name in names}
     for function in whole.functions:
         if not function.is_declaration and function.name not in kept:
             function.linkage = llvm.Linkage.internal
@@ -168,8 +144,8 @@ def _compiled(texts: Mapping[str, str], target: Target) -> bytes:
 def _without_counts(text: str) -> str:
     """The code without the counting of references: no array of a plug-in's memory has an owner."""
     return re.sub(
-        r"^define linkonce_odr void @NRT_(incref|decref)\(ptr (%\S+)\)[^{]*\{.*?^\}",
-        r"define linkonce_odr void @NRT_\1(ptr \2) {\n  ret void\n}",
+        r"^define void @NRT_(incref|decref)\(ptr (%\S+)\)[^{]*\{.*?^\}",
+        r"define void @NRT_\1(ptr \2) {\n  ret void\n}",
         text,
         flags=re.M | re.S,
     )

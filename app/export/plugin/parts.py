@@ -5,15 +5,18 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from app.instrument.drum_keys import DrumKey, DrumKeys
 from app.instrument.effects import effects_of
 from app.instrument.loud_keys import LoudKeys
+from app.patches.drums import Drums
 from app.patches.patch import Patch
-from engine.effects.impulse import convolved, noise_powers
+from engine.effects import BODIES
+from engine.effects.body import HIGHEST_HZ, SUBSONIC, modes_of
 from engine.kernels.playing_layout import KEYS
 from engine.presets import PresetInfo
 from engine.voices import Ear
@@ -24,16 +27,28 @@ STEPS = 5  # positions of a macro at which levels are known
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """Body and room apart, at one rate.
+    """What the shell computes responses of body and room from.
 
     Attributes:
-        body, room: responses (frames, 1 or 2); of what is not there, without frames.
-        powers: (4, 4), of noise through two of: nothing, the body, the room, and both.
+        modes: of the body, (4, modes): Hz, decay in 1/s, amplitudes left and right; None: it has no modes.
+        body_s: how long they ring.
+        subsonic_hz: below it the body radiates next to nothing.
+        impulse: a body that is a response, at `impulse_hz` (frames, 1 or 2); None: it is not.
+        room_t60_s: 0: there is no room.
     """
 
-    body: NDArray[np.float64]
-    room: NDArray[np.float64]
-    powers: NDArray[np.float64]
+    modes: NDArray[np.float64] | None = None
+    body_s: float = 0.0
+    subsonic_hz: float = 0.0
+    impulse: NDArray[np.float64] | None = None
+    impulse_hz: float = 0.0
+    room_t60_s: float = 0.0
+
+    @property
+    def seconds(self) -> float:
+        """How long body and room ring, at most."""
+        heard_s = 0.0 if self.impulse is None else len(self.impulse) / self.impulse_hz
+        return self.body_s + heard_s + self.room_t60_s
 
 
 def mixed(patch: Patch) -> tuple[str, ...]:
@@ -43,20 +58,27 @@ def mixed(patch: Patch) -> tuple[str, ...]:
     return tuple(each for each in MIXES if there[each] and (each in moved or patch.value(each) > 0))
 
 
-def parts_of(patch: Patch, rate_hz: int) -> Parts | None:
-    """None: neither body nor room is ever heard."""
+def parts_of(patch: Patch) -> Parts:
+    """Of a patch's body and room, as far as either is ever heard."""
     effects = effects_of(patch.with_values(dict.fromkeys(mixed(patch), 1.0)))
     if effects is None:
-        return None
-    none = np.zeros((0, 1))
-    body, room = (none if part is None else part.response(rate_hz) for part in (effects.body, effects.room))
-    both = convolved(body, room) if len(body) and len(room) else none
-    return Parts(body, room, noise_powers((np.ones((1, 1)), body, room, both), rate_hz))
+        return Parts()
+    found = Parts(room_t60_s=0.0 if effects.room is None else effects.room.t60_s)
+    body = effects.body
+    if body is None:
+        return found
+    if body.impulse is not None:
+        hz = body.impulse.rate_hz / body.size
+        return replace(found, impulse=body.impulse.samples, impulse_hz=hz)
+    wood = BODIES[body.name]
+    modes = np.vstack([part.T for part in modes_of(wood, body.size, HIGHEST_HZ)])
+    subsonic_hz = SUBSONIC * wood.lowest[0].frequency_hz / body.size
+    return replace(found, modes=modes, body_s=wood.seconds * body.size, subsonic_hz=subsonic_hz)
 
 
-def levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float32]:
+def levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float64]:
     """How levels of keys change as each macro moves alone, in dB: (macros, STEPS, KEYS)."""
-    found, now = np.zeros((len(patch.macros), STEPS, KEYS), np.float32), _levels(patch, preset)
+    found, now = np.zeros((len(patch.macros), STEPS, KEYS)), _levels(patch, preset)
     for number, macro in enumerate(patch.macros):
         if all(target.field == "room.mix" for target in macro.targets):
             continue  # no level depends on the room
@@ -67,10 +89,36 @@ def levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float32]:
 
 def _levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float64]:
     """Of all keys, in dB; of silent ones, that of their neighbours."""
-    loud = LoudKeys(patch, Ear(tuple(patch.pickup.points), patch.pickup.kind), preset)
-    known = dict(_known(loud, patch))
+    if isinstance(patch.strings, Drums):
+        known = {key: 20 * math.log10(found.gain) for key, found in drum_keys(patch)}
+    else:
+        known = dict(_known(LoudKeys(patch, _ear(patch), preset), patch))
     keys = sorted(known) or [0]
     return np.interp(np.arange(KEYS), keys, [known.get(key, 0.0) for key in keys])
+
+
+def drum_keys(patch: Patch) -> Iterator[tuple[int, DrumKey]]:
+    """The drums of an instrument by their keys, as far as they are possible."""
+    drums = DrumKeys(patch, _ear(patch))
+    low, high = patch.range
+    for key in range(low, high + 1):
+        with contextlib.suppress(ValueError):
+            if (found := drums.of_key(key)) is not None:
+                yield key, found
+
+
+def losses(patch: Patch, key: DrumKey) -> NDArray[np.float64]:
+    """What a knob of decay, and one of brightness decay, at 1 add to decay rates, in 1/s: (2, modes)."""
+    drum, knobs = key.modes.drum, patch.knobs
+    added = (
+        key.modes.damped(drum.damping_d1_kg_m2_s + drum.damping_d1_kg_m2_s / knobs.decay, drum.damping_d3_kg_s),
+        key.modes.damped(drum.damping_d1_kg_m2_s, drum.damping_d3_kg_s * (1 + 1 / knobs.brightness_decay)),
+    )
+    return np.stack([each.sigma - key.modes.sigma for each in added])
+
+
+def _ear(patch: Patch) -> Ear:
+    return Ear(tuple(patch.pickup.points), patch.pickup.kind)
 
 
 def _known(loud: LoudKeys, patch: Patch) -> Iterator[tuple[int, float]]:

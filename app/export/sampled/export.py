@@ -36,7 +36,7 @@ class SampledExport:
         )
         kept = report.samples - report.rendered
         samples = f"{number_of(report.rendered, 'sample')} rendered, {kept} kept, {megabytes(report.size_bytes)}"
-        alike = ", as loud as the patch" if abs(report.gain_db) < SMALLEST_TOLD_DB else ""
+        alike = ", as loud as the instrument" if abs(report.gain_db) < SMALLEST_TOLD_DB else ""
         level = f"peak {report.peak_db:.1f} dBFS{alike}"
         lines = [f"Saved {report.path} ({samples}, {level}, {pitch_words(plan.pitch_error_cents)})."]
         lines += [f"{note[0].upper()}{note[1:]}." for note in notes(plan, report, "Dry leaves")]

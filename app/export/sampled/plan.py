@@ -115,14 +115,16 @@ class SampledPlan:
                 raise ValueError(f"{name} must lie in {low:g} … {high:g}, not {number:g}")
         (low, high), (lowest, highest) = self.key_range, self.patch.range
         if not lowest <= low <= high <= highest:
-            raise ValueError(f"keys must be a range within the patch's own, {lowest}-{highest}, not {low}-{high}")
+            raise ValueError(
+                f"keys must be a range within the instrument's own, {lowest}-{highest}, not {low}-{high}"
+            )
         if self.every > 1 and (self.patch.tuning.scale or self.patch.tuning.keymap):
             raise ValueError(
-                "every must be 1: transposed by semitones, samples would leave the patch's own tuning; "
+                "every must be 1: transposed by semitones, samples would leave the instrument's own tuning; "
                 "sample every key, or remove the scale"
             )
         if not self.zones:
-            raise ValueError("keys: the patch's tuning leaves all of them out; choose others")
+            raise ValueError("keys: the instrument's tuning leaves all of them out; choose others")
 
     @property
     def key_range(self) -> tuple[int, int]:

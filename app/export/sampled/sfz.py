@@ -44,7 +44,7 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
     if plan.every > 1:
         yield f"// A sample for every {plan.every} keys; those between are transposed."
     if gain_db:
-        yield f"// All of it is {-gain_db:.2f} dB softer than the patch, so that no note clips."
+        yield f"// All of it is {-gain_db:.2f} dB softer than the instrument, so that no note clips."
     yield "<control>"
     yield f"default_path={folder}/"
     yield ""  # sfzlint reads a value that ends with a slash on into the next line

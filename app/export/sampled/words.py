@@ -48,7 +48,7 @@ def counted(plan: SampledPlan) -> str:
 
 def pitch_words(error_cents: float) -> str:
     """The largest pitch error of a note's start (`SampledPlan.pitch_error_cents`) in words."""
-    return f"note starts within {error_cents:.1f} cents of the patch"
+    return f"note starts within {error_cents:.1f} cents of the instrument"
 
 
 def megabytes(size: int) -> str:
@@ -64,8 +64,8 @@ def notes(plan: SampledPlan, report: SampledReport, dry: str) -> list[str]:
         rang = f"{number_of(report.cut, 'sample')} still rang after {plan.seconds:g} s and "
         told.append(rang + ("was faded out" if report.cut == 1 else "were faded out"))
     if abs(report.gain_db) >= SMALLEST_TOLD_DB:
-        why = "softer than the patch, so that no note clips"
+        why = "softer than the instrument, so that no note clips"
         if report.gain_db > 0:
-            why = "louder than the patch, at the full level of 16 bits"
+            why = "louder than the instrument, at the full level of 16 bits"
         told.append(f"all of it is {abs(report.gain_db):.1f} dB {why}")
     return told

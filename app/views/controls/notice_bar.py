@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import datetime
 
-from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, QTimer
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
 
@@ -16,6 +16,7 @@ from app.views.controls.parts import tool_button
 from app.views.controls.plain import Label
 
 MOST_KEPT = 50
+INFORMED_MS = 8000  # a notice that is no error hides by itself
 
 
 class NoticeBar(QFrame):
@@ -30,6 +31,8 @@ class NoticeBar(QFrame):
         self.setAccessibleName("Notice")
         self._notices: list[Notice] = []
         self._list: NoticeList | None = None
+        self._hide = QTimer(self, interval=INFORMED_MS, singleShot=True)
+        self._hide.timeout.connect(self.hide)
         self.bell = Bell()  # placed by the window
         self.bell.clicked.connect(self.show_all)
         self._label = Label()
@@ -38,7 +41,7 @@ class NoticeBar(QFrame):
         self._details = tool_button("Details", "Notice details", "Show the error details, which can be copied (F8)")
         self._details.clicked.connect(self.show_all)
         dismiss = tool_button("Dismiss", "Dismiss the notice", "Dismiss (kept in the list)")
-        dismiss.clicked.connect(self.hide)
+        dismiss.clicked.connect(self._dismiss)
         for button in (self._details, dismiss):
             button.setObjectName("small")
         row = QHBoxLayout(self)
@@ -91,6 +94,11 @@ class NoticeBar(QFrame):
             self._fit()
         return super().event(event)
 
+    def _dismiss(self) -> None:
+        """Hides the notice, which has been read."""
+        self.hide()
+        self.bell.set_unseen(max(0, self.bell.unseen - 1))
+
     def _fit(self) -> None:
         self.resize(self.width(), self.heightForWidth(self.width()))
 
@@ -108,6 +116,10 @@ class NoticeBar(QFrame):
         self._fit()
         self.show()
         self.raise_()
+        if notice.error:
+            self._hide.stop()
+        else:
+            self._hide.start()
         self.bell.set_unseen(self.bell.unseen + (earlier is None))
         if self._list is not None:
             self._list.set_notices(self.notices)

@@ -31,7 +31,7 @@ from engine.pluck import (
 )
 
 KNOBS = ("position", "amplitude_mm", "width", "listen", "listen_right", "seconds", "speed", "volume_db")
-OF_THE_PATCH = "While keys play the patch, it is the patch's own and is saved with it"
+OF_THE_PATCH = "While keys play the instrument, it is the instrument's own and is saved with it"
 
 
 class TransportBar(QFrame):
@@ -92,7 +92,6 @@ class TransportBar(QFrame):
         for knob in self.knobs.values():
             knob.set_narrow(compact)
         self.slots.set_narrow(compact, tight)
-        self._export.setText("Export …" if compact else "Export WAV …")
         for button in (self._play, self._loop, self._stereo, self._export):
             button.setProperty("compact", compact)
             button.setProperty("tight", tight)
@@ -121,18 +120,18 @@ class TransportBar(QFrame):
             return
         self._playing = playing
         self._play.setChecked(playing)
-        words = "■  Stop" if playing else "▶  Play"
+        words = "■  Stop" if playing else "▶  Pluck"
         self._play.setText(words[0] if self._tight else words)
 
     def _forget_playing(self) -> None:
         self._playing = None
 
     def _build_transport(self) -> QVBoxLayout:
-        self._play = QPushButton("▶  Play")
-        self._play.setAccessibleName("Play or stop")
+        self._play = QPushButton("▶  Pluck")
+        self._play.setAccessibleName("Pluck or stop")
         self._play.setObjectName("play")
         self._play.setCheckable(True)
-        self._play.setToolTip("Play from the pluck, or stop (Space)")
+        self._play.setToolTip("Pluck the string, or stop (Space)")
         self._play.clicked.connect(self._forget_playing)
         self._play.clicked.connect(self.play_asked)
         column = QVBoxLayout()
@@ -175,8 +174,8 @@ class TransportBar(QFrame):
         return column
 
     def _build_output(self) -> QVBoxLayout:
-        self.export = self._export = QPushButton("Export WAV …")
-        self._export.setAccessibleName("Export WAV")
+        self.export = self._export = QPushButton("Export …")
+        self._export.setAccessibleName("Export")
         self._export.setToolTip("Save what you hear as a WAV file (Ctrl+E)")
         self._export.clicked.connect(self.export_asked)
         column = QVBoxLayout()

@@ -69,7 +69,7 @@ class ExportDialog(QDialog):
         )
         self.tabs = QTabBar(drawBase=False, expanding=False)
         self.tabs.setAccessibleName("What to export")
-        self.tabs.setToolTip("A note, what was recorded, or the patch for samplers or as a plug-in")
+        self.tabs.setToolTip("A note, what was recorded, or the instrument for samplers or as a plug-in")
         self._settled = QTimer(self, singleShot=True, interval=SETTLE_MS)
         self._settled.timeout.connect(self._update)
         self._lay_out()

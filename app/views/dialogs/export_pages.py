@@ -254,7 +254,7 @@ class NotePage(ExportPage):
 class PerformancePage(ExportPage):
     """What was played, to a WAV and a MIDI file of one name."""
 
-    title, missing = "Performance", "Nothing was recorded: click Record, play, and click it again."
+    title, missing = "Recording", "Nothing was recorded: click Record, play, and click it again."
 
     def __init__(self, export: ExportChoices, wav: WavForm) -> None:
         super().__init__()
@@ -279,7 +279,7 @@ class PerformancePage(ExportPage):
             raise ValueError(self.missing)
         played, preset = self._subject.played, self._subject.preset
         if preset is None:
-            raise ValueError(f"The preset {played.patch.preset}, which plays the patch, was not found.")
+            raise ValueError(f"The preset {played.patch.preset}, which plays the instrument, was not found.")
         choices = ExportChoices.model_validate(self._wav.choices())
         return PlayedExport(played, preset, self.file.path, choices.wav)
 
@@ -291,7 +291,7 @@ class PerformancePage(ExportPage):
 class SamplerPage(ExportPage):
     """A patch as an instrument for samplers: format, keys, layers, length, source, place."""
 
-    title, missing, writes_wav = "Sampler", "There is no patch to export: choose one first.", False
+    title, missing, writes_wav = "Sampler", "There is no instrument to export: choose one first.", False
 
     def __init__(self, choices: SampledChoices) -> None:
         super().__init__()
@@ -313,7 +313,7 @@ class SamplerPage(ExportPage):
         tip = "Silent ones end sooner; one that still rings is faded out"
         self.seconds = spin_box("Longest sample", SECONDS_RANGE, choices.seconds, tip, " s", 1, prefix="at most ")
         self.source = combo_box("Source", [("Model", "model"), ("Truth", "truth")], choices.source)
-        self.source.setToolTip("What plays the patch")
+        self.source.setToolTip("What plays the instrument")
         self.dry = QCheckBox("Dry: the room is left to the sampler")
         self.dry.setToolTip("A room in the samples ends with the release of each key")
         self.dry.setMinimumHeight(28)

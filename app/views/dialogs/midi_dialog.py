@@ -19,11 +19,11 @@ from app.views.controls.parts import combo_box, scrolled
 from app.views.controls.plain import Label
 
 NOTE_MODES = (
-    ("Play pitches of the patch", "pitch"),
-    ("Set pluck position", "position"),
-    ("Select preset", "preset"),
+    ("Notes of the instrument", "pitch"),
+    ("Pluck position", "position"),
+    ("Preset", "preset"),
 )
-CHANNELS = (("Any channel plays any key", "poly"), ("Guitar: a channel is a string", "guitar"), ("MPE", "mpe"))
+CHANNELS = (("Any channel plays any key", "poly"), ("Guitar: one channel per string", "guitar"), ("MPE", "mpe"))
 BENDS_BY = (
     ("Tension: the string is pulled tighter", "tension"),
     ("Length: a slide along the string", "length"),
@@ -33,7 +33,7 @@ BEND_TIP = (
     "How the pitch wheel bends: a string that is pulled tighter, as by a finger on a guitar, keeps its length;\n"
     "one that is made shorter or longer, as by a slide, keeps its tension. They sound different"
 )
-OF_THE_PATCH = "It belongs to the patch and is saved with it"
+OF_THE_PATCH = "It belongs to the instrument and is saved with it"
 
 
 class MidiDialog(QDialog):
@@ -57,14 +57,14 @@ class MidiDialog(QDialog):
         self._inputs = combo_box("MIDI input", [])
         self._inputs.setToolTip("The MIDI keyboard, or the port of another program, whose notes are played")
         self._inputs.activated.connect(lambda row: self.port_chosen.emit(self._inputs.itemData(row)))
-        self._notes = combo_box("Function of notes", NOTE_MODES)
+        self._notes = combo_box("MIDI notes control", NOTE_MODES)
         self._notes.setToolTip("Velocity always sets how hard the string is plucked")
         self._notes.activated.connect(lambda row: self.notes_chosen.emit(self._notes.itemData(row)))
         self._channels = combo_box("Channels", CHANNELS)
-        self._bends = combo_box("Range of the pitch wheel", [(_semitones(each), each) for each in BENDS])
+        self._bends = combo_box("Bend range", [(_semitones(each), each) for each in BENDS])
         turnable = [(name[:1].upper() + name[1:], field) for field, name in wheel.items()]
         self._wheel = combo_box("Modulation wheel", [("Nothing", "none"), *turnable])
-        self._bends_by = combo_box("What the pitch wheel changes", BENDS_BY)
+        self._bends_by = combo_box("Pitch bend changes", BENDS_BY)
         for box, field, tip in (
             (self._channels, "mode", "Whether the MIDI channel of a note says on which string it is played"),
             (self._bends, "bend_semitones", "How far the pitch wheel bends when it is turned all the way"),
@@ -84,10 +84,10 @@ class MidiDialog(QDialog):
         form = QFormLayout()
         for name, box in (
             ("Input", self._inputs),
-            ("Notes", self._notes),
+            ("MIDI notes control", self._notes),
             ("Channels", self._channels),
-            ("Pitch wheel", self._bends),
-            ("Bends by", self._bends_by),
+            ("Bend range", self._bends),
+            ("Pitch bend changes", self._bends_by),
             ("Modulation wheel", self._wheel),
         ):
             label = Label(name)

@@ -25,7 +25,9 @@ NARROW_NAME, NARROWEST_NAME = 180, 120  # pixels: the least, and the least with 
 LONGEST_SCALE_NAME = 120  # characters
 SAID_MS = 2_500  # a text that says why the octave stops or moves
 SAID_ABOVE = 44  # pixels
-COMPARE_TIP = "While this is on, keys play the patch as it was saved; the knobs keep your changes. Any change ends it"
+COMPARE_TIP = (
+    "While this is on, keys play the instrument as it was saved; the knobs keep your changes. Any change ends it"
+)
 MIXES = ("body.mix", "room.mix", "level_db")
 
 
@@ -86,25 +88,27 @@ class PatchBar(QFrame):
         row.addLayout(self._build_sound())
 
     def _build_words(self) -> QVBoxLayout:
-        previous = tool_button("◀", "Previous patch", "Previous patch in the browser's list")
-        following = tool_button("▶", "Next patch", "Next patch in the browser's list")
+        previous = tool_button("◀", "Previous instrument", "Previous instrument in the browser's list")
+        following = tool_button("▶", "Next instrument", "Next instrument in the browser's list")
         for button in (previous, following):
             button.setObjectName("narrow")
         previous.clicked.connect(self.previous_asked)
         following.clicked.connect(self.next_asked)
-        self.name = NameButton("No patch")
-        self.name.setToolTip("Browse the patches")
+        self.name = NameButton("No instrument")
+        self.name.setToolTip("Browse the instruments")
         self.name.setMinimumWidth(NARROW_NAME)
         self.name.setMaximumWidth(320)
         self.name.clicked.connect(self.browse_asked)
         self.category = Label()
         self.category.setObjectName("badge")
-        self.category.setToolTip("The patch's category")
+        self.category.setToolTip("The instrument's category")
         self.category.hide()
-        self.save = tool_button("Save", "Save the patch", "Save the patch; a shipped one under a name of your own")
-        self.rename = tool_button("Rename …", "Rename the patch", "Give your patch another name")
+        self.save = tool_button(
+            "Save", "Save the instrument", "Save the instrument; a factory one under a name of your own"
+        )
+        self.rename = tool_button("Rename …", "Rename the instrument", "Give your instrument another name")
         self.revert = tool_button(
-            "Revert", "Revert the patch", "Go back to the patch as it was saved; your changes are lost"
+            "Revert", "Revert the instrument", "Go back to the instrument as it was saved; your changes are lost"
         )
         for button, signal in (
             (self.save, self.save_asked),
@@ -114,7 +118,7 @@ class PatchBar(QFrame):
             button.setObjectName("small")
             button.setEnabled(False)
             button.clicked.connect(signal)
-        self.compare = tool_button("Compare", "Hear the saved patch", COMPARE_TIP)
+        self.compare = tool_button("Compare", "Hear the saved instrument", COMPARE_TIP)
         self.compare.setObjectName("small")
         self.compare.setCheckable(True)
         self.compare.setEnabled(False)
@@ -134,7 +138,7 @@ class PatchBar(QFrame):
 
     def _build_state(self) -> QHBoxLayout:
         self.note = words_label()
-        self.scala = tool_button("Scala  ✕", "Remove the Scala tuning of the patch")
+        self.scala = tool_button("Scala  ✕", "Remove the Scala tuning of the instrument")
         self.scala.setObjectName("solo")
         self.scala.clicked.connect(self.scala_remove_asked)
         self.scala.hide()
@@ -180,7 +184,7 @@ class PatchBar(QFrame):
         self.body = combo_box("Body", [("No body", "")])
         self.body.setToolTip("The body of the instrument, which colours the sound of the strings")
         self.body.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.body.setMinimumWidth(104)
+        self.body.setMinimumWidth(124)
         self.body.activated.connect(lambda row: self.body_chosen.emit(str(self.body.itemData(row))))
         head = Label("BODY TYPE")
         head.setObjectName("knob")
@@ -226,9 +230,9 @@ class PatchBar(QFrame):
         """`own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""
         mark = "●  " if changed else ""
         self.name.setText(f"{mark}{patch.name}   ▾".replace("&", "&&"))
-        self.name.setAccessibleName(f"Patch: {patch.name}{', changed' if changed else ''}")
+        self.name.setAccessibleName(f"Instrument: {patch.name}{', changed' if changed else ''}")
         told = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
-        self.name.setToolTip(plain_tip(f"{told}\nClick to browse the patches"))
+        self.name.setToolTip(plain_tip(f"{told}\nClick to browse the instruments"))
         self.category.setText(patch.category)
         self.save.setEnabled(changed)
         self.revert.setEnabled(changed)

@@ -11,20 +11,20 @@ from app.shared.key_names import note_name
 from app.views.controls.browser import Browser
 from app.views.controls.browser_rows import Column, Row
 
-MODES = {"guitar": "each MIDI channel is a string", "mpe": "MPE"}
+MODES = {"guitar": "one MIDI channel per string", "mpe": "MPE"}
 
 
 def patch_browser(parent: QWidget | None = None) -> Browser:
     return Browser(
-        "patches",
+        "instruments",
         "name, category, description, author",
-        (Column("Patch"),),
+        (Column("Instrument"),),
         (("Category", "All categories"), ("Bank", "Factory + User")),
         ("By category",),
         "Play a note",
         at_rest=True,
         size=(1000, 520, 240),
-        folder_tip="Show the folder of your patches, to which Save writes. A patch file dropped here is loaded",
+        folder_tip="Show the folder of your instruments, to which Save writes. Files dropped here are loaded",
         parent=parent,
     )
 

@@ -26,10 +26,12 @@ WIDTHS = {  # in pixels, by the longest name or value
     "pluck.width": 66,
     "pluck.width_hard": 66,
 }  # the others are narrow
-NO_A4 = "The Scala keyboard mapping of this patch has a reference pitch of its own, so that A4 would change nothing"
-NO_STRING = "The patch has drums, and no string that this could change"
+NO_A4 = (
+    "The Scala keyboard mapping of this instrument has a reference pitch of its own, so that A4 would change nothing"
+)
+NO_STRING = "This instrument has drums, and no string that this could change"
 OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "knobs.modulus", "pluck.curve")
-LETS_RING = "The patch lets its strings ring: no key damps them"
+LETS_RING = "Release off (let ring)"
 
 
 GROUPS = (PITCH, STRING, DECAY, PLUCK)  # in the order of the strip; the pick-up is in the transport bar

@@ -338,7 +338,7 @@ class StringView(QWidget):
         elif self._frame is None:
             self._span_mm = _span_mm(self._pluck.amplitude_mm)
         else:
-            largest_mm = self._frame.largest_mm()
+            largest_mm = self._frame.largest_mm(with_envelopes=self._plain)
             self._span_mm = max(_span_mm(largest_mm), min(self._span_mm, _span_mm(largest_mm, air=1.4)))
 
     # Painting
@@ -380,6 +380,12 @@ class StringView(QWidget):
             paint_caption(painter, axes, self._frame)
 
     @property
+    def _heard_remark(self) -> str:
+        """What sounds instead of the model, for a picture without a legend."""
+        others = (each.title for each in self._sources if each.heard and each.source != "model")
+        return next((f"You hear: {title}" for title in others), "")
+
+    @property
     def _heard(self) -> str:
         return next((source.source for source in self._sources if source.heard), "")
 
@@ -416,8 +422,8 @@ class StringView(QWidget):
             paint_ground(painter, axes, None if self._plain else self._trained, pluck)
             if not self._plain:
                 paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
-            elif self._warning:
-                paint_remark(painter, axes.width, self._warning)
+            elif remark := self._warning or self._heard_remark:
+                paint_remark(painter, axes.width, remark)
             if self.hasFocus():
                 painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
                 painter.setBrush(Qt.BrushStyle.NoBrush)

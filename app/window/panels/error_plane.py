@@ -141,7 +141,7 @@ class ErrorPlanePanel(Panel):
             self._words.setText(self._resting)
             return
         error = self._picture.at(position, amplitude_mm)
-        text = "runs away" if math.isinf(error) else f"error as trained about {percent(error)}"
+        text = "diverges" if math.isinf(error) else f"error as trained about {percent(error)}"
         if self._picture.spacing > 1:
             text += ", still coarse"
         trained = "" if self.map.is_trained(position, amplitude_mm) else ",  outside the training range"

@@ -80,7 +80,7 @@ def test_a_model_that_runs_away_has_infinite_errors_and_says_when(entries: list[
     save_preset(entries[0].path, preset.info, preset.model)
     compare(entries[:1], TRIAL, job)
     (row,) = job.results
-    assert "runs away" in row.note
+    assert "diverges" in row.note
     assert row.mae == row.past_mae == float("inf")
 
 

@@ -140,7 +140,7 @@ def test_a_model_that_runs_away_leaves_the_truth(
     monkeypatch.setattr(sound, "ModelSource", Away)
     rows = run_batch(plan(small_preset, folder))
     assert {(row.source, row.status) for row in rows} == {("model", "failed"), ("truth", "written")}
-    assert all("runs away" in row.message for row in rows if row.source == "model")
+    assert all("diverges" in row.message for row in rows if row.source == "model")
     assert len(list((folder / "out").glob("*.wav"))) == 4
 
 

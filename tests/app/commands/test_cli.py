@@ -18,7 +18,6 @@ ROOT = Path(__file__).parents[3]
 COMMANDS = [
     "presets",
     "models",
-    "patches",
     "simulate",
     "predict",
     "render",
@@ -29,7 +28,6 @@ COMMANDS = [
     "dataset",
     "train",
     "evaluate",
-    "instruments",
 ]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import math
 from dataclasses import replace
@@ -104,7 +103,7 @@ def test_the_errors_by_how_far_a_pluck_raises_the_tension(run, preset: Path, fol
     info = replace(loaded.info, tension_modulated=True, training={**loaded.info.training, "data": data})
     path = folder / "hard.safetensors"
     save_preset(path, info, loaded.model)
-    words = ["evaluate", path, "--held-out", "40", "--csv", folder / "errors.csv"]
+    words = ["evaluate", path, "--held-out", "40"]
     told = run(*words)
     assert "tension rises %" in told.out
     groups = json.loads(run(*words, "--json").out)["held_out"]["by_rise"]
@@ -114,7 +113,6 @@ def test_the_errors_by_how_far_a_pluck_raises_the_tension(run, preset: Path, fol
     assert sum(group["share"] for group in groups) == pytest.approx(1)
     assert all(0 < group["largest"] <= group["share"] for group in groups)
     assert groups[0]["rel_mse"] < 0.5 * groups[3]["rel_mse"]  # at half the rate soon out of step, too
-    assert "rise1_share," in (folder / "errors.csv").read_text(encoding="utf-8")
 
 
 def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) -> None:
@@ -178,28 +176,6 @@ def test_a_preset_of_many_strings_is_measured_on_plucks_of_one(run, folder: Path
     assert "decay time 27.6" not in beyond  # of the first mode: the error does not grow with it
 
 
-def test_every_figure_as_a_table(run, preset: Path, cache: list[Any], folder: Path) -> None:
-    path = folder / "errors.csv"
-    words = ["evaluate", preset, "--past", "1", "--partials", "--split", "both", "--csv", path, *cache]
-    assert run(*words).status == 0
-    with path.open(newline="", encoding="utf-8") as file:
-        rows = list(csv.DictReader(file))
-    assert {row["preset"] for row in rows} == {"tiny"}
-    assert {row["split"] for row in rows} == {"validation", "test"}
-    values = {
-        (row["split"], row["start_s"], row["stop_s"], row["mode"], row["quantity"]): float(row["value"])
-        for row in rows
-    }
-    found = json.loads(run(*words[:-4], *cache, "--json").out)
-    assert values["validation", "0.0", "0.125", "", "rel_mae"] == pytest.approx(found["rel_mae"])
-    late = found["test"]["windows"][-1]
-    assert values["test", "0.125", "1.125", "", "null_depth_db"] == pytest.approx(late["null_depth_db"])
-    mode = found["test"]["partials"][1]["modes"][0]
-    assert values["test", "0.125", "1.125", "1", "level_db"] == pytest.approx(mode["level_db"])
-    assert ("test", "0.125", "1.125", "all", "phase_cycles") in values
-    assert {row["past_horizon"] for row in rows if row["start_s"] == "0.125"} == {"True"}
-
-
 def test_some_trajectories(run, preset: Path, cache: list[Any]) -> None:
     found = json.loads(run("evaluate", preset, "--trajectories", "1", "--json", *cache).out)["validation"]
     assert (found["trajectories"], found["rel_mse_spread"]) == (1, 0)
@@ -214,11 +190,10 @@ def test_a_model_that_grows_is_shown_as_infinite(run, preset: Path, cache: list[
         weights.fill_(3e38)
     path = folder / "grown.safetensors"
     save_preset(path, loaded.info, loaded.model)
-    told = run("evaluate", path, "--partials", "--csv", folder / "grown.csv", *cache)
+    told = run("evaluate", path, "--partials", *cache)
     assert told.status == 0
     assert "rel. MSE inf, rel. MAE inf" in told.out
     assert "null depth inf dB" in told.out
-    assert "rel_mse,inf" in (folder / "grown.csv").read_text(encoding="utf-8")
     assert json.loads(run("evaluate", path, "--json", *cache).out)["rel_mse"] is None
 
 
@@ -235,13 +210,6 @@ def test_a_model_that_grows_is_shown_as_infinite(run, preset: Path, cache: list[
 )
 def test_bad_usage(run, preset: Path, words: list[str], message: str) -> None:
     assert message in run("evaluate", preset, *words).usage
-
-
-def test_a_table_that_cannot_be_written_is_told_before_the_work(run, preset: Path, folder: Path) -> None:
-    path = folder / "nowhere" / "errors.csv"
-    failure = run("evaluate", preset, "--csv", path, "--cache", folder / "cache").failure
-    assert f"{path}: cannot be written" in failure
-    assert not (folder / "cache").exists()
 
 
 def test_a_preset_that_says_nothing_of_its_training_is_told(run, small_preset: Path) -> None:

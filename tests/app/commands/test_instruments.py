@@ -1,23 +1,37 @@
-"""The command that measures instruments."""
+"""The command that lists instruments."""
 
 from __future__ import annotations
 
 import json
+from pathlib import Path
+
+import pytest
+
+from app.patches.library import SHIPPED
 
 
-def test_instruments_are_measured_beside_ranges(run) -> None:
-    found = json.loads(run("instruments", "measure", "harpsichord", "koto", "--json").out)
-    assert set(found["instruments"]) == {"harpsichord", "koto"}
-    harpsichord = found["instruments"]["harpsichord"]
-    assert harpsichord["figures"]["key"] == 60
-    assert harpsichord["ranges"]["centroid_hz"] == [1500, 3000]
-    for figure, met in harpsichord["met"].items():
-        low, high = harpsichord["ranges"][figure]
-        value = harpsichord["figures"][figure]
-        assert met == (low <= value and (high is None or value <= high)), figure
-    assert list(found["distances_db"]) == ["harpsichord, koto"]
-    assert all(each["taken"] for each in found["references"])
+def test_factory_instruments_are_listed(run) -> None:
+    found = run("instruments", "--json")
+    assert found.status == 0 and found.err == ""
+    listed = json.loads(found.out)
+    assert {each["file"] for each in listed} == {str(path) for path in SHIPPED.glob("*.json")}
+    table = run("instruments").out
+    for each in listed:
+        assert set(each) == {"name", "title", "category", "own", "description", "file"} and not each["own"]
+        assert each["name"] in table and each["title"] in table
 
 
-def test_an_unknown_instrument_is_named(run) -> None:
-    assert "no patch" in run("instruments", "measure", "theremin").failure
+def test_a_broken_instrument_is_reported_and_hides_no_other(
+    run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path))
+    own = tmp_path / "patches"
+    own.mkdir()
+    some = json.loads(next(SHIPPED.glob("*.json")).read_text(encoding="utf-8"))
+    (own / "mine.json").write_text(json.dumps({**some, "name": "Mine"}))
+    (own / "broken.json").write_text("{")
+    found = run("instruments", "--json")
+    assert found.status == 0
+    assert found.err.startswith(f"learned-strings: {own / 'broken.json'}: not JSON") and found.err.count("\n") == 1
+    (mine,) = (each for each in json.loads(found.out) if each["own"])
+    assert (mine["name"], mine["title"]) == ("mine", "Mine")

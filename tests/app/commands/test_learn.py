@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from training.recording.synthetic import synthetic_note
+from tests.bench.recordings.synthetic import synthetic_note
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,9 @@ def test_a_body_that_is_not_here_is_told_and_the_rest_is_played(
     (tmp_path / "mine.json").write_text(json.dumps(patch))
     (tmp_path / "one.mid").write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(57, 90)), TimedEvent(0.1, NoteOff(57))]))
     out = tmp_path / "one.wav"
-    found = run("play", tmp_path / "one.mid", "--patch", tmp_path / "mine.json", "--out", out, "--seconds", "0.3")
+    found = run(
+        "play", tmp_path / "one.mid", "--instrument", tmp_path / "mine.json", "--out", out, "--seconds", "0.3"
+    )
     assert found.status == 0
     assert "is played without its body: the body a cello is not here" in found.err
     assert found.out.startswith(f"{out}: 0.3 s of model in ")
@@ -41,7 +43,7 @@ def test_a_midi_file_is_played_by_model_and_truth_the_same_each_time(run, tmp_pa
     (tmp_path / "one.mid").write_bytes(midi_bytes(EVENTS))
 
     def played(name: str, *more: str) -> bytes:
-        found = run("play", tmp_path / "one.mid", "--patch", "jazz_guitar", "--out", tmp_path / name, *more)
+        found = run("play", tmp_path / "one.mid", "--instrument", "jazz_guitar", "--out", tmp_path / name, *more)
         assert found.status == 0, found.err
         return (tmp_path / name).read_bytes()[-20_000:]
 
@@ -60,9 +62,9 @@ def test_what_cannot_be_played_is_told_in_a_line(run, tmp_path: Path) -> None:
     (tmp_path / "one.mid").write_bytes(midi_bytes(EVENTS))
     out = tmp_path / "one.wav"
     for arguments in (
-        (tmp_path / "none.mid", "--patch", "jazz_guitar", "--out", out),
-        (tmp_path / "one.mid", "--patch", "no such patch", "--out", out),
-        (tmp_path / "one.mid", "--patch", "jazz_guitar", "--out", tmp_path / "nowhere" / "one.wav"),
+        (tmp_path / "none.mid", "--instrument", "jazz_guitar", "--out", out),
+        (tmp_path / "one.mid", "--instrument", "no such instrument", "--out", out),
+        (tmp_path / "one.mid", "--instrument", "jazz_guitar", "--out", tmp_path / "nowhere" / "one.wav"),
     ):
         found = run("play", *arguments)
         assert found.status == 1
@@ -76,7 +78,7 @@ def test_drums_are_left_out_and_that_is_told_in_a_line(run, tmp_path: Path) -> N
 
     def played(name: str) -> tuple[bytes, str]:
         out = tmp_path / f"{name}.wav"
-        found = run("play", tmp_path / f"{name}.mid", "--patch", "jazz_guitar", "--out", out, "--seconds", "0.5")
+        found = run("play", tmp_path / f"{name}.mid", "--instrument", "jazz_guitar", "--out", out, "--seconds", "0.5")
         assert found.status == 0, found.err
         return soundfile.read(out)[0].tobytes(), found.err
 
@@ -92,7 +94,7 @@ def test_a_file_of_one_channel_sounds_in_chords_by_a_guitars_patch(run, tmp_path
     def played(name: str, events: list[TimedEvent]) -> NDArray[np.float64]:
         (tmp_path / f"{name}.mid").write_bytes(midi_bytes(events))
         out = tmp_path / f"{name}.wav"
-        found = run("play", tmp_path / f"{name}.mid", "--patch", "oud", "--out", out, "--seconds", "0.5")
+        found = run("play", tmp_path / f"{name}.mid", "--instrument", "oud", "--out", out, "--seconds", "0.5")
         assert found.status == 0, found.err
         sound = soundfile.read(out, always_2d=True)[0][:, 0]
         return np.abs(np.fft.rfft(sound * np.hanning(len(sound))))
@@ -107,7 +109,7 @@ def test_a_file_of_one_channel_sounds_in_chords_by_a_guitars_patch(run, tmp_path
 def test_info_says_which_instrument_played(run, tmp_path: Path) -> None:
     midi, out = tmp_path / "one.mid", tmp_path / "one.wav"
     midi.write_bytes(midi_bytes(EVENTS))
-    told = ("--patch", "jazz_guitar", "--source", "truth", "--rate", 44_100, "--bits", "16", "--seconds", "0.2")
+    told = ("--instrument", "jazz_guitar", "--source", "truth", "--rate", 44_100, "--bits", "16", "--seconds", "0.2")
     assert run("play", midi, "--out", out, *told).status == 0
     facts = json.loads(run("info", out, "--json").out)
     assert facts["preset_file"] == str(PRESETS / "studio_any_string.safetensors")

@@ -42,7 +42,7 @@ def test_an_sfz_with_its_samples(run, notes: list[tuple], folder: Path) -> None:
     preset = find_patch(PATCH).patch.preset
     plan = SampledPlan(find_patch(PATCH).patch, (60, 62), layers=2)
     assert notes == [(PATCH, preset, zone.key, zone.velocity, 0.2, 0.2, 44_100, "truth") for zone in plan.zones]
-    pitch = f"; note starts within {plan.pitch_error_cents:.1f} cents of the patch\n"
+    pitch = f"; note starts within {plan.pitch_error_cents:.1f} cents of the instrument\n"
     assert found.out.endswith(pitch) and pitch in found.err
     assert len(list((folder / "a_samples").glob("*.flac"))) == 6
     assert (
@@ -107,7 +107,7 @@ def test_a_large_one_is_asked_for(run, notes: list[tuple], folder: Path, monkeyp
         (("a.sf2", "--bits", "16"), "a SoundFont holds 16 bits"),
         (("a.sf2", "--rate", 96_000), "a SoundFont's rate must lie in"),
         (("a.sfz", "--keys", "low-high"), "must be two keys as in E2-E5 or 40-76"),
-        (("a.sfz", "--keys", "0-127"), "keys must be a range within the patch's own"),
+        (("a.sfz", "--keys", "0-127"), "keys must be a range within the instrument's own"),
         (("a.sfz", "--layers", 0), "layers must lie in 1 … 32"),
         (("a.sfz", "--every", 99), "every must lie in 1 … 12"),
         (("a.sfz", "--seconds", "inf"), "seconds must lie in"),

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import errno
 import json
-import shutil
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -13,15 +12,12 @@ from typing import Any
 import pytest
 
 from engine.metrics import RelativeError
-from engine.presets import find_preset
 from engine.result_file import REMEDIES
 from tests.app.commands.conftest import FullDisk
-from training.cell import Cell, configuration_of
 from training.cli import console
 from training.cli.sweep import Shown
 from training.fitting.fit import Progress
 from training.results import Row, add_rows, read_results
-from training.run import run_row
 from training.sweeping.plan import load_plan
 from training.sweeping.workers import Layout
 from training.sweeping.workers.base import Ended, Event, Noted, Progressed, Task
@@ -226,39 +222,6 @@ def test_a_full_disk_leaves_the_rows_as_they_were(run, tmp_path: Path, bytes_lef
     assert told == f"learned-strings: {here}: cannot be written (File too large); {REMEDIES[errno.EFBIG]}"
     assert here.read_bytes() == before
     assert not list(tmp_path.glob("*.unfinished"))
-
-
-def test_rows_are_filled_from_presets(run, tmp_path: Path) -> None:
-    """The sweep's own rows of today lack nothing; those of yesterday get what they lack, and keep the rest."""
-    name, places = NAMES[1], {"runs": tmp_path / "runs", "cache": tmp_path / "cache"}
-    made = configuration_of(Cell.parse(name) or pytest.fail(), {"count": 10, "steps": 60}, {"epochs": 1})
-    row = run_row(name, "ours", made, **places)
-    preset, file = tmp_path / "runs" / name / f"{name}.safetensors", tmp_path / "results.csv"
-    add_rows(file, [replace(row, rel_mse_se=None, test_rel_mae_se=None), row_of("other")])
-    words = ["results", "measure", preset, "--results", file, "--cache", tmp_path / "cache"]
-    assert run(*words).out == f"{name}: 2 figures added\n"
-    assert read_results(file) == sorted([row, row_of("other")], key=lambda r: r.name)
-    add_rows(file, [replace(row, finished="2999")])
-    assert run(*words).out == f"{name}: 0 figures added\n"
-    file.unlink()
-    assert f"{preset}: {file} has no row of its run" in run(*words).failure
-
-
-def test_presets_without_a_row_do_not_hinder_the_others(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A model of many strings has none, and a folder may hold anything."""
-    name, places = NAMES[1], {"runs": tmp_path / "runs", "cache": tmp_path / "cache"}
-    made = configuration_of(Cell.parse(name) or pytest.fail(), {"count": 10, "steps": 60}, {"epochs": 1})
-    folder, file = tmp_path / "shipped", tmp_path / "results.csv"
-    folder.mkdir()
-    row = run_row(name, "ours", made, **places, preset=folder / f"{name}.safetensors")
-    shutil.copy(find_preset("studio_any_nylon_e2"), folder)
-    (folder / "damaged.safetensors").write_bytes(b"none")
-    add_rows(file, [replace(row, rel_mse_se=None)])
-    monkeypatch.setattr("engine.presets.finding.SHIPPED", folder)
-    assert (
-        run("results", "measure", "--results", file, "--cache", tmp_path / "cache").out
-        == f"{name}: 1 figures added\n"
-    )
 
 
 def test_the_time_left_follows_what_is_known() -> None:

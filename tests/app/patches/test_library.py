@@ -84,9 +84,9 @@ def test_two_patches_of_one_name_are_told_apart(make_patch: Make, own: Path) -> 
 def test_a_shipped_patch_is_neither_overwritten_nor_renamed(make_patch: Make, own: Path) -> None:
     shipped = list_patches(SHIPPED)[0][0]
     for replace in (None, shipped.path):
-        with pytest.raises(PatchError, match="shipped"):
+        with pytest.raises(PatchError, match="factory"):
             save_patch(make_patch(name=shipped.patch.name), replace)
-    with pytest.raises(PatchError, match="shipped"):
+    with pytest.raises(PatchError, match="shipped with"):
         rename_patch(shipped, "Other")
     assert not own.exists()
 
@@ -161,7 +161,7 @@ def test_of_two_patches_of_one_name_the_shipped_one_counts(own: Path) -> None:
 
 def test_an_unknown_name_lists_the_known_ones(make_patch: Make) -> None:
     save_patch(make_patch(name="Mine"))
-    with pytest.raises(PatchError, match=r"no patch 'other'; .*mine"):
+    with pytest.raises(PatchError, match=r"no instrument 'other'; .*mine"):
         find_patch("other")
     with pytest.raises(PatchError, match="absent"):
         find_patch("absent.json")

@@ -91,7 +91,7 @@ def test_keys_play_what_was_chosen_last() -> None:
     choices = session.choices
     assert (choices.instrument, choices.patch, choices.string) == (SingleString(preset="one"), patch, None)
     session.update(preset="many")
-    assert (session.choices.instrument, session.choices.kept) == (patch, None), "it is the preset of the patch"
+    assert (session.choices.instrument, session.choices.kept) == (patch, None), "it is the preset of the instrument"
     session.update(preset="one")
     session.play_patch()
     assert (session.choices.preset, session.choices.plays_patch) == ("many", True)

@@ -191,7 +191,7 @@ def test_what_is_played_is_a_step_with_the_pick_up_that_comes_with_it(clock: Clo
         words.append(history.undo_words)
         history.undo()
         assert (session.choices.plays_patch, session.choices.listen) == (plays_patch, listen)
-    assert words == ["patch Classical guitar", "listening point", "preset studio_any_string"]
+    assert words == ["instrument Classical guitar", "listening point", "preset studio_any_string"]
     assert heard(session) == own
     for _ in words:
         history.redo()

@@ -35,17 +35,17 @@ def with_part(patch: Patch, **parts: Any) -> Patch:
 
 def test_fields_of_a_patch(guitar: Patch, harp: Patch) -> None:
     assert words(guitar, guitar) == ""
-    assert words(guitar, harp) == f"patch {harp.name}"
-    assert words(SingleString(), guitar) == "patch Classical guitar"
+    assert words(guitar, harp) == f"instrument {harp.name}"
+    assert words(SingleString(), guitar) == "instrument Classical guitar"
     assert words(guitar, SingleString(preset="nylon")) == "preset nylon"
     assert step_words({"kept": guitar}, {"kept": guitar.with_value("knobs.stiffness", 2.0)}) == "stiffness"
-    assert words(guitar, with_part(guitar, name="Mine")) == "name of the patch"
+    assert words(guitar, with_part(guitar, name="Mine")) == "name of the instrument"
     assert words(guitar, guitar.with_value("knobs.stiffness", 2.0)) == "stiffness"
     assert words(guitar, guitar.with_value("pluck.position", 0.31)) == "pluck position"
     assert words(guitar, with_part(guitar, body=Body(name="mine", mix=guitar.body.mix))) == "body"
     scale = "! a\n!\nhalves\n 2\n!\n 600.\n 2/1\n"
     assert words(guitar, with_part(guitar, tuning=TuningChoice(scale=scale))) == "scale"
-    assert words(guitar, with_part(guitar, bend_by="length")) == "kind of bends"
+    assert words(guitar, with_part(guitar, bend_by="length")) == "bend mode"
     assert words(guitar, with_part(guitar, strings=harp.strings)) == "strings"
     two = guitar.with_values({"knobs.stiffness": 2.0, "level_db": -3.0})
     assert words(guitar, two) == "stiffness and level"
@@ -101,9 +101,9 @@ def test_history_names_the_next_step_each_way(guitar: Patch, harp: Patch) -> Non
         found.append(history.undo_words)
         history.undo()
         assert history.redo_words == found[-1]
-    assert found == ["pluck position", "decay", f"patch {harp.name}", "patch Classical guitar"]
+    assert found == ["pluck position", "decay", f"instrument {harp.name}", "instrument Classical guitar"]
     history.redo()
-    assert (history.undo_words, history.redo_words) == ("patch Classical guitar", f"patch {harp.name}")
+    assert (history.undo_words, history.redo_words) == ("instrument Classical guitar", f"instrument {harp.name}")
 
 
 def test_a_drag_that_came_back_is_not_told(guitar: Patch) -> None:
@@ -129,4 +129,4 @@ def test_two_knobs_of_a_patch_are_two_steps_however_quick_and_notches_of_one_are
     while history.undo_words:
         found.append(history.undo_words)
         history.undo()
-    assert found == ["stiffness", "decay", "patch Classical guitar"]
+    assert found == ["stiffness", "decay", "instrument Classical guitar"]

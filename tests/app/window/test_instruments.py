@@ -25,7 +25,7 @@ def test_midi_selects_a_preset_of_one_string_after_a_key_of_a_patch(
     midi._receive(NoteOn(LOWEST_PLACE + played.library.names.index("second"), 100))  # as in mido's thread
     note = played.performance.notes._notes[-1]
     assert path_of(note.request.preset).stem == "second"
-    assert string_of(note.request.preset) is None, "the string of the patch's key"
+    assert string_of(note.request.preset) is None, "the string of the instrument's key"
     qtbot.waitUntil(lambda: note.seconds > 0 or note.cut)
     assert not note.cut
     qtbot.waitUntil(lambda: session.choices.preset == "second")

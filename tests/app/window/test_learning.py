@@ -14,7 +14,7 @@ from app.patches.library import own_patches
 from app.views.dialogs.learn_dialog import LearnDialog
 from app.window.controller import Controller
 from engine.presets import find_preset, read_info
-from training.recording.synthetic import synthetic_note
+from tests.bench.recordings.synthetic import synthetic_note
 
 LEARNED_MS = 90_000
 

@@ -57,7 +57,7 @@ def watch(controller):
 
     def close_when_played():
         if len(struck) == 2 and controller.performance.ready:
-            print(json.dumps({"struck": struck, "patch": controller.session.choices.patch.name}))
+            print(json.dumps({"struck": struck, "instrument": controller.session.choices.instrument.name}))
             controller.window.close()
 
     notes.handle = noted

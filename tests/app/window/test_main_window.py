@@ -198,9 +198,8 @@ def test_it_fits_a_small_screen_with_a_notice(qtbot: QtBot, controller: Controll
 def test_in_a_narrow_window_the_controls_stand_closer_and_all_are_seen(qtbot: QtBot, controller: Controller) -> None:
     window = controller.window
     transport = window.transport
-    for width, words in ((1000, "Export …"), (1280, "Export WAV …"), (958, "Export …")):
+    for width in (1000, 1280, 958):
         window.resize(width, 600)
-        qtbot.waitUntil(lambda words=words: transport._export.text() == words)
         qtbot.waitUntil(lambda: transport.minimumSizeHint().width() <= transport.parentWidget().width())
         right = transport._export.mapTo(window, transport._export.rect().topRight()).x()
         assert right < width

@@ -242,7 +242,7 @@ def test_an_impossible_name_is_explained_and_asked_for_again(
     assert read_patch(own_patches() / "mine.json").name == "Mine"
     assert [text for _, text in asked[1:]] == ["AC/DC", "My Bass.", "Classical guitar"], "what was typed stays"
     assert "must not begin or end with a full stop, or hold one of" in asked[1][0]
-    assert "a shipped patch has this name" in asked[3][0]
+    assert "a factory instrument has this name" in asked[3][0]
 
 
 def test_a_copied_patch_is_saved_and_reverted_by_itself(played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -388,9 +388,9 @@ def test_a_patch_that_is_there_already_is_heard_with_its_changes(played: Control
 def test_a_switch_chooses_what_keys_play_and_is_remembered(qtbot: QtBot, played: Controller) -> None:
     """Also of the preset that plays the patch."""
     strip = played.window.instrument
-    assert strip.plays.text().startswith("Keys play pitches")
+    assert strip.plays.text().startswith("Keys play notes")
     strip._plays["place"].trigger()
-    assert strip.plays.text().startswith("Keys choose the place")
+    assert strip.plays.text().startswith("Keys set pluck position")
     assert played.session.choices.preset == "studio_any_string"
     assert not played.settings().choices.plays_patch
     press(qtbot, played, Qt.Key.Key_A)
@@ -417,7 +417,7 @@ def test_keys_say_once_that_they_do_not_play_another_preset(played: Controller) 
     keys = played.window.instrument.keys
     played.session.update(a="preset:second", heard="a")
     assert len(informed) == 1
-    assert "Keys sound with the model of their patch" in informed[0]
+    assert "Keys sound with the model of their instrument" in informed[0]
     assert keys._source == "model"
     played.session.switch_source()
     assert keys._source == "truth"

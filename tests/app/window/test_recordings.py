@@ -76,7 +76,7 @@ def test_what_is_played_is_recorded_as_wav_and_midi(
     recordings = played.patches.recordings
     recordings.record()
     recordings.record()
-    assert "Nothing was played" in told.errors[0]
+    assert "Nothing was played" in told.good[0]
     out = tmp_path / "take.wav"
     record(played)
     assert "1 note in" in dialog_of(played).performance.what.text()

@@ -48,7 +48,7 @@ def test_without_a_patch_it_says_so(controller: Controller) -> None:
     controller.session.update(patch=None)
     controller.window.action["sampler"].trigger()
     assert controller.exports.dialog is None
-    assert "There is no patch to export" in controller.window.notices.notices[-1].message
+    assert "There is no instrument to export" in controller.window.notices.notices[-1].message
 
 
 def test_the_patch_is_exported_while_the_window_plays(qtbot: QtBot, patched: Controller, tmp_path: Path) -> None:

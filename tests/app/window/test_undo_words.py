@@ -28,7 +28,7 @@ def test_the_menu_names_both_steps_and_takes_them(controller: Controller) -> Non
     undo.trigger()
     assert controller.session.choices.position != 0.77
     undo, redo = actions(controller)
-    assert undo.text() == "Undo: patch Classical guitar"
+    assert undo.text() == "Undo: instrument Classical guitar"
     assert redo.text() == "Redo: pluck position"
     redo.trigger()
     assert controller.session.choices.position == 0.77

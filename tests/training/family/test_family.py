@@ -106,7 +106,6 @@ def test_players_are_as_good_as_they_should_be() -> None:
     players = {
         "series": players_of_physics.untrained("series"),
         "kicks": players_of_physics.untrained("kicks"),
-        "slow flow": players_of_physics.averaged_flow,
         "averaging": players_of_physics.averaging,
         "linear": players_of_physics.linear_string,
     }
@@ -121,23 +120,8 @@ def test_a_column_tells_its_worst() -> None:
     assert told.worst.tension_rise == 0.4
     assert told.share_large == 0.5
     assert math.isclose(told.geometric_mean, math.sqrt(1e-7))
-    parts = family_errors.in_ranges(strings, tension_rise=(0, 0.2, 0.3, 0.5))
-    assert [(edges, len(part.strings)) for edges, part in parts] == [(((0, 0.2),), 1), (((0.3, 0.5),), 1)]
-
-
-def test_a_map_has_every_string_once() -> None:
-    strings = tuple(
-        StringError(100.0, inharmonicity, rise, 50, 1e-6)
-        for inharmonicity in (1e-5, 1e-4, 1e-3)
-        for rise in (0.02, 0.1, 0.5)
-    )
-    cells = family_errors.in_ranges(strings, tension_rise=(0.02, 0.1, 0.5), inharmonicity=(1e-5, 1e-4, 1e-3))
-    assert {ranges: len(part.strings) for ranges, part in cells} == {
-        ((0.02, 0.1), (1e-5, 1e-4)): 1,
-        ((0.02, 0.1), (1e-4, 1e-3)): 2,
-        ((0.1, 0.5), (1e-5, 1e-4)): 2,
-        ((0.1, 0.5), (1e-4, 1e-3)): 4,
-    }
+    parts = family_errors.by_rise(strings, (0, 0.2, 0.3, 0.5))
+    assert [(edges, len(part.strings)) for edges, part in parts] == [((0, 0.2), 1), ((0.3, 0.5), 1)]
 
 
 def test_a_string_that_has_fallen_silent_says_so() -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
 from training.recording.learn import Learned, learn
 from training.recording.preset import Source
-from training.recording.synthetic import SyntheticNote, synthetic_note
 
 SEED = 2  # 95 Hz
 

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
+from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
 from training.recording.gate import examine
 from training.recording.learn import Refused, learn
 from training.recording.note import note_of
 from training.recording.numbering import number_note
 from training.recording.preset import Source
-from training.recording.synthetic import SyntheticNote, synthetic_note
 
 RATE_HZ = 44_100
 Change = Callable[[np.ndarray], np.ndarray]

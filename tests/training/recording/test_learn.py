@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from engine.presets import load_preset
-from training.recording.coverage import coverage
+from tests.bench.recordings.coverage import coverage
+from tests.bench.recordings.synthetic import SyntheticNote
 from training.recording.fit import fit_note
 from training.recording.learn import Learned, learn
 from training.recording.numbering import number_note
 from training.recording.preset import Source, body_response, recorded_note, recorded_string, write_preset
 from training.recording.report import errors_of, figures
-from training.recording.synthetic import SyntheticNote
 from training.recording.table import as_data, as_text
 
 RECORDINGS = Path(__file__).parents[4] / "shared" / "recordings"
@@ -43,7 +43,7 @@ def test_pitch_and_stiffness_are_the_strings(learned: Learned, synthetic: Synthe
 
 
 def test_intervals_hold_the_truth() -> None:
-    found = coverage((11, 12))  # `judge --synthetic 200` is the whole of it
+    found = coverage((11, 12))  # `bench recordings --synthetic 200` is the whole of it
     assert found["misnumbered"] == 0 and found["partials"] > 20
     assert min(found["hz"], found["decay"], found["level_db"]) > 0.85
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tests.bench.recordings.synthetic import SyntheticNote
 from training.recording.note import RecordingError, note_of
-from training.recording.synthetic import SyntheticNote
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from tests.bench.recordings.synthetic import SyntheticNote
 from training.recording.note import note_of
 from training.recording.numbering import number_note
-from training.recording.synthetic import SyntheticNote
 
 RATE_HZ = 44_100
 

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import psutil
 import pytest
@@ -104,15 +105,15 @@ def test_what_failed_is_tried_again_then_recorded_and_tried_by_the_next_sweep(pl
 
     assert [run.name for run in unfinished(made, read_results(options.results))] == [worst]
     again = Script(lambda task, tries: row_of(task, finished="2100-01-01T00:00:00Z"))
-    assert {row.status for row in sweep(made, again, options)} == {"done"}
+    assert {row.status for row in sweep(made, again, options, Mock())} == {"done"}
     assert again.started == [worst]
 
 
 def test_what_diverged_is_a_result(plan, options: Options) -> None:
     diverged = Script(lambda task, tries: row_of(task, status="diverged", rel_mae=None, message="the loss is nan"))
-    assert {row.status for row in sweep(plan(), diverged, options)} == {"diverged"}
+    assert {row.status for row in sweep(plan(), diverged, options, Mock())} == {"diverged"}
     nothing = Script(lambda task, tries: "not to be run")
-    sweep(plan(), nothing, options)
+    sweep(plan(), nothing, options, Mock())
     assert nothing.started == []
     assert is_finished(row_of(Task("a", "ours", {}, "a"))) and not is_finished(None)
 
@@ -123,7 +124,7 @@ def test_what_kills_its_workers_is_not_tried_again(plan, options: Options) -> No
             return Ended(self._tasks.pop().name, None, "its worker died 4 times", final=True)
 
     workers = Deadly(lambda task, tries: "")
-    assert {row.status for row in sweep(plan(), workers, options)} == {"failed"}
+    assert {row.status for row in sweep(plan(), workers, options, Mock())} == {"failed"}
     assert len(workers.started) == len(plan().runs)
 
 
@@ -136,7 +137,7 @@ def test_a_row_that_another_machine_added_meanwhile_is_not_done_again(plan, opti
         return row_of(task)
 
     workers = Script(outcome, capacity=1)
-    rows = sweep(made, workers, options)
+    rows = sweep(made, workers, options, Mock())
     assert last.name not in workers.started
     assert rows[-1].rel_mae == 0.25
 
@@ -146,11 +147,11 @@ def test_a_results_file_that_cannot_be_written_ends_the_sweep_before_the_work(pl
     folder = options.results
     folder.mkdir()
     with pytest.raises(SchemaError, match="not an ordinary file"):
-        sweep(plan(), workers, options)
+        sweep(plan(), workers, options, Mock())
     folder.rmdir()
     folder.write_text("something else\n", encoding="utf-8")
     with pytest.raises(SchemaError, match="not a results file"):
-        sweep(plan(), workers, options)
+        sweep(plan(), workers, options, Mock())
     assert workers.started == []
 
 
@@ -221,7 +222,7 @@ def here(count: int) -> Layout:
 def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(plan, options: Options, alone: Options) -> None:
     """Two models on two data sets from two seeds: on two processes with a kill, and one after another here."""
     made = plan(epochs=60)
-    sweep(made, Inline(), alone)
+    sweep(made, Inline(), alone, Mock())
 
     killer = Killer(options.runs / made.name)
     with local_workers(here(2)) as workers:
@@ -239,13 +240,13 @@ def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(plan, options:
     # the same plan again: nothing to do, nothing changed
     before = options.results.read_bytes()
     nobody = Script(lambda task, tries: "not to be run")
-    assert [(r.name, r.status) for r in sweep(made, nobody, options)] == [(r.name, r.status) for r in rows]
+    assert [(r.name, r.status) for r in sweep(made, nobody, options, Mock())] == [(r.name, r.status) for r in rows]
     assert nobody.started == []
     assert options.results.read_bytes() == before
 
     # the results file is lost: the rows come back from the runs' folders
     options.results.unlink()
-    sweep(made, Inline(), options)
+    sweep(made, Inline(), options, Mock())
     assert options.results.read_bytes() == before
 
 
@@ -254,13 +255,13 @@ def test_the_workers_of_a_dask_cluster_do_the_same(plan, options: Options, alone
 
     made = plan(seeds="0")
     made = replace(made, runs=made.runs[:1])
-    sweep(made, Inline(), alone)
+    sweep(made, Inline(), alone, Mock())
     with (
         LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster,
         cluster_workers(cluster.scheduler_address) as workers,
     ):
         assert "the Dask cluster inproc://" in workers.description
-        sweep(made, workers, options)
+        sweep(made, workers, options, Mock())
     assert measured(options.results) == measured(alone.results)
 
 

@@ -11,7 +11,6 @@ from training.cell import Cell, configuration_of
 from training.results import Row
 from training.start import PHASES
 from training.tables.compact import as_compact
-from training.tables.markdown import as_markdown
 from training.tables.paper import COLUMNS, Column, Figure
 from training.tables.sections import sections
 from training.tables.tidy_csv import as_csv
@@ -45,167 +44,92 @@ def seeds(count: int, **fields: Any) -> list[Cell]:
     return [Cell(seed=seed, **fields) for seed in range(count)]
 
 
-def table(markdown: str, string: str, horizon: int) -> list[list[str]]:
-    """The cells of one table, its head first."""
-    _, _, text = markdown.partition(f"## {string}")
-    _, _, text = text.partition(f"### {horizon} frames\n\n")
-    lines = text.partition("\n\n")[0].splitlines()
-    return [[cell.strip() for cell in line.strip("|").split(" | ")] for line in (lines[0], *lines[2:])]
-
-
-def line(cells: list[list[str]], model: str, run: str) -> list[str]:
-    """What follows the model and the run of the only line that has them."""
-    found = [entry[2:] for entry in cells if entry[:2] == [model, run]]
-    assert len(found) == 1, found
-    return found[0]
-
-
 def records(text: str, **wanted: str) -> list[dict[str, str]]:
     lines = list(csv.DictReader(io.StringIO(text)))
     return [entry for entry in lines if all(entry[name] == value for name, value in wanted.items())]
 
 
+def cell(rows: list[Row], **wanted: str) -> dict[str, str]:
+    """The only line of the CSV that has these values, of the non-linear string at 4 kHz."""
+    place = {"string": "nonlinear", "horizon": "4000", "model": "lru", "initial": "gaussian", "rate_hz": "4000"}
+    (found,) = records(as_csv(rows), **{**place, **wanted})
+    return found
+
+
 def test_a_cell_is_the_mean_over_its_seeds_beside_the_paper() -> None:
     first, second = seeds(2)
-    found = as_markdown([row(first, 0.010, 0.10), row(second, 0.012, 0.16)])
-    cells = table(found, "Non-linear", 4000)
-    assert cells[0][2:4] == ["Gaussian 4 kHz MSE", "Gaussian 4 kHz MAE"]
-    assert line(cells, "LRU", "**the paper**")[:2] == ["0.0260 (0.0067)", "0.1571 (0.0240)"]
-    ours = line(cells, "LRU", "our recipe")
-    assert ours[0] == "0.011 (0.0014) **better**, 2 seeds"
-    assert ours[1] == "0.13 (0.042) **equal**, 2 seeds"
-    assert ours[2:] == ["not run"] * 6
+    found = cell([row(first, 0.010, 0.10), row(second, 0.012, 0.16)])
+    assert (found["paper_rel_mse"], found["paper_rel_mse_std"]) == ("0.026", "0.0067")
+    assert float(found["rel_mse"]) == pytest.approx(0.011)
+    assert float(found["rel_mae_std"]) == pytest.approx(0.03 * 2**0.5)
+    assert (found["mse_mark"], found["mae_mark"], found["seeds"]) == ("better", "equal", "2")
 
 
-def test_one_seed_has_no_deviation_and_small_errors_keep_their_digits() -> None:
-    cells = table(as_markdown([row(mse=5.123e-6, mae=1.5)]), "Non-linear", 4000)
-    assert line(cells, "LRU", "our recipe")[:2] == ["5.12e-06 **better**, 1 seed", "1.5 **worse**, 1 seed"]
+def test_one_seed_has_no_deviation() -> None:
+    found = cell([row(mse=5.123e-6, mae=1.5)])
+    assert (found["rel_mse"], found["rel_mse_std"], found["seeds"]) == ("5.123e-06", "", "1")
+    assert (found["mse_mark"], found["mae_mark"]) == ("better", "worse")
 
 
 def test_a_seed_that_runs_away_on_the_test_split_is_not_left_out_of_its_mean() -> None:
     first, second = seeds(2)
     tame, wild = (row(name, 0.01, test_rel_mse=test) for name, test in ((first, 0.01), (second, None)))
-    assert line(table(as_markdown([tame]), "Non-linear", 4000), "LRU", "… test split")[0] == "0.01 **better**"
-    both = table(as_markdown([tame, wild]), "Non-linear", 4000)
-    assert not [entry for entry in both if entry[:2] == ["LRU", "… test split"]]
+    assert (cell([tame])["test_rel_mse"], cell([tame])["test_mse_mark"]) == ("0.01", "better")
+    assert cell([tame, wild])["test_rel_mse"] == ""
 
 
 def test_which_strings_are_in_the_split_counts_beside_the_seeds() -> None:
     first, second = seeds(2)
-    alone = line(table(as_markdown([row(first, 0.02, rel_mse_se=0.005)]), "Non-linear", 4000), "LRU", "our recipe")
-    assert alone[0] == "0.02 (0.005) **equal**, 1 seed"
-    assert line(table(as_markdown([row(first, 0.02)]), "Non-linear", 4000), "LRU", "our recipe")[0] == (
-        "0.02 **equal**, 1 seed"
-    )
+    assert cell([row(first, 0.02, rel_mse_se=0.005)])["rel_mse_se"] == "0.005"
     # deviation over seeds 0.003, of the split √((0.003² + 0.005²) / 2): the seeds share their strings
-    rows = [
-        row(first, 0.02 - 0.0015 * 2**0.5, rel_mse_se=0.003),
-        row(second, 0.02 + 0.0015 * 2**0.5, rel_mse_se=0.005),
-    ]
-    both = line(table(as_markdown(rows), "Non-linear", 4000), "LRU", "our recipe")
-    assert both[0] == "0.02 (0.0051) **equal**, 2 seeds"
-    (found,) = records(as_csv(rows), seeds="2")
+    found = cell(
+        [
+            row(first, 0.02 - 0.0015 * 2**0.5, rel_mse_se=0.003),
+            row(second, 0.02 + 0.0015 * 2**0.5, rel_mse_se=0.005),
+        ]
+    )
+    assert found["mse_mark"] == "equal"
     assert float(found["rel_mse_std"]) == pytest.approx(0.003)
     assert float(found["rel_mse_se"]) == pytest.approx(17e-6**0.5)
 
 
-def test_the_test_split_stands_below_with_words_of_its_own() -> None:
-    figures = {"test_rel_mse": 0.03, "test_rel_mae": 0.2, "test_rel_mse_se": 0.002}
-    cells = table(as_markdown([row(mse=0.005, mae=0.1, **figures)]), "Non-linear", 4000)
-    ours = cells.index(["LRU", "our recipe", "0.005 **better**, 1 seed", "0.1 **better**, 1 seed", *["not run"] * 6])
-    assert cells[ours + 1] == ["LRU", "… test split", "0.03 (0.002) **equal**", "0.2 **worse**", *["—"] * 6]
-    (found,) = records(as_csv([row(mse=0.005, mae=0.1, **figures)]), seeds="1")
+def test_the_test_split_has_marks_of_its_own() -> None:
+    found = cell([row(mse=0.005, mae=0.1, test_rel_mse=0.03, test_rel_mae=0.2, test_rel_mse_se=0.002)])
     assert (found["mse_mark"], found["test_mse_mark"], found["test_mae_mark"]) == ("better", "equal", "worse")
     assert (found["test_rel_mse"], found["test_rel_mse_se"], found["test_rel_mae_se"]) == ("0.03", "0.002", "")
-    assert "… test split" not in as_markdown([row()])  # where nothing was measured
 
 
-def test_black_boxes_with_a_hint_are_marked() -> None:
-    rows = [
-        row(Cell(model, True, "gaussian", 4000, horizon, recipe), initialisation=PHASES)
-        for model, horizon, recipe in (
-            ("koopman_integrated", 4000, "hinted"),
-            ("koopman_integrated", 4000, "blind"),
-            ("fgru", 400, "ours"),
-        )
-    ]
-    cells = table(as_markdown(rows), "Non-linear", 4000)
-    assert line(cells, "integrated phase", "hinted recipe §")
-    assert line(cells, "integrated phase", "blind recipe")
-    assert line(table(as_markdown(rows), "Non-linear", 400), "FGRU", "our recipe §")
-
-
-def test_what_was_not_run_is_said_to_be_so() -> None:
-    found = as_markdown([])
-    for string, horizon, lines in (("Linear", 4000, 6), ("Non-linear", 400, 8)):
-        cells = table(found, string, horizon)
-        own = [entry for entry in cells if entry[1] == "not run"]
-        assert len(own) == lines
-        assert all(entry[2:] == ["not run"] * 8 for entry in own)
-    assert "FGRU" not in [entry[0] for entry in table(found, "Linear", 4000)]  # as in the paper
-
-
-def test_diverged_and_failed_runs_are_told() -> None:
+def test_diverged_and_failed_runs_are_counted() -> None:
     a, b, c, d = seeds(4)
     gone = {"mse": None, "mae": None}
     rows = [row(a), row(b, **gone, status="diverged"), row(c, **gone, status="diverged")]
     rows.append(row(d, **gone, status="failed"))
-    ours = line(table(as_markdown(rows), "Non-linear", 4000), "LRU", "our recipe")
-    assert ours[0] == "0.01 **better**, 1 seed; diverged (2 of 4 seeds); failed (1 of 4 seeds)"
-    alone = line(table(as_markdown(rows[1:3]), "Non-linear", 4000), "LRU", "our recipe")
-    assert alone[0] == "diverged (2 of 2 seeds)"
+    found = cell(rows)
+    assert (found["rel_mse"], found["seeds"], found["diverged"], found["failed"]) == ("0.01", "1", "2", "1")
+    assert cell(rows[1:3])["rel_mse"] == ""
 
 
 def test_prior_knowledge_and_recipes_have_lines_of_their_own() -> None:
-    cell, paper = (
-        Cell("koopman_var", True, "gaussian", 4000),
-        Cell("koopman_var", True, "gaussian", 4000, recipe="paper"),
-    )
-    phase = Cell("koopman_integrated", True, "gaussian", 4000)
-    rows = [
-        row(cell, 0.006, initialisation="physics"),
-        row(paper, 0.020),
-        row(phase, 1.13e-5, initialisation="averaging"),
-    ]
-    cells = table(as_markdown(rows), "Non-linear", 4000)
-    assert line(cells, "Koopman_var", "our recipe, prior knowledge (physics)")[0].startswith("0.006 **equal**")
-    assert line(cells, "Koopman_var", "paper recipe")[0].startswith("0.02 **worse**")
-    assert line(cells, "integrated phase", "our recipe, prior knowledge (averaging)")[0] == "1.13e-05, 1 seed"
-    assert line(cells, "**paper's best**", "")[0] == "0.0113 Koopman_var"
-    assert line(cells, "**our best**", "black box")[0] == "**×1.8** Koopman_var (paper recipe)"
-    assert line(cells, "**our best**", "prior knowledge")[0] == "**×0.001** integrated phase"
-
-    for recipe, runs in (("ours", {"our recipe, prior knowledge (physics)"}), ("paper", {"paper recipe"})):
-        cells = table(as_markdown(rows, recipe), "Non-linear", 4000)  # type: ignore[arg-type]
-        assert {entry[1] for entry in cells if entry[0] == "Koopman_var"} == {"**the paper**"} | runs
+    ours, paper = (Cell("koopman_var", True, "gaussian", 4000, recipe=recipe) for recipe in ("ours", "paper"))
+    rows = [row(ours, 0.006, initialisation="physics"), row(paper, 0.020)]
+    assert cell(rows, model="koopman_var", structured="True")["mse_mark"] == "equal"
+    assert cell(rows, model="koopman_var", recipe="paper")["mse_mark"] == "worse"
+    dmd = row(Cell("dmd", True, "gaussian", 4000), 1.0, 0.8, initialisation="least squares")
+    assert cell([dmd], model="dmd")["structured"] == "False"
+    for recipe in ("ours", "paper"):
+        lines = records(as_csv(rows, recipe), model="koopman_var", seeds="1")  # type: ignore[arg-type]
+        assert [entry["recipe"] for entry in lines] == [recipe]
 
 
-def test_a_run_that_diverged_stands_with_the_others() -> None:
-    cells = [Cell("koopman_var", True, "gaussian", 4000, seed=seed) for seed in (0, 1)]
-    gone = row(cells[1], None, None, status="diverged", initialisation="physics")
-    found = as_markdown([row(cells[0], initialisation="physics"), gone])
-    ours = line(table(found, "Non-linear", 4000), "Koopman_var", "our recipe, prior knowledge (physics)")
-    assert ours[0] == "0.01 **equal**, 1 seed; diverged (1 of 2 seeds)"
-
-
-def test_dmd_is_no_prior_knowledge() -> None:
-    rows = [row(Cell("dmd", True, "gaussian", 4000), 1.0, 0.8, initialisation="least squares")]
-    cells = table(as_markdown(rows), "Non-linear", 4000)
-    assert line(cells, "DMD", "our recipe")[0] == "1 **equal**, 1 seed"
-    assert line(cells, "**our best**", "black box")[0] == "not run"  # fitted, not learned
-
-
-def test_long_runs_measured_over_400_frames_are_told_from_short_ones() -> None:
+def test_long_runs_measured_over_400_frames_are_apart_from_short_ones() -> None:
     long, short = Cell("lru", True, "gaussian", 4000), Cell("lru", True, "gaussian", 4000, 400)
     first_frames = {"rel_mse_400": 0.0002, "rel_mae_400": 0.01, "test_rel_mse_400": 0.0003, "rel_mse_400_se": 0.00001}
     rows = [row(long, test_rel_mse=0.9, **first_frames), row(short, 0.0008, 0.02)]
-    cells = table(as_markdown(rows), "Non-linear", 400)
-    assert line(cells, "LRU", "our recipe")[0] == "0.0008 **equal**, 1 seed"
-    from_long = line(cells, "LRU", "our recipe, trained on 4000 frames ‡")
-    assert from_long[:2] == ["0.0002 (1e-05) **better**, 1 seed", "0.01 **better**, 1 seed"]
-    assert line(cells, "LRU", "… test split")[:2] == ["0.0003 **better**", "—"]
-    unmeasured = table(as_markdown([row(long)]), "Non-linear", 400)
-    assert line(unmeasured, "LRU", "not run") == ["not run"] * 8
+    assert cell(rows, horizon="400", trained="400")["rel_mse"] == "0.0008"
+    from_long = cell(rows, horizon="400", trained="4000")
+    assert (from_long["rel_mse"], from_long["rel_mse_se"], from_long["rel_mae"]) == ("0.0002", "1e-05", "0.01")
+    assert (from_long["test_rel_mse"], from_long["test_rel_mae"]) == ("0.0003", "")
+    assert cell([row(long)], horizon="400")["seeds"] == "0"
 
 
 def test_of_two_runs_of_a_seed_the_later_counts_and_the_rest_is_said_to_be_left_out() -> None:
@@ -217,7 +141,7 @@ def test_of_two_runs_of_a_seed_the_later_counts_and_the_rest_is_said_to_be_left_
     ]
     (section,) = (s for s in sections(rows) if s.place == ("nonlinear", 4000))
     assert [entry[G4].rel_mse for entry in section.lines.values()] == [Figure(0.3)]
-    assert "2 of 3 rows of the results file are not shown" in as_markdown(rows)
+    assert "2 of 3 rows of the results file are not shown" in as_compact(rows)
 
 
 def compact_lines(text: str, horizon: int, string: str, model: str) -> list[list[str]]:
@@ -270,11 +194,9 @@ def test_compact_tables_leave_out_long_runs_measured_over_400_frames() -> None:
 
 def test_rows_of_a_trial_or_of_an_older_recipe_are_no_figures() -> None:
     a, b = seeds(2)
-    told = as_markdown(
-        [row(a, 0.010), row(a, 0.9, digest="of a trial", finished="2999"), row(b, 0.2, digest="older")]
-    )
-    assert line(table(told, "Non-linear", 4000), "LRU", "our recipe")[0] == "0.01 **better**, 1 seed"
-    assert "2 of 3 rows of the results file are not shown" in told
+    rows = [row(a, 0.010), row(a, 0.9, digest="of a trial", finished="2999"), row(b, 0.2, digest="older")]
+    assert (cell(rows)["rel_mse"], cell(rows)["seeds"]) == ("0.01", "1")
+    assert "2 of 3 rows of the results file are not shown" in as_compact(rows)
 
 
 def test_csv_has_every_cell_and_exact_figures() -> None:

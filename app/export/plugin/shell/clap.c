@@ -228,6 +228,7 @@ static bool shell_activate(const clap_plugin *plugin, double rate_hz, uint32_t l
 
 static void shell_destroy(const clap_plugin *plugin) {
   shell_deactivate(plugin);
+  instrument_free(&shell_of(plugin)->own);
   free(shell_of(plugin));
 }
 

@@ -7,10 +7,13 @@
 #include <string.h>
 
 #include "layout.h"
+#include "responses.h"
 
 #if defined(__x86_64__)
 #include <xmmintrin.h>
 #endif
+
+_Static_assert(sizeof(image) == IMAGE_BYTES && sizeof(parameter) == PARAMETER_BYTES && sizeof(macro) == MACRO_BYTES, "as image.py writes");
 
 int32_t ls_render(void *result, void **error, int64_t mixer, int64_t frames, int64_t out);
 int32_t ls_begin(void *result, void **error, int64_t player);
@@ -58,83 +61,6 @@ static slot *copied(const image *of, int64_t first, int64_t count) {
 
 /* Body and room: one response for the convolver, mixed of four: nothing, the body, the room, and both in series. */
 
-/* A part's samples (frames, 2), converted by cubic interpolation where its rate is another; the caller frees them. */
-static double *samples_of(const image *of, const part *from, double step, int64_t *frames) {
-  const int32_t *stored = (const int32_t *)of + from->first;
-  bool same = fabs(step - 1) < 1e-9;
-  *frames = same ? from->frames : (int64_t)((double)from->frames / step);
-  double *samples = malloc((size_t)(2 * *frames + 1) * sizeof(double));
-  for (int64_t frame = 0; samples && frame < *frames; frame++) {
-    double place = same ? (double)frame : (double)frame * step;
-    int64_t left = (int64_t)place;
-    double t = place - (double)left;
-    for (int64_t channel = 0; channel < 2; channel++) {
-      double y[4];
-      for (int64_t k = 0; k < 4; k++) {
-        int64_t at = left + k - 1;
-        y[k] = at < 0 || at >= from->frames ? 0 : from->unit * stored[at * from->channels + channel % from->channels];
-      }
-      double value = y[1] + 0.5 * t * (y[2] - y[0] + t * (2 * y[0] - 5 * y[1] + 4 * y[2] - y[3] +
-                                                         t * (3 * (y[1] - y[2]) + y[3] - y[0])));
-      samples[2 * frame + channel] = same ? value : value * step;
-    }
-  }
-  return samples;
-}
-
-/* A Fourier transform in place of `size` complex numbers, a power of two. */
-static void transform(double *z, int64_t size, double sign) {
-  for (int64_t place = 1, other = 0; place < size; place++) {
-    int64_t bit = size >> 1;
-    for (; other & bit; bit >>= 1) other ^= bit;
-    other |= bit;
-    for (int64_t k = 0; place < other && k < 2; k++) {
-      double kept = z[2 * place + k];
-      z[2 * place + k] = z[2 * other + k];
-      z[2 * other + k] = kept;
-    }
-  }
-  for (int64_t length = 2; length <= size; length *= 2)
-    for (int64_t k = 0; k < length / 2; k++) {
-      double turn = sign * 2 * 3.14159265358979323846 * (double)k / (double)length, c = cos(turn), d = sin(turn);
-      for (int64_t first = 2 * k; first < 2 * size; first += 2 * length) {
-        double *one = z + first, *two = one + length, re = c * two[0] - d * two[1], im = c * two[1] + d * two[0];
-        two[0] = one[0] - re, two[1] = one[1] - im;
-        one[0] += re, one[1] += im;
-      }
-    }
-}
-
-/* Both in series: left and right as the real and the imaginary part. The caller frees them. */
-static double *in_series(const double *body, int64_t body_frames, const double *room, int64_t room_frames) {
-  int64_t frames = body_frames + room_frames - 1, size = 1;
-  while (size < frames) size *= 2;
-  double *one = calloc((size_t)(2 * size), sizeof(double)), *two = calloc((size_t)(2 * size), sizeof(double));
-  if (one && two) {
-    memcpy(one, body, (size_t)(2 * body_frames) * sizeof(double));
-    memcpy(two, room, (size_t)(2 * room_frames) * sizeof(double));
-    transform(one, size, -1);
-    transform(two, size, -1);
-    for (int64_t k = 0; k <= size / 2; k++) { /* the spectra of both channels, apart, multiplied, together again */
-      int64_t other = (size - k) % size;
-      double *a = one + 2 * k, *b = one + 2 * other, *c = two + 2 * k, *d = two + 2 * other;
-      double left_re = 0.5 * (a[0] + b[0]), left_im = 0.5 * (a[1] - b[1]), right_re = 0.5 * (a[1] + b[1]), right_im = 0.5 * (b[0] - a[0]);
-      double l_re = 0.5 * (c[0] + d[0]), l_im = 0.5 * (c[1] - d[1]), r_re = 0.5 * (c[1] + d[1]), r_im = 0.5 * (d[0] - c[0]);
-      double x_re = left_re * l_re - left_im * l_im, x_im = left_re * l_im + left_im * l_re;
-      double y_re = right_re * r_re - right_im * r_im, y_im = right_re * r_im + right_im * r_re;
-      a[0] = x_re - y_im, a[1] = x_im + y_re;
-      b[0] = x_re + y_im, b[1] = y_re - x_im;
-    }
-    transform(one, size, 1);
-    for (int64_t place = 0; place < 2 * frames; place++) one[place] /= (double)size;
-  } else {
-    free(one);
-    one = NULL;
-  }
-  free(two);
-  return one;
-}
-
 static double mix_wanted(const instrument *own, int32_t which) {
   const slot *gains = own->player + PLAYER_SOURCE_GAINS;
   if (gains[0].real != 0 && gains[1].real != 0) return 0; /* a difference is heard as it is */
@@ -151,7 +77,8 @@ static bool begin_mix(instrument *own) {
     return false;
   }
   double weights[] = {(1 - body) * (1 - room), body * (1 - room), (1 - body) * room, body * room};
-  for (int32_t each = 0; each < 16; each++) power += weights[each / 4] * weights[each % 4] * own->of_rate->powers[each];
+  const double *powers = own->powers[(body > 0 ? POWER_BODY : 0) + (room > 0 ? POWER_ROOM : 0)];
+  for (int32_t each = 0; each < 16; each++) power += weights[each / 4] * weights[each % 4] * powers[each];
   for (int32_t each = 0; each < 1 + MIX_PARTS; each++) own->weights[each] = weights[each] / fmax(sqrt(power), 1e-30);
   own->mixing_at = I_HEADER;
   return true;
@@ -188,62 +115,78 @@ static void follow_mix(instrument *own) {
     begin_mix(own);
 }
 
-static bool begin_responses(instrument *own) {
-  const image *of = own->of;
-  own->mixing_at = -1;
-  if (!of->response_count) return true;
-  const response *found = (const response *)((const char *)of + of->responses), *chosen = found;
-  for (int64_t place = 1; place < of->response_count; place++)
-    if (fabs((double)found[place].rate_hz - own->rate_hz) < fabs((double)chosen->rate_hz - own->rate_hz)) chosen = &found[place];
-  own->of_rate = chosen;
-  double step = (double)chosen->rate_hz / own->rate_hz, *samples[MIX_PARTS] = {NULL};
-  int64_t counts[MIX_PARTS] = {0}, frames = 1;
-  samples[PART_BODY] = samples_of(of, &chosen->body, step, &counts[PART_BODY]);
-  samples[PART_ROOM] = samples_of(of, &chosen->room, step, &counts[PART_ROOM]);
-  bool made = samples[PART_BODY] && samples[PART_ROOM];
-  if (made && counts[PART_BODY] && counts[PART_ROOM]) {
-    counts[PART_BOTH] = counts[PART_BODY] + counts[PART_ROOM] - 1;
-    samples[PART_BOTH] = in_series(samples[PART_BODY], counts[PART_BODY], samples[PART_ROOM], counts[PART_ROOM]);
-    made = samples[PART_BOTH];
-  }
+/* The parts of the response at a rate, in the convolver's form. */
+static bool begin_parts(instrument *own) {
+  responses found;
+  bool made = responses_begin(&found, own->of, own->rate_hz);
+  int64_t frames = 1;
   for (int32_t which = 0; which < MIX_PARTS; which++)
-    if (counts[which] > frames) frames = counts[which];
+    if (found.of[which].frames > frames) frames = found.of[which].frames;
+  own->frames_of_parts = frames;
   int64_t early_frames = frames < EARLY * QUANTUM ? frames : EARLY * QUANTUM;
   int64_t early = (early_frames + QUANTUM - 1) / QUANTUM, late = (frames - early_frames + WINDOW - 1) / WINDOW;
   own->mix_slots = I_HEADER + 2 * 2 * (early * (QUANTUM + 1) + late * (WINDOW + 1));
-  own->convolver = calloc((size_t)(C_LATE + (late + 1) * 4 * (WINDOW + 1)), sizeof(slot));
-  for (int32_t each = 0; each < 2; each++) {
-    own->mixes[each] = calloc((size_t)own->mix_slots, sizeof(slot));
-    made = made && own->mixes[each];
-  }
-  made = made && own->convolver;
-  slot *c = own->convolver;
-  if (made) {
-    c[C_CAPACITY].whole = late + 1;
-    c[C_FADE_WINDOWS].whole = (int64_t)ceil(CONVOLVER_FADE_S * own->rate_hz / WINDOW);
-    c[C_STEP].whole = -1;
-    for (int64_t k = 0; k < 2 * WINDOW; k++) {
-      double turn = 2 * 3.14159265358979323846 * (double)k / (2 * WINDOW);
-      c[C_COSINES + k].real = cos(turn);
-      c[C_SINES + k].real = sin(turn);
-    }
-  }
+  memcpy(own->powers, found.powers, sizeof own->powers);
   for (int32_t which = 0; made && which < MIX_PARTS; which++) {
-    if (!counts[which]) continue;
+    const sound *each = &found.of[which];
+    if (!each->frames) continue;
     double *padded = calloc((size_t)(2 * frames), sizeof(double)); /* all of one length, so that all are laid out alike */
     own->parts[which] = calloc((size_t)own->mix_slots, sizeof(slot));
     made = padded && own->parts[which];
     void *error = NULL, *result = NULL;
     if (made) {
-      memcpy(padded, samples[which], (size_t)(2 * counts[which]) * sizeof(double));
-      ls_partition(&result, &error, number_of(padded), frames, 2, number_of(own->parts[which]), number_of(c));
-      for (int32_t each = 0; each < 2; each++) memcpy(own->mixes[each], own->parts[which], I_HEADER * sizeof(slot));
+      memcpy(padded, each->samples, (size_t)each->frames * sizeof(pair));
+      ls_partition(&result, &error, number_of(padded), frames, 2, number_of(own->parts[which]), number_of(own->convolver));
     }
     free(padded);
   }
-  for (int32_t which = 0; which < MIX_PARTS; which++) free(samples[which]);
-  if (!made) return false;
+  responses_end(&found);
+  own->parts_hz = made ? own->rate_hz : 0;
+  return made;
+}
+
+static void end_parts(instrument *own) {
+  for (int32_t which = 0; which < MIX_PARTS; which++) {
+    free(own->parts[which]);
+    own->parts[which] = NULL;
+  }
+  own->parts_hz = 0;
+}
+
+static bool begin_responses(instrument *own) {
+  const image *of = own->of;
+  own->mixing_at = -1;
+  if (!of->body_modes && !of->impulse_frames && of->room_t60_s == 0) return true;
+  slot *workshop = calloc(C_LATE, sizeof(slot));
+  if (!workshop) return false;
+  for (int64_t k = 0; k < 2 * WINDOW; k++) {
+    double turn = 2 * 3.14159265358979323846 * (double)k / (2 * WINDOW);
+    workshop[C_COSINES + k].real = cos(turn);
+    workshop[C_SINES + k].real = sin(turn);
+  }
+  own->convolver = workshop;
+  if (own->parts_hz != own->rate_hz) {
+    end_parts(own);
+    if (!begin_parts(own)) return false;
+  }
+  int64_t late = (own->frames_of_parts + WINDOW - 1) / WINDOW; /* at least as many as there are */
+  own->convolver = realloc(workshop, (size_t)(C_LATE + (late + 1) * 4 * (WINDOW + 1)) * sizeof(slot));
+  if (!own->convolver) {
+    free(workshop);
+    return false;
+  }
+  slot *c = own->convolver;
+  memset(c + C_LATE, 0, (size_t)((late + 1) * 4 * (WINDOW + 1)) * sizeof(slot));
   memset(c + C_WORK, 0, 8 * WINDOW * sizeof(slot));
+  c[C_CAPACITY].whole = late + 1;
+  c[C_FADE_WINDOWS].whole = (int64_t)ceil(CONVOLVER_FADE_S * own->rate_hz / WINDOW);
+  c[C_STEP].whole = -1;
+  for (int32_t each = 0; each < 2; each++) {
+    own->mixes[each] = calloc((size_t)own->mix_slots, sizeof(slot));
+    if (!own->mixes[each]) return false;
+    for (int32_t which = 0; which < MIX_PARTS; which++)
+      if (own->parts[which]) memcpy(own->mixes[each], own->parts[which], I_HEADER * sizeof(slot));
+  }
   own->mixer[M_CONVOLVER].whole = number_of(c);
   return true;
 }
@@ -272,7 +215,7 @@ static int64_t frame_of(const instrument *own, uint32_t at) { return own->mixer[
 /* A macro's share in the level of a key: known at steps, and 0 where the macro stands in the app. */
 static double level_db(const instrument *own, int32_t number, int32_t key) {
   const image *of = own->of;
-  const float *levels = (const float *)of + of->levels + number * of->level_steps * KEYS + key;
+  const double *levels = (const double *)of + of->levels + number * of->level_steps * KEYS + key;
   double last = (double)(of->level_steps - 1), place = own->positions[number] * last, none = own->standards[number] * last;
   int64_t step = place < last - 1 ? (int64_t)place : of->level_steps - 2;
   double left = (double)step, right = left + 1, left_db = levels[step * KEYS], right_db = levels[(step + 1) * KEYS];
@@ -296,10 +239,26 @@ static void follow_levels(instrument *own, int32_t moved, double value) {
   }
 }
 
+/* Drums that are struck from now on decay as a knob says. */
+static void follow_losses(instrument *own, int64_t knob, double value) {
+  const image *of = own->of;
+  double by = value - ((const slot *)of)[of->table + TABLE_VALUES + knob].real; /* of the instrument's own */
+  own->added[knob == BRIGHTNESS_DECAY] = by;
+  const slot *before = (const slot *)of + of->table, *slots = (const slot *)of + of->losses;
+  const slot *drums = own->table + own->table[TABLE_DRUMS].whole;
+  for (int32_t key = 0; key < KEYS; key++) {
+    int64_t drum = drums[key].whole, modes = drum ? own->table[drum + DRUM_MODES].whole : 0;
+    const double *rows = (const double *)of + slots[key].whole;
+    for (int64_t mode = 0, first = drum + DRUM_HEADER + modes; mode < modes; mode++)
+      own->table[first + mode].real = before[first + mode].real + own->added[0] * rows[mode] + own->added[1] * rows[modes + mode];
+  }
+}
+
 static void apply(instrument *own, int32_t place, double value, int64_t frame) {
   const parameter *of = &parameters_of(own->of)[place];
   if (of->kind == KIND_VALUE) {
     pushed(own, frame, PARAMETER, 0, of->index, value);
+    if (own->of->losses && (of->index == DECAY || of->index == BRIGHTNESS_DECAY)) follow_losses(own, of->index, value);
   } else if (of->kind == KIND_POINT) {
     own->table[TABLE_POINT + of->index].real = value;
   } else if (of->kind == KIND_VOLUME) {
@@ -363,6 +322,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
   if (own->convolver && begin_mix(own)) mix_on(own, own->mix_slots);
   own->waiting = 0;
   own->read = 0;
+  own->added[0] = own->added[1] = 0;
   slot *event = pushed(own, 0, TABLE, 0, 0, 0);
   event[EVENT_TABLE].whole = number_of(own->table);
   for (int32_t place = 0; place < of->parameter_count; place++) {
@@ -376,11 +336,16 @@ bool instrument_begin(instrument *own, double rate_hz) {
 
 void instrument_end(instrument *own) {
   slot **all[] = {&own->mixer, &own->player, &own->table, &own->model, &own->truth, &own->convolver, &own->scratch,
-                  &own->parts[PART_BODY], &own->parts[PART_ROOM], &own->parts[PART_BOTH], &own->mixes[0], &own->mixes[1]};
+                  &own->mixes[0], &own->mixes[1]};
   for (size_t place = 0; place < sizeof(all) / sizeof(*all); place++) {
     free(address(*all[place]));
     *all[place] = NULL;
   }
+}
+
+void instrument_free(instrument *own) {
+  instrument_end(own);
+  end_parts(own);
 }
 
 /* Events */

@@ -13,6 +13,7 @@ typedef union { double real; int64_t whole; } slot;
 enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_POINT, KIND_MACRO, KIND_MIX };
 enum { MIX_BODY, MIX_ROOM };
 enum { PART_BODY, PART_ROOM, PART_BOTH, MIX_PARTS };
+enum { POWER_BODY = 1, POWER_ROOM = 2, POWER_CASES = 4 }; /* which of both are heard: a sum of these */
 enum { SOURCE_MODEL, SOURCE_TRUTH, SOURCE_DIFFERENCE };
 enum { MOST_PARAMETERS = 64, MOST_MACRO_TARGETS = 8, MOST_CHANGES = 512 };
 
@@ -25,22 +26,16 @@ typedef struct {
 
 typedef struct { int32_t count, spare; struct { int32_t parameter, spare; double low, high; } targets[MOST_MACRO_TARGETS]; } macro;
 typedef struct {
-  int64_t frames, channels, first; /* `first`: of its samples, 32-bit whole numbers of the image */
-  double unit;                     /* of a sample of 1 */
-} part;
-typedef struct {
-  int64_t rate_hz;
-  part body, room;
-  double powers[16]; /* of noise through two of: nothing, body, room, both */
-} response;
-
-typedef struct {
   char magic[8];
   int64_t version, bytes;
   int64_t table, table_slots, model, model_slots, truth, truth_slots; /* in slots from the beginning */
   int64_t parameters, parameter_count, macros, macro_count;           /* in bytes */
-  int64_t taps, responses, response_count;
-  int64_t levels, level_steps; /* single precision, dB: of each macro, step and key */
+  int64_t taps;
+  int64_t body, body_modes;                                          /* Hz, 1/s, left, right: each of all modes */
+  int64_t impulse, impulse_frames, impulse_channels;                 /* a body that is a response: 32-bit whole numbers */
+  double body_s, body_subsonic_hz, impulse_hz, impulse_unit, room_t60_s; /* no time: no room */
+  int64_t levels, level_steps; /* dB: of each macro, step and key */
+  int64_t losses;              /* of drums: of each key the slot of two rows, 1/s that knobs of decay add at 1; 0: strings */
   int64_t wheel_mix;           /* which mix the modulation wheel moves, -1: none */
   int64_t modes, most_notes;
   double longest_s, wheel_goal;
@@ -55,10 +50,12 @@ typedef struct {
   double rate_hz;
   slot *mixer, *player, *table, *model, *truth, *convolver, *scratch;
   slot *parts[MIX_PARTS], *mixes[2]; /* responses as the convolver reads them: of body, room and both; of their mixes */
-  const response *of_rate;
-  int64_t mix_slots, mixing_at;      /* of a response; the next slot of the one that is being mixed, -1: none is */
+  double parts_hz;                   /* of the parts, which are kept from rate to rate; 0: there are none */
+  double powers[POWER_CASES][16];    /* of `responses` */
+  int64_t frames_of_parts, mix_slots, mixing_at; /* the next slot of the response that is being mixed, -1: none is */
   double mix[2], mixing[2], weights[1 + MIX_PARTS]; /* of body and room: the latest, and those of that one */
   double values[MOST_PARAMETERS];
+  double added[2]; /* knobs of decay and of brightness decay beyond the instrument's own, which drums follow */
   double positions[MOST_PARAMETERS], standards[MOST_PARAMETERS]; /* of macros: as levels follow them */
   change changes[MOST_CHANGES];
   int32_t waiting;
@@ -74,6 +71,7 @@ int32_t parameter_with_id(const image *, uint32_t id);
 void instrument_reset_values(instrument *);
 bool instrument_begin(instrument *, double rate_hz);   /* allocates; false where there is no memory */
 void instrument_end(instrument *);
+void instrument_free(instrument *); /* and what is kept from rate to rate */
 uint32_t instrument_latency(void);
 uint32_t instrument_tail(const instrument *);
 

@@ -126,7 +126,7 @@ static void run(void *handle, uint32_t frames) {
 static void deactivate(void *handle) { instrument_end(&((shell *)handle)->own); }
 
 static void cleanup(void *handle) {
-  deactivate(handle);
+  instrument_free(&((shell *)handle)->own);
   free(handle);
 }
 

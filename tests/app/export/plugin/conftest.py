@@ -15,19 +15,19 @@ from engine.kernels import cache
 from engine.kernels.playing_layout import KEYS
 from engine.presets import SHIPPED, load_preset
 from tests.app.export.plugin.host import Library
-from tests.app.export.plugin.pieces import MOVED, NAMES, patch_of
+from tests.app.export.plugin.pieces import BARS, MOVED, NAMES, patch_of
 
 
 @pytest.fixture(scope="package")
 def images() -> list[Image]:
-    """Levels at moved macros take a second per instrument: one has them."""
+    """Levels at moved macros take a second per instrument: two have them."""
     found = []
     for name in NAMES:
         patch = patch_of(name)
         with pytest.MonkeyPatch.context() as patched:
-            if name != MOVED:
+            if name not in (MOVED, BARS):
                 shape = (len(patch.macros), STEPS, KEYS)
-                patched.setattr("app.export.plugin.image.levels", lambda *_, shape=shape: np.zeros(shape, np.float32))
+                patched.setattr("app.export.plugin.image.levels", lambda *_, shape=shape: np.zeros(shape))
             found.append(image_of(patch, load_preset(SHIPPED / f"{patch.preset}.safetensors")))
     return found
 

@@ -16,16 +16,18 @@ from engine.presets import SHIPPED, load_preset
 from tests.app.export.plugin.host import Event, Instance, midi, note_off, note_on
 
 NAMES = (
-    "concert_harp",  # rings on
+    "concert_harp",  # rings on; other strings ring with it
     "damped_harp",
     "classical_guitar",  # body and room
     "electric_bass",  # magnetic pick-up
     "jazz_guitar",  # magnetic pick-up and body
     "fretless_bass",  # a channel for each string
-    "sitar",
+    "sitar",  # open strings ring with it
     "cimbalom",
+    "timpani",  # drums
+    "thin_bars",  # drums that are bars
 )
-MOVED = "classical_guitar"  # the one whose levels follow its macros
+MOVED, BARS = "classical_guitar", "thin_bars"  # those whose levels follow their macros
 LONG = os.environ.get("LEARNED_STRINGS_FUZZ") == "long"  # by `run.py test --fuzz`
 SECONDS = 1.6
 EQUAL_DB = -140.0

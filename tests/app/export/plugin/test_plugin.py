@@ -20,6 +20,7 @@ from app.instrument.events import Controller, PatchTurned, TimedEvent
 from tests.app.export.plugin import host
 from tests.app.export.plugin.host import Event, Instance, Library, choke, midi, note_off, note_on, param, tune
 from tests.app.export.plugin.pieces import (
+    BARS,
     EQUAL_DB,
     LONG,
     MOVED,
@@ -51,23 +52,25 @@ def test_it_sounds_as_the_app_renders(bank: Library, name: str) -> None:
     instance.destroy()
 
 
-@pytest.mark.parametrize("rate_hz", (44_100, 96_000))
-@pytest.mark.parametrize("name", NAMES if LONG else ("concert_harp",))
+@pytest.mark.parametrize(
+    ("name", "rate_hz"),
+    [
+        *(("concert_harp", rate_hz) for rate_hz in (44_100, 88_200, 96_000, 192_000)),
+        *((name, rate_hz) for rate_hz in (44_100, 96_000) for name in (NAMES[1:] if LONG else ())),
+    ],
+)
 def test_it_sounds_so_at_other_rates(bank: Library, name: str, rate_hz: int) -> None:
     patch = patch_of(name)
-    sound = played(instance_of(bank, name, rate_hz), patch, rate_hz)
-    assert difference_db(sound, rendered(patch, rate_hz)) < EQUAL_DB
+    instance = instance_of(bank, name, rate_hz)
+    assert difference_db(played(instance, patch, rate_hz), rendered(patch, rate_hz)) < EQUAL_DB
+    instance.destroy()
 
 
-def test_a_rate_without_a_response_of_its_own_is_converted(bank: Library) -> None:
-    sound = played(instance_of(bank, "concert_harp", 88_200), patch_of("concert_harp"), 88_200)
-    assert -60 < difference_db(sound, rendered(patch_of("concert_harp"), 88_200)) < -20
-
-
-def test_the_source_may_be_the_truth_or_the_difference(bank: Library) -> None:
-    patch = patch_of("electric_bass")
+@pytest.mark.parametrize("name", ("electric_bass", "timpani"))
+def test_the_source_may_be_the_truth_or_the_difference(bank: Library, name: str) -> None:
+    patch = patch_of(name)
     for value, source in ((1, "truth"), (2, "difference")):
-        instance = instance_of(bank, "electric_bass")
+        instance = instance_of(bank, name)
         id = instance.parameters["Source"].id
         instance.block(512, [param(0, id, value)])
         instance.deactivate()
@@ -142,12 +145,17 @@ def test_macros_move_body_and_room_and_keys_stay_as_loud(bank: Library) -> None:
     patch = patch_of(MOVED)
     names = [macro.targets[0].field for macro in patch.macros]
     room, body, place = (names.index(each) for each in ("room.mix", "body.mix", "pluck.position"))
-    for value, most_db in ((0.0, -60), (0.7, EQUAL_DB)):  # without a room the app averages power at other frequencies
-        wanted = rendered(patch.turned(room, value), 48_000)
-        assert difference_db(played(with_macro(bank, MOVED, room, value), patch, 48_000), wanted) < most_db
-    for macro, value in ((body, 0.0), (body, 0.5), (place, 0.25), (place, 1.0)):
+    for macro, value in ((room, 0.0), (room, 0.7), (body, 0.0), (body, 0.5), (place, 0.25), (place, 1.0)):
         wanted = rendered(patch.turned(macro, value), 48_000)
-        assert difference_db(played(with_macro(bank, MOVED, macro, value), patch, 48_000), wanted) < -60
+        assert difference_db(played(with_macro(bank, MOVED, macro, value), patch, 48_000), wanted) < EQUAL_DB
+
+
+def test_decay_of_drums_follows_a_macro(bank: Library) -> None:
+    patch = patch_of(BARS)
+    decay = [macro.targets[0].field for macro in patch.macros].index("knobs.decay")
+    sound = played(with_macro(bank, BARS, decay, 0.0), patch, 48_000)
+    assert difference_db(sound, rendered(patch, 48_000)) > -40
+    assert difference_db(sound, rendered(patch.turned(decay, 0.0), 48_000)) < EQUAL_DB
 
 
 def test_body_and_room_follow_macros_and_the_wheel_while_it_plays(bank: Library) -> None:
@@ -226,7 +234,7 @@ def test_process_calls_nothing_but_arithmetic(objects: Path) -> None:
 def test_an_lv2_bundle_is_valid(images: list[Image], objects: Path, tmp_path: Path) -> None:
     path = build_plugin(images[:1], "lv2", this_target(), tmp_path / "Concert harp", objects)
     assert {each.name for each in path.iterdir()} >= {"manifest.ttl", "instruments.ttl"}
-    if shutil.which("lv2_validate"):
+    if shutil.which("lv2_validate") and shutil.which("sord_validate"):  # which the first calls
         done = subprocess.run(["lv2_validate", *path.glob("*.ttl")], capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
     if shutil.which("lv2ls"):

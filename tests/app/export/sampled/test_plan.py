@@ -78,7 +78,7 @@ def test_largest_bytes_counts_every_frame(patch: Patch, patch_of: Callable[..., 
         ({"layers": 33}, "layers must lie in 1 … 32, not 33"),
         ({"seconds": float("nan")}, "seconds must lie in 0.1 … 60, not nan"),
         ({"rate_hz": 10**9}, "rate_hz must lie in 8000 … 192000"),
-        ({"keys": (40, 64)}, "keys must be a range within the patch's own, 45-64, not 40-64"),
+        ({"keys": (40, 64)}, "keys must be a range within the instrument's own, 45-64, not 40-64"),
         ({"keys": (60, 50)}, "not 60-50"),
         ({"format": "mp3"}, "format 'mp3' is not one of flac, wav"),
         ({"bits": "32f"}, "bits '32f' is not one of 16, 24"),
@@ -128,5 +128,5 @@ def test_keys_that_the_tuning_leaves_out_have_no_sample(patch_of: Callable[..., 
     keymap = "\n".join(["12", "0", "127", "60", "69", "440.0", "12", *white]) + "\n"
     tuned = patch_of(tuning={"keymap": keymap})
     assert {zone.key for zone in SampledPlan(tuned, (48, 59)).zones} == {48, 50, 52, 53, 55, 57, 59}
-    with pytest.raises(ValueError, match="keys: the patch's tuning leaves all of them out"):
+    with pytest.raises(ValueError, match="keys: the instrument's tuning leaves all of them out"):
         SampledPlan(tuned, (49, 49))

@@ -21,9 +21,9 @@ def test_it_tells_what_plays_and_is_left_alone_while_nothing_changes(
         return bar._play.isChecked(), bar._play.text()
 
     assert shown(True) == (True, "■  Stop")
-    assert shown(False) == (False, "▶  Play")
+    assert shown(False) == (False, "▶  Pluck")
     qtbot.mouseClick(bar._play, Qt.MouseButton.LeftButton)  # it checks itself
-    assert shown(False) == (False, "▶  Play")
+    assert shown(False) == (False, "▶  Pluck")
     qtbot.mouseClick(bar._play, Qt.MouseButton.LeftButton)
     assert shown(True) == (True, "■  Stop")
     texts: list[str] = []
@@ -31,7 +31,7 @@ def test_it_tells_what_plays_and_is_left_alone_while_nothing_changes(
     bar.show_playing(True)
     assert not texts
     bar.show_playing(False)
-    assert texts == ["▶  Play"]
+    assert texts == ["▶  Pluck"]
 
 
 def test_listening_points_are_barred_at_the_bridge(qtbot: QtBot) -> None:

@@ -222,9 +222,9 @@ def test_a_sound_that_is_rendered_is_waited_for(qtbot: QtBot, open_dialog: Open)
 
 def test_a_sound_that_cannot_be_rendered_is_told(qtbot: QtBot, open_dialog: Open) -> None:
     rendered: Future[Sounds] = Future()
-    rendered.set_exception(RuntimeError("the model's output runs away 0.1 s after the pluck"))
+    rendered.set_exception(RuntimeError("the model's output diverges 0.1 s after the pluck"))
     dialog = open_dialog(rendered=rendered)
-    qtbot.waitUntil(lambda: "runs away" in texts(dialog))
+    qtbot.waitUntil(lambda: "diverges" in texts(dialog))
     assert not dialog._setup.start.isEnabled()
 
 

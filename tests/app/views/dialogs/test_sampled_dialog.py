@@ -118,7 +118,7 @@ def test_an_sfz_is_written_as_it_was_told(
     out = folder / "Classical_guitar.sfz"
     assert f"Saved {out} (6 samples rendered, 0 kept" in dialog.state.text()
     assert "peak -1.0 dBFS" in dialog.state.text()
-    assert "softer than the patch, so that no note clips" in dialog.state.text()
+    assert "softer than the instrument, so that no note clips" in dialog.state.text()
     zones = SampledPlan(patch, SMALL["keys"], layers=SMALL["layers"]).zones
     assert [note[1:] for note in notes.rendered] == [(z.key, z.velocity, 0.2, 44_100, "truth") for z in zones]
     samples = sorted((folder / "Classical_guitar_samples").glob("*.wav"))
@@ -137,7 +137,7 @@ def test_a_soundfont_is_one_file(qtbot: QtBot, made, folder: Path) -> None:
     assert not dialog.sampler.bits.isVisible()
     run(qtbot, dialog, "Saved")
     assert [path.name for path in folder.iterdir()] == ["Classical_guitar.sf2"]
-    assert "louder than the patch" in dialog.state.text() or "softer" in dialog.state.text()
+    assert "louder than the instrument" in dialog.state.text() or "softer" in dialog.state.text()
 
 
 def test_size_follows_the_choices_and_nothing_is_written(
@@ -174,9 +174,9 @@ def test_the_error_of_pitch_is_reported_before_and_after(qtbot: QtBot, made, pat
         dialog.sampler.layers.setValue(layers)
         settle(qtbot, dialog)
         cents = SampledPlan(patch, SMALL["keys"], layers=layers).pitch_error_cents
-        assert dialog.sampler.size_text.text().endswith(f"; note starts within {cents:.1f} cents of the patch")
+        assert dialog.sampler.size_text.text().endswith(f"; note starts within {cents:.1f} cents of the instrument")
     run(qtbot, dialog, "Saved")
-    assert f"note starts within {cents:.1f} cents of the patch)." in dialog.state.text()
+    assert f"note starts within {cents:.1f} cents of the instrument)." in dialog.state.text()
 
 
 def test_more_than_there_is_room_for_is_told(made, monkeypatch: pytest.MonkeyPatch) -> None:

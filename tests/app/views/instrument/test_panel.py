@@ -86,7 +86,7 @@ def test_in_a_low_window_the_knobs_take_the_place_of_the_keys(qtbot: QtBot, pane
 
 
 def test_what_keys_play_is_chosen_from_words(qtbot: QtBot, panel: InstrumentPanel) -> None:
-    for plays, words in (("place", "Keys choose the place"), ("pitch", "Keys play pitches")):
+    for plays, words in (("place", "Keys set pluck position"), ("pitch", "Keys play notes")):
         with qtbot.waitSignal(panel.keys_play_asked) as told:
             panel._plays[plays].trigger()
         assert told.args == [plays]
@@ -95,4 +95,4 @@ def test_what_keys_play_is_chosen_from_words(qtbot: QtBot, panel: InstrumentPane
         assert panel.bar.octave.isVisible() == panel.bar.velocity.isVisible() == (plays == "pitch")
     panel.show_keys_play("place", possible=False)
     assert not panel.plays.isEnabled()
-    assert "Choose a patch" in panel.plays.toolTip()
+    assert "Choose an instrument" in panel.plays.toolTip()

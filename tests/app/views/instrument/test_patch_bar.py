@@ -28,12 +28,12 @@ def bar(qtbot: QtBot, guitar: Patch) -> PatchBar:
 @pytest.mark.parametrize(
     ("name", "signal"),
     [
-        ("Previous patch", "previous_asked"),
-        ("Next patch", "next_asked"),
-        ("Patch: Classical guitar, changed", "browse_asked"),
-        ("Save the patch", "save_asked"),
-        ("Rename the patch", "rename_asked"),
-        ("Revert the patch", "revert_asked"),
+        ("Previous instrument", "previous_asked"),
+        ("Next instrument", "next_asked"),
+        ("Instrument: Classical guitar, changed", "browse_asked"),
+        ("Save the instrument", "save_asked"),
+        ("Rename the instrument", "rename_asked"),
+        ("Revert the instrument", "revert_asked"),
         ("Record what is played", "record_asked"),
     ],
 )
@@ -70,7 +70,7 @@ def test_the_tip_of_a_macro_says_in_words_what_it_changes(bar: PatchBar, guitar:
         bar.show_patch(guitar.model_copy(update={"macros": (macro,)}), own=True)
         return bar.macros[0].toolTip().splitlines()[0]
 
-    assert tip("pluck.position", "knobs.brightness_decay") == "Tone: changes pluck position, dulling"
+    assert tip("pluck.position", "knobs.brightness_decay") == "Tone: changes pluck position, HF damping"
     assert tip("pickup.points.0") == "Tone: changes listening point"  # of the same name, with other targets
 
 
@@ -102,7 +102,7 @@ def test_what_the_instrument_does_is_told(qtbot: QtBot, bar: PatchBar) -> None:
     assert bar.octave.text() == "from C-1"
     bar.show_velocity(17)
     assert bar.velocity.text() == "velocity 17"
-    bar.show_note("Choose a patch")
+    bar.show_note("Choose an instrument")
     assert bar.note.objectName() == "faint"
     with qtbot.waitSignal(bar.octave_asked) as told:
         (higher,) = (each for each in bar.findChildren(QAbstractButton) if each.accessibleName() == "Octave up")

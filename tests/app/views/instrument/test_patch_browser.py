@@ -124,7 +124,7 @@ def test_the_first_hit_is_selected_shown_and_what_keys_are_for(qtbot: QtBot, bro
         qtbot.mouseClick(browser.play_button, LEFT)
     assert told.args == chosen == ["harp of brass"]
     browser.search.setText("tuba")
-    assert browser.selected == "" and browser.card.text().startswith("No matching patch")
+    assert browser.selected == "" and browser.card.text().startswith("No matching instrument")
     browser.search.clear()
     assert browser.selected == "harp of brass"
 
@@ -233,5 +233,5 @@ def test_what_is_shown_does_not_load(browser: Browser, guitar: Patch) -> None:
 
 
 def test_it_is_named_after_what_it_lists(browser: Browser) -> None:
-    assert browser.accessibleName() == "Browser of patches"
-    assert browser.search.placeholderText() == browser.search.accessibleName() == "Search patches"
+    assert browser.accessibleName() == "Browser of instruments"
+    assert browser.search.placeholderText() == browser.search.accessibleName() == "Search instruments"

@@ -108,7 +108,7 @@ def test_another_shape_is_another_map_and_returning_computes_nothing(
     assert shown._picture is None
     qtbot.waitUntil(lambda: len(asked) == 2 * count and shown.progress.share is None)
     shown.map._point_at((0.5, 5.0))
-    assert "runs away" in shown.words
+    assert "diverges" in shown.words
     controller.session.update(shape="gaussian")
     qtbot.waitUntil(lambda: shown._picture is not None and shown.progress.share is None)
     assert len(asked) == 2 * count

@@ -17,12 +17,12 @@ import torch
 from torch import Tensor
 
 from engine.plain_text import one_line
+from tests.bench.baselines.models import BASELINES, LONGEST_S, Baseline, Strings, in_own_units, units
 from training.family.fit import FLOOR
 from training.family.motions import solve
 from training.family.preset import FamilyConfiguration
 from training.family.strings import MOST_MODES, draw_string
 from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
-from training.research.baselines import BASELINES, LONGEST_S, Baseline, Strings, in_own_units, units
 
 ROWS, FRAMES = 16, 48  # of a batch
 FRAMES_KEPT = 1_500_000  # of all strings together, at random times

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -9,12 +10,13 @@ from pathlib import Path
 import pytest
 import torch
 
+from tests.bench.baselines import fit as fitting
+from tests.bench.baselines.fit import BaselineProgress, checkpoint_file, fit_baseline, trained_baseline
+from tests.bench.baselines.models import BASELINES, ModalSynthesis, baseline_player, in_own_units, units
+from training.cli.console import number
 from training.family.preset import FamilyConfiguration
 from training.family.strings import PluckedString, draw_string
 from training.fitting.checkpoint import Checkpoint
-from training.research import fit_baseline as fitting
-from training.research.baselines import BASELINES, ModalSynthesis, baseline_player, in_own_units, units
-from training.research.fit_baseline import BaselineProgress, checkpoint_file, fit_baseline, trained_baseline
 from training.research.players import linear_string
 
 RATE_HZ = 48_000
@@ -156,3 +158,22 @@ def test_training_lowers_the_error_within_its_reach(monkeypatch: pytest.MonkeyPa
         loss.backward()
         optimiser.step()
     assert float(fitting._error(model, *batch).detach().mean()) < start / 3
+
+
+def test_a_baseline_is_trained_and_measured(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fitting, "FRAMES_VALIDATED", 8)
+    few = ("--strings", 1, "--rate", 8_000, "--json")
+    words = ("baseline", "koopman_var", "--minutes", 0.01, "--train-strings", 1, "--runs", tmp_path)
+    facts = json.loads(run(*words, *few).out)
+    assert (facts["baseline"], facts["minutes"]) == ("koopman_var", 0.01)
+    assert facts["parameters"] == 156_259
+    assert all(facts[name] > 0 for name in ("steps", "train", "validation"))
+    told = run(*words, *few[:-1]).out  # the training is at its end
+    assert told.startswith(f"koopman_var: 156,259 numbers, {facts['steps']:,} steps of 16 strings and 48 frames")
+    assert f"{number(facts['train'])} in training, {number(facts['validation'])} in validation" in told
+    checkpoint = tmp_path / "family_koopman_var" / "checkpoint.safetensors"
+    checkpoint.write_bytes(checkpoint.read_bytes()[:1000])
+    failure = run(*words, *few).err
+    assert f"{checkpoint}: damaged checkpoint" in failure
+    assert "delete it to start the run again" in failure
+    assert "is not one of koopman_var, dmsp" in run("baseline", "lru").err

@@ -7,7 +7,7 @@ dmsp         differentiable modal synthesis (Lee, Park, Choi, Lee, NeurIPS 2024,
 Both work in the dimensionless form (time in 1/Ω, amplitudes in (ℓ/π)√(4T₀/EA)) on 99 modal amplitudes, of which a
 string leaves those above its own at rest: a sine transform away from the grid, as are their linear layers. Both are
 given the frequencies and decays of the linear string in closed form, which the paper's model is not, and both begin
-as the linear string. They are baselines: no presets, and no part of the engine.
+as the linear string.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from app.analysis import timbre as t
 from app.patches.library import find_patch
+from tests.bench import timbre as t
 
 FIRST_HZ = 200.0
 PARTIALS_HZ = FIRST_HZ * np.arange(1, 31)

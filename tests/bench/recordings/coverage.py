@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 
+from tests.bench.recordings.synthetic import synthetic_note
 from training.recording.fit import fit_note
 from training.recording.note import note_of
 from training.recording.numbering import number_note
-from training.recording.synthetic import synthetic_note
 
 QUIETEST_DB = -50.0  # below a note's loudest partial: those below are not counted
 NUMBERED_CENTS = 50.0

@@ -1,0 +1,65 @@
+"""Draw `past-training.png`: `PYTHONPATH=. .venv/bin/python docs/images/past_training.py` (some minutes of one core).
+
+The error of five models per time step, over four times their training: ten trajectories of the validation set.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import torch
+from matplotlib.figure import Figure
+
+from engine.presets import find_preset, load_preset
+from training.data.dataset import Dataset
+from training.evaluate import evaluate_past_horizon
+from training.figures import style
+from training.figures.extrapolation import common_data, describe, horizons
+
+HERE = Path(__file__).resolve().parent
+DATA = "nylon_nonlinear_gaussian_16k"
+MODELS = {
+    "koopman_integrated": "integrated phase",
+    "koopman_integrated_hinted": "integrated phase (hinted)",
+    "koopman_var": "Koopman_var",
+    "koopman": "Koopman",
+    "lru": "LRU",
+}
+SECONDS, TRAJECTORIES, SMOOTHED_S = 1.0, 10, 0.01
+
+
+def main() -> None:
+    presets = [load_preset(find_preset(f"{DATA}_{name}")) for name in MODELS]
+    data = common_data(presets)
+    with style.styled():
+        figure = Figure(figsize=(9, 5), layout="constrained")
+        axes = figure.subplots()
+        for place, (preset, label) in enumerate(zip(presets, MODELS.values(), strict=True)):
+            own = Dataset(data, torch.empty(0), preset.info.scale_m)
+            found = evaluate_past_horizon(
+                preset.model, own, "validation", SECONDS, horizon=0, trajectories=slice(TRAJECTORIES)
+            )
+            mse, _ = found.string.per_frame()
+            time_s = np.arange(1, len(mse) + 1) / data.rate_hz
+            axes.plot(time_s, mse, linewidth=0.5, alpha=0.25, **style.colour(place))
+            axes.plot(time_s, smoothed(mse, round(SMOOTHED_S * data.rate_hz)), label=label, **style.colour(place))
+        style.scale_errors(axes)
+        axes.set_xlim(0, SECONDS)
+        for words, horizon_s in horizons(presets):
+            style.mark_horizon(axes, horizon_s, words)
+        axes.set_xlabel("time in s")
+        axes.set_ylabel("relative MSE per time step")
+        axes.set_title(f"{TRAJECTORIES} trajectories of the validation set: {describe(data)}")
+        style.add_legend(figure, (axes,))
+    style.save_figure(figure, HERE / "past-training.png")
+
+
+def smoothed(values: np.ndarray, width: int) -> np.ndarray:
+    """The running mean over `width` frames, at the ends over those that exist."""
+    window = np.ones(width)
+    return np.convolve(values, window, "same") / np.convolve(np.ones(len(values)), window, "same")
+
+
+if __name__ == "__main__":
+    main()
