@@ -120,7 +120,7 @@ class Listened:
 
 
 class Sounding(Protocol):
-    """What is heard of a pluck or of a blow, as it is rendered.
+    """The sound of a pluck or of a blow, which grows as it is rendered.
 
     Attributes:
         seconds: the duration.

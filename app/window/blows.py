@@ -106,7 +106,7 @@ class Blows:
         return True
 
     def seek(self, position_s: float) -> None:
-        """Moves the playhead; the sound goes on."""
+        """Moves the playhead; the sound continues."""
         if self._shown.take is not None:
             self._shown.note = None
             self._shown.parked_s = min(max(position_s, 0.0), self._shown.take.seconds)

@@ -14,7 +14,7 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPen, QPolygonF
 
 from app.session.shown import ShownSource, readable_unit
 from app.views import theme
-from app.views.drum.axes import MARGIN_TOP, MARGIN_X, HeadAxes, Place
+from app.views.drum.axes import MARGIN_X, HeadAxes, Place
 from app.views.plots.colour_maps import error_map
 
 COLOURS = 511  # odd: the middle one is rest
@@ -23,6 +23,7 @@ LEAST_M = 1e-15  # of a colour scale
 LOOSE = 1.4  # a scale shrinks only where the motion has so much room
 PLACE_RADIUS = 6.0
 FOOT = 8.0
+FOOT_WORDS = 70  # pixels: room on the left of a foot for its words
 
 
 @dataclass(frozen=True)
@@ -101,18 +102,13 @@ def paint_edge(painter: QPainter, axes: HeadAxes, head: int, source: ShownSource
 
 
 def paint_scale(painter: QPainter, axes: HeadAxes, head: int, scale_m: float) -> None:
-    """What the strongest colours stand for, above a picture."""
+    """What the strongest colours stand for, below a picture."""
     factor, unit = readable_unit(scale_m, "displacement")
     area = axes.rect(head)
-    text = f"± {factor * scale_m:g} {unit}"
     painter.setFont(theme.small_font(10))
-    width = painter.fontMetrics().horizontalAdvance(text)
-    left, middle = area.right() + 10, area.top() + 6
-    if left + width > axes.width - 4:
-        left = area.right() - width
-        middle = MARGIN_TOP - 6
     painter.setPen(QColor(theme.FAINT))
-    painter.drawText(QRectF(left, middle - 8, width + 2, 16), Qt.AlignmentFlag.AlignVCenter, text)
+    place = QRectF(area.left(), area.bottom() + 4, area.width(), 16)
+    painter.drawText(place, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignTop, f"± {factor * scale_m:g} {unit}")
 
 
 def paint_place(painter: QPainter, at: QPointF, clear: bool) -> None:
@@ -165,11 +161,12 @@ def paint_caption(painter: QPainter, axes: HeadAxes, text: str) -> None:
     painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)
 
 
-def paint_name(painter: QPainter, axes: HeadAxes, text: str) -> None:
-    """Which drum it is, in the lower left corner."""
+def paint_name(painter: QPainter, axes: HeadAxes, text: str, points: Mapping[str, float]) -> None:
+    """Which drum it is, in the lower left corner, as far as the words of the listening points."""
     painter.setFont(theme.small_font(12))
     painter.setPen(QColor(theme.FAINT))
-    room = max(0.0, axes.rect(0).left() - MARGIN_X / 2)
+    first = min((axes.x(0, point) for point in points.values()), default=float(axes.width))
+    room = max(axes.rect(0).left() - MARGIN_X / 2, first - theme.px(FOOT_WORDS) - MARGIN_X / 2, 0.0)
     cut = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(room))
     painter.drawText(QRectF(MARGIN_X / 2, axes.height - 22, room, 18), Qt.AlignmentFlag.AlignVCenter, cut)
 

@@ -269,7 +269,7 @@ class DrumView(QWidget):
         grabbed = self._drag or self._hovered
         if self._listening:
             paint_listening(painter, axes, self._listening, grabbed)
-        paint_name(painter, axes, self._name)
+        paint_name(painter, axes, self._name, self._listening)
         if frame is not None and not self._plain:
             paint_caption(painter, axes, frame.caption)
 

@@ -83,6 +83,7 @@ class Panel(QWidget):
         self.background = Background(self.key, self, rests=self._rests)
         self.background.failed.connect(self.told)
         self._cover = Label(self)
+        self._cover.setObjectName("cover")
         self._cover.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._cover.setWordWrap(True)
         self._cover.setAutoFillBackground(True)

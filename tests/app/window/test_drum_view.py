@@ -114,7 +114,7 @@ def test_a_click_on_the_drum_sounds_and_its_picture_moves(qtbot: QtBot, drummed:
 
 
 def test_the_picture_is_of_the_blow_that_sounds(qtbot: QtBot, drummed: Controller) -> None:
-    """Its signal is, but for the gain of the key, what the compiled player makes of the same event."""
+    """Its signal is what the compiled player makes of the same event, times the gain of the key."""
     assert blow.FULL_SCALE_PA == FULL_SCALE_PA
     strike(drummed.drum, 0.2, 0.5)
     qtbot.waitUntil(lambda: (take := shown(drummed)) is not None and take.complete)
@@ -172,6 +172,9 @@ def test_views_of_a_line_say_so_and_those_of_sound_and_error_go_on(qtbot: QtBot,
     for key in ("partials", "space_time", "eigenvalues", "error_plane", "compare"):
         panel = panel_of(drummed, key)
         assert panel.covered
+    cover = panel_of(drummed, "space_time").grab().toImage()
+    left = {cover.pixelColor(3, y).name() for y in range(3, cover.height() - 3)}
+    assert len(left) == 1, "nothing shines through"
     for key in ("waveform", "spectrum", "spectrogram", "error_time", "drum"):
         assert panel_of(drummed, key).covered == ""
     session.update(left_view="spectrum", right_view="error_time")
@@ -192,6 +195,15 @@ def test_views_of_a_line_say_so_and_those_of_sound_and_error_go_on(qtbot: QtBot,
     assert panel_of(drummed, "string").isVisible()
     assert not drummed.drum.isVisible()
     qtbot.waitUntil(lambda: "Error of this pluck" in window.error_label.text())
+
+
+def test_controls_of_a_string_rest_while_drums_are_played(drummed: Controller) -> None:
+    bar = drummed.window.transport
+    of_string = [bar.knobs["position"], bar._pickup, bar._loop]
+    assert not any(control.isEnabled() for control in of_string)
+    assert bar.knobs["listen"].isEnabled()
+    drummed.session.update(preset="first")
+    assert all(control.isEnabled() for control in of_string)
 
 
 def test_a_seek_and_stop_keep_the_picture(qtbot: QtBot, drummed: Controller) -> None:
