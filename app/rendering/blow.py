@@ -208,6 +208,11 @@ class BlowTake:
         return self.ready_frames == self.frames
 
     @property
+    def ready_s(self) -> float:
+        """The latest time at which both sources can be shown."""
+        return max(0, min(motion.ready for motion in self.motions.values()) - 1) / FLASH_HZ
+
+    @property
     def rate_hz(self) -> int:
         return RATE_HZ
 

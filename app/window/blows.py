@@ -86,8 +86,13 @@ class Blows:
         self._submit(request)
 
     def listen(self) -> None:
-        """Renders the shown blow again where its duration or the listening points have changed."""
+        """Renders the shown blow again where its duration or the listening points have changed.
+
+        That of another instrument is forgotten.
+        """
         choices = self._session.choices
+        if self._asked is not None and choices.patch is not None and self._asked[1].patch.name != choices.patch.name:
+            self.forget()
         if self._asked is None:
             return
         before, note = self._asked

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from app.patches.drums import PlayedDrum
 from app.presets.library import Library
 from app.rendering import BlowTake
@@ -96,16 +98,26 @@ class DrumPanel(Panel):
         if not moment.playing and standing == self._standing:
             return
         self._standing = standing
-        if blow is None or not choices.motion or not (moment.playing or moment.position_s > 0):
+        seen = blow is not None and choices.motion and (moment.playing or moment.position_s > 0)
+        if blow is None or not seen or not self._looks_like(blow):
             self.view.show_frame(None)
             return
+        position_s = min(moment.position_s, blow.ready_s)  # the sound may be ahead of the motions: all at one time
         pictures = {}
         for source in self._sources:
-            amplitudes = blow.modal_m(source.source, moment.position_s, choices.speed)
+            amplitudes = blow.modal_m(source.source, position_s, choices.speed)
             if amplitudes is not None:
                 pictures[source.source] = blow.head.picture(amplitudes)
         slow = "" if choices.speed >= 1 else f"   slow motion × {choices.speed:.3f}"
-        self.view.show_frame(HeadFrame(pictures, f"{moment.position_s:.3f} s{slow}"))
+        self.view.show_frame(HeadFrame(pictures, f"{position_s:.3f} s{slow}"))
+
+    def _looks_like(self, blow: BlowTake) -> bool:
+        """Whether a blow is on a drum of the shape that is shown: another pad may just have been struck."""
+        if (played := self._drum) is None:
+            return False
+        own, shown = blow.request.modes.drum, played.drum
+        alike = math.isclose(own.width_m * shown.length_m, shown.width_m * own.length_m, rel_tol=1e-6)
+        return alike and own.shape == shown.shape
 
     # Gestures
 

@@ -239,3 +239,7 @@ def test_a_kit_shows_the_drum_that_is_struck(qtbot: QtBot, drummed: Controller) 
     QTest.keyClick(drummed.drum.view, Qt.Key.Key_Down, Qt.KeyboardModifier.ControlModifier)
     QTest.keyClick(drummed.drum.view, Qt.Key.Key_Down, Qt.KeyboardModifier.ControlModifier)
     assert drummed.instruments.drum_key == 36, "the lowest"
+    qtbot.waitUntil(lambda: shown(drummed) is not None)
+    drummed.session.update(instrument=read_patch(PATCHES / "tuned_toms.json"))
+    assert shown(drummed) is None
+    qtbot.waitUntil(lambda: drummed.drum.view.frame is None)
