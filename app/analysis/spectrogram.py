@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.analysis.heard import HeardSignal
-from app.rendering import SOURCES, Take
+from app.rendering import SOURCES, BlowTake, Sounding
 from app.rendering.take import Listened
 
 FLOOR_DB = -150.0
@@ -21,23 +21,23 @@ class Spectrogram:
     """Model, truth and error in dB; a sine at the pick-up's full scale is 0 dB. A `Growing`.
 
     Column k is of the window centred at k·hop_s; the last one ends with the take. Before its start the take is
-    mirrored, as the motion of a string released from rest would be: a sudden start would show as a click that is not
-    heard.
+    mirrored, as the motion of a string released from rest would be, and of a drum or a velocity with the other sign:
+    a sudden start would show as a click that is not heard.
 
     Attributes:
         ready: columns so far.
         levels_db: (columns, bins) each, for "model", "truth" and "error": model − truth, of the signals.
     """
 
-    def __init__(self, take: Take, listened: Listened) -> None:
+    def __init__(self, take: Sounding, listened: Listened) -> None:
         self.take, self.listened = take, listened
         self._heard = {name: HeardSignal(listened, name) for name in SOURCES}
-        rate_hz = take.info.rate_hz
+        rate_hz = take.rate_hz
         self.window_frames = max(2 ** round(math.log2(WINDOW_PERIODS * rate_hz / take.fundamental_hz)), 16)
         self.hop = self.window_frames // OVERLAP
         self.ready = 0
         self._window = np.hanning(self.window_frames + 1)[:-1].astype(np.float32)
-        self._window *= np.float32(2 / self._window.sum() / listened.ear.full_scale)
+        self._window *= np.float32(2 / self._window.sum() / take.full_scale)
         self.columns = self._columns_of(self._heard["truth"].frames)
         shape = (self.columns, self.window_frames // 2 + 1)
         self.levels_db = {name: np.empty(shape, np.float32) for name in ("model", "truth", "error")}
@@ -48,12 +48,12 @@ class Spectrogram:
 
     @property
     def hop_s(self) -> float:
-        return self.hop / self.take.info.rate_hz
+        return self.hop / self.take.rate_hz
 
     @property
     def bin_hz(self) -> float:
         """The distance between two bins."""
-        return self.take.info.rate_hz / self.window_frames
+        return self.take.rate_hz / self.window_frames
 
     def advance(self) -> bool:
         count = min(self._possible() - self.ready, COLUMNS_AT_A_TIME)
@@ -82,7 +82,7 @@ class Spectrogram:
         signal = heard.read(max(first, 0), last)
         if first < 0:
             mirror = heard.read(1, 1 - first)[::-1]
-            if self.listened.ear.pickup == "velocity":
+            if isinstance(self.take, BlowTake) or self.listened.ear.pickup == "velocity":
                 mirror = -mirror
             signal = np.concatenate([mirror, signal])
         windows = np.lib.stride_tricks.sliding_window_view(signal, self.window_frames)[:: self.hop]

@@ -16,12 +16,17 @@ if TYPE_CHECKING:
     from app.instrument.drum_keys import DrumKey
     from app.patches.patch import Patch
     from engine.resonators.drum import DrumModes
+    from engine.strike import Strike
 
 drums = typer.Typer(help="Modes and sounds of drums.", no_args_is_help=True)
 PatchOption = Annotated[str, typer.Argument(metavar="PATCH", help="An instrument of drums, by name or as a file.")]
 KeyOption = Annotated[int, typer.Argument(metavar="KEY", min=0, max=127, help="A MIDI key of it.")]
 Velocity = Annotated[int, typer.Option(min=1, max=127, help="Of the key.")]
 Seconds = Annotated[float, typer.Option(metavar="S", help="Duration in s.")]
+Place = Annotated[
+    tuple[float, float] | None,
+    typer.Option(metavar="X Y", help="Where it is struck, from the centre in half-lengths; default its own place."),
+]
 Rate = Annotated[int, typer.Option(metavar="HZ", help="Sample rate.")]
 LONGEST_S = 60.0
 HIGHEST_HZ = 20_000.0
@@ -77,6 +82,7 @@ def strike(
     key: KeyOption,
     out: Annotated[Path, typer.Argument(metavar="OUT.wav", help="The file to write.")],
     velocity: Velocity = 100,
+    place: Place = None,
     seconds: Seconds = 3.0,
     source: Annotated[
         PlayedSource, typer.Option(help="The learned model, the truth (the solved physics), or their difference.")
@@ -85,12 +91,13 @@ def strike(
 ) -> None:
     """Render a blow on a drum to a WAV file of 24 bits."""
     arguments.check_range("--seconds", seconds, 0.01, LONGEST_S, "s")
-    chosen, _ = _key_of(patch, key)
+    chosen, struck = _key_of(patch, key)
+    _strike_of(struck, velocity, place)
     from app.export.played import write_played
     from app.export.wav import WavSettings
     from app.instrument.events import NoteOn, TimedEvent
 
-    loaded, events = arguments.open_preset(chosen.preset), [TimedEvent(0.0, NoteOn(key, velocity))]
+    loaded, events = arguments.open_preset(chosen.preset), [TimedEvent(0.0, NoteOn(key, velocity, place=place))]
     with progress(f"{chosen.name}") as report:
         written = write_played(
             out,
@@ -111,6 +118,7 @@ def compare(
     patch: PatchOption,
     key: KeyOption,
     velocity: Velocity = 127,
+    place: Place = None,
     seconds: Seconds = 1.0,
     rate: Rate = 48_000,
     json: Json = False,
@@ -123,7 +131,7 @@ def compare(
 
     from training.family.drums import StruckDrum, linear_drum, model_player, motion_errors
 
-    speeds = struck.strike(velocity, chosen.pluck.curve).speeds(struck.modes)
+    speeds = _strike_of(struck, velocity, place, chosen.pluck.curve).speeds(struck.modes)
     resonator = struck.modes.resonator(np.zeros((1, 2)))
     rise = float(resonator.relative_tension_rise(speeds / resonator.omega))
     start = np.zeros_like(speeds)
@@ -141,6 +149,22 @@ def compare(
         f"{struck.played.name}, {resonator.modes} modes, rise of tension {rise:.3g}, first {seconds:g} s at {rate} Hz"
     )
     print_table(("", "rel. MSE over the surface"), [[name, number(error)] for name, error in errors.items()])
+
+
+def _strike_of(struck: DrumKey, velocity: int, place: tuple[float, float] | None, curve: float = 0.0) -> Strike:
+    """The blow at a place. Raises typer.BadParameter: it is not on the drum."""
+    import numpy as np
+
+    from engine.strike import Strike
+
+    own = struck.strike(velocity, curve)
+    if place is None:
+        return own
+    if not struck.modes.surface.inside(np.array([place])):
+        raise typer.BadParameter(
+            f"must be on the drum, not {place[0]:g} {place[1]:g}; choose one nearer the centre", param_hint="--place"
+        )
+    return Strike(place, own.speed_m_s, own.mallet)
 
 
 def _of_file(path: Path, count: int) -> DrumModes:

@@ -1,7 +1,17 @@
-"""From a pluck to the pictures and signals that the window shows: the take, and the worker thread that renders it."""
+"""From a pluck or a blow to pictures and signals: the take, and the worker thread that renders it."""
 
+from app.rendering.blow import BlowRequest, BlowTake
 from app.rendering.request import RenderListener, RenderRequest
-from app.rendering.take import SOURCES, Take
+from app.rendering.take import SOURCES, Sounding, Take
 from app.rendering.worker import RenderWorker
 
-__all__ = ["SOURCES", "RenderListener", "RenderRequest", "RenderWorker", "Take"]
+__all__ = [
+    "SOURCES",
+    "BlowRequest",
+    "BlowTake",
+    "RenderListener",
+    "RenderRequest",
+    "RenderWorker",
+    "Sounding",
+    "Take",
+]

@@ -32,9 +32,9 @@ class RenderRequest:
     speed: float = 1.0
     others: tuple[Path, ...] = ()
 
-    def same_motion(self, other: RenderRequest | None) -> bool:
+    def same_motion(self, other: object) -> bool:
         """Whether model and truth move alike: only listening points, slow motion or other presets may differ."""
-        return other is not None and (self.preset, self.pluck, self.seconds) == (
+        return isinstance(other, RenderRequest) and (self.preset, self.pluck, self.seconds) == (
             other.preset,
             other.pluck,
             other.seconds,

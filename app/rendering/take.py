@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -118,6 +119,38 @@ class Listened:
         return all(name in self.signals and self.signals[name].complete for name in SOURCES)
 
 
+class Sounding(Protocol):
+    """The sound of a pluck or of a blow, which grows as it is rendered.
+
+    Attributes:
+        seconds: the duration.
+        listened: signals by source; replaced as a whole.
+    """
+
+    seconds: float
+    listened: Listened
+    fundamental_hz: float
+
+    @property
+    def rate_hz(self) -> int: ...
+
+    @property
+    def horizon_s(self) -> float:
+        """The end of the time that the model was trained for, or of the motion where it was trained on none."""
+
+    @property
+    def partials_hz(self) -> NDArray[np.float64]:
+        """At rest, (modes,), rising."""
+
+    @property
+    def full_scale(self) -> float:
+        """What is 0 dB, in the unit of the signals."""
+
+    @property
+    def progress(self) -> tuple[object, ...]:
+        """A value that changes whenever more of it is ready, or signals are replaced."""
+
+
 class Take:
     """Motions and signals of model and truth for a pluck, and of other presets' models beside them.
 
@@ -153,6 +186,22 @@ class Take:
         self.frames = self.motions["truth"].frames
         self.listened = Listened(ear, {name: Signal(info.rate_hz, len(ear.points), seconds) for name in SOURCES})
         self.fundamental_hz = float(info.resonator.omega[0]) / (2 * np.pi)
+
+    @property
+    def rate_hz(self) -> int:
+        return self.info.rate_hz
+
+    @property
+    def horizon_s(self) -> float:
+        return self.info.horizon_s
+
+    @property
+    def partials_hz(self) -> NDArray[np.float64]:
+        return np.asarray(self.info.resonator.omega / math.tau)
+
+    @property
+    def full_scale(self) -> float:
+        return self.listened.ear.full_scale
 
     @property
     def picture_hz(self) -> float:

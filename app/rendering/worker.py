@@ -10,7 +10,9 @@ import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import TYPE_CHECKING, Protocol
 
+from app.rendering.blow import BlowListener, BlowRequest
 from app.rendering.job import Job
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
@@ -19,11 +21,18 @@ from app.shared.heap import return_free_pages
 from app.shared.thread_priority import Rank, step_back
 from engine.presets import PresetError
 
+if TYPE_CHECKING:
+    from app.rendering.blow_job import BlowJob
+
 TIDY_AFTER_S = 1.0  # without anything to render, until free memory is given back
 IN_STEP_S = 0.5  # for how long after its pluck a motion may be held in step with its sound
 LEAD_S = 0.08  # how far ahead of the sound it is rendered meanwhile
 LOOK_AGAIN_S = 0.01
 PATIENCE_S = 5.0  # for the first sound
+
+
+class WorkListener(RenderListener, BlowListener, Protocol):
+    """Of plucks and of blows."""
 
 
 class RenderWorker:
@@ -38,20 +47,20 @@ class RenderWorker:
 
     def __init__(
         self,
-        listener: RenderListener,
+        listener: WorkListener,
         load: Callable[[Subject], Loaded],
         hurried: Callable[[], bool] = lambda: False,
         sounds: Callable[[], bool] = lambda: True,
     ) -> None:
         self._listener, self._load, self._hurried, self._sounds = listener, load, hurried, sounds
         self._mailbox = threading.Condition()
-        self._request: RenderRequest | None = None
+        self._request: RenderRequest | BlowRequest | None = None
         self._closing = False
         self._helper = ThreadPoolExecutor(1, "render-helper", step_back, (Rank.RENDERING,))
         self._thread = threading.Thread(target=self._run, name="render-worker", daemon=True)
         self._thread.start()
 
-    def submit(self, request: RenderRequest) -> None:
+    def submit(self, request: RenderRequest | BlowRequest) -> None:
         """Replaces a request that waits and abandons another motion being rendered. Any thread; returns at once."""
         with self._mailbox:
             self._request = request
@@ -72,7 +81,7 @@ class RenderWorker:
         ends_s = time.monotonic() + PATIENCE_S
         while not (self._closing or self._sounds() or time.monotonic() > ends_s):
             time.sleep(LOOK_AGAIN_S)
-        job: Job | None = None
+        job: Job | BlowJob | None = None
         untidy = False  # whether anything was rendered since free memory was given back
         while True:
             with self._mailbox:
@@ -89,9 +98,9 @@ class RenderWorker:
                 request, self._request = self._request, None
             if request is not None:
                 if job is not None and request.same_motion(job.request):
-                    job.ask_again(request)
+                    job.ask_again(request)  # type: ignore[arg-type]  # of the same kind
                 else:
-                    job = Job(request, self._load, self._listener, self._helper)
+                    job = self._job(request)
             assert job is not None
             if self._in_step(job):
                 continue
@@ -105,6 +114,13 @@ class RenderWorker:
                 job = None
                 self._listener.render_failed(f"Rendering failed: {error}", traceback.format_exc())
 
-    def _in_step(self, job: Job) -> bool:
+    def _job(self, request: RenderRequest | BlowRequest) -> Job | BlowJob:
+        if isinstance(request, RenderRequest):
+            return Job(request, self._load, self._listener, self._helper)
+        from app.rendering.blow_job import BlowJob  # and torch
+
+        return BlowJob(request, self._load, self._listener, self._helper)
+
+    def _in_step(self, job: Job | BlowJob) -> bool:
         """Whether the motion is far enough ahead of its sound for now."""
         return job.age_s < IN_STEP_S and job.rendered_s > job.age_s + LEAD_S and self._hurried()

@@ -75,8 +75,8 @@ def full_scale_words(choices: Choices) -> str:
 
 
 def readable_unit(peak: float, pickup: str) -> tuple[float, str]:
-    """Factor and name of a unit in which `peak`, in m, m/s or N, has few digits; mm or smaller for displacement."""
-    unit = {"displacement": "m", "velocity": "m/s"}.get(pickup, "N")
+    """Factor and name of a unit in which `peak`, in m, m/s, N or Pa, has few digits; a displacement at most mm."""
+    unit = {"displacement": "m", "velocity": "m/s", "pressure": "Pa"}.get(pickup, "N")
     prefixes = _PREFIXES[1:] if pickup == "displacement" else _PREFIXES
     factor, prefix = next((pair for pair in prefixes if peak * pair[0] >= 0.1), prefixes[-1] if peak else prefixes[0])
     return factor, prefix + unit

@@ -39,6 +39,7 @@ from app.views.dialogs.abx_dialog import AbxDialog
 from app.views.dialogs.help_dialog import HelpDialog
 from app.views.dialogs.learn_dialog import LearnDialog
 from app.views.dialogs.preset_card import preset_browser
+from app.views.drum.view import DrumView
 from app.views.instrument.patch_card import patch_browser
 from app.views.string.view import StringView
 from app.window.about import about_text
@@ -48,7 +49,8 @@ from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports
 from app.window.instruments import Instruments
 from app.window.main_window import PLAYED_KEYS, MainWindow
-from app.window.panels import Moment, StringPanel
+from app.window.panels import StringPanel
+from app.window.panels.drum import DrumPanel
 from app.window.panels.rack import fill
 from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
@@ -66,7 +68,9 @@ FACTS_S = 0.1  # between two updates of gains and of the audio state
 LIVELY_S = 1.0  # at the full rate after the last movement
 METER_FALL_DB_PER_S = 20.0
 METER_FLOOR_DB = -120.0
-DRUMS_PLAYED = "This view shows a plucked string, and drums are played.\nThey are heard, recorded and exported."
+DRUMS_PLAYED = (
+    "This view shows a string, and drums are played.\nWaveform, spectrum, spectrogram and error over time show them."
+)
 ProblemListener = Callable[[AudioProblem], None]
 
 
@@ -108,6 +112,7 @@ class Controller(QObject):
         self._facts_due_s = 0.0
         self._decks_shown_s = dict.fromkeys((True, False), self._last_tick_s)  # True: of the left one
         self._peak_db = METER_FLOOR_DB
+        self._struck: KeyNote | None = None  # the blow whose drum was shown last
         self._abx: AbxDialog | None = None  # while it is open, nothing else plays
         self._help: HelpDialog | None = None
         self._learning: LearnDialog | None = None
@@ -117,6 +122,8 @@ class Controller(QObject):
             self.session, self.library, window.presets, preset_browser(window), settings.favourites
         )
         self.panels = fill(window, self.session, self.library)
+        self.string = next(panel for panel in self.panels if isinstance(panel, StringPanel))
+        self.drum = next(panel for panel in self.panels if isinstance(panel, DrumPanel))
         self.performance = Performance(window, self.session, self.library, self.sound, self.panels)
         window.order_tabs()
         self._connect()
@@ -137,6 +144,8 @@ class Controller(QObject):
             self.performance.notes.look,
         )
         self.instruments.played.connect(self.performance.follow)
+        self.instruments.played.connect(self._show_struck)
+        self.drum.view.drum_stepped.connect(self._step_drum)
         self.instruments.told.connect(window.notices.tell)
         self.instruments.start()
         self.patches = PatchDesk(
@@ -241,8 +250,8 @@ class Controller(QObject):
     def _connect_history(self) -> None:
         window, history = self.window, self.history
         window.menu.aboutToShow.connect(lambda: window.menu.show_steps(history.undo_words, history.redo_words))
-        strings = (panel.view for panel in self.panels if isinstance(panel, StringPanel))
-        draggable: list[StringView | Knob] = [*strings, *window.transport.knobs.values()]
+        views = self.string.view, self.drum.view
+        draggable: list[StringView | DrumView | Knob] = [*views, *window.transport.knobs.values()]
         for dragged in draggable:
             dragged.drag_started.connect(history.hold)
             dragged.drag_ended.connect(history.let_go)
@@ -274,7 +283,7 @@ class Controller(QObject):
         if self.session.choices.drums is None:
             self.performance.pluck()
         else:
-            self.instruments.strike()
+            self.instruments.strike(*self.drum.place, self.session.choices.velocity)
 
     def strike(self, x: float, y: float, velocity: float) -> None:
         """Strikes the drum at a place, in half-lengths from its centre."""
@@ -445,17 +454,46 @@ class Controller(QObject):
         window.right.show_key(choices.right_view)
         for panel in self.panels:
             panel.choices_changed(names)
-        if "instrument" in names:
-            words = "" if choices.drums is None else DRUMS_PLAYED
-            for panel in self.panels:
-                if panel.of_strings:
-                    panel.cover(words)
+        if names & {"instrument", "patch"}:
+            self._show_kind()
         window.show_solo(choices.solo)
         self.patches.choices_changed(names)
         self.exports.choices_changed(names)
         if "volume_db" in names and self._abx is None:  # a blind test keeps the one that it began with
             self.sound.set_volume_db(choices.volume_db)
         self._wake()
+
+    def _show_kind(self) -> None:
+        """Shows the string or the drum; views of a string say that they do not show drums."""
+        drums = self.session.choices.drums
+        if (key := self.instruments.drum_key) is not None:
+            self.drum.show_key(key)
+        shown = self.string if drums is None else self.drum
+        self.window.show_on_stage(shown, shown.view)
+        for panel in self.panels:
+            if panel.of_strings:
+                panel.cover("" if drums is None else DRUMS_PLAYED)
+
+    def _show_struck(self) -> None:
+        """Shows the drum that was struck last, and where."""
+        latest, drums = self.instruments.latest, self.session.choices.drums
+        if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum or latest is self._struck:
+            return
+        self._struck = latest
+        if (played := drums.of_key(latest.event.key)) is not None:
+            self.drum.show_key(latest.event.key, latest.event.place or played.place)
+
+    def _step_drum(self, steps: int) -> None:
+        """Shows another drum of the kit, or the drum of a higher or lower key."""
+        patch, drums, key = self.session.choices.patch, self.session.choices.drums, self.instruments.drum_key
+        if patch is None or drums is None or key is None:
+            return
+        low, high = patch.range
+        keys = [each.note for each in drums.drums] if drums.keys == "pads" else list(range(low, high + 1))
+        if key in keys:
+            key = keys[min(max(keys.index(key) + steps, 0), len(keys) - 1)]
+            self.instruments.latest_key = key, None
+            self.drum.show_key(key)
 
     def _wake(self) -> None:
         """Something may move: runs the timer at its full rate for LIVELY_S."""
@@ -479,9 +517,9 @@ class Controller(QObject):
             choices = self.session.choices
             window.transport.slots.show_gains({slot: choices.gain_db(slot, performance.match) for slot in SLOTS})
             self.audio.show(status, performance.notes, take)
-        moment = Moment(take, performance.position_s, performance.moving, elapsed_s)
+        moment = performance.moment(elapsed_s)
         for panel in self.panels:
-            if isinstance(panel, StringPanel) and panel.isVisible():
+            if panel.on_stage and panel.isVisible():
                 panel.show_moment(moment)
         self._deck_timer.start()
         self.patches.tick()
@@ -498,9 +536,9 @@ class Controller(QObject):
         """
         on_the_left, now_s, performance = bool(self._ticks % 2), time.monotonic(), self.performance
         elapsed_s, self._decks_shown_s[on_the_left] = now_s - self._decks_shown_s[on_the_left], now_s
-        moment = Moment(performance.take, performance.position_s, performance.moving, elapsed_s)
+        moment = performance.moment(elapsed_s)
         for panel in self.panels:
-            if not isinstance(panel, StringPanel) and panel.on_the_left == on_the_left and panel.isVisible():
+            if not panel.on_stage and panel.on_the_left == on_the_left and panel.isVisible():
                 panel.show_moment(moment)
 
     def _show_level(self, elapsed_s: float) -> None:

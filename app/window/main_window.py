@@ -26,6 +26,7 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QMainWindow,
     QSplitter,
+    QStackedWidget,
     QTabBar,
     QToolTip,
     QVBoxLayout,
@@ -186,7 +187,7 @@ class MainWindow(QMainWindow):
         self._loading.setObjectName("faint")
         self._loading.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._stage.addWidget(self._loading)
-        self._string: QWidget = self._loading  # until it is there
+        self._shown = QStackedWidget()  # the string or the drum
         self._stage.addWidget(decks)
         self._set_alive(False)
         for splitter in (decks, self._stage):
@@ -211,14 +212,25 @@ class MainWindow(QMainWindow):
         self._drop_sign = DropSign(self)
         theme.changes.theme_changed.connect(self._fit)
 
-    def show_string(self, view: QWidget) -> None:
-        """Puts the string's view above the decks, gives it the focus and enables the window, which was loading."""
+    def show_stage(self, *views: QWidget) -> None:
+        """Puts the views of string and drum above the decks and enables the window, which was loading."""
         self._loading.hide()
-        self._string = view
-        self._stage.insertWidget(0, view)
+        for view in views:
+            self._shown.addWidget(view)
+        self._stage.insertWidget(0, self._shown)
         self._stage.setSizes([310, 0, 300])
         self._set_alive(True)
-        view.setFocus()
+
+    def show_on_stage(self, view: QWidget, focus: QWidget) -> None:
+        """Shows one of these; `focus` in it gets the focus that the other had."""
+        before = self._shown.currentWidget()
+        if view is before:
+            return
+        focused = self.focusWidget()
+        held = before is not None and focused is not None and before.isAncestorOf(focused)
+        self._shown.setCurrentWidget(view)
+        if held:
+            focus.setFocus()
 
     def show_failed(self) -> None:
         """Says, in the place of the string, that the models cannot be loaded."""
@@ -229,7 +241,7 @@ class MainWindow(QMainWindow):
         header = (self._menu_button, self.faces, self.presets, self._keys_button, self._test_button)
         aside = (self.notices.bell, self._audio_button)
         chain: list[QWidget] = []
-        views = (self._string, self.left, self.right)
+        views = (self._shown, self.left, self.right)
         for part in (*header, *aside, self.notices, *views, self.song, self.transport, self.instrument):
             inside = [part, *part.findChildren(QWidget)]
             stops = [

@@ -27,7 +27,7 @@ from app.playing.notes import Notes
 from app.playing.sources import Sources
 from app.presets.library import Library, PresetEntry
 from app.presets.words import model_word, percent
-from app.rendering import RenderRequest, RenderWorker, Take
+from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
 from app.session.choices import Choices, PluckedString, Session
 from app.session.listener import Listener
@@ -35,8 +35,9 @@ from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
 from app.session.slots import request_of
 from app.shared.vocabulary import DIFFERENCE
+from app.window.blows import Blows
 from app.window.main_window import MainWindow
-from app.window.panels import Panel
+from app.window.panels import Moment, Panel
 from app.window.render_signals import RenderSignals
 from engine.metrics import ErrorSums
 
@@ -75,6 +76,9 @@ class Performance(QObject):
         self._sources = Sources()
         self.notes = Notes(sound, self._sources, library.find, mail.refused.emit, sound.set_effects)
         self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable)
+        self._blows = Blows(session, library, sound, self._worker.submit)
+        mail.struck.connect(self._blow_started)
+        mail.blow_complete.connect(self._blow_finished)
 
     @property
     def entry(self) -> PresetEntry | None:
@@ -83,8 +87,12 @@ class Performance(QObject):
 
     @property
     def take(self) -> Take | None:
-        """The motion that is shown."""
-        return self._shown.take
+        """The motion that is shown; None while drums are played."""
+        return None if self._of_drums else self._shown.take
+
+    @property
+    def _of_drums(self) -> bool:
+        return self._session.choices.drums is not None
 
     @property
     def ready(self) -> bool:
@@ -98,7 +106,9 @@ class Performance(QObject):
 
     @property
     def playable(self) -> bool:
-        """Whether a pluck would sound at once, and a key of the patch if there is one."""
+        """Whether a pluck would sound at once, and a key of the patch if there is one; of drums a key alone."""
+        if self._of_drums:
+            return self._sound.status().changes_done > 0 and self.notes.keys.player is not None
         return self.at_hand and (self._session.choices.patch is None or self.notes.keys.player is not None)
 
     @property
@@ -109,6 +119,8 @@ class Performance(QObject):
     @property
     def position_s(self) -> float:
         """The playhead: the time in the shown motion that is heard now, or where it stands."""
+        if self._of_drums:
+            return self._blows.position_s
         shown = self._shown
         if shown.take is None:
             return 0.0
@@ -120,18 +132,27 @@ class Performance(QObject):
     @property
     def moving(self) -> bool:
         """Whether the playhead moves."""
+        if self._of_drums:
+            return self._blows.moving
         note, take = self._shown.note, self._shown.take
         return note is not None and take is not None and not note.over and note.seconds < take.seconds
 
     @property
     def settled(self) -> bool:
         """Whether motion and signals are complete, so that views need not look for more."""
+        if self._of_drums:
+            return self._blows.settled
         return self.take is None or (self.take.complete and self.take.listened.complete)
 
     @property
     def match(self) -> Mapping[str, float] | None:
         """By source, the factor that brings the latest note to the level of the truth; None: not known yet."""
         return None if self.notes.latest is None else self.notes.latest.match
+
+    def moment(self, elapsed_s: float) -> Moment:
+        """What panels show now; `elapsed_s`: since they were shown the last one."""
+        blow = self._blows.take if self._of_drums else None
+        return Moment(self.take, self.position_s, self.moving, elapsed_s, blow)
 
     # Intents
 
@@ -143,6 +164,10 @@ class Performance(QObject):
     def follow(self) -> None:
         """Shows the latest note while it rings, if its motion is rendered; otherwise `_take_started` does."""
         latest = self.notes.latest
+        if isinstance(latest, KeyNote) and latest.of_drum:
+            if self._of_drums:
+                self._blows.follow(latest)
+            return
         if latest is None or latest is self._shown.note or latest.released or latest.over:
             return
         if self.ready and self._is_chosen(latest):
@@ -152,12 +177,18 @@ class Performance(QObject):
     def stop(self) -> None:
         """Everything fades out; the playhead stays."""
         self._forget_turn()
+        if self._of_drums:
+            self._blows.stop()
+            self.notes.stop()
+            return
         self._shown.parked_s = self.position_s
         self._shown.note = None
         self.notes.stop()
 
     def seek(self, position_s: float) -> None:
         """Moves the playhead; while notes ring, one that begins there replaces them."""
+        if self._of_drums:
+            self._blows.seek(position_s)
         if self.take is None:
             return
         position_s = min(max(position_s, 0.0), self.take.seconds)
@@ -176,7 +207,11 @@ class Performance(QObject):
             self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
         elif names & Listener.model_fields.keys():
             self.notes.listen(choices.ear)
-        asked = request_of(choices, self._library)
+        asked = None if self._of_drums else request_of(choices, self._library)
+        if self._of_drums:
+            self._blows.listen()
+        elif names & {"instrument", "patch"}:
+            self._blows.forget()
         if names & PLACED and not (choices.plays_patch or entry is None or asked is None):
             plucks = [replace(asked.pluck, position=place) for place in Reach.of(entry.info).row]
             self.notes.prepare_plucks(asked.preset, plucks)
@@ -303,6 +338,18 @@ class Performance(QObject):
         parts = [f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, places, strict=False)]
         self._tell("Error of this pluck: " + ", ".join(parts))
         self._window.show_growth(growth_words([w.rel_mae for w in windows], take.info.rel_mae))
+
+    def _blow_started(self, take: BlowTake) -> None:
+        if not self._of_drums or not self._blows.started(take):  # overtaken by the next one
+            return
+        for panel in self._panels:
+            panel.blow_started(take)
+        self._tell("Rendering …")
+        self._window.show_growth("")
+
+    def _blow_finished(self, take: BlowTake) -> None:
+        if self._of_drums and take is self._blows.take:
+            self._tell(f"Error of this blow: {percent(math.sqrt(take.errors.rel_mse))} over the drum")
 
     def _other_refused(self, preset: str, message: str) -> None:
         self._window.notices.tell(f"{preset} cannot be heard beside this preset: {message}")

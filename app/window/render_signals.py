@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtCore import QObject, Signal
 
-from app.rendering import Take
+from app.rendering import BlowTake, Take
 from engine.metrics import ErrorSums
 
 
@@ -13,6 +13,8 @@ class RenderSignals(QObject):
 
     started = Signal(object)  # Take
     finished = Signal(object, object)  # Take, ErrorSums
+    struck = Signal(object)  # BlowTake
+    blow_complete = Signal(object)  # BlowTake
     other_refused = Signal(str, str)  # name of the preset, message
     failed = Signal(str, str)  # message, details
     refused = Signal(str, str)  # a pluck cannot be played: message, details
@@ -22,6 +24,12 @@ class RenderSignals(QObject):
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
         self.finished.emit(take, errors)
+
+    def blow_started(self, take: BlowTake) -> None:
+        self.struck.emit(take)
+
+    def blow_finished(self, take: BlowTake) -> None:
+        self.blow_complete.emit(take)
 
     def other_failed(self, preset: str, message: str) -> None:
         self.other_refused.emit(preset, message)

@@ -1,4 +1,4 @@
-"""Drums: the cost of a voice of many modes, and of a kit beside strings.
+"""Drums: the cost of a voice of many modes, of a kit beside strings, and of the picture in the window.
 
 Costs are processor time of this thread at 48 kHz, less that of an empty mixer, as shares of a core. The least of some
 repeats counts: other processes only add.
@@ -6,10 +6,17 @@ repeats counts: other processes only add.
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from PySide6.QtGui import QPixmap
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import Event, NoteOn
@@ -26,6 +33,8 @@ EDGES_S = (0.0, 0.05, 1.0)  # of the ages of voices that are measured apart
 REPEATS = 5
 STEP_FRAMES = 480
 VELOCITY = 110
+PICTURES = (("concert_toms", 36), ("concert_toms", 47), ("timpani", 50), ("soft_plate", 60), ("thin_bars", 72))
+T = TypeVar("T")
 SIZES = (400, 800, 1500)  # modes
 HARD = PhysicalMallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)  # so that all modes move
 STRINGS, STRING_PATCH = (40, 45, 50, 55, 59, 64, 67, 71), "classical_guitar"
@@ -47,10 +56,32 @@ class DrumCost:
 
 
 @dataclass(frozen=True)
+class PictureCost:
+    """Of the picture of a drum in the window.
+
+    Attributes:
+        modes, shown: of the drum, and in its picture.
+        shapes_s: to prepare the shapes on the grid, once for each drum.
+        second_s: to render motion, sound and errors of model and truth, for each second.
+        picture_ms: to compute a picture of one source.
+        painted_ms: to paint it, 1240 by 300 pixels.
+    """
+
+    drum: str
+    modes: int
+    shown: int
+    shapes_s: float
+    second_s: float
+    picture_ms: float
+    painted_ms: float
+
+
+@dataclass(frozen=True)
 class DrumsBenchmark:
     machine: Machine
     rate_hz: int
     drums: tuple[DrumCost, ...]
+    pictures: tuple[PictureCost, ...]
 
 
 def measure(report: Callable[[float, str], None]) -> DrumsBenchmark:
@@ -67,7 +98,79 @@ def measure(report: Callable[[float, str], None]) -> DrumsBenchmark:
         report(len(SIZES) / (len(SIZES) + 2), "kit")
         found.append(_cost("kit", 0, (kit, pads)))
         found.append(_cost("kit and strings", 0, (kit, pads), (guitar, STRINGS)))
-        return DrumsBenchmark(Machine.here(), RATE_HZ, tuple(found))
+        report((len(SIZES) + 1) / (len(SIZES) + 2), "pictures")
+        pictures = tuple(_picture(*drum) for drum in PICTURES)
+        return DrumsBenchmark(Machine.here(), RATE_HZ, tuple(found), pictures)
+
+
+def _picture(patch: str, key: int) -> PictureCost:
+    from PySide6.QtWidgets import QApplication
+
+    from app.instrument.drum_keys import DrumKeys
+    from app.rendering import BlowRequest, BlowTake
+    from app.rendering.blow import Head
+    from app.rendering.blow_job import BlowJob
+    from app.rendering.loaded import Loaded
+    from app.session.shown import DEFAULT_SOURCES
+    from app.views.drum.ink import HeadFrame
+    from app.views.drum.view import DrumView
+    from engine.voices import Ear
+
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    application = QApplication.instance() or QApplication([])
+    found = DrumKeys(read_patch(PATCHES / f"{patch}.json"), Ear((0.5,))).of_key(key)
+    assert found is not None
+    drum, surface = found.modes.drum, found.modes.surface
+    shapes_s, _ = _timed(lambda: Head.of(surface, (drum.length_m, drum.width_m)), 1)
+    path = SHIPPED / "studio_any_string.safetensors"
+    loaded = Loaded(load_preset(path))
+    request = BlowRequest(path, found.modes, found.strike(VELOCITY), 1.0, Ear((0.5,)))
+
+    class Silent:
+        def blow_started(self, take: BlowTake) -> None: ...
+
+        def blow_finished(self, take: BlowTake) -> None: ...
+
+    def render() -> BlowTake:
+        with ThreadPoolExecutor(1) as helper:
+            job = BlowJob(request, lambda _: loaded, Silent(), helper)
+            while not job.idle:
+                job.advance()
+        assert job.take is not None
+        return job.take
+
+    render()  # loads the shapes
+    second_s, take = _timed(render, REPEATS)
+
+    def picture() -> NDArray[np.float32]:
+        amplitudes = take.modal_m("model", 0.1, 0.02)
+        assert amplitudes is not None
+        return take.head.picture(amplitudes)
+
+    picture_s, pixels = _timed(picture, 50 * REPEATS)
+    view = DrumView()
+    view.resize(1240, 300)
+    view.set_drum(patch, drum.shape, (drum.length_m, drum.width_m))
+    view.set_sources(DEFAULT_SOURCES[:1])
+    view.show_frame(HeadFrame({"model": pixels}))
+    target = QPixmap(view.size())
+    painted_s, _ = _timed(lambda: view.render(target), 50 * REPEATS)
+    view.close()
+    application.processEvents()
+    shown = len(take.head.shapes)
+    return PictureCost(
+        f"{patch} {key}", len(found.modes), shown, shapes_s, second_s, 1e3 * picture_s, 1e3 * painted_s
+    )
+
+
+def _timed(work: Callable[[], T], repeats: int) -> tuple[float, T]:
+    """The least of the process's processor times in s, and the result."""
+    times = []
+    for _ in range(repeats):
+        began_s = time.process_time()
+        found = work()
+        times.append(time.process_time() - began_s)
+    return min(times), found
 
 
 def _drums(patch: Patch) -> Drums:

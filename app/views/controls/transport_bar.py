@@ -113,6 +113,8 @@ class TransportBar(QFrame):
         with QSignalBlocker(self._stereo), QSignalBlocker(self._pickup):
             self._stereo.setChecked(choices.stereo)
             self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup))
+        for part in (*self.areas["pluck"], self._pickup, self._loop):
+            part.setEnabled(choices.drums is None)  # they are of a string
         self.slots.show_choices(choices)
 
     def show_playing(self, playing: bool) -> None:

@@ -35,12 +35,7 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks | N
     `pluck`: the end of the string, 0 or 1, that the pluck is nearer to; None while the motion is shown. Only for a
     pluck are amplitudes hatched, which a string in motion all crosses, and words written, which it would cover.
     """
-    gradient = QLinearGradient(0, 0, 0, axes.height)
-    gradient.setColorAt(0, QColor(theme.present.ground_top))
-    gradient.setColorAt(1, QColor(theme.present.ground_bottom))
-    painter.setPen(QPen(QColor(theme.LINE), 1))
-    painter.setBrush(gradient)
-    painter.drawRoundedRect(QRectF(0.5, 0.5, axes.width - 1, axes.height - 1), 6, 6)
+    paint_backdrop(painter, axes.width, axes.height)
     if trained is None:
         return
     paint_grid(painter, axes)
@@ -49,6 +44,16 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks | N
         _paint_untrained_positions(painter, axes, trained.position, words=pluck is not None)
     if pluck is not None and trained.amplitude_mm is not None:
         _paint_untrained_amplitudes(painter, axes, trained, pluck)
+
+
+def paint_backdrop(painter: QPainter, width: float, height: float) -> None:
+    """The gradient behind a string or a drum, with a frame."""
+    gradient = QLinearGradient(0, 0, 0, height)
+    gradient.setColorAt(0, QColor(theme.present.ground_top))
+    gradient.setColorAt(1, QColor(theme.present.ground_bottom))
+    painter.setPen(QPen(QColor(theme.LINE), 1))
+    painter.setBrush(gradient)
+    painter.drawRoundedRect(QRectF(0.5, 0.5, width - 1, height - 1), 6, 6)
 
 
 def paint_grid(painter: QPainter, axes: StringAxes) -> None:
@@ -97,11 +102,11 @@ def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: s
         painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
 
 
-def paint_remark(painter: QPainter, axes: StringAxes, text: str) -> None:
+def paint_remark(painter: QPainter, width: float, text: str) -> None:
     """Paints a line in the upper left corner, why nothing is heard."""
     painter.setPen(QColor(theme.FAINT))
     painter.setFont(theme.small_font(11))
-    room = axes.width - 2 * MARGIN_X
+    room = width - 2 * MARGIN_X
     cut = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(room))
     painter.drawText(QRectF(MARGIN_X, LEGEND_Y - 10, room, 20), Qt.AlignmentFlag.AlignVCenter, cut)
 

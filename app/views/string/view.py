@@ -423,7 +423,7 @@ class StringView(QWidget):
             if not self._plain:
                 paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
             elif remark := self._warning or self._heard_remark:
-                paint_remark(painter, axes, remark)
+                paint_remark(painter, axes.width, remark)
             if self.hasFocus():
                 painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
                 painter.setBrush(Qt.BrushStyle.NoBrush)

@@ -20,7 +20,7 @@ from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QWidget
 
 from app.presets.library import Library
-from app.rendering import Take
+from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Choices, Session
 from app.shared.worker import Job, Work
 from app.views.background import Background
@@ -41,16 +41,24 @@ class Moment:
         position_s: the playhead, from the pluck on: the time that sounds now.
         playing: whether the playhead moves.
         elapsed_s: since the last call of `show_moment`, by the clock.
+        blow: the motion of a drum, while one is played; `take` is None then.
     """
 
     take: Take | None
     position_s: float
     playing: bool
     elapsed_s: float
+    blow: BlowTake | None = None
+
+    @property
+    def sounding(self) -> Sounding | None:
+        """The pluck or the blow that is heard."""
+        return self.take or self.blow
 
     def standing(self, choices: Choices) -> tuple[object, ...]:
         """What a picture of the take depends on: while it is equal and nothing plays, the picture is the same."""
-        return self.take, self.take.progress if self.take is not None else (), self.position_s, choices
+        sounding = self.sounding
+        return sounding, sounding.progress if sounding is not None else (), self.position_s, choices
 
 
 class Panel(QWidget):
@@ -60,6 +68,7 @@ class Panel(QWidget):
     title: ClassVar[str]  # on its tab
     help: ClassVar[str] = ""  # what the view shows, in a sentence or two, for the help dialog
     on_the_left = False  # in which deck
+    on_stage: ClassVar[bool] = False  # the picture of the string or the drum, above the decks
     of_strings: ClassVar[bool] = True  # it shows a string: while a drum is played it says that it does not show it
 
     seek_asked = Signal(float)  # move the playhead to this time in s
@@ -74,6 +83,7 @@ class Panel(QWidget):
         self.background = Background(self.key, self, rests=self._rests)
         self.background.failed.connect(self.told)
         self._cover = Label(self)
+        self._cover.setObjectName("cover")
         self._cover.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self._cover.setWordWrap(True)
         self._cover.setAutoFillBackground(True)
@@ -99,6 +109,9 @@ class Panel(QWidget):
 
     def choices_changed(self, names: frozenset[str]) -> None:
         """Called with the fields of `Choices` that have new values; at the start with all of them."""
+
+    def blow_started(self, take: BlowTake) -> None:
+        """Called with another motion of a drum, which grows from now on; not where the panel is `of_strings`."""
 
     def take_started(self, take: Take) -> None:
         """Called with another motion, of which nothing is rendered yet; it grows from now on."""

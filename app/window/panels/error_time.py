@@ -13,7 +13,8 @@ from PySide6.QtCore import Qt
 from app.analysis.error_course import ErrorCourse
 from app.presets import words
 from app.presets.library import Library
-from app.rendering import Take
+from app.rendering import BlowTake, Sounding, Take
+from app.rendering.blow import BlowErrors
 from app.session.choices import Session
 from app.views import theme
 from app.views.controls.parts import tool_button
@@ -31,9 +32,10 @@ LOWEST_DECADE, HIGHEST_DECADE = -9, 4  # motions are kept in single precision, a
 LEVEL_SPANS_DB = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
 
-class ErrorTimePanel(TimePanel[ErrorCourse]):
+class ErrorTimePanel(TimePanel[ErrorCourse | BlowErrors]):
     """The axis grows with the curves by decades."""
 
+    of_strings = False
     key = "error_time"
     title = "Error over time"
     help = (
@@ -64,6 +66,7 @@ class ErrorTimePanel(TimePanel[ErrorCourse]):
         self._stored = {name: item.plot(pen=pen) for name, pen in dotted.items()}
         self.readout.setTextFormat(Qt.TextFormat.AutoText)  # a legend in colours
         self._stored_errors: dict[str, float] = {}
+        self._measured: tuple[str, ...] = ("rmse", "mae")  # of a drum there is no mean of absolute errors
         self._range: tuple[float, float] | None = None
         theme.changes.theme_changed.connect(self._show_legend)
         self.quantities.chosen.connect(self._choose)
@@ -78,21 +81,32 @@ class ErrorTimePanel(TimePanel[ErrorCourse]):
         super().take_started(take)
         rmse = None if take.info.rel_mse is None else math.sqrt(take.info.rel_mse)
         stored = {"rmse": rmse, "mae": take.info.rel_mae}
-        self._stored_errors = {name: error for name, error in stored.items() if error is not None}
+        self._start_over({name: error for name, error in stored.items() if error is not None}, take)
+
+    def blow_started(self, take: BlowTake) -> None:
+        super().blow_started(take)
+        self._start_over({}, take)  # the model was validated on no drum
+
+    def _start_over(self, stored_errors: dict[str, float], take: Sounding) -> None:
+        self._measured = ("rmse",) if isinstance(take, BlowTake) else ("rmse", "mae")
+        self._stored_errors = stored_errors
         for curve in self._curves.values():
             curve.setData([], [])
         for name, line in self._stored.items():
             value = self._stored_errors.get(name, 0.0)
             level = math.log10(value) if value > 0 else math.nan
-            line.setData([0, min(take.info.horizon_s, take.seconds)], [level, level])
+            line.setData([0, min(take.horizon_s, take.seconds)], [level, level])
         self._range = None
         self._fit([])
         self._show_legend()
 
-    def _begin(self, take: Take) -> ErrorCourse:
+    def _begin(self, take: Sounding) -> ErrorCourse | BlowErrors:
+        if isinstance(take, BlowTake):
+            return take.errors
+        assert isinstance(take, Take)
         return ErrorCourse(take)
 
-    def _draw(self, made: ErrorCourse) -> None:
+    def _draw(self, made: ErrorCourse | BlowErrors) -> None:
         ready = made.ready
         shown = (made, ready, self.quantities.key)
         if ready and shown != self._shown:
@@ -100,22 +114,22 @@ class ErrorTimePanel(TimePanel[ErrorCourse]):
             self.show_curves(made.middle_s[:ready], {name: values[:ready] for name, values in made.curves.items()})
 
     def show_curves(self, time_s: NDArray[np.float64], curves: dict[str, NDArray[np.float64]]) -> None:
-        """Relative errors "rmse" and "mae", and "level_db", (windows,) each at `time_s`."""
+        """Relative errors "rmse" and perhaps "mae", and "level_db", (windows,) each at `time_s`."""
         if self._level:
             drawn = {"level_db": curves["level_db"]}
         else:
             with np.errstate(divide="ignore"):  # no error at all lies below the axis
-                drawn = {name: np.log10(curves[name]) for name in ("rmse", "mae")}
+                drawn = {name: np.log10(curves[name]) for name in ("rmse", "mae") if name in curves}
         for name, values in drawn.items():
             self._curves[name].setData(time_s, np.where(np.isfinite(values), values, np.nan), connect="finite")
         self._fit(list(drawn.values()))
 
-    def _words(self, made: ErrorCourse, time_s: float, place: float) -> Iterable[str]:
+    def _words(self, made: ErrorCourse | BlowErrors, time_s: float, place: float) -> Iterable[str]:
         window = int(time_s / made.window_s)
         if not 0 <= window < made.ready:
             return []
         here = {name: values[window] for name, values in made.curves.items()}
-        what = f"RMSE {percent(here['rmse'])}   MAE {percent(here['mae'])}"
+        what = "   ".join(f"{name.upper()} {percent(here[name])}" for name in ("rmse", "mae") if name in here)
         if self._level:
             what = f"{here['level_db']:+.2f} dB" if math.isfinite(here["level_db"]) else "silent"
         return [f"{made.middle_s[window]:.3f} s   {what}"]
@@ -162,7 +176,8 @@ class ErrorTimePanel(TimePanel[ErrorCourse]):
         if self._level:
             self.readout.rest("")
             return
-        drawn = (("rmse", theme.MODEL), ("mae", theme.DIFFERENCE))
+        hues = {"rmse": theme.MODEL, "mae": theme.DIFFERENCE}
+        drawn = [(name, hue) for name, hue in hues.items() if name in self._measured]
         text = "&nbsp;&nbsp;".join(f"<span style='color:{colour}'>— {name.upper()}</span>" for name, colour in drawn)
         stored = [percent(self._stored_errors[name]) for name, _ in drawn if name in self._stored_errors]
         self.readout.rest(f"{text}&nbsp;&nbsp; ⋯ validation {', '.join(stored)}" if stored else text)

@@ -7,6 +7,7 @@ from app.session.choices import Session
 from app.window.main_window import MainWindow
 from app.window.panels.base import Panel
 from app.window.panels.compare import ComparePanel
+from app.window.panels.drum import DrumPanel
 from app.window.panels.eigenvalues import EigenvaluesPanel
 from app.window.panels.error_plane import ErrorPlanePanel
 from app.window.panels.error_time import ErrorTimePanel
@@ -22,11 +23,11 @@ RIGHT: tuple[type[Panel], ...] = (WaveformPanel, SpaceTimePanel, ErrorTimePanel,
 
 
 def fill(window: MainWindow, session: Session, library: Library) -> list[Panel]:
-    """The panels: the string's first, then those of the left and the right deck. Connects decks and session."""
-    string = StringPanel(session, library)
-    window.show_string(string)
+    """The panels: of string and drum, then of the left and the right deck. Connects decks and session."""
+    string, drum = StringPanel(session, library), DrumPanel(session, library)
+    window.show_stage(string, drum)
     string.view.setFocus()
-    panels: list[Panel] = [string]
+    panels: list[Panel] = [string, drum]
     for choice, deck, kinds in (("left_view", window.left, LEFT), ("right_view", window.right, RIGHT)):
         for panel in (kind(session, library) for kind in kinds):
             deck.add(panel.key, panel.title, panel)

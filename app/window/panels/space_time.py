@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF
 
 from app.analysis.space_time import Envelopes, Picture, picture
 from app.presets.library import Library
-from app.rendering import SOURCES, Take
+from app.rendering import SOURCES, Sounding, Take
 from app.session.choices import Session
 from app.session.shown import readable_unit
 from app.views import theme
@@ -104,7 +104,8 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         self._image.clear()
         self._show_scale()
 
-    def _begin(self, take: Take) -> Envelopes:
+    def _begin(self, take: Sounding) -> Envelopes:
+        assert isinstance(take, Take)  # it draws no drums
         return Envelopes(take)
 
     def _draw(self, made: Envelopes) -> None:

@@ -12,7 +12,7 @@ from PySide6.QtCore import QRectF
 
 from app.analysis.spectrogram import FrequencyRows, Spectrogram
 from app.presets.library import Library
-from app.rendering import Take
+from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Session
 from app.session.shown import full_scale_words
 from app.views import theme
@@ -36,6 +36,7 @@ SCALES = (("log", "Log", "Octaves of equal height"), ("linear", "Linear", "Parti
 class SpectrogramPanel(TimePanel[Spectrogram]):
     """0 dB is a sine of full scale; levels below the chosen range have the colour of the background."""
 
+    of_strings = False
     key = "spectrogram"
     title = "Spectrogram"
     help = (
@@ -95,14 +96,22 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
 
     def take_started(self, take: Take) -> None:
         super().take_started(take)
-        if take.info.rate_hz / 2 != self._highest_hz:
-            self._highest_hz = take.info.rate_hz / 2
+        self._fit_to(take, full_scale_words(self.session.choices))
+
+    def blow_started(self, take: BlowTake) -> None:
+        super().blow_started(take)
+        self._fit_to(take, f"{take.full_scale:g} Pa")
+
+    def _fit_to(self, take: Sounding, full_scale: str) -> None:
+        self._bar_label.set(f"dB re {full_scale}", "dB")
+        if take.rate_hz / 2 != self._highest_hz:
+            self._highest_hz = take.rate_hz / 2
             self._label_frequencies()
 
-    def _begin(self, take: Take) -> Spectrogram:
+    def _begin(self, take: Sounding) -> Spectrogram:
         return Spectrogram(take, take.listened)
 
-    def _is_of(self, made: Spectrogram, take: Take) -> bool:
+    def _is_of(self, made: Spectrogram, take: Sounding) -> bool:
         return made.listened is take.listened
 
     def _draw(self, made: Spectrogram) -> None:

@@ -14,7 +14,7 @@ from PySide6.QtGui import QResizeEvent
 
 from app.analysis.heard import HeardSignal
 from app.presets.library import Library
-from app.rendering import Take
+from app.rendering import BlowTake, Take
 from app.session.choices import Session
 from app.session.shown import (
     DEFAULT_SOURCES,
@@ -98,6 +98,7 @@ def analyser_at(rate_hz: int) -> Analyser:
 class SpectrumPanel(Panel):
     """The heard source is on top. The mouse reads a frequency."""
 
+    of_strings = False
     key = "spectrum"
     title = "Spectrum"
     help = (
@@ -162,11 +163,17 @@ class SpectrumPanel(Panel):
 
     def take_started(self, take: Take) -> None:
         self._shown = self._standing = ()  # which would hold the last take
-        self._partials_hz = take.info.resonator.omega / (2 * np.pi)
+        self._partials_hz = take.partials_hz
+        self._label.set(f"dB re {full_scale_words(self.session.choices)}", "dB")
+
+    def blow_started(self, take: BlowTake) -> None:
+        self._shown = self._standing = ()
+        self._partials_hz = take.partials_hz
+        self._label.set(f"dB re {take.full_scale:g} Pa", "dB")
 
     def show_moment(self, moment: Moment) -> None:
         self._moments += 1
-        take, choices = moment.take, self.session.choices
+        take, choices = moment.sounding, self.session.choices
         if take is None or self._moments % EVERY:
             return
         standing = moment.standing(choices)
@@ -180,19 +187,19 @@ class SpectrumPanel(Panel):
         if shown == self._shown:
             return
         self._shown = shown
-        self.set_rate(max((signal.rate_hz for signal in there), default=take.info.rate_hz))
+        self.set_rate(max((signal.rate_hz for signal in there), default=take.rate_hz))
         for signal in signals:
             if signal in there:
-                self._draw(signal, moment.position_s)
+                self._draw(signal, moment.position_s, take.full_scale)
             else:
                 self._clear(signal.source)
         self._show_readout()
 
-    def _draw(self, heard: HeardSignal, position_s: float) -> None:
+    def _draw(self, heard: HeardSignal, position_s: float, full_scale: float) -> None:
         analyser = analyser_at(heard.rate_hz)
         last_window = heard.ready - analyser.window_frames  # the window does not pass the end of the signal
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
-        signal = heard.read(first, first + analyser.window_frames) / heard.of.ear.full_scale
+        signal = heard.read(first, first + analyser.window_frames) / full_scale
         self.show_signal(heard.source, signal, analyser)
 
     def set_rate(self, rate_hz: int) -> None:

@@ -34,6 +34,7 @@ WARNING_FIELDS = {"volume_db", *PLUCK_FIELDS, *Listener.model_fields, *Monitor.m
 
 
 class StringPanel(Panel):
+    on_stage = True
     key = "string"
     title = "String"
     help = (

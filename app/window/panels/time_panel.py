@@ -12,7 +12,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.analysis.growing import Growing, keep_up
 from app.presets.library import Library
-from app.rendering import Take
+from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Session
 from app.views.controls.parts import lay_out_view
 from app.views.controls.readout import Readout
@@ -40,8 +40,8 @@ class TimePanel(Panel, Generic[G]):
         lay_out_view(self, controls, self.readout, (), self.plot, gap=0)
 
     @abstractmethod
-    def _begin(self, take: Take) -> G:
-        """What is to be computed from a take."""
+    def _begin(self, take: Sounding) -> G:
+        """What is to be computed from a take, or from a blow where the panel draws drums."""
 
     @abstractmethod
     def _draw(self, made: G) -> None:
@@ -51,19 +51,26 @@ class TimePanel(Panel, Generic[G]):
     def _words(self, made: G, time_s: float, place: float) -> Iterable[str]:
         """What is there, in one or more wordings, the longest first; none where nothing is."""
 
-    def _is_of(self, made: G, take: Take) -> bool:
+    def _is_of(self, made: G, take: Sounding) -> bool:
         """Whether it shows the take as it is heard now."""
         return True
 
     def take_started(self, take: Take) -> None:
+        self._forget(take)
+
+    def blow_started(self, take: BlowTake) -> None:
+        self._forget(take)
+
+    def _forget(self, coming: Sounding) -> None:
+        """Discards what was computed of the take before, in whose place this one comes."""
         self.background.cancel()
-        self._made, self._shown = None, ()  # which would hold the last take
-        self.plot.set_times(take.seconds, take.info.horizon_s)
+        self._made, self._shown = None, ()
+        self.plot.set_times(coming.seconds, coming.horizon_s)
 
     def show_moment(self, moment: Moment) -> None:
         self.plot.show_playhead(moment.position_s)
         self._moments += 1
-        take = moment.take
+        take = moment.take if self.of_strings else moment.sounding
         if take is None or self._moments % self.EVERY:
             return
         made = self._made

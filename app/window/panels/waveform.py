@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.analysis.heard import HeardSignal
 from app.presets.library import Library
-from app.rendering import Take
+from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Session
 from app.session.shown import (
     DEFAULT_SOURCES,
@@ -58,6 +58,7 @@ class _Drawn:
 class WaveformPanel(Panel):
     """One curve a source; the heard source is on top."""
 
+    of_strings = False
     key = "waveform"
     title = "Waveform"
     help = (
@@ -81,7 +82,7 @@ class WaveformPanel(Panel):
         self._label = UprightLabel(item)
         self._curves: dict[str, pg.PlotDataItem] = {}
         self.legend = Legend(self.plot)
-        self._take: Take | None = None
+        self._take: Sounding | None = None
         self._period_s = 0.0  # of its string; 0: not known
         self._drawn: dict[str, _Drawn] = {}
         self._full = 0.0  # of the axis, in m or m/s
@@ -99,10 +100,16 @@ class WaveformPanel(Panel):
             self._shown = ()
 
     def take_started(self, take: Take) -> None:
+        self._begin(take)
+
+    def blow_started(self, take: BlowTake) -> None:
+        self._begin(take)
+
+    def _begin(self, take: Sounding) -> None:
         self._take, self._drawn, self._full = take, {}, 0.0
         self._shown = self._caught_up = ()  # which would hold the last take
         self._period_s = 1 / take.fundamental_hz
-        self.plot.set_times(take.seconds, take.info.horizon_s)
+        self.plot.set_times(take.seconds, take.horizon_s)
         for curve in self._curves.values():
             curve.setData([], [])
 
@@ -122,7 +129,7 @@ class WaveformPanel(Panel):
             self._shown = shown
             self._draw(take)
 
-    def _follow(self, take: Take) -> bool:
+    def _follow(self, take: Sounding) -> bool:
         """Reads on what the slots hold; a signal that is new from its start.
 
         Whether there was anything to read: there may be more.
@@ -140,8 +147,8 @@ class WaveformPanel(Panel):
             self._full = 0.0  # something else is drawn: its own scale
         return moved
 
-    def _draw(self, take: Take) -> None:
-        pickup = take.listened.ear.pickup
+    def _draw(self, take: Sounding) -> None:
+        pickup = "pressure" if isinstance(take, BlowTake) else take.listened.ear.pickup
         peak = max((drawn.peak for drawn in self._drawn.values()), default=0.0)
         if peak > self._full or self._full == 0.0:
             self._full = max(AIR * peak, FLAT)

@@ -72,7 +72,7 @@ def test_it_waits_until_its_parts_are_there(qtbot: QtBot) -> None:
         window.show()
     assert not window.transport.isEnabled()
     assert window.presets.name.text() == "Reading presets …"  # nobody has looked yet whether there are any
-    window.show_string(QWidget())
+    window.show_stage(QWidget())
     assert window.transport.isEnabled()
 
 
@@ -283,7 +283,7 @@ def test_the_look_is_chosen_in_the_menu(qtbot: QtBot, qapp: QApplication) -> Non
 def alive(qtbot: QtBot) -> MainWindow:
     window = MainWindow()
     qtbot.addWidget(window)
-    window.show_string(QWidget())
+    window.show_stage(QWidget())
     window.show_face("lab")
     window.show_keys(True)
     with qtbot.waitExposed(window):
@@ -333,8 +333,8 @@ def test_in_a_low_play_face_the_knobs_take_the_place_of_the_keys(alive: MainWind
 
 
 AREAS = {  # by face: what is shown of it, and what is not
-    "play": ("instrument.bar", "instrument.keys", "_string", "transport.meter"),
-    "lab": ("presets", "left", "right", "transport.slots", "_facts", "_test_button", "_string", "transport.meter"),
+    "play": ("instrument.bar", "instrument.keys", "_shown", "transport.meter"),
+    "lab": ("presets", "left", "right", "transport.slots", "_facts", "_test_button", "_shown", "transport.meter"),
 }
 
 
@@ -454,7 +454,7 @@ LONG = "A fault in words that are long enough for two lines where the window is 
 
 
 def heights(window: MainWindow) -> list[int]:
-    return [part.height() for part in (window._string, window.left, window.right, window.transport)]
+    return [part.height() for part in (window._shown, window.left, window.right, window.transport)]
 
 
 @pytest.mark.usefixtures("themed")
@@ -472,7 +472,7 @@ def test_neither_a_notice_nor_the_knobs_of_the_string_remove_what_is_seen(
     assert heights(window) == bare, "it lies over the window"
     qtbot.waitUntil(lambda: middle.minimumSizeHint().height() <= window.height())
     for view, least in (
-        (window._string, window._string.minimumSizeHint().height()),
+        (window._shown, window._shown.minimumSizeHint().height()),
         (window.left, window.left.minimumSizeHint().height()),
         (window.right, window.right.minimumSizeHint().height()),
     ):
@@ -482,7 +482,7 @@ def test_neither_a_notice_nor_the_knobs_of_the_string_remove_what_is_seen(
     window.instrument.set_unfolded(True)
     qtbot.waitUntil(lambda: middle.minimumSizeHint().height() <= window.height())
     assert window.instrument.knobs.isVisible()
-    assert window._string.height() >= window._string.minimumSizeHint().height()
+    assert window._shown.height() >= window._shown.minimumSizeHint().height()
 
 
 @pytest.mark.usefixtures("themed")
@@ -497,7 +497,7 @@ def test_the_knobs_of_the_string_work_at_150_percent(qtbot: QtBot, played: Contr
         qtbot.waitUntil(part.isVisible)
     qtbot.mouseClick(strip._fold, Qt.MouseButton.LeftButton)
     qtbot.waitUntil(lambda: middle.minimumSizeHint().height() <= window.height())
-    assert window._string.height() >= window._string.minimumHeight()
+    assert window._shown.height() >= window._shown.minimumHeight()
     knob = strip.knobs.knobs["pluck.curve"]  # the last
     tab_to(qtbot, window, knob)
     qtbot.waitUntil(lambda: knob.visibleRegion().boundingRect().size() == knob.size())

@@ -1,0 +1,271 @@
+"""A blow on a drum as it is drawn: how model and truth move, their error, and their sound, which grow.
+
+A string's take has pictures of points. A drum's has its lowest modes at flashes: amplitude, and the angle that the
+mode has turned through since the blow. A picture at any speed of slow motion follows from these: each mode turns more
+slowly by the same factor, as under a stroboscope of its own, while it decays in real time. Waves that run out from
+the mallet are thus seen as they run, only slower.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.rendering.strobe import FLASH_HZ
+from app.rendering.take import SOURCES, Listened
+from engine.resonators.base import Array
+from engine.resonators.drum import DrumModes
+from engine.resonators.surface import Circle, Surface
+from engine.strike import Strike
+from engine.voices import Ear
+
+MOST_SHOWN = 160  # modes in a picture: their waves are wider than three points of its grid
+GRID = 57  # points of a picture along the longer side; odd: one is the centre
+MOST_HEADS = 24  # that are kept, of 2 MB at most
+RATE_HZ = 48_000
+FULL_SCALE_PA = 20.0  # as `app.instrument.drum_keys` has it
+WINDOW_PERIODS = 2.0  # of the lowest mode, in which the error is measured
+
+
+@dataclass(frozen=True, eq=False)
+class BlowRequest:
+    """The motion and sound of a blow.
+
+    Attributes:
+        preset: of the model of many strings.
+        seconds: the duration.
+        ear: its points are directions: 0 and 1 lie along the head, on the left and on the right, 0.5 above it.
+    """
+
+    preset: Path
+    modes: DrumModes
+    strike: Strike
+    seconds: float
+    ear: Ear
+
+    def same_motion(self, other: object) -> bool:
+        """Whether model and truth move alike: only listening points may differ."""
+        if not isinstance(other, BlowRequest):
+            return False
+        own, others = (
+            (each.preset, each.modes.drum, len(each.modes), each.strike, each.seconds) for each in (self, other)
+        )
+        return own == others
+
+
+@dataclass(frozen=True, eq=False)
+class Head:
+    """A drum as it is drawn: the shapes of its lowest modes on a grid.
+
+    Attributes:
+        inside: which points of the grid (rows, columns) lie on the drum; the first row is the farthest (y = 1).
+        shapes: of a surface's modes at amplitude 1 there, float32 (modes, points inside).
+        places: (points inside, 2), from the centre in half-lengths.
+    """
+
+    inside: NDArray[np.bool_]
+    shapes: NDArray[np.float32]
+    places: Array
+
+    @classmethod
+    def of(cls, surface: Surface, sides: tuple[float, float]) -> Head:
+        """`sides`: length and width, for the numbers of columns and rows."""
+        longer = max(sides)
+        columns, rows = (max(3, 2 * round((GRID - 1) / 2 * side / longer) + 1) for side in sides)
+        x, y = (np.arange(-(n // 2), n // 2 + 1) / (n // 2) for n in (columns, rows))
+        grid = np.stack([part.ravel() for part in np.meshgrid(x, y[::-1])], axis=1)
+        inside = np.hypot(*grid.T) <= 1 if isinstance(surface, Circle) else np.ones(len(grid), bool)
+        shapes = surface.picked(np.arange(min(len(surface.wavenumber), MOST_SHOWN))).shapes(grid[inside])
+        return cls(inside.reshape(rows, columns), shapes.astype(np.float32), grid[inside])
+
+    def picture(self, amplitudes: NDArray[np.floating]) -> NDArray[np.float32]:
+        """Displacement (rows, columns) of modal amplitudes (modes,), in their unit; 0 outside the drum."""
+        found = np.zeros(self.inside.shape, np.float32)
+        found[self.inside] = amplitudes.astype(np.float32) @ self.shapes[: len(amplitudes)]
+        return found
+
+
+def head_of(modes: DrumModes) -> Head:
+    """Made once for each drum, whatever its damping; half a second of work at most."""
+    drum, surface = modes.drum, modes.surface
+    for known, head in _heads:
+        if known is surface:
+            return head
+    head = Head.of(surface, (drum.length_m, drum.width_m))
+    _heads.append((surface, head))
+    return head
+
+
+_heads: deque[tuple[Surface, Head]] = deque(maxlen=MOST_HEADS)  # the worker's
+
+
+class ModalMotion:
+    """The lowest modes of one source at flashes, which grow.
+
+    Attributes:
+        ready: flashes so far.
+    """
+
+    def __init__(self, flashes: int, modes: int) -> None:
+        self.flashes, self.ready = flashes, 0
+        self.size_m = np.zeros((flashes, modes))
+        self.angle = np.zeros((flashes, modes))
+
+    def append(self, size_m: Array, angle: Array) -> None:
+        """The next flashes, of the modes that move; flashes after the last are left out."""
+        first, moving = self.ready, size_m.shape[1]
+        stop = min(first + len(size_m), self.flashes)
+        self.size_m[first:stop, :moving], self.angle[first:stop, :moving] = (
+            size_m[: stop - first],
+            angle[: stop - first],
+        )
+        self.ready = stop
+
+
+class BlowErrors:
+    """How far the model is from the truth over the whole surface, in windows of two periods of the lowest mode.
+
+    Attributes:
+        ready: windows so far.
+        middle_s: (windows,), the time of each window's middle.
+        curves: (windows,) each. "rmse": √(Σ∫(ŵ - w)²/Σ∫w²). "level_db": 10 log₁₀(Σ∫ŵ²/Σ∫w²), not finite where one
+            of them is silent.
+    """
+
+    def __init__(self, frames: int, lowest_hz: float) -> None:
+        self.window_frames = max(round(WINDOW_PERIODS * RATE_HZ / lowest_hz), 1)
+        self.windows, self.ready = frames // self.window_frames, 0
+        self.middle_s: NDArray[np.float64] = (np.arange(self.windows, dtype=np.float64) + 0.5) * self.window_s
+        self.curves = {name: np.full(self.windows, np.nan) for name in ("rmse", "level_db")}
+        self._sums = np.zeros((3, self.windows + 1))  # of error, model and truth
+        self._total = np.zeros(2)
+        self._done = 0
+
+    @property
+    def window_s(self) -> float:
+        return self.window_frames / RATE_HZ
+
+    @property
+    def rel_mse(self) -> float:
+        """Of all frames so far; not a number where the truth rests."""
+        wrong, true = self._total
+        return float(wrong / true) if true > 0 else math.nan
+
+    @property
+    def complete(self) -> bool:
+        return self.ready == self.windows
+
+    def advance(self) -> bool:
+        """The render worker adds what is new; here there is nothing to compute."""
+        return False
+
+    def add(self, model_m: Array, truth_m: Array, weight: Array) -> None:
+        """The next frames, (frames, modes) each; `weight` (modes,) is that of a square in the mean."""
+        squares = [np.einsum("fm,fm,m->f", part, part, weight) for part in (model_m - truth_m, model_m, truth_m)]
+        window = np.minimum((self._done + np.arange(len(model_m))) // self.window_frames, self.windows)
+        for row, values in enumerate(squares):
+            self._sums[row] += np.bincount(window, values, self.windows + 1)
+        self._total += squares[0].sum(), squares[2].sum()
+        self._done += len(model_m)
+        first, stop = self.ready, min(self._done // self.window_frames, self.windows)
+        wrong, model, truth = (part[first:stop] for part in self._sums)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            self.curves["rmse"][first:stop] = np.sqrt(wrong / truth)
+            self.curves["level_db"][first:stop] = 10 * np.log10(model / truth)
+        self.ready = stop
+
+
+class BlowTake:
+    """One blow: motion, sound and errors of model and truth, which grow while they are rendered.
+
+    Attributes:
+        head: the drum's shapes on a grid.
+        motions: by source.
+        errors: of the model.
+        listened: signals by source in Pa at 1 m, one column for each direction; replaced as a whole.
+        fundamental_hz: of its lowest mode at rest.
+        frames: samples, the first at the blow, and one more than `seconds` has.
+    """
+
+    def __init__(self, request: BlowRequest, head: Head) -> None:
+        self.request, self.head, self.seconds = request, head, request.seconds
+        self.frames = int(request.seconds * RATE_HZ) + 2
+        self.motions = {name: ModalMotion(int(request.seconds * FLASH_HZ) + 1, len(head.shapes)) for name in SOURCES}
+        omega, sigma = request.modes.omega[0], request.modes.sigma[0]
+        self.fundamental_hz = math.sqrt(max(omega**2 - sigma**2, 1.0)) / math.tau
+        self.errors = BlowErrors(self.frames - 1, self.fundamental_hz)
+        self.listened = Listened(request.ear)
+        self.ready_frames = 0
+
+    @property
+    def complete(self) -> bool:
+        return self.ready_frames == self.frames
+
+    @property
+    def ready_s(self) -> float:
+        """The latest time at which both sources can be shown."""
+        return max(0, min(motion.ready for motion in self.motions.values()) - 1) / FLASH_HZ
+
+    @property
+    def rate_hz(self) -> int:
+        return RATE_HZ
+
+    @property
+    def horizon_s(self) -> float:
+        """All of it: the model was trained on no drum."""
+        return self.seconds
+
+    @property
+    def partials_hz(self) -> Array:
+        """At rest, (modes,)."""
+        return np.asarray(self.request.modes.omega / math.tau)
+
+    @property
+    def full_scale(self) -> float:
+        """What is 0 dB, in Pa."""
+        return FULL_SCALE_PA
+
+    @property
+    def progress(self) -> tuple[object, ...]:
+        """A value that changes whenever more of it is ready, or signals are replaced."""
+        return self.ready_frames, self.listened, *(part.ready_frames for part in self.listened.signals.values())
+
+    @property
+    def scale(self) -> Array:
+        """(modes,): from amplitudes of the modes to those that `head` has shapes of."""
+        return self.request.modes.scale[: len(self.head.shapes)]
+
+    def modal_m(self, source: str, position_s: float, speed: float) -> Array | None:
+        """Amplitudes (modes,) of `head`'s shapes as slow motion shows them at a time; None: not rendered yet.
+
+        "difference" is that of the true motions, turned as slowly as the truth is.
+        """
+        parts = [self.motions[name] for name in (SOURCES if source == "difference" else (source,))]
+        ready = min(part.ready for part in parts)
+        if ready == 0:
+            return None
+        flash = min(int(position_s * FLASH_HZ), ready - 1)
+        shown = parts[-1]
+        begins, angle = shown.angle[0], shown.angle[flash]
+        slowed = begins + min(speed, 1.0) * (angle - begins)
+        found = shown.size_m[flash] * np.cos(slowed)
+        if source == "difference":
+            model = parts[0]
+            found = model.size_m[flash] * np.cos(slowed + model.angle[flash] - angle) - found
+        return np.asarray(found * self.scale)
+
+
+class BlowListener(Protocol):
+    """Called with the worker's results, in the worker's thread."""
+
+    def blow_started(self, take: BlowTake) -> None:
+        """A new blow has its first block."""
+
+    def blow_finished(self, take: BlowTake) -> None:
+        """Motion, signals and errors are complete."""

@@ -1,0 +1,226 @@
+"""The render worker's job for a blow on a drum: motion, sound and errors of model and truth, block by block."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from concurrent.futures import Executor
+
+import numpy as np
+import torch
+
+from app.rendering.blow import RATE_HZ, BlowListener, BlowRequest, BlowTake, ModalMotion, head_of
+from app.rendering.loaded import Loaded
+from app.rendering.strobe import FLASH_HZ
+from app.rendering.subject import Subject
+from app.rendering.take import SOURCES, Listened, Signal
+from engine.models.base import Physics
+from engine.models.koopman_tension import KoopmanTension
+from engine.pluck import FULL_SCALE_M
+from engine.presets import PresetError
+from engine.resonators.base import Array, Resonator
+from engine.truth import ModalState, SplittingSolver, default_substeps
+
+BLOCK_FRAMES = 1_200  # of 1,600 modes 15 MB
+COARSER = 3  # times fewer sub-steps of the truth than a data set has: 1e-12 of the energy off after a second
+SILENCE = 1e-10  # of a mode, of all: what the truth leaves out
+TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its angle follows from them
+
+Advance = Callable[[int], Array]
+
+
+class BlowJob:
+    """Renders a blow; `advance` does the next block of it. The worker uses it as it uses a `Job`.
+
+    Args:
+        load: returns a preset's model and truth; raises PresetError.
+        listener: called in the thread that calls `advance`.
+        helper: another thread, so that model and truth are rendered at the same time.
+    """
+
+    def __init__(
+        self, request: BlowRequest, load: Callable[[Subject], Loaded], listener: BlowListener, helper: Executor
+    ) -> None:
+        self.request = request
+        self._load, self._listener, self._helper = load, listener, helper
+        self.take: BlowTake | None = None
+        self._movers: dict[str, _Mover] = {}
+        self._weights = np.zeros((0, 0))  # of the signals that are rendered
+        self._coming: tuple[Listened, dict[str, _Mover]] | None = None  # signals of other listening points
+        self._finished = False  # whether the listener has been called for it
+        self._begun_s = time.monotonic()
+
+    def ask_again(self, request: BlowRequest) -> None:
+        """Takes a request for the same motion with other listening points."""
+        self.request = request
+
+    @property
+    def age_s(self) -> float:
+        """Seconds since the request."""
+        return time.monotonic() - self._begun_s
+
+    @property
+    def rendered_s(self) -> float:
+        """Seconds of the motion that are rendered."""
+        return 0.0 if self.take is None else self.take.ready_frames / RATE_HZ
+
+    @property
+    def idle(self) -> bool:
+        """Whether there is nothing left to do."""
+        take = self.take
+        return take is not None and self._finished and self._coming is None and take.listened.ear == self.request.ear
+
+    def advance(self) -> None:
+        """Renders a block of both sources, or of the signals at other listening points.
+
+        Raises:
+            PresetError: the preset cannot be used, or is not of many strings.
+        """
+        take = self.take
+        if take is None:
+            take = self.take = self._begin()
+            self._render(take)
+            self._listener.blow_started(take)
+        elif not take.complete:
+            self._render(take)
+        elif take.listened.ear != self.request.ear or self._coming is not None:
+            self._listen(take)
+        if take.complete and not self._finished:
+            self._finished = True
+            self._listener.blow_finished(take)
+
+    def _begin(self) -> BlowTake:
+        take = BlowTake(self.request, head_of(self.request.modes))
+        self._movers = self._set_out()
+        take.listened, self._weights = _listened(self.request), _weights(self.request)
+        return take
+
+    def _set_out(self) -> dict[str, _Mover]:
+        request, resonator = self.request, self.request.modes.resonator(np.zeros((1, 2)))
+        speeds = request.strike.speeds(request.modes)
+        model = self._load(request.preset).preset.model
+        if not isinstance(model, KoopmanTension):
+            raise PresetError(f"{request.preset}: knows one string; drums need a preset of many strings")
+        return {"model": _Mover(_model(model, resonator, speeds)), "truth": _Mover(_truth(resonator, speeds))}
+
+    def _blocks(self, movers: dict[str, _Mover], frames: int) -> dict[str, Array]:
+        """The next frames, (frames, modes) each, of the modes up to the last that moves; one source in the helper."""
+        truth = self._helper.submit(movers["truth"].advance, frames)
+        blocks = {"model": movers["model"].advance(frames), "truth": truth.result()}
+        moving = 1 + max(
+            (int(np.flatnonzero(part.any(axis=0)).max(initial=0)) for part in blocks.values()), default=0
+        )
+        return {name: np.ascontiguousarray(part[:, :moving]) for name, part in blocks.items()}
+
+    def _render(self, take: BlowTake) -> None:
+        first = take.ready_frames
+        count = min(BLOCK_FRAMES, take.frames - first)
+        blocks = self._blocks(self._movers, count)
+        _append(take.listened, blocks, self._weights)
+        moving = blocks["truth"].shape[1]
+        take.errors.add(blocks["model"], blocks["truth"], take.request.modes.scale[:moving] ** 2)
+        for name, block in blocks.items():
+            self._movers[name].show(block, take.motions[name], take.request.modes.omega)
+        take.ready_frames = first + count
+
+    def _listen(self, take: BlowTake) -> None:
+        """Renders the signals for other listening points; those that are there stay until these are complete."""
+        if self._coming is None:
+            self._coming, self._weights = (_listened(self.request), self._set_out()), _weights(self.request)
+        listened, movers = self._coming
+        done = listened.signals["truth"].ready_frames
+        blocks = self._blocks(movers, min(BLOCK_FRAMES, listened.signals["truth"].frames - done))
+        _append(listened, blocks, self._weights)
+        if listened.complete:
+            take.listened, self._coming = listened, None
+
+
+class _Mover:
+    """The amplitudes of all modes of one source from the blow on, block by block, and its lowest modes at flashes."""
+
+    def __init__(self, more: Advance) -> None:
+        self._more, self._begun = more, False
+        self._done, self._step = 0, 1  # frames whose angles are known, and how many lie between two that are computed
+        self._last = np.zeros((0, 0))  # the last two frames, of which the second has no angle yet
+        self._wrapped = self._angle = np.zeros(0)  # the last angle, within a turn and as it has grown
+
+    def advance(self, frames: int) -> Array:
+        """The next frames, (frames, modes) in m; the first of all is that of the blow, at rest."""
+        if self._begun:
+            return self._more(frames)
+        self._begun, found = True, self._more(frames - 1)
+        return np.concatenate([np.zeros((1, found.shape[1])), found])
+
+    def show(self, block: Array, motion: ModalMotion, omega: Array) -> None:
+        """Takes the flashes of these frames, which follow those of the last call; a speed needs the next frame.
+
+        Modes that the frames leave out rest from now on.
+        """
+        shown, between = motion.size_m.shape[1], RATE_HZ // FLASH_HZ
+        first, moving = self._done, min(block.shape[1], shown)
+        turn = omega[:moving] / RATE_HZ
+        if first == 0:
+            most = max(1.0, math.tau / TURNS * RATE_HZ / float(omega[shown - 1]))
+            self._step = max(step for step in range(1, between + 1) if between % step == 0 and step <= most)
+            self._last, block = np.stack([-block[1, :moving], block[0, :moving]]), block[1:]  # odd about the blow
+        q = np.concatenate([self._last[:, :moving], block[:, :moving]])
+        stop = first + len(q) - 2
+        numbers = np.arange(-(-first // self._step) * self._step, stop, self._step)
+        here = numbers - first + 1
+        swing = (q[here + 1] - q[here - 1]) / (2 * np.sin(turn))  # v/ω
+        size, angle = np.hypot(q[here], swing), np.arctan2(-swing, q[here])
+        if len(numbers):
+            before = angle[0] if first == 0 else self._wrapped[:moving]
+            turned = (np.diff(np.concatenate([before[None], angle]), axis=0) + math.pi) % math.tau - math.pi
+            angles = (before if first == 0 else self._angle[:moving]) + np.cumsum(turned, axis=0)
+            self._wrapped, self._angle = angle[-1], angles[-1]
+            flash = numbers % between == 0
+            motion.append(size[flash], angles[flash])
+        self._done, self._last = stop, q[-2:]
+
+
+@torch.inference_mode()
+def _model(model: KoopmanTension, resonator: Resonator, speeds: Array) -> Advance:
+    own = model.for_resonator(Physics(resonator, RATE_HZ, FULL_SCALE_M))
+    q, v = torch.zeros(1, resonator.modes, dtype=torch.float64), torch.from_numpy(speeds)[None] / FULL_SCALE_M
+    state = own.encode_modes(q, v / RATE_HZ)
+
+    @torch.inference_mode()
+    def more(frames: int) -> Array:
+        nonlocal state
+        found, state = own.advance_modes(state, frames)
+        return found[0].numpy() * FULL_SCALE_M
+
+    return more
+
+
+def _truth(resonator: Resonator, speeds: Array) -> Advance:
+    substeps = math.ceil(default_substeps(resonator, RATE_HZ) / COARSER)
+    solver = SplittingSolver(resonator, RATE_HZ, substeps=substeps, silence=SILENCE)
+    state = ModalState(torch.zeros(1, resonator.modes, dtype=torch.float64), torch.from_numpy(speeds)[None])
+
+    @torch.inference_mode()
+    def more(frames: int) -> Array:
+        nonlocal state
+        found, state = solver.advance(state, frames)
+        return found[0].numpy()
+
+    return more
+
+
+def _listened(request: BlowRequest) -> Listened:
+    points, seconds = len(request.ear.points), request.seconds
+    return Listened(request.ear, {name: Signal(RATE_HZ, points, seconds) for name in SOURCES})
+
+
+def _weights(request: BlowRequest) -> Array:
+    """(modes, points): amplitudes in m @ weights = pressure in Pa at 1 m."""
+    return np.stack([request.modes.radiated((2 * point - 1, 0.0)) for point in request.ear.points], axis=1)
+
+
+def _append(listened: Listened, blocks: dict[str, Array], weights: Array) -> None:
+    for name, block in blocks.items():
+        signal = listened.signals[name]
+        heard = block[: signal.frames - signal.ready_frames] @ weights[: block.shape[1]]
+        signal.append(heard.astype(np.float32))

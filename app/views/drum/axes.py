@@ -1,0 +1,89 @@
+"""The axes of a drum's picture: places on its head and directions of listening to pixels, and back."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from PySide6.QtCore import QPointF, QRectF
+from PySide6.QtGui import QPainterPath
+
+Shape = Literal["circle", "rectangle", "bar"]
+Place = tuple[float, float]
+MARGIN_X, MARGIN_TOP, MARGIN_BOTTOM, GAP = 54, 38, 40, 36
+RIM = 0.98  # of half a drum: farther out it is not struck, for there nothing moves
+FLATTEST = 0.12  # height of a picture, of its width: a bar is narrower
+
+
+@dataclass(frozen=True)
+class HeadAxes:
+    """Pictures of one drum, side by side, in a widget of `width` × `height` pixels.
+
+    Places are given from the centre, in half-lengths, and y points up. Listening points are 0 … 1 from left to right.
+
+    Attributes:
+        sides: length and width of the drum, in any unit.
+        heads: how many pictures there are.
+    """
+
+    width: int
+    height: int
+    shape: Shape = "circle"
+    sides: tuple[float, float] = (1.0, 1.0)
+    heads: int = 1
+
+    @property
+    def bottom(self) -> float:
+        """Where the feet of listening points stand."""
+        return self.height - MARGIN_BOTTOM
+
+    def rect(self, head: int) -> QRectF:
+        """Where a picture lies."""
+        count = max(1, self.heads)
+        room_x = (self.width - 2 * MARGIN_X - (count - 1) * GAP) / count
+        room_y = self.bottom - MARGIN_TOP - 8
+        ratio = max(self.sides[1] / self.sides[0], FLATTEST)
+        across = max(8.0, min(room_x, room_y / ratio))
+        middle_x = MARGIN_X + (head + 0.5) * room_x + head * GAP
+        middle_y = MARGIN_TOP + room_y / 2
+        return QRectF(middle_x - across / 2, middle_y - across * ratio / 2, across, across * ratio)
+
+    def outline(self, head: int) -> QPainterPath:
+        """The edge of the drum."""
+        path = QPainterPath()
+        if self.shape == "circle":
+            path.addEllipse(self.rect(head))
+        else:
+            path.addRect(self.rect(head))
+        return path
+
+    def at(self, head: int, place: Place) -> QPointF:
+        area = self.rect(head)
+        x, y = place
+        return QPointF(area.center().x() + x * area.width() / 2, area.center().y() - y * area.height() / 2)
+
+    def place(self, at: QPointF) -> Place | None:
+        """The place under a point, on whichever picture; None where no drum can be struck."""
+        for head in range(self.heads):
+            area = self.rect(head)
+            x = (at.x() - area.center().x()) / (area.width() / 2)
+            y = (area.center().y() - at.y()) / (area.height() / 2)
+            if self.holds((x, y)):
+                return x, y
+        return None
+
+    def holds(self, place: Place) -> bool:
+        """Whether a drum can be struck at a place."""
+        x, y = place
+        away = math.hypot(x, y) if self.shape == "circle" else max(abs(x), abs(y))
+        return away <= RIM
+
+    def x(self, head: int, point: float) -> float:
+        """Of a listening point."""
+        area = self.rect(head)
+        return area.left() + point * area.width()
+
+    def point(self, head: int, x: float) -> float:
+        area = self.rect(head)
+        return (x - area.left()) / area.width()

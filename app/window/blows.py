@@ -1,0 +1,125 @@
+"""The blow that is shown: of the latest note of a drum, rendered by the worker, at the note's own time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from app.audio.sound import Sound
+from app.instrument.drum_keys import DrumKeys
+from app.playing.key_note import KeyNote
+from app.presets.library import Library
+from app.rendering import BlowRequest, BlowTake
+from app.session.choices import Session
+from engine.strike import Strike
+
+
+@dataclass
+class _Shown:
+    """A motion and the note whose time it follows; without a note it stands at `parked_s`."""
+
+    take: BlowTake | None = None
+    note: KeyNote | None = None
+    parked_s: float = 0.0
+
+
+class Blows:
+    """Everything runs in the window's thread. Times are in s from the blow.
+
+    Args:
+        submit: hands a request to the render worker.
+    """
+
+    def __init__(
+        self, session: Session, library: Library, sound: Sound, submit: Callable[[BlowRequest], None]
+    ) -> None:
+        self._session, self._library, self._sound, self._submit = session, library, sound, submit
+        self._asked: tuple[BlowRequest, KeyNote] | None = None  # the latest blow, rendered or not
+        self._shown = _Shown()
+
+    @property
+    def take(self) -> BlowTake | None:
+        """The motion that is shown."""
+        return self._shown.take
+
+    @property
+    def position_s(self) -> float:
+        """The playhead: the time in the shown motion that is heard now, or where it stands."""
+        shown = self._shown
+        if shown.take is None:
+            return 0.0
+        heard_s = shown.parked_s
+        if shown.note is not None:
+            heard_s = max(shown.note.seconds - self._sound.mixer.output_latency_s, 0.0)
+        return min(heard_s, shown.take.seconds)
+
+    @property
+    def moving(self) -> bool:
+        """Whether the playhead moves."""
+        note, take = self._shown.note, self._shown.take
+        return note is not None and take is not None and not note.over and note.seconds < take.seconds
+
+    @property
+    def settled(self) -> bool:
+        """Whether motion and signals are complete, so that views need not look for more."""
+        asked, take = self._asked, self._shown.take
+        return asked is None or (
+            take is not None and take.complete and take.request.same_motion(asked[0]) and take.listened.complete
+        )
+
+    def follow(self, note: KeyNote) -> None:
+        """Shows the latest blow, once its motion is rendered."""
+        if self._asked is not None and self._asked[1] is note:
+            return
+        keys = note.player.keys
+        found = keys.of_key(note.event.key) if isinstance(keys, DrumKeys) else None
+        entry, choices = self._library.find(note.patch.preset), self._session.choices
+        if found is None or entry is None:
+            return
+        strike = found.strike(note.event.velocity, note.patch.pluck.curve)
+        if note.event.place is not None:
+            strike = Strike(note.event.place, strike.speed_m_s, strike.mallet)
+        request = BlowRequest(entry.path, found.modes, strike, choices.seconds, choices.ear)
+        self._asked = request, note
+        if self._shown.take is not None and request.same_motion(self._shown.take.request):
+            self._shown = _Shown(self._shown.take, note)
+        self._submit(request)
+
+    def listen(self) -> None:
+        """Renders the shown blow again where its duration or the listening points have changed.
+
+        That of another instrument is forgotten.
+        """
+        choices = self._session.choices
+        if self._asked is not None and choices.patch is not None and self._asked[1].patch.name != choices.patch.name:
+            self.forget()
+        if self._asked is None:
+            return
+        before, note = self._asked
+        if (before.seconds, before.ear) != (choices.seconds, choices.ear):
+            request = replace(before, seconds=choices.seconds, ear=choices.ear)
+            self._asked = request, note
+            self._submit(request)
+
+    def started(self, take: BlowTake) -> bool:
+        """Takes a motion that was begun; whether it is of the latest blow."""
+        if self._asked is None or not take.request.same_motion(self._asked[0]):
+            return False
+        note, before = self._asked[1], self._shown
+        parked = before.note is None and before.take is not None and before.take.request.strike is take.request.strike
+        self._shown = _Shown(take, None, before.parked_s) if parked else _Shown(take, note)
+        return True
+
+    def seek(self, position_s: float) -> None:
+        """Moves the playhead; the sound continues."""
+        if self._shown.take is not None:
+            self._shown.note = None
+            self._shown.parked_s = min(max(position_s, 0.0), self._shown.take.seconds)
+
+    def stop(self) -> None:
+        """The playhead stays where it is."""
+        self.seek(self.position_s)
+
+    def forget(self) -> None:
+        """Another instrument is played."""
+        self._asked, self._shown = None, _Shown()

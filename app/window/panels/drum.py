@@ -1,0 +1,143 @@
+"""A drum in motion, where it is struck, and the directions it is heard from."""
+
+from __future__ import annotations
+
+import math
+
+from app.patches.drums import PlayedDrum
+from app.presets.library import Library
+from app.rendering import BlowTake
+from app.session.choices import Choices, Session
+from app.session.listener import Listener
+from app.session.shown import LEGEND_FIELDS, ShownSource, shown_sources
+from app.session.silence import why_silent
+from app.shared.key_names import note_name
+from app.shared.vocabulary import DIFFERENCE
+from app.views.controls.parts import lay_out_alone
+from app.views.drum.axes import Place
+from app.views.drum.ink import HeadFrame
+from app.views.drum.view import DrumView
+from app.window.panels.base import Moment, Panel
+
+HARDEST = 127
+DRAWN = ("model", "truth", DIFFERENCE)
+
+
+class DrumPanel(Panel):
+    on_stage = True
+    of_strings = False
+    key = "drum"
+    title = "Drum"
+    help = (
+        "The drum seen from above: the motion of the latest blow in slots A and B, amber up and blue down, in slow "
+        "motion. Click on it to strike, with Shift as hard as it goes; drag the green marker to listen from another "
+        "side."
+    )
+
+    def __init__(self, session: Session, library: Library) -> None:
+        super().__init__(session, library)
+        self.view = DrumView()
+        lay_out_alone(self, self.view)
+        self.view.struck.connect(self._strike)
+        self.view.place_moved.connect(lambda x, y: self._aim((x, y)))
+        self.view.place_reset.connect(self._reset_place)
+        self.view.listening_point_moved.connect(self._move_listening_point)
+        self.view.listening_point_reset.connect(self._reset_listening_point)
+        self.view.motion_toggled.connect(lambda on: session.update(motion=on))
+        self._key: int | None = None
+        self._place: Place = (0.0, 0.0)
+        self._standing: tuple[object, ...] = ()
+
+    @property
+    def place(self) -> Place:
+        """Where the keyboard strikes: as chosen, or where the drum was struck last."""
+        return self._place
+
+    def choices_changed(self, names: frozenset[str]) -> None:
+        choices = self.session.choices
+        if names & {"instrument", "patch"} and choices.drums is not None and self._key is not None:
+            self.show_key(self._key)
+        if names & {"face", "volume_db", *LEGEND_FIELDS}:
+            self.view.set_plain(choices.face == "play")
+            self.view.set_sources(self._sources)
+            self.view.set_warning(why_silent(choices, self.library))
+            self._standing = ()
+        if names & Listener.model_fields.keys():
+            self.view.set_listening_points(choices.listen, choices.listen_right if choices.stereo else None)
+        if "motion" in names:
+            self.view.set_motion(choices.motion)
+
+    @property
+    def _sources(self) -> tuple[ShownSource, ...]:
+        """The drawn sources: both slots, or in Play the audible one; of another preset the model plays drums."""
+        choices = self.session.choices
+        sources = tuple(each for each in shown_sources(choices, self.library) if each.source in DRAWN)
+        return tuple(each for each in sources if each.heard) if choices.face == "play" else sources
+
+    @property
+    def _drum(self) -> PlayedDrum | None:
+        drums = self.session.choices.drums
+        return None if drums is None or self._key is None else drums.of_key(self._key)
+
+    def show_key(self, key: int, place: Place | None = None) -> None:
+        """The drum of a key is shown, struck at a place; None: at its own where it is another drum."""
+        before, self._key = self._drum, key
+        drum = self._drum
+        if drum is None:
+            return
+        self.view.set_drum(f"{drum.name}, {note_name(key)}", drum.drum.shape, (drum.drum.length_m, drum.drum.width_m))
+        if place is not None or drum != before:
+            self._aim(place or drum.place)
+
+    def blow_started(self, take: BlowTake) -> None:
+        self._standing = ()
+
+    def show_moment(self, moment: Moment) -> None:
+        blow, choices = moment.blow, self.session.choices
+        standing = moment.standing(choices)
+        if not moment.playing and standing == self._standing:
+            return
+        self._standing = standing
+        seen = blow is not None and choices.motion and (moment.playing or moment.position_s > 0)
+        if blow is None or not seen or not self._looks_like(blow):
+            self.view.show_frame(None)
+            return
+        position_s = min(moment.position_s, blow.ready_s)  # the sound may be ahead of the motions: all at one time
+        pictures = {}
+        for source in self._sources:
+            amplitudes = blow.modal_m(source.source, position_s, choices.speed)
+            if amplitudes is not None:
+                pictures[source.source] = blow.head.picture(amplitudes)
+        slow = "" if choices.speed >= 1 else f"   slow motion × {choices.speed:.3f}"
+        self.view.show_frame(HeadFrame(pictures, f"{position_s:.3f} s{slow}"))
+
+    def _looks_like(self, blow: BlowTake) -> bool:
+        """Whether a blow is on a drum of the shape that is shown: another pad may just have been struck."""
+        if (played := self._drum) is None:
+            return False
+        own, shown = blow.request.modes.drum, played.drum
+        alike = math.isclose(own.width_m * shown.length_m, shown.width_m * own.length_m, rel_tol=1e-6)
+        return alike and own.shape == shown.shape
+
+    # Gestures
+
+    def _strike(self, x: float, y: float, hard: bool) -> None:
+        self._aim((x, y))
+        self.strike_asked.emit(x, y, HARDEST if hard else self.session.choices.velocity)
+
+    def _aim(self, place: Place) -> None:
+        self._place = place
+        self.view.set_place(place)
+
+    def _reset_place(self) -> None:
+        if (drum := self._drum) is not None:
+            self._aim(drum.place)
+
+    def _move_listening_point(self, side: str, point: float) -> None:
+        if side == "right":
+            self.session.update(listen_right=min(max(point, 0.0), 1.0))
+        else:
+            self.session.move_listening_point(point)
+
+    def _reset_listening_point(self, side: str) -> None:
+        self._move_listening_point(side, Choices().listen_right if side == "right" else Choices().listen)

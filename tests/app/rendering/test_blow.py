@@ -1,0 +1,226 @@
+"""A blow on a drum: what pictures, signals and errors show of it agrees with the engine, at any speed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from app.rendering import blow_job
+from app.rendering.blow import RATE_HZ, BlowRequest, BlowTake, Head
+from app.rendering.blow_job import BlowJob
+from app.rendering.loaded import Loaded
+from app.rendering.strobe import FLASH_HZ
+from app.rendering.worker import RenderWorker
+from engine.presets import SHIPPED, PresetError, load_preset
+from engine.resonators.drum import DrumModes, DrumParameters
+from engine.strike import Strike
+from engine.truth import ModalState, SplittingSolver
+from engine.voices import Ear
+from training.family.drums import StruckDrum, model_player, motion_errors
+
+PRESET = SHIPPED / "studio_any_string.safetensors"
+LOADED = Loaded(load_preset(PRESET))
+TOM = DrumParameters(uneven=0.004, air_kg_m3=1.2).modes(1_500.0)
+STEEL = DrumParameters(
+    shape="rectangle",
+    length_m=0.3,
+    width_m=0.2,
+    thickness_m=0.001,
+    density_kg_m3=7850.0,
+    youngs_modulus_pa=2e11,
+    poisson=0.3,
+    tension_n_m=0.0,
+)
+PLATE = STEEL.modes(3_000.0)
+BAR = replace(STEEL, shape="bar", width_m=0.03, thickness_m=0.002).modes(4_000.0)
+HARD, SOFT = Strike((0.3, 0.1), 8.0), Strike((0.3, 0.1), 0.01)
+
+
+class Log:
+    def __init__(self) -> None:
+        self.calls: list[str] = []
+
+    def blow_started(self, take: BlowTake) -> None:
+        self.calls.append("started")
+
+    def blow_finished(self, take: BlowTake) -> None:
+        self.calls.append("finished")
+
+
+@pytest.fixture
+def helper() -> Iterator[Executor]:
+    with ThreadPoolExecutor(1) as pool:
+        yield pool
+
+
+def request_of(modes: DrumModes, strike: Strike = HARD, seconds: float = 0.25) -> BlowRequest:
+    return BlowRequest(PRESET, modes, strike, seconds, Ear((0.5,)))
+
+
+def rendered(request: BlowRequest, helper: Executor) -> BlowTake:
+    job, log = BlowJob(request, lambda _: LOADED, Log(), helper), Log()
+    job._listener = log
+    while not job.idle:
+        job.advance()
+    assert log.calls == ["started", "finished"]
+    assert job.take is not None
+    return job.take
+
+
+def true_amplitudes(modes: DrumModes, strike: Strike, frames: int) -> np.ndarray:
+    """(frames + 1, modes) in m."""
+    solver = SplittingSolver(modes.resonator(np.zeros((1, 2))), RATE_HZ)
+    speeds = torch.from_numpy(strike.speeds(modes))[None]
+    return solver.solve(ModalState(torch.zeros_like(speeds), speeds), frames)[0].numpy()
+
+
+@pytest.mark.parametrize("modes", [TOM, PLATE, BAR], ids=["tom", "plate", "bar"])
+def test_in_real_time_a_picture_is_the_true_motion(modes: DrumModes, helper: Executor) -> None:
+    take = rendered(request_of(modes), helper)
+    true = true_amplitudes(modes, HARD, take.frames - 1)
+    head = take.head
+    shapes = modes.shapes(head.places)[: len(head.shapes)]
+    for flash in (0, 1, 7, take.motions["truth"].flashes - 1):
+        amplitudes = take.modal_m("truth", flash / FLASH_HZ + 1e-9, 1.0)
+        assert amplitudes is not None
+        picture = head.picture(amplitudes)
+        expected = true[round(flash / FLASH_HZ * RATE_HZ)][: len(shapes)] @ shapes
+        assert picture[head.inside] == pytest.approx(expected, abs=1e-5 * np.abs(true).max())
+        assert (picture[~head.inside] == 0).all()
+
+
+def test_in_slow_motion_each_mode_turns_slowly_and_decays_in_real_time(helper: Executor) -> None:
+    """A quiet drum is linear: each mode is v₀/ω' e^(-σt) sin(ω's t) at the speed s."""
+    take, speed = rendered(request_of(TOM, SOFT), helper), 0.03
+    omega, sigma = np.sqrt(TOM.omega**2 - TOM.sigma**2), TOM.sigma
+    sizes = SOFT.speeds(TOM) / omega
+    for flash in (0, 3, 12, 28):
+        time_s = flash / FLASH_HZ
+        expected = sizes * np.exp(-sigma * time_s) * np.sin(speed * omega * time_s)
+        found = take.modal_m("truth", time_s + 1e-9, speed)
+        assert found == pytest.approx(expected * TOM.scale, abs=0.03 * np.abs(sizes * TOM.scale).max())
+        assert np.square(found - expected * TOM.scale).sum() <= 1e-3 * np.square(sizes * TOM.scale).sum()
+
+
+def test_the_difference_is_that_of_the_motions(helper: Executor) -> None:
+    take = rendered(request_of(TOM), helper)
+    for time_s in (0.01, 0.1, 0.25):
+        parts = [take.modal_m(name, time_s, 1.0) for name in ("model", "truth", "difference")]
+        model, truth, difference = (part for part in parts if part is not None)
+        assert difference == pytest.approx(model - truth, abs=1e-12 * np.abs(truth).max())
+        assert 0 < np.abs(difference).max() < 1e-4 * np.abs(truth).max()
+
+
+def test_any_length_of_blocks_gives_the_same(helper: Executor, monkeypatch: pytest.MonkeyPatch) -> None:
+    one = rendered(request_of(TOM), helper)
+    monkeypatch.setattr(blow_job, "BLOCK_FRAMES", 317)
+    other = rendered(request_of(TOM), helper)
+    for name in ("model", "truth"):
+        assert other.motions[name].ready == one.motions[name].ready == one.motions[name].flashes
+        assert other.motions[name].size_m == pytest.approx(one.motions[name].size_m, abs=1e-12)
+        assert other.modal_m(name, 0.2, 0.01) == pytest.approx(one.modal_m(name, 0.2, 0.01), abs=1e-10)
+        first, second = (take.listened.signals[name].read() for take in (one, other))
+        assert second == pytest.approx(first, rel=1e-5, abs=1e-6)
+    assert other.errors.rel_mse == pytest.approx(one.errors.rel_mse, rel=1e-3)
+
+
+def test_errors_are_those_over_the_surface(helper: Executor) -> None:
+    take = rendered(request_of(TOM), helper)
+    resonator, speeds = TOM.resonator(np.zeros((1, 2))), HARD.speeds(TOM)
+    struck = StruckDrum("tom", TOM.drum, resonator, np.zeros(len(TOM)), speeds, TOM.scale**2, 0.1)
+    expected = motion_errors(struck, {"model": model_player(LOADED.preset.model)}, RATE_HZ, take.frames - 1)
+    assert take.errors.rel_mse == pytest.approx(expected["model"], rel=0.01)
+    curve = take.errors.curves["rmse"][: take.errors.ready]
+    assert take.errors.ready == take.errors.windows > 5
+    assert curve.min() <= np.sqrt(expected["model"]) <= curve.max()
+    assert np.abs(take.errors.curves["level_db"]).max() < 0.01
+
+
+def test_another_direction_changes_the_sound_alone(helper: Executor) -> None:
+    job = BlowJob(request_of(TOM), lambda _: LOADED, Log(), helper)
+    while not job.idle:
+        job.advance()
+    take = job.take
+    assert take is not None
+    before, shown = take.listened, take.motions["truth"].size_m.copy()
+    moved = replace(job.request, ear=Ear((0.1, 0.9)))
+    assert moved.same_motion(job.request)
+    job.ask_again(moved)
+    while not job.idle:
+        job.advance()
+    assert job.take is take
+    assert (take.motions["truth"].size_m == shown).all()
+    true = true_amplitudes(TOM, HARD, take.frames - 1)
+    for column, point in enumerate((0.1, 0.9)):
+        expected = true @ TOM.radiated((2 * point - 1, 0.0))
+        found = take.listened.signals["truth"].read()[:, column]
+        assert found == pytest.approx(expected[: len(found)], abs=1e-4 * np.abs(expected).max())
+    assert take.listened is not before
+
+
+def test_another_blow_is_another_motion() -> None:
+    asked = request_of(TOM)
+    for other in (
+        replace(asked, strike=SOFT),
+        replace(asked, modes=TOM.damped(5.0, 0.0)),
+        replace(asked, seconds=1.0),
+        request_of(PLATE),
+    ):
+        assert not asked.same_motion(other)
+    assert asked.same_motion(replace(asked, modes=TOM.damped(TOM.drum.damping_d1_kg_m2_s, 0.0005)))
+    assert not asked.same_motion(None)
+
+
+def test_the_edge_of_a_head_rests_and_a_bar_moves_alike_across() -> None:
+    for modes in (TOM, PLATE):
+        head = Head.of(modes.surface, (modes.drum.length_m, modes.drum.width_m))
+        picture = head.picture(np.ones(4))
+        rows, columns = picture.shape
+        for edge in (picture[0, columns // 2], picture[-1, columns // 2], picture[rows // 2, 0]):
+            assert abs(edge) < 1e-5 * np.abs(picture).max()
+    bar = Head.of(BAR.surface, (0.3, 0.03)).picture(np.ones(3))
+    assert (bar == bar[:1]).all()
+    assert np.abs(bar).max() > 0.5
+
+
+def test_a_preset_of_one_string_is_refused(helper: Executor) -> None:
+    nylon = Loaded(load_preset(SHIPPED / "studio_nylon_b3.safetensors"))
+    job = BlowJob(request_of(TOM), lambda _: nylon, Log(), helper)
+    with pytest.raises(PresetError, match="many strings"):
+        job.advance()
+
+
+def test_the_worker_renders_blows() -> None:
+    import threading
+
+    done, takes = threading.Event(), []
+
+    class Listener(Log):
+        def blow_finished(self, take: BlowTake) -> None:
+            takes.append(take)
+            done.set()
+
+        def take_started(self, take: object) -> None: ...
+
+        def take_finished(self, take: object, errors: object) -> None: ...
+
+        def other_failed(self, preset: str, message: str) -> None: ...
+
+        def render_failed(self, message: str, detail: str) -> None:
+            raise AssertionError(message + detail)
+
+    worker = RenderWorker(Listener(), lambda _: LOADED)
+    try:
+        worker.submit(request_of(BAR, seconds=0.1))
+        assert done.wait(60)
+    finally:
+        worker.close()
+    (take,) = takes
+    assert take.complete
+    assert take.listened.complete
+    assert np.abs(take.listened.signals["model"].read()).max() > 0
