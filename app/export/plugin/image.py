@@ -37,6 +37,7 @@ MOST_NOTES = 40
 MOST_PARAMETERS, MOST_TARGETS = 64, 8  # of the shell
 MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
 LARGEST_WHOLE = 2**31 - 1
+NOISE_BYTES = 8  # of a frame
 NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
 SOURCE, VOLUME, VALUE, POINT, MACRO, MIX = range(6)  # kinds of the shell's parameters
 SOURCE_ID = "source"
@@ -154,18 +155,29 @@ class Image:
     left_out: tuple[str, ...]
     noise_frames: int = 0
 
+    @property
+    def bytes(self) -> int:
+        """With the noise, which instruments of a bank share."""
+        return len(self.content) + self.noise_frames * NOISE_BYTES
 
-def image_of(patch: Patch, preset: Preset) -> Image:
+
+def image_of(patch: Patch, preset: Preset, levelled: bool = True) -> Image:
     """The image of an instrument.
 
+    Args:
+        levelled: whether keys stay as loud while macros move, for which levels are computed for a second or two.
+
     Raises:
-        ValueError: its model learned one string only, or its tuning is impossible.
+        ValueError: its model learned one string only, its tuning is impossible, or no key sounds.
     """
     drums = isinstance(patch.strings, Drums)
     player = InstrumentPlayer(patch, preset, PREPARED_HZ, {"model": 1.0, "truth": 1.0})
     player.prepare()
     table = player.table
     assert table is not None
+    gains = table.memory[of.TABLE_GAINS : of.TABLE_GAINS + of.KEYS * of.GAINS]
+    if not (gains > 0).any():
+        raise ValueError(f"{patch.name}: no key sounds with {preset.path}; choose another pick-up")
     header = _Header(magic=b"LSPLUGIN", version=1, modes=min(of.MOST_MODES, player.grid_points - 2) + of.MOST_PAIRS)
     struck = dict(drum_keys(patch)) if drums else {}
     if drums:
@@ -193,7 +205,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     ids = tuple(id for id, _ in parameters)
     macros, left_out = _macros(patch, ids)
     header.macros, header.macro_count = put(b"".join(bytes(each) for each in macros)), len(macros)
-    heights = levels(patch, preset.info)
+    heights = levels(patch, preset.info) if levelled else np.zeros((len(patch.macros), STEPS, of.KEYS))
     header.levels, header.level_steps = put(heights.tobytes()) // 8, STEPS
     header.wheel_mix = MIXES.index(patch.mod_wheel) if patch.mod_wheel in MIXES else -1
     header.wheel_goal = wheel_goal(patch) or 0.0

@@ -4,32 +4,20 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import this_target
 from app.export.plugin.image import Image, image_of
-from app.export.plugin.parts import STEPS
 from engine.kernels import cache
-from engine.kernels.playing_layout import KEYS
-from engine.presets import SHIPPED, load_preset
 from tests.app.export.plugin.host import Library
-from tests.app.export.plugin.pieces import BARS, MOVED, NAMES, patch_of
+from tests.app.export.plugin.pieces import BARS, MOVED, NAMES, patch_of, preset_of
 
 
 @pytest.fixture(scope="package")
 def images() -> list[Image]:
-    """Levels at moved macros take a second per instrument: two have them."""
-    found = []
-    for name in NAMES:
-        patch = patch_of(name)
-        with pytest.MonkeyPatch.context() as patched:
-            if name not in (MOVED, BARS):
-                shape = (len(patch.macros), STEPS, KEYS)
-                patched.setattr("app.export.plugin.image.levels", lambda *_, shape=shape: np.zeros(shape))
-            found.append(image_of(patch, load_preset(SHIPPED / f"{patch.preset}.safetensors")))
-    return found
+    """Two of them with levels that follow macros."""
+    return [image_of(patch_of(name), preset_of(name), levelled=name in (MOVED, BARS)) for name in NAMES]
 
 
 @pytest.fixture(scope="package")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,8 +13,9 @@ from app.instrument.offline import render_events
 from app.patches.library import SHIPPED as INSTRUMENTS
 from app.patches.library import read_patch
 from app.patches.patch import Patch
-from engine.presets import SHIPPED, load_preset
+from engine.presets import SHIPPED, Preset, load_preset
 from tests.app.export.plugin.host import Event, Instance, midi, note_off, note_on
+from tests.engine.resonators.test_recorded import recorded
 
 NAMES = (
     "concert_harp",  # rings on; other strings ring with it
@@ -26,15 +28,27 @@ NAMES = (
     "cimbalom",
     "timpani",  # drums
     "thin_bars",  # drums that are bars
+    "learned",  # from a recording
 )
 MOVED, BARS = "classical_guitar", "thin_bars"  # those whose levels follow their macros
+LEARNED = "learned"
 LONG = os.environ.get("LEARNED_STRINGS_FUZZ") == "long"  # by `run.py test --fuzz`
 SECONDS = 1.6
 EQUAL_DB = -140.0
 
 
 def patch_of(name: str) -> Patch:
+    if name == LEARNED:
+        return read_patch(INSTRUMENTS / "falling_nylon.json").model_copy(update={"name": "Learned"})
     return read_patch(INSTRUMENTS / f"{name}.json")
+
+
+def preset_of(name: str) -> Preset:
+    preset = load_preset(SHIPPED / f"{patch_of(name).preset}.safetensors")
+    if name != LEARNED:
+        return preset
+    own = replace(recorded(), smooth_hz=(200.0, 1e3, 5e3), smooth_ratio=(1.5, 2.5, 0.8), pitch_hz=196.0)
+    return replace(preset, info=replace(preset.info, recorded=own))
 
 
 def piece(patch: Patch) -> list[tuple[float, NoteOn | NoteOff | Bend | Controller]]:
@@ -79,7 +93,7 @@ def played(
 def rendered(
     patch: Patch, rate_hz: int, source: str = "model", gain_db: float = 0.0, more: tuple[TimedEvent, ...] = ()
 ) -> NDArray[np.float32]:
-    preset = load_preset(SHIPPED / f"{patch.preset}.safetensors")
+    preset = preset_of(LEARNED if patch.name == "Learned" else "concert_harp")
     timed = [TimedEvent(time_s, event) for time_s, event in piece(patch)] + list(more)
     sound = render_events(patch, preset, timed, rate_hz, source, SECONDS, difference_gain_db=gain_db)
     return np.broadcast_to(np.concatenate(list(sound)), (round(SECONDS * rate_hz), 2))

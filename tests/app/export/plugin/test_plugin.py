@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import TARGETS, this_target
-from app.export.plugin.image import Image
+from app.export.plugin.image import Image, image_of
 from app.export.plugin.objects import object_of
 from app.instrument.events import Controller, PatchTurned, TimedEvent
 from tests.app.export.plugin import host
@@ -22,6 +22,7 @@ from tests.app.export.plugin.host import Event, Instance, Library, choke, midi, 
 from tests.app.export.plugin.pieces import (
     BARS,
     EQUAL_DB,
+    LEARNED,
     LONG,
     MOVED,
     NAMES,
@@ -29,11 +30,15 @@ from tests.app.export.plugin.pieces import (
     patch_of,
     piece,
     played,
+    preset_of,
     rendered,
     to_host,
 )
 
 pytestmark = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang, the extra [plugin]")
+
+
+LARGEST_BYTES = 3_000_000  # the code has a third of a megabyte more
 
 
 def instance_of(bank: Library, name: str, rate_hz: int = 48_000) -> Instance:
@@ -241,6 +246,18 @@ def test_an_lv2_bundle_is_valid(images: list[Image], objects: Path, tmp_path: Pa
         environment = {**os.environ, "LV2_PATH": str(tmp_path)}
         done = subprocess.run(["lv2ls"], env=environment, capture_output=True, text=True, check=True)
         assert done.stdout.split() == [f"urn:{images[0].id}"]
+
+
+def test_an_instrument_that_cannot_sound_is_refused() -> None:
+    sitar = patch_of("sitar")
+    assert sitar.pickup.kind == "bridge"  # whose force a recording does not give
+    with pytest.raises(ValueError, match="no key sounds"):
+        image_of(sitar, preset_of(LEARNED), levelled=False)
+
+
+def test_instruments_with_the_most_modes_and_the_longest_room_are_small() -> None:
+    for name in ("frame_drum", "slow_water"):
+        assert image_of(patch_of(name), preset_of(name), levelled=False).bytes < LARGEST_BYTES
 
 
 def test_targets_are_known_and_an_unknown_one_is_refused(objects: Path) -> None:
