@@ -91,7 +91,7 @@ def test_messages_come_through_jack_and_an_input_closes_while_they_stream(tmp_pa
     if "missing" in found:
         pytest.skip(found["missing"])
     assert found["came"] == [
-        "NoteOn(key=60, velocity=100, channel=2)",
+        "NoteOn(key=60, velocity=100, channel=2, place=None)",
         "Bend(value=-1.0, channel=0)",
         "Controller(number=64, value=127, channel=0)",
         "NoteOff(key=60, channel=2)",

@@ -77,7 +77,7 @@ def test_files_are_taken_at_the_start_and_no_note_of_a_song_is_lost(tmp_path: Pa
     done = start(OPENING, settings, PATCHES / "concert_harp.json", song)
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout.splitlines()[-1])
-    assert found == {"struck": [[50, True], [57, True]], "patch": "Concert harp"}
+    assert found == {"struck": [[50, True], [57, True]], "instrument": "Concert harp"}
 
 
 def start(program: str, settings: Path, *files: Path) -> subprocess.CompletedProcess[str]:
