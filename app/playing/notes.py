@@ -91,6 +91,7 @@ class Notes:
         self._closed = False
         self._wished_plucks: object = None
         self.keys = Keys(sources, self._path_of, lambda: sound.mixer, self.in_background, report, set_effects)
+        self._set_gains_of_keys()
         sound.watch(self._bound_load)
 
     # What is played
@@ -131,7 +132,7 @@ class Notes:
             notes = self._plucks()
             for note in notes:
                 self._apply_monitor(note)
-        self.keys.set_gains({source: monitor.gain(source, SOURCES, None) for source in SOURCES})
+        self._set_gains_of_keys()
         for note in notes:
             if not note.pending and not note.over:
                 self._ask_match(note)
@@ -319,6 +320,10 @@ class Notes:
         self._ahead.close()
 
     # How it is done
+
+    def _set_gains_of_keys(self) -> None:
+        """Sets which sources of keys are heard; both are of one string, whose levels match as they are."""
+        self.keys.set_gains({source: self._monitor.gain(source, SOURCES, None) for source in SOURCES})
 
     def _plucks(self) -> list[Note]:
         """The notes whose voices are made here."""
