@@ -46,10 +46,17 @@ def test_sounds_and_pictures_are_small() -> None:
 
 def commands() -> Iterator[tuple[str, list[str]]]:
     """The command lines of all documents: where, and their words after the program's name."""
+    from app.commands.cli import cli
+
+    known: Any = typer.main.get_command(cli)
     for path in DOCUMENTS:
         for line in path.read_text("utf-8").splitlines():
             if line.startswith("python3 run.py -- "):
                 yield path.name, shlex.split(line.removeprefix("python3 run.py -- "), comments=True)
+            for words in re.findall(r"`([^`]+)`", line):  # within a sentence, the beginning may be left out
+                first, _, others = words.removeprefix("python3 run.py -- ").partition(" ")
+                if others and first in known.commands:
+                    yield path.name, shlex.split(f"{first} {others}")
 
 
 def test_commands_and_their_options_exist() -> None:
@@ -116,6 +123,9 @@ def test_the_model_of_the_worked_example_is_a_linear_string() -> None:
     assert torch.allclose(last, end)
     expected = torch.exp(300 * Physics(resonator, 16_000).log_eigenvalues)
     assert torch.allclose(last / model.encode(start), expected, atol=1e-9)
+    lossless = StringParameters(0.65, 5.188e-07, 1.41e-13, 1140.0, 5.4e9, 0.0, 0.0, 60.97).resonator(10)
+    model.initialise("physics", Physics(lossless, 16_000), torch.Generator().manual_seed(0))
+    assert torch.isfinite(model.nu_log).all(), "of fewer modes, without losses"
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)

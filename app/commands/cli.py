@@ -21,7 +21,6 @@ from app.commands import (
     drums,
     faust,
     info,
-    instruments,
     learn,
     listing,
     motion,
@@ -73,7 +72,7 @@ def start(
 for command in (
     listing.presets,
     listing.models,
-    instruments.instruments,
+    listing.instruments,
     motion.simulate,
     motion.predict,
     render.render,

@@ -1,4 +1,4 @@
-"""presets, models: lists of them."""
+"""presets, models, instruments: lists of them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from training.cli.arguments import Json
 from training.cli.console import print_json, print_table, say
 
 if TYPE_CHECKING:
+    from collections.abc import Container
     from pathlib import Path
 
     from training.heard_file import Heard
@@ -51,11 +52,28 @@ def models(json: Json = False) -> None:
     _show(found, json)
 
 
-def _show(found: list[dict[str, Any]], json: bool) -> None:
+def instruments(json: Json = False) -> None:
+    """List the instruments, factory and your own. Files that cannot be used are reported on standard error."""
+    from app.patches.library import list_patches
+
+    entries, problems = list_patches()
+    for problem in problems:
+        say(problem)
+    found = []
+    for entry in entries:
+        patch = entry.patch
+        facts = {"name": entry.name, "title": patch.name, "category": patch.category, "own": entry.own}
+        found.append({**facts, "description": patch.description, "file": str(entry.path)})
+    _show(found, json, but=("own", "file"))
+
+
+def _show(found: list[dict[str, Any]], json: bool, but: Container[str] = ()) -> None:
+    """Prints facts as JSON, or as a table without the columns `but`."""
     if json:
         print_json(found)
     elif found:
-        print_table(list(found[0]), [list(facts.values()) for facts in found])
+        columns = [name for name in found[0] if name not in but]
+        print_table(columns, [[facts[name] for name in columns] for facts in found])
 
 
 def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:

@@ -36,7 +36,8 @@ def play(
 
     The same files give the same samples. Drums (channel 10) are left out, except with an instrument for MPE.
     """
-    from app.export.files import LONGEST_S, RATE_RANGE_HZ
+    from app.export.sound import LONGEST_S
+    from app.export.wav import RATE_RANGE_HZ
 
     arguments.check_suffix("--out", out, ".wav")
     arguments.check_range("--rate", rate, *RATE_RANGE_HZ, "Hz")

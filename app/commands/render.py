@@ -13,7 +13,8 @@ from training.cli import arguments
 from training.cli.console import Failure, progress, say
 
 if TYPE_CHECKING:
-    from app.export.files import SoundRequest, WavReport
+    from app.export.files import WavReport
+    from app.export.sound import SoundRequest
     from app.export.wav import WavSettings
     from engine.presets import Preset
 
@@ -110,7 +111,8 @@ def render(
     seconds = _given("--seconds", seconds)
     pluck = options.check_pluck(position, amplitude_mm, shape, width)
     check_sound(seconds, rate, listen, listen_right, difference_gain_db, decay_db)
-    from app.export.files import SoundRequest, WavSettings
+    from app.export.sound import SoundRequest
+    from app.export.wav import WavSettings
 
     loaded = arguments.open_preset_to_render(preset, string, rate, modes)
     check_shortest(loaded, seconds)
@@ -132,8 +134,8 @@ def check_sound(
     decay_db: float | None,
 ) -> None:
     """Checks the ranges of the options that `render` and `batch` share. Raises as `arguments.check_range`."""
-    from app.export.files import LONGEST_S, RATE_RANGE_HZ
-    from app.export.sound import DECAY_RANGE_DB
+    from app.export.sound import DECAY_RANGE_DB, LONGEST_S
+    from app.export.wav import RATE_RANGE_HZ
 
     arguments.check_range("--seconds", seconds, 0, LONGEST_S, "s")
     options.check(listen=listen, listen_right=listen_right, difference_gain_db=difference_gain_db)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from app.export.batch_index import INDEX, BatchIndex, BatchRow
-from app.export.files import ExportError, default_file_name, export_sounds, settings_of
+from app.export.files import default_file_name, export_sounds, settings_of
 from app.export.recipe import Recipe, RecipeError, read_recipe
 from app.export.recording import blocks
 from app.export.sound import SoundRequest, Voices
@@ -22,8 +22,9 @@ from app.export.wav import WavSettings
 from app.shared.vocabulary import Pickup, Source
 from app.shared.worker import Progress
 from engine.pluck import Pluck
-from engine.presets import Preset, load_preset, of_string, outside_training
+from engine.presets import Preset, PresetError, load_preset, of_string, outside_training
 from engine.resonators.string import StringParameters
+from engine.result_file import WriteError
 from engine.sources import Runaway
 
 
@@ -145,12 +146,12 @@ def run_batch(plan: BatchPlan, progress: Progress = lambda *_: None) -> list[Bat
 
     Raises:
         Cancelled: `progress` raised it; whole files and their rows stay.
-        ExportError: the folder or the index cannot be written.
+        WriteError: the folder or the index cannot be written.
     """
     try:
         plan.folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise ExportError(f"{plan.folder}: cannot be made ({error.strerror}); choose another folder") from error
+        raise WriteError(f"{plan.folder}: cannot be made ({error.strerror}); choose another folder") from error
     index = BatchIndex(plan.folder / INDEX)
     instruments, plucks = list(plan.instruments()), list(plan.plucks())
     rows: list[BatchRow] = []
@@ -222,7 +223,7 @@ def _rendered(
         if "truth" not in blank:
             return failed
         return [*failed, *_rendered(plan, instrument, preset, pluck, ["truth"], progress)]
-    except ExportError as error:
+    except (PresetError, WriteError) as error:
         return [replace(row, message=str(error)) for row in blank.values()]
     words = outside_training(preset.info, pluck) if preset.info.family else []
     warning = f"warning: {instrument.name}: {'; '.join(words)}" if words else ""
@@ -281,6 +282,3 @@ def _row(
         message=message,
         string=instrument.string.name if instrument.string else "",
     )
-
-
-__all__ = ["INDEX", "BatchPlan", "BatchRow", "NamedString", "run_batch"]

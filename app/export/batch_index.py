@@ -9,9 +9,8 @@ from typing import Literal
 
 from filelock import FileLock
 
-from app.export.files import ExportError
 from engine import bounds
-from engine.result_file import explain
+from engine.result_file import WriteError, explain
 from engine.schema import SchemaError
 from engine.table import read_table, write_table
 
@@ -51,7 +50,7 @@ class BatchIndex:
     """The CSV file; `rows`, by file name, has those of earlier batches in the same folder too.
 
     Raises:
-        ExportError: a table that is no index has its name, or it cannot be read.
+        WriteError: a table that is no index has its name, or it cannot be read.
     """
 
     def __init__(self, path: Path) -> None:
@@ -64,7 +63,7 @@ class BatchIndex:
         What failed does not replace the row of a file that is still there.
 
         Raises:
-            ExportError: the file cannot be written.
+            WriteError: the file cannot be written.
         """
         if not rows:
             return
@@ -74,7 +73,7 @@ class BatchIndex:
                 self.rows |= {row.file: row for row in rows if row.status != "failed" or not self._have(row.file)}
                 write_table(self._path, BatchRow, self.rows.values())
         except OSError as error:
-            raise ExportError(explain(self._path, error)) from error
+            raise WriteError(explain(self._path, error)) from error
 
     def _have(self, file: str) -> bool:
         row = self.rows.get(file)
@@ -85,14 +84,14 @@ def read_rows(path: Path) -> dict[str, BatchRow]:
     """By file name, without damaged lines; empty where there is no index.
 
     Raises:
-        ExportError: it is another table, or cannot be read.
+        WriteError: it is another table, or cannot be read.
     """
     try:
         rows = list(read_table(BatchRow, path, "index of a batch", bounds.LARGEST_TABLE_BYTES))
     except FileNotFoundError:
         return {}
     except SchemaError as error:
-        raise ExportError(f"{path}: is there already, and no index of a batch; choose another folder") from error
+        raise WriteError(f"{path}: is there already, and no index of a batch; choose another folder") from error
     except OSError as error:
-        raise ExportError(explain(path, error)) from error
+        raise WriteError(explain(path, error)) from error
     return {row.file: row for row in rows if isinstance(row, BatchRow)}

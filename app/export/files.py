@@ -17,30 +17,21 @@ from typing import BinaryIO
 from app.export.recipe import Recipe
 from app.export.recording import Sound
 from app.export.sound import (
-    LONGEST_S,
-    SOURCES,
     Mixed,
     SoundRequest,
     Source,
     Voices,
-    render_sound,
     render_voices,
 )
-from app.export.wav import RATE_RANGE_HZ, Level, WavSettings, write_wav
+from app.export.wav import Level, WavSettings, write_wav
 from app.shared.version import PROGRAM, program_version
-from app.shared.vocabulary import BITS, Bits
 from app.shared.worker import Progress
 from engine.pluck import Pluck
-from engine.presets import PresetError
 from engine.result_file import WriteError, explain, whole_file
 
 END_OF_TRAINING = "end of training"  # the name of the marker at the training horizon
 LONGEST_NAME = 150  # characters of a preset's name in a file's name
 DECAY_FADE_S = 0.05  # the fade-out where a sound ends by its decay
-
-
-class ExportError(Exception):
-    """An export failed. The message names the path, what happened and the remedy. No file is left."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +71,8 @@ def export_sound(
     """Renders and writes a WAV file, whole or not at all.
 
     Raises:
-        ExportError: the file cannot be written, or the preset's file cannot be read any more.
+        WriteError: the file cannot be written.
+        PresetError: the preset's file cannot be read any more.
         Cancelled: `progress` raised it; no file is left.
         Runaway: the model's output grew without bound or is not finite.
     """
@@ -117,10 +109,7 @@ def export_sounds(
     request = next(iter(requests.values()))
     info = request.preset.info
     with ExitStack() as files:
-        try:
-            recipes = {source: Recipe.of(one, settings) for source, one in requests.items()}
-        except PresetError as error:
-            raise ExportError(str(error)) from error
+        recipes = {source: Recipe.of(one, settings) for source, one in requests.items()}
         # opened first, so that a folder that cannot be written to fails before the work
         opened = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
         rate_hz = settings.rate_hz or info.rate_hz
@@ -128,7 +117,7 @@ def export_sounds(
             both = measured or settings.normalise
             voices = render_voices(request, paths, rate_hz, all_voices=both, progress=progress)
         except OSError as error:  # the recordings lie in temporary files
-            raise ExportError(explain(Path(tempfile.gettempdir()), error)) from error
+            raise WriteError(explain(Path(tempfile.gettempdir()), error)) from error
         sounds = {source: Mixed(voices, source, request.difference_gain_db) for source in paths}
         # of each file the gain follows from its own recipe, whatever else is written beside it
         beside: list[Sound] = list(voices.sounds.values()) if settings.normalise else []
@@ -185,30 +174,9 @@ def _report(path: Path, file: BinaryIO, frames: int, rate_hz: int, level: Level)
 def _explained(path: Path) -> Iterator[None]:
     try:
         yield
-    except WriteError as error:
-        raise ExportError(str(error)) from error
     except OSError as error:
-        raise ExportError(explain(path, error)) from error
+        raise WriteError(explain(path, error)) from error
     except ValueError as error:
-        raise ExportError(f"{path}: {error}") from error
+        raise WriteError(f"{path}: {error}") from error
     except MemoryError as error:
-        raise ExportError(f"{path}: the sound does not fit in memory; choose a shorter duration") from error
-
-
-__all__ = [
-    "BITS",
-    "LONGEST_S",
-    "RATE_RANGE_HZ",
-    "SOURCES",
-    "Bits",
-    "ExportError",
-    "SoundRequest",
-    "Source",
-    "WavReport",
-    "WavSettings",
-    "default_file_name",
-    "export_sound",
-    "export_sounds",
-    "render_sound",
-    "settings_of",
-]
+        raise WriteError(f"{path}: the sound does not fit in memory; choose a shorter duration") from error

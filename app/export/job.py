@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
-from app.export.files import ExportError
 from app.export.recipe import RecipeError
 from app.shared.worker import Progress
 from engine.presets import PresetError
 from engine.result_file import WriteError
 from engine.sources import Runaway
 
-EXPECTED = (ExportError, PresetError, RecipeError, Runaway, WriteError, ValueError)  # their messages are for the user
+EXPECTED = (PresetError, RecipeError, Runaway, WriteError, ValueError)  # their messages are for the user
 
 
 class ExportJob(Protocol):
@@ -31,4 +30,4 @@ class ExportJob(Protocol):
         """
 
     def cancelled(self) -> str:
-        """What is there after it was cancelled, in words. Raises ExportError: what is there is damaged."""
+        """What is there after it was cancelled, in words. Raises WriteError: what is there is damaged."""

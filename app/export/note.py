@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.export.choices import Chosen, ExportChoices
-from app.export.files import SoundRequest, WavReport, export_sounds
-from app.export.sound import Through
+from app.export.files import WavReport, export_sounds
+from app.export.sound import SoundRequest, Through
 from app.shared.key_names import note_name
 from app.shared.vocabulary import Pickup, PlayedSource, Source
 from app.shared.worker import Progress

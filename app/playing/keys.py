@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.instrument.compiled import InstrumentPlayer, is_another
+from app.instrument.drum_keys import DrumKeys
 from app.instrument.effects import body_problem, effects_of
 from app.instrument.events import Controller, Event, NoteOn, PatchTurned, moves_effects
 from app.patches.drums import Drums
@@ -279,7 +280,10 @@ class Keys:
     def _bring(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
         """Lets keys play what is wanted, unless something else is by now. `nearly`: as of `loud_keys`."""
         try:
-            made = player.tabled(player.loud_keys(wanted.patch, wanted.ear, nearly))
+            keys = player.loud_keys(wanted.patch, wanted.ear, nearly)
+            if isinstance(keys, DrumKeys) and not self._all_computed(keys):
+                return
+            made = player.tabled(keys)
         except ValueError as error:
             with self._lock:
                 if wanted is self._wanted:  # what is played stays
@@ -293,6 +297,16 @@ class Keys:
                 if turned:
                     self.recorder.take(_turned(player))
 
+    def _all_computed(self, keys: DrumKeys) -> bool:
+        """Computes a patch's drums, which takes up to seconds; False: another patch is wanted by now."""
+        low, high = keys.patch.range
+        for key in range(low, high + 1):
+            if self._wanted is None or self._wanted.patch is not keys.patch:
+                return False
+            with contextlib.suppress(ValueError):  # raised again when it is struck
+                keys.of_key(key)
+        return True
+
     def _begin(self, wanted: _Wanted) -> None:
         """Loads the preset of what is wanted."""
         patch, path = wanted.patch, self._find(wanted.patch.preset)
@@ -301,7 +315,10 @@ class Keys:
             return
         try:
             preset, rate_hz = self._sources.load(path).preset, self._mixer().rate_hz
-            player = InstrumentPlayer(patch, preset, rate_hz, self._gains, wanted.ear)
+            drums = DrumKeys(patch, wanted.ear) if isinstance(patch.strings, Drums) else None
+            if drums is not None and not self._all_computed(drums):
+                return
+            player = InstrumentPlayer(patch, preset, rate_hz, self._gains, wanted.ear, keys=drums)
         except (ValueError, PresetError) as error:
             self._report(str(error), "")
             return

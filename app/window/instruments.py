@@ -119,11 +119,13 @@ class Instruments(QObject):
     @property
     def drum_key(self) -> int | None:
         """The key of the drum that is shown and struck: the latest, or the lowest; None: no drum is played."""
-        drums = self._session.choices.drums
-        if drums is None:
+        drums, patch = self._session.choices.drums, self._session.choices.patch
+        if drums is None or patch is None:
             return None
-        latest = None if self.latest_key is None else self.latest_key[0]
-        return latest if latest is not None and drums.of_key(latest) is not None else drums.drums[0].note
+        (low, high), latest = patch.range, -1 if self.latest_key is None else self.latest_key[0]
+        if low <= latest <= high and drums.of_key(latest) is not None:
+            return latest
+        return min(max(drums.drums[0].note, low), high)
 
     def strike(self, x: float | None = None, y: float | None = None, velocity: float | None = None) -> None:
         """Strikes the drum that is shown.

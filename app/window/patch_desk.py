@@ -525,10 +525,9 @@ class PatchDesk(QObject):
         self._show_string(patch)
         panel.set_range(*patch.range)
         strings = patch.strings
+        panel.set_drums(isinstance(strings, Drums))
         if isinstance(strings, StringSet):
             panel.neck.set_strings([(note_name(each.note), each.note) for each in strings.strings])
-        elif isinstance(strings, Drums):
-            panel.neck.set_strings([(each.name, each.note) for each in strings.drums])
         else:
             panel.neck.set_strings([(note_name(patch.range[0]), patch.range[0])])
         self.desk.show_chosen()

@@ -35,7 +35,14 @@ OF_MANY_STRINGS = frozenset({"koopman_tension"})  # take any resonator
 
 # sizes of earlier versions, and the only value that they ever had in a model that was kept
 RETIRED: dict[str, dict[str, Any]] = {
-    "koopman_integrated": {"multiplier_widths": [], "decoder_widths": [], "rate_unit": 1e-3, "gain_limit_db": 6.0}
+    "koopman_integrated": {
+        "multiplier_widths": [],
+        "decoder_widths": [],
+        "rate_unit": 1e-3,
+        "gain_limit_db": 6.0,
+        "modulation": True,
+        "physical_units": True,
+    }
 }
 
 

@@ -85,13 +85,8 @@ class IntegratedPhaseConfiguration:
         state_size: number n of complex eigenvalues: one for each mode, or more to spare.
         encoder_widths: hidden widths of the MLP that is added to the linear encoder.
         eigenvalue_widths: hidden widths of g.
-        modulation: whether there are M_in and M_out. Evaluated at every frame.
-        adiabatic: whether f follows the mean tension to all orders and there are A_in and A_out, too, which need
-            the modulation.
+        adiabatic: whether f follows the mean tension to all orders and there are A_in and A_out.
         node_spacing: samples between the nodes of the integral of g; energies hardly change in between.
-        physical_units: K, g and M receive the tension that each mode adds, as a share of that at rest, instead of
-            the energies, and yield shares of each mode's frequency: numbers of the order of 1 for every mode,
-            which an optimiser and a network need. A start from the physics fills the units in.
         second_order: whether g counts by Σ E_m.
     """
 
@@ -99,16 +94,12 @@ class IntegratedPhaseConfiguration:
     state_size: int = 25
     encoder_widths: tuple[int, ...] = (128, 128)
     eigenvalue_widths: tuple[int, ...] = (128, 128)
-    modulation: bool = False
     adiabatic: bool = False
     node_spacing: int = 40
-    physical_units: bool = False
     second_order: bool = False
 
     def __post_init__(self) -> None:
         check_sizes(self, "grid_points", "state_size", "encoder_widths", "eigenvalue_widths", "node_spacing")
-        if self.adiabatic and not self.modulation:
-            raise ValueError("adiabatic needs modulation = true")
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,10 @@ coordinates (a near-identity transform):
 
 with real matrices on [Re z², Im z²] that yield log gain (bounded as above) and phase.
 
+Units. K, g and M receive the tension that each mode adds, as a share of that at rest, and yield shares of each mode's
+frequency: numbers of the order of 1 for every mode, which an optimiser and a network need. A start from the physics
+fills the units in.
+
 Adiabatic change. The mean tension raises ω_n² by 2 ω_n κ_n, so that f has ω√(1 + 2κ/ω) - ω in place of κ, which
 matters where the tension doubles. And what a falling tension leaves alone is a mode's action, ω q²: as the pitch
 falls the amplitude gains. So |z| may be the action's root, which decays by σ alone, for then E(s) above is right long
@@ -73,7 +77,6 @@ GAIN_LIMIT = 6.0 * math.log(10) / 20  # b in nepers: the largest change of level
 RATE_UNIT = 1e-3  # of K E and of g in rad and nepers a sample: a weight of 1 turns a phase by 1 rad in a horizon
 SEGMENT = 8  # samples at most between the times at which a render computes gain and phase again
 SETTLED = 16  # node spacings after which the segments of a sample may be as long as those
-MODULATION_UNIT = 1e-3  # of M: with it a weight of 1 suits an optimiser's usual steps
 SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
 NUMBERS_AT_ONCE = 2**17  # frames times latents in a block of a long advance: what suits a processor's cache
 
@@ -147,15 +150,14 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         self.nu_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))
         self.theta_log = nn.Parameter(torch.zeros(n, dtype=torch.float64))
         self.K = nn.Parameter(torch.zeros(2 * n, n))  # real parts first
-        self.energy_units: Tensor | None
-        self.rate_units: Tensor | None
-        units = [torch.full((n,), unit, dtype=torch.float64) for unit in (1.0, RATE_UNIT)]
-        self.register_buffer("energy_units", units[0] if c.physical_units else None)  # 1/(normalised displacement)²
-        self.register_buffer("rate_units", units[1] if c.physical_units else None)  # 1/samples
+        self.energy_units: Tensor  # 1/(normalised displacement)²
+        self.rate_units: Tensor  # 1/samples
+        for name, unit in (("energy_units", 1.0), ("rate_units", RATE_UNIT)):
+            self.register_buffer(name, torch.full((n,), unit, dtype=torch.float64))
         self.g = _mlp(n, c.eigenvalue_widths, 2 * n, last_bias=False)  # g(0) is subtracted: it would cancel
         self.decoder = nn.Linear(2 * n, c.grid_points)
-        self.M_in = nn.Parameter(torch.zeros(2 * n, 2 * n)) if c.modulation else None  # real parts first
-        self.M_out = nn.Parameter(torch.zeros(2 * n, 2 * n)) if c.modulation else None
+        self.M_in = nn.Parameter(torch.zeros(2 * n, 2 * n))  # real parts first
+        self.M_out = nn.Parameter(torch.zeros(2 * n, 2 * n))
         self.A_in = nn.Parameter(torch.zeros(n, n)) if c.adiabatic else None
         self.A_out = nn.Parameter(torch.zeros(n, n)) if c.adiabatic else None
 
@@ -163,9 +165,8 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         z = self.encoder(displacement)
         if self.encoder_residual is not None:
             z = z + self.encoder_residual(displacement)
-        if self.M_in is not None:
-            real, imag = z.chunk(2, dim=-1)
-            z = torch.cat(self._modulate(self.M_in, self.A_in, real, imag, slice(None)), dim=-1)
+        real, imag = z.chunk(2, dim=-1)
+        z = torch.cat(self._modulate(self.M_in, self.A_in, real, imag, slice(None)), dim=-1)
         return _at_rest(pack(z))
 
     def advance(
@@ -213,10 +214,8 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
     def _rates(self) -> _Rates:
         # below, σ is as good as none, and one of zero would be divided by; above, all is over within a sample
         sigma = self.nu_log.exp().clamp(1e-9, 1e3)
-        coupling = self.K.double().T
-        if self.energy_units is not None:
-            coupling = coupling * self.energy_units[:, None]
-        return _Rates(sigma, self.theta_log.exp(), coupling * self._rate_units)
+        coupling = self.K.double().T * self.energy_units[:, None] * self._rate_units
+        return _Rates(sigma, self.theta_log.exp(), coupling)
 
     def _render(
         self, state: IntegratedPhaseState, rates: _Rates, count: int, readout: Tensor | None
@@ -333,7 +332,7 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         """f(E) - K E of energies (..., state_size), float64 (..., 2 state_size)."""
         f = energies.new_zeros(*energies.shape[:-1], 2 * len(rates.omega))
         if self.g is not None:
-            told = energies if self.energy_units is None else energies * self.energy_units
+            told = energies * self.energy_units
             dtype = self.K.dtype
             network = self.g(told.to(dtype)) - self.g(told.new_zeros(told.shape[-1], dtype=dtype))
             f = network.double() * self._rate_units
@@ -348,14 +347,11 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
     @property
     def _rate_units(self) -> Tensor:
         """Of f, in radians and nepers a sample, float64 (2 state_size,)."""
-        if self.rate_units is None:
-            return self.nu_log.new_full((2 * self.configuration.state_size,), RATE_UNIT, dtype=torch.float64)
         return self.rate_units.repeat(2)
 
     def _displacement(self, real: Tensor, imag: Tensor, readout: Tensor | None, alive: Tensor | slice) -> Tensor:
         """The decoder on both parts of z, of the latents `alive`; a readout is folded into its last layers."""
-        if self.M_out is not None:
-            real, imag = self._modulate(self.M_out, self.A_out, real, imag, alive)
+        real, imag = self._modulate(self.M_out, self.A_out, real, imag, alive)
         weight, bias = read_layer(self.decoder, readout)
         of_real, of_imag = weight.chunk(2, dim=-1)
         found = nn.functional.linear(real, of_real[:, alive], bias)
@@ -380,8 +376,6 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
     @property
     def _modulation_units(self) -> Tensor:
         """Of M, half of them of A: radians and nepers for squares of normalised displacement, (2 state_size,)."""
-        if self.energy_units is None:
-            return self.K.new_full((2 * self.configuration.state_size,), MODULATION_UNIT)
         return self.energy_units.to(self.K.dtype).repeat(2)
 
     @torch.no_grad()
@@ -440,26 +434,22 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         self.encoder.weight[n : n + count] = (starts.imag[:, None] * analysis).to(self.K.dtype)
         self.decoder.weight[:, :count] = modes.shapes.T.to(self.K.dtype)
         coupling = modes.coupling / starts.abs().square()
-        if self.energy_units is not None and self.rate_units is not None:
-            self.rate_units[:count] = omega
-            self.energy_units[:count] = (coupling / omega[:, None]).abs().median(0).values
-            coupling = coupling / self.energy_units[:count]
-        self.K[n : n + count, :count] = (coupling / self._rate_units[:count, None]).to(self.K.dtype)
+        self.rate_units[:count] = omega
+        self.energy_units[:count] = (coupling / omega[:, None]).abs().median(0).values
+        coupling = coupling / self.energy_units[:count] / self._rate_units[:count, None]
+        self.K[n : n + count, :count] = coupling.to(self.K.dtype)
 
     def _initialise_averaging(self, physics: Physics) -> None:
         n, modes = self.configuration.state_size, physics.modes
         mode = torch.arange(n) % modes
         averaged = torch.zeros(2 * n, n, dtype=torch.float64)
         averaged[n:, :modes] = averaged_coupling(physics)[mode]
-        averaged = averaged.T / self._rate_units
-        energy_units = 1.0 if self.energy_units is None else self.energy_units[:, None]
-        self.K.copy_((averaged / energy_units).T)
-        if self.M_in is not None and self.M_out is not None:
-            gain, turn = (matrix[mode] for matrix in averaged_modulation(physics))
-            modulation = torch.zeros(2 * n, 2 * n, dtype=torch.float64)
-            modulation[:n, :modes], modulation[n:, n : n + modes] = gain, turn
-            self.M_out.copy_(modulation / self._modulation_units)
-            self.M_in[:n, :n] = -self.M_out[:n, :n]
+        self.K.copy_((averaged.T / self._rate_units / self.energy_units[:, None]).T)
+        gain, turn = (matrix[mode] for matrix in averaged_modulation(physics))
+        modulation = torch.zeros(2 * n, 2 * n, dtype=torch.float64)
+        modulation[:n, :modes], modulation[n:, n : n + modes] = gain, turn
+        self.M_out.copy_(modulation / self._modulation_units)
+        self.M_in[:n, :n] = -self.M_out[:n, :n]
         if self.A_in is not None and self.A_out is not None:
             self.A_in[:, :modes] = averaged_amplitude(physics)[mode] / self._modulation_units[:modes]
             self.A_out.copy_(-self.A_in)
@@ -469,10 +459,9 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         log_eigenvalues = linear_string_eigenvalues(n, physics, generator)
         store_eigenvalues(self.nu_log, self.theta_log, log_eigenvalues)
         mode = torch.arange(n) % modes
-        if self.energy_units is not None and self.rate_units is not None:
-            unit_m = torch.eye(modes, dtype=torch.float64)[mode] * physics.scale_m
-            self.energy_units.copy_(torch.from_numpy(physics.resonator.relative_tension_rise(unit_m.numpy())))
-            self.rate_units.copy_(torch.from_numpy(physics.resonator.omega / physics.rate_hz)[mode])
+        unit_m = torch.eye(modes, dtype=torch.float64)[mode] * physics.scale_m
+        self.energy_units.copy_(torch.from_numpy(physics.resonator.relative_tension_rise(unit_m.numpy())))
+        self.rate_units.copy_(torch.from_numpy(physics.resonator.omega / physics.rate_hz)[mode])
         analysis = torch.from_numpy(physics.resonator.inverse).T[mode]
         imaginary = eigenvalues.slope_at_rest(log_eigenvalues)[:, None] * analysis
         self.encoder.weight.copy_(torch.cat([analysis, imaginary]))

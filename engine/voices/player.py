@@ -344,8 +344,8 @@ class CompiledPlayer:
             return None
         voices = self._voices(report.note, note)
         counts = [voice.view(np.int64) for voice in voices]
-        frames = max((int(each[at.FRAME]) for each in counts), default=0)
-        began = max((int(each[at.BEGAN_FRAME]) for each in counts), default=0)
+        frames = max((int(whole[at.FRAME]) for whole in counts), default=0)
+        began = max((int(whole[at.BEGAN_FRAME]) for whole in counts), default=0)
         known = began > 0 and bool(voices[0][at.STRUCK_S])
         took_s = float(voices[0][at.BEGAN_S] - voices[0][at.STRUCK_S]) if known else None
         return Playing(frames / self.rate_hz, max(0, began), took_s)

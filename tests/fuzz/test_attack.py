@@ -20,9 +20,9 @@ import torch
 from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.commands.arrays import read_displacements
-from app.export.files import ExportError, SoundRequest
 from app.export.recipe import InstrumentSound, Recipe, RecipeError, read_recipe, request_of
 from app.export.sampled.store import SampleIndex, StoredSample, read_index
+from app.export.sound import SoundRequest
 from app.export.wav import WavSettings
 from app.instrument.bodies import own_bodies
 from app.instrument.events import Bend, Controller, NoteOff, NoteOn, TimedEvent
@@ -45,6 +45,7 @@ from engine.presets import (
     read_string,
 )
 from engine.resonators.sine_transform import project
+from engine.result_file import WriteError
 from engine.schema import SchemaError, write
 from engine.sources import ModelSource, Runaway, TruthSource
 from engine.voices import Ear, model_program, render_voice, truth_program
@@ -341,7 +342,7 @@ TARGETS = (
     Target("u0.npy", lambda p: saved(np.zeros((2, 101))), read_displacements, (Failure,)),
     Target("checkpoint.safetensors", checkpoint, Checkpoint.load, (ValueError,)),
     Target("patch.json", lambda p: PATCH.read_bytes(), read_patch, (PatchError,), json_or_bytes),
-    Target("index.json", sample_index, read_index, (ExportError,), json_or_bytes),
+    Target("index.json", sample_index, read_index, (WriteError,), json_or_bytes),
     Target("song.mid", lambda p: SONG, song, (MidiFileError,)),
     Target("scale.scl", lambda p: SCALE, scala, (ValueError,), scala_or_bytes),
     Target("keys.kbm", lambda p: KEYMAP, scala, (ValueError,), scala_or_bytes),

@@ -18,7 +18,6 @@ from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.commands.arrays import read_displacements
 from app.export.batch_index import read_rows
-from app.export.files import ExportError
 from app.export.recipe import RecipeError, read_recipe
 from app.export.sampled.store import read_index
 from app.instrument.midi_file import MOST_EVENTS, MidiFileError, read_midi
@@ -29,6 +28,7 @@ from app.window.settings import Settings, load_settings, read_settings
 from engine.folders import usable_files
 from engine.presets import PresetError, load_preset, preset_digest, read_string
 from engine.read_file import UnusableFile, read_bounded
+from engine.result_file import WriteError
 from engine.schema import SchemaError, read_toml
 from tests.fuzz.costs import MOST_MB, Costs
 from training.cell import load
@@ -154,9 +154,9 @@ def test_tables_of_nothing(text: str, tmp_path: Path) -> None:
     path = tmp_path / "rows.csv"
     path.write_text(text)
     refused(read_results, path, SchemaError)
-    refused(read_rows, path, ExportError)
+    refused(read_rows, path, WriteError)
     path.write_text("file,status,\n" + text[:-100])
-    refused(read_rows, path, ExportError)
+    refused(read_rows, path, WriteError)
 
 
 def test_an_array_that_is_larger_than_its_file_tells(tmp_path: Path) -> None:

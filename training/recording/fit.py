@@ -134,7 +134,7 @@ def _first_glide(samples: Array, rate: int, hz: Array, edges: Array) -> Glide:
         usable = int(len(z) * len(samples) / size) - 2
         bands.append((float(hz[number]), spacing, (z * middle)[2:usable]))
     loud = sorted(bands, key=lambda band: -float(np.sum(np.abs(band[2]) ** 2)) * band[0])[:12]
-    return glide_of_phases(loud, len(samples) / rate)
+    return glide_of_phases(loud)
 
 
 def _add_pole(fit: Fit, number: int, residual: NDArray[np.complex128]) -> None:

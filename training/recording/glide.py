@@ -70,7 +70,7 @@ def warped(samples: Array, rate_hz: int, glide: Glide) -> tuple[Array, Array]:
     return interpolate.make_interp_spline(grid, samples, k=5)(t), t
 
 
-def glide_of_phases(bands: list[tuple[float, float, NDArray[np.complex128]]], duration_s: float) -> Glide:
+def glide_of_phases(bands: list[tuple[float, float, NDArray[np.complex128]]]) -> Glide:
     """From the phases of partials.
 
     Args:

@@ -24,7 +24,6 @@ PRESENT_DB = 9.0  # above the local floor, for a peak that counts
 FULL_DB = 40.0  # above it a peak counts no more than at it
 MISSING = 0.55  # what a predicted partial costs that is not there, of a strong one
 SPECTRUM_S = 0.7
-LARGEST_STIFF_SHARE = 0.35  # of the last partial's rise over its harmonic
 
 
 @dataclass(frozen=True)

@@ -29,9 +29,7 @@ def averaging(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
         "encoder_widths": (),
         "eigenvalue_widths": (),
         "node_spacing": 160,
-        "modulation": True,
         "adiabatic": True,
-        "physical_units": True,
         "second_order": True,
     }
     return rollout(_started("koopman_integrated", sizes, "averaging", plucked, rate_hz), plucked, steps)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 
 import soundfile
 
-from app.export.files import ExportError
 from app.export.sampled.levels import headroom_db
 from app.export.sampled.plan import NoteRenderer, SampledPlan, SampledSource
 from app.export.sampled.sf2 import check_sf2, write_sf2
@@ -88,7 +87,7 @@ def export_sampled(
     Raises:
         ValueError: see `planned`.
         Cancelled: `progress` raised it; whole samples stay for the next time, without any no folder stays.
-        ExportError: a file cannot be written, or a note not rendered.
+        WriteError: a file cannot be written, or a note not rendered.
     """
     plan = planned(plan, out)
     store = SampleStore(sample_folder(out), out.name)
@@ -109,12 +108,10 @@ def export_sampled(
             size = out.stat().st_size
             if out.suffix.lower() == ".sfz":
                 size += sum(store.path(plan.file_name(zone)).stat().st_size for zone in samples)
-        except WriteError as error:
-            raise ExportError(str(error)) from error
         except OSError as error:
-            raise ExportError(explain(out, error)) from error
+            raise WriteError(explain(out, error)) from error
         except soundfile.LibsndfileError as error:
-            raise ExportError(f"{store.folder}: a sample cannot be read ({error.error_string}); try again") from error
+            raise WriteError(f"{store.folder}: a sample cannot be read ({error.error_string}); try again") from error
     if out.suffix.lower() == ".sf2":
         store.remove()
     cut = sum(sample.cut for sample in samples.values())
@@ -147,7 +144,7 @@ def kept_samples(plan: SampledPlan, out: Path) -> int:
 
     Raises:
         ValueError: see `planned`.
-        ExportError: there is an index that cannot be read.
+        WriteError: there is an index that cannot be read.
     """
     plan = planned(plan, out)
     index = read_index(sample_folder(out) / INDEX)

@@ -14,7 +14,6 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 from pydantic import BaseModel, ConfigDict, Field
 
-from app.export.files import ExportError
 from app.export.sampled.plan import NoteRenderer, SampledPlan, Zone
 from app.export.sampled.sample import INAUDIBLE_DBFS, PEAK_DBFS, encoded, sample_of
 from app.shared.worker import Progress
@@ -70,7 +69,7 @@ class SampleStore:
     """The samples of one instrument file, in a folder of their own beside it.
 
     Raises:
-        ExportError: the folder cannot be made, or holds something else.
+        WriteError: the folder cannot be made, or holds something else.
     """
 
     def __init__(self, folder: Path, instrument: str) -> None:
@@ -79,26 +78,26 @@ class SampleStore:
             folder.mkdir(parents=True, exist_ok=True)
             others = any(not path.name.startswith(".") for path in folder.iterdir())  # a lock, or a file cut short
         except OSError as error:
-            raise ExportError(explain(folder, error)) from error
+            raise WriteError(explain(folder, error)) from error
         found = read_index(folder / INDEX)
         if found is None and others:
-            raise ExportError(f"{folder}: holds other files; remove it, or choose another name for {instrument}")
+            raise WriteError(f"{folder}: holds other files; remove it, or choose another name for {instrument}")
         if found is not None and found.instrument != instrument:
-            raise ExportError(
+            raise WriteError(
                 f"{folder}: holds the samples of {one_line(found.instrument)}; choose another name for {instrument}"
             )
         self._index = found or SampleIndex(instrument=instrument)
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """Within, no other export writes here. Raises ExportError where one does."""
+        """Within, no other export writes here. Raises WriteError where one does."""
         lock = FileLock(self.folder / LOCK, timeout=0)
         try:
             lock.acquire()
         except Timeout:
-            raise ExportError(f"{self.folder}: another export writes there; wait for its end") from None
+            raise WriteError(f"{self.folder}: another export writes there; wait for its end") from None
         except OSError as error:
-            raise ExportError(explain(self.folder, error)) from error
+            raise WriteError(explain(self.folder, error)) from error
         try:
             yield
         finally:
@@ -121,7 +120,7 @@ class SampleStore:
 
         Raises:
             Cancelled: `progress` raised it; whole files and the index stay.
-            ExportError: a file cannot be written, or a note is not finite.
+            WriteError: a file cannot be written, or a note is not finite.
         """
         self._write_index()  # before any sample: it says whose they are
         wanted = []
@@ -143,7 +142,7 @@ class SampleStore:
 
     def remove(self) -> None:
         """Deletes the samples and the index, and the folder if nothing else is in it; errors are ignored."""
-        with contextlib.suppress(OSError, ExportError):
+        with contextlib.suppress(OSError, WriteError):
             self._remove_all_but(set())
             (self.folder / INDEX).unlink(missing_ok=True)
             (self.folder / LOCK).unlink(missing_ok=True)
@@ -166,7 +165,7 @@ class SampleStore:
             note = (plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
             sample = sample_of(render(*note, advanced=lambda seconds: check()), plan.rate_hz)
         except ValueError as error:
-            raise ExportError(f"{self.path(name)}: {error}") from error
+            raise WriteError(f"{self.path(name)}: {error}") from error
         data = encoded(sample, plan.rate_hz, plan.format, plan.bits)
         self._index.samples.pop(name, None)
         self._write(name, data)
@@ -187,7 +186,7 @@ class SampleStore:
             try:
                 self.path(name).unlink(missing_ok=True)
             except OSError as error:  # a sampler has it open
-                raise ExportError(explain(self.path(name), error)) from error
+                raise WriteError(explain(self.path(name), error)) from error
         if left:
             self._index.samples = {n: entry for n, entry in self._index.samples.items() if n in names}
             self._write_index()
@@ -197,18 +196,15 @@ class SampleStore:
         self._write(INDEX, self._index.model_dump_json(indent=1).encode())
 
     def _write(self, name: str, data: bytes) -> None:
-        try:
-            with whole_file(self.path(name)) as file:
-                file.write(data)
-        except WriteError as error:
-            raise ExportError(str(error)) from error
+        with whole_file(self.path(name)) as file:
+            file.write(data)
 
 
 def read_index(path: Path) -> SampleIndex | None:
     """The index; None where there is no file.
 
     Raises:
-        ExportError: there is one that is not the index of samples, or one of another version.
+        WriteError: there is one that is not the index of samples, or one of another version.
     """
     try:
         raw = read_bounded(path, LARGEST_INDEX_BYTES)
@@ -216,10 +212,10 @@ def read_index(path: Path) -> SampleIndex | None:
     except FileNotFoundError:
         return None
     except UnusableFile as error:
-        raise ExportError(f"{path}: {error.strerror}; remove it, or choose another name") from error
+        raise WriteError(f"{path}: {error.strerror}; remove it, or choose another name") from error
     except OSError as error:
-        raise ExportError(explain(path, error)) from error
+        raise WriteError(explain(path, error)) from error
     except (ValueError, OverflowError) as error:
-        raise ExportError(
+        raise WriteError(
             f"{path}: no index of samples that this version reads; remove its folder, or choose another name"
         ) from error

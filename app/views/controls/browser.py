@@ -30,7 +30,7 @@ from PySide6.QtWidgets import (
 
 from app.views.controls.browser_rows import STAR, TITLE, Column, ListedRows, Row, RowsModel
 from app.views.controls.notice_bar import NoticeBar
-from app.views.controls.parts import combo_box, faint, scrolled, tool_button
+from app.views.controls.parts import combo_box, faint, filled, scrolled, tool_button
 from app.views.controls.plain import Label
 
 KEYS = Qt.Key
@@ -159,18 +159,12 @@ class Browser(QFrame):
         close.clicked.connect(self.dismiss)
         folder = tool_button("Open folder", tip=folder_tip)
         folder.clicked.connect(self.folder_asked)
-        head, foot, buttons = QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
-        head.addWidget(self.search, 1)
-        for widget in (*self.filters.values(), self.order, self.starred, close):
-            head.addWidget(widget)
-        foot.addWidget(self.state, 1)
-        foot.addWidget(folder)
-        for button in (self.play_button, self.star, self.rename, self.delete):
-            buttons.addWidget(button)
-        buttons.addStretch(1)
-        aside = QVBoxLayout()
-        aside.addWidget(scrolled(self.card), 1)
-        aside.addLayout(buttons)
+        head = filled(QHBoxLayout(), self.search, *self.filters.values(), self.order, self.starred, close)
+        foot = filled(QHBoxLayout(), self.state, folder)
+        buttons = filled(QHBoxLayout(), self.play_button, self.star, self.rename, self.delete, None)
+        aside = filled(QVBoxLayout(), scrolled(self.card), buttons)
+        for layout in (head, foot, aside):
+            layout.setStretch(0, 1)
         hint = f"Type to search   ·   {arrows}   ·   Space plays   ·   Ctrl+D favourite   ·   Enter closes"
         grid = QGridLayout(self)
         grid.setContentsMargins(14, 14, 14, 12)

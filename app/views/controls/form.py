@@ -5,10 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtWidgets import QDoubleSpinBox, QFileDialog, QHBoxLayout, QLabel, QLineEdit, QSpinBox, QWidget
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDoubleSpinBox,
+    QFileDialog,
+    QHBoxLayout,
+    QLabel,
+    QLineEdit,
+    QSpinBox,
+    QWidget,
+)
 
 from app.views import theme
-from app.views.controls.parts import tool_button
+from app.views.controls.parts import filled, tool_button
 from app.views.controls.plain import Label
 
 LABEL_WIDTH = 104
@@ -33,12 +42,17 @@ def form_label(text: str) -> QLabel:
 
 def row_of(*widgets: QWidget) -> QHBoxLayout:
     """Side by side, with empty space at the end."""
-    row = QHBoxLayout()
+    row = filled(QHBoxLayout(), *widgets, None)
     row.setContentsMargins(0, 0, 0, 0)
-    for widget in widgets:
-        row.addWidget(widget)
-    row.addStretch(1)
     return row
+
+
+def check_box(text: str, on: bool, tip: str) -> QCheckBox:
+    box = QCheckBox(text)
+    box.setChecked(on)
+    box.setMinimumHeight(28)
+    box.setToolTip(tip)
+    return box
 
 
 def spin_box(

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import TypeVar
 
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QGuiApplication, QKeyEvent
 from PySide6.QtWidgets import (
+    QBoxLayout,
     QComboBox,
     QDialog,
     QFrame,
     QHBoxLayout,
     QLabel,
+    QLayout,
     QPlainTextEdit,
     QPushButton,
     QScrollArea,
@@ -24,6 +27,7 @@ from PySide6.QtWidgets import (
 from app.views.controls.elided_label import ElidedLabel
 from app.views.controls.plain import Label
 
+Box = TypeVar("Box", bound=QBoxLayout)
 ENTER_KEYS = (Qt.Key.Key_Return, Qt.Key.Key_Enter)
 
 
@@ -34,6 +38,25 @@ def tool_button(text: str, name: str = "", tip: str = "") -> QToolButton:
     button.setAccessibleName(name or text)
     button.setToolTip(tip)
     return button
+
+
+def push_button(text: str, tip: str = "") -> QPushButton:
+    """A button that Enter presses only where it has the focus."""
+    button = QPushButton(text, autoDefault=False)
+    button.setToolTip(tip)
+    return button
+
+
+def filled(layout: Box, *parts: QWidget | QLayout | None) -> Box:
+    """The layout, with parts in their order; None is empty space that grows."""
+    for part in parts:
+        if isinstance(part, QWidget):
+            layout.addWidget(part)
+        elif part is None:
+            layout.addStretch(1)
+        else:
+            layout.addLayout(part)
+    return layout
 
 
 def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object = None) -> QComboBox:
@@ -131,11 +154,7 @@ def copy_and_close(dialog: QDialog, text: Callable[[], str], word: str, tip: str
     copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(text()))
     close = QPushButton("Close", default=True)
     close.clicked.connect(dialog.accept)
-    buttons = QHBoxLayout()
-    buttons.addWidget(copy)
-    buttons.addStretch(1)
-    buttons.addWidget(close)
-    return buttons
+    return filled(QHBoxLayout(), copy, None, close)
 
 
 def vertical_rule() -> QFrame:

@@ -18,7 +18,7 @@ from app.shared.parameters import OF_CHOICES
 from app.views import theme
 from app.views.controls.knob import Knob
 from app.views.controls.meter import Meter
-from app.views.controls.parts import tool_button, vertical_rule
+from app.views.controls.parts import filled, tool_button, vertical_rule
 from app.views.controls.plain import Label
 from app.views.controls.shape_box import AT_BRIDGE, NO_WIDTH, pickup_box, shape_box
 from app.views.controls.slot_buttons import SlotButtons
@@ -134,10 +134,7 @@ class TransportBar(QFrame):
         self._play.setToolTip("Pluck the string, or stop (Space)")
         self._play.clicked.connect(self._forget_playing)
         self._play.clicked.connect(self.play_asked)
-        column = QVBoxLayout()
-        column.addWidget(self._play)
-        column.addWidget(self._loop)
-        return column
+        return filled(QVBoxLayout(), self._play, self._loop)
 
     def _build_pickup(self) -> QVBoxLayout:
         self._stereo = tool_button(
@@ -156,10 +153,7 @@ class TransportBar(QFrame):
         )
         self._pickup.activated.connect(lambda row: self.change_asked.emit("pickup", self._pickup.itemData(row)))
         self._stereo.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
-        column = QVBoxLayout()
-        column.addWidget(self._stereo)
-        column.addWidget(self._pickup)
-        return column
+        return filled(QVBoxLayout(), self._stereo, self._pickup)
 
     def _build_shape(self) -> QVBoxLayout:
         self._shape = shape_box()
@@ -178,22 +172,13 @@ class TransportBar(QFrame):
         self._export.setAccessibleName("Export")
         self._export.setToolTip("Save what you hear as a WAV file (Ctrl+E)")
         self._export.clicked.connect(self.export_asked)
-        column = QVBoxLayout()
-        column.addWidget(self.meter)
-        column.addWidget(self._export)
-        return column
+        return filled(QVBoxLayout(), self.meter, self._export)
 
     def _group(self, *parts: QWidget | QLayout) -> QWidget:
         """A rule and parts beside each other, which are shown and hidden together."""
         group = QWidget()
-        row = QHBoxLayout(group)
+        row = filled(QHBoxLayout(group), vertical_rule(), *parts)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(5)
-        row.addWidget(vertical_rule())
-        for part in parts:
-            if isinstance(part, QLayout):
-                row.addLayout(part)
-            else:
-                row.addWidget(part)
         self._groups.append(row)
         return group

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from PySide6.QtWidgets import QDialog, QVBoxLayout, QWidget
 
-from app.views.controls.parts import copy_and_close, read_only_text
+from app.views.controls.parts import copy_and_close, filled, read_only_text
 from app.views.controls.plain import Label
 
 
@@ -18,7 +18,6 @@ class AboutDialog(QDialog):
         self.resize(620, 460)
         heading = Label(title)
         heading.setObjectName("title")
-        column = QVBoxLayout(self)
-        column.addWidget(heading)
-        column.addWidget(read_only_text("About this program", rest.strip()))
-        column.addLayout(copy_and_close(self, lambda: text, "Copy", "Copy this text, for a bug report"))
+        shown = read_only_text("About this program", rest.strip())
+        last = copy_and_close(self, lambda: text, "Copy", "Copy this text, for a bug report")
+        filled(QVBoxLayout(self), heading, shown, last)

@@ -8,10 +8,10 @@ from functools import partial
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
-    QCheckBox,
     QFormLayout,
     QHBoxLayout,
     QLabel,
+    QLayout,
     QProgressBar,
     QPushButton,
     QSpinBox,
@@ -21,8 +21,8 @@ from PySide6.QtWidgets import (
 
 from app.analysis.abx.record import MEANING, AbxRecord, p_text
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, AbxChoices, needed_correct
-from app.views.controls.form import count_box, form_label, row_of
-from app.views.controls.parts import label
+from app.views.controls.form import check_box, count_box, form_label, row_of
+from app.views.controls.parts import filled, label, push_button
 from app.views.controls.plain import Label
 
 HEAR = "Listen to X, then answer which one it is."
@@ -45,27 +45,25 @@ class SetupPage(QWidget):
         tip = "Fixed before the start: a test that could stop at any time would prove nothing"
         self.trials: QSpinBox = count_box("Number of trials", MOST_TRIALS, choices.trials, tip)
         self.trials.valueChanged.connect(self._show_trials)
-        self.restart = QCheckBox("Restart from the pluck at each switch")
-        self.restart.setChecked(choices.restart)
-        self.restart.setMinimumHeight(30)
-        self.restart.setToolTip("Otherwise the switch happens at the playhead, with a cross-fade")
+        tip = "Otherwise the switch happens at the playhead, with a cross-fade"
+        self.restart = check_box("Restart from the pluck at each switch", choices.restart, tip)
         self._needed, self._warning = label("faint"), label("warning")
-        self.start = _button("Start the test", "Begin the first trial")
+        self.start = push_button("Start the test", "Begin the first trial")
         self.start.setObjectName("play")
-        self.open_result = _button("Open result …", "Show a result that was saved")
-        self.close_button = _button("Close", "Close the listening test")
+        self.open_result = push_button("Open result …", "Show a result that was saved")
+        self.close_button = push_button("Close", "Close the listening test")
         self._listen = []
         form = QFormLayout()
         for name, text in zip("AB", labels, strict=True):
-            listen = _button(f"▶  Hear {name}", f"Listen to {name} before the test ({name})")
+            listen = push_button(f"▶  Hear {name}", f"Listen to {name} before the test ({name})")
             listen.clicked.connect(lambda _=False, name=name: self.audition_asked.emit(name))
             self._listen.append(listen)
             form.addRow(form_label(name), row_of(listen, Label(text)))
         form.addRow(form_label("Trials"), row_of(self.trials, self._needed))
         form.addRow(form_label("Switch"), self.restart)
         self._needed.setMinimumWidth(320)
-        _stack(self, label(text=RULES), form, label("faint", MEANING), None, self._warning)
-        _buttons(self, self.open_result, None, self.close_button, self.start)
+        buttons = filled(QHBoxLayout(), self.open_result, None, self.close_button, self.start)
+        _stack(self, label(text=RULES), form, label("faint", MEANING), None, self._warning, buttons)
         self._show_trials(choices.trials)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -114,15 +112,17 @@ class TrialPage(QWidget):
         self._bar.setAccessibleName("Trials answered")
         self._hint = _centred()
         texts = {"A": labels[0], "X": "?", "B": labels[1]}
-        self._sounds = {name: self._sound_button(name, text) for name, text in texts.items()}
+        self._sounds = {name: self._soundpush_button(name, text) for name, text in texts.items()}
         self._answers = {
-            "A": _button("←  X is A", "Answer: X is A (1 or ←)"),
-            "B": _button("X is B  →", "Answer: X is B (2 or →)"),
+            "A": push_button("←  X is A", "Answer: X is A (1 or ←)"),
+            "B": push_button("X is B  →", "Answer: X is B (2 or →)"),
         }
         for name, button in self._answers.items():
             button.setMinimumHeight(42)
             button.clicked.connect(lambda _=False, name=name: self.answered.emit(name))
-        self.stop = _button("Stop the test", "An unfinished test is recorded as incomplete, without p-value (Esc)")
+        self.stop = push_button(
+            "Stop the test", "An unfinished test is recorded as incomplete, without p-value (Esc)"
+        )
         for button in (*self._sounds.values(), *self._answers.values(), self.stop):
             button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         keys = _centred()
@@ -131,8 +131,8 @@ class TrialPage(QWidget):
         for row, buttons in ((sounds, self._sounds), (answers, self._answers)):
             for button in buttons.values():
                 row.addWidget(button, 1)
-        _stack(self, self._number, self._bar, None, sounds, self._hint, answers, None, keys)
-        _buttons(self, None, self.stop)
+        last = filled(QHBoxLayout(), None, self.stop)
+        _stack(self, self._number, self._bar, None, sounds, self._hint, answers, None, keys, last)
         self._acts: dict[int, Callable[[], object]] = {
             **{getattr(Qt.Key, f"Key_{name}"): partial(self.audition_asked.emit, name) for name in "ABX"},
             **dict.fromkeys((Qt.Key.Key_1, Qt.Key.Key_Left), self._answers["A"].click),  # nothing while disabled
@@ -140,8 +140,8 @@ class TrialPage(QWidget):
             Qt.Key.Key_Space: self.replay_asked.emit,
         }
 
-    def _sound_button(self, name: str, text: str) -> QPushButton:
-        button = _button(f"{name}\n{text}", f"Hear {name} ({name})")
+    def _soundpush_button(self, name: str, text: str) -> QPushButton:
+        button = push_button(f"{name}\n{text}", f"Hear {name} ({name})")
         button.setObjectName(text.lower() if name != "X" else "")  # its colour in the style sheet
         button.setAccessibleName(f"Hear {name}: {text}" if name != "X" else "Hear X")
         button.setCheckable(True)
@@ -181,11 +181,11 @@ class ResultPage(QWidget):
         self._marks, self._verdict = _centred(), _centred()
         self._marks.setToolTip("The trials in their order: filled where the answer was right")
         self._meaning, self._saved = label("faint", MEANING), label("faint", selectable=True)
-        self.save = _button("Save elsewhere …", "Choose another folder")
-        self.again = _button("New test", "Back to the first page")
-        self.close_button = _button("Close", "Close the listening test")
-        _stack(self, None, self._score, self._marks, self._p, self._verdict, None, self._meaning, self._saved)
-        _buttons(self, None, self.save, self.again, self.close_button)
+        self.save = push_button("Save elsewhere …", "Choose another folder")
+        self.again = push_button("New test", "Back to the first page")
+        self.close_button = push_button("Close", "Close the listening test")
+        last = filled(QHBoxLayout(), None, self.save, self.again, self.close_button)
+        _stack(self, None, self._score, self._marks, self._p, self._verdict, None, self._meaning, self._saved, last)
 
     def show_record(self, record: AbxRecord) -> None:
         answered = len(record.trials)
@@ -206,12 +206,6 @@ class ResultPage(QWidget):
         self.save.setVisible(failed)
 
 
-def _button(text: str, tip: str) -> QPushButton:
-    made = QPushButton(text, autoDefault=False)
-    made.setToolTip(tip)
-    return made
-
-
 def _centred(style: str = "") -> QLabel:
     made = label("" if style else "faint")
     made.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -219,28 +213,7 @@ def _centred(style: str = "") -> QLabel:
     return made
 
 
-def _stack(page: QWidget, *parts: QWidget | QFormLayout | QHBoxLayout | None) -> None:
-    """From top to bottom; None takes the room that is left."""
-    column = QVBoxLayout(page)
+def _stack(page: QWidget, *parts: QWidget | QLayout | None) -> None:
+    column = filled(QVBoxLayout(page), *parts)
     column.setContentsMargins(0, 0, 0, 0)
     column.setSpacing(14)
-    for part in parts:
-        if isinstance(part, QWidget):
-            column.addWidget(part)
-        elif part is None:
-            column.addStretch(1)
-        else:
-            column.addLayout(part)
-
-
-def _buttons(page: QWidget, *buttons: QPushButton | None) -> None:
-    """The page's last row; None takes the room that is left."""
-    row = QHBoxLayout()
-    for button in buttons:
-        if button is None:
-            row.addStretch(1)
-        else:
-            row.addWidget(button)
-    layout = page.layout()
-    assert isinstance(layout, QVBoxLayout)
-    layout.addLayout(row)

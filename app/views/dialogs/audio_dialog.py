@@ -22,7 +22,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.audio.choices import Buffer, DeviceChoice, SoundChoice
-from app.views.controls.parts import combo_box, label
+from app.views.controls.parts import combo_box, filled, label, push_button
 from app.views.controls.plain import Label
 
 RATES = {0: "Device default", 44_100: "44.1 kHz", 48_000: "48 kHz", 96_000: "96 kHz"}
@@ -146,46 +146,28 @@ class AudioDialog(QDialog):
         reset = _button("Reset", "Count dropouts from zero", self.gaps_reset)
         form = QFormLayout()
         form.setLabelAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
-        form.setVerticalSpacing(10)
-        form.addRow("Output", _row(self._device, rescan))
+        form.setSpacing(10)
+        output = filled(QHBoxLayout(), self._device, rescan)
+        output.setStretch(0, 1)
+        form.addRow("Output", output)
         form.addRow("Sample rate", self._rate)
         form.addRow("Buffer", self._buffer)
-        form.addRow("Test tone", _row(*self._tones, None))
-        form.addRow("Dropouts", _row(self._gaps, reset, None))
+        form.addRow("Test tone", filled(QHBoxLayout(), *self._tones, None))
+        form.addRow("Dropouts", filled(QHBoxLayout(), self._gaps, reset, None))
         form.addRow("Load", self._load)
         close = _button("Close", "Close; changes are already applied")
         close.setDefault(True)
         close.clicked.connect(self.accept)
-        column = QVBoxLayout(self)
-        column.setSpacing(14)
-        column.addWidget(self._state_label)
-        column.addWidget(self._problem)
-        column.addLayout(form)
-        column.addWidget(label("faint", ADVICE))
-        column.addStretch(1)
-        column.addLayout(_row(None, close))
+        last, advice = filled(QHBoxLayout(), None, close), label("faint", ADVICE)
+        filled(QVBoxLayout(self), self._state_label, self._problem, form, advice, None, last).setSpacing(14)
 
 
 def _button(text: str, tip: str, signal: object = None) -> QPushButton:
-    button = QPushButton(text)
-    button.setAutoDefault(False)
-    button.setToolTip(tip)
+    button = push_button(text, tip)
     button.setAccessibleName(tip if len(text) < 6 else text)
     if signal is not None:
         button.clicked.connect(signal)
     return button
-
-
-def _row(*widgets: QWidget | None) -> QHBoxLayout:
-    """Side by side; None is empty space that grows."""
-    row = QHBoxLayout()
-    row.setSpacing(8)
-    for widget in widgets:
-        if widget is None:
-            row.addStretch(1)
-        else:
-            row.addWidget(widget, 1 if isinstance(widget, QComboBox) else 0)
-    return row
 
 
 def _set(shown: QLabel, text: str) -> None:

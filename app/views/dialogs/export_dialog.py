@@ -14,11 +14,10 @@ from PySide6.QtGui import QDesktopServices, QKeyEvent
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QPushButton, QTabBar, QVBoxLayout, QWidget
 
 from app.export.choices import ExportChoices
-from app.export.files import ExportError
 from app.export.job import EXPECTED, ExportJob
 from app.export.sampled.choices import SampledChoices
 from app.views.background import Background
-from app.views.controls.parts import label
+from app.views.controls.parts import filled, label
 from app.views.dialogs.export_pages import (
     PAGES,
     ExportPage,
@@ -30,6 +29,7 @@ from app.views.dialogs.export_pages import (
     WavForm,
 )
 from engine.plain_text import duration
+from engine.result_file import WriteError
 
 KINDS = tuple(PAGES)
 SETTLE_MS = 150  # after the last change: a knob that is turned changes the patch at each step
@@ -95,20 +95,9 @@ class ExportDialog(QDialog):
         self.close_button = QPushButton("Close")
         self.close_button.setToolTip("Close, or cancel the rendering (Escape)")
         self.close_button.clicked.connect(self.reject)
-        buttons = QHBoxLayout()
-        buttons.addWidget(self.show_folder)
-        buttons.addStretch(1)
-        buttons.addWidget(self.close_button)
-        buttons.addWidget(self.save)
+        buttons = filled(QHBoxLayout(), self.show_folder, None, self.close_button, self.save)
         self._choosers = (self.tabs, *self.pages.values(), self.wav)
-        column = QVBoxLayout(self)
-        column.setSpacing(12)
-        for part in self._choosers:
-            column.addWidget(part)
-        column.addStretch(1)
-        column.addWidget(self.bar)
-        column.addWidget(self.state)
-        column.addLayout(buttons)
+        filled(QVBoxLayout(self), *self._choosers, None, self.bar, self.state, buttons).setSpacing(12)
         self.bar.hide()
         self.show_folder.hide()
 
@@ -164,7 +153,7 @@ class ExportDialog(QDialog):
         self.show_folder.hide()
         try:
             text, words = self.page.offer()
-        except (ValueError, ExportError) as error:
+        except (ValueError, WriteError) as error:
             self._tell(str(error), failed=True)
             self.save.setEnabled(False)
             return
@@ -223,7 +212,7 @@ class ExportDialog(QDialog):
         assert self._job is not None
         try:
             self._end(f"Cancelled; {self._job.cancelled()}")
-        except ExportError as error:
+        except WriteError as error:
             self._end(str(error), failed=True)
 
     def _end(self, text: str, failed: bool = False) -> None:

@@ -11,7 +11,6 @@ from typing import Any, Literal
 from PySide6.QtCore import QSignalBlocker, Signal, SignalInstance
 from PySide6.QtWidgets import (
     QAbstractButton,
-    QCheckBox,
     QComboBox,
     QDoubleSpinBox,
     QFormLayout,
@@ -21,7 +20,6 @@ from PySide6.QtWidgets import (
 )
 
 from app.export.choices import Chosen, ExportChoices
-from app.export.files import ExportError
 from app.export.job import ExportJob
 from app.export.note import HeardNote, Note, NoteExport
 from app.export.played import Played, PlayedExport, recorded_files
@@ -40,11 +38,11 @@ from app.instrument.events import NoteOn
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits, Source
-from app.views.controls.form import FilePicker, count_box, form_label, row_of, spin_box
+from app.views.controls.form import FilePicker, check_box, count_box, form_label, row_of, spin_box
 from app.views.controls.note_box import NoteBox
 from app.views.controls.parts import combo_box, faint, label
 from engine.presets import PresetError, preset_digest
-from engine.result_file import explain
+from engine.result_file import WriteError, explain
 
 Rows = dict[str, QWidget | QLayout]
 Kind = Literal["note", "performance", "sampler", "plugin"]
@@ -100,10 +98,8 @@ class WavForm(QWidget):
         self.note = faint()
         self.bits = combo_box("Format", [(name, bits) for bits, name in BITS_NAMES.items()], export.bits)
         self.bits.setToolTip("16 bits are dithered; floating point never clips")
-        self.normalise = QCheckBox("Normalise to −1 dBFS, one gain for model and truth")
-        self.normalise.setMinimumHeight(28)
-        self.normalise.setToolTip("Off: as loud as it is played at 0 dB; of a string alone, 10 mm are full scale")
-        self.normalise.setChecked(export.normalise)
+        tip = "Off: as loud as it is played at 0 dB; of a string alone, 10 mm are full scale"
+        self.normalise = check_box("Normalise to −1 dBFS, one gain for model and truth", export.normalise, tip)
         rows: Rows = {
             "Sample rate": row_of(self.rate, self.note),
             "Format": row_of(self.bits),
@@ -142,7 +138,7 @@ class ExportPage(QWidget):
         raise NotImplementedError
 
     def offer(self) -> tuple[str, str]:
-        """The button's text, and a note on what will be written. Raises ValueError, ExportError or OSError."""
+        """The button's text, and a note on what will be written. Raises ValueError, WriteError or OSError."""
         raise NotImplementedError
 
 
@@ -158,10 +154,7 @@ class NotePage(ExportPage):
         self.what = label("faint")
         self.source = combo_box("Source", SOURCE_NAMES, export.source)
         self.source.setToolTip("What to save")
-        self.alone = QCheckBox("String alone")
-        self.alone.setMinimumHeight(28)
-        self.alone.setToolTip("Leaves out level, body and room of the instrument")
-        self.alone.setChecked(export.alone)
+        self.alone = check_box("String alone", export.alone, "Leaves out level, body and room of the instrument")
         limits = 0.1, LONGEST_S
         ends = (("Until it has decayed", True), ("Fixed", False))
         self.length = combo_box("Length", ends, export.until_decayed)
@@ -314,10 +307,8 @@ class SamplerPage(ExportPage):
         self.seconds = spin_box("Longest sample", SECONDS_RANGE, choices.seconds, tip, " s", 1, prefix="at most ")
         self.source = combo_box("Source", [("Model", "model"), ("Truth", "truth")], choices.source)
         self.source.setToolTip("What plays the instrument")
-        self.dry = QCheckBox("Dry: the room is left to the sampler")
-        self.dry.setToolTip("A room in the samples ends with the release of each key")
-        self.dry.setMinimumHeight(28)
-        self.dry.setChecked(choices.dry)
+        tip = "A room in the samples ends with the release of each key"
+        self.dry = check_box("Dry: the room is left to the sampler", choices.dry, tip)
         self.file = FilePicker(choices.folder, "Where the instrument is written")
         self.size_text = label(selectable=True)
         self.size_text.setMinimumHeight(36)  # of two lines
@@ -409,7 +400,7 @@ class SamplerPage(ExportPage):
         try:
             kept, free = kept_samples(plan, out), disk_usage(out.parent).free
         except OSError as error:
-            raise ExportError(explain(out.parent, error)) from error
+            raise WriteError(explain(out.parent, error)) from error
         short = f"; {megabytes(free)} are free there" if needed_bytes(plan, soundfont) > free else ""
         pitch = pitch_words(plan.pitch_error_cents)
         self.size_text.setText(f"{counted(plan)}, {size_words(plan, soundfont)}{short}; {pitch}")

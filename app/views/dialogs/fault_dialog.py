@@ -6,7 +6,7 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QDialog, QVBoxLayout, QWidget
 
-from app.views.controls.parts import copy_and_close, label, read_only_text
+from app.views.controls.parts import copy_and_close, filled, label, read_only_text
 
 MOST_CHARACTERS = 100_000
 
@@ -20,10 +20,8 @@ class FaultDialog(QDialog):
         self.resize(680, 420)
         words = label(text=f"{heading}\n\nPlease copy this and report it. It is also in {log}.", selectable=True)
         self._text = read_only_text("What happened")
-        column = QVBoxLayout(self)
-        column.addWidget(words)
-        column.addWidget(self._text)
-        column.addLayout(copy_and_close(self, lambda: self.text, "Copy", "Copy all of this, for a bug report"))
+        last = copy_and_close(self, lambda: self.text, "Copy", "Copy all of this, for a bug report")
+        filled(QVBoxLayout(self), words, self._text, last)
 
     @property
     def text(self) -> str:

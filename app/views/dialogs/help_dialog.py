@@ -8,6 +8,8 @@ from pathlib import Path
 
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QPushButton, QTabWidget, QTextBrowser, QVBoxLayout, QWidget
 
+from app.views.controls.parts import filled
+
 TEXT = Path(__file__).with_name("help.md")  # a part for each heading of the first level
 
 
@@ -42,12 +44,7 @@ class HelpDialog(QDialog):
         self._add("Errors", f"{parts['Errors']}\n\n`{log}`")
         close = QPushButton("Close", default=True)
         close.clicked.connect(self.accept)
-        buttons = QHBoxLayout()
-        buttons.addStretch(1)
-        buttons.addWidget(close)
-        column = QVBoxLayout(self)
-        column.addWidget(self.tabs)
-        column.addLayout(buttons)
+        filled(QVBoxLayout(self), self.tabs, filled(QHBoxLayout(), None, close))
 
     def _add(self, title: str, markdown: str) -> None:
         page = QTextBrowser()

@@ -30,7 +30,7 @@ from app.playing.pair import Pair
 from app.shared.worker import Job
 from app.views.background import Background
 from app.views.controls.form import form_label, row_of, spin_box
-from app.views.controls.parts import combo_box, label, read_only_text
+from app.views.controls.parts import combo_box, filled, label, read_only_text
 from engine.plain_text import duration
 from engine.presets import PresetError
 from engine.result_file import WriteError
@@ -105,33 +105,19 @@ class LearnDialog(QDialog):
         }
         for name, part in rows.items():
             form.addRow(form_label(name), part)
-        column = QVBoxLayout(question)
+        asked = label(text="String or body?")
+        column = filled(QVBoxLayout(question), asked, self.string, form, self.body, None)
         column.setContentsMargins(0, 0, 0, 0)
-        column.addWidget(label(text="String or body?"))
-        column.addWidget(self.string)
-        column.addLayout(form)
-        column.addWidget(self.body)
-        column.addStretch(1)
         result, sounds = QWidget(), QHBoxLayout()
         for button in self.heard.values():
             button.setCheckable(True)
             button.setToolTip("Both play on, in a loop; the switch is at the same moment")
             sounds.addWidget(button, 1)
-        column = QVBoxLayout(result)
-        column.setContentsMargins(0, 0, 0, 0)
-        column.addLayout(sounds)
-        column.addWidget(self.report)
+        filled(QVBoxLayout(result), sounds, self.report).setContentsMargins(0, 0, 0, 0)
         for page in (question, result):
             self._pages.addWidget(page)
-        buttons = QHBoxLayout()
-        buttons.addStretch(1)
-        buttons.addWidget(self.close_button)
-        buttons.addWidget(self.start)
-        column = QVBoxLayout(self)
-        column.setSpacing(12)
-        for part in (self._pages, self.bar, self.state):
-            column.addWidget(part)
-        column.addLayout(buttons)
+        buttons = filled(QHBoxLayout(), None, self.close_button, self.start)
+        filled(QVBoxLayout(self), self._pages, self.bar, self.state, buttons).setSpacing(12)
         self.bar.hide()
 
     def _connect(self) -> None:

@@ -15,7 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from app.views.controls.parts import combo_box, scrolled
+from app.views.controls.parts import combo_box, faint, label, push_button, scrolled
 from app.views.controls.plain import Label
 
 NOTE_MODES = (
@@ -73,12 +73,7 @@ class MidiDialog(QDialog):
         ):
             box.setToolTip(f"{tip}.\n{OF_THE_PATCH}")
             box.activated.connect(lambda row, box=box, field=field: self.patch_turned.emit(field, box.itemData(row)))
-        self._problem = Label()
-        self._problem.setObjectName("warning")
-        self._problem.setWordWrap(True)
-        self._problem.setTextInteractionFlags(
-            Qt.TextInteractionFlag.TextSelectableByMouse | Qt.TextInteractionFlag.TextSelectableByKeyboard
-        )
+        self._problem = label("warning", selectable=True)
         self._turned = turned
         self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
         form = QFormLayout()
@@ -90,23 +85,19 @@ class MidiDialog(QDialog):
             ("Pitch bend changes", self._bends_by),
             ("Modulation wheel", self._wheel),
         ):
-            label = Label(name)
-            label.setMinimumHeight(box.sizeHint().height())  # so that it is level with its box
-            form.addRow(label, box)
+            title = Label(name)
+            title.setMinimumHeight(box.sizeHint().height())  # so that it is level with its box
+            form.addRow(title, box)
         column = QVBoxLayout(self)
         column.setContentsMargins(18, 16, 18, 16)
         column.setSpacing(12)
         column.addLayout(form)
         column.addWidget(self._problem)
-        heading = Label("CONTROLLERS")
-        heading.setObjectName("faint")
-        column.addWidget(heading)
+        column.addWidget(faint("CONTROLLERS"))
         rows = QWidget()
         rows.setLayout(self._build_rows(turned))
         column.addWidget(scrolled(rows), stretch=1)
-        close = QPushButton("Close")
-        close.setAutoDefault(False)
-        close.setToolTip("Close the dialog; MIDI plays on (Escape)")
+        close = push_button("Close", "Close the dialog; MIDI plays on (Escape)")
         close.clicked.connect(self.reject)
         column.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
         self.set_learnable("")
@@ -115,17 +106,15 @@ class MidiDialog(QDialog):
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
         grid.setVerticalSpacing(6)
-        for row, (field, label) in enumerate(turned.items()):
+        for row, (field, name) in enumerate(turned.items()):
             taught = Label()
-            learn, forget = QPushButton("Learn"), QPushButton("Forget")
+            learn, forget = push_button("Learn"), push_button("Forget", f"Unassign {name}")
             learn.setCheckable(True)
-            learn.setAccessibleName(f"Assign a controller to {label}")
-            forget.setAccessibleName(f"Unassign {label}")
-            forget.setToolTip(f"Unassign {label}")
+            learn.setAccessibleName(f"Assign a controller to {name}")
+            forget.setAccessibleName(f"Unassign {name}")
             for button, asked in ((learn, self.learn_asked), (forget, self.forget_asked)):
-                button.setAutoDefault(False)
                 button.clicked.connect(lambda _=False, asked=asked, field=field: asked.emit(field))
-            for place, widget in enumerate((Label(label[:1].upper() + label[1:]), taught, learn, forget)):
+            for place, widget in enumerate((Label(name[:1].upper() + name[1:]), taught, learn, forget)):
                 grid.addWidget(widget, row, place)
             self._rows[field] = taught, learn, forget
         return grid

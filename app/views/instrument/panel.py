@@ -31,6 +31,7 @@ from app.views.instrument.piano_keys import PianoKeys
 from app.views.instrument.string_knobs import StringKnobs
 
 HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or click the strings"}
+NO_STRINGS = "Drums have no strings to show: keys strike them"
 FOLD_TIP = "Show every knob of the string in place of the macros, or the macros again"
 LOW_TIP = "Show every knob of the string in place of macros and keys, or these again"
 ROOMY = 1320  # pixels: in a narrower window the bar is compact
@@ -67,6 +68,7 @@ class InstrumentPanel(QFrame):
         for played in (self.keys, self.neck):
             played.pressed.connect(self._press)
             played.released.connect(self.released)
+        self._drums = False
         self._choice = Segments("Surface", _SURFACES)
         self._choice.chosen.connect(self.show_surface)
         self._choice.clicked.connect(self._uncover_surface)
@@ -134,9 +136,18 @@ class InstrumentPanel(QFrame):
 
     def show_surface(self, surface: str) -> None:
         self._choice.show_key(surface)
-        self._stack.setCurrentWidget(self.keys if surface == "keys" else self.neck)
-        self._hint.setText(HINTS[surface])
+        shown = "keys" if self._drums else surface
+        self._stack.setCurrentWidget(self.keys if shown == "keys" else self.neck)
+        self._hint.setText(HINTS[shown])
         self._place_hint()
+
+    def set_drums(self, drums: bool) -> None:
+        """For drums, which have no strings to show: their keys are shown, whatever the surface is."""
+        if drums != self._drums:
+            self._drums = drums
+            self._choice.setEnabled(not drums)
+            self._choice.setToolTip(NO_STRINGS if drums else "")
+            self.show_surface(self.surface)
 
     @property
     def unfolded(self) -> bool:

@@ -14,7 +14,8 @@ import soundfile
 
 from app.export import batch, sound
 from app.export.batch import BatchPlan, run_batch
-from app.export.files import SoundRequest, export_sound
+from app.export.files import export_sound
+from app.export.sound import SoundRequest
 from app.shared.worker import Cancelled
 from engine.pluck import Pluck
 from engine.presets import find_string, load_preset

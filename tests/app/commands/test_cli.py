@@ -10,8 +10,8 @@ import pytest
 import typer
 
 from app.commands import cli, render
-from app.export.files import BITS, SOURCES
-from app.shared.vocabulary import PICKUPS
+from app.export.sound import SOURCES
+from app.shared.vocabulary import BITS, PICKUPS
 from training.cli import arguments
 
 ROOT = Path(__file__).parents[3]

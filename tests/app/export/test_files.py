@@ -11,27 +11,24 @@ import numpy as np
 import pytest
 import soundfile
 
-from app.export import files as export
 from app.export import sound
 from app.export.files import (
-    ExportError,
-    SoundRequest,
-    Source,
-    WavSettings,
     default_file_name,
     export_sound,
     export_sounds,
-    render_sound,
 )
 from app.export.recipe import Recipe
-from app.export.sound import Voices
+from app.export.sound import SoundRequest, Voices, render_sound
+from app.export.wav import WavSettings
 from app.export.wav_chunks import Marker
 from app.playing.ahead import AheadVoice
+from app.shared.vocabulary import BITS, Bits, Source
 from app.shared.worker import Cancelled
 from engine.kernels.limiter import AHEAD
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
-from engine.presets import SHIPPED, load_preset
+from engine.presets import SHIPPED, PresetError, load_preset
 from engine.resonators.sine_transform import listening_weights, project
+from engine.result_file import WriteError
 from engine.sources import ModelSource, TruthSource
 from engine.voices import Ear, Mixer, Voice, model_program, offline, truth_program
 from engine.voices.voice import ATTACK_S
@@ -96,8 +93,8 @@ def test_the_difference_is_model_minus_truth(request_: SoundRequest) -> None:
     assert (difference == model - truth).all()
 
 
-@pytest.mark.parametrize("bits", export.BITS)
-def test_a_file_holds_the_sound_and_its_recipe(request_: SoundRequest, bits: export.Bits, tmp_path: Path) -> None:
+@pytest.mark.parametrize("bits", BITS)
+def test_a_file_holds_the_sound_and_its_recipe(request_: SoundRequest, bits: Bits, tmp_path: Path) -> None:
     path = tmp_path / "a.wav"
     settings = WavSettings(bits, fade_out_s=0)
     report = export_sound(request_, path, settings)
@@ -163,7 +160,7 @@ def test_cancelling_leaves_no_file(request_: SoundRequest, tmp_path: Path) -> No
 
 
 def test_a_folder_that_refuses_is_told_before_the_work(request_: SoundRequest, tmp_path: Path) -> None:
-    with pytest.raises(ExportError, match=r"missing.a\.wav: cannot be written .*; make the folder first"):
+    with pytest.raises(WriteError, match=r"missing.a\.wav: cannot be written .*; make the folder first"):
         export_sound(request_, tmp_path / "missing" / "a.wav", progress=lambda *_: pytest.fail("rendered"))
 
 
@@ -177,7 +174,7 @@ def test_a_full_disk_leaves_what_was_there(
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(Path, "replace", full)
-    with pytest.raises(ExportError, match=r"a\.wav: cannot be written .*; free some space"):
+    with pytest.raises(WriteError, match=r"a\.wav: cannot be written .*; free some space"):
         export_sound(request_, path)
     assert path.read_bytes() == b"old"
     assert list(tmp_path.iterdir()) == [path]
@@ -185,7 +182,7 @@ def test_a_full_disk_leaves_what_was_there(
 
 def test_a_preset_that_vanished_is_told(request_: SoundRequest, tmp_path: Path) -> None:
     gone = replace(request_, preset=replace(request_.preset, path=tmp_path / "gone.safetensors"))
-    with pytest.raises(ExportError, match=r"gone\.safetensors: the preset cannot be read any more"):
+    with pytest.raises(PresetError, match=r"gone\.safetensors: the preset cannot be read any more"):
         export_sound(gone, tmp_path / "a.wav")
 
 
@@ -194,7 +191,7 @@ def test_samples_that_are_not_finite_are_refused(
 ) -> None:
     broken = Voices({"model": np.array([[np.inf]])})
     monkeypatch.setattr("app.export.files.render_voices", lambda *_, **__: broken)
-    with pytest.raises(ExportError, match=r"a\.wav: .*not finite"):
+    with pytest.raises(WriteError, match=r"a\.wav: .*not finite"):
         export_sound(request_, tmp_path / "a.wav")
     assert list(tmp_path.iterdir()) == []
 
@@ -277,8 +274,8 @@ def test_files_of_a_decay_have_one_length_and_an_unfinished_one_is_told(
     assert not export_sound(replace(decaying, seconds=0.1), tmp_path / "m.wav").decayed
 
 
-@pytest.mark.parametrize("bits", export.BITS)
-def test_the_end_of_training_is_marked_in_the_file(request_: SoundRequest, bits: export.Bits, tmp_path: Path) -> None:
+@pytest.mark.parametrize("bits", BITS)
+def test_the_end_of_training_is_marked_in_the_file(request_: SoundRequest, bits: Bits, tmp_path: Path) -> None:
     for source, marks in (("model", [Marker(1200, "end of training")]), ("truth", [])):
         path = tmp_path / f"{source}.wav"
         export_sound(replace(request_, source=source), path, WavSettings(bits, 12_000))  # type: ignore[arg-type]

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from app.instrument.compiled import InstrumentPlayer
+from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import (
     KEYS,
     NOTES_OFF,
@@ -548,4 +549,24 @@ def test_a_patch_that_is_kept_beside_a_single_string_sounds_when_it_is_played_ag
     assert played.handle(NoteOn(45, 60)) is None
     assert played.handle(NoteOff(45)) is None
     played.set_instrument(patch, EAR)
+    strike(played, NoteOn(45, 60))
+
+
+def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(
+    played: Notes, patch: Patch, wait: Wait, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun, held, computed = Event(), Event(), list[int]()
+
+    def slow(self: DrumKeys, key: int) -> None:
+        computed.append(key)
+        begun.set()
+        held.wait(30)
+
+    monkeypatch.setattr(DrumKeys, "_of_key", slow)
+    played.set_instrument(read_patch(PATCHES / "tuned_toms.json"), EAR)
+    wait(begun.is_set)
+    played.set_instrument(patch, EAR)
+    held.set()
+    wait(lambda: played.keys.player is not None and played.keys.player.patch == patch)
+    assert len(computed) == 1
     strike(played, NoteOn(45, 60))

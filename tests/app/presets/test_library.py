@@ -13,7 +13,8 @@ import soundfile
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
-from app.export.files import SoundRequest, export_sound
+from app.export.files import export_sound
+from app.export.sound import SoundRequest
 from app.patches.instrument import SingleString
 from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets

@@ -12,7 +12,8 @@ from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent
 from pytestqt.qtbot import QtBot
 
-from app.export.files import SoundRequest, export_sound
+from app.export.files import export_sound
+from app.export.sound import SoundRequest
 from app.instrument.bodies import own_bodies
 from app.patches.instrument import SingleString
 from app.patches.tuning import Tuning

@@ -11,7 +11,8 @@ from PySide6.QtGui import QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import QAbstractButton, QComboBox, QLineEdit, QTreeView
 from pytestqt.qtbot import QtBot
 
-from app.export.files import SoundRequest, export_sound
+from app.export.files import export_sound
+from app.export.sound import SoundRequest
 from app.views.controls.browser import Browser
 from app.window.controller import Controller
 from app.window.settings import FIRST_FAVOURITES, load_settings

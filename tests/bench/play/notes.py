@@ -1,6 +1,7 @@
 """A test piece, played by MIDI and by the computer's keys in the running app, recorded and judged.
 
-The patch is played without its body and room, whose tails would hide the damping of strings.
+The patch is played without its body and room, whose tails would hide the damping of strings. Its strings move in one
+direction, are released at once, each alike, and none rings in sympathy: what is judged has no beats of its own.
 """
 
 from __future__ import annotations
@@ -104,7 +105,9 @@ def measure(by: By, buffer: Buffer, seed: int, patch: Patch, report: Callable[..
         RuntimeError: the app did not open, or no sound of it was recorded.
     """
     need_programs(*SOUND_AND_SCREEN, *(() if by == "keys" else ("jackd",)))
-    dry = Patch.model_validate({**dict(patch), "body": Body(), "room": Room()})
+    pluck = patch.pluck.model_copy(update={"variation": 0.0, "release_ms": 0.0, "release_hard_ms": 0.0})
+    plain = {"pluck": pluck, "polarisations": None, "sympathy_s_kg": 0.0}
+    dry = Patch.model_validate({**dict(patch), "body": Body(), "room": Room(), **plain})
     piece = score.parts(Random(seed), *dry.range)
     kinds = ("midi", "keys") if by == "both" else (by,)
     whole_s = 40 + len(kinds) * sum(part.seconds + SILENCE_S for part in piece)

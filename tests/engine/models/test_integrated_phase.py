@@ -12,7 +12,7 @@ from engine.models._averaging import FIXED_POINT_STEPS
 from engine.models._cubics import integrate_parabolas
 from engine.models.base import Physics, count_parameters
 from engine.models.configurations import IntegratedPhaseConfiguration
-from engine.models.integrated_phase import GAIN_LIMIT, RATE_UNIT, KoopmanIntegrated
+from engine.models.integrated_phase import GAIN_LIMIT, KoopmanIntegrated
 from engine.resonators.sine_transform import synthesis_matrix
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, SplittingSolver, solve_linear
@@ -23,9 +23,7 @@ KINDS: tuple[dict, ...] = (
     {"encoder_widths": (), "eigenvalue_widths": ()},
     SMALL,
     SMALL | {"node_spacing": 7},
-    {"encoder_widths": (), "eigenvalue_widths": (), "modulation": True},
-    SMALL | {"modulation": True, "physical_units": True},
-    SMALL | {"modulation": True, "adiabatic": True, "physical_units": True, "second_order": True},
+    SMALL | {"adiabatic": True, "second_order": True},
 )
 
 
@@ -70,12 +68,12 @@ def test_agrees_with_a_plain_quadrature(sizes: dict) -> None:
         return z.abs().square() * torch.exp(-2 * sigma * times[:, None])
 
     def f(times: Tensor) -> Tensor:
-        told = energies(times) * (1 if model.energy_units is None else model.energy_units)
+        told = energies(times) * model.energy_units
         found = told @ model.K.T
         if model.g is not None:
             network = model.g(told) - model.g(torch.zeros(12).double())
             found = found + (network * told.sum(-1, keepdim=True) if c.second_order else network)
-        found = found * (RATE_UNIT if model.rate_units is None else torch.cat([model.rate_units] * 2))
+        found = found * torch.cat([model.rate_units] * 2)
         if c.adiabatic:  # ω' ² = ω² + 2ωκ, κ of the amplitudes of these actions
             linear = kappa = (told @ model.K.T)[:, 12:] * model.rate_units
             for _ in range(FIXED_POINT_STEPS):
@@ -197,12 +195,10 @@ def test_averaging_is_nearly_the_tension_modulated_string() -> None:
 
 
 @torch.no_grad()
-def test_physical_units_change_no_start_but_its_numbers() -> None:
-    model, scaled = (string_model(physical_units=units, modulation=True) for units in (False, True))
-    loud = 5 * initial()
-    assert relative(scaled(loud, 3000), model(loud, 3000)) < 1e-4
-    assert 0.1 < scaled.K.abs().max() < 2 and scaled.M_out is not None and 0.01 < scaled.M_out.abs().max() < 20
-    assert float(scaled.energy_units[0]) == pytest.approx(  # type: ignore[index]
+def test_in_its_units_all_numbers_are_of_the_order_of_one() -> None:
+    model = string_model()
+    assert 0.1 < model.K.abs().max() < 2 and 0.01 < model.M_out.abs().max() < 20
+    assert float(model.energy_units[0]) == pytest.approx(
         float(StringParameters().resonator(3).relative_tension_rise(np.array([1e-3, 0, 0]))), rel=1e-6
     )
 
@@ -218,11 +214,13 @@ def test_modulation_is_what_a_strong_low_mode_does_to_a_high_one_within_a_period
         amplitudes[0, 0], amplitudes[0, high] = 8e-3 * strength, 1e-5
         truth = SplittingSolver(string.resonator(10), rate_hz).solve(ModalState.at_rest(amplitudes), steps)
         for modulation in errors:
-            sizes = IntegratedPhaseConfiguration(state_size=10, modulation=modulation)
-            model = KoopmanIntegrated(sizes).double()
+            model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10)).double()
             model.initialise(
                 "averaging", Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0)
             )
+            if not modulation:
+                model.M_in.zero_()
+                model.M_out.zero_()
             found = to_modes(model(to_grid(amplitudes / 1e-3, 101), steps), 10)[0, :, high] * 1e-3
             errors[modulation].append(relative(found, truth[0, 1:, high]))
     assert errors[True][0] < 0.2 * errors[False][0]
@@ -238,17 +236,12 @@ def test_the_action_keeps_the_phase_long_after_the_start() -> None:
     truth, _ = SplittingSolver(string.resonator(10), rate_hz).advance(ModalState.at_rest(amplitudes), 5 * rate_hz)
     errors = {}
     for adiabatic in (False, True):
-        model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10, modulation=True, adiabatic=adiabatic))
+        model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10, adiabatic=adiabatic))
         model.initialise("averaging", Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0))
         found, _ = model.advance(model.encode(to_grid(amplitudes / 1e-3, 101).float()), 5 * rate_hz)
         late = to_modes(found[:, -rate_hz:], 10) * 1e-3 - truth[:, -rate_hz:]
         errors[adiabatic] = float(late.square().sum() / truth[:, -rate_hz:].square().sum())
     assert errors[True] < 0.3 * errors[False]
-
-
-def test_adiabatic_change_needs_the_modulation() -> None:
-    with pytest.raises(ValueError, match="adiabatic needs modulation = true"):
-        IntegratedPhaseConfiguration(adiabatic=True)
 
 
 def test_averaging_of_the_linear_string_is_the_linear_string() -> None:
@@ -269,6 +262,7 @@ def test_no_parameters_let_it_grow() -> None:
         for logarithm in (model.nu_log, model.theta_log):
             logarithm.uniform_(-12, 3, generator=generator)
         state = model.encode(initial(1) / scale)
+        model.M_out.zero_()
         model.decoder.weight.copy_(torch.eye(101, 24))
         model.decoder.bias.zero_()
         parts = model.advance(state, 3000)[0][0, :, :24].double()

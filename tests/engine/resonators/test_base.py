@@ -101,7 +101,7 @@ def test_a_model_starts_as_a_linear_membrane(name: str) -> None:
 
 
 def test_averaging_follows_the_stiffening_of_a_membrane() -> None:
-    drum = membrane(stiffening=3e7)
+    drum = membrane(stiffening=1e7)
     state = struck(drum)
     truth = torch.from_numpy(drum.to_grid(SplittingSolver(drum, RATE_HZ).solve(state, 1600)[:, 1:].numpy()))
     errors = {}
@@ -112,7 +112,7 @@ def test_averaging_follows_the_stiffening_of_a_membrane() -> None:
             errors[how] = relative(
                 model(torch.from_numpy(drum.to_grid(state.amplitude.numpy()) / 1e-3), 1600) * 1e-3, truth
             )
-    assert errors["averaging"] < 0.5 * errors["physics"]
+    assert errors["averaging"] < 0.1 * errors["physics"]
 
 
 def test_what_does_not_go_together_is_refused() -> None:

@@ -25,10 +25,8 @@ from training.start import BLIND_PURSUIT, COUNT, PHASES, PURSUIT, SYMMETRIES, be
 STEPS = 450
 
 
-def integrated_phase(state_size: int = 5, physical_units: bool = True) -> KoopmanIntegrated:
-    model = KoopmanIntegrated(
-        IntegratedPhaseConfiguration(state_size=state_size, modulation=True, physical_units=physical_units)
-    )
+def integrated_phase(state_size: int = 5) -> KoopmanIntegrated:
+    model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=state_size))
     model.initialise("random", None, torch.Generator().manual_seed(0))  # type: ignore[arg-type]
     return model
 
@@ -91,11 +89,9 @@ def test_a_fourier_cell_starts_as_the_string_that_it_has_seen(
     assert error.rel_mse < largest
 
 
-@pytest.mark.parametrize(("state_size", "physical_units"), [(5, True), (7, False)])
-def test_it_predicts_strings_that_the_fit_has_not_seen(
-    small_dataset: Dataset, state_size: int, physical_units: bool
-) -> None:
-    model = integrated_phase(state_size, physical_units)
+@pytest.mark.parametrize("state_size", [5, 7])
+def test_it_predicts_strings_that_the_fit_has_not_seen(small_dataset: Dataset, state_size: int) -> None:
+    model = integrated_phase(state_size)
     start_from_phases(model, found_modes(small_dataset, STEPS), seed=0)
     assert evaluate_model(model, small_dataset, "validation", STEPS).total().rel_mse < 1e-3
     linear = small_dataset.configuration.string.resonator(5).eigenvalues() / small_dataset.configuration.rate_hz
@@ -104,9 +100,8 @@ def test_it_predicts_strings_that_the_fit_has_not_seen(
 
 def test_a_run_starts_there(small_dataset: Dataset, runs: Path) -> None:
     recipe = Recipe(epochs=1, start=PHASES, peak_learning_rate=1e-9, first_horizon=STEPS, consistency_weight=0.0)
-    sizes = {"state_size": 5, "modulation": True, "physical_units": True}
     configuration = TrainingConfiguration(
-        "A test", "koopman_integrated", small_dataset.configuration, recipe, model_configuration=sizes
+        "A test", "koopman_integrated", small_dataset.configuration, recipe, model_configuration={"state_size": 5}
     )
     assert configuration.start == PHASES
     untrained = integrated_phase()
@@ -139,7 +134,6 @@ def test_a_start_is_one_of_the_models() -> None:
 def test_an_integrated_phase_without_a_size_has_a_latent_for_each_mode_that_is_found(
     small_dataset: Dataset, sizes: dict[str, int]
 ) -> None:
-    sizes = {"modulation": True, "physical_units": True, **sizes}
     configuration = TrainingConfiguration(
         "A test",
         "koopman_integrated",

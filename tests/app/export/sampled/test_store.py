@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from filelock import FileLock
 
-from app.export.files import ExportError
 from app.export.sampled import sf2
 from app.export.sampled.job import export_sampled, kept_samples, sample_folder
 from app.export.sampled.plan import MOST_LAYERS, SampledPlan
@@ -20,6 +19,7 @@ from app.export.sampled.store import INDEX, LOCK, SampleIndex, StoredSample, rea
 from app.export.wav import quantised
 from app.patches.patch import Patch
 from app.shared.worker import Cancelled
+from engine.result_file import WriteError
 
 Render = Callable[..., np.ndarray]
 KINDS = pytest.mark.parametrize("kind", ["sfz", "sf2"])
@@ -224,21 +224,21 @@ def test_a_folder_of_something_else_stays(patch: Patch, render: Render, tmp_path
     folder = tmp_path / "a_samples"
     folder.mkdir()
     (folder / "key050_vel063.flac").write_bytes(b"mine")
-    with pytest.raises(ExportError, match=r"holds other files; remove it, or choose another name for a\.sfz"):
+    with pytest.raises(WriteError, match=r"holds other files; remove it, or choose another name for a\.sfz"):
         export_sampled(small(patch), tmp_path / "a.sfz", render)
     assert contents(tmp_path) == {f"a_samples{os.sep}key050_vel063.flac": b"mine"}
 
 
 def test_two_names_of_one_folder_do_not_mix(patch: Patch, render: Render, tmp_path: Path) -> None:
     export_sampled(small(patch), tmp_path / "a b.sfz", render)
-    with pytest.raises(ExportError, match=r"holds the samples of a b\.sfz"):
+    with pytest.raises(WriteError, match=r"holds the samples of a b\.sfz"):
         export_sampled(small(patch), tmp_path / "a=b.sfz", render)
 
 
 def test_one_export_at_a_time(patch: Patch, render: Render, tmp_path: Path) -> None:
     out = tmp_path / "a.sfz"
     export_sampled(small(patch), out, render)
-    with FileLock(sample_folder(out) / LOCK), pytest.raises(ExportError, match="another export writes there"):
+    with FileLock(sample_folder(out) / LOCK), pytest.raises(WriteError, match="another export writes there"):
         export_sampled(small(patch), out, render)
 
 
@@ -260,7 +260,7 @@ def test_a_broken_index_is_told(text: str, patch: Patch, render: Render, tmp_pat
     out = tmp_path / "a.sfz"
     export_sampled(small(patch), out, render)
     (sample_folder(out) / INDEX).write_text(text)
-    with pytest.raises(ExportError, match=r"index\.json: no index of samples that this version reads; remove its"):
+    with pytest.raises(WriteError, match=r"index\.json: no index of samples that this version reads; remove its"):
         export_sampled(small(patch), out, render)
 
 
@@ -282,7 +282,7 @@ def test_the_index_of_the_largest_instrument_is_read(patch_of: Callable[..., Pat
 
 def test_a_note_that_is_not_finite_is_told(patch: Patch, tmp_path: Path) -> None:
     first = small(patch).zones[0].stem
-    with pytest.raises(ExportError, match=rf"{first}\.flac: the note holds values that are not finite"):
+    with pytest.raises(WriteError, match=rf"{first}\.flac: the note holds values that are not finite"):
         export_sampled(small(patch), tmp_path / "a.sfz", lambda *_, advanced: np.full((100, 1), np.inf))
     assert not (tmp_path / "a.sfz").exists()
 
@@ -291,11 +291,11 @@ def test_a_key_without_a_note_is_told(patch: Patch, tmp_path: Path) -> None:
     def none(*_: object, **more: object) -> np.ndarray:
         raise ValueError("key 50 has no string")
 
-    with pytest.raises(ExportError, match="key 50 has no string"):
+    with pytest.raises(WriteError, match="key 50 has no string"):
         export_sampled(small(patch), tmp_path / "a.sfz", none)
 
 
 def test_a_place_that_cannot_be_written_is_told(patch: Patch, render: Render, tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
-    with pytest.raises(ExportError, match="choose another"):
+    with pytest.raises(WriteError, match="choose another"):
         export_sampled(small(patch), tmp_path / "file" / "a.sfz", render)
