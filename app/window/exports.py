@@ -26,7 +26,6 @@ from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerforma
 from app.window.recordings import Recordings
 
 PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "patch"}
-NO_PLUGIN = "Drums cannot be exported as a plug-in yet: export samples, or what was recorded."
 HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "difference_gain_db"}
 
 
@@ -67,7 +66,7 @@ class Exports(QObject):
         if kind == "note" and drums:  # of a drum
             kind = "sampler" if subjects["performance"] is None else "performance"
         if subjects[kind] is None:
-            self.told.emit(NO_PLUGIN if kind == "plugin" and drums else PAGES[kind].missing)
+            self.told.emit(PAGES[kind].missing)
             return
         if self.dialog is None:
             self.dialog = ExportDialog(*self._choices, self._window)
@@ -101,7 +100,7 @@ class Exports(QObject):
             "note": heard_note(choices, self._library, self._through(choices)),
             "performance": played and HeardPerformance(played, None if preset is None else preset.path),
             "sampler": instrument,
-            "plugin": None if instrument is None or instrument.patch.strings.kind == "drums" else instrument,
+            "plugin": instrument,
         }
 
     def _exported(self, job: object) -> None:

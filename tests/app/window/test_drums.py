@@ -198,10 +198,12 @@ def test_what_is_drummed_is_recorded_and_exported(qtbot: QtBot, kit: Controller,
     assert {message.note for message in midi if message.type == "note_on" and message.velocity} == {36, 38, 41}
 
 
-def test_a_plug_in_of_drums_is_not_promised(kit: Controller) -> None:
+def test_drums_are_exported_as_a_plug_in_too(kit: Controller) -> None:
     kit.exports.open("plugin")
-    assert kit.exports.dialog is None
-    assert "Drums cannot be exported as a plug-in yet" in kit.window.notices.text
+    dialog = kit.exports.dialog
+    assert dialog is not None
+    assert dialog.kind == "plugin"
+    assert dialog.plugin.job().patch.strings.kind == "drums"
 
 
 def test_knobs_say_which_drum_is_meant_and_which_of_them_do_nothing(kit: Controller) -> None:

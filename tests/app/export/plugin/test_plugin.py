@@ -182,6 +182,23 @@ def test_body_and_room_follow_macros_and_the_wheel_while_it_plays(bank: Library)
     assert difference_db(sound, rendered(harp, rate_hz)) > -60
 
 
+def test_registered_parameter_0_sets_the_range_of_bends(bank: Library) -> None:
+    patch = patch_of("electric_bass")
+    wide = [Controller(101, 0), Controller(100, 0), Controller(6, 12)]
+    sound = played(instance_of(bank, "electric_bass"), patch, 48_000, more=tuple(to_host(each, 0) for each in wide))
+    assert (
+        difference_db(sound, rendered(patch, 48_000, more=tuple(TimedEvent(0.0, each) for each in wide))) < EQUAL_DB
+    )
+    assert difference_db(sound, rendered(patch, 48_000)) > -20
+
+
+def test_latency_and_tail_are_reported(bank: Library) -> None:
+    instance = instance_of(bank, "concert_harp", 96_000)
+    assert instance.latency == 96
+    tail = instance.extension("clap.tail", host.Frames).get(instance.at)  # type: ignore[attr-defined]
+    assert tail / 96_000 > patch_of("concert_harp").room.t60_s
+
+
 def test_ends_of_notes_are_reported(bank: Library) -> None:
     instance = instance_of(bank, "electric_bass")
     instance.block(4_096, [note_on(0, 40, 100, note_id=7)])
