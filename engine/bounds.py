@@ -111,8 +111,8 @@ def check(name: str, value: float, limits: tuple[float, float], unit: str = "") 
     """Raises ValueError, naming the field and its range, where a value is out of it."""
     low, high = limits
     if not low <= value <= high:
-        told = f" {unit}" if unit else ""
-        raise ValueError(f"{name} must lie in {low:.10g} … {high:.10g}{told}, not {brief(value)}")
+        reported = f" {unit}" if unit else ""
+        raise ValueError(f"{name} must lie in {low:.10g} … {high:.10g}{reported}, not {brief(value)}")
 
 
 def check_sizes(configuration: object) -> None:

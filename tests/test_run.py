@@ -119,7 +119,7 @@ def test_help_goes_to_standard_output(run, capsys):
     assert "python3 run.py -- render" in capsys.readouterr().out
 
 
-def test_an_old_python_can_read_the_file_and_is_told(monkeypatch):
+def test_an_old_python_can_read_the_file_and_is_reported(monkeypatch):
     ast.parse(SOURCE.read_text("utf-8"), feature_version=(3, 6))
     monkeypatch.setattr(sys, "version_info", (3, 6, 15))
     with pytest.raises(SystemExit, match=r"needs Python 3\.11 to 3\.14"):
@@ -207,7 +207,7 @@ def test_a_moved_folder_is_seen(run, tmp_path):
     assert not run.sound()
 
 
-def test_a_sound_environment_is_installed_into_and_another_is_made_anew(run, monkeypatch):
+def test_a_sound_environment_is_installed_into_and_another_is_made_again(run, monkeypatch):
     steps = []
     monkeypatch.setattr(run, "pip", lambda *arguments: steps.append(arguments[-1]))
     monkeypatch.setattr(run, "make_venv", lambda: steps.append("venv"))
@@ -411,7 +411,7 @@ class TestSystemPackages:
         assert run.present("/proc/*/stat") and not run.present("/proc/nothing")
         assert run.present("sh") and not run.present("nothing-of-the-kind")
 
-    def test_a_user_is_told_the_line_once_and_again_only_for_the_window(self, machine, monkeypatch, capsys):
+    def test_a_user_is_reported_the_line_once_and_again_only_for_the_window(self, machine, monkeypatch, capsys):
         run = machine.run
         monkeypatch.setattr(run, "APT", False)
         monkeypatch.setattr(run, "start", lambda arguments: 0)

@@ -1,4 +1,4 @@
-"""Plain English: a word list over strings, comments and Markdown, the length of sentences, and commit subjects."""
+"""Plain English: a word list over strings, comments, names and Markdown; sentences and commit subjects."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ AVOIDED = {
     r"beside (the|its|our|their) (truth|paper\S*|physics|figures?)|(our|results|model) beside": "compared with",
 }
 WORDS = re.compile("|".join(rf"\b({words})\b" for words in AVOIDED), re.IGNORECASE)
+NAMES = {"told", "tells", "anew", "whoever", "errs", "obey", "believed", "tired"}  # parts of names, avoided too
 LONGEST = 30  # words of a sentence
 LONGEST_SUBJECT = 72
 SINCE = "5d41648"  # the last commit before subjects were checked
@@ -72,6 +73,16 @@ def test_no_word_of_the_list_is_used() -> None:
                     )
                     found.append(f"{path.relative_to(ROOT)}:{number}: {hit[0]!r} (write: {remedy})")
     assert not found, "\n" + "\n".join(found)
+
+
+def test_no_name_has_a_word_of_the_list() -> None:
+    found = {
+        f"{path.relative_to(ROOT)}:{token.start[0]}: {token.string}"
+        for path in set(CODE) - {Path(__file__)}
+        for token in tokenize.generate_tokens(io.StringIO(path.read_text("utf-8")).readline)
+        if token.type == tokenize.NAME and NAMES & set(token.string.casefold().split("_"))
+    }
+    assert not found, "\n" + "\n".join(sorted(found))
 
 
 def sentences(path: Path) -> Iterator[tuple[int, str]]:

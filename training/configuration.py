@@ -177,9 +177,9 @@ class TrainingConfiguration:
                 "digest_version": DIGEST_VERSION,
                 "model": self.model,
                 "model_configuration": sizes | RETIRED_SIZES.get(self.model, {}),
-                "data": unlike_default(self.data),
+                "data": non_default(self.data),
                 "data_version": DATA_VERSION,
-                "recipe": {**unlike_default(self.recipe), "start": self.start},
+                "recipe": {**non_default(self.recipe), "start": self.start},
                 "horizon": self.steps,
             }
         )
@@ -217,7 +217,7 @@ def _with_start(recipe: dict[str, Any]) -> dict[str, Any]:
     return {**own, "start": PHASES if blind else recipe.get("initialisation", "")}
 
 
-def unlike_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:
+def non_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:
     """The fields that differ from their default, as plain data: what a digest is taken of."""
     defaults = {f.name: f.default for f in fields(value)}
     return {name: entry for name, entry in write(value).items() if getattr(value, name) != defaults[name]}

@@ -19,7 +19,7 @@ from engine.table import columns_of, read_table, write_table
 NAME = "heard.csv"
 METHOD = 1  # of the measurement: lines of another one say nothing
 LARGEST_BYTES = 2**20
-MOST_TOLD = 3  # bad lines of a file
+MOST_REPORTED = 3  # bad lines of a file
 LONGEST_NAME = 200
 
 _BOUNDS = {
@@ -94,8 +94,8 @@ def read_heard(folder: Path) -> tuple[dict[str, Heard], list[str]]:
         return {}, [str(error)]
     except OSError as error:
         return {}, [f"{path}: cannot be read ({error.strerror or error}); presets are listed without it"]
-    if (more := len(problems) - MOST_TOLD) > 0:
-        problems = [*problems[:MOST_TOLD], f"{path}: {more} more lines cannot be used"]
+    if (more := len(problems) - MOST_REPORTED) > 0:
+        problems = [*problems[:MOST_REPORTED], f"{path}: {more} more lines cannot be used"]
     return found, problems
 
 

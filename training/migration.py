@@ -13,7 +13,7 @@ from dataclasses import replace
 from engine.models import RETIRED, model_class, read_model_configuration
 from engine.schema import SchemaError, write
 from training.cell import load
-from training.configuration import DATA_VERSION, TrainingConfiguration, digest_of, unlike_default
+from training.configuration import DATA_VERSION, TrainingConfiguration, digest_of, non_default
 from training.results import Row
 from training.start import BLIND_PURSUIT, PHASES, STARTS
 
@@ -21,7 +21,7 @@ from training.start import BLIND_PURSUIT, PHASES, STARTS
 def earlier_digest(configuration: TrainingConfiguration) -> str:
     """By the second rule: a start had a name where it was the model's own, and flags for others."""
     start, model, given = configuration.start, configuration.model, configuration.model_configuration
-    recipe = {name: value for name, value in unlike_default(configuration.recipe).items() if name != "start"}
+    recipe = {name: value for name, value in non_default(configuration.recipe).items() if name != "start"}
     recipe["initialisation"] = model_class(model).own_initialisation() if start in STARTS else start
     if start in (BLIND_PURSUIT, PHASES):
         recipe["blind"] = True
@@ -33,7 +33,7 @@ def earlier_digest(configuration: TrainingConfiguration) -> str:
             "digest_version": 2,
             "model": model,
             "model_configuration": sizes | RETIRED.get(model, {}),
-            "data": unlike_default(configuration.data),
+            "data": non_default(configuration.data),
             "data_version": DATA_VERSION,
             "recipe": recipe,
             "horizon": configuration.steps,

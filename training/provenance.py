@@ -16,9 +16,9 @@ _ROOT = Path(__file__).parents[1]
 
 def commit() -> str:
     """The commit of the code, with "+" where files differ from it; "" where neither git nor COMMIT_VARIABLE tell."""
-    told = os.environ.get(COMMIT_VARIABLE, "")
-    if told or not (_ROOT / ".git").exists():
-        return told
+    reported = os.environ.get(COMMIT_VARIABLE, "")
+    if reported or not (_ROOT / ".git").exists():
+        return reported
     try:
         return _git("rev-parse", "--short=10", "HEAD") + ("+" if _git("status", "--porcelain", "-uno") else "")
     except (OSError, subprocess.SubprocessError):

@@ -25,7 +25,9 @@ STRIDES = (16, 8, 4, 2, 1)  # of the finest grid, level by level
 FINEST = (49, 33)  # positions, amplitudes: each a multiple of the coarsest stride plus one
 PLUCKS_AT_ONCE = 4
 FRAMES_AT_ONCE = 1000
-COARSER = 4  # the truth takes a quarter of its default sub-steps: an error of 1e-5, far below any that is shown
+SUBSTEP_DIVISOR = (
+    4  # the truth takes a quarter of its default sub-steps: an error of 1e-5, far below any that is shown
+)
 
 POSITIONS = np.linspace(*POSITION_RANGE, FINEST[0])
 AMPLITUDES_MM = np.geomspace(SMALLEST_AMPLITUDE_MM, LARGEST_AMPLITUDE_MM, FINEST[1])
@@ -126,7 +128,7 @@ def error_of_plucks(preset: Preset) -> Callable[[list[Pluck], Job], Array]:
     from engine.truth import default_substeps
 
     info, model = preset.info, preset.model
-    truth = TruthSource(info, -(-default_substeps(info.resonator, info.rate_hz) // COARSER))
+    truth = TruthSource(info, -(-default_substeps(info.resonator, info.rate_hz) // SUBSTEP_DIVISOR))
 
     @torch.inference_mode()
     def errors(plucks: list[Pluck], job: Job) -> Array:

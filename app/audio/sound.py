@@ -110,7 +110,7 @@ class Sound:
         self._gaps: deque[Gap] = deque(maxlen=MOST_GAPS)
         self._status = SoundStatus(rate_hz=rate_hz)
         self._changes_done = 0
-        self._caretaker = threading.Thread(target=self._take_care, name="sound-caretaker", daemon=True)
+        self._caretaker = threading.Thread(target=self._supervise, name="sound-caretaker", daemon=True)
         self._caretaker.start()
 
     def open(
@@ -189,12 +189,12 @@ class Sound:
 
     # All below runs in the caretaker's thread.
 
-    def _take_care(self) -> None:
+    def _supervise(self) -> None:
         try:
             while not self._closing.is_set():
                 self._woken.wait(LOOK_EVERY_S)
                 self._woken.clear()
-                self._obey()
+                self._process_requests()
                 if self._closing.is_set():
                     break
                 self._look_at_output()
@@ -214,7 +214,7 @@ class Sound:
         finally:
             self._output.close()
 
-    def _obey(self) -> None:
+    def _process_requests(self) -> None:
         while True:
             try:
                 wish = self._wishes.get_nowait()

@@ -34,8 +34,8 @@ def info(
         print_json({**facts, "preset_file": here})
         return
     parts = {part: facts.pop(part, None) or {} for part in ("pluck", "string")}
-    told = {f"{part} {name}": value for part, of_part in parts.items() for name, value in of_part.items()}
-    lines = {**told, **facts, "preset file": here}
+    reported = {f"{part} {name}": value for part, of_part in parts.items() for name, value in of_part.items()}
+    lines = {**reported, **facts, "preset file": here}
     width = max(map(len, lines))
     for name, value in lines.items():
         print(f"{name.replace('_', ' '):<{width}}  {'-' if value is None else one_line(str(value))}")

@@ -94,7 +94,7 @@ def channels_in(events: Iterable[Event]) -> set[int]:
     return {event.channel for event in events if not isinstance(event, PatchTurned | PluckAt)}
 
 
-def let_go(channels: Iterable[int]) -> list[Event]:
+def release_all(channels: Iterable[int]) -> list[Event]:
     """What leaves channels as if nobody had played on them: pedal up, wheels at rest, no key held."""
     events: list[Event] = []
     for channel in sorted(channels):
@@ -103,7 +103,7 @@ def let_go(channels: Iterable[int]) -> list[Event]:
     return events
 
 
-def still_down(events: Iterable[Event]) -> list[Event]:
+def releases_for(events: Iterable[Event]) -> list[Event]:
     """The events that release the keys and pedals that are down after these events."""
     down: dict[NoteOff | Controller, None] = {}  # in their order
     for event in events:

@@ -59,27 +59,29 @@ def facts_of(string: KeyString) -> dict[str, str]:
     return {
         "key": note_name(string.key),
         "pitch": f"{string.pitch_hz:.1f} Hz",
-        "mass": told(1000 * parameters.mass_per_length_kg_m, "g/m"),
-        "stress": told(parameters.tension_n / parameters.area_m2 / 1e6, "MPa"),
+        "mass": reported(1000 * parameters.mass_per_length_kg_m, "g/m"),
+        "stress": reported(parameters.tension_n / parameters.area_m2 / 1e6, "MPa"),
     }
 
 
 def facts_of_drum(played: PlayedDrum) -> dict[str, str]:
     """A drum in figures: values with their units, by name."""
     drum = played.drum
-    size = told(100 * drum.length_m, "cm")
+    size = reported(100 * drum.length_m, "cm")
     if drum.shape != "circle":
-        size = f"{told(100 * drum.length_m, '')} × {told(100 * drum.width_m, 'cm')}"
-    tension = told(drum.tension_n_m / 1000, "kN/m") if drum.tension_n_m else "stiff, without tension"
+        size = f"{reported(100 * drum.length_m, '')} × {reported(100 * drum.width_m, 'cm')}"
+    tension = reported(drum.tension_n_m / 1000, "kN/m") if drum.tension_n_m else "stiff, without tension"
     return {"drum": played.name, "key": note_name(played.note), "size": size, "tension": tension}
 
 
 def figures_of(string: StringParameters) -> dict[str, str]:
     """The figures of a string with their units, by field."""
-    return {field: told(figure.of(string), OF_PATCHES[field].figure_unit or "") for field, figure in FIGURES.items()}
+    return {
+        field: reported(figure.of(string), OF_PATCHES[field].figure_unit or "") for field, figure in FIGURES.items()
+    }
 
 
-def told(figure: float, unit: str) -> str:
+def reported(figure: float, unit: str) -> str:
     """Three digits and the unit: "70.3 N"."""
     if figure == 0:
         text = "0"

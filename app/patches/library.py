@@ -75,8 +75,10 @@ def read_patch(path: Path) -> Patch:
     except PatchError:
         raise
     except (ValueError, OverflowError) as error:
-        told = explained(error) if isinstance(error, ValueError) else str(error)
-        raise PatchError(f"{path}: {one_line(told, 300)}; mend this field, or save the instrument again") from error
+        reported = explained(error) if isinstance(error, ValueError) else str(error)
+        raise PatchError(
+            f"{path}: {one_line(reported, 300)}; mend this field, or save the instrument again"
+        ) from error
 
 
 def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:

@@ -135,8 +135,10 @@ def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
     pitch_hz = np.array([tuned.frequency_for_midi_note(int(note)) for note in mapped])
     bad = mapped[~((pitch_hz > PITCHES_HZ[0]) & (pitch_hz < PITCHES_HZ[1]))]  # not a number is neither
     if not len(mapped) or len(bad):
-        told = f"key {bad[0]}" if len(bad) else "any key"
-        raise ValueError(f"{field}: gives no pitch to {told}; its intervals or its reference pitch are impossible")
+        reported = f"key {bad[0]}" if len(bad) else "any key"
+        raise ValueError(
+            f"{field}: gives no pitch to {reported}; its intervals or its reference pitch are impossible"
+        )
     return mapped, np.log2(pitch_hz)
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from app.shared.thread_priority import Rank, step_back
+from app.shared.thread_priority import Rank, lower_priority
 from engine.pluck import FULL_SCALE_M
 from engine.sources import ModelSource, Runaway, SourceState
 from engine.voices import Voice
@@ -167,7 +167,7 @@ class Ahead:
             self._thread.join(10)
 
     def _run(self) -> None:
-        step_back(Rank.RENDERING)
+        lower_priority(Rank.RENDERING)
         while True:
             with self._mailbox:
                 self._voices = [

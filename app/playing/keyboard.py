@@ -50,14 +50,14 @@ LOWEST_OCTAVE, HIGHEST_OCTAVE = -4, 4
 
 
 @dataclass(frozen=True)
-class Reach:
+class PluckRange:
     """The positions of the lowest and the highest key's plucks, and the amplitudes of velocities 1 and 127."""
 
     position: tuple[float, float] = ANYWHERE
     amplitude_mm: tuple[float, float] = ANY_AMPLITUDE_MM
 
     @classmethod
-    def of(cls, info: PresetInfo | None) -> Reach:
+    def of(cls, info: PresetInfo | None) -> PluckRange:
         """What a preset was trained on, so that every key sounds as learned."""
         if info is None:
             return cls()

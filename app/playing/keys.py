@@ -79,7 +79,7 @@ class Keys:
         self._latest: KeyNote | None = None
         self._effects: Effects | None = None  # as set
         self._dry = False
-        self._told_body = ""  # the fault of the body that was reported last
+        self._reported_body = ""  # the fault of the body that was reported last
 
     @property
     def player(self) -> InstrumentPlayer | None:
@@ -228,9 +228,9 @@ class Keys:
         if effects != self._effects:
             self._effects = effects
             self._set_effects(effects)
-        problem, told = body_problem(patch) if patch is not None else "", self._told_body
-        self._told_body = problem
-        if problem and problem != told:
+        problem, reported = body_problem(patch) if patch is not None else "", self._reported_body
+        self._reported_body = problem
+        if problem and problem != reported:
             self._report(problem, "")
 
     def _present(self) -> InstrumentPlayer | None:

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from app.instrument.events import Event, channels_in, let_go
+from app.instrument.events import Event, channels_in, release_all
 from app.instrument.midi_file import event_of
 from app.playing.midi_backend import Backend, MidiUnavailable, OpenPort, load_backend
 
@@ -67,12 +67,12 @@ class MidiInput:
         port, self._port, self.name = self._port, None, ""
         if port is not None:
             port.close()
-        self.let_go()
+        self.release_all()
 
-    def let_go(self) -> None:
+    def release_all(self) -> None:
         """Releases the keys that are held through the input, and leaves its wheels and pedals at rest."""
         channels, self._channels = self._channels, set()
-        for event in let_go(channels):
+        for event in release_all(channels):
             self._on_let_go(event)
 
     def _loaded(self) -> Backend:

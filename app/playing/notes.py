@@ -26,7 +26,7 @@ from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
 from app.playing.due import Due
 from app.playing.key_note import SOURCES, KeyNote
-from app.playing.keyboard import Reach
+from app.playing.keyboard import PluckRange
 from app.playing.keys import Keys
 from app.playing.levels import Levels
 from app.playing.note import Note
@@ -35,7 +35,7 @@ from app.presets.library import PresetEntry
 from app.rendering import RenderRequest
 from app.rendering.subject import Subject, path_of, string_of
 from app.session.monitor import Monitor
-from app.shared.thread_priority import Rank, step_back
+from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import OTHER
 from engine.effects import Effects
 from engine.pluck import Pluck
@@ -82,11 +82,11 @@ class Notes:
         self._ear: Ear | None = None
         self.latest: Note | KeyNote | None = None
         self._chosen: RenderRequest | None = None
-        self._reach: Reach | None = None  # of a single string, which is played; None: a patch is
+        self._reach: PluckRange | None = None  # of a single string, which is played; None: a patch is
         self._dry = False
         self._ahead = Ahead()
         self._latencies_s: deque[float] = deque(maxlen=100)
-        self._helper = ThreadPoolExecutor(1, "notes-helper", step_back, (Rank.BACKGROUND,))
+        self._helper = ThreadPoolExecutor(1, "notes-helper", lower_priority, (Rank.BACKGROUND,))
         self._levels = Levels(sources, self.in_background)
         self._closed = False
         self._wished_plucks: object = None
@@ -104,7 +104,7 @@ class Notes:
         """
         single = isinstance(instrument, SingleString)
         entry = self._find(instrument.preset) if single else None
-        reach = Reach.of(entry.info if entry is not None else None) if single else None
+        reach = PluckRange.of(entry.info if entry is not None else None) if single else None
         with self._lock:
             self._reach, self._ear, chosen = reach, ear, self._chosen
             if chosen is not None and entry is not None and path_of(chosen.preset) != entry.path:
@@ -299,7 +299,7 @@ class Notes:
         """Forgets notes that ended, and moves listening points. The window calls it at each frame."""
         self.look()
         with self._lock:
-            self._carry()
+            self._move_to_new_mixer()
             self._notes = [note for note in self._notes if not note.over]
             for each in self._notes:
                 ahead = isinstance(each, Note) and each.ahead
@@ -367,7 +367,7 @@ class Notes:
 
         return guarded
 
-    def _carry(self) -> None:
+    def _move_to_new_mixer(self) -> None:
         """When the device has changed its rate, the latest plucks ring on in its new mixer; keys' notes end."""
         mixer = self._sound.mixer
         left = [note for note in self._notes if note.mixer not in (None, mixer) and not note.over]

@@ -30,9 +30,9 @@ class Pair:
         for each, voice in self._voices.items():
             voice.set_gain(float(each == name))
 
-    def play(self, anew: bool = False) -> None:
+    def play(self, restart: bool = False) -> None:
         """Starts both where nothing sounds, or `again`; otherwise they continue."""
-        if self._voices and not anew:
+        if self._voices and not restart:
             return
         self.stop()
         for name, samples in self._samples.items():

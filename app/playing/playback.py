@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from app.instrument.events import Event, TimedEvent, channels_in, let_go
+from app.instrument.events import Event, TimedEvent, channels_in, release_all
 from app.playing.due import Due
 from engine.voices import Mixer
 
@@ -70,7 +70,7 @@ class Playback:
 
     def _run(self, events: Sequence[TimedEvent], stopping: threading.Event) -> None:
         beginning, due = _Beginning(self._clock, self._ahead_s), None
-        nobody_plays = let_go(channels_in(each.event for each in events))
+        nobody_plays = release_all(channels_in(each.event for each in events))
         for each in events:
             due = beginning.wait(each.time_s, self._ahead_s, stopping)
             if stopping.is_set():

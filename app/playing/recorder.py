@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 
-from app.instrument.events import Event, NoteOn, TimedEvent, still_down
+from app.instrument.events import Event, NoteOn, TimedEvent, releases_for
 
 LONGEST_RECORDING = 100_000  # events
 FULL = (
@@ -27,7 +27,7 @@ class EventRecorder:
         self._lock = threading.Lock()
         self._recorded: list[TimedEvent] | None = None
         self._began_s = 0.0
-        self._told_full = False
+        self._reported_full = False
 
     @property
     def recording(self) -> bool:
@@ -36,7 +36,7 @@ class EventRecorder:
     def begin(self, first: Iterable[Event]) -> None:
         """Records from now on, after the events `first`; an earlier recording is discarded."""
         with self._lock:
-            self._recorded, self._began_s, self._told_full = [], time.monotonic(), False
+            self._recorded, self._began_s, self._reported_full = [], time.monotonic(), False
         for event in first:
             self.take(event)
 
@@ -49,8 +49,8 @@ class EventRecorder:
             if not full:
                 at_s = time.monotonic() if time_s is None else time_s
                 self._recorded.append(TimedEvent(at_s - self._began_s, event))
-            told, self._told_full = self._told_full, self._told_full or full
-        if full and not told:
+            reported, self._reported_full = self._reported_full, self._reported_full or full
+        if full and not reported:
             self._report(FULL, "")
 
     def cancel(self) -> None:
@@ -69,7 +69,7 @@ class EventRecorder:
             recorded, self._recorded = self._recorded or [], None
             end_s = time.monotonic() - self._began_s
         events = sorted((each for each in recorded if each.time_s <= end_s), key=lambda each: each.time_s)
-        events += [TimedEvent(end_s, event) for event in still_down(each.event for each in events)]
+        events += [TimedEvent(end_s, event) for event in releases_for(each.event for each in events)]
         first = next((each.time_s for each in events if isinstance(each.event, NoteOn)), None)
         if first is None:
             return []

@@ -101,8 +101,8 @@ class Library:
         if entries != self.entries:
             self.entries = entries
             self.changed.emit()
-        told, self._problems = self._problems, problems
-        return [problem for problem in problems if problem not in told]
+        reported, self._problems = self._problems, problems
+        return [problem for problem in problems if problem not in reported]
 
 
 def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
@@ -135,8 +135,8 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
     models = Counter(title for title, _ in {(entry.title, entry.info.model) for entry in entries.values()})
     for name, entry in entries.items():
         if models[entry.title] > 1:  # two models of one string
-            told_apart = f"{entry.info.title} ({model_word(entry.info.model)})"
-            entries[name] = replace(entry, info=replace(entry.info, title=told_apart))
+            reported_apart = f"{entry.info.title} ({model_word(entry.info.model)})"
+            entries[name] = replace(entry, info=replace(entry.info, title=reported_apart))
     return sorted(entries.values(), key=lambda entry: (not entry.studio, entry.name)), problems
 
 

@@ -23,7 +23,7 @@ from engine.resonators.base import Array, Resonator
 from engine.truth import ModalState, SplittingSolver, default_substeps
 
 BLOCK_FRAMES = 1_200  # of 1,600 modes 15 MB
-COARSER = 3  # times fewer sub-steps of the truth than a data set has: 1e-12 of the energy off after a second
+SUBSTEP_DIVISOR = 3  # times fewer sub-steps of the truth than a data set has: 1e-12 of the energy off after a second
 SILENCE = 1e-10  # of a mode, of all: what the truth leaves out
 TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its angle follows from them
 
@@ -196,7 +196,7 @@ def _model(model: KoopmanTension, resonator: Resonator, speeds: Array) -> Advanc
 
 
 def _truth(resonator: Resonator, speeds: Array) -> Advance:
-    substeps = math.ceil(default_substeps(resonator, RATE_HZ) / COARSER)
+    substeps = math.ceil(default_substeps(resonator, RATE_HZ) / SUBSTEP_DIVISOR)
     solver = SplittingSolver(resonator, RATE_HZ, substeps=substeps, silence=SILENCE)
     state = ModalState(torch.zeros(1, resonator.modes, dtype=torch.float64), torch.from_numpy(speeds)[None])
 

@@ -8,7 +8,9 @@ from engine.presets import Preset
 from engine.sources import ModelSource, TruthSource
 from engine.voices import Program, model_program, truth_program
 
-COARSER = 4  # the voice of the truth takes a quarter of the default sub-steps: an error of 1e-6, for drawing alone
+SUBSTEP_DIVISOR = (
+    4  # the voice of the truth takes a quarter of the default sub-steps: an error of 1e-6, for drawing alone
+)
 
 
 class Loaded:
@@ -32,4 +34,4 @@ class Loaded:
 
     @cached_property
     def truth_program(self) -> Program:
-        return truth_program(self.preset.info, self.preset.info.rate_hz, COARSER)
+        return truth_program(self.preset.info, self.preset.info.rate_hz, SUBSTEP_DIVISOR)

@@ -18,7 +18,7 @@ from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.subject import Subject
 from app.shared.heap import return_free_pages
-from app.shared.thread_priority import Rank, step_back
+from app.shared.thread_priority import Rank, lower_priority
 from engine.presets import PresetError
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class RenderWorker:
         self._mailbox = threading.Condition()
         self._request: RenderRequest | BlowRequest | None = None
         self._closing = False
-        self._helper = ThreadPoolExecutor(1, "render-helper", step_back, (Rank.RENDERING,))
+        self._helper = ThreadPoolExecutor(1, "render-helper", lower_priority, (Rank.RENDERING,))
         self._thread = threading.Thread(target=self._run, name="render-worker", daemon=True)
         self._thread.start()
 
@@ -77,7 +77,7 @@ class RenderWorker:
     # All below runs in the worker's thread.
 
     def _run(self) -> None:
-        step_back(Rank.RENDERING)
+        lower_priority(Rank.RENDERING)
         ends_s = time.monotonic() + PATIENCE_S
         while not (self._closing or self._sounds() or time.monotonic() > ends_s):
             time.sleep(LOOK_AGAIN_S)

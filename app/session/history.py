@@ -75,7 +75,7 @@ class History:
         self._held = True
         self._open_fields = None
 
-    def let_go(self) -> None:
+    def release_all(self) -> None:
         """The gesture has ended: the next change begins a step of its own."""
         self._held = False
         self._open_fields = None
@@ -89,7 +89,7 @@ class History:
         self._restore(self._redo, self._undo)
 
     def _restore(self, source: deque[Values] | list[Values], target: deque[Values] | list[Values]) -> None:
-        self.let_go()
+        self.release_all()
         wanted = self._next(source)
         while source and source.pop() is not wanted:
             pass
@@ -112,7 +112,7 @@ class History:
         if self._restoring or not fields or values == self._present:  # the latter where a note was played
             return
         if self._held and not self._still_held():
-            self.let_go()
+            self.release_all()
         now_s, turned = self._now_s(), turned_fields(fields, self._present, values)
         soon = turned == self._open_fields and now_s - self._changed_s <= GATHER_S
         if self._open_fields is None or not (self._held or soon):

@@ -58,8 +58,8 @@ class Listener(BaseModel):
         if not self.stereo:
             for macro in patch.macros:
                 if any(target.field == RIGHT_POINT for target in macro.targets):
-                    told = f"its macro {macro.name} moves the right listening point"
-                    raise ValueError(f"{patch.name} stays in stereo: {told}")
+                    reported = f"its macro {macro.name} moves the right listening point"
+                    raise ValueError(f"{patch.name} stays in stereo: {reported}")
         return patch.model_copy(update={"pickup": heard})
 
 

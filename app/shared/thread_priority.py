@@ -23,7 +23,7 @@ class Rank(IntEnum):
     BACKGROUND = 10
 
 
-def step_back(rank: Rank) -> None:
+def lower_priority(rank: Rank) -> None:
     """Lowers the priority of the calling thread, and of those that it starts later, by `rank`.
 
     Only Linux gives each thread a niceness of its own; elsewhere this does nothing.

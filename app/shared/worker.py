@@ -12,7 +12,7 @@ import traceback
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from app.shared.thread_priority import Rank, step_back
+from app.shared.thread_priority import Rank, lower_priority
 
 BREATH_S = 0.001  # between pieces of a job, so that other threads get their turn
 LOOK_AGAIN_S = 0.02  # while a job rests
@@ -150,7 +150,7 @@ class Worker:
             self._thread.join(seconds)
 
     def _run(self) -> None:
-        step_back(Rank.BACKGROUND)
+        lower_priority(Rank.BACKGROUND)
         while True:
             with self._mailbox:
                 self._mailbox.wait_for(lambda: self._next is not None or self._closing)

@@ -33,7 +33,9 @@ class Background(QObject):
     ) -> None:
         super().__init__(parent)
         self._job: Job | None = None  # the one whose signals are passed on
-        self._worker = Worker(name, lambda job, what, *told: self._said.emit(job, what, told), expected, rests)
+        self._worker = Worker(
+            name, lambda job, what, *reported: self._said.emit(job, what, reported), expected, rests
+        )
         self._said.connect(self._pass_on, Qt.ConnectionType.QueuedConnection)
 
     @property
@@ -60,9 +62,9 @@ class Background(QObject):
         self._worker.close(seconds, cancel=cancel)
 
     @Slot(object, str, tuple)
-    def _pass_on(self, job: Job, what: str, told: tuple[object, ...]) -> None:
+    def _pass_on(self, job: Job, what: str, reported: tuple[object, ...]) -> None:
         if job is not self._job:
             return
         if what != "progressed":
             self._job = None
-        getattr(self, what).emit(*told)
+        getattr(self, what).emit(*reported)

@@ -57,7 +57,7 @@ class AudioControl(QObject):
             rescan,
         )
 
-    def tell(self, problem: AudioProblem) -> None:
+    def report(self, problem: AudioProblem) -> None:
         """Shows a fault of the output as a notice, with what plays on."""
         if self._notice:
             self._window.notices.withdraw(self._notice)  # one notice about the sound at a time
@@ -67,7 +67,7 @@ class AudioControl(QObject):
             self._notice += (
                 f" Playback continues on “{device.name}”." if device else " The app continues without sound."
             )
-        self._window.notices.tell(self._notice, problem.detail)
+        self._window.notices.report(self._notice, problem.detail)
 
     def show(self, status: SoundStatus, notes: Notes, take: Take | None) -> None:
         """Shows the present state; to be called ten times a second."""

@@ -25,7 +25,7 @@ class BrowserDesk(QObject):
         favourites: names of rows, also of those whose files are missing at present.
     """
 
-    told = Signal(str)  # a notice for the user
+    reported = Signal(str)  # a notice for the user
 
     def __init__(
         self,
@@ -76,7 +76,7 @@ class BrowserDesk(QObject):
             folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             remedy = "choose another with LEARNED_STRINGS_PRESETS"
-            self.told.emit(f"{folder}: cannot be created ({error.strerror}); {remedy}.")
+            self.reported.emit(f"{folder}: cannot be created ({error.strerror}); {remedy}.")
             return
         if not QDesktopServices.openUrl(QUrl.fromLocalFile(str(folder))):
-            self.told.emit(f"No file manager was found here; your own {self.browser.what} are in {folder}.")
+            self.reported.emit(f"No file manager was found here; your own {self.browser.what} are in {folder}.")

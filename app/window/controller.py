@@ -55,7 +55,7 @@ from app.window.panels.rack import fill
 from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
-from app.window.remembering import Keeper
+from app.window.remembering import SettingsSaver
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets import SHIPPED, PresetError
 
@@ -77,7 +77,7 @@ ProblemListener = Callable[[AudioProblem], None]
 class _AudioMail(QObject):
     """Carries a fault of the sound device from the caretaker's thread into the window's (Qt queues the signal)."""
 
-    told = Signal(object)
+    reported = Signal(object)
 
 
 class Controller(QObject):
@@ -96,10 +96,10 @@ class Controller(QObject):
         self._settings = settings
         self._settings_path = settings_path
         self._audio_mail = _AudioMail()
-        self.sound = make_sound(self._audio_mail.told.emit)
+        self.sound = make_sound(self._audio_mail.reported.emit)
         window.closing.connect(self.sound.close)  # in case the rest of this fails
         self.audio = AudioControl(window, self.sound, settings.device, settings.sound)
-        self._audio_mail.told.connect(self.audio.tell)
+        self._audio_mail.reported.connect(self.audio.report)
         self.audio.open()  # it is opened while all else is made
         self.appearance = Appearance(window, settings.look)
         self._last_tick_s = time.monotonic()
@@ -146,7 +146,7 @@ class Controller(QObject):
         self.instruments.played.connect(self.performance.follow)
         self.instruments.played.connect(self._show_struck)
         self.drum.view.drum_stepped.connect(self._step_drum)
-        self.instruments.told.connect(window.notices.tell)
+        self.instruments.reported.connect(window.notices.report)
         self.instruments.start()
         self.patches = PatchDesk(
             self.session,
@@ -158,7 +158,7 @@ class Controller(QObject):
             patch_browser(window),
             settings.patch_favourites,
         )
-        self.patches.told.connect(window.notices.tell)
+        self.patches.reported.connect(window.notices.report)
         self.patches.informed.connect(window.notices.inform)
         window.may_close = self.patches.recordings.may_close
         self.instruments.played.connect(self.patches.show_played)
@@ -168,7 +168,7 @@ class Controller(QObject):
         window.instrument.set_unfolded(settings.instrument.unfolded)
         for dragged in (window.instrument.bar, window.instrument.knobs):
             dragged.drag_started.connect(self.history.hold)
-            dragged.drag_ended.connect(self.history.let_go)
+            dragged.drag_ended.connect(self.history.release_all)
         self.exports = Exports(
             self.session,
             self.library,
@@ -177,13 +177,13 @@ class Controller(QObject):
             (settings.export, settings.sampled),
             window,
         )
-        self.exports.told.connect(window.notices.tell)
+        self.exports.reported.connect(window.notices.report)
         window.transport.export_asked.connect(window.action["export"].trigger)
         self._connect_actions()
-        self.keeper = Keeper(settings_path, settings, self.settings, self)
-        self.keeper.failed.connect(window.notices.tell)
+        self.keeper = SettingsSaver(settings_path, settings, self.settings, self)
+        self.keeper.failed.connect(window.notices.report)
         for problem in problems:
-            self.window.notices.tell(problem)
+            self.window.notices.report(problem)
         everything = frozenset(OBSERVED)
         self.session.changed.connect(self._choices_changed)
         self.performance.choices_changed(everything)
@@ -201,9 +201,9 @@ class Controller(QObject):
             panel.seek_asked.connect(self.performance.seek)
             panel.pluck_asked.connect(self.pluck)
             panel.strike_asked.connect(self.strike)
-            panel.told.connect(window.notices.tell)
+            panel.reported.connect(window.notices.report)
         self.presets.browser.played.connect(lambda name: self.pluck())
-        self.presets.told.connect(window.notices.tell)
+        self.presets.reported.connect(window.notices.report)
         window.file_dropped.connect(lambda path: self.take_file(Path(path)))
         window.transport.slots.set_entries(self.library.entries)
         self.library.changed.connect(lambda: window.transport.slots.set_entries(self.library.entries))
@@ -254,7 +254,7 @@ class Controller(QObject):
         draggable: list[StringView | DrumView | Knob] = [*views, *window.transport.knobs.values()]
         for dragged in draggable:
             dragged.drag_started.connect(history.hold)
-            dragged.drag_ended.connect(history.let_go)
+            dragged.drag_ended.connect(history.release_all)
 
     def _change(self, field: str, value: object) -> None:
         try:
@@ -262,7 +262,7 @@ class Controller(QObject):
         except ValueError as error:
             self._choices_shown(frozenset({field}))
             if not isinstance(value, float):  # else a knob at its end, which asks for slightly more than the bound
-                self.window.notices.tell(str(error))
+                self.window.notices.report(str(error))
 
     # Intents
 
@@ -309,18 +309,18 @@ class Controller(QObject):
         """Opens the ABX test of the chosen pluck; until it is closed nothing else plays."""
         entry = self.entry
         if self.session.choices.drums is not None:
-            self.window.notices.tell(
+            self.window.notices.report(
                 "The listening test compares model and truth of a plucked string, and drums are played: choose an "
                 "instrument of strings first. The slots A and B compare drums while you play."
             )
             return
         if entry is None:
-            self.window.notices.tell("The listening test needs a preset that can be plucked: choose one first.")
+            self.window.notices.report("The listening test needs a preset that can be plucked: choose one first.")
             return
         try:
             material = material_of(entry, self.session.choices)
         except PresetError as error:
-            self.window.notices.tell(str(error))
+            self.window.notices.report(str(error))
             return
         self.performance.stop()
         render = partial(self.performance.render_sound, self.session.choices)
@@ -367,7 +367,7 @@ class Controller(QObject):
         if dropped.body:
             self.patches.take_body(dropped.body)
         if notice:
-            self.window.notices.tell(notice)
+            self.window.notices.report(notice)
 
     def _ask_what_it_is(self, file: Path) -> None:
         """String or body? One dialog at a time: a further file takes its place."""
@@ -390,7 +390,7 @@ class Controller(QObject):
         self.library.refresh()
         self.patches.reload()
         self.patches.take_file(kept.patch)
-        self.window.notices.tell(f"{kept.patch.stem}: learned. Its report: {kept.report}")
+        self.window.notices.report(f"{kept.patch.stem}: learned. Its report: {kept.report}")
 
     @property
     def entry(self) -> PresetEntry | None:

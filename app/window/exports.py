@@ -15,7 +15,7 @@ from app.export.played import PlayedExport
 from app.export.sampled.choices import SampledChoices
 from app.export.sound import Through
 from app.patches.patch import Patch
-from app.playing.keyboard import Reach
+from app.playing.keyboard import PluckRange
 from app.presets.library import Library, PresetEntry
 from app.presets.words import shape_word
 from app.session.choices import Choices, Session
@@ -30,13 +30,13 @@ HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", 
 
 
 class Exports(QObject):
-    """Lives as long as the window; `told` has notices for the user.
+    """Lives as long as the window; `reported` has notices for the user.
 
     Args:
         through: what the present instrument adds to a string of `Choices`; None: nothing.
     """
 
-    told = Signal(str)
+    reported = Signal(str)
 
     def __init__(
         self,
@@ -66,7 +66,7 @@ class Exports(QObject):
         if kind == "note" and drums:  # of a drum
             kind = "sampler" if subjects["performance"] is None else "performance"
         if subjects[kind] is None:
-            self.told.emit(PAGES[kind].missing)
+            self.reported.emit(PAGES[kind].missing)
             return
         if self.dialog is None:
             self.dialog = ExportDialog(*self._choices, self._window)
@@ -145,7 +145,7 @@ def heard_note(choices: Choices, library: Library, through: Through | None) -> H
 def _name(choices: Choices, entry: PresetEntry) -> str:
     """For a file: of the instrument whose key was played, else of the preset."""
     string = entry.info.string if choices.string is None else choices.string.parameters
-    title, amplitudes_mm = entry.info.title, Reach.of(entry.info).amplitude_mm
+    title, amplitudes_mm = entry.info.title, PluckRange.of(entry.info).amplitude_mm
     if isinstance(choices.instrument, Patch):
         pluck = choices.instrument.pluck
         title, amplitudes_mm = choices.instrument.name, (pluck.softest_mm, pluck.hardest_mm)

@@ -14,17 +14,17 @@ UNEXPECTED = "An unexpected error. Sound and picture may continue; if they do no
 class Faults(QObject):
     """`tell` may be called from any thread."""
 
-    _told = Signal(str, str)
+    _reported = Signal(str, str)
 
     def __init__(self, window: QWidget) -> None:
         super().__init__(window)
         self._window = window
         self.dialog: FaultDialog | None = None
-        self._told.connect(self._show, Qt.ConnectionType.QueuedConnection)
+        self._reported.connect(self._show, Qt.ConnectionType.QueuedConnection)
 
-    def tell(self, text: str, heading: str = UNEXPECTED) -> None:
+    def report(self, text: str, heading: str = UNEXPECTED) -> None:
         """Shows an error in the dialog; `heading` is that of the first one."""
-        self._told.emit(text, heading)
+        self._reported.emit(text, heading)
 
     def _show(self, text: str, heading: str) -> None:
         if self.dialog is None:

@@ -14,7 +14,7 @@ from app.patches.instrument import SingleString
 from app.patches.patch import PhysicalString
 from app.playing.due import Due
 from app.playing.key_note import KeyNote
-from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, Reach, place_of, semitone_of, turn
+from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, PluckRange, place_of, semitone_of, turn
 from app.playing.midi import MidiChoices
 from app.playing.note import Note
 from app.presets.library import Library
@@ -44,7 +44,7 @@ class Instruments(QObject):
     """
 
     played = Signal()  # a note has begun, and the session has its values
-    told = Signal(str)  # an error, for the user
+    reported = Signal(str)  # an error, for the user
 
     _begun = Signal()  # emitted in any thread
 
@@ -64,7 +64,7 @@ class Instruments(QObject):
         self._handle, self._play_preset, self._look = handle, play_preset, look
         self.latest_key: tuple[int, int | None] | None = None
         self._lock = threading.Lock()
-        self._told: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
+        self._reported: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
         self.latest: Note | KeyNote | None = None
         self._unknown: KeyNote | None = None  # the latest, which the player has not reported yet
         self._look_timer = QTimer(self, interval=LOOK_MS)
@@ -76,7 +76,7 @@ class Instruments(QObject):
         self._keys.released.connect(self._release)
         self.midi = MidiControl(midi, self.play, self._play_note, self)
         self.midi.performed.connect(lambda changes: session.update(**changes))
-        self.midi.told.connect(self.told)
+        self.midi.reported.connect(self.reported)
 
     def start(self) -> None:
         """Opens the remembered MIDI input, if any."""
@@ -87,10 +87,10 @@ class Instruments(QObject):
         self.midi.close()
 
     @property
-    def reach(self) -> Reach:
+    def reach(self) -> PluckRange:
         """The positions and amplitudes that keys pluck with: what the preset was trained on."""
         entry = self._library.find(self._session.choices.preset)
-        return Reach.of(entry.info if entry else None)
+        return PluckRange.of(entry.info if entry else None)
 
     def choices_changed(self) -> None:
         self._keys.piano = self._session.choices.plays_patch
@@ -114,7 +114,7 @@ class Instruments(QObject):
         string = string_of(request.preset)
         shown = {"string": None if string is None else PhysicalString(**asdict(string)), **asdict(request.pluck)}
         with self._lock:
-            self._told |= shown
+            self._reported |= shown
 
     @property
     def drum_key(self) -> int | None:
@@ -151,7 +151,7 @@ class Instruments(QObject):
             pluck = replace(pluck, amplitude_mm=reach.amplitude_of(event.velocity))
             self._play_preset(name)
             with self._lock:
-                self._told |= {"instrument": SingleString(preset=name)}
+                self._reported |= {"instrument": SingleString(preset=name)}
         self.play(PluckAt(pluck))
 
     def _look_at_key(self) -> None:
@@ -177,10 +177,10 @@ class Instruments(QObject):
             self._look_timer.start()
             self._look_at_key()
         with self._lock:
-            told = self._told
-            self._told = {}
-        if told:
-            self._session.play(**told)
+            reported = self._reported
+            self._reported = {}
+        if reported:
+            self._session.play(**reported)
             self.played.emit()
 
     def _press(self, press: KeyPress) -> None:

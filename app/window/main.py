@@ -103,7 +103,7 @@ class _Start(QObject):
             self._failed(error)
             return
         if self._notice:
-            self._window.notices.tell(self._notice)
+            self._window.notices.report(self._notice)
         self._alive(self._controller)
         self._patience_s = time.monotonic() + PATIENCE_S
         self._follow_up()
@@ -125,7 +125,7 @@ class _Start(QObject):
         """Shows the error in a dialog; the window stays until its user closes it."""
         collect_anywhere()
         self._window.show_failed()
-        self._faults.tell(log_fault(error, "while the engine was loaded"), CANNOT_START)
+        self._faults.report(log_fault(error, "while the engine was loaded"), CANNOT_START)
 
 
 def load_engine() -> None:
@@ -183,7 +183,7 @@ def run(
     window.restore_geometry(settings.window_geometry)
     faults = Faults(window)
     start = _Start(window, settings, path, notice, alive, faults, files)
-    with crashes_written(), faults_logged(faults.tell):
+    with crashes_written(), faults_logged(faults.report):
         watch(window)
         window.show()
         status = application.exec()

@@ -58,7 +58,7 @@ WIDE, HIGH = (
     1100,
     560,
 )  # pixels: a narrower window hides brand, keys and ABX button; a lower the preset's facts
-ROOMY, TIGHT = 1240, 900  # pixels: in a narrower window the controls are compact, and more so
+COMPACT_BELOW_PX, TIGHT = 1240, 900  # pixels: in a narrower window the controls are compact, and more so
 ALL_HIGH = 640  # pixels: a lower window shows the instrument instead of the views
 KNOBS_HIGH, AIRY = (
     610,
@@ -396,7 +396,7 @@ class MainWindow(QMainWindow):
     def _fit(self) -> None:
         self._share_width()
         self._share_height()
-        narrow, low = self._wide < ROOMY, self._high < AIRY
+        narrow, low = self._wide < COMPACT_BELOW_PX, self._high < AIRY
         self.transport.set_compact(narrow, self._wide < TIGHT and self.face == "lab")
         self._head.setSpacing(6 if narrow else 10)
         aside, above = 8 if narrow else 14, 6 if low else 12

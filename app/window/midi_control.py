@@ -32,7 +32,7 @@ class MidiControl(QObject):
     """
 
     performed = Signal(dict)  # new values for `Choices.changed`, by a controller or the dialog
-    told = Signal(str)  # an error, for the user
+    reported = Signal(str)  # an error, for the user
     _received = Signal(object)  # emitted in the input's thread
 
     def __init__(
@@ -53,12 +53,12 @@ class MidiControl(QObject):
         self.input = MidiInput(self._receive, load, handle)
 
     def start(self) -> None:
-        """Opens the remembered input, if any; emits `told` where it cannot."""
+        """Opens the remembered input, if any; emits `reported` where it cannot."""
         if self.choices.port:
             try:
                 self.input.open(self.choices.port)
             except MidiUnavailable as error:
-                self.told.emit(str(error))
+                self.reported.emit(str(error))
 
     def close(self) -> None:
         self.input.close()
@@ -126,7 +126,7 @@ class MidiControl(QObject):
             self._dialog.show_problem(problem)
 
     def _choose_notes(self, mode: str) -> None:
-        self.input.let_go()  # releases of what is held would no longer be played
+        self.input.release_all()  # releases of what is held would no longer be played
         self._remember(self.choices.model_copy(update={"notes": mode}))
 
     def _learn(self, field: str) -> None:
@@ -169,6 +169,6 @@ class MidiControl(QObject):
             self._remember(self.choices.learned(field, event.number))
             if self._dialog is not None:
                 self._dialog.show_problem("")
-            self.input.let_go()  # it may be the modulation wheel, whose way back would no longer be played
+            self.input.release_all()  # it may be the modulation wheel, whose way back would no longer be played
         if changes := turns_of(event, self.choices, self._patch):
             self.performed.emit(changes)

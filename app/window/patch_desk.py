@@ -56,7 +56,7 @@ from engine.result_file import WriteError
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
-NOTE_TOLD_AFTER_MS = 150
+NOTE_REPORTED_AFTER_MS = 150
 MANY_STRINGS = "studio_any_string"
 C_OF_OCTAVE_0 = LOWEST_C // 12 - 1  # C3 is the lowest of the computer's keys at octave 0
 NO_PATCH = "The computer's keys pluck the chosen preset at ten places; choose an instrument to play pitches"
@@ -73,7 +73,7 @@ class PatchDesk(QObject):
         recordings: of what is played.
     """
 
-    told = Signal(str)  # an error, for the user
+    reported = Signal(str)  # an error, for the user
     informed = Signal(str)  # what went well
     outside_changed = Signal(str)  # what of the latest note lies outside the training; "": nothing
 
@@ -100,16 +100,16 @@ class PatchDesk(QObject):
             own_patches,
             favourites,
         )
-        self.desk.told.connect(self.told)
+        self.desk.reported.connect(self.reported)
         self._shown_s = 0.0
         self._noted: Patch | None = None  # the patch, when the note in the bar was judged last
-        self._told_other = ""  # the source that a notice reported as not heard from keys
+        self._reported_other = ""  # the source that a notice reported as not heard from keys
         self._playback = Playback(instruments.play, performance.notes, performance.notes.cancel)
         self._song = Song(self._playback, strip)
-        self._note_timer = QTimer(self, interval=NOTE_TOLD_AFTER_MS, singleShot=True)
+        self._note_timer = QTimer(self, interval=NOTE_REPORTED_AFTER_MS, singleShot=True)
         self._note_timer.timeout.connect(self._show_latest_note)
         self.recordings = Recordings(session, performance.notes.keys, panel.bar, self)
-        self.recordings.told.connect(self.told)
+        self.recordings.reported.connect(self.reported)
         self.recordings.informed.connect(self.informed)
         self.reload()
         self._connect()
@@ -159,7 +159,7 @@ class PatchDesk(QObject):
             self.compare(False)
         self._entries, problems = list_patches()
         for problem in problems:
-            self.told.emit(problem)
+            self.reported.emit(problem)
         self._panel.bar.set_bodies(body_titles())
         self.desk.show()
         self._show_patch()
@@ -208,7 +208,7 @@ class PatchDesk(QObject):
         try:
             self.change(field, knob_for(patch, self._shown_key(patch), field, figure))
         except ValueError as error:
-            self.told.emit(one_line(str(error)))
+            self.reported.emit(one_line(str(error)))
 
     def save(self) -> None:
         """Saves the patch: under its name where it is the user's own, else asks for one."""
@@ -246,7 +246,7 @@ class PatchDesk(QObject):
         try:
             saved = save_patch(patch, replace)
         except WriteError as error:
-            self.told.emit(one_line(str(error)))
+            self.reported.emit(one_line(str(error)))
             return
         self.reload()
         self._session.update(patch=patch)
@@ -257,7 +257,7 @@ class PatchDesk(QObject):
         """Asks for a new name of one of the user's own patches, by default the present one."""
         entry = next((each for each in self._entries if each.name == name), self.entry)
         if entry is None or not entry.own:
-            self.told.emit("Only instruments of your own can be renamed: save this one first.")
+            self.reported.emit("Only instruments of your own can be renamed: save this one first.")
             return
         self._ask("Rename instrument", "New name:", entry.patch.name, lambda new: self._rename(entry, new))
 
@@ -266,7 +266,7 @@ class PatchDesk(QObject):
         try:
             renamed = rename_patch(entry, name)
         except WriteError as error:
-            self.told.emit(one_line(str(error)))
+            self.reported.emit(one_line(str(error)))
             return
         if entry.name in self.desk.favourites:
             self.desk.favourites ^= {entry.name, renamed.name}
@@ -283,7 +283,7 @@ class PatchDesk(QObject):
         try:
             entry.path.unlink()
         except OSError as error:
-            self.told.emit(f"{entry.path}: cannot be deleted ({error.strerror}).")
+            self.reported.emit(f"{entry.path}: cannot be deleted ({error.strerror}).")
         else:
             self.desk.favourites.discard(entry.name)
         self.reload()
@@ -311,7 +311,7 @@ class PatchDesk(QObject):
             else:
                 self._session.update(instrument=read_patch(file))
         except (MidiFileError, PatchError, PresetError, OSError, ValueError) as error:
-            self.told.emit(one_line(str(error)))
+            self.reported.emit(one_line(str(error)))
 
     def _play_file(self, file: Path) -> None:
         song = read_song(file, self.patch)
@@ -324,7 +324,7 @@ class PatchDesk(QObject):
         """Makes the string whose physical parameters the file has the instrument, by the model of many strings."""
         many = next((each for each in self._library.entries if each.name == MANY_STRINGS), None)
         if many is None:
-            self.told.emit(f"{file.name}: the preset {MANY_STRINGS}, which knows many strings, was not found.")
+            self.reported.emit(f"{file.name}: the preset {MANY_STRINGS}, which knows many strings, was not found.")
             return
         string, preset = read_string(file), load_preset(many.path)
         try:
@@ -340,7 +340,7 @@ class PatchDesk(QObject):
         """Tunes the patch by a Scala file. Where scale and mapping do not fit each other, the new one stays."""
         patch, text = self.patch, read_scala(file)
         if patch is None:
-            self.told.emit(f"{file.name} tunes an instrument, and none is chosen; choose one first.")
+            self.reported.emit(f"{file.name} tunes an instrument, and none is chosen; choose one first.")
             return
         field, other = ("keymap", "scale") if file.suffix.lower() == ".kbm" else ("scale", "keymap")
         tuned, left_out = {**dict(patch.tuning), field: text}, ""
@@ -396,7 +396,7 @@ class PatchDesk(QObject):
             self._panel.show_keys_play("pitch" if pitches else "place", choices.patch is not None)
             self._panel.show_letters(letters_of(choices.octave) if pitches else {})
         if names & {"instrument", "patch"}:
-            self._judge_anew()
+            self._judge_again()
         if names & {"instrument", "patch", *Monitor.model_fields}:
             self._show_source()
 
@@ -423,22 +423,22 @@ class PatchDesk(QObject):
         """In whose colour keys are lit; says once that keys do not play another preset which a slot holds."""
         choices, heard = self._session.choices, self._session.choices.source_heard
         other = heard if choices.plays_patch and other_preset(heard) else ""
-        if self._told_other not in (choices.a, choices.b):
-            self._told_other = ""
+        if self._reported_other not in (choices.a, choices.b):
+            self._reported_other = ""
         self._panel.show_source("model" if other else heard)
-        if other and other != self._told_other:
+        if other and other != self._reported_other:
             self.informed.emit(
                 f"Keys sound with the model of their instrument, not with {source_title(other, self._library)}: that "
                 "preset is heard when you pluck the string by hand, or where keys choose the place."
             )
-            self._told_other = other
+            self._reported_other = other
 
     def show_played(self) -> None:
         """Says soon in the bar what of the latest note, which the session knows by now, lies outside the training."""
         if not self._note_timer.isActive():  # of a chord, of fast notes, or of a knob, once: it takes milliseconds
             self._note_timer.start()
 
-    def _judge_anew(self) -> None:
+    def _judge_again(self) -> None:
         """Says soon what of the latest note lies outside the training with the knobs as they are now.
 
         Another patch, or keys that choose places, leave nothing to say.

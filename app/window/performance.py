@@ -21,7 +21,7 @@ from app.instrument.events import PluckAt
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
-from app.playing.keyboard import Reach
+from app.playing.keyboard import PluckRange
 from app.playing.note import Note
 from app.playing.notes import Notes
 from app.playing.sources import Sources
@@ -72,7 +72,7 @@ class Performance(QObject):
         mail.finished.connect(self._take_finished)
         mail.other_refused.connect(self._other_refused)
         mail.failed.connect(self._render_failed)
-        mail.refused.connect(self._window.notices.tell)
+        mail.refused.connect(self._window.notices.report)
         self._sources = Sources()
         self.notes = Notes(sound, self._sources, library.find, mail.refused.emit, sound.set_effects)
         self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable)
@@ -213,7 +213,7 @@ class Performance(QObject):
         elif names & {"instrument", "patch"}:
             self._blows.forget()
         if names & PLACED and not (choices.plays_patch or entry is None or asked is None):
-            plucks = [replace(asked.pluck, position=place) for place in Reach.of(entry.info).row]
+            plucks = [replace(asked.pluck, position=place) for place in PluckRange.of(entry.info).row]
             self.notes.prepare_plucks(asked.preset, plucks)
         if "loop" in names and not choices.loop:
             self._forget_turn()
@@ -332,7 +332,7 @@ class Performance(QObject):
         for panel in self._panels:
             panel.take_finished(take, errors)
         if reason := why_ran_away(take):
-            self._window.notices.tell(reason)
+            self._window.notices.report(reason)
         windows = errors.windows(take.picture_hz, (0.0, take.info.horizon_s, max(take.seconds, take.info.horizon_s)))
         places = ("in the training range", "beyond")
         parts = [f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, places, strict=False)]
@@ -352,11 +352,11 @@ class Performance(QObject):
             self._tell(f"Error of this blow: {percent(math.sqrt(take.errors.rel_mse))} over the drum")
 
     def _other_refused(self, preset: str, message: str) -> None:
-        self._window.notices.tell(f"{preset} cannot be heard beside this preset: {message}")
+        self._window.notices.report(f"{preset} cannot be heard beside this preset: {message}")
 
     def _render_failed(self, message: str, detail: str) -> None:
         self._tell("")
-        self._window.notices.tell(message, detail)
+        self._window.notices.report(message, detail)
 
     # Helpers
 

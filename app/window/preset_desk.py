@@ -62,4 +62,4 @@ class PresetDesk(BrowserDesk):
     def _reload(self) -> None:
         """Reads the folders again: the user may have added files."""
         for problem in self._library.refresh():
-            self.told.emit(problem)
+            self.reported.emit(problem)

@@ -22,7 +22,7 @@ class Recordings(QObject):
     A recording is kept until it is written or discarded; while one is, no other begins.
     """
 
-    told = Signal(str)  # an error, for the user
+    reported = Signal(str)  # an error, for the user
     informed = Signal(str)  # what went well
     save_asked = Signal()  # of the latest one
     unsaved_changed = Signal()

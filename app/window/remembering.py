@@ -15,7 +15,7 @@ LOOK_EVERY_MS = 1_000
 LOCK_S = 2.0  # waited for another instance that is saving
 
 
-class Keeper(QObject):
+class SettingsSaver(QObject):
     """Looks at the settings each second, and writes them when they have changed and then stayed for one look.
 
     Only fields that this instance has changed are written over those of the file, which another one may have changed.
@@ -31,7 +31,7 @@ class Keeper(QObject):
         self._path, self._current = path, current
         self._base = self._seen = read
         self._writing: threading.Thread | None = None
-        self._told = False
+        self._reported = False
         self._timer = QTimer(self, interval=LOOK_EVERY_MS)
         self._timer.timeout.connect(self.look)
         self._timer.start()
@@ -62,6 +62,6 @@ class Keeper(QObject):
                 save_settings(self._path, now if theirs is None else merged(base, now, theirs))
             self._base = now  # not where it failed: it is tried again
         except OSError as error:
-            if not self._told:  # once: it would come again with every change
-                self._told = True
+            if not self._reported:  # once: it would come again with every change
+                self._reported = True
                 self.failed.emit(f"The settings {self._path} cannot be written ({error.strerror or error}).")

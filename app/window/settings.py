@@ -74,8 +74,8 @@ def load_settings(path: Path) -> tuple[Settings, str]:
     except FileNotFoundError:
         return Settings(), ""
     except OSError as error:
-        told = error.strerror or error
-        return Settings(), one_line(f"The settings {path} cannot be read ({told}); starting with defaults.")
+        reported = error.strerror or error
+        return Settings(), one_line(f"The settings {path} cannot be read ({reported}); starting with defaults.")
     try:
         return _parsed(text), ""
     except (ValueError, OverflowError) as error:  # the latter of integers where numbers belong
@@ -89,11 +89,11 @@ def load_settings(path: Path) -> tuple[Settings, str]:
             faults = error.errors(include_url=False, include_input=False)
             why = f"{'.'.join(map(str, faults[0]['loc'])) or 'the file'}: {faults[0]['msg']}"
             kept = _usable(text)
-        told = (
+        reported = (
             f"{'Some' if kept else 'The'} settings were not usable ({why}) and have their defaults "
             f"again; the file was set aside as {aside}."
         )
-        return kept or Settings(), one_line(told)
+        return kept or Settings(), one_line(reported)
 
 
 def read_settings(path: Path) -> Settings | None:

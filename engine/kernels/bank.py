@@ -82,10 +82,10 @@ def higher_orders(program: np.ndarray, energy: np.ndarray, out: np.ndarray, scra
     omega = program[whole[at.O_OMEGA] :]
     out[: 2 * n] = 0.0
     units = program[whole[at.O_ENERGY_UNITS] :]
-    told = 0.0
+    reported = 0.0
     for m in range(n):
-        told += units[m] * energy[m]
-    if told < 1e-12:
+        reported += units[m] * energy[m]
+    if reported < 1e-12:
         return
     layers = whole[at.P_LAYERS]
     if layers > 0:
@@ -116,7 +116,7 @@ def higher_orders(program: np.ndarray, energy: np.ndarray, out: np.ndarray, scra
                     values[o] = x / (np.float32(1) + np.float32(_exp(-float(x))))
             else:
                 at_zero, rate_units = program[whole[at.O_AT_ZERO] :], program[whole[at.O_RATE_UNITS] :]
-                factor = told if whole[at.P_SECOND_ORDER] else 1.0
+                factor = reported if whole[at.P_SECOND_ORDER] else 1.0
                 for o in range(2 * n):
                     out[o] = (results[o] - at_zero[o]) * rate_units[o] * factor
     if whole[at.P_ADIABATIC]:
@@ -166,7 +166,7 @@ def strike(voice: np.ndarray, program: np.ndarray, scratch: np.ndarray) -> None:
     counts[at.SEGMENT_VALID] = 0
     counts[at.MODULATED] = whole[at.P_MODULATION]
     counts[at.REFRESH] = 0
-    counts[at.ALIVE] = n
+    counts[at.AUDIBLE_COUNT] = n
     if whole[at.P_HIGHER]:
         _integrate_from(voice, program, 0, scratch)
 
@@ -259,7 +259,7 @@ def _move(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray, 
     coupling, largest = program[whole[at.O_COUPLING] :], program[whole[at.O_LARGEST] :]
     start = voice[rows + at.ENERGY_0 * n :]
     constant = voice[rows + at.CONSTANT * n :]
-    alive = counts[at.ALIVE]
+    alive = counts[at.AUDIBLE_COUNT]
     f, integral = scratch[: 2 * n], scratch[2 * at.MOST_MODES : 2 * at.MOST_MODES + 2 * n]
     if whole[at.P_HIGHER]:
         spacing = program[at.P_SPACING]
@@ -329,7 +329,7 @@ def generate(
         if not counts[at.SEGMENT_VALID]:
             _keep_end(voice, program, first * ratio, scratch)
         for begin in range(0, at.QUANTUM, length):
-            _segment(voice, program, first + begin, length, counts[at.ALIVE], z[begin * 2 * n :], scratch)
+            _segment(voice, program, first + begin, length, counts[at.AUDIBLE_COUNT], z[begin * 2 * n :], scratch)
         if counts[at.MODULATED]:
             if counts[at.REFRESH] == 0:
                 _look(voice, program, z, scratch)
@@ -338,13 +338,17 @@ def generate(
         modulated = counts[at.MODULATED] and counts[at.ROWS] > 0
         for which in range(2 if fading else 1):
             for point in range(points):
-                _sum(voice, n, counts[at.ALIVE], which, point, z, out[2 * which + point], scratch)
+                _sum(voice, n, counts[at.AUDIBLE_COUNT], which, point, z, out[2 * which + point], scratch)
         if modulated:
             _modulate(voice, program, z, fading, points, out, scratch)
     else:
         counts[at.SEGMENT_VALID] = 0
     counts[at.GENERATED] = first + at.QUANTUM
-    loudest, alive, was_alive = -1e9, 1, counts[at.ALIVE]  # beyond it there is no level: what is dead stays so
+    loudest, alive, was_alive = (
+        -1e9,
+        1,
+        counts[at.AUDIBLE_COUNT],
+    )  # beyond it there is no level: what is dead stays so
     sigma = program[whole[at.O_SIGMA] :]
     time = (first + at.QUANTUM) * ratio
     for m in range(n):
@@ -355,7 +359,7 @@ def generate(
         if level + program[at.P_LOUDNESS] > DEAD:
             alive = m + 1
     voice[at.LOUDNESS] = loudest + program[at.P_LOUDNESS]
-    counts[at.ALIVE] = alive
+    counts[at.AUDIBLE_COUNT] = alive
 
 
 @njit(**COMPILED)
@@ -478,7 +482,7 @@ def _look(voice: np.ndarray, program: np.ndarray, z: np.ndarray, scratch: np.nda
     whole = program.view(np.int64)
     counts = voice.view(np.int64)
     n = whole[at.P_MODES]
-    rows, alive = at.state(n), counts[at.ALIVE]
+    rows, alive = at.state(n), counts[at.AUDIBLE_COUNT]
     matrix, largest = program[whole[at.O_M] :], program[whole[at.O_M_LARGEST] :]
     squares, loud = (
         scratch[20 * at.MOST_MODES : 20 * at.MOST_MODES + n],
@@ -537,7 +541,7 @@ def _modulate(
     row_list, column_list = counts[rows + at.ROW_LIST * n :], counts[rows + at.COLUMN_LIST * n :]
     change, next_change = voice[rows + at.CHANGE * n :], voice[rows + (at.CHANGE + 1) * n :]
     squares = scratch[(at.SCRATCH_ROWS + 2 * quantum) * at.MOST_MODES :].view(np.float32)
-    alive, columns, rows_kept = counts[at.ALIVE], counts[at.COLUMNS], counts[at.ROWS]
+    alive, columns, rows_kept = counts[at.AUDIBLE_COUNT], counts[at.COLUMNS], counts[at.ROWS]
     while columns > 0 and column_list[columns - 1] >= alive:  # died since the lists, which ascend, were made
         columns -= 1
     while rows_kept > 0 and row_list[rows_kept - 1] >= alive:

@@ -37,12 +37,12 @@ def convolve(mixer: np.ndarray) -> None:
     whole = convolver.view(np.int64)
     mix = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2)
     heard = _clean(counts, mix)
-    if not whole[at.C_AWAKE] or whole[at.C_PHASE] == 0:
+    if not whole[at.C_ACTIVE] or whole[at.C_PHASE] == 0:
         _exchange(counts, whole)
     step, now = whole[at.C_STEP], counts[at.M_EFFECTS_NOW]
     if step < 0 and now == 0:
         return
-    if not whole[at.C_AWAKE]:
+    if not whole[at.C_ACTIVE]:
         if step < 0 and not heard:
             return
         _wake(convolver, whole)
@@ -56,7 +56,7 @@ def convolve(mixer: np.ndarray) -> None:
     _mix(convolver, whole, mix, now != 0, counts[at.M_EFFECTS_NEXT] != 0)
     whole[at.C_PHASE] = (whole[at.C_PHASE] + 1) % at.WINDOW_QUANTA
     if step < 0 and whole[at.C_QUIET] > tail:
-        whole[at.C_AWAKE] = 0
+        whole[at.C_ACTIVE] = 0
 
 
 @njit(**COMPILED)
@@ -95,8 +95,8 @@ def _exchange(counts: np.ndarray, whole: np.ndarray) -> None:
         return
     whole[at.C_STEP] = 0
     if now == 0:
-        whole[at.C_AWAKE] = 0  # the input up to now is not known
-    if counts[at.M_FRAMES] == 0 or (now != 0 and not whole[at.C_AWAKE]):
+        whole[at.C_ACTIVE] = 0  # the input up to now is not known
+    if counts[at.M_FRAMES] == 0 or (now != 0 and not whole[at.C_ACTIVE]):
         _take(counts, whole)
 
 
@@ -117,7 +117,7 @@ def _wake(convolver: np.ndarray, whole: np.ndarray) -> None:
     convolver[at.C_GIVEN : at.C_WET] = 0.0
     whole[at.C_PHASE] = whole[at.C_WINDOWS] = whole[at.C_QUIET] = 0
     whole[at.C_EARLY_FILLED] = whole[at.C_LATE_FILLED] = 0
-    whole[at.C_AWAKE] = 1
+    whole[at.C_ACTIVE] = 1
 
 
 @njit(**COMPILED)

@@ -66,12 +66,14 @@ COLUMNS = 35  # W latents that can be heard in others' modulation
 BEGIN_AT = 36  # W the mixer's frame at which it begins; in the past: with the next quantum
 RELEASE_AT = 37  # W the mixer's frame from which it fades out; 0: none
 LOOPED = 38  # W whether a rendered voice, of the device's own rate, begins again after its last sample
-ALIVE = 39  # W latents up to the last that can be heard
+AUDIBLE_COUNT = 39  # W latents up to the last that can be heard
 WARM = 40  # W quanta of its own displacement that a velocity voice has behind it, without one that was unheard
 RESONATOR = 41  # W address of the latest of these that are due; the kernel glides there
-TAKEN = 42  # W the one that it is gliding to, or has reached
+CURRENT_MODES = 42  # W the one that it is gliding to, or has reached
 GLIDE = 43  # W quanta left of the way
-BEFORE = 44  # W address of the voice that has the string until this one begins; 0: none has, or it is taken over
+PREVIOUS_VOICE = (
+    44  # W address of the voice that has the string until this one begins; 0: none has, or it is taken over
+)
 PREPARED = 45  # W whether the rows that follow from its modes are there
 STEPS = 46  # W nodes, or sub-steps, of a frame, for which they were made
 DECAY = 47  # R of the largest energy in a frame
@@ -83,7 +85,7 @@ ENDS_AT = 52  # W frames since the pluck, from which on it fades out whatever it
 ENDS_IN = 53  # W frames of that fade
 STOPS_IN = 54  # W frames of the fade in which it stops the voice before; 0: it is added to that motion
 LATE = 55  # W frames after the beginning of the mixer's quantum at which its own begins, below QUANTUM
-WISHES = 56  # W address of the first modes that it was to have; each names the next
+PENDING_MODES = 56  # W address of the first modes that it was to have; each names the next
 HEADER = 57
 
 
@@ -231,7 +233,7 @@ M_EFFECTS = 26  # W address of the impulse response that is wanted; 0: none
 M_EFFECTS_NOW = 27  # W of the one that is heard
 M_EFFECTS_NEXT = 28  # W of the one that is being faded to; 0: none is, or to none
 M_PLAYER = 29  # W address of the player whose events are played; 0: none
-M_HERE = 30  # W its own address
+M_ADDRESS = 30  # W its own address
 M_PLAYER_BEFORE = 31  # W address of the player before, whose notes ring on; 0: none
 M_VOICES = 32  # W addresses
 M_RING = M_VOICES + MOST_VOICES  # W addresses
@@ -264,7 +266,7 @@ I_HEADER = 4
 # Slots of a convolver: the input's spectra, and two lanes, of the response that is heard and of the next one
 C_CAPACITY = 0  # W late partitions, at most
 C_FADE_WINDOWS = 1  # W that a change of the response takes
-C_AWAKE = 2  # W whether there is any input, or an echo of it
+C_ACTIVE = 2  # W whether there is any input, or an echo of it
 C_QUIET = 3  # W quanta without input
 C_PHASE = 4  # W the quantum of its window
 C_WINDOWS = 5  # W that have begun since it woke

@@ -17,7 +17,7 @@ from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 
 CEILING = 10 ** (-0.3 / 20)
-BELIEVED = 100.0  # +40 dBFS: the level that is believed at most, so that one wild sample is soon forgotten
+LARGEST_LEVEL = 100.0  # +40 dBFS: the level that is believed at most, so that one wild sample is soon forgotten
 AHEAD, QUANTUM = at.AHEAD, at.QUANTUM
 _SIDE = AHEAD // 2 + 1  # frames of either average
 STEEPEST = 1 / _SIDE  # of the gain a frame, were it to fall to nothing
@@ -36,7 +36,7 @@ def limit(mixer: np.ndarray) -> None:
     for frame in range(QUANTUM):
         left, right = mix[frame, 0], mix[frame, 1]
         waiting[AHEAD + frame, 0], waiting[AHEAD + frame, 1] = left, right
-        peaks[AHEAD + frame] = min(max(abs(left), abs(right)), BELIEVED)
+        peaks[AHEAD + frame] = min(max(abs(left), abs(right)), LARGEST_LEVEL)
     if mixer[at.M_LIMITER] > CEILING or peaks.max() > CEILING or gains[:AHEAD].min() < 1.0:
         _reduce(mixer, mix, waiting, peaks, gains)
     else:

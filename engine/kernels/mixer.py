@@ -60,13 +60,13 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     if before == player:
         before = 0
     if before != 0:
-        play(before, counts[at.M_HERE])
+        play(before, counts[at.M_ADDRESS])
     if player != 0:
-        play(player, counts[at.M_HERE])
+        play(player, counts[at.M_ADDRESS])
     for place in range(counts[at.M_ACTIVE]):  # before any sounds on
         voice = carray(pointer(counts[at.M_VOICES + place]), (1 << 40,), np.float64)
         whole = voice.view(np.int64)
-        while whole[at.BEFORE] != 0 and whole[at.BEGIN_AT] < counts[at.M_FRAMES] + at.QUANTUM:
+        while whole[at.PREVIOUS_VOICE] != 0 and whole[at.BEGIN_AT] < counts[at.M_FRAMES] + at.QUANTUM:
             take_over(voice, counts[at.M_FRAMES], mixer[at.M_SCRATCH : at.MIXER_SLOTS])
     given_s = now_s + at.AHEAD / mixer[at.M_RATE] if counts[at.M_LIMITING] else now_s
     kept = 0
@@ -82,9 +82,9 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     fence()
     counts[at.M_ACTIVE] = kept
     if before != 0:
-        sympathise(before, counts[at.M_HERE])
+        sympathise(before, counts[at.M_ADDRESS])
     if player != 0:
-        sympathise(player, counts[at.M_HERE])
+        sympathise(player, counts[at.M_ADDRESS])
     convolve(mixer)
     _finish(mixer)
 

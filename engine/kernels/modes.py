@@ -37,7 +37,7 @@ def following(voice: np.ndarray, modes: int) -> np.ndarray:
 def gliding(voice: np.ndarray) -> bool:
     """Whether its modes are still to change."""
     counts = voice.view(np.int64)
-    return counts[at.RESONATOR] != counts[at.TAKEN] or counts[at.GLIDE] > 0
+    return counts[at.RESONATOR] != counts[at.CURRENT_MODES] or counts[at.GLIDE] > 0
 
 
 @njit(**COMPILED)
@@ -45,12 +45,12 @@ def glide(voice: np.ndarray) -> None:
     """A step towards the modes that it is to have."""
     counts = voice.view(np.int64)
     wanted = counts[at.RESONATOR]
-    if wanted != counts[at.TAKEN]:
+    if wanted != counts[at.CURRENT_MODES]:
         fence()
         counts[at.GLIDE] = max(1, carray(pointer(wanted), (at.B_HEADER,), np.int64)[at.B_QUANTA])
-        counts[at.TAKEN] = wanted
+        counts[at.CURRENT_MODES] = wanted
     n, left = counts[at.MODES], counts[at.GLIDE]
-    block = carray(pointer(counts[at.TAKEN]), (at.B_HEADER + 4 * n,), np.float64)
+    block = carray(pointer(counts[at.CURRENT_MODES]), (at.B_HEADER + 4 * n,), np.float64)
     present = at.state(n) + at.OMEGA_SQUARED * n
     for place in range(4 * n):
         voice[present + place] += (block[at.B_HEADER + place] - voice[present + place]) / left

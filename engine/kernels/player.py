@@ -542,7 +542,7 @@ def _release_note(player: np.ndarray, players: np.ndarray, note: int, seconds: f
 def _due(address: int, now: int) -> int:
     """The latest frame for which modes count with a voice's next quantum."""
     counts = _whole(address)
-    due, before = now + counts[at.LATE], counts[at.BEFORE]
+    due, before = now + counts[at.LATE], counts[at.PREVIOUS_VOICE]
     if counts[at.STATE] == at.WAITING:
         due = max(due, counts[at.BEGIN_AT])
         if before != 0 and counts[at.STOPS_IN] == 0 and _whole(before)[at.STATE] == at.SOUNDING:
@@ -566,8 +566,8 @@ def _wish(
     At most two are still to be reached: those that are due in this quantum, and those for the next.
     """
     counts, modes = _whole(address), players[of.PLAYER_MODES]
-    latest, taken, due = counts[at.RESONATOR], counts[at.TAKEN], _due(address, now)
-    first = counts[at.WISHES] if latest == 0 else _whole(latest)[at.B_NEXT]
+    latest, taken, due = counts[at.RESONATOR], counts[at.CURRENT_MODES], _due(address, now)
+    first = counts[at.PENDING_MODES] if latest == 0 else _whole(latest)[at.B_NEXT]
     tail, wished = 0, first
     while wished != 0:
         tail = wished
@@ -592,7 +592,7 @@ def _wish(
     elif found != tail and latest != 0:
         _whole(latest)[at.B_NEXT] = found
     elif found != tail:
-        counts[at.WISHES] = found
+        counts[at.PENDING_MODES] = found
     return (found - base) // 8 + at.B_HEADER
 
 
@@ -752,8 +752,8 @@ def _take_out(mixers: np.ndarray, address: int) -> None:
         if each != address:
             mixers[at.M_VOICES + kept] = each
             kept += 1
-            if _whole(each)[at.BEFORE] == address:
-                _whole(each)[at.BEFORE] = 0
+            if _whole(each)[at.PREVIOUS_VOICE] == address:
+                _whole(each)[at.PREVIOUS_VOICE] = 0
     mixers[at.M_ACTIVE] = kept
     fence()
     _whole(address)[at.STATE] = at.OVER
@@ -772,7 +772,7 @@ def _follow(player: np.ndarray, players: np.ndarray, tables: np.ndarray, note: i
             continue
         counts = _whole(address)
         moves = counts[at.KIND] in (at.TRUTH, at.TENSION) and _whole(other)[at.KIND] == counts[at.KIND]
-        counts[at.BEFORE] = other
+        counts[at.PREVIOUS_VOICE] = other
         counts[at.STOPS_IN] = stops if tables[of.TABLE_STOPS] != 0 or not moves else 0
 
 

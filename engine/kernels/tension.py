@@ -15,7 +15,7 @@ from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.modes import damped, following, glide, gliding, rest_above, row
 
-SPARE = 1.5  # of the energy at the start, as in the model
+ENERGY_BOUND = 1.5  # of the energy at the start, as in the model
 HARDEST_KICK, MOST_NODES = 0.3, 3  # as in the model
 NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller change is the last
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
@@ -235,7 +235,7 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
         y[m] = -(v[m] + sigmas[m] * q[m]) / omega
         energy += rows[7, m] * (square + y[m] * y[m])
         widest = max(widest, stretches[m] / rows[7, m])
-    largest = SPARE * (energy + 0.5 * tension * held)
+    largest = ENERGY_BOUND * (energy + 0.5 * tension * held)
     voice[at.LARGEST_ENERGY] = min(voice[at.LARGEST_ENERGY], largest) if bounded else largest
     voice[at.LARGEST_STRETCH] = voice[at.LARGEST_ENERGY] * widest
     moved, share = 0.0, 1.0

@@ -99,19 +99,19 @@ def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
     the voice before that one, which is left as what is to be taken over.
     """
     counts = voice.view(np.int64)
-    before = carray(pointer(counts[at.BEFORE]), (1 << 40,), np.float64)
+    before = carray(pointer(counts[at.PREVIOUS_VOICE]), (1 << 40,), np.float64)
     befores = before.view(np.int64)
     stops, waits, earlier = counts[at.STOPS_IN], befores[at.STATE] == at.WAITING, 0
     later = befores[at.BEGIN_AT] >= now + at.QUANTUM and befores[at.JOINS] == 0
     if waits and (later or stops > 0):
         _never_begin(before)
-        earlier = befores[at.BEFORE]
+        earlier = befores[at.PREVIOUS_VOICE]
     elif stops == 0:
         _join(voice, before, now, scratch)
     elif befores[at.RELEASE] == 0:
         befores[at.RELEASE] = stops
     fence()
-    counts[at.BEFORE] = earlier
+    counts[at.PREVIOUS_VOICE] = earlier
 
 
 @njit(inline="always", **COMPILED)
@@ -181,7 +181,7 @@ def _look_at_wishes(voice: np.ndarray, now: int) -> None:
     """Continues to the latest modes that are due. Wishes count in their order, and wait for those before them."""
     counts = voice.view(np.int64)
     latest = counts[at.RESONATOR]
-    wished = counts[at.WISHES] if latest == 0 else carray(pointer(latest), (at.B_HEADER,), np.int64)[at.B_NEXT]
+    wished = counts[at.PENDING_MODES] if latest == 0 else carray(pointer(latest), (at.B_HEADER,), np.int64)[at.B_NEXT]
     while wished != 0:
         fence()
         block = carray(pointer(wished), (at.B_HEADER,), np.int64)

@@ -332,12 +332,12 @@ class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
         """f(E) - K E of energies (..., state_size), float64 (..., 2 state_size)."""
         f = energies.new_zeros(*energies.shape[:-1], 2 * len(rates.omega))
         if self.g is not None:
-            told = energies * self.energy_units
+            reported = energies * self.energy_units
             dtype = self.K.dtype
-            network = self.g(told.to(dtype)) - self.g(told.new_zeros(told.shape[-1], dtype=dtype))
+            network = self.g(reported.to(dtype)) - self.g(reported.new_zeros(reported.shape[-1], dtype=dtype))
             f = network.double() * self._rate_units
             if self.configuration.second_order:
-                f = f * told.sum(-1, keepdim=True)
+                f = f * reported.sum(-1, keepdim=True)
         if self.configuration.adiabatic:
             n = len(rates.omega)
             turn = stiffening(energies, rates.omega, rates.coupling[:, n:])

@@ -55,7 +55,7 @@ from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_init
 from engine.models.configurations import KoopmanTensionConfiguration
 
 SERIES = 1 / 12  # r and p of small hω
-SPARE = 1.5  # of the energy at the start: more is not believed
+ENERGY_BOUND = 1.5  # of the energy at the start: more is not believed
 SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
 FRAMES_AT_ONCE = 4096
 HARDEST_KICK = 0.3  # of the root of Σ η²κ (q² + v²/ω²) as a string sets out: beyond it nodes come closer
@@ -180,7 +180,7 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         stretch = (self._stretch * q.square()).sum(-1)
         # 2 × the energy: of the linear string, and what the tension holds
         energy = (omega.square() * (x.square() + y.square())).sum(-1)
-        energy = SPARE * (energy + 0.5 * stretch * (self._coupling * q.square()).sum(-1))
+        energy = ENERGY_BOUND * (energy + 0.5 * stretch * (self._coupling * q.square()).sum(-1))
         largest_stretch = energy * (self._stretch / omega.square()).amax()
         return KoopmanTensionState(x, y, energy, largest_stretch)
 

@@ -58,7 +58,7 @@ class Mixer:
         self._players: list[tuple[CompiledPlayer, int]] = []  # whose memory may be in use, from which frame on
         memory[at.M_RATE] = rate_hz
         counts[at.M_CHANNELS], counts[at.M_LIMITING] = channels, limited
-        counts[at.M_HERE] = memory.ctypes.data
+        counts[at.M_ADDRESS] = memory.ctypes.data
         memory[at.M_WANTED_VOLUME] = memory[at.M_VOLUME] = memory[at.M_REDUCTION] = 1.0
         memory[at.M_GAINS : at.M_GAINS + at.AHEAD] = 1.0
         memory[at.M_RELEASE] = math.exp(-1 / (LIMITER_RELEASE_S * rate_hz))

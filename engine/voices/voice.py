@@ -206,7 +206,7 @@ class Voice:
         block = np.concatenate([np.zeros(at.B_HEADER), _rows(resonator)])
         own = block.view(np.int64)
         own[at.B_QUANTA], own[at.B_AT] = max(1, round(seconds * self.program.rate_hz / at.QUANTUM)), frame
-        taken = int(self._counts[at.TAKEN])
+        taken = int(self._counts[at.CURRENT_MODES])
         for place, each in enumerate(self._blocks):
             if int(each.ctypes.data) == taken:
                 del self._blocks[:place]
@@ -214,7 +214,7 @@ class Voice:
         if self._blocks:
             publish(self._blocks[-1].view(np.int64), at.B_NEXT, block.ctypes.data)
         else:
-            publish(self._counts, at.WISHES, block.ctypes.data)
+            publish(self._counts, at.PENDING_MODES, block.ctypes.data)
         self._blocks.append(block)
 
     def continues(self, before: Voice) -> None:
@@ -242,10 +242,10 @@ class Voice:
         """Keeps the voice before in memory until this one, which is the same string, has begun."""
         before._forget_before()
         self._before = before
-        self._counts[at.BEFORE] = before.address
+        self._counts[at.PREVIOUS_VOICE] = before.address
 
     def _forget_before(self) -> None:
-        if self._counts[at.BEFORE] == 0:
+        if self._counts[at.PREVIOUS_VOICE] == 0:
             self._before = None
 
     def append(self, samples: NDArray[np.floating]) -> None:

@@ -92,7 +92,7 @@ class Holes:
     heard_ms: float = field(metadata=target(0))
     longest_ms: float = field(metadata=target(0))
     heard_at_s: tuple[float, ...]
-    told: dict[str, int]
+    reported: dict[str, int]
     control: int
     control_ms: float
     late: int
@@ -196,7 +196,7 @@ def soak(seconds: float, seed: int, playing: bool, buffer: Buffer, report: Calla
     )
 
 
-def _holes(file: Path, tone: Path, playing: bool, told: Counter[str], late_ms: list[float]) -> Holes:
+def _holes(file: Path, tone: Path, playing: bool, reported: Counter[str], late_ms: list[float]) -> Holes:
     sound, control = (np.memmap(each, np.float32, "r", shape=(each.stat().st_size // 4,)) for each in (file, tone))
     found = [silence for silence in analysis.silences(sound, RATE_HZ) if playing or silence.sharp]
     lengths_ms = [1000 * silence.frames / RATE_HZ for silence in found]
@@ -207,7 +207,7 @@ def _holes(file: Path, tone: Path, playing: bool, told: Counter[str], late_ms: l
         sum(lengths_ms),
         max(lengths_ms, default=0.0),
         tuple(round(silence.start / RATE_HZ, 3) for silence in found),
-        dict(told),
+        dict(reported),
         len(controls_ms),
         sum(controls_ms),
         len(late_ms),

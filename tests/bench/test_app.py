@@ -9,7 +9,7 @@ from app.window.settings import Settings
 from tests.bench.start import Starts
 
 
-def test_bench_app_tells_every_figure_with_its_target(bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bench_app_reports_every_figure_with_its_target(bench, monkeypatch: pytest.MonkeyPatch) -> None:
     starts = Starts((1.0, 1.5, 1.2), (3.0, 3.3, 2.9))
     monkeypatch.setattr("tests.bench.app.measure_starts", lambda count, report: starts)
     for name, value in (("SETTLING_S", 0.1), ("SIZE", (900, 600)), ("PICTURE_S", 0.5)):

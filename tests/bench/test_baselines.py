@@ -108,15 +108,19 @@ def test_a_stopped_training_goes_on_as_if_it_had_not_been(
     path, minutes = checkpoint_file(tmp_path, name), 12 / 60
     with pytest.raises(Stopped):
         fit_baseline(name, SMALL, path, minutes, report=stop)
-    told: list[BaselineProgress] = []
-    fitted = fit_baseline(name, SMALL, path, minutes, report=told.append)
-    assert told[-1].share == 1
-    assert (fitted.steps, fitted.train, fitted.validation) == (told[-1].steps, told[-1].train, told[-1].validation)
+    reported: list[BaselineProgress] = []
+    fitted = fit_baseline(name, SMALL, path, minutes, report=reported.append)
+    assert reported[-1].share == 1
+    assert (fitted.steps, fitted.train, fitted.validation) == (
+        reported[-1].steps,
+        reported[-1].train,
+        reported[-1].validation,
+    )
     model = fitted.model.state_dict()
     other = checkpoint_file(tmp_path / "other", name)
     whole: list[BaselineProgress] = []
     uninterrupted = fit_baseline(name, SMALL, other, minutes, report=whole.append).model.state_dict()
-    assert [progress.steps for progress in told] == [progress.steps for progress in whole[1:]]
+    assert [progress.steps for progress in reported] == [progress.steps for progress in whole[1:]]
     kept, ended = trained_baseline(path), fit_baseline(name, SMALL, path, minutes, report=stop)
     for again in (kept, ended):
         assert (again.steps, again.train, again.validation) == (fitted.steps, fitted.train, fitted.validation)
@@ -168,9 +172,9 @@ def test_a_baseline_is_trained_and_measured(run, tmp_path: Path, monkeypatch: py
     assert (facts["baseline"], facts["minutes"]) == ("koopman_var", 0.01)
     assert facts["parameters"] == 156_259
     assert all(facts[name] > 0 for name in ("steps", "train", "validation"))
-    told = run(*words, *few[:-1]).out  # the training is at its end
-    assert told.startswith(f"koopman_var: 156,259 numbers, {facts['steps']:,} steps of 16 strings and 48 frames")
-    assert f"{number(facts['train'])} in training, {number(facts['validation'])} in validation" in told
+    reported = run(*words, *few[:-1]).out  # the training is at its end
+    assert reported.startswith(f"koopman_var: 156,259 numbers, {facts['steps']:,} steps of 16 strings and 48 frames")
+    assert f"{number(facts['train'])} in training, {number(facts['validation'])} in validation" in reported
     checkpoint = tmp_path / "family_koopman_var" / "checkpoint.safetensors"
     checkpoint.write_bytes(checkpoint.read_bytes()[:1000])
     failure = run(*words, *few).err

@@ -8,7 +8,7 @@ import pytest
 from tests.bench.printing import show, target
 
 
-def test_bench_solver_tells_cost_and_error(run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bench_solver_reports_cost_and_error(run, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tests.bench.solver.AUDIO_S", 0.005)
     found = json.loads(run("solver", "--json", "--batch", 2, "--steps", 20).out)
     assert [(case["initial"], case["rate_hz"]) for case in found["protocol"]] == [

@@ -5,7 +5,7 @@ import pytest
 from tests.bench import effects
 
 
-def test_bench_effects_tells_what_each_costs(bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bench_effects_reports_what_each_costs(bench, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (("SECONDS", 0.2), ("FILLING_S", 0.1), ("REPEATS", 1)):
         monkeypatch.setattr(effects, name, value)
     found = bench("effects")["effects"]

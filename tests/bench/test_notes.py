@@ -113,7 +113,7 @@ def test_faults_are_found(patch: Patch, piece: Piece) -> None:
     assert found.melody_cents < 0.05  # which has none of these
 
 
-def test_pitch_is_told_in_cents(patch: Patch, sound: NDArray[np.float32], piece: Piece) -> None:
+def test_pitch_is_reported_in_cents(patch: Patch, sound: NDArray[np.float32], piece: Piece) -> None:
     note = score.sounded(piece["melody"])[0]
     span = (note.pressed_s + hearing.ATTACK_S, note.released_s)
     hz = Tuning(patch.tuning).hz(note.key)

@@ -77,18 +77,18 @@ def test_the_recording_is_judged_by_who_played(tmp_path: Path) -> None:
     sound[19_000:20_000] *= np.linspace(1, 0, 1000, dtype=np.float32)
     sound[20_960:21_960] *= np.linspace(0, 1, 1000, dtype=np.float32)
     (tmp_path / "recording").write_bytes(sound.tobytes())
-    told, tone = Counter({"device": 1}), np.ones(48_000, np.float32)
+    reported, tone = Counter({"device": 1}), np.ones(48_000, np.float32)
     tone[30_000:30_096] = 0
     (tmp_path / "tone").write_bytes(tone.tobytes())
     files = (tmp_path / "recording", tmp_path / "tone")
-    playing, restless = (_holes(*files, playing, told, [3.5, 8.25]) for playing in (True, False))
+    playing, restless = (_holes(*files, playing, reported, [3.5, 8.25]) for playing in (True, False))
     assert (playing.control, playing.control_ms) == (1, 2.0)
     assert (playing.late, playing.latest_ms) == (2, 8.25)
     assert (playing.heard, restless.heard) == (2, 1)
     assert restless.heard_ms == pytest.approx(10, abs=0.1)
     assert playing.longest_ms == pytest.approx(20, abs=0.1)
     assert restless.a_minute == 60
-    assert restless.told == {"device": 1}
+    assert restless.reported == {"device": 1}
 
 
 def test_one_who_plays_is_weighed_at_the_end_of_each_minute(qtbot: QtBot) -> None:
@@ -134,8 +134,8 @@ def test_faults_are_collected_once_each_with_their_number() -> None:
             thread.join()
         qWarning("odd")
         warnings.warn("careful", stacklevel=1)
-    told = sorted(faults.items(), key=lambda fault: -fault[1])
-    assert told[0][1] == 2
-    assert "ArithmeticError: a slip" in told[0][0]
+    reported = sorted(faults.items(), key=lambda fault: -fault[1])
+    assert reported[0][1] == 2
+    assert "ArithmeticError: a slip" in reported[0][0]
     assert any(text == "Qt: odd" for text in faults)
     assert any("careful" in text for text in faults)

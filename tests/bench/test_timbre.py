@@ -44,7 +44,7 @@ def test_what_is_no_partial_is_found_at_its_level(hz: float, figure) -> None:
     assert figure(t.attack(other, FIRST_HZ), PARTIALS_HZ) == pytest.approx(10 * math.log10(0.01 / 1.26), abs=0.3)
 
 
-def test_two_decays_are_told_apart() -> None:
+def test_two_decays_are_reported_apart() -> None:
     sound = rung([1.0], 1.0) + 0.003 * rung([1.0], 6.0)
     assert t.t60_s(rung([1.0], 2.0), t.EARLY_S) == pytest.approx(2.0, rel=0.01)
     assert t.t60_s(sound, t.EARLY_S) == pytest.approx(1.02, rel=0.03)

@@ -39,8 +39,8 @@ def test_a_device_that_goes_and_comes_back_is_played_again(
     if "no key of the app was heard" in err:
         pytest.skip("ALSA does not play into PulseAudio here")
     assert status == 0, err + out
-    told = json.loads(out)
-    assert [loss["kind"] for loss in told["losses"]] == ["card", "server"]
-    assert told["in_time"] == 2
-    assert all(0 < loss["loudest"] <= 1 for loss in told["losses"])
-    assert told["ends_s"] is not None and told["alive"]
+    reported = json.loads(out)
+    assert [loss["kind"] for loss in reported["losses"]] == ["card", "server"]
+    assert reported["in_time"] == 2
+    assert all(0 < loss["loudest"] <= 1 for loss in reported["losses"])
+    assert reported["ends_s"] is not None and reported["alive"]

@@ -7,7 +7,7 @@ import pytest
 from tests.bench import voices
 
 
-def test_bench_voices_tells_costs_and_errors_of_every_studio_preset(bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bench_voices_reports_costs_and_errors_of_every_studio_preset(bench, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, value in (("EDGES_S", (0.0, 0.02, 0.04, 0.06)), ("REPEATS", 1), ("STRIKES", 2)):
         monkeypatch.setattr(voices, name, value)
     monkeypatch.setattr(voices, "ERROR_S", 0.05)

@@ -42,7 +42,7 @@ def test_the_truth_itself_has_no_errors_whatever_its_phase() -> None:
 
 
 @pytest.mark.parametrize("cents", (-40.0, -13.0, 3.0, 13.0))
-def test_a_detuned_string_is_told_in_cents_and_only_so(cents: float) -> None:
+def test_a_detuned_string_is_reported_in_cents_and_only_so(cents: float) -> None:
     found = errors(string(cents))
     assert found.pitch_cents == pytest.approx(cents, abs=0.1)
     assert found.split_cents is None
@@ -52,7 +52,7 @@ def test_a_detuned_string_is_told_in_cents_and_only_so(cents: float) -> None:
 
 
 @pytest.mark.parametrize("change_db", (-8.0, -2.0, 5.0))
-def test_a_level_that_changes_is_told_against_the_truths(change_db: float) -> None:
+def test_a_level_that_changes_is_reported_against_the_truths(change_db: float) -> None:
     found = errors(drifting(change_db) * string())
     assert found.level_db == pytest.approx(change_db, abs=0.01)
     assert found.pitch_cents == pytest.approx(0, abs=0.05)
@@ -64,13 +64,13 @@ def test_a_model_that_is_louder_throughout_does_not_grow() -> None:
     assert errors(2 * string()).level_db == pytest.approx(0, abs=1e-9)
 
 
-def test_a_model_whose_own_level_rises_is_told_by_how_much() -> None:
+def test_a_model_whose_own_level_rises_is_reported_by_how_much() -> None:
     assert errors(drifting(5) * string(decay_db_s=0)).rise_db == pytest.approx(5, abs=0.01)
     assert errors(drifting(5) * string()).rise_db == 0
 
 
 @pytest.mark.parametrize("cents", (6.0, 22.0, 40.0))
-def test_two_pitches_where_the_truth_has_one_are_told_with_their_distance(cents: float) -> None:
+def test_two_pitches_where_the_truth_has_one_are_reported_with_their_distance(cents: float) -> None:
     found = errors(string() + 0.5 * string(cents))
     assert found.split_cents == pytest.approx(cents, abs=0.5)
     assert found.pitch_cents == pytest.approx(0, abs=0.5)

@@ -74,8 +74,8 @@ def test_a_hostile_description_is_refused_in_one_line(preset_file: Path, kind: s
     for reader in (read_info, load_preset):
         with pytest.raises(PresetError, match=message) as caught:
             reader(path)
-        told = str(caught.value)
-        assert str(path) in told and len(told) <= 500 and told.isprintable()
+        reported = str(caught.value)
+        assert str(path) in reported and len(reported) <= 500 and reported.isprintable()
 
 
 @pytest.mark.parametrize(("model", "field"), [("frnn", "depth"), ("lru", "layers"), ("dmd", "lags")])

@@ -79,7 +79,7 @@ def test_the_level_alone_is_exact() -> None:
 
 
 @pytest.mark.parametrize("cycles", [-0.4, -0.25, 0.125, 0.45])
-def test_a_phase_is_told_with_its_sign_below_and_above_half_the_rate(cycles: float) -> None:
+def test_a_phase_is_reported_with_its_sign_below_and_above_half_the_rate(cycles: float) -> None:
     time_s, hz, sigma = ten_modes(0.5)
     truth = partial(time_s, hz, sigma)
     found = errors(partial(time_s, hz, sigma, cycles=0.1 + cycles).real, truth, (0, 0.5))
@@ -95,7 +95,7 @@ def test_a_flat_partial_above_half_the_rate_has_negative_cents() -> None:
     assert (found.phase_cycles[0, 0, RESOLVED] < 0).all()
 
 
-def test_a_glide_is_told_of_truth_and_prediction() -> None:
+def test_a_glide_is_reported_of_truth_and_prediction() -> None:
     """Frequencies that fall in a straight line, the prediction's further: between the thirds' middles two thirds."""
     time_s, hz, sigma = ten_modes(1)
 
@@ -129,7 +129,7 @@ def test_what_lies_below_the_floor_is_absent() -> None:
     assert found.by_mode(0)[2].trajectories == 0
 
 
-def test_a_mode_is_told_of_while_it_is_there() -> None:
+def test_a_mode_is_reported_of_while_it_is_there() -> None:
     time_s, hz, sigma = ten_modes(2)
     sigma[5] = 30.0  # 60 dB below the others, which lose 3 dB or so, after a quarter of a second
     truth = partial(time_s, hz, sigma)

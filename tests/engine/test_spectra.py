@@ -12,7 +12,7 @@ def sine(hz: float, samples: int = 4000, phase: float = 0.0) -> torch.Tensor:
     return torch.sin(2 * math.pi * hz * torch.arange(samples, dtype=torch.float64) / 4000 + phase)[None]
 
 
-def test_a_gain_is_told_exactly() -> None:
+def test_a_gain_is_reported_exactly() -> None:
     noise = torch.randn(3, 5000, generator=torch.Generator().manual_seed(0))
     convergence, log_db = spectral_distances(2 * noise, noise)
     assert convergence.tolist() == pytest.approx([1, 1, 1])

@@ -124,7 +124,7 @@ def attacked(
             attack(random.Random(f"{seed}:{name}:{number}"))
         except Exception as error:
             failures.append(f"{name} {seed}:{number}: {type(error).__name__}: {error}"[:600])
-    told = f"; {costs}" if costs else ""
-    print(f"\n{name}: refused or harmless {rounds - len(failures)} of {rounds} (seed {seed}){told}")
+    reported = f"; {costs}" if costs else ""
+    print(f"\n{name}: refused or harmless {rounds - len(failures)} of {rounds} (seed {seed}){reported}")
     assert not failures, "\n".join(failures[:20])
     assert costs is None or (costs.largest_mb or 0) <= MOST_MB, f"{name}: {costs}"

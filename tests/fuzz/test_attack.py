@@ -62,8 +62,8 @@ FRAMES = 32
 
 
 def in_one_line(error: Exception, path: Path) -> None:
-    told = str(error)
-    assert len(told) <= 500 and told.isprintable() and str(path) in told, told[:700]
+    reported = str(error)
+    assert len(reported) <= 500 and reported.isprintable() and str(path) in reported, reported[:700]
 
 
 def use(path: Path, costs: Costs) -> None:

@@ -159,7 +159,7 @@ def test_tables_of_nothing(text: str, tmp_path: Path) -> None:
     refused(read_rows, path, WriteError)
 
 
-def test_an_array_that_is_larger_than_its_file_tells(tmp_path: Path) -> None:
+def test_an_array_that_is_larger_than_its_file_reports(tmp_path: Path) -> None:
     path = tmp_path / "u0.npy"
     np.lib.format.open_memmap(path, "w+", np.uint8, (1, 2**33))  # it takes no place on the disk
 
@@ -211,18 +211,18 @@ def test_a_pipe_keeps_nobody_waiting(name: str, tmp_path: Path) -> None:
     read, error = PIPES[name]
     path = tmp_path / name
     os.mkfifo(path)
-    told: list[BaseException | object] = []
+    reported: list[BaseException | object] = []
 
     def attempt() -> None:
         try:
-            told.append(read(path))
+            reported.append(read(path))
         except BaseException as caught:
-            told.append(caught)
+            reported.append(caught)
 
     thread = threading.Thread(target=attempt, daemon=True)
     thread.start()
     thread.join(20)
-    assert told and isinstance(told[0], error), told
+    assert reported and isinstance(reported[0], error), reported
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes with names")
@@ -247,7 +247,7 @@ def test_a_folder_that_cannot_be_looked_into_hides_no_other(
     assert usable_files()
 
 
-def test_what_is_no_file_is_told(tmp_path: Path) -> None:
+def test_what_is_no_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(UnusableFile, match="ordinary"):
         read_bounded(tmp_path, 10)
     with pytest.raises(UnusableFile, match="name"):

@@ -53,8 +53,8 @@ def test_a_configuration_is_refused_by_file_and_field(kind: str, tmp_path: Path)
     path.write_bytes(text.encode("utf-8", "surrogateescape"))
     with pytest.raises(SchemaError, match=message) as caught:
         load(str(path))
-    told = str(caught.value)
-    assert str(path) in told and len(told) <= 500 and told.isprintable()
+    reported = str(caught.value)
+    assert str(path) in reported and len(reported) <= 500 and reported.isprintable()
 
 
 def test_a_plan_of_sixteen_million_cells_is_refused_before_one_is_made(
@@ -79,7 +79,7 @@ seeds = [{seeds}]
     assert str(path) in str(caught.value)
 
 
-def test_a_results_file_of_long_values_is_told_in_a_line(tmp_path: Path) -> None:
+def test_a_results_file_of_long_values_is_reported_in_a_line(tmp_path: Path) -> None:
     path = tmp_path / "results.csv"
     path.write_text("digest,rate_hz\nabc," + "x" * 100_000 + "\n")
     with pytest.raises(SchemaError, match="line 2, column rate_hz") as caught:

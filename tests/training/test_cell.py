@@ -96,7 +96,7 @@ def test_titles_do_not_enter_the_digest_but_the_seed_does() -> None:
         ("no_such_thing", "no training configuration 'no_such_thing'"),
     ],
 )
-def test_a_name_that_is_no_cell_is_told(name: str, words: str) -> None:
+def test_a_name_that_is_no_cell_is_reported(name: str, words: str) -> None:
     with pytest.raises(SchemaError, match=words):
         load(name)
 
@@ -109,7 +109,7 @@ def test_a_name_that_is_no_cell_is_told(name: str, words: str) -> None:
         ({"steps": 100}, {}, r"horizon must lie in 1 … 100, the data's steps, not 4000"),
     ],
 )
-def test_wrong_overrides_are_told(data: dict[str, int], recipe: dict[str, int], words: str) -> None:
+def test_wrong_overrides_are_reported(data: dict[str, int], recipe: dict[str, int], words: str) -> None:
     with pytest.raises(SchemaError, match=words):
         configuration_of(Cell("koopman", True, "noise", 4000), data, recipe)
 

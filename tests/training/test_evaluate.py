@@ -79,7 +79,7 @@ def test_the_truth_has_no_error_to_any_time(data: Dataset) -> None:
     assert model.training
 
 
-def test_a_gain_is_told(data: Dataset) -> None:
+def test_a_gain_is_reported(data: Dataset) -> None:
     model = Truth(data, gain=0.9)
     found = evaluate_past_horizon(model, data, "validation", 0.1)
     assert found.string.total().rel_mse == pytest.approx(0.01, rel=1e-4)
@@ -118,15 +118,17 @@ def test_any_splitting_into_blocks_gives_the_same_errors(data: Dataset) -> None:
 
 
 def test_some_trajectories_and_the_progress(data: Dataset) -> None:
-    told: list[float] = []
-    found = evaluate_past_horizon(Truth(data), data, "validation", 0.05, trajectories=slice(1), report=told.append)
+    reported: list[float] = []
+    found = evaluate_past_horizon(
+        Truth(data), data, "validation", 0.05, trajectories=slice(1), report=reported.append
+    )
     assert len(found.string.per_trajectory()[0]) == 1
     partials = evaluate_partials(
-        Truth(data), data, "validation", [(0, 0.05)], trajectories=slice(1), report=told.append
+        Truth(data), data, "validation", [(0, 0.05)], trajectories=slice(1), report=reported.append
     )
     assert partials.energy.shape == (1, 1, 10)
-    assert told.count(1.0) == 2
-    assert max(told) == 1
+    assert reported.count(1.0) == 2
+    assert max(reported) == 1
 
 
 def test_an_output_that_is_no_number_is_an_infinite_error(data: Dataset) -> None:

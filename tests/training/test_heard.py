@@ -13,7 +13,7 @@ import torch
 from engine.presets import Preset, load_preset, preset_digest
 from engine.sources import Runaway
 from training.heard import AMPLITUDES_MM, listen_to, standard_plucks
-from training.heard_file import COLUMNS, LARGEST_BYTES, METHOD, MOST_TOLD, NAME, Heard, add_heard, read_heard
+from training.heard_file import COLUMNS, LARGEST_BYTES, METHOD, MOST_REPORTED, NAME, Heard, add_heard, read_heard
 
 GOOD = Heard("good", "a" * 64, 4.0, 0.25, -0.5, 0.0, 13.0, 22.0, 3.2, METHOD, -66.0)
 HEAD = ",".join(COLUMNS)
@@ -118,9 +118,9 @@ def test_what_is_added_is_read_again_and_replaces_the_line_of_its_name(tmp_path:
     add_heard(tmp_path, [GOOD])
     add_heard(tmp_path, [other])
     assert read_heard(tmp_path) == ({GOOD.sha256: GOOD, other.sha256: other}, [])
-    anew = replace(GOOD, sha256="c" * 64)
-    add_heard(tmp_path, [anew])
-    assert read_heard(tmp_path) == ({anew.sha256: anew, other.sha256: other}, [])
+    again = replace(GOOD, sha256="c" * 64)
+    add_heard(tmp_path, [again])
+    assert read_heard(tmp_path) == ({again.sha256: again, other.sha256: other}, [])
     text = (tmp_path / NAME).read_text()
     assert [row.split(",")[0] for row in text.splitlines()] == ["name", "good", "other"]
     assert "-0.0" not in line_of(tmp_path, replace(GOOD, level_db=-0.0001))
@@ -132,7 +132,7 @@ def line_of(folder: Path, heard: Heard) -> str:
 
 
 @pytest.mark.parametrize(
-    ("bad", "told"),
+    ("bad", "reported"),
     [
         (line(distance_db="nan"), "finite"),
         (line(distance_db="1e999"), "finite"),
@@ -154,11 +154,11 @@ def line_of(folder: Path, heard: Heard) -> str:
         ('"' + line(), "values"),
     ],
 )
-def test_a_bad_line_is_told_and_hides_no_other(tmp_path: Path, bad: str, told: str) -> None:
+def test_a_bad_line_is_reported_and_hides_no_other(tmp_path: Path, bad: str, reported: str) -> None:
     known, (problem,) = read_heard(table(tmp_path, bad, line()))
     assert known == {GOOD.sha256: GOOD}
     assert problem.startswith(f"{tmp_path / NAME}: line 2")
-    assert told in problem
+    assert reported in problem
     assert len(problem) < len(str(tmp_path)) + 300
 
 
@@ -173,7 +173,7 @@ def test_lines_of_another_method_say_nothing(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "reported"),
     [
         (b"", "first line must name"),
         (b"some text\n", "first line must name"),
@@ -182,24 +182,24 @@ def test_lines_of_another_method_say_nothing(tmp_path: Path) -> None:
         (b" " * (LARGEST_BYTES + 1), "larger than"),
     ],
 )
-def test_a_file_that_is_no_table_is_told_in_one_line(tmp_path: Path, content: bytes, told: str) -> None:
+def test_a_file_that_is_no_table_is_reported_in_one_line(tmp_path: Path, content: bytes, reported: str) -> None:
     (tmp_path / NAME).write_bytes(content)
     known, (problem,) = read_heard(tmp_path)
     assert known == {}
-    assert told in problem
+    assert reported in problem
 
 
-def test_many_bad_lines_are_told_in_few(tmp_path: Path) -> None:
+def test_many_bad_lines_are_reported_in_few(tmp_path: Path) -> None:
     known, problems = read_heard(table(tmp_path, *["a,b"] * 100_000, line()))
     assert known == {GOOD.sha256: GOOD}
-    assert len(problems) == MOST_TOLD + 1
+    assert len(problems) == MOST_REPORTED + 1
     assert "99997 more lines" in problems[-1]
 
 
 def test_a_folder_in_its_place_and_one_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / NAME).mkdir()
-    known, (told,) = read_heard(tmp_path)
-    assert known == {} and "not an ordinary file; remove it" in told
+    known, (reported,) = read_heard(tmp_path)
+    assert known == {} and "not an ordinary file; remove it" in reported
     with pytest.raises(OSError, match=NAME):
         add_heard(tmp_path, [GOOD])
 

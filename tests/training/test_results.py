@@ -202,7 +202,7 @@ def test_what_is_no_results_file_is_refused_and_left_alone(path: Path, text: str
         (",4000,", ",4 kHz,", "line 3, column rate_hz: '4 kHz' is not a number"),
     ],
 )
-def test_a_wrong_value_is_told_with_its_line_and_column(path: Path, old: str, new: str, message: str) -> None:
+def test_a_wrong_value_is_reported_with_its_line_and_column(path: Path, old: str, new: str, message: str) -> None:
     add_rows(path, [row("a", rel_mae=0.5), row("b")])
     first, second, third = path.read_text(encoding="utf-8").splitlines()
     path.write_text("\n".join([first, second, third.replace(old, new)]), encoding="utf-8")

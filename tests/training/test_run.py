@@ -75,7 +75,7 @@ def configuration(**changes: object) -> TrainingConfiguration:
     return replace(made, model_configuration={"state_size": 8, "multiplier_widths": [4]})
 
 
-def test_a_row_tells_what_its_preset_measures(tmp_path: Path) -> None:
+def test_a_row_reports_what_its_preset_measures(tmp_path: Path) -> None:
     made = configuration()
     row = run_row(CELL.name, "ours", made, tmp_path / "runs", cache=tmp_path / "cache")
     preset = load_preset(tmp_path / "runs" / CELL.name / f"{CELL.name}.safetensors")

@@ -24,7 +24,7 @@ WINDOWS = 4  # of the horizon
 LONGEST_PAST_S = 60.0
 FEWEST_PLUCKS = 10  # of a string that none was trained on
 HELD_OUT = "held_out"  # what fresh trajectories are called in place of a split
-TOLD = {
+REPORTED = {
     "se": "standard error over trajectories (bootstrap)",
     "spread": "spread over the trajectories",
     "400": "first 400 frames",
@@ -277,8 +277,8 @@ def _on(preset: Preset, run: str) -> Preset:
     from training.cell import load
 
     data = load(run).data
-    told = replace(preset.info, tension_modulated=data.tension_modulated)
-    own = of_string(replace(preset, info=told), data.string, data.rate_hz, data.modes)
+    reported = replace(preset.info, tension_modulated=data.tension_modulated)
+    own = of_string(replace(preset, info=reported), data.string, data.rate_hz, data.modes)
     # the errors that it reports are those of the family
     info = replace(own.info, rel_mse=None, rel_mae=None, test_rel_mse=None, test_rel_mae=None)
     return replace(own, info=replace(info, horizon_steps=data.steps))
@@ -322,7 +322,7 @@ def _print_errors(split: str, errors: dict[str, Any], horizon_s: float) -> None:
     print(f"{split.replace('_', ' ')}: rel. MSE {number(errors['rel_mse'])}, rel. MAE {number(errors['rel_mae'])}")
     if "stored_rel_mse" in errors:
         print(f"stored in the preset: {number(errors['stored_rel_mse'])}, {number(errors['stored_rel_mae'])}")
-    for key, text in TOLD.items():
+    for key, text in REPORTED.items():
         if f"rel_mse_{key}" in errors:
             print(f"{text}: {number(errors[f'rel_mse_{key}'])}, {number(errors[f'rel_mae_{key}'])}")
     print(

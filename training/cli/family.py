@@ -141,8 +141,8 @@ def evaluate(
             ]
             if tenth:
                 alone = {loaded.name: players[loaded.name]}
-                span_s, told = (9.0, 10.0), shares.next()
-                last = measure(alone, column, "test", tenth, rate, span_s, seed=seed, report=told)[loaded.name]
+                span_s, reported = (9.0, 10.0), shares.next()
+                last = measure(alone, column, "test", tenth, rate, span_s, seed=seed, report=reported)[loaded.name]
                 facts["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
     if picture is not None:
         from training.figures.family_errors import family_errors

@@ -156,11 +156,11 @@ def training_report(report: Report) -> Callable[[Progress], None]:
     """Step, epoch, horizon, loss and the last validation as progress."""
     last = ""
 
-    def told(p: Progress) -> None:
+    def reported(p: Progress) -> None:
         nonlocal last
         if p.validation:
             last = f", val. MAE {number(p.validation.rel_mae)}"
         text = f"step {p.step}, epoch {p.epoch}/{p.epochs}, horizon {p.horizon}, loss {number(p.loss)}{last}"
         report(p.step / p.steps, text, p.seconds_left)
 
-    return told
+    return reported

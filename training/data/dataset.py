@@ -26,7 +26,7 @@ from engine.resonators.base import Array
 from engine.schema import write
 from engine.truth import ModalState, SplittingSolver
 from engine.whole_file import naming
-from training.configuration import DATA_VERSION, DatasetConfiguration, unlike_default
+from training.configuration import DATA_VERSION, DatasetConfiguration, non_default
 from training.data.draws import DRAWS
 
 CHUNK = 50  # trajectories a step of the progress
@@ -70,7 +70,7 @@ def default_cache() -> Path:
 
 def dataset_key(configuration: DatasetConfiguration) -> str:
     """A digest of everything that determines the data."""
-    text = json.dumps([DATA_VERSION, unlike_default(configuration)], sort_keys=True)
+    text = json.dumps([DATA_VERSION, non_default(configuration)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -275,13 +275,13 @@ def measure_drum(
                     wrong[name][window] += float(((found - expected).square() @ weight).sum())
     size = np.square(struck.amplitudes_m) + np.square(struck.speeds_m_s / struck.resonator.omega)
     sounds = energy[1] > UNHEARD * float(size @ struck.weight) * rate_hz
-    told = (struck.kind, struck.pitch_hz, struck.resonator.modes, struck.tension_rise)
+    reported = (struck.kind, struck.pitch_hz, struck.resonator.modes, struck.tension_rise)
     blow = "blow" if struck.speeds_m_s.any() else "pressed"
     return [
         DrumError(
             number,
             name,
-            *told,
+            *reported,
             blow,
             _finite(wrong[name][0] / energy[0]),
             _finite(wrong[name][1] / energy[1]) if tenth and sounds else None,

@@ -95,9 +95,9 @@ def measure(
             wrong = played[first:] - truth
             energy = float(truth.square().sum())
             error = float(wrong.square().sum()) / max(energy, unheard)
-            told = (plucked.pitch_hz, plucked.inharmonicity, plucked.tension_rise, plucked.resonator.modes)
+            reported = (plucked.pitch_hz, plucked.inharmonicity, plucked.tension_rise, plucked.resonator.modes)
             found[name].append(
-                StringError(*told, error if math.isfinite(error) else math.inf, processor_s, energy > unheard)
+                StringError(*reported, error if math.isfinite(error) else math.inf, processor_s, energy > unheard)
             )
         report((number + 1) / count)
     return {name: FamilyErrors(tuple(errors)) for name, errors in found.items()}

@@ -8,7 +8,9 @@ from engine.resonators.base import Resonator
 from engine.truth import ModalState, SplittingSolver, default_substeps
 from training.family.strings import PluckedString
 
-COARSER = 3  # times fewer sub-steps than a data set has: 1e-12 of the energy off after a second, inside the family
+SUBSTEP_DIVISOR = (
+    3  # times fewer sub-steps than a data set has: 1e-12 of the energy off after a second, inside the family
+)
 
 
 def solve(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
@@ -19,4 +21,4 @@ def solve(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
 
 def substeps_of(resonator: Resonator, rate_hz: int) -> int:
     """Of the true motion in a frame."""
-    return max(1, -(-default_substeps(resonator, rate_hz) // COARSER))
+    return max(1, -(-default_substeps(resonator, rate_hz) // SUBSTEP_DIVISOR))

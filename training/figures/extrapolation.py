@@ -79,12 +79,19 @@ def extrapolation(
         own, before = Dataset(data, torch.empty(0), preset.info.scale_m), 0.0
         for found, part, share in zip(measured, parts, shares, strict=True):
 
-            def told(done: float, first: float = place + before, width: float = share - before) -> None:
+            def reported(done: float, first: float = place + before, width: float = share - before) -> None:
                 report((first + width * done) / len(presets))
 
             found.append(
                 evaluate_past_horizon(
-                    preset.model, own, "validation", seconds, horizon=0, trajectories=part, listen=listen, report=told
+                    preset.model,
+                    own,
+                    "validation",
+                    seconds,
+                    horizon=0,
+                    trajectories=part,
+                    listen=listen,
+                    report=reported,
                 )
             )
             before = share

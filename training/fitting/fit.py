@@ -116,7 +116,7 @@ def fit(
     else:
         run.measure_start()
         run.seconds = time.monotonic() - begun
-    started = saved = told = time.monotonic()
+    started = saved = reported = time.monotonic()
     first_step, earlier_s = run.step, run.seconds
     while not run.ended:
         run.train_step()
@@ -128,9 +128,9 @@ def fit(
         now = time.monotonic()
         step_s = (now - started) / (run.step - first_step)
         run.seconds = earlier_s + now - started
-        if run.ends_epoch or now - told > TELL_EVERY_S:
+        if run.ends_epoch or now - reported > TELL_EVERY_S:
             report(run.progress(validation, step_s))
-            told = now
+            reported = now
         if now - saved + step_s > every_s or run.ended:
             run.checkpoint().save(path)
             saved = now
@@ -193,8 +193,8 @@ class _Run:
         patience = self._recipe.patience
         # while the latents are learned there is no prediction, and so none that is no better
         since = max(self._best_epoch, self._latent_steps // self._per_epoch)
-        tired = patience > 0 and self.epoch - since >= patience
-        return self.ends_epoch and (self.epoch >= self._recipe.epochs or tired)
+        patience_exhausted = patience > 0 and self.epoch - since >= patience
+        return self.ends_epoch and (self.epoch >= self._recipe.epochs or patience_exhausted)
 
     @property
     def _latent_steps(self) -> int:

@@ -94,7 +94,7 @@ class Kernels:
         self.lags = torch.zeros(2 * grid_points, width, width, dtype=torch.float64)
         self.bias = torch.zeros(grid_points, width, dtype=torch.float64)
 
-    def pass_on(self, source: int, target: int, factor: float, lag: int = 0) -> None:
+    def add_shifted(self, source: int, target: int, factor: float, lag: int = 0) -> None:
         """A channel's number at any point to another channel's, `lag` points further."""
         self.lags[lag, source, target] += factor
 
@@ -168,12 +168,12 @@ def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
         same, crossed = (steps[0] + steps[1]) / 2, (steps[0] - steps[1]) / 2
         for target, row in ((now + pair, 0), (rate + pair, 1)):
             for source, column in ((now + pair, 0), (rate + pair, 1)):
-                turn.pass_on(source, target, float(same[row, column]))
+                turn.add_shifted(source, target, float(same[row, column]))
                 for lag in (-last, last):
-                    turn.pass_on(source, target, float(crossed[row, column]), lag)
+                    turn.add_shifted(source, target, float(crossed[row, column]), lag)
             turn.bias[[0, last], target] = LIFT * (1 - float((same + crossed)[row].sum()))
         for layer in (analyse, synthesise):
-            layer.pass_on(rate + pair, rate + pair, 1.0)
+            layer.add_shifted(rate + pair, rate + pair, 1.0)
             layer.bias[[0, last], rate + pair] = 0.0
         synthesise.bias[:, field] -= LIFT * total * 2 * shapes[0]
     for layer in (analyse, turn):
@@ -298,7 +298,7 @@ def _turn(h: Kernels, own: tuple[int, ...], other: tuple[int, ...], sign: int, t
     """cos · own ± sin · other, where r shows (cosine, sine, one half) of either."""
     (own_cosine, _, own_half), (_, other_sine, other_half) = own, other
     for source, factor in ((own_cosine, 1), (own_half, -1), (other_sine, sign), (other_half, -sign)):
-        h.pass_on(source, target, factor / MARGIN, lag)
+        h.add_shifted(source, target, factor / MARGIN, lag)
 
 
 def _follow_squares(
@@ -323,20 +323,20 @@ def _follow_squares(
             r.bias[:count, target] = bias[number]
             share = 2 * slope[number] * everyone * typical / (2 * unit * SQUARE_SIZE**2)
             r.lags[torch.arange(count) - last, channels.sum, target] += share
-            r.pass_on(channels.own, target, reach, -block)
+            r.add_shifted(channels.own, target, reach, -block)
         for mode, (channel, end) in enumerate(at_end):
-            h.pass_on(channel, channels.root, float(roots[mode]), block + mode - end)
+            h.add_shifted(channel, channels.root, float(roots[mode]), block + mode - end)
             for target in (channels.plus, channels.minus):
-                h.pass_on(channel, target, float(content[mode]), block + mode - end)
+                h.add_shifted(channel, target, float(content[mode]), block + mode - end)
     for mode, (channel, end) in enumerate(at_end):
         for target in (channels.root, channels.plus, channels.minus):
-            h.pass_on(channel, target, float(roots[mode]), 2 * count + mode - end)
-        h.pass_on(channels.plus, channels.sum, SUM_SIZE, last - 2 * count - mode)
-        h.pass_on(channels.minus, channels.sum, -SUM_SIZE, last - 2 * count - mode)
-    h.pass_on(channels.plus, channels.own, SUM_SIZE)
-    h.pass_on(channels.minus, channels.own, -SUM_SIZE)
-    r.pass_on(channels.root, channels.plus, SQUARE_SLOPE)
-    r.pass_on(channels.root, channels.minus, -SQUARE_SLOPE)
+            h.add_shifted(channel, target, float(roots[mode]), 2 * count + mode - end)
+        h.add_shifted(channels.plus, channels.sum, SUM_SIZE, last - 2 * count - mode)
+        h.add_shifted(channels.minus, channels.sum, -SUM_SIZE, last - 2 * count - mode)
+    h.add_shifted(channels.plus, channels.own, SUM_SIZE)
+    h.add_shifted(channels.minus, channels.own, -SUM_SIZE)
+    r.add_shifted(channels.root, channels.plus, SQUARE_SLOPE)
+    r.add_shifted(channels.root, channels.minus, -SQUARE_SLOPE)
 
 
 def shared_coupling(coupling: Tensor, squares: Tensor) -> tuple[Tensor, Tensor, float]:

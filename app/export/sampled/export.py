@@ -7,7 +7,7 @@ from pathlib import Path
 
 from app.export.sampled.job import export_sampled, kept_samples, note_renderer
 from app.export.sampled.plan import SampledPlan
-from app.export.sampled.words import SMALLEST_TOLD_DB, megabytes, notes, number_of, pitch_words
+from app.export.sampled.words import SMALLEST_REPORTED_DB, megabytes, notes, number_of, pitch_words
 from app.shared.worker import Progress
 from engine.presets import load_preset
 
@@ -36,7 +36,7 @@ class SampledExport:
         )
         kept = report.samples - report.rendered
         samples = f"{number_of(report.rendered, 'sample')} rendered, {kept} kept, {megabytes(report.size_bytes)}"
-        alike = ", as loud as the instrument" if abs(report.gain_db) < SMALLEST_TOLD_DB else ""
+        alike = ", as loud as the instrument" if abs(report.gain_db) < SMALLEST_REPORTED_DB else ""
         level = f"peak {report.peak_db:.1f} dBFS{alike}"
         lines = [f"Saved {report.path} ({samples}, {level}, {pitch_words(plan.pitch_error_cents)})."]
         lines += [f"{note[0].upper()}{note[1:]}." for note in notes(plan, report, "Dry leaves")]

@@ -155,7 +155,7 @@ class SampledPlan:
 
     def digest(self, zone: Zone) -> str:
         """SHA-256 of all that the sound of a zone's file depends on; names and descriptions are not among it."""
-        told = {
+        reported = {
             "patch": self._heard_fields,
             "preset": self.preset_sha256,
             **({"body": self.body_sha256} if self.body_sha256 and "body" in self._heard_fields else {}),
@@ -164,7 +164,7 @@ class SampledPlan:
             "file": [self.format, self.bits],
             "version": program_version(),
         }
-        return hashlib.sha256(json.dumps(told, sort_keys=True).encode()).hexdigest()
+        return hashlib.sha256(json.dumps(reported, sort_keys=True).encode()).hexdigest()
 
     @cached_property
     def _heard_fields(self) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from app.export.sampled.job import SampledReport
 from app.export.sampled.plan import SampledPlan
 from app.export.sampled.sf2 import ZEROS_BEHIND
 
-SMALLEST_TOLD_DB = 0.05
+SMALLEST_REPORTED_DB = 0.05
 _LINES_BYTES = 512  # of a sample at most: its lines of the SFZ and its file's header, or its rows of a SoundFont
 
 
@@ -57,15 +57,15 @@ def megabytes(size: int) -> str:
 
 def notes(plan: SampledPlan, report: SampledReport, dry: str) -> list[str]:
     """What a musician should know of what was written. `dry`: what takes the room out, as in "--dry leaves"."""
-    told = []
+    reported = []
     if plan.patch.room.mix > 0 and not plan.patch.damping.let_ring:
-        told.append(f"a released key ends the room's tail as well; {dry} the room to the sampler")
+        reported.append(f"a released key ends the room's tail as well; {dry} the room to the sampler")
     if report.cut:
         rang = f"{number_of(report.cut, 'sample')} still rang after {plan.seconds:g} s and "
-        told.append(rang + ("was faded out" if report.cut == 1 else "were faded out"))
-    if abs(report.gain_db) >= SMALLEST_TOLD_DB:
+        reported.append(rang + ("was faded out" if report.cut == 1 else "were faded out"))
+    if abs(report.gain_db) >= SMALLEST_REPORTED_DB:
         why = "softer than the instrument, so that no note clips"
         if report.gain_db > 0:
             why = "louder than the instrument, at the full level of 16 bits"
-        told.append(f"all of it is {abs(report.gain_db):.1f} dB {why}")
-    return told
+        reported.append(f"all of it is {abs(report.gain_db):.1f} dB {why}")
+    return reported

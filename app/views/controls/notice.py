@@ -13,7 +13,7 @@ class Notice:
     details: str = ""
     error: bool = True  # False: information
     times: int = 1
-    last_told: str = ""  # hours:minutes:seconds
+    last_reported: str = ""  # hours:minutes:seconds
 
     @property
     def line(self) -> str:

@@ -61,7 +61,7 @@ class NoticeBar(QFrame):
         """The notices of this run, the latest last."""
         return list(self._notices)
 
-    def tell(self, message: str, details: str = "") -> None:
+    def report(self, message: str, details: str = "") -> None:
         """Shows an error; the message says what to do about it."""
         self._take(Notice(message, details))
 
@@ -108,7 +108,7 @@ class NoticeBar(QFrame):
             self._notices.remove(earlier)
         times = 1 if earlier is None else earlier.times + 1
         now = f"{datetime.now():%H:%M:%S}"
-        self._notices = [*self._notices, replace(notice, times=times, last_told=now)][-MOST_KEPT:]
+        self._notices = [*self._notices, replace(notice, times=times, last_reported=now)][-MOST_KEPT:]
         self._label.setObjectName("warning" if notice.error else "")
         self._label.style().polish(self._label)
         self._label.setText(self._notices[-1].line)

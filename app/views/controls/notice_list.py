@@ -39,7 +39,7 @@ class NoticeList(QDialog):
         self._notices = list(reversed(notices))
         self._list.clear()
         for notice in self._notices:
-            self._list.addItem(f"{notice.last_told}   {'error' if notice.error else 'note'}   {notice.line}")
+            self._list.addItem(f"{notice.last_reported}   {'error' if notice.error else 'note'}   {notice.line}")
         if self._notices:
             self._list.setCurrentRow(0)
         else:
@@ -48,7 +48,7 @@ class NoticeList(QDialog):
     def report(self) -> str:
         """Everything as text."""
         return "\n\n".join(
-            f"{notice.last_told} {notice.line}" + (f"\n{notice.details}" if notice.details else "")
+            f"{notice.last_reported} {notice.line}" + (f"\n{notice.details}" if notice.details else "")
             for notice in self._notices
         )
 

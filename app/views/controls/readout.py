@@ -18,16 +18,16 @@ class Readout(ElidedLabel):
         self.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self._resting: tuple[str, ...] = ("",)
-        self._told: tuple[str, ...] = ("",)
+        self._reported: tuple[str, ...] = ("",)
 
     def rest(self, text: str, *shorter: str) -> None:
         self._resting = (text, *shorter)
-        self.tell(*self._told)
+        self.report(*self._reported)
 
-    def tell(self, text: str, *shorter: str) -> None:
+    def report(self, text: str, *shorter: str) -> None:
         """What the mouse points at; "" for nothing. `shorter` as in `ElidedLabel.say`."""
-        self._told = (text, *shorter)
-        wordings = self._told if text else self._resting
+        self._reported = (text, *shorter)
+        wordings = self._reported if text else self._resting
         if wordings[0] != self.text():
             self.say(*wordings)
             # where there is too little room for it

@@ -147,8 +147,8 @@ class SlotButtons(QWidget):
         for entry in self._entries:
             source = f"preset:{entry.name}"
             action = self._add(others, held, entry.title, slot, source, getattr(self._choices, slot) == source)
-            told = f"Its model on the same pluck, at {entry.info.rate_hz / 1000:g} kHz"
-            action.setToolTip(plain_tip(f"{told}\n{entry.path.name}"))
+            reported = f"Its model on the same pluck, at {entry.info.rate_hz / 1000:g} kHz"
+            action.setToolTip(plain_tip(f"{reported}\n{entry.path.name}"))
         menu.addSeparator()
         match = QAction("Match levels to the truth", menu, checkable=True, checked=self._choices.level_match)
         match.toggled.connect(lambda on: self.change_asked.emit("level_match", on))

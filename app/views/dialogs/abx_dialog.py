@@ -151,7 +151,7 @@ class AbxDialog(QDialog):
             identity = self._run.heard_as(sound)
             self._run = self._run.auditioned(sound)
         self._pair.select(identity)
-        self._pair.play(anew=again or self._setup.restart.isChecked() or self._sounding is None)
+        self._pair.play(restart=again or self._setup.restart.isChecked() or self._sounding is None)
         self._sounding = sound
         if self._run is not None:
             self._trial.show_sounding(sound, self._run.x_heard)

@@ -48,7 +48,7 @@ class Neck(Playable):
         """Name and open key of each; none or one that is fretted for every key is shown as a fan."""
         ordered = tuple(sorted(strings, key=lambda string: string[1]))
         if ordered != self._strings:
-            self.let_go()
+            self.release_all()
             self._strings = ordered
             self.rest_changed()
 

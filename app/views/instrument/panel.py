@@ -34,7 +34,7 @@ HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or 
 NO_STRINGS = "Drums have no strings to show: keys strike them"
 FOLD_TIP = "Show every knob of the string in place of the macros, or the macros again"
 LOW_TIP = "Show every knob of the string in place of macros and keys, or these again"
-ROOMY = 1320  # pixels: in a narrower window the bar is compact
+COMPACT_BELOW_PX = 1320  # pixels: in a narrower window the bar is compact
 TIGHT = 900  # pixels: a narrower one has no button that renames
 PLAYS_WIDTH = 164  # pixels: of the longer words, so that the keys beside them stay where they are
 KEYS_PLAY = {  # what the computer's keys play -> (words, tip)
@@ -177,7 +177,7 @@ class InstrumentPanel(QFrame):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
-        self.bar.set_compact(self.width() < theme.px(ROOMY), self.width() < theme.px(TIGHT))
+        self.bar.set_compact(self.width() < theme.px(COMPACT_BELOW_PX), self.width() < theme.px(TIGHT))
 
     def _share_room(self) -> None:
         self._grid.removeWidget(self._knobs_row)
@@ -235,10 +235,10 @@ class InstrumentPanel(QFrame):
     def hide_hint(self) -> None:
         self._hint.hide()
 
-    def let_go(self) -> None:
+    def release_all(self) -> None:
         """Releases all keys that are down."""
-        self.keys.let_go()
-        self.neck.let_go()
+        self.keys.release_all()
+        self.neck.release_all()
 
     def _press(self, key: int, velocity: int) -> None:
         self.hide_hint()

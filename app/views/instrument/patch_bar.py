@@ -231,8 +231,8 @@ class PatchBar(QFrame):
         mark = "●  " if changed else ""
         self.name.setText(f"{mark}{patch.name}   ▾".replace("&", "&&"))
         self.name.setAccessibleName(f"Instrument: {patch.name}{', changed' if changed else ''}")
-        told = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
-        self.name.setToolTip(plain_tip(f"{told}\nClick to browse the instruments"))
+        reported = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
+        self.name.setToolTip(plain_tip(f"{reported}\nClick to browse the instruments"))
         self.category.setText(patch.category)
         self.save.setEnabled(changed)
         self.revert.setEnabled(changed)

@@ -93,7 +93,7 @@ class Playable(QWidget):
     def set_range(self, low: int, high: int) -> None:
         """The lowest and the highest key that have a string."""
         if (low, high) != (self._low, self._high):
-            self.let_go()
+            self.release_all()
             self._low, self._high = low, high
             self._set_cursor(self._cursor)
             self.lay_out()
@@ -129,7 +129,7 @@ class Playable(QWidget):
         """Keys that stay down by themselves."""
         return frozenset(self._held)
 
-    def let_go(self) -> None:
+    def release_all(self) -> None:
         """Releases all keys that are down."""
         if self._typed is not None:
             typed, self._typed = self._typed, None
@@ -275,7 +275,7 @@ class Playable(QWidget):
         self.update()
 
     def hideEvent(self, event: QHideEvent) -> None:
-        self.let_go()
+        self.release_all()
         super().hideEvent(event)
 
     @property

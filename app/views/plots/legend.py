@@ -90,18 +90,18 @@ def _whole(source: ShownSource) -> str:
 
 def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -> list[str]:
     """The text of each: whole; where too wide without “heard”, which the colour shows; then with cut titles."""
-    for told in (sources, [replace(source, heard=False) for source in sources]):
-        if _width(texts := [_whole(source) for source in told], metrics) <= room:
+    for reported in (sources, [replace(source, heard=False) for source in sources]):
+        if _width(texts := [_whole(source) for source in reported], metrics) <= room:
             return texts
-    titles = room - _width([_whole(replace(source, title="")) for source in told], metrics)
-    needed = [metrics.horizontalAdvance(source.title) for source in told]
+    titles = room - _width([_whole(replace(source, title="")) for source in reported], metrics)
+    needed = [metrics.horizontalAdvance(source.title) for source in reported]
     for done, place in enumerate(sorted(range(len(needed)), key=lambda i: needed[i])):  # the longest give the most
         needed[place] = int(min(needed[place], max(0.0, titles / (len(needed) - done))))
         titles -= needed[place]
     elide = Qt.TextElideMode.ElideMiddle
     return [
         _whole(replace(source, title=metrics.elidedText(source.title, elide, room)))
-        for source, room in zip(told, needed, strict=True)
+        for source, room in zip(reported, needed, strict=True)
     ]
 
 

@@ -74,14 +74,14 @@ class Panel(QWidget):
     seek_asked = Signal(float)  # move the playhead to this time in s
     pluck_asked = Signal()
     strike_asked = Signal(float, float, float)  # the drum at a place, in half-lengths from its centre; velocity
-    told = Signal(str, str)  # a notice for the user, and its details
+    reported = Signal(str, str)  # a notice for the user, and its details
 
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__()
         self.session = session
         self.library = library
         self.background = Background(self.key, self, rests=self._rests)
-        self.background.failed.connect(self.told)
+        self.background.failed.connect(self.reported)
         self._cover = Label(self)
         self._cover.setObjectName("cover")
         self._cover.setAlignment(Qt.AlignmentFlag.AlignCenter)

@@ -264,7 +264,7 @@ class SpectrumPanel(Panel):
                 cents = 1200 * math.log2(frequency_hz / partial_hz)
                 text += f"   partial {nearest + 1}: {partial_hz:.1f} Hz ({cents:+.0f} cents)"
                 self._partial.setValue(math.log10(partial_hz))
-        self.readout.tell(text)
+        self.readout.report(text)
         self._partial.setVisible(nearest is not None)
 
     def resizeEvent(self, event: QResizeEvent) -> None:

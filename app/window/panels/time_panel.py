@@ -82,4 +82,4 @@ class TimePanel(Panel, Generic[G]):
     def _hover(self, time_s: float, place: float) -> None:
         made = self._made
         wordings = [] if made is None or not math.isfinite(time_s) else [*self._words(made, time_s, place)]
-        self.readout.tell(*(wordings or ("",)))
+        self.readout.report(*(wordings or ("",)))

@@ -133,7 +133,7 @@ def test_the_device_calls_the_compiled_mixer_itself(sounddevice: FakeSoundDevice
     assert options["channels"] == 2  # of its eight
 
 
-def test_nothing_is_looked_for_anew_while_a_stream_is_open(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
+def test_nothing_is_looked_for_again_while_a_stream_is_open(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
     stream = open_device(find("Speakers", "ALSA"), 0.05, mixer)
     output_devices(rescan=True)
     assert sounddevice.restarts == 0

@@ -64,7 +64,7 @@ def broken(name: str, folder: Path) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("name", "told"),
+    ("name", "reported"),
     [
         ("missing", "no file"),
         ("folder", "no file"),
@@ -79,9 +79,9 @@ def broken(name: str, folder: Path) -> Path:
         ("huge", "64 MiB"),
     ],
 )
-def test_what_cannot_be_used_is_told_with_its_name(tmp_path: Path, name: str, told: str) -> None:
+def test_what_cannot_be_used_is_reported_with_its_name(tmp_path: Path, name: str, reported: str) -> None:
     path = broken(name, tmp_path)
-    with pytest.raises(ImpulseError, match=told) as error:
+    with pytest.raises(ImpulseError, match=reported) as error:
         read_impulse(path)
     assert str(error.value).startswith(f"{path}: ") and str(error.value).isprintable()
 

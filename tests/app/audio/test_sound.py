@@ -231,7 +231,7 @@ def test_a_new_rate_that_is_refused_leaves_the_old_one(sound: Sound, desk: Desk,
     assert (sound.rate_hz, sound.status().device) == (48_000, headphones)
 
 
-def test_no_device_at_all_is_told_and_time_goes_on(sound: Sound, desk: Desk) -> None:
+def test_no_device_at_all_is_reported_and_time_goes_on(sound: Sound, desk: Desk) -> None:
     desk.devices.clear()
     opened(sound)
     voice = lasting(sound)
@@ -240,7 +240,7 @@ def test_no_device_at_all_is_told_and_time_goes_on(sound: Sound, desk: Desk) -> 
     assert sound.status().device is None
 
 
-def test_a_lost_device_is_told_once_and_found_again(
+def test_a_lost_device_is_reported_once_and_found_again(
     sound: Sound, desk: Desk, headphones: AudioDevice, speakers: AudioDevice
 ) -> None:
     opened(sound)  # the default, whichever it is
@@ -279,7 +279,7 @@ def test_while_one_is_missed_another_may_be_chosen(
     assert (sound.status().device, desk.rescans) == (speakers, tries)
 
 
-def test_a_stall_is_told_and_withdrawn(sound: Sound, desk: Desk) -> None:
+def test_a_stall_is_reported_and_withdrawn(sound: Sound, desk: Desk) -> None:
     opened(sound)
     desk.outputs[0].is_stalled = True
     wait_for(lambda: desk.problems != [])
@@ -302,7 +302,7 @@ def test_what_has_rung_out_is_freed_and_gaps_are_kept(sound: Sound, desk: Desk) 
     assert [gap.cause for gap in sound.status().gaps] == ["runaway"]
 
 
-def test_a_fault_of_the_program_is_told_with_its_details(desk: Desk) -> None:
+def test_a_fault_of_the_program_is_reported_with_its_details(desk: Desk) -> None:
     def broken(device: AudioDevice | None, rescan: bool) -> AudioDevice:
         raise ZeroDivisionError("a mistake")
 

@@ -83,7 +83,7 @@ def test_files_without_their_rows_are_made_again_as_they_were(run, words: list[o
     assert {path.name: path.read_bytes() for path in (folder / "out").iterdir()} == before
 
 
-def test_another_sound_of_the_name_is_told_and_stays(run, words: list[object], folder: Path) -> None:
+def test_another_sound_of_the_name_is_reported_and_stays(run, words: list[object], folder: Path) -> None:
     run(*words)
     path = folder / "out" / "a_x0.30_a2.0_4000_model.wav"
     before = path.read_bytes()
@@ -190,7 +190,7 @@ def test_lists_that_are_no_lists_are_bad_usage(run, words: list[object], more: l
         assert message in run(*words, *more).usage.replace("'", "")
 
 
-def test_an_unwritable_folder_is_told(run, words: list[object], folder: Path) -> None:
+def test_an_unwritable_folder_is_reported(run, words: list[object], folder: Path) -> None:
     (folder / "out").write_text("in the way")
     assert "cannot be made" in run(*words).failure
     assert batch.INDEX == "index.csv"
@@ -230,13 +230,13 @@ def test_a_batch_varies_strings(run, folder: Path, tmp_path: Path) -> None:
     assert "decay time near 3 kHz" in rows["bright"]["message"] and rows["steel_g3"]["message"] == ""
     assert rows["steel_g3"]["file"] == "studio_any_string_steel_g3_x0.30_a1.0_44100_model.wav"
     one = folder / "one.wav"
-    told = ("--position", 0.3, "--amplitude-mm", 1, "--seconds", 0.1, "--string", "steel_g3", "--rate", 44_100)
-    assert run("render", "studio_any_string", one, *told).status == 0
+    reported = ("--position", 0.3, "--amplitude-mm", 1, "--seconds", 0.1, "--string", "steel_g3", "--rate", 44_100)
+    assert run("render", "studio_any_string", one, *reported).status == 0
     assert one.read_bytes() == (folder / "out" / rows["steel_g3"]["file"]).read_bytes()
     assert "0 written, 2 kept, 1 failed" in run(*line).out
 
 
-def test_a_preset_of_one_string_in_a_batch_of_strings_is_told(run, words: list[object]) -> None:
+def test_a_preset_of_one_string_in_a_batch_of_strings_is_reported(run, words: list[object]) -> None:
     found = run(*words, "--strings", "steel_g3")
     assert found.status == 1
     assert "choose a preset of many strings" in found.err

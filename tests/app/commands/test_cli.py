@@ -119,7 +119,7 @@ def test_an_absent_file_is_named_and_nothing_opens(
     assert capsys.readouterr().err == "learned-strings: gone.wav: no such file; check the name\n"
 
 
-def test_the_version_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_version_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["--version"]) == 0
     assert capsys.readouterr().out.strip()
 
@@ -150,7 +150,7 @@ def test_a_failure_is_one_line_without_a_traceback(
 def test_a_failure_shows_its_traceback_on_demand(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    _failing(monkeypatch, ValueError("told"))
+    _failing(monkeypatch, ValueError("reported"))
     monkeypatch.setenv(cli.DEBUG_VARIABLE, "1")
     assert cli.main([]) == 1
     assert "Traceback" in capsys.readouterr().err
@@ -189,6 +189,6 @@ def test_what_is_known_without_soundfile_is_what_they_say() -> None:
 
 @pytest.mark.parametrize("value", [-0.1, 1.1, float("nan"), float("inf")])
 def test_a_range_error_names_option_value_and_range(value: float) -> None:
-    with pytest.raises(typer.BadParameter, match=rf"must lie in 0 … 1 mm, not {value:g}") as told:
+    with pytest.raises(typer.BadParameter, match=rf"must lie in 0 … 1 mm, not {value:g}") as reported:
         arguments.check_range("--option", value, 0, 1, "mm")
-    assert told.value.param_hint == "--option"
+    assert reported.value.param_hint == "--option"

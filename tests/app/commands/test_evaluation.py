@@ -52,13 +52,13 @@ def preset(small_preset: Path, tmp_path: Path) -> Path:
 
 
 def test_the_horizon_and_what_is_stored(run, preset: Path, cache: list[Any]) -> None:
-    told = run("evaluate", preset, "--split", "both", *cache)
-    assert (told.status, told.err) == (0, "")
-    assert "validation: rel. MSE" in told.out
-    assert "stored in the preset: 0.5, 0.25" in told.out
-    assert "stored in the preset: 0.75, -" in told.out
-    assert "2 trajectories, trained to 0.125 s" in told.out
-    assert "past the training horizon" not in told.out
+    reported = run("evaluate", preset, "--split", "both", *cache)
+    assert (reported.status, reported.err) == (0, "")
+    assert "validation: rel. MSE" in reported.out
+    assert "stored in the preset: 0.5, 0.25" in reported.out
+    assert "stored in the preset: 0.75, -" in reported.out
+    assert "2 trajectories, trained to 0.125 s" in reported.out
+    assert "past the training horizon" not in reported.out
 
     found = json.loads(run("evaluate", preset, "--split", "both", "--json", *cache).out)
     validation, test = found["validation"], found["test"]
@@ -77,11 +77,11 @@ def test_the_horizon_and_what_is_stored(run, preset: Path, cache: list[Any]) -> 
 
 def test_fresh_plucks_that_nobody_trained_on(run, preset: Path, cache: list[Any]) -> None:
     words = ["evaluate", preset, "--held-out", "12", *cache]
-    told = run(*words)
-    assert (told.status, told.err) == (0, "")
-    assert told.out.startswith("held out: rel. MSE")
-    assert "stored in the preset" not in told.out
-    assert "12 trajectories, trained to 0.125 s" in told.out
+    reported = run(*words)
+    assert (reported.status, reported.err) == (0, "")
+    assert reported.out.startswith("held out: rel. MSE")
+    assert "stored in the preset" not in reported.out
+    assert "12 trajectories, trained to 0.125 s" in reported.out
     found = json.loads(run(*words, "--json").out)
     assert (found["split"], found["held_out"]["trajectories"]) == ("held_out", 12)
     assert 0 < found["held_out"]["rel_mse_se"] < found["rel_mse"]
@@ -104,8 +104,8 @@ def test_the_errors_by_how_far_a_pluck_raises_the_tension(run, preset: Path, fol
     path = folder / "hard.safetensors"
     save_preset(path, info, loaded.model)
     words = ["evaluate", path, "--held-out", "40"]
-    told = run(*words)
-    assert "tension rises %" in told.out
+    reported = run(*words)
+    assert "tension rises %" in reported.out
     groups = json.loads(run(*words, "--json").out)["held_out"]["by_rise"]
     assert [group["trajectories"] for group in groups] == [20, 10, 6, 2, 2]
     rises = [rise for group in groups for rise in (group["from_rise"], group["to_rise"])]
@@ -117,9 +117,9 @@ def test_the_errors_by_how_far_a_pluck_raises_the_tension(run, preset: Path, fol
 
 def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) -> None:
     words = ["evaluate", preset, "--past", "2.5", *cache]
-    told = run(*words)
-    assert told.status == 0
-    assert told.out.count("past the training horizon") == 3
+    reported = run(*words)
+    assert reported.status == 0
+    assert reported.out.count("past the training horizon") == 3
     found = json.loads(run(*words, "--json").out)["validation"]
     late = [w for w in found["windows"] if w["past_horizon"]]
     assert [(w["start_s"], w["stop_s"]) for w in late] == [(0.125, 1.125), (1.125, 2.125), (2.125, 2.625)]
@@ -130,7 +130,7 @@ def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) ->
     assert late[1]["rel_mse"] < found["last_second"]["rel_mse"] < late[2]["rel_mse"]
     assert found["first_second"]["rel_mse"] < late[0]["rel_mse"]
     times = found["last_second"]["rel_mse"] / found["first_second"]["rel_mse"]
-    assert f"{times:.3g} times as much" in told.out
+    assert f"{times:.3g} times as much" in reported.out
     at_horizon = json.loads(run("evaluate", preset, "--json", *cache).out)
     assert "first_second" not in at_horizon["validation"]
     assert found["rel_mse"] == pytest.approx(at_horizon["rel_mse"], rel=1e-4)
@@ -138,10 +138,10 @@ def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) ->
 
 def test_partials(run, preset: Path, cache: list[Any]) -> None:
     words = ["evaluate", preset, "--past", "1", "--partials", *cache]
-    told = run(*words)
-    assert "validation, partials of 0 … 0.125 s: medians of the magnitudes" in told.out
-    assert "validation, partials of 0.125 … 1.125 s, past the training horizon" in told.out
-    assert told.out.count("all, by energy") == 2
+    reported = run(*words)
+    assert "validation, partials of 0 … 0.125 s: medians of the magnitudes" in reported.out
+    assert "validation, partials of 0.125 … 1.125 s, past the training horizon" in reported.out
+    assert reported.out.count("all, by energy") == 2
     found = json.loads(run(*words, "--json").out)["validation"]["partials"]
     horizon, past, *windows = found
     assert [(w["start_s"], w["stop_s"]) for w in (horizon, past)] == [(0, 0.125), (0.125, 1.125)]
@@ -165,10 +165,10 @@ def test_a_preset_of_many_strings_is_measured_on_plucks_of_one(run, folder: Path
     assert first["frequency_hz"] == pytest.approx(330, abs=5)
     assert first["glide_cents"] > 1
     assert all(first[name] < 0.01 for name in ("level_db", "cents", "t60_error_percent", "glide_error_cents"))
-    told = run(*words)
-    assert told.err == ""
-    assert "held out: rel. MSE" in told.out
-    assert "glide error" in told.out
+    reported = run(*words)
+    assert reported.err == ""
+    assert "held out: rel. MSE" in reported.out
+    assert "glide error" in reported.out
     other = json.loads(run(*words[:2], "--rate", "8000", "--modes", "5", "--held-out", "11", "--json").out)
     assert (other["rate_hz"], other["held_out"]["trajectories"]) == (8_000, 11)  # the preset's own string
     beyond = run(*words[:2], "--string", "piano_c2", "--modes", "5").err
@@ -179,8 +179,8 @@ def test_a_preset_of_many_strings_is_measured_on_plucks_of_one(run, folder: Path
 def test_some_trajectories(run, preset: Path, cache: list[Any]) -> None:
     found = json.loads(run("evaluate", preset, "--trajectories", "1", "--json", *cache).out)["validation"]
     assert (found["trajectories"], found["rel_mse_spread"]) == (1, 0)
-    told = run("evaluate", preset, "--trajectories", "3", *cache)
-    assert "--trajectories: must lie in 1 … 2, not 3" in told.usage.replace("'", "")
+    reported = run("evaluate", preset, "--trajectories", "3", *cache)
+    assert "--trajectories: must lie in 1 … 2, not 3" in reported.usage.replace("'", "")
 
 
 def test_a_model_that_grows_is_shown_as_infinite(run, preset: Path, cache: list[Any], folder: Path) -> None:
@@ -190,10 +190,10 @@ def test_a_model_that_grows_is_shown_as_infinite(run, preset: Path, cache: list[
         weights.fill_(3e38)
     path = folder / "grown.safetensors"
     save_preset(path, loaded.info, loaded.model)
-    told = run("evaluate", path, "--partials", *cache)
-    assert told.status == 0
-    assert "rel. MSE inf, rel. MAE inf" in told.out
-    assert "null depth inf dB" in told.out
+    reported = run("evaluate", path, "--partials", *cache)
+    assert reported.status == 0
+    assert "rel. MSE inf, rel. MAE inf" in reported.out
+    assert "null depth inf dB" in reported.out
     assert json.loads(run("evaluate", path, "--json", *cache).out)["rel_mse"] is None
 
 
@@ -212,7 +212,7 @@ def test_bad_usage(run, preset: Path, words: list[str], message: str) -> None:
     assert message in run("evaluate", preset, *words).usage
 
 
-def test_a_preset_that_says_nothing_of_its_training_is_told(run, small_preset: Path) -> None:
+def test_a_preset_that_says_nothing_of_its_training_is_reported(run, small_preset: Path) -> None:
     assert "metadata.training: field 'title' is missing" in run("evaluate", small_preset).failure
 
 
@@ -224,7 +224,7 @@ def test_a_preset_that_says_nothing_of_its_training_is_told(run, small_preset: P
         ({"grid_points": 51}, "grid_points is 101, the data's are 51"),
     ],
 )
-def test_a_data_set_that_is_not_the_models_is_told(
+def test_a_data_set_that_is_not_the_models_is_reported(
     run, preset: Path, folder: Path, changes: dict[str, Any], message: str
 ) -> None:
     loaded = load_preset(preset)
@@ -235,10 +235,10 @@ def test_a_data_set_that_is_not_the_models_is_told(
 
 
 def test_what_is_heard_is_printed_and_kept_where_it_is_asked(run, preset: Path) -> None:
-    told = run("evaluate", preset, "--heard")
-    assert told.status == 0
-    assert "tiny" in told.out
-    assert "spectra dB" in told.out
+    reported = run("evaluate", preset, "--heard")
+    assert reported.status == 0
+    assert "tiny" in reported.out
+    assert "spectra dB" in reported.out
     assert read_heard(preset.parent) == ({}, [])
     (facts,) = json.loads(run("evaluate", preset, "--heard", "--write", "--json").out)
     known, _ = read_heard(preset.parent)
@@ -248,15 +248,15 @@ def test_what_is_heard_is_printed_and_kept_where_it_is_asked(run, preset: Path) 
     assert kept.level_db == pytest.approx(-1.0, abs=0.3)  # its own decay is a tenth faster than 2.9 dB a second
 
 
-def test_all_presets_are_listened_to_and_a_broken_one_is_told(
+def test_all_presets_are_listened_to_and_a_broken_one_is_reported(
     run, preset: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (preset.parent / "broken.safetensors").write_bytes(b"not a preset")
     monkeypatch.setattr("engine.presets.finding.SHIPPED", preset.parent)
-    told = run("evaluate", "--heard", "--all", "--write", "--json")
-    assert told.status == 0
-    assert [facts["name"] for facts in json.loads(told.out)] == ["tiny"]
-    assert "broken.safetensors: not a whole safetensors file" in told.err
+    reported = run("evaluate", "--heard", "--all", "--write", "--json")
+    assert reported.status == 0
+    assert [facts["name"] for facts in json.loads(reported.out)] == ["tiny"]
+    assert "broken.safetensors: not a whole safetensors file" in reported.err
     assert set(read_heard(preset.parent)[0]) == {preset_digest(preset)}
 
 

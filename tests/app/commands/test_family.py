@@ -51,6 +51,6 @@ def test_partials_over_the_family(run) -> None:
     assert "learned one string" in run("family", "partials", "studio_steel_e4").failure
 
 
-def test_more_strings_for_the_tenth_second_than_there_are_is_told_at_once(run) -> None:
+def test_more_strings_for_the_tenth_second_than_there_are_is_reported_at_once(run) -> None:
     found = run("family", "evaluate", "studio_any_string", "--strings", 1, "--tenth", 2)
     assert "is 2 of 1 strings; give at most as many" in found.usage

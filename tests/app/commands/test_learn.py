@@ -51,7 +51,7 @@ def test_a_note_becomes_an_instrument(run, recording, folder: Path, monkeypatch:
     assert "exists already" in taken.failure
 
 
-def test_what_cannot_be_learned_is_told_and_leaves_nothing(
+def test_what_cannot_be_learned_is_reported_and_leaves_nothing(
     run, folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder / "own"))

@@ -40,7 +40,7 @@ def test_presets_lists_every_field(run, installed: Path) -> None:
     }
 
 
-def test_a_broken_preset_is_told_and_hides_no_other(run, installed: Path) -> None:
+def test_a_broken_preset_is_reported_and_hides_no_other(run, installed: Path) -> None:
     found = run("presets")
     assert found.status == 0
     assert "good" in found.out
@@ -83,12 +83,12 @@ def test_what_was_heard_is_listed_and_a_hostile_table_hides_nothing(run, install
     assert preset["heard"] == "pitch +13 cents …"
     with (installed / NAME).open("a") as table:
         table.write("<script>,1e999,nan\n")
-    told = run("presets", "--json")
-    (again,) = json.loads(told.out)
-    assert (told.status, again) == (0, preset)
-    assert f"{NAME}: line 3: holds 3 values" in told.err
+    reported = run("presets", "--json")
+    (again,) = json.loads(reported.out)
+    assert (reported.status, again) == (0, preset)
+    assert f"{NAME}: line 3: holds 3 values" in reported.err
     (installed / NAME).write_bytes(b"\xff" * 100)
-    told = run("presets", "--json")
-    (unknown,) = json.loads(told.out)
-    assert (told.status, unknown["heard"]) == (0, "not measured")
-    assert "not a text file" in told.err
+    reported = run("presets", "--json")
+    (unknown,) = json.loads(reported.out)
+    assert (reported.status, unknown["heard"]) == (0, "not measured")
+    assert "not a text file" in reported.err

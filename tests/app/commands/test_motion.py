@@ -130,7 +130,7 @@ BAD_INPUTS = {
 
 @pytest.mark.parametrize("command", ["simulate", "predict"])
 @pytest.mark.parametrize("name", BAD_INPUTS)
-def test_a_bad_input_is_told_in_one_line(run, folder, tmp_path, small_preset, name: str, command: str) -> None:
+def test_a_bad_input_is_reported_in_one_line(run, folder, tmp_path, small_preset, name: str, command: str) -> None:
     content, message = BAD_INPUTS[name]
     path = tmp_path / "bad.npy"
     if isinstance(content, bytes):
@@ -145,14 +145,14 @@ def test_a_bad_input_is_told_in_one_line(run, folder, tmp_path, small_preset, na
     assert list(folder.iterdir()) == []
 
 
-def test_a_truncated_input_and_an_archive_are_told(run, folder: Path, u0: Path, tmp_path: Path) -> None:
+def test_a_truncated_input_and_an_archive_are_reported(run, folder: Path, u0: Path, tmp_path: Path) -> None:
     u0.write_bytes(u0.read_bytes()[:-100])
     assert "not a whole NumPy .npy file" in run(*simulate(u0, folder / "out.npy")).failure
     np.savez(tmp_path / "many.npz", a=np.zeros((1, 101)))
     assert "an archive of arrays" in run(*simulate(tmp_path / "many.npz", folder / "out.npy")).failure
 
 
-def test_the_grid_of_a_preset_is_told(run, folder: Path, tmp_path: Path, small_preset: Path) -> None:
+def test_the_grid_of_a_preset_is_reported(run, folder: Path, tmp_path: Path, small_preset: Path) -> None:
     np.save(tmp_path / "u0.npy", np.zeros((2, 50)))
     failure = run("predict", small_preset, tmp_path / "u0.npy", folder / "out.npy", "--steps", 5).failure
     assert "u0.npy: has shape (2, 50), expected (batch, 101), the grid of small" in failure
@@ -181,7 +181,7 @@ def test_a_result_that_would_not_fit_is_refused_before_the_work(run, u0: Path, f
     assert "would take 2257.5 GiB, more than the 4 GiB allowed; lower --steps" in failure
 
 
-def test_metres_that_look_like_millimetres_are_told(run, u0: Path, folder: Path) -> None:
+def test_metres_that_look_like_millimetres_are_reported(run, u0: Path, folder: Path) -> None:
     np.save(u0, np.load(u0) * 1000)
     found = run(*simulate(u0, folder / "out.npy"))
     assert found.status == 0
@@ -196,7 +196,7 @@ def test_a_motion_that_is_not_finite_leaves_no_file(run, u0: Path, folder: Path)
     assert list(folder.iterdir()) == []
 
 
-def test_a_folder_that_cannot_be_written_is_told(run, u0: Path, folder: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_reported(run, u0: Path, folder: Path) -> None:
     out = folder / "missing" / "out.npy"
     assert f"{out}: cannot be written" in run(*simulate(u0, out)).failure
 
@@ -241,7 +241,7 @@ def test_windows_meet_at_whole_seconds_and_at_the_horizon(small_preset: Path) ->
     assert motion.window_edges(0.05, info) == [0, 0.05]
 
 
-def test_a_pluck_outside_the_training_is_told_and_compared(run, small_preset: Path) -> None:
+def test_a_pluck_outside_the_training_is_reported_and_compared(run, small_preset: Path) -> None:
     found = run(*compare(small_preset, "--width", 0.3, position=0.1, amplitude_mm=15))
     assert found.status == 0
     assert found.err.splitlines() == [
@@ -290,12 +290,12 @@ def test_a_preset_of_many_strings_predicts_the_string_that_is_named(run, folder:
 def test_a_string_file_rate_and_modes_are_taken(run, folder: Path) -> None:
     np.save(folder / "u.npy", Pluck(0.3, 1.0).displacement(101)[None])
     (folder / "mine.toml").write_bytes(find_string(STEEL_E4).read_bytes())
-    told = ("--string", folder / "mine.toml", "--rate", 22_050, "--modes", 12, "--steps", 40)
-    assert run("predict", "studio_any_string", folder / "u.npy", folder / "m.npy", *told).status == 0
+    reported = ("--string", folder / "mine.toml", "--rate", 22_050, "--modes", 12, "--steps", 40)
+    assert run("predict", "studio_any_string", folder / "u.npy", folder / "m.npy", *reported).status == 0
     assert np.load(folder / "m.npy").shape == (1, 41, 101)
 
 
-def test_a_string_beyond_the_family_is_rendered_and_told(run, folder: Path) -> None:
+def test_a_string_beyond_the_family_is_rendered_and_reported(run, folder: Path) -> None:
     np.save(folder / "u.npy", Pluck(0.3, 20.0, "triangular").displacement(101)[None])
     text = find_string(STEEL_E4).read_text(encoding="utf-8")
     slack = text.replace("tension_n = 72.592", "tension_n = 0.72592")

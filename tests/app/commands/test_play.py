@@ -17,7 +17,7 @@ from app.shared.version import program_version
 from engine.presets import SHIPPED as PRESETS
 
 
-def test_a_body_that_is_not_here_is_told_and_the_rest_is_played(
+def test_a_body_that_is_not_here_is_reported_and_the_rest_is_played(
     run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
@@ -58,7 +58,7 @@ def test_a_midi_file_is_played_by_model_and_truth_the_same_each_time(run, tmp_pa
     assert abs(model[-480:]).max() < 1e-3
 
 
-def test_what_cannot_be_played_is_told_in_a_line(run, tmp_path: Path) -> None:
+def test_what_cannot_be_played_is_reported_in_a_line(run, tmp_path: Path) -> None:
     (tmp_path / "one.mid").write_bytes(midi_bytes(EVENTS))
     out = tmp_path / "one.wav"
     for arguments in (
@@ -72,7 +72,7 @@ def test_what_cannot_be_played_is_told_in_a_line(run, tmp_path: Path) -> None:
     assert not out.exists()
 
 
-def test_drums_are_left_out_and_that_is_told_in_a_line(run, tmp_path: Path) -> None:
+def test_drums_are_left_out_and_that_is_reported_in_a_line(run, tmp_path: Path) -> None:
     (tmp_path / "plain.mid").write_bytes(midi_bytes(EVENTS))
     (tmp_path / "drums.mid").write_bytes(midi_bytes([TimedEvent(0.0, NoteOn(40, 127, 9)), *EVENTS]))
 
@@ -82,9 +82,9 @@ def test_drums_are_left_out_and_that_is_told_in_a_line(run, tmp_path: Path) -> N
         assert found.status == 0, found.err
         return soundfile.read(out)[0].tobytes(), found.err
 
-    (plain, silent), (without, told) = played("plain"), played("drums")
+    (plain, silent), (without, reported) = played("plain"), played("drums")
     assert plain == without
-    assert "drums.mid is played without its drums (channel 10)" in told
+    assert "drums.mid is played without its drums (channel 10)" in reported
     assert "drums" not in silent
 
 
@@ -109,8 +109,19 @@ def test_a_file_of_one_channel_sounds_in_chords_by_a_guitars_patch(run, tmp_path
 def test_info_says_which_instrument_played(run, tmp_path: Path) -> None:
     midi, out = tmp_path / "one.mid", tmp_path / "one.wav"
     midi.write_bytes(midi_bytes(EVENTS))
-    told = ("--instrument", "jazz_guitar", "--source", "truth", "--rate", 44_100, "--bits", "16", "--seconds", "0.2")
-    assert run("play", midi, "--out", out, *told).status == 0
+    reported = (
+        "--instrument",
+        "jazz_guitar",
+        "--source",
+        "truth",
+        "--rate",
+        44_100,
+        "--bits",
+        "16",
+        "--seconds",
+        "0.2",
+    )
+    assert run("play", midi, "--out", out, *reported).status == 0
     facts = json.loads(run("info", out, "--json").out)
     assert facts["preset_file"] == str(PRESETS / "studio_any_string.safetensors")
     assert (facts["instrument"], facts["preset"], facts["source"]) == ("Jazz guitar", "studio_any_string", "truth")

@@ -71,7 +71,7 @@ def test_a_preset_is_found_by_its_content_under_another_name(run, installed: Pat
     assert "renamed.safetensors" in run("info", first).out
 
 
-def test_another_version_of_a_preset_is_told(run, installed: Path, folder: Path) -> None:
+def test_another_version_of_a_preset_is_reported(run, installed: Path, folder: Path) -> None:
     first = folder / "first.wav"
     run("render", "good", first, *PLUCK)
     data = installed.read_bytes()
@@ -82,7 +82,7 @@ def test_another_version_of_a_preset_is_told(run, installed: Path, folder: Path)
     assert "the preset good is not the one that made this file" in found.err
 
 
-def test_a_recipe_whose_preset_is_gone_is_told(run, installed: Path, folder: Path) -> None:
+def test_a_recipe_whose_preset_is_gone_is_reported(run, installed: Path, folder: Path) -> None:
     first = folder / "first.wav"
     run("render", "good", first, *PLUCK)
     installed.unlink()
@@ -101,7 +101,7 @@ def test_info_shows_every_choice(run, installed: Path, folder: Path) -> None:
     assert "past its training" in shown.err
 
 
-def test_files_without_a_usable_recipe_are_told_in_one_line(run, folder: Path) -> None:
+def test_files_without_a_usable_recipe_are_reported_in_one_line(run, folder: Path) -> None:
     path = folder / "foreign.wav"
     assert f"{path}: no sound file that can be read" in run("info", path).failure
     path.write_bytes(b"RIFF nothing")
@@ -170,13 +170,13 @@ def test_a_preset_name_of_a_recipe_is_never_a_path(
         ({"source": "both", "listen_right": 0.5}, "cannot share one file"),
     ],
 )
-def test_a_recipe_out_of_range_is_told_with_its_file(
+def test_a_recipe_out_of_range_is_reported_with_its_file(
     run, installed: Path, folder: Path, tmp_path: Path, changes: dict[str, object], message: str
 ) -> None:
     run("render", "good", folder / "first.wav", *PLUCK)
     bad = forged(folder / "first.wav", tmp_path / "bad.wav", **changes)
-    told = run("render", "--recipe", bad, tmp_path / "again.wav").failure
-    assert f"{bad}: its recipe cannot be used" in told and message in told
+    reported = run("render", "--recipe", bad, tmp_path / "again.wav").failure
+    assert f"{bad}: its recipe cannot be used" in reported and message in reported
     assert not (tmp_path / "again.wav").exists()
 
 
@@ -200,8 +200,8 @@ def test_a_recipe_holds_the_string_that_a_model_of_many_played(run, folder: Path
     """Its file may be gone: the eight parameters are in the recipe, and rate and modes beside them."""
     string, first, again = tmp_path / "mine.toml", folder / "first.wav", folder / "again.wav"
     string.write_bytes(find_string("steel_g3").read_bytes())
-    told = ("--string", string, "--rate", 44_100, "--modes", 30)
-    assert run("render", "studio_any_string", first, *PLUCK, *told).status == 0
+    reported = ("--string", string, "--rate", 44_100, "--modes", 30)
+    assert run("render", "studio_any_string", first, *PLUCK, *reported).status == 0
     string.unlink()
     facts = json.loads(run("info", first, "--json").out)
     assert StringParameters(**facts["string"]) == read_string(find_string("steel_g3"))
@@ -237,15 +237,15 @@ def test_a_recipe_from_before_there_were_strings_is_rendered(run, installed: Pat
         ({"damping_d1_kg_m_s": 900.0}, "overdamped"),
     ],
 )
-def test_an_impossible_string_of_a_recipe_is_told(
+def test_an_impossible_string_of_a_recipe_is_reported(
     run, folder: Path, tmp_path: Path, changes: dict[str, object], message: str
 ) -> None:
     run("render", "studio_any_string", folder / "first.wav", *PLUCK)
     with soundfile.SoundFile(folder / "first.wav") as sound:
         string = json.loads(sound.comment)["string"]
     bad = forged(folder / "first.wav", tmp_path / "bad.wav", string=string | changes)
-    told = run("render", "--recipe", bad, tmp_path / "again.wav").failure
-    assert f"{bad}: its recipe cannot be used" in told and message in told
+    reported = run("render", "--recipe", bad, tmp_path / "again.wav").failure
+    assert f"{bad}: its recipe cannot be used" in reported and message in reported
 
 
 @pytest.mark.parametrize("changes", [{"modes": 100}, {"modes": -1}, {"preset_rate_hz": 10**9}])
@@ -257,7 +257,7 @@ def test_modes_and_rate_of_a_recipe_are_bounded(
     assert "its recipe cannot be used" in run("render", "--recipe", bad, tmp_path / "again.wav").failure
 
 
-def test_a_string_beyond_the_family_is_rendered_to_a_file_and_told(run, folder: Path, tmp_path: Path) -> None:
+def test_a_string_beyond_the_family_is_rendered_to_a_file_and_reported(run, folder: Path, tmp_path: Path) -> None:
     text = find_string("steel_g3").read_text(encoding="utf-8")
     slack = re.sub("d3_kg_m_s = .*", "d3_kg_m_s = 1e-8", text.replace("tension_n = 74.173", "tension_n = 0.74173"))
     (tmp_path / "slack.toml").write_text(slack, encoding="utf-8")
@@ -266,12 +266,14 @@ def test_a_string_beyond_the_family_is_rendered_to_a_file_and_told(run, folder: 
     assert "decay time near 3 kHz" in found.err and "raises the tension" in found.err
     heavy = slack.replace("d1_kg_m_s = 0.00098472", "d1_kg_m_s = 900.0")
     (tmp_path / "heavy.toml").write_text(heavy, encoding="utf-8")
-    told = run("render", "studio_any_string", folder / "b.wav", *PLUCK, "--string", tmp_path / "heavy.toml").failure
-    assert f"{tmp_path / 'heavy.toml'}: " in told and "overdamped" in told
+    reported = run(
+        "render", "studio_any_string", folder / "b.wav", *PLUCK, "--string", tmp_path / "heavy.toml"
+    ).failure
+    assert f"{tmp_path / 'heavy.toml'}: " in reported and "overdamped" in reported
     assert not (folder / "b.wav").exists()
 
 
 def test_a_preset_of_one_string_plays_no_other(run, installed: Path, folder: Path) -> None:
-    told = run("render", "good", folder / "a.wav", *PLUCK, "--string", "steel_g3").failure
-    assert "choose a preset of many strings" in told
+    reported = run("render", "good", folder / "a.wav", *PLUCK, "--string", "steel_g3").failure
+    assert "choose a preset of many strings" in reported
     assert "--recipe: holds all" in run("render", "--recipe", "c.wav", "--string", "steel_g3").usage.replace("'", "")

@@ -26,7 +26,9 @@ def render(preset: object, out: Path, *more: Any, position: float = 0.4, amplitu
 @pytest.mark.parametrize(
     ("bits", "subtype"), [(None, "PCM_24"), ("16", "PCM_16"), ("24", "PCM_24"), ("32f", "FLOAT")]
 )
-def test_every_format_is_written_and_told(run, small_preset, folder: Path, bits: str | None, subtype: str) -> None:
+def test_every_format_is_written_and_reported(
+    run, small_preset, folder: Path, bits: str | None, subtype: str
+) -> None:
     out = folder / "a.wav"
     found = run(*render(small_preset, out, *(["--bits", bits] if bits else [])))
     assert (found.status, found.err) == (0, "")
@@ -68,7 +70,7 @@ def test_the_difference_is_model_minus_truth(run, small_preset: Path, folder: Pa
     assert sounds["difference"] == pytest.approx(sounds["model"] - sounds["truth"], abs=1e-6)
 
 
-def test_what_lies_past_or_outside_the_training_is_told(run, small_preset: Path, folder: Path) -> None:
+def test_what_lies_past_or_outside_the_training_is_reported(run, small_preset: Path, folder: Path) -> None:
     found = run(*render(small_preset, folder / "a.wav", "--seconds", 0.2, position=0.1))
     assert found.err.splitlines() == [
         "learned-strings: warning: position 0.1 is outside the trained 0.3 … 0.7",
@@ -107,7 +109,7 @@ def test_options_out_of_range_are_bad_usage(
     assert list(folder.iterdir()) == []
 
 
-def test_an_unwritable_place_is_told(run, small_preset: Path, folder: Path) -> None:
+def test_an_unwritable_place_is_reported(run, small_preset: Path, folder: Path) -> None:
     out = folder / "missing" / "a.wav"
     assert f"{out}: cannot be written" in run(*render(small_preset, out)).failure
     assert "not a file that can be replaced" in run(*render(small_preset, folder)).failure
@@ -161,7 +163,7 @@ def _impossible(tensors: Tensors, facts: dict[str, Any]) -> None:
         (_impossible, "rate_hz must be above 0"),
     ],
 )
-def test_a_damaged_preset_is_told(
+def test_a_damaged_preset_is_reported(
     run, small_preset, folder, tmp_path, damage: Callable[[Tensors, dict[str, Any]], None], message: str
 ) -> None:
     with safe_open(small_preset, framework="pt") as file:
@@ -176,7 +178,7 @@ def test_a_damaged_preset_is_told(
     assert list(folder.iterdir()) == []
 
 
-def test_a_missing_truncated_or_oversized_preset_is_told(run, small_preset, folder: Path, tmp_path: Path) -> None:
+def test_a_missing_truncated_or_oversized_preset_is_reported(run, small_preset, folder: Path, tmp_path: Path) -> None:
     out, path = folder / "a.wav", tmp_path / "bad.safetensors"
     assert "no preset" in run(*render(path, out)).failure
     path.write_bytes(small_preset.read_bytes()[:-50])

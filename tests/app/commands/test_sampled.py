@@ -75,9 +75,9 @@ def test_a_dry_one_has_no_room(run, notes: list[tuple], folder: Path, monkeypatc
         "render_note",
         lambda patch, *words: rooms.append(patch.room.mix) or whole(patch, *words),
     )
-    told = "a released key ends the room's tail as well; --dry leaves the room to the sampler"
-    assert told in run("sampled", PATCH, folder / "a.sfz", *SMALL).err
-    assert told not in run("sampled", PATCH, folder / "a.sfz", *SMALL, "--dry").err
+    reported = "a released key ends the room's tail as well; --dry leaves the room to the sampler"
+    assert reported in run("sampled", PATCH, folder / "a.sfz", *SMALL).err
+    assert reported not in run("sampled", PATCH, folder / "a.sfz", *SMALL, "--dry").err
     assert rooms == [find_patch(PATCH).patch.room.mix] * 6 + [0.0] * 6
     assert rooms[0] > 0
 
@@ -92,8 +92,8 @@ def test_the_size_alone(run, notes: list[tuple], folder: Path) -> None:
 
 
 def test_a_large_one_is_asked_for(run, notes: list[tuple], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    told = run("sampled", PATCH, folder / "a.sfz", "--layers", 32, "--seconds", 30).failure
-    assert "MB, before FLAC compression; take fewer --keys, --layers or --seconds, or say --yes" in told
+    reported = run("sampled", PATCH, folder / "a.sfz", "--layers", 32, "--seconds", 30).failure
+    assert "MB, before FLAC compression; take fewer --keys, --layers or --seconds, or say --yes" in reported
     monkeypatch.setattr("app.commands.sampled.ASKED_ABOVE_BYTES", 1000)
     assert run("sampled", PATCH, folder / "a.sfz", *SMALL).status == 1
     assert notes == [] and list(folder.iterdir()) == []
@@ -101,7 +101,7 @@ def test_a_large_one_is_asked_for(run, notes: list[tuple], folder: Path, monkeyp
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "reported"),
     [
         (("a.wav",), "must end with .sfz or .sf2"),
         (("a.sf2", "--bits", "16"), "a SoundFont holds 16 bits"),
@@ -113,9 +113,9 @@ def test_a_large_one_is_asked_for(run, notes: list[tuple], folder: Path, monkeyp
         (("a.sfz", "--seconds", "inf"), "seconds must lie in"),
     ],
 )
-def test_bad_usage(run, notes: list[tuple], folder: Path, words: tuple, told: str) -> None:
+def test_bad_usage(run, notes: list[tuple], folder: Path, words: tuple, reported: str) -> None:
     name, *options = words
-    assert told in " ".join(run("sampled", PATCH, folder / name, *options).usage.replace("│", " ").split())
+    assert reported in " ".join(run("sampled", PATCH, folder / name, *options).usage.replace("│", " ").split())
     assert notes == []
 
 

@@ -161,20 +161,20 @@ def test_a_dry_run_lists_the_order_and_what_is_finished(run, words: list[Any], t
     assert sorted(tmp_path.rglob("*")) == before
 
 
-def test_a_plan_that_is_not_there_is_told(run) -> None:
+def test_a_plan_that_is_not_there_is_reported(run) -> None:
     assert "no plan 'nothing'; give a .toml file or one of: tables, tiny" in run("sweep", "nothing").failure
 
 
-def test_an_unknown_name_in_a_plan_is_told(run, words: list[Any], plan: Path) -> None:
+def test_an_unknown_name_in_a_plan_is_reported(run, words: list[Any], plan: Path) -> None:
     plan.write_text(PLAN.replace('"koopman"', '"koopmann"'), encoding="utf-8")
     assert f"{plan}.block[0]: model 'koopmann' is not one of" in run(*words).failure
 
 
-def test_a_results_file_that_is_none_is_told(run, words: list[Any], plan: Path) -> None:
+def test_a_results_file_that_is_none_is_reported(run, words: list[Any], plan: Path) -> None:
     assert "not a results file" in run(*words, "--results", plan).failure
 
 
-def test_a_scheduler_that_is_not_there_is_told(run, words: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_is_not_there_is_reported(run, words: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("training.sweeping.workers.on_dask.CONNECT_S", 0.2)
     found = run(*words, "--scheduler", "tcp://127.0.0.1:9")
     assert found.status == 1
@@ -218,8 +218,8 @@ def test_a_full_disk_leaves_the_rows_as_they_were(run, tmp_path: Path, bytes_lef
     add_rows(there, [row_of("b")])
     before = here.read_bytes()
     with full_disk(bytes_left):
-        told = run("results", "merge", there, "--results", here).failure
-    assert told == f"learned-strings: {here}: cannot be written (File too large); {REMEDIES[errno.EFBIG]}"
+        reported = run("results", "merge", there, "--results", here).failure
+    assert reported == f"learned-strings: {here}: cannot be written (File too large); {REMEDIES[errno.EFBIG]}"
     assert here.read_bytes() == before
     assert not list(tmp_path.glob("*.unfinished"))
 
@@ -228,7 +228,7 @@ def test_the_time_left_follows_what_is_known() -> None:
     ended: list[str] = []
 
     def begin(what: str) -> Any:
-        return lambda share, *told: ended.append(what) if share == 1 else None
+        return lambda share, *reported: ended.append(what) if share == 1 else None
 
     shown = Shown(begin, 5, 2)
     assert shown.summary() == "0 done, 0 running, 5 waiting"
@@ -255,16 +255,16 @@ def test_a_terminal_shows_each_run_that_is_under_way(capsys, monkeypatch: pytest
             shown.started(SimpleNamespace(name=name))
         shown.progressed(progress_of("second", 10, 30, RelativeError(0.25, 0.125)))
         shown.progressed(progress_of("second", 20, 20))
-    told = capsys.readouterr().err
-    assert "first" in told
-    assert "20.0 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125" in told
+    reported = capsys.readouterr().err
+    assert "first" in reported
+    assert "20.0 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125" in reported
 
 
-def test_a_log_tells_of_a_long_run_now_and_then(capsys) -> None:
+def test_a_log_reports_of_a_long_run_now_and_then(capsys) -> None:
     for every_s in (60.0, 0.0):
         with console.bars(every_s) as begin:
             shown = Shown(begin, 1, 1)
             shown.started(SimpleNamespace(name="a"))
             shown.progressed(progress_of("a", 1, 3, RelativeError(0.25, 0.125)))
-    told = "learned-strings: a: 25%, 3.0 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125\n"
-    assert capsys.readouterr().err == told
+    reported = "learned-strings: a: 25%, 3.0 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125\n"
+    assert capsys.readouterr().err == reported

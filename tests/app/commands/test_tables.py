@@ -66,7 +66,7 @@ def test_the_tables_are_printed_or_written(run, results: Path, folder: Path) -> 
     assert list(folder.iterdir()) == [path]
 
 
-def test_the_tables_of_a_document_are_made_anew_in_place(run, results: Path, folder: Path) -> None:
+def test_the_tables_of_a_document_are_made_again_in_place(run, results: Path, folder: Path) -> None:
     document = folder / "RESULTS.md"
     document.write_text("# Results\n\nWords.\n\n<!-- tables -->\nan older table\n", encoding="utf-8")
     words = ["table", "--results", results]
@@ -97,13 +97,13 @@ def test_csv_is_read_back(run, results: Path) -> None:
     assert "--into" in run("table", "--results", results, "--format", "csv", "--into", results).usage
 
 
-def test_no_results_are_told_and_the_papers_tables_are_there(run, folder: Path) -> None:
+def test_no_results_are_reported_and_the_papers_tables_are_there(run, folder: Path) -> None:
     found = run("table", "--results", folder / "none.csv")
     assert "none.csv has no rows" in found.err
     assert "not run (0.0113)" in found.out
 
 
-def test_a_file_that_is_no_results_file_is_told(run, folder: Path) -> None:
+def test_a_file_that_is_no_results_file_is_reported(run, folder: Path) -> None:
     (folder / "other.csv").write_text("a,b\n1,2\n", encoding="utf-8")
     assert "not a results file" in run("table", "--results", folder / "other.csv").failure
 
@@ -145,7 +145,7 @@ def test_a_figure_stands_here_by_default(run, tiny: Path, folder: Path, monkeypa
     assert (folder / "extrapolation.png").exists()
 
 
-def test_bad_usage_of_figures_is_told(run, tiny: Path, small_preset: Path, folder: Path) -> None:
+def test_bad_usage_of_figures_is_reported(run, tiny: Path, small_preset: Path, folder: Path) -> None:
     draw = ("figure", "extrapolation")
     assert "suffixes" in run(*draw, tiny, "--output", folder / "figure.bmp").usage
     assert "--seconds" in run(*draw, tiny, "--seconds", 1e6).usage

@@ -133,8 +133,8 @@ def test_a_data_set_is_described(run, place: Place) -> None:
     assert facts["shape"] == [20, 51, 5]
     assert Path(facts["folder"], "amplitudes.npy").exists()
     assert 0 < facts["tension_rise"]["median"] < facts["tension_rise"]["max"] < 1
-    told = run("dataset", place.configuration, *place.cache)
-    assert (told.status, facts["key"] in told.out, "tension rise" in told.out) == (0, True, True)
+    reported = run("dataset", place.configuration, *place.cache)
+    assert (reported.status, facts["key"] in reported.out, "tension rise" in reported.out) == (0, True, True)
 
 
 @pytest.mark.parametrize("bytes_left", [0, 100, 15_000])
@@ -145,24 +145,24 @@ def test_a_full_disk_leaves_no_half_data_set(run, place: Place, bytes_left: int,
     whole = {path.name: path.read_bytes() for path in made.iterdir()}
     shutil.rmtree(made)
     with full_disk(bytes_left):
-        told = run(*words).failure
-    assert told == f"learned-strings: {made}: cannot be written (File too large); {REMEDIES[errno.EFBIG]}"
+        reported = run(*words).failure
+    assert reported == f"learned-strings: {made}: cannot be written (File too large); {REMEDIES[errno.EFBIG]}"
     assert [path.suffix for path in made.parent.iterdir()] == [".lock"]
     assert run(*words).status == 0
     assert {path.name: path.read_bytes() for path in made.iterdir()} == whole
 
 
 @pytest.mark.parametrize("command", ["dataset", "train"])
-def test_a_configuration_that_is_not_there_is_told(run, command: str) -> None:
+def test_a_configuration_that_is_not_there_is_reported(run, command: str) -> None:
     assert "no training configuration 'nothing'" in run(command, "nothing").failure
 
 
-def test_a_wrong_field_is_told(run, place: Place) -> None:
+def test_a_wrong_field_is_reported(run, place: Place) -> None:
     path = place.folder / "wrong.toml"
     path.write_text(CONFIGURATION.replace("epochs", "epoch"), encoding="utf-8")
     assert f"{path}.recipe: unknown field 'epoch'" in run("train", path).failure
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="there is a CUDA device")
-def test_a_device_that_is_not_there_is_told(run, place: Place) -> None:
+def test_a_device_that_is_not_there_is_reported(run, place: Place) -> None:
     assert "no CUDA device can be used here" in run(*place.train("a"), "--device", "cuda").failure

@@ -92,7 +92,7 @@ def test_the_program_says_what_it_is(preset: Preset) -> None:
         assert f"{name} = " in text
 
 
-def test_a_patch_without_a_string_is_told(preset: Preset) -> None:
+def test_a_patch_without_a_string_is_reported(preset: Preset) -> None:
     patch = quiet("classical_guitar", range=(127, 127), tuning=TuningChoice(transpose=48))
     with pytest.raises(ValueError, match="none of its keys"):
         faust_program(patch, preset.info)

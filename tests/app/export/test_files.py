@@ -159,7 +159,7 @@ def test_cancelling_leaves_no_file(request_: SoundRequest, tmp_path: Path) -> No
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_folder_that_refuses_is_told_before_the_work(request_: SoundRequest, tmp_path: Path) -> None:
+def test_a_folder_that_refuses_is_reported_before_the_work(request_: SoundRequest, tmp_path: Path) -> None:
     with pytest.raises(WriteError, match=r"missing.a\.wav: cannot be written .*; make the folder first"):
         export_sound(request_, tmp_path / "missing" / "a.wav", progress=lambda *_: pytest.fail("rendered"))
 
@@ -180,7 +180,7 @@ def test_a_full_disk_leaves_what_was_there(
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_preset_that_vanished_is_told(request_: SoundRequest, tmp_path: Path) -> None:
+def test_a_preset_that_vanished_is_reported(request_: SoundRequest, tmp_path: Path) -> None:
     gone = replace(request_, preset=replace(request_.preset, path=tmp_path / "gone.safetensors"))
     with pytest.raises(PresetError, match=r"gone\.safetensors: the preset cannot be read any more"):
         export_sound(gone, tmp_path / "a.wav")
@@ -216,7 +216,7 @@ def test_a_request_out_of_range_is_refused(request_: SoundRequest, change: dict,
         replace(request_, **change)
 
 
-def test_the_file_name_tells_what_is_in_it() -> None:
+def test_the_file_name_reports_what_is_in_it() -> None:
     assert default_file_name("nylon", Pluck(0.35, 4), 48_000, "truth") == "nylon_x0.35_a4.0_48000_truth.wav"
     assert default_file_name("b", Pluck(0.1234, 0.25), 4000, "both") == "b_x0.1234_a0.25_4000_both.wav"
 
@@ -262,7 +262,7 @@ def test_a_decay_ends_where_it_is_so_far_down_and_not_before() -> None:
     assert sound.decayed_frames(np.zeros((500, 1)), rate_hz, 60.0) == 50
 
 
-def test_files_of_a_decay_have_one_length_and_an_unfinished_one_is_told(
+def test_files_of_a_decay_have_one_length_and_an_unfinished_one_is_reported(
     request_: SoundRequest, tmp_path: Path
 ) -> None:
     decaying = replace(request_, seconds=8.0, decay_db=10.0)

@@ -83,7 +83,7 @@ def test_a_room_rings_out_after_the_string() -> None:
     assert np.abs(tail[-4_800:]).max() < 0.01 * np.abs(wet).max()
 
 
-def test_a_body_that_has_changed_is_told() -> None:
+def test_a_body_that_has_changed_is_reported() -> None:
     body = GUITAR.body.model_copy(update={"name": "mine", "mix": 0.5})
     through = Through.of(GUITAR.model_copy(update={"body": body}), 0.5).model_copy(update={"body_sha256": "0" * 64})
     with pytest.raises(ValueError, match="the body mine is not the one of Classical guitar"):

@@ -43,7 +43,7 @@ def test_any_blocks_make_the_same_bytes(bits: wav.Bits, normalise: bool, monkeyp
     assert again.getvalue() == whole.getvalue() and (level.clipped > 0) == (bits != "32f" and not normalise)
 
 
-def test_a_disk_that_becomes_full_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_becomes_full_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     class Full(io.BytesIO):
         def write(self, data: object) -> int:  # type: ignore[override]
             if self.tell() > 1000:

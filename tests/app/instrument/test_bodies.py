@@ -112,7 +112,7 @@ def test_the_digest_of_a_file_that_stays_is_computed_once(tmp_path: Path, monkey
     assert body_digest(name) == first
 
 
-def test_one_that_is_gone_is_told_in_a_line_and_left_out(patch: Patch, preset: Preset, tmp_path: Path) -> None:
+def test_one_that_is_gone_is_reported_in_a_line_and_left_out(patch: Patch, preset: Preset, tmp_path: Path) -> None:
     name = install_body(late(tmp_path / "late.wav"))
     wooden = on(patch, name)
     assert body_problem(wooden) == "" and effects_of(wooden) is not None
@@ -126,7 +126,7 @@ def test_one_that_is_gone_is_told_in_a_line_and_left_out(patch: Patch, preset: P
     assert body_problem(on(patch, name, mix=0.0)) == ""  # it would not be heard
 
 
-def test_one_that_was_damaged_is_told_with_its_file(patch: Patch, tmp_path: Path) -> None:
+def test_one_that_was_damaged_is_reported_with_its_file(patch: Patch, tmp_path: Path) -> None:
     name = install_body(late(tmp_path / "late.wav"))
     (own_bodies() / "late.wav").write_text("no sound any more")
     assert str(own_bodies() / "late.wav") in body_problem(on(patch, name))

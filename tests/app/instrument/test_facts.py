@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from app.instrument.facts import FIGURES, bright_mode, facts_of, figures_of, knob_for, t60_s, told
+from app.instrument.facts import FIGURES, bright_mode, facts_of, figures_of, knob_for, reported, t60_s
 from app.instrument.strings import Strings
 from app.patches.patch import Fretted, Knobs, Patch, PhysicalString
 from app.shared.parameters import OF_PATCHES
@@ -22,10 +22,10 @@ def string_of(patch: Patch) -> StringParameters:
 
 
 def test_figures_are_three_digits_and_a_unit() -> None:
-    told_as = {70.31: "70.3 N", 649.6: "650 N", 17829.0: "17829 N", 0.0512: "0.0512 N", 4.1e-5: "4.1e-05 N"}
-    assert told(0.0, "N") == "0 N"
-    assert {figure: told(figure, "N") for figure in told_as} == told_as
-    assert told(0.5, "") == "0.500"
+    reported_as = {70.31: "70.3 N", 649.6: "650 N", 17829.0: "17829 N", 0.0512: "0.0512 N", 4.1e-5: "4.1e-05 N"}
+    assert reported(0.0, "N") == "0 N"
+    assert {figure: reported(figure, "N") for figure in reported_as} == reported_as
+    assert reported(0.5, "") == "0.500"
 
 
 def test_every_knob_of_the_string_has_a_figure(patch: Patch) -> None:
@@ -40,7 +40,7 @@ def test_every_knob_of_the_string_has_a_figure(patch: Patch) -> None:
     assert facts_of(found) == {"key": "A3", "pitch": "220.0 Hz", "mass": "3.92 g/m", "stress": "150 MPa"}
 
 
-def test_decay_is_told_of_the_first_partial_and_of_the_one_near_three_kilohertz(patch: Patch) -> None:
+def test_decay_is_reported_of_the_first_partial_and_of_the_one_near_three_kilohertz(patch: Patch) -> None:
     string = string_of(patch)
     assert bright_mode(string) == 14  # of 220 Hz
     for mode in (1, 14):
@@ -72,7 +72,7 @@ def test_where_there_is_no_such_string_it_goes_as_far_as_there_is_one(patch: Pat
     assert knob_for(heavy, (KEY, None), "knobs.density", 1e9) == pytest.approx(2.0)  # 1e5 kg/m³ at most
 
 
-def test_a_silent_key_is_told(patch: Patch) -> None:
+def test_a_silent_key_is_reported(patch: Patch) -> None:
     with pytest.raises(ValueError, match="key 10 of test is silent"):
         knob_for(patch, (10, None), "knobs.tension", 80.0)
 

@@ -27,7 +27,7 @@ from app.instrument.events import (
     Event,
     NoteOff,
     NoteOn,
-    let_go,
+    release_all,
 )
 from app.instrument.strings import pitch_hz_of
 from app.patches.patch import Knobs, OpenString, Patch, StringSet
@@ -140,7 +140,7 @@ def test_reset_leaves_the_next_key_and_the_ringing_one_in_tune_and_lifts_the_ped
 
 def test_what_a_file_leaves_behind_does_not_bend_the_keys_of_the_computer(hand: Hand) -> None:
     hand.play(NoteOn(45, 60), Bend(1.0))
-    hand.play(*let_go([0]))
+    hand.play(*release_all([0]))
     assert hand.play(NoteOn(57, 60, KEYS)).semitones == pytest.approx(0, abs=1e-6)
     assert hand.struck[0].now.damped
 
@@ -148,7 +148,7 @@ def test_what_a_file_leaves_behind_does_not_bend_the_keys_of_the_computer(hand: 
 def test_a_channels_reset_leaves_the_others(hand: Hand) -> None:
     one = hand.play(NoteOn(45, 60, 0), Bend(1.0, 0))
     other = hand.play(NoteOn(57, 60, 1), Bend(1.0, 1))
-    hand.play(*let_go([0]))
+    hand.play(*release_all([0]))
     assert (one.now.damped, other.now.damped) == (True, False)
     assert (other.semitones, other.now.held) == (pytest.approx(2), True)
 
@@ -260,7 +260,7 @@ def test_with_its_input_at_rest_a_guitar_is_forgotten(strung: Patch, preset: Pre
     hand.play(NoteOn(64, 90, HIGH_E), NoteOn(59, 90, B))
     hand.play(NoteOn(65, 90, HIGH_E), NoteOn(67, 90, HIGH_E))
     assert hand.sounding.count(65) == 0
-    hand.play(*let_go([HIGH_E, B]), NoteOn(72, 90), NoteOn(76, 90))
+    hand.play(*release_all([HIGH_E, B]), NoteOn(72, 90), NoteOn(76, 90))
     assert {72, 76} <= set(hand.sounding)
 
 

@@ -68,7 +68,7 @@ def test_what_strings_do_not_answer_is_left_out() -> None:
 
 
 @pytest.mark.parametrize(
-    ("raw", "told"),
+    ("raw", "reported"),
     [
         (b"", "no MIDI file"),
         (b"RIFF....WAVE", "no MIDI file"),
@@ -79,10 +79,10 @@ def test_what_strings_do_not_answer_is_left_out() -> None:
         (midi_bytes([TimedEvent(4000.0, NoteOn(1, 1))]), "an hour"),
     ],
 )
-def test_a_file_that_cannot_be_played_is_named(tmp_path: Path, raw: bytes, told: str) -> None:
+def test_a_file_that_cannot_be_played_is_named(tmp_path: Path, raw: bytes, reported: str) -> None:
     file = tmp_path / "bad.mid"
     file.write_bytes(raw)
-    with pytest.raises(MidiFileError, match=told) as caught:
+    with pytest.raises(MidiFileError, match=reported) as caught:
         read_midi(file)
     assert str(file) in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -118,7 +118,7 @@ def notes_of(song: Song) -> list[tuple[int, int]]:
     return [(each.event.key, each.event.channel) for each in song.events if isinstance(each.event, NoteOn)]
 
 
-def test_drums_are_no_strings_and_that_is_told(tmp_path: Path) -> None:
+def test_drums_are_no_strings_and_that_is_reported(tmp_path: Path) -> None:
     found = read_song(song(tmp_path, (60, 0), (36, 9), (62, 1)), None)
     assert notes_of(found) == [(60, 0), (62, 1)]
     assert channels_in(each.event for each in found.events) == {0, 1}
@@ -138,7 +138,7 @@ def test_a_file_of_one_channel_is_no_guitars(tmp_path: Path) -> None:
     assert notes_of(read_song(song(tmp_path, (60, 3), (64, 0)), PATCHES["guitar"])) == [(60, 3), (64, 0)]
 
 
-def test_notes_for_which_there_is_no_string_are_told(tmp_path: Path, guitar: Patch) -> None:
+def test_notes_for_which_there_is_no_string_are_reported(tmp_path: Path, guitar: Patch) -> None:
     narrow = guitar.model_copy(update={"mode": "poly", "range": (40, 76)})
     found = read_song(song(tmp_path, (10, 0), (60, 0), (120, 0), (36, 9)), narrow)
     words = "its drums (channel 10) and 2 of its 3 notes, for which test has no string (E2 to E5)"

@@ -388,7 +388,7 @@ def test_every_knob_turned_while_it_rings_changes_model_and_truth_alike_without_
     assert float(((model - truth)[at:] ** 2).sum() / (truth[at:] ** 2).sum()) < 1e-5
 
 
-def test_an_impossible_knob_leaves_what_rings_and_is_told_by_the_next_key(patch: Patch, preset: Preset) -> None:
+def test_an_impossible_knob_leaves_what_rings_and_is_reported_by_the_next_key(patch: Patch, preset: Preset) -> None:
     stage = Stage(patch, preset)
     (before,) = stage.play(NoteOn(57, 60))
     thin = changed(patch, strings=Fretted(string=physical(replace(STEEL, density_kg_m3=90_000.0))))

@@ -42,7 +42,7 @@ def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guit
     assert abs(low.parameters.length_m / lowest.parameters.length_m - 1) < 1e-3
 
 
-def test_a_set_may_be_told_on_which_string(guitar: Patch) -> None:
+def test_a_set_may_be_reported_on_which_string(guitar: Patch) -> None:
     strings = [
         OpenString(note=note, string=physical(replace(STEEL, tension_n=tension_n)))
         for note, tension_n in ((50, 60.0), (55, 70.0), (59, 80.0))

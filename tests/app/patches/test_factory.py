@@ -55,7 +55,7 @@ def test_there_are_many_and_none_is_broken() -> None:
 
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
-def test_a_file_is_named_after_its_patch_and_tells_what_it_is(entry) -> None:
+def test_a_file_is_named_after_its_patch_and_reports_what_it_is(entry) -> None:
     patch = entry.patch
     assert entry.name == file_stem(patch.name) and entry.name.isascii()
     assert 20 <= len(patch.description) <= 200 and patch.description.endswith(".")
@@ -76,11 +76,11 @@ def test_every_key_is_a_string_that_the_model_knows(patch: Patch) -> None:
     assert len(strings) >= 20
     tuning = Tuning(patch.tuning)
     for string in strings:
-        told = f"key {string.key}: {string}"
-        assert PITCH_RANGE_HZ[0] <= string.pitch_hz <= PITCH_RANGE_HZ[1], told
-        assert pitch_hz_of(string.parameters) == pytest.approx(tuning.hz(string.key), rel=1e-6), told
-        assert inharmonicity(string.parameters) <= MOST_INHARMONIC, told
-        assert T60_RANGE_S[0] <= math.log(1000) / string.parameters.decay_rate(1) <= T60_RANGE_S[1], told
+        reported = f"key {string.key}: {string}"
+        assert PITCH_RANGE_HZ[0] <= string.pitch_hz <= PITCH_RANGE_HZ[1], reported
+        assert pitch_hz_of(string.parameters) == pytest.approx(tuning.hz(string.key), rel=1e-6), reported
+        assert inharmonicity(string.parameters) <= MOST_INHARMONIC, reported
+        assert T60_RANGE_S[0] <= math.log(1000) / string.parameters.decay_rate(1) <= T60_RANGE_S[1], reported
         string.parameters.check_motion(string.modes, GRID_POINTS, 48_000, tension_modulated=True)
 
 

@@ -68,7 +68,7 @@ def test_a_patch_replaces_its_own_file_and_no_other(make_patch: Make, own: Path)
     assert read_patch(own / "my_bass.json").name == "My-Bass"
 
 
-def test_two_patches_of_one_name_are_told_apart(make_patch: Make, own: Path) -> None:
+def test_two_patches_of_one_name_are_reported_apart(make_patch: Make, own: Path) -> None:
     save_patch(make_patch(name="Mine"))
     long = "M" * 60
     for name, file in (("Mine", "mine (copy)"), ("mine", "mine_3"), (long, "long"), (long, "longer")):
@@ -94,8 +94,8 @@ def test_a_shipped_patch_is_neither_overwritten_nor_renamed(make_patch: Make, ow
 def test_renaming(make_patch: Make, own: Path) -> None:
     first = save_patch(make_patch(name="First"))
     save_patch(make_patch(name="Taken"))
-    for name, told in (("taken", "exists already"), ("../up", "name"), ("", "name"), ("a\nb", "name")):
-        with pytest.raises(PatchError, match=told):
+    for name, reported in (("taken", "exists already"), ("../up", "name"), ("", "name"), ("a\nb", "name")):
+        with pytest.raises(PatchError, match=reported):
             rename_patch(first, name)
     second = rename_patch(first, "Second")
     assert sorted(path.name for path in own.iterdir()) == ["second.json", "taken.json"]
@@ -103,7 +103,7 @@ def test_renaming(make_patch: Make, own: Path) -> None:
     assert spelt.path == second.path and read_patch(spelt.path).name == "SECOND"
 
 
-def test_a_folder_that_cannot_be_written_is_told(make_patch: Make, own: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_reported(make_patch: Make, own: Path) -> None:
     own.parent.parent.mkdir(exist_ok=True)
     own.parent.write_text("a file")
     with pytest.raises(WriteError, match="own"):
@@ -138,8 +138,8 @@ def test_one_bad_file_hides_no_other(make_patch: Make, own: Path) -> None:
     entries, problems = list_patches(own)
     assert entries == [good]
     assert all(problem.isprintable() and len(problem) <= 500 for problem in problems)
-    told = {Path(problem.split(".json: ")[0] + ".json").name: problem for problem in problems}
-    assert set(told) == expected
+    reported = {Path(problem.split(".json: ")[0] + ".json").name: problem for problem in problems}
+    assert set(reported) == expected
     for name, words in (
         ("newer", "version: made by a newer version"),
         ("colour", "colour"),
@@ -148,7 +148,7 @@ def test_one_bad_file_hides_no_other(make_patch: Make, own: Path) -> None:
         ("nan", "tuning.a4_hz"),
         ("big", "larger than"),
     ):
-        assert words in told[f"{name}.json"], told[f"{name}.json"]
+        assert words in reported[f"{name}.json"], reported[f"{name}.json"]
 
 
 def test_of_two_patches_of_one_name_the_shipped_one_counts(own: Path) -> None:

@@ -31,9 +31,9 @@ def test_twelve_equal_steps(a4_hz: float, note: float) -> None:
 
 
 def test_twelve_equal_steps_as_a_scale_are_the_same() -> None:
-    told = Tuning(TuningChoice(scale=scale(*(f"{100 * n}." for n in range(1, 13))), a4_hz=432))
+    reported = Tuning(TuningChoice(scale=scale(*(f"{100 * n}." for n in range(1, 13))), a4_hz=432))
     for note in (0, 33.25, 60, 69, 127):
-        assert told.hz(note) == pytest.approx(432 * 2 ** ((note - 69) / 12), rel=1e-9)
+        assert reported.hz(note) == pytest.approx(432 * 2 ** ((note - 69) / 12), rel=1e-9)
 
 
 def test_transposition_moves_all_keys() -> None:
@@ -64,7 +64,7 @@ def test_between_two_keys_the_interval_is_divided_evenly() -> None:
     assert tuned.hz(60.25) == pytest.approx(tuned.hz(60) * (9 / 8) ** 0.25, rel=1e-9)
 
 
-def test_keys_that_a_mapping_leaves_out_are_told_and_lie_between() -> None:
+def test_keys_that_a_mapping_leaves_out_are_reported_and_lie_between() -> None:
     """White keys play the seven notes; black keys are silent."""
     white = keymap(0, "x", 1, "x", 2, 3, "x", 4, "x", 5, "x", 6, octave=7)
     tuned = Tuning(TuningChoice(scale=scale(*JUST), keymap=white))
@@ -147,7 +147,7 @@ def test_remarks_below_a_scale_are_no_notes(tmp_path: Path) -> None:
         ("short.kbm", b"12\n0\n"),
     ],
 )
-def test_a_file_that_is_no_tuning_is_told_in_one_line(tmp_path: Path, name: str, content: bytes | None) -> None:
+def test_a_file_that_is_no_tuning_is_reported_in_one_line(tmp_path: Path, name: str, content: bytes | None) -> None:
     path = tmp_path / name
     if content is not None:
         path.write_bytes(content)

@@ -32,7 +32,7 @@ def ahead() -> Iterator[Ahead]:
     assert not any(thread.name == "render-ahead" for thread in threading.enumerate())
 
 
-class Told:
+class Reported:
     """What an ahead voice says."""
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ class Told:
         self.given_up = False
 
 
-Make = Callable[..., tuple[AheadVoice, Told]]
+Make = Callable[..., tuple[AheadVoice, Reported]]
 
 
 @pytest.fixture
@@ -56,8 +56,8 @@ def make(sources: Sources, small_preset: Path) -> Make:
         key: object = None,
         model: ModelSource = loaded.model,
         amplitude_mm: float = 3.0,
-    ) -> tuple[AheadVoice, Told]:
-        told = Told()
+    ) -> tuple[AheadVoice, Reported]:
+        reported = Reported()
         initial_m = project(Pluck(0.4, amplitude_mm).displacement(info.grid_points), info.modes)
         voice = AheadVoice(
             Voice(program, initial_m, EAR, 1.0, seconds, info.rate_hz),
@@ -65,12 +65,12 @@ def make(sources: Sources, small_preset: Path) -> Make:
             initial_m,
             EAR.weights(info.grid_points),
             (key or object(),),
-            lambda: told.begun_s.append(voice.rendered_s),
-            told.errors.append,
-            lambda: told.given_up,
+            lambda: reported.begun_s.append(voice.rendered_s),
+            reported.errors.append,
+            lambda: reported.given_up,
             from_s,
         )
-        return voice, told
+        return voice, reported
 
     return made
 
@@ -97,11 +97,11 @@ def heard(voice: Voice, frames: int) -> np.ndarray:
 
 
 def test_it_begins_when_a_little_is_there_and_is_the_models_signal(ahead: Ahead, make: Make, wait: Wait) -> None:
-    voice, told = make()
+    voice, reported = make()
     ahead.render(voice)
-    wait(lambda: voice.finished and told.begun_s != [])
-    assert len(told.begun_s) == 1
-    assert LEAST_S <= told.begun_s[0] < 1.0
+    wait(lambda: voice.finished and reported.begun_s != [])
+    assert len(reported.begun_s) == 1
+    assert LEAST_S <= reported.begun_s[0] < 1.0
     assert voice.waits_s == 0
     frames, _ = voice.source.advance(voice.source.start(voice.initial_m[None]), 2_000, voice.weights)
     expected = frames[0, :, 0] / FULL_SCALE_M
@@ -113,11 +113,11 @@ def test_a_slow_model_begins_when_the_rest_will_be_ready_in_time(
     ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     slow_down(monkeypatch, speed=0.8)
-    voice, told = make(seconds=1.0)
+    voice, reported = make(seconds=1.0)
     ahead.render(voice)
     wait(lambda: voice.waits_s > 0)
-    wait(lambda: told.begun_s != [])  # it is `begun` a moment before that is reported
-    (begun_s,) = told.begun_s
+    wait(lambda: reported.begun_s != [])  # it is `begun` a moment before that is reported
+    (begun_s,) = reported.begun_s
     assert 1 - CARE * 0.8 <= begun_s < 1.0, "some of it is rendered while it is heard"
     assert voice.waits_s == 0
 
@@ -127,9 +127,9 @@ def test_what_was_rendered_once_is_there_at_once(ahead: Ahead, make: Make, wait:
     ahead.render(first)
     wait(lambda: first.finished)
     wait(lambda: ("a",) in ahead._known)
-    again, told = make(key="a")
+    again, reported = make(key="a")
     ahead.render(again)
-    assert told.begun_s == [first.rendered_s]
+    assert reported.begun_s == [first.rendered_s]
     np.testing.assert_array_equal(heard(again.voice, 3_000), heard(first.voice, 3_000))
     other, _ = make(key="b")
     ahead.render(other)
@@ -139,11 +139,11 @@ def test_what_was_rendered_once_is_there_at_once(ahead: Ahead, make: Make, wait:
 def test_where_a_seek_begins_in_the_middle_it_waits_for_that(
     ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    voice, told = make(from_s=0.8)
+    voice, reported = make(from_s=0.8)
     ahead.render(voice)
-    wait(lambda: told.begun_s != [])
-    assert told.begun_s[0] >= 0.8 + LEAST_S
-    late, told = make(from_s=5.0)  # behind its end
+    wait(lambda: reported.begun_s != [])
+    assert reported.begun_s[0] >= 0.8 + LEAST_S
+    late, reported = make(from_s=5.0)  # behind its end
     ahead.render(late)
     wait(lambda: late.begun)
     assert late.finished
@@ -161,7 +161,7 @@ def test_a_model_that_runs_away_ends_there(
         return (frames * float("nan") if state.step >= 512 else frames), after
 
     monkeypatch.setattr(KoopmanVar, "advance", faulty)
-    voice, told = make(key="wild")
+    voice, reported = make(key="wild")
     ahead.render(voice)
     wait(lambda: voice.finished)
     wait(lambda: voice.begun)
@@ -169,33 +169,33 @@ def test_a_model_that_runs_away_ends_there(
     samples = heard(voice.voice, 4_000)
     assert np.abs(samples[voice.done - 200 : voice.done]).max() > 0.01
     assert not samples[voice.done + 128 :].any()
-    assert told.errors == []
+    assert reported.errors == []
     assert ahead._known == {}
 
 
-def test_a_fault_is_told_and_the_others_go_on(
+def test_a_fault_is_reported_and_the_others_go_on(
     ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    voice, told = make()
+    voice, reported = make()
     with monkeypatch.context() as broken:
         broken.setattr(KoopmanVar, "encode", lambda *_: 1 / 0)
         ahead.render(voice)
-        wait(lambda: told.errors != [])
-    assert isinstance(told.errors[0], ZeroDivisionError)
-    assert told.begun_s == []
-    other, told = make()
+        wait(lambda: reported.errors != [])
+    assert isinstance(reported.errors[0], ZeroDivisionError)
+    assert reported.begun_s == []
+    other, reported = make()
     ahead.render(other)
-    wait(lambda: other.finished and told.begun_s != [])
+    wait(lambda: other.finished and reported.begun_s != [])
 
 
 def test_what_nobody_wants_is_rendered_no_further(
     ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     slow_down(monkeypatch, speed=2.0)
-    voice, told = make(seconds=60.0)
+    voice, reported = make(seconds=60.0)
     ahead.render(voice)
     wait(lambda: voice.done > 1_000)
-    told.given_up = True
+    reported.given_up = True
     wait(lambda: ahead._voices == [])
     assert not voice.finished
 

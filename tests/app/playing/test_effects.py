@@ -89,14 +89,14 @@ def test_the_modulation_wheel_brings_the_room(stage: Stage, patch: Patch, wait: 
         assert (effects.room.mix if effects.room is not None else 0.0) == pytest.approx(mix)
 
 
-def test_a_body_that_is_not_here_is_told_once_however_its_knobs_are_turned(
+def test_a_body_that_is_not_here_is_reported_once_however_its_knobs_are_turned(
     stage: Stage, patch: Patch, wait: Wait
 ) -> None:
     for mix in (0.2, 0.3, 0.4):
         stage.notes.set_instrument(patch.model_copy(update={"body": Body(name="a cello", mix=mix)}), EAR)
         stage.settle(wait)
-    (told,) = stage.reports
-    assert "is played without its body: the body a cello is not here" in told
+    (reported,) = stage.reports
+    assert "is played without its body: the body a cello is not here" in reported
     assert all(effects is None or effects.body is None for effects in stage.effects)
 
 

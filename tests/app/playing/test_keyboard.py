@@ -13,7 +13,7 @@ from app.playing.keyboard import (
     LOWEST_OCTAVE,
     LOWEST_PLACE,
     KeyPress,
-    Reach,
+    PluckRange,
     letters_of,
     octaves_of,
     place_of,
@@ -23,7 +23,7 @@ from app.playing.keyboard import (
 from engine.pluck import Pluck
 from engine.presets import find_preset, read_info
 
-REACH = Reach((0.3, 0.7), (1.0, 10.0))
+REACH = PluckRange((0.3, 0.7), (1.0, 10.0))
 
 
 def test_the_row_goes_from_end_to_end_of_what_is_trained() -> None:
@@ -81,22 +81,22 @@ def test_velocity_and_amplitude_go_back_and_forth_in_equal_steps_of_level() -> N
 
 
 def test_what_is_played_is_round_and_within_reach() -> None:
-    assert Reach((0.05, 0.95)).place(2 / 9) == 0.25
-    odd = Reach((1 / 3, 2 / 3), (1 / 3, 2 / 3))
+    assert PluckRange((0.05, 0.95)).place(2 / 9) == 0.25
+    odd = PluckRange((1 / 3, 2 / 3), (1 / 3, 2 / 3))
     assert (odd.place(0), odd.place(1)) == odd.position
     assert (odd.amplitude_of(1), odd.amplitude_of(127)) == odd.amplitude_mm
 
 
 def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
-    assert Reach.of(read_info(small_preset)) == Reach((0.3, 0.7), (1.0, 10.0))
-    assert Reach.of(None).position == (0.05, 0.95)
+    assert PluckRange.of(read_info(small_preset)) == PluckRange((0.3, 0.7), (1.0, 10.0))
+    assert PluckRange.of(None).position == (0.05, 0.95)
 
 
 def test_keys_of_a_model_of_many_strings_reach_as_hard_as_it_was_trained() -> None:
     """Up to the rise of tension; a string that bears more than the loudest key is played as any other."""
     nylon, harp = (read_info(find_preset(name)) for name in ("studio_any_string", "studio_any_harp_c6"))
-    assert Reach.of(nylon) == Reach((0.06, 0.94), (0.5, 10.0))
-    low_mm, high_mm = Reach.of(harp).amplitude_mm
+    assert PluckRange.of(nylon) == PluckRange((0.06, 0.94), (0.5, 10.0))
+    low_mm, high_mm = PluckRange.of(harp).amplitude_mm
     assert low_mm == 0.5
     assert harp.tension_rise(Pluck(amplitude_mm=high_mm)) == pytest.approx(0.5)
 

@@ -60,14 +60,16 @@ def wishes() -> list[Effects | None]:
 
 
 @pytest.fixture
-def told() -> list[str]:
+def reported() -> list[str]:
     return []
 
 
 @pytest.fixture
-def played(sound: Any, patch: Patch, wait: Wait, wishes: list[Effects | None], told: list[str]) -> Iterator[Notes]:
+def played(
+    sound: Any, patch: Patch, wait: Wait, wishes: list[Effects | None], reported: list[str]
+) -> Iterator[Notes]:
     """Notes whose instrument is the patch."""
-    made = Notes(sound, Sources(), find_shipped, lambda message, details: told.append(message), wishes.append)
+    made = Notes(sound, Sources(), find_shipped, lambda message, details: reported.append(message), wishes.append)
     made.set_monitor(hears("model"))
     made.set_instrument(patch, EAR)
     wait(lambda: made.keys.player is not None)
@@ -163,18 +165,18 @@ def test_another_patch_is_played_at_once(played: Notes, patch: Patch) -> None:
 
 
 def test_an_impossible_tuning_is_reported_and_what_was_played_stays(
-    played: Notes, patch: Patch, wait: Wait, told: list[str]
+    played: Notes, patch: Patch, wait: Wait, reported: list[str]
 ) -> None:
     made = strike(played, NoteOn(45, 60))
     tuning = patch.tuning.model_copy(update={"scale": "no scale"})  # as no patch of a file could have it
     played.set_instrument(patch.model_copy(update={"tuning": tuning}), EAR)
-    wait(lambda: bool(told))
+    wait(lambda: bool(reported))
     played.listen(Ear((0.1,)))
     settle(played, wait)
     again = strike(played, NoteOn(45, 60))
     assert again.parameters == made.parameters
     assert again.ear == Ear((0.1,))
-    assert len(told) == 1
+    assert len(reported) == 1
 
 
 def test_a_patch_that_is_left_before_it_is_loaded_does_not_come_back(played: Notes, patch: Patch, wait: Wait) -> None:
@@ -340,22 +342,24 @@ def test_the_strings_end_with_the_devices_rate_and_new_ones_sound(played: Notes,
     assert player_of(played).compiled.channel(0).pedal, "the foot is still on it"
 
 
-def test_a_preset_that_is_not_there_is_told(played: Notes, patch: Patch, wait: Wait, told: list[str]) -> None:
+def test_a_preset_that_is_not_there_is_reported(played: Notes, patch: Patch, wait: Wait, reported: list[str]) -> None:
     played.set_instrument(patch.model_copy(update={"preset": "gone"}), EAR)
-    wait(lambda: bool(told))
-    assert "gone" in told[0]
+    wait(lambda: bool(reported))
+    assert "gone" in reported[0]
     assert played.handle(NoteOn(45, 60)) is None
 
 
-def test_a_full_recording_is_told_once(played: Notes, told: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_recording_is_reported_once(
+    played: Notes, reported: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("app.playing.recorder.LONGEST_RECORDING", 3)
     played.keys.begin_recording()
     for _ in range(3):
         played.handle(NoteOn(45, 60))
         played.handle(NoteOff(45))
     assert len(played.keys.recorder.end()) == 3
-    assert [line for line in told if "recording is full" in line] == told
-    assert len(told) == 1
+    assert [line for line in reported if "recording is full" in line] == reported
+    assert len(reported) == 1
 
 
 def test_the_pick_up_through_which_it_is_heard_is_recorded(played: Notes, patch: Patch) -> None:

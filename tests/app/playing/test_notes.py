@@ -21,7 +21,7 @@ from app.patches.instrument import SingleString
 from app.playing import notes as module
 from app.playing.ahead import LEAST_S
 from app.playing.due import Due
-from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE, Reach
+from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE, PluckRange
 from app.playing.note import Note
 from app.playing.notes import Notes
 from app.playing.sources import Sources
@@ -273,7 +273,7 @@ def test_what_waits_hears_of_switches_and_of_stop(
     assert not seconds_of(sound.mixer, 0.1).any()
 
 
-def test_a_preset_that_cannot_be_played_is_told(
+def test_a_preset_that_cannot_be_played_is_reported(
     notes: Notes, sound: Any, tmp_path: Path, pluck_of: PluckOf, strike: Strike, reports: Reports, wait: Wait
 ) -> None:
     (tmp_path / "broken.safetensors").write_bytes(b"damaged")
@@ -535,7 +535,7 @@ def test_a_switch_while_a_model_is_rendered_counts(
     assert gains(note) == {"model": 0.0, "truth": 1.0}
 
 
-def test_a_model_that_fails_is_told(
+def test_a_model_that_fails_is_reported(
     notes: Notes,
     small_preset: Path,
     pluck_of: PluckOf,
@@ -635,16 +635,16 @@ def test_closed_it_is_silent_and_strikes_nothing_more_that_waits(
 
 
 @pytest.fixture
-def string(notes: Notes, bank: Path, pluck_of: PluckOf, monkeypatch: pytest.MonkeyPatch) -> Reach:
+def string(notes: Notes, bank: Path, pluck_of: PluckOf, monkeypatch: pytest.MonkeyPatch) -> PluckRange:
     """The reach of a single string, which is the instrument."""
     entry = PresetEntry("bank", bank, read_info(bank), 0)
     monkeypatch.setattr(notes, "_find", {"bank": entry}.get)
     notes.choose(pluck_of(bank))
     notes.set_instrument(SingleString(preset="bank"), EAR)
-    return Reach.of(entry.info)
+    return PluckRange.of(entry.info)
 
 
-def test_keys_of_a_single_string_are_places_along_it_and_ring(notes: Notes, sound: Any, string: Reach) -> None:
+def test_keys_of_a_single_string_are_places_along_it_and_ring(notes: Notes, sound: Any, string: PluckRange) -> None:
     """As a pluck by hand at that place; no release damps it."""
     begun = [notes.handle(NoteOn(key, 64)) for key in (LOWEST_PLACE, HIGHEST_PLACE)]
     plucks = [note.request.pluck for note in begun if note is not None]
@@ -656,7 +656,7 @@ def test_keys_of_a_single_string_are_places_along_it_and_ring(notes: Notes, soun
     assert notes.ringing == 2
 
 
-def test_a_key_and_a_hand_at_one_place_sound_alike(notes: Notes, sound: Any, string: Reach) -> None:
+def test_a_key_and_a_hand_at_one_place_sound_alike(notes: Notes, sound: Any, string: PluckRange) -> None:
     heard = []
     for event in (NoteOn(50, 64), PluckAt(string.pluck(50, 64, Pluck(0.35, 3.0)))):
         assert notes.handle(event) is not None
@@ -667,7 +667,9 @@ def test_a_key_and_a_hand_at_one_place_sound_alike(notes: Notes, sound: Any, str
     np.testing.assert_allclose(heard[0], heard[1], atol=1e-6)
 
 
-def test_a_pluck_at_a_place_waits_for_its_frame_and_can_be_cancelled(notes: Notes, sound: Any, string: Reach) -> None:
+def test_a_pluck_at_a_place_waits_for_its_frame_and_can_be_cancelled(
+    notes: Notes, sound: Any, string: PluckRange
+) -> None:
     due = Due(sound.mixer, sound.mixer.frames + 6_400, 0.0)
     kept, cancelled = notes.handle(NoteOn(50, 64), due), notes.handle(NoteOn(55, 64), replace_frame(due, 20_000))
     assert kept is not None and cancelled is not None

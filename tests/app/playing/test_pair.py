@@ -49,10 +49,10 @@ def test_a_switch_is_a_cross_fade_in_step(mixer: Mixer, pair: Pair) -> None:
     assert len(mixer.voices) == 2
 
 
-def test_anew_it_begins_at_its_start_and_what_rang_fades(mixer: Mixer, pair: Pair) -> None:
+def test_again_it_begins_at_its_start_and_what_rang_fades(mixer: Mixer, pair: Pair) -> None:
     pair.play()
     mixer.render(1_920)
-    pair.play(anew=True)
+    pair.play(restart=True)
     assert len(mixer.voices) == 4
     mixer.render(1_920)
     assert len(mixer.voices) == 2

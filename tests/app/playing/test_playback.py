@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from app.instrument.events import KEYS, NOTES_OFF, Bend, Controller, Event, NoteOff, NoteOn, TimedEvent, let_go
+from app.instrument.events import KEYS, NOTES_OFF, Bend, Controller, Event, NoteOff, NoteOn, TimedEvent, release_all
 from app.playing.due import Due
 from app.playing.playback import AHEAD_S, Playback
 from engine.voices import Mixer
@@ -68,7 +68,7 @@ def test_each_event_is_handed_over_before_its_frame_and_everything_is_let_go_in_
     player = Player(TurnedClock())
     player.plays(TimedEvent(0.2001, NoteOff(60)), TimedEvent(0.0, NoteOn(60, 90)), TimedEvent(0.1, NoteOn(64, 90)))
     assert player.ended.wait(10)
-    assert player.events == [NoteOn(60, 90), NoteOn(64, 90), NoteOff(60), *let_go([0])]
+    assert player.events == [NoteOn(60, 90), NoteOn(64, 90), NoteOff(60), *release_all([0])]
     assert frames(player)[:3] == [0, 4_800, 9_605]
     assert set(frames(player)[3:]) == {9_605}, "with the last event"
     assert all(0 < early <= AHEAD_S * RATE_HZ for early in player.early)
@@ -108,7 +108,7 @@ def test_it_can_be_stopped_and_lets_go_at_once(wait: Wait) -> None:
     playback.stop()
     assert not playback.playing
     assert player.cancelled == 1
-    assert player.came[1:] == [(event, None) for event in let_go([0])]
+    assert player.came[1:] == [(event, None) for event in release_all([0])]
     assert player.came[-1] == (Controller(NOTES_OFF, 0), None)
     playback.stop()
     assert player.cancelled == 1
@@ -119,7 +119,7 @@ def test_wheels_and_pedals_of_every_channel_are_at_rest_when_it_ends_within_a_be
     played: list[Event] = [NoteOn(60, 90), Bend(1.0), NoteOn(64, 90, 5), Bend(-0.5, 5), NoteOn(65, 90, KEYS)]
     player.plays(*(TimedEvent(0.0, event) for event in played))
     assert player.ended.wait(10)
-    assert player.events == [*played, *let_go([0, 5, KEYS])]
+    assert player.events == [*played, *release_all([0, 5, KEYS])]
     bends = [event for event in player.events[5:] if isinstance(event, Bend)]
     assert bends == [Bend(0.0), Bend(0.0, 5), Bend(0.0, KEYS)]
 
@@ -144,7 +144,7 @@ def test_with_another_mixer_it_goes_on_from_where_it_was() -> None:
     assert dues[0].frame_in(late) == 0
 
 
-def test_what_is_due_is_told_by_the_clock_of_recordings() -> None:
+def test_what_is_due_is_reported_by_the_clock_of_recordings() -> None:
     player, began_s = Player(TurnedClock()), time.monotonic()
     player.plays(TimedEvent(0.0, NoteOn(60, 90)), TimedEvent(0.3, NoteOn(60, 90)))
     assert player.ended.wait(10)

@@ -52,7 +52,7 @@ def files(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def test_a_refresh_tells_only_when_there_are_others(library: Library, small_preset: Path, own: Path) -> None:
+def test_a_refresh_reports_only_when_there_are_others(library: Library, small_preset: Path, own: Path) -> None:
     seen: list[None] = []
     library.changed.connect(lambda: seen.append(None))
     assert (library.refresh(), library.names, seen) == ([], ["first", "second"], [])
@@ -96,7 +96,7 @@ def test_what_is_no_preset_is_refused_and_leaves_nothing(
     assert not own.exists()
 
 
-def test_a_folder_that_cannot_be_made_is_told(small_preset: Path, own: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported(small_preset: Path, own: Path) -> None:
     own.write_text("in the way")
     with pytest.raises(InstallError, match="cannot be written"):
         install_preset(small_preset, own, [])
@@ -109,7 +109,7 @@ def test_a_dropped_preset_is_chosen_at_once(library: Library, small_preset: Path
     assert files(own) == ["New.safetensors"]
 
 
-def test_a_dropped_preset_that_is_there_is_chosen_and_told(
+def test_a_dropped_preset_that_is_there_is_chosen_and_reported(
     library: Library, small_preset: Path, own: Path, tmp_path: Path
 ) -> None:
     dropped = receive(small_preset, library)
@@ -236,7 +236,7 @@ def test_what_was_heard_comes_with_the_preset_and_goes_with_its_change(
     assert [entry.heard is None for entry in library.entries] == [True, False]
 
 
-def test_a_hostile_table_is_told_and_every_preset_listed(library: Library, preset_folder: Path) -> None:
+def test_a_hostile_table_is_reported_and_every_preset_listed(library: Library, preset_folder: Path) -> None:
     for content in (b"\x00" * 5000, b"<b>x</b>\n" * 200_000, ",".join(COLUMNS).encode() + b"\n<b>" * 1000):
         (preset_folder / NAME).write_bytes(content)
         entries, problems = list_presets()

@@ -188,7 +188,7 @@ def test_another_speed_shows_what_it_would_have_shown(preset: Any, blocks: int, 
             np.testing.assert_allclose(take.motions[name].shape_m(position_s), expected, atol=near)
 
 
-def test_the_error_that_is_told_is_that_of_every_frame(job: Render, sources: Sources) -> None:
+def test_the_error_that_is_reported_is_that_of_every_frame(job: Render, sources: Sources) -> None:
     """Of a model whose relative MSE is 1e-8: far below what a voice keeps."""
     made = job(STUDIO, pluck=PLUCK)
     take, loaded = finished(made), sources.load(STUDIO)
@@ -196,9 +196,9 @@ def test_the_error_that_is_told_is_that_of_every_frame(job: Render, sources: Sou
     every = ErrorSums(model.shape[1])
     every.add(model, truth)
     assert every.total().rel_mse < 2e-7
-    told = made._listener.errors.total()  # type: ignore[attr-defined]
-    assert told.rel_mse == pytest.approx(every.total().rel_mse, rel=0.06)
-    assert told.rel_mae == pytest.approx(every.total().rel_mae, rel=0.03)
+    reported = made._listener.errors.total()  # type: ignore[attr-defined]
+    assert reported.rel_mse == pytest.approx(every.total().rel_mse, rel=0.06)
+    assert reported.rel_mae == pytest.approx(every.total().rel_mae, rel=0.03)
 
 
 def test_ten_seconds_take_few_megabytes(job: Render) -> None:

@@ -162,7 +162,7 @@ def test_when_all_is_rendered_free_memory_is_given_back_once(
     assert calls == ["returned"]
 
 
-def test_a_broken_preset_is_told_and_the_worker_lives_on(
+def test_a_broken_preset_is_reported_and_the_worker_lives_on(
     small_preset: Path, tmp_path: Path, worker: RenderWorker, heard: Heard
 ) -> None:
     broken = tmp_path / "broken.safetensors"
@@ -198,7 +198,9 @@ def test_a_runaway_model_is_silenced_and_the_truth_goes_on(
     assert not heard_m[3_000:].any()
 
 
-def test_the_error_that_is_told_is_that_of_the_take(small_preset: Path, worker: RenderWorker, heard: Heard) -> None:
+def test_the_error_that_is_reported_is_that_of_the_take(
+    small_preset: Path, worker: RenderWorker, heard: Heard
+) -> None:
     worker.submit(request_of(small_preset))
     wait_until(lambda: bool(heard.finished))
     take, errors = heard.finished[0]

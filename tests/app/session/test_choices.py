@@ -24,7 +24,7 @@ def recorded(session: Session) -> list[frozenset[str]]:
     return seen
 
 
-def test_only_real_changes_are_told() -> None:
+def test_only_real_changes_are_reported() -> None:
     session = Session()
     seen = recorded(session)
     session.update(listen=0.5, seconds=session.choices.seconds)
@@ -116,14 +116,14 @@ def test_choices_from_before_the_instrument_are_understood(plays: str | None, pr
     assert Choices.model_validate_json(choices.model_dump_json()) == choices
 
 
-def test_what_a_note_changes_is_told_as_played_before_it_is_told_as_changed() -> None:
-    session, told = Session(), []
-    session.played.connect(lambda names: told.append(("played", set(names), session.choices.position)))
-    session.changed.connect(lambda names: told.append(("changed", set(names), session.choices.position)))
+def test_what_a_note_changes_is_reported_as_played_before_it_is_reported_as_changed() -> None:
+    session, reported = Session(), []
+    session.played.connect(lambda names: reported.append(("played", set(names), session.choices.position)))
+    session.changed.connect(lambda names: reported.append(("changed", set(names), session.choices.position)))
     session.play(position=0.5)
     session.play(position=0.5)  # nothing new
     session.update(position=0.6)
-    assert told == [("played", {"position"}, 0.5), ("changed", {"position"}, 0.5), ("changed", {"position"}, 0.6)]
+    assert reported == [("played", {"position"}, 0.5), ("changed", {"position"}, 0.5), ("changed", {"position"}, 0.6)]
     with pytest.raises(ValueError, match="position"):
         session.play(position=2)
 

@@ -23,7 +23,7 @@ def test_at_first_it_is_model_and_truth(library: Library) -> None:
     assert shown_sources(Choices(), library) == DEFAULT_SOURCES
 
 
-def test_each_slot_is_told_with_its_title_and_gain(library: Library) -> None:
+def test_each_slot_is_reported_with_its_title_and_gain(library: Library) -> None:
     choices = Choices(a="difference", b="preset:steel_e4", heard="b", difference_gain_db=30)
     difference, other = shown_sources(choices, library)
     assert (difference.slots, difference.title, difference.remark) == ("A", "difference", " +30 dB")

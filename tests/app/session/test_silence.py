@@ -85,7 +85,7 @@ def test_a_difference_of_nothing_or_too_little_is_named(
         assert bool(found) == bool(words)
 
 
-def test_a_model_that_runs_away_is_told_with_the_reason(small_preset: Path) -> None:
+def test_a_model_that_runs_away_is_reported_with_the_reason(small_preset: Path) -> None:
     take = Take("small", read_info(small_preset), Pluck(amplitude_mm=20.0), 0.5, Ear((0.5,)))
     assert why_ran_away(take) == ""
     take.model_ends_s = 0.0

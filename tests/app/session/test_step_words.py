@@ -59,13 +59,13 @@ def test_whatever_a_knob_turns_has_words_without_marks(guitar: Patch) -> None:
         value = guitar.value(field)
         for turned in (0.9 * value + 0.011, 0.9 * value - 0.011):
             try:
-                told = words(guitar, guitar.with_value(field, turned))
+                reported = words(guitar, guitar.with_value(field, turned))
             except ValueError:
                 continue
-            assert told and "_" not in told and "." not in told, field
+            assert reported and "_" not in reported and "." not in reported, field
 
 
-def test_a_macro_is_told_by_its_name(guitar: Patch) -> None:
+def test_a_macro_is_reported_by_its_name(guitar: Patch) -> None:
     target = {"field": "knobs.decay", "low": 1.0, "high": 3.0}
     patch = with_part(guitar, macros=({"name": "Damp", "value": 0.5, "targets": (target,)},))
     assert words(patch, patch.turned(0, 0.9)) == "Damp"
@@ -83,7 +83,7 @@ def test_choices_of_the_pluck() -> None:
     assert step_words(start, {**start, "position": 0.5, "amplitude_mm": 4.0}) == "pluck position and amplitude"
     assert step_words(start, {**start, "instrument": SingleString(preset="b")}) == "preset b"
     every = {name: step_words({name: 1}, {name: 2}) for name in RECORDED - {"instrument", "kept"}}
-    assert all(told and "_" not in told for told in every.values()), every
+    assert all(reported and "_" not in reported for reported in every.values()), every
 
 
 def test_history_names_the_next_step_each_way(guitar: Patch, harp: Patch) -> None:
@@ -106,14 +106,14 @@ def test_history_names_the_next_step_each_way(guitar: Patch, harp: Patch) -> Non
     assert (history.undo_words, history.redo_words) == ("instrument Classical guitar", f"instrument {harp.name}")
 
 
-def test_a_drag_that_came_back_is_not_told(guitar: Patch) -> None:
+def test_a_drag_that_came_back_is_not_reported(guitar: Patch) -> None:
     session = Session()
     history = History(session)
     session.update(seconds=2.0)
     history.hold()
     session.update(position=0.6)
     session.update(position=0.35)
-    history.let_go()
+    history.release_all()
     assert history.undo_words == "duration"
 
 

@@ -50,14 +50,14 @@ print(deleted_in)
 
 
 def test_garbage_of_any_thread_is_deleted_in_the_windows() -> None:
-    told = subprocess.run([sys.executable, "-c", GARBAGE], capture_output=True, text=True, check=True).stdout
-    assert told.strip() == "{True}"
+    reported = subprocess.run([sys.executable, "-c", GARBAGE], capture_output=True, text=True, check=True).stdout
+    assert reported.strip() == "{True}"
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's heap")
 def test_large_blocks_are_returned() -> None:
-    told = subprocess.run([sys.executable, "-c", LARGE_BLOCKS], capture_output=True, text=True, check=True).stdout
-    most_mib, left_mib = map(int, told.split())
+    reported = subprocess.run([sys.executable, "-c", LARGE_BLOCKS], capture_output=True, text=True, check=True).stdout
+    most_mib, left_mib = map(int, reported.split())
     assert most_mib > 48
     assert left_mib < 8
 
@@ -89,7 +89,7 @@ print((kept - before[0]) // 2**20, (process.memory_info().rss - before[0]) // 2*
 
 @pytest.mark.skipif(sys.platform != "linux", reason="glibc's heap")
 def test_free_pages_of_a_threads_heap_are_returned() -> None:
-    told = subprocess.run([sys.executable, "-c", SMALL_BLOCKS], capture_output=True, text=True, check=True).stdout
-    kept_mib, left_mib = map(int, told.split())
+    reported = subprocess.run([sys.executable, "-c", SMALL_BLOCKS], capture_output=True, text=True, check=True).stdout
+    kept_mib, left_mib = map(int, reported.split())
     assert kept_mib > 32
     assert left_mib < 8

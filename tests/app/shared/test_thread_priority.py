@@ -6,7 +6,7 @@ import threading
 
 import pytest
 
-from app.shared.thread_priority import NICEST, Rank, step_back
+from app.shared.thread_priority import NICEST, Rank, lower_priority
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="only Linux has a niceness by thread")
 
@@ -19,7 +19,7 @@ def test_a_thread_and_what_it_starts_step_back_and_no_other() -> None:
     found: dict[str, int] = {}
 
     def work() -> None:
-        step_back(Rank.RENDERING)
+        lower_priority(Rank.RENDERING)
         found["itself"] = niceness()
         helper = threading.Thread(target=lambda: found.update(helper=niceness()))
         helper.start()
@@ -39,7 +39,7 @@ def test_where_the_system_refuses_nothing_happens(monkeypatch: pytest.MonkeyPatc
         raise PermissionError
 
     monkeypatch.setattr(os, "setpriority", refuse)
-    step_back(Rank.BACKGROUND)
+    lower_priority(Rank.BACKGROUND)
 
 
 def test_rendering_goes_before_the_background() -> None:

@@ -29,7 +29,7 @@ def test_after_an_error_the_old_file_stays_and_nothing_else(tmp_path: Path) -> N
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_a_full_disk_is_told_with_the_remedy(tmp_path: Path) -> None:
+def test_a_full_disk_is_reported_with_the_remedy(tmp_path: Path) -> None:
     path = tmp_path / "out.bin"
     with (
         pytest.raises(WriteError, match=r"out\.bin: cannot be written \(No space left.*\); free some space"),
@@ -53,7 +53,7 @@ def test_a_write_that_the_system_stops_half_way_leaves_nothing(tmp_path: Path) -
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_missing_folder_is_told_before_the_work(tmp_path: Path) -> None:
+def test_a_missing_folder_is_reported_before_the_work(tmp_path: Path) -> None:
     with (
         pytest.raises(WriteError, match="make the folder first"),
         whole_file(tmp_path / "missing" / "out.bin"),
@@ -61,14 +61,14 @@ def test_a_missing_folder_is_told_before_the_work(tmp_path: Path) -> None:
         pytest.fail("the block must not run")
 
 
-def test_a_folder_that_is_a_file_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_is_a_file_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(WriteError, match="cannot be written"), whole_file(tmp_path / "file" / "out.bin"):
         pytest.fail("the block must not run")
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
-def test_an_unwritable_folder_is_told(tmp_path: Path) -> None:
+def test_an_unwritable_folder_is_reported(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     with pytest.raises(WriteError, match="a folder that you may write to"), whole_file(tmp_path / "out.bin"):
         pytest.fail("the block must not run")

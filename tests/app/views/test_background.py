@@ -27,7 +27,7 @@ def background(qtbot: QtBot) -> Iterator[Background]:
 
 def test_a_job_reports_and_returns(qtbot: QtBot, background: Background) -> None:
     here, seen = threading.get_ident(), []
-    background.progressed.connect(lambda *told: seen.append((*told, threading.get_ident())))
+    background.progressed.connect(lambda *reported: seen.append((*reported, threading.get_ident())))
 
     def work(job: Job) -> str:
         assert threading.get_ident() != here
@@ -80,7 +80,7 @@ def test_the_latest_job_alone_is_heard(qtbot: QtBot, background: Background) -> 
 def test_what_was_said_before_a_cancel_does_not_arrive(qtbot: QtBot, background: Background) -> None:
     said, heard = threading.Event(), []
     background.finished.connect(heard.append)
-    background.progressed.connect(lambda *told: heard.append(told))
+    background.progressed.connect(lambda *reported: heard.append(reported))
 
     def work(job: Job) -> str:
         job.report(0.5, so_far="half")

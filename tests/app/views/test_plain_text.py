@@ -75,13 +75,13 @@ def test_no_view_that_holds_a_files_text_takes_it_for_markup(
     views: list[QWidget] = [notices, bar, bar.card, slots, browser, readout, dialog]
     for view in views:
         qtbot.addWidget(view)
-    notices.tell(f"{EVIL}: tensor {EVIL} is unknown", EVIL)
+    notices.report(f"{EVIL}: tensor {EVIL} is unknown", EVIL)
     notices.show_all()
     bar.set_chosen(entry)
     slots.set_entries([entry])
     slots.show_choices(Choices(a=f"preset:{entry.name}", b="difference"))
     browser.show_rows([preset_row(entry)], (), entry.name, str(tmp_path / EVIL))
-    readout.tell(EVIL)
+    readout.report(EVIL)
     for view in views:
         assert [text for text in formatted(view) if EVIL in text] == [], type(view).__name__
     assert "evil" in texts(notices)  # and it is shown

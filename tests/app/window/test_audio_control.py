@@ -77,12 +77,12 @@ def test_a_choice_is_saved_once_it_plays(control: AudioControl, output: FakeSoun
     assert (control.device, control.sound) == WISH
 
 
-def test_a_refused_choice_is_told_and_not_saved(control: AudioControl, output: FakeSound) -> None:
+def test_a_refused_choice_is_reported_and_not_saved(control: AudioControl, output: FakeSound) -> None:
     control.show_dialog()
     assert control._dialog is not None
     control._dialog.choice_made.emit(*WISH)
     output.present = SoundStatus(device=SPEAKERS, changes_done=2, problem="It refuses 96000 Hz.")
-    control.tell(AudioProblem(ProblemKind.RATE_REFUSED, "It refuses 96000 Hz.", "Choose another.", "code"))
+    control.report(AudioProblem(ProblemKind.RATE_REFUSED, "It refuses 96000 Hz.", "Choose another.", "code"))
     show(control, output.present)
     notices = control._window.notices
     assert "Playback continues on “Speakers”" in notices.text
@@ -95,8 +95,8 @@ def test_a_refused_choice_is_told_and_not_saved(control: AudioControl, output: F
     assert notices.text == ""
 
 
-def test_a_stall_is_told_without_a_word_on_what_plays(control: AudioControl, output: FakeSound) -> None:
-    control.tell(stalled("Speakers"))
+def test_a_stall_is_reported_without_a_word_on_what_plays(control: AudioControl, output: FakeSound) -> None:
+    control.report(stalled("Speakers"))
     notices = control._window.notices
     assert "keeps trying" in notices.text
     assert "Playback continues on" not in notices.text
@@ -130,7 +130,7 @@ def test_gaps_count_from_the_reset(control: AudioControl, output: FakeSound) -> 
     assert counter.text() == "1, the last at 7.2 s: rendering"
 
 
-def test_the_latency_that_was_measured_is_told(control: AudioControl) -> None:
+def test_the_latency_that_was_measured_is_reported(control: AudioControl) -> None:
     control.show_dialog()
     assert control._dialog is not None
     facts = control._dialog._state_label

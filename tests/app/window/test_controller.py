@@ -290,7 +290,7 @@ def test_a_pluck_outside_training_or_silent_is_explained(controller: Controller)
     assert view(controller, "string")._warning == ""
 
 
-def test_no_device_is_told_once_and_the_picture_moves(qtbot: QtBot, controller: Controller) -> None:
+def test_no_device_is_reported_once_and_the_picture_moves(qtbot: QtBot, controller: Controller) -> None:
     qtbot.waitUntil(lambda: "without sound" in controller.window.notices.text)
     assert len(controller.window.notices.notices) == 1
     wait_for_take(qtbot, controller)
@@ -298,7 +298,7 @@ def test_no_device_is_told_once_and_the_picture_moves(qtbot: QtBot, controller: 
     qtbot.waitUntil(lambda: controller.performance.position_s > 0.1)
 
 
-def test_a_broken_preset_is_told_and_the_app_goes_on(
+def test_a_broken_preset_is_reported_and_the_app_goes_on(
     qtbot: QtBot, controller: Controller, preset_folder: Path
 ) -> None:
     wait_for_take(qtbot, controller)
@@ -402,19 +402,19 @@ def test_plucks_that_are_overtaken_sound_all_the_same(qtbot: QtBot, controller: 
     qtbot.waitUntil(lambda: all(note.seconds > 0 for note in struck))
 
 
-def test_only_what_concerns_the_sound_is_told_to_the_notes(
+def test_only_what_concerns_the_sound_is_reported_to_the_notes(
     qtbot: QtBot, controller: Controller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     wait_for_take(qtbot, controller)
-    told: list[object] = []
-    monkeypatch.setattr(controller.performance.notes, "set_monitor", told.append)
-    monkeypatch.setattr(controller.performance.notes, "listen", told.append)
+    reported: list[object] = []
+    monkeypatch.setattr(controller.performance.notes, "set_monitor", reported.append)
+    monkeypatch.setattr(controller.performance.notes, "listen", reported.append)
     controller.session.update(left_view="waveform", speed=0.1, position=0.4)
-    assert told == []
+    assert reported == []
     controller.session.update(heard="b")
     heard = controller.session.choices
     controller.session.update(listen=0.2)
-    assert told == [heard, controller.session.choices.ear]
+    assert reported == [heard, controller.session.choices.ear]
 
 
 def test_while_nothing_moves_pictures_are_looked_at_less_often(qtbot: QtBot, controller: Controller) -> None:
@@ -439,7 +439,7 @@ def test_while_the_string_is_drawn_the_last_pluck_rings_on(qtbot: QtBot, control
     qtbot.waitUntil(lambda: controller.performance._shown.note is second)
 
 
-def test_slots_are_chosen_heard_and_told(qtbot: QtBot, controller: Controller) -> None:
+def test_slots_are_chosen_heard_and_reported(qtbot: QtBot, controller: Controller) -> None:
     slots, session = controller.window.transport.slots, controller.session
     wait_for_take(qtbot, controller)
     slots.change_asked.emit("b", "preset:second")

@@ -80,7 +80,9 @@ def test_a_scale_and_its_mapping_together_in_either_order(patched: Controller, t
 
 
 @pytest.mark.parametrize("name", ["empty.scl", "words.scl", "words.kbm", "missing.scl"])
-def test_a_file_that_is_no_tuning_is_told_and_changes_nothing(patched: Controller, tmp_path: Path, name: str) -> None:
+def test_a_file_that_is_no_tuning_is_reported_and_changes_nothing(
+    patched: Controller, tmp_path: Path, name: str
+) -> None:
     before = patched.session.choices
     if name != "missing.scl":
         written(tmp_path / name, "no tuning" if "words" in name else "")
@@ -89,7 +91,7 @@ def test_a_file_that_is_no_tuning_is_told_and_changes_nothing(patched: Controlle
     assert patched.session.choices == before
 
 
-def test_without_a_patch_a_scale_is_told_what_it_needs(controller: Controller, tmp_path: Path) -> None:
+def test_without_a_patch_a_scale_is_reported_what_it_needs(controller: Controller, tmp_path: Path) -> None:
     drop(controller, written(tmp_path / "five.scl", FIVE))
     assert controller.patches.patch is None
     assert "choose one first" in controller.window.notices.text
@@ -133,7 +135,7 @@ def test_a_dropped_sound_without_a_recipe_is_a_body_and_the_patch_stands_on_it(
     assert patched.patches.patch == before
 
 
-def test_a_sound_that_is_no_body_is_told_and_changes_nothing(
+def test_a_sound_that_is_no_body_is_reported_and_changes_nothing(
     own_folder: Path, patched: Controller, tmp_path: Path
 ) -> None:
     before = patched.session.choices
@@ -149,7 +151,7 @@ def test_a_body_that_comes_back_is_heard_again(
 ) -> None:
     """The patch names it all the time, so that nothing of it changes."""
     heard: list[Effects | None] = []
-    told: list[str] = []
+    reported: list[str] = []
 
     def is_knock() -> bool:
         """The last body is a sound; the guitar's, which the patch begins with, may come late and has none."""
@@ -161,14 +163,14 @@ def test_a_body_that_comes_back_is_heard_again(
         )
 
     patched.performance.notes.keys._set_effects = heard.append
-    patched.performance.notes.keys._report = lambda message, details: told.append(message)
+    patched.performance.notes.keys._report = lambda message, details: reported.append(message)
     drop(patched, knock(tmp_path / "knock.wav"))
     chosen = patched.session.choices
     qtbot.waitUntil(is_knock)
     (own_bodies() / "knock.wav").unlink()
     patched.performance.choices_changed(frozenset({"patch"}))
     qtbot.waitUntil(lambda: heard[-1] is None or heard[-1].body is None)
-    qtbot.waitUntil(lambda: any("played without its body" in line for line in told))
+    qtbot.waitUntil(lambda: any("played without its body" in line for line in reported))
     drop(patched, tmp_path / "knock.wav")
     qtbot.waitUntil(is_knock)
     assert patched.session.choices == chosen

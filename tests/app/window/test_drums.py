@@ -39,7 +39,7 @@ def heard_db(controller: Controller) -> float:
     return controller.window.transport.meter._peak_db
 
 
-def told(controller: Controller) -> list[str]:
+def reported(controller: Controller) -> list[str]:
     """Notices, without the one that there is no device here."""
     return [each.message for each in controller.window.notices.notices if "No sound output" not in each.message]
 
@@ -70,7 +70,7 @@ def test_pads_sound_light_and_ring(qtbot: QtBot, kit: Controller) -> None:
     assert kit.performance.notes.ringing == 2
     kit.play_or_stop()
     qtbot.waitUntil(lambda: not kit.performance.notes.keys.sounding())
-    assert told(kit) == []
+    assert reported(kit) == []
 
 
 def test_pads_of_a_midi_input_strike_by_channel_ten(qtbot: QtBot, kit: Controller) -> None:
@@ -113,7 +113,7 @@ def test_views_of_a_string_say_that_drums_are_played(qtbot: QtBot, kit: Controll
     kit.patches.choose("steel_string_acoustic")
     assert all(not panel.covered for panel in kit.panels)
     qtbot.waitUntil(lambda: kit.performance.ready)
-    assert told(kit) == []
+    assert reported(kit) == []
 
 
 def test_space_and_a_click_strike_the_drum_that_was_struck_last(qtbot: QtBot, kit: Controller) -> None:

@@ -47,7 +47,7 @@ def test_without_a_preset_it_says_so(short: Controller) -> None:
     assert "There is no preset to export" in short.window.notices.text
 
 
-def test_what_cannot_be_rendered_is_told(qtbot: QtBot, short: Controller) -> None:
+def test_what_cannot_be_rendered_is_reported(qtbot: QtBot, short: Controller) -> None:
     entry = short.library.find("first")
     assert entry is not None
     qtbot.waitUntil(lambda: short.performance.at_hand)  # else the window itself would tell that the file is gone

@@ -30,11 +30,11 @@ def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "logs" / "here.log"
 
 
-def test_a_fault_of_any_thread_is_written_and_told_in_one_dialog(qtbot: QtBot, log: Path) -> None:
+def test_a_fault_of_any_thread_is_written_and_reported_in_one_dialog(qtbot: QtBot, log: Path) -> None:
     window = QWidget()
     qtbot.addWidget(window)
     faults = Faults(window)
-    with faults_logged(faults.tell):
+    with faults_logged(faults.report):
         for number in range(3):
             thread = threading.Thread(target=lambda: 1 / 0, name=f"unlucky-{number}")
             thread.start()
@@ -62,11 +62,11 @@ def test_the_log_stays_small(log: Path) -> None:
 
 def test_without_a_place_for_the_log_it_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(FILE_VARIABLE, "/dev/null/there/here.log")
-    before, told = sys.excepthook, []
-    with faults_logged(told.append):
+    before, reported = sys.excepthook, []
+    with faults_logged(reported.append):
         error = ValueError("shown all the same")
         sys.excepthook(ValueError, error, None)
-    assert "shown all the same" in told[0] and sys.excepthook is before
+    assert "shown all the same" in reported[0] and sys.excepthook is before
     assert log_file() == Path("/dev/null/there/here.log")
 
 

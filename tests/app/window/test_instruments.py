@@ -76,7 +76,7 @@ def test_places_are_prepared_where_keys_choose_them_alone(
     for key in (52, 55):
         played.window.instrument.pressed.emit(key, 100)
         qtbot.waitUntil(lambda key=key: played.instruments.latest_key == (key, None))  # type: ignore[misc]
-    qtbot.waitUntil(lambda: not played.instruments._told and played.session.choices.string is not None)
+    qtbot.waitUntil(lambda: not played.instruments._reported and played.session.choices.string is not None)
     assert prepared == []
     played.session.play_string()
     (positions,) = prepared

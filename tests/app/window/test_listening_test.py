@@ -65,7 +65,7 @@ def sounds(controller: Controller) -> bool:
     return any(voice.sounding for voice in controller.sound.mixer.voices)
 
 
-def test_nothing_behind_tells_what_is_heard(qtbot: QtBot, heard: Controller) -> None:
+def test_nothing_behind_reports_what_is_heard(qtbot: QtBot, heard: Controller) -> None:
     window = heard.window
     heard.pluck()
     qtbot.waitUntil(lambda: window.transport.meter._peak_db > -60)
@@ -122,10 +122,10 @@ def test_a_pedal_that_is_lifted_meanwhile_is_up_afterwards(
     taken: list[object] = []
     monkeypatch.setattr(heard.performance.notes, "handle", lambda event, due: taken.append(event))
     dialog = open_test(qtbot, heard)
-    let_go = [events.NoteOff(52), events.Controller(events.SUSTAIN, 0)]
-    for event in (events.NoteOn(52, 90), *let_go):
+    release_all = [events.NoteOff(52), events.Controller(events.SUSTAIN, 0)]
+    for event in (events.NoteOn(52, 90), *release_all):
         heard._handle(event, None)
-    assert taken == let_go
+    assert taken == release_all
     dialog.abandon()
 
 

@@ -87,7 +87,7 @@ def test_everything_that_tab_reaches_has_a_name(controller: Controller) -> None:
 
 def test_tab_visits_everything_and_returns(controller: Controller) -> None:
     window = controller.window
-    window.notices.tell("Something to dismiss.")
+    window.notices.report("Something to dismiss.")
     visited = walk(window, window.presets.findChildren(QAbstractButton)[0])
     assert set(visited) == set(stops(window))
     assert len(visited) == len(set(visited))
@@ -147,7 +147,7 @@ def test_f10_opens_the_menu(qtbot: QtBot, controller: Controller) -> None:
 
 def test_tab_goes_as_the_eye_does(controller: Controller) -> None:
     window = controller.window
-    window.notices.tell("Something to dismiss.")
+    window.notices.report("Something to dismiss.")
     visited = walk(window, window.presets.findChildren(QAbstractButton)[0])
     string = next(panel.view for panel in controller.panels if panel.key == "string")
     parts = [window.presets, window.notices.bell, window.notices, string, window.left, window.right, window.transport]
@@ -186,7 +186,7 @@ def themed(qapp: QApplication) -> Iterator[None]:
 @pytest.mark.usefixtures("themed")
 def test_it_fits_a_small_screen_with_a_notice(qtbot: QtBot, controller: Controller) -> None:
     window = controller.window
-    window.notices.tell(LONG)
+    window.notices.report(LONG)
     middle = window.centralWidget()
     for size in (QSize(1024, 560), QSize(820, 490)):
         window.resize(size)
@@ -467,7 +467,7 @@ def test_neither_a_notice_nor_the_knobs_of_the_string_remove_what_is_seen(
     window.notices.hide()
     qtbot.wait(50)
     bare = heights(window)
-    window.notices.tell(LONG)
+    window.notices.report(LONG)
     qtbot.wait(50)
     assert heights(window) == bare, "it lies over the window"
     qtbot.waitUntil(lambda: middle.minimumSizeHint().height() <= window.height())
@@ -491,7 +491,7 @@ def test_the_knobs_of_the_string_work_at_150_percent(qtbot: QtBot, played: Contr
     window, strip = played.window, played.window.instrument
     middle = window.centralWidget()
     played.session.update(face="play")
-    window.notices.tell(LONG)
+    window.notices.report(LONG)
     window.resize(853, height)
     for part in (strip.bar, strip.keys):
         qtbot.waitUntil(part.isVisible)
@@ -516,7 +516,7 @@ def test_a_notice_is_read_whole_over_the_window_and_dismissed_by_keys(qtbot: QtB
     for width in (1280, 853):
         window.resize(width, 700)
         for text in ("Saved.", LONG * 3):
-            notices.tell(text)
+            notices.report(text)
             label = notices._label
             qtbot.waitUntil(lambda label=label: label.height() >= label.heightForWidth(label.width()))
             qtbot.waitUntil(lambda: window.presets.geometry().bottom() < notices.geometry().top())
@@ -540,7 +540,7 @@ def test_a_browser_covers_a_notice_below_the_header_and_has_room_for_a_search(
 ) -> None:
     window = controller.window
     window.resize(*size)
-    window.notices.tell(LONG)
+    window.notices.report(LONG)
     for desk in (controller.presets, controller.patches.desk):
         desk.toggle()
         browser = desk.browser

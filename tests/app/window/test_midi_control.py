@@ -12,7 +12,7 @@ from PySide6.QtCore import QCoreApplication, Qt
 from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, let_go
+from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, release_all
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Patch
@@ -65,7 +65,7 @@ def test_an_input_is_found_again_under_new_numbers() -> None:
     assert not same_device("Keys 1", "Keys 2")
 
 
-def test_faults_are_told_in_plain_words() -> None:
+def test_faults_are_reported_in_plain_words() -> None:
     backend = FakeBackend()
     midi = MidiInput(lambda message: None, lambda: backend)
     with pytest.raises(MidiUnavailable, match="Strings is not connected"):
@@ -186,9 +186,9 @@ def test_what_an_input_holds_is_let_go_with_it(
         "notes": lambda: dialog.notes_chosen.emit("position"),
     }
     changes[change]()
-    assert came == let_go([2])
+    assert came == release_all([2])
     heard.close()
-    assert came == let_go([2])
+    assert came == release_all([2])
     QCoreApplication.processEvents()
     assert performed == []
     assert heard.choices.controllers == {"width": 74}
@@ -202,7 +202,7 @@ def test_a_wheel_that_is_assigned_while_it_is_turned_does_not_stay_there(
     heard._learn("listen")
     with qtbot.waitSignal(heard.performed):
         backend.send("control_change", control=1, value=127, channel=1)
-    assert came[1:] == let_go([1])
+    assert came[1:] == release_all([1])
 
 
 @pytest.mark.parametrize("number", [64, 6, 101, 120, 123])
@@ -333,11 +333,11 @@ def test_the_patch_says_what_channels_and_wheels_do(qtbot: QtBot, midi: MidiCont
     assert [each.accessibleName() for each in (*boxes, *buttons) if not each.toolTip()] == []
 
 
-def test_an_input_that_is_gone_is_told_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
+def test_an_input_that_is_gone_is_reported_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
     backend.names = []
-    with qtbot.waitSignal(midi.told) as told:
+    with qtbot.waitSignal(midi.reported) as reported:
         midi.start()
-    assert "not connected" in told.args[0]
+    assert "not connected" in reported.args[0]
     assert midi.choices.port == "Keys:Keys 9:0"
     window = QWidget()
     qtbot.addWidget(window)

@@ -21,7 +21,7 @@ from app.playing.note import Note
 from app.rendering.subject import string_of
 from app.shared.key_names import note_name
 from app.window.controller import Controller
-from app.window.patch_desk import NOTE_TOLD_AFTER_MS
+from app.window.patch_desk import NOTE_REPORTED_AFTER_MS
 from engine.presets.of_string import STRINGS, read_string
 from tests.app.instrument.seen import Seen, sounding
 
@@ -131,7 +131,7 @@ def test_keys_on_the_screen_and_of_the_computer_sound_together_on_a_guitars_patc
     qtbot.waitUntil(lambda: keys_that_ring(played) == {60, 64, 67})
 
 
-def test_a_files_drums_are_left_out_and_told(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
+def test_a_files_drums_are_left_out_and_reported(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
     song = tmp_path / "song.mid"
     notes = [TimedEvent(0.0, NoteOn(40, 90, 9)), TimedEvent(0.0, NoteOn(52, 90)), TimedEvent(30.0, NoteOff(52))]
     song.write_bytes(midi_bytes(notes))  # at the end of a file all is released: it must not end before it is seen
@@ -278,28 +278,28 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
     shutil.copy(PATCHES / "concert_harp.json", harp)
     played.take_file(harp)
     assert played.session.choices.patch == read_patch(harp)
-    told: list[str] = []
+    reported: list[str] = []
     informed: list[str] = []
-    played.patches.told.connect(told.append)
+    played.patches.reported.connect(reported.append)
     played.patches.informed.connect(informed.append)
     played.take_file(STRINGS / "steel_g3.toml")
     assert played.session.choices.string is not None
     assert played.session.choices.string.parameters == read_string(STRINGS / "steel_g3.toml")
     assert "steel_g3.toml is plucked" in informed.pop()
-    assert not told  # it is no error
+    assert not reported  # it is no error
     (tmp_path / "bad.toml").write_text("length_m = -1")
     played.take_file(tmp_path / "bad.toml")
-    assert "bad.toml" in told.pop()
+    assert "bad.toml" in reported.pop()
     (tmp_path / "short.toml").write_text("length_m = 0.65")
     played.take_file(tmp_path / "short.toml")
-    assert "short.toml: area_m2, " in told[-1]
-    assert "are missing" in told.pop()
+    assert "short.toml: area_m2, " in reported[-1]
+    assert "are missing" in reported.pop()
     steel = (STRINGS / "steel_g3.toml").read_text(encoding="utf-8")
     heavy = steel.replace("d1_kg_m_s = 0.00098472", "d1_kg_m_s = 900.0")
     (tmp_path / "heavy.toml").write_text(heavy, encoding="utf-8")
     played.take_file(tmp_path / "heavy.toml")
-    assert "heavy.toml: " in told[-1]
-    assert "overdamped" in told.pop()
+    assert "heavy.toml: " in reported[-1]
+    assert "overdamped" in reported.pop()
     assert played.session.choices.string.parameters == read_string(STRINGS / "steel_g3.toml")
     slack = steel.replace("tension_n = 74.173", "tension_n = 0.74173")
     (tmp_path / "slack.toml").write_text(slack, encoding="utf-8")
@@ -307,40 +307,40 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
     assert "Beyond training: pitch" in informed.pop()
     (tmp_path / "bad.mid").write_bytes(b"no")
     played.take_file(tmp_path / "bad.mid")
-    assert "bad.mid" in told[0]
+    assert "bad.mid" in reported[0]
 
 
-def test_what_is_beyond_training_is_told_and_follows_the_knobs(qtbot: QtBot, played: Controller) -> None:
+def test_what_is_beyond_training_is_reported_and_follows_the_knobs(qtbot: QtBot, played: Controller) -> None:
     label = played.window.outside_label
 
-    def told(beyond: bool) -> None:
+    def reported(beyond: bool) -> None:
         qtbot.waitUntil(lambda: ("decay time near 3 kHz" in label.toolTip()) == beyond)
 
     played.patches.change("knobs.brightness_decay", 0.1)
     played.patches.change("knobs.decay", 0.5)
     assert not label.toolTip()  # nothing was struck
     played.window.instrument.pressed.emit(80, 100)
-    told(True)
+    reported(True)
     played.patches.change("knobs.decay", 1.5)
-    told(True)
-    qtbot.wait(2 * NOTE_TOLD_AFTER_MS)
-    told(True)
+    reported(True)
+    qtbot.wait(2 * NOTE_REPORTED_AFTER_MS)
+    reported(True)
     played.patches.change("knobs.brightness_decay", 3.0)
     played.patches.change("knobs.stiffness", 10.0)
-    told(False)  # the inharmonicity is beyond the training, and no error grows with it
+    reported(False)  # the inharmonicity is beyond the training, and no error grows with it
     assert "inharmonicity" not in label.toolTip()
     played.patches.change("knobs.brightness_decay", 0.1)
     played.patches.change("knobs.decay", 0.5)
-    told(True)  # before the next key
+    reported(True)  # before the next key
     played.session.play_string()
     assert not label.toolTip()
     played.session.play_patch()
     assert not label.toolTip()
     played.window.instrument.pressed.emit(80, 100)
-    told(True)
+    reported(True)
     played.patches.choose("concert_harp")
     assert not label.toolTip()
-    qtbot.wait(2 * NOTE_TOLD_AFTER_MS)
+    qtbot.wait(2 * NOTE_REPORTED_AFTER_MS)
     assert not label.toolTip()
 
 
@@ -362,7 +362,7 @@ def test_the_transport_changes_where_the_patch_is_heard(played: Controller) -> N
     assert transport._stereo.isChecked() == (len(harp.pickup.points) == 2)
 
 
-def test_why_a_patch_stays_in_stereo_is_told(played: Controller) -> None:
+def test_why_a_patch_stays_in_stereo_is_reported(played: Controller) -> None:
     patch = played.session.choices.patch
     assert patch is not None
     macro = Macro(name="Width", targets=(Target(field="pickup.points.1", low=0.5, high=0.9),))
@@ -450,7 +450,7 @@ def test_a_scala_scale_is_shown_and_removed(played: Controller) -> None:
     assert played.session.choices.patch == tuned
 
 
-def test_knobs_tell_the_string_that_was_struck_last_and_take_figures(qtbot: QtBot, played: Controller) -> None:
+def test_knobs_report_the_string_that_was_struck_last_and_take_figures(qtbot: QtBot, played: Controller) -> None:
     knobs = played.window.instrument.knobs
     tension, length = knobs.knobs["knobs.tension"], knobs.knobs["knobs.length"]
     patch = played.session.choices.patch

@@ -288,12 +288,12 @@ def test_a_note_of_an_instrument_is_in_the_mixer_before_the_window_knows(
         time.sleep(0.01)
     assert all(note.seconds > 0 for note in ringing(performance)), "it sounds"
     assert window.session.choices == before
-    told: list[Choices] = []
-    window.instruments.played.connect(lambda: told.append(window.session.choices))
+    reported: list[Choices] = []
+    window.instruments.played.connect(lambda: reported.append(window.session.choices))
     plucks = [note.request.pluck for note in ringing(performance)]
     assert [(each.position, each.amplitude_mm) for each in plucks] == [(0.4, 5.0), (0.6, 5.0)]
-    qtbot.waitUntil(lambda: told != [])
-    assert (told[-1].position, told[-1].amplitude_mm) == (0.6, 5.0)
+    qtbot.waitUntil(lambda: reported != [])
+    assert (reported[-1].position, reported[-1].amplitude_mm) == (0.6, 5.0)
     qtbot.waitUntil(lambda: performance._shown.note is ringing(performance)[-1])
     qtbot.waitUntil(lambda: bool(performance.notes.latencies_s))
 
@@ -330,7 +330,7 @@ def slow_model(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(KoopmanVar, "advance", slow)
 
 
-def test_how_long_a_model_is_waited_for_is_told_and_then_its_error(
+def test_how_long_a_model_is_waited_for_is_reported_and_then_its_error(
     qtbot: QtBot, window: Controller, performance: Performance, slow_model: None
 ) -> None:
     window.session.update(preset="rendered", seconds=0.8)

@@ -129,7 +129,7 @@ def test_filters_by_kind(controller: Controller, browser: Browser) -> None:
     assert listed(browser) == ["first", "second"]
 
 
-def test_a_filter_is_told_beside_the_preset_and_cleared_there(
+def test_a_filter_is_reported_beside_the_preset_and_cleared_there(
     qtbot: QtBot, controller: Controller, browser: Browser
 ) -> None:
     """Previous and next go through what it leaves."""
@@ -264,7 +264,7 @@ def test_the_first_favourites_are_shipped() -> None:
     assert {path.stem for path in preset_files()} >= set(FIRST_FAVOURITES)
 
 
-def test_the_card_tells_what_a_musician_wants_to_know(controller: Controller, browser: Browser) -> None:
+def test_the_card_reports_what_a_musician_wants_to_know(controller: Controller, browser: Browser) -> None:
     card = browser.card.text()
     for words in ("A small string", "4 kHz", "the first 0.1 s", "25 % of the motion", "Licence", "MIT", "kB"):
         assert words in card

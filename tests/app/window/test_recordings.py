@@ -21,14 +21,14 @@ from app.views.dialogs.export_dialog import ExportDialog
 from app.window.controller import Controller
 
 
-class Told:
+class Reported:
     """The notices to the user, and the answers to the question for a file: paths, and "" for Cancel."""
 
     def __init__(self, played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
         self.errors: list[str] = []
         self.good: list[str] = []
         self.loses = True  # the answer to whether the window may be closed, and lose a recording
-        played.patches.told.connect(self.errors.append)
+        played.patches.reported.connect(self.errors.append)
         played.patches.informed.connect(self.good.append)
         monkeypatch.setattr(QMessageBox, "question", self._question)
 
@@ -37,8 +37,8 @@ class Told:
 
 
 @pytest.fixture
-def told(played: Controller, monkeypatch: pytest.MonkeyPatch) -> Told:
-    return Told(played, monkeypatch)
+def reported(played: Controller, monkeypatch: pytest.MonkeyPatch) -> Reported:
+    return Reported(played, monkeypatch)
 
 
 def dialog_of(played: Controller) -> ExportDialog:
@@ -71,18 +71,18 @@ def record(played: Controller) -> None:
 
 
 def test_what_is_played_is_recorded_as_wav_and_midi(
-    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
 ) -> None:
     recordings = played.patches.recordings
     recordings.record()
     recordings.record()
-    assert "Nothing was played" in told.good[0]
+    assert "Nothing was played" in reported.good[0]
     out = tmp_path / "take.wav"
     record(played)
     assert "1 note in" in dialog_of(played).performance.what.text()
     words = save(qtbot, played, out)
     assert f"Saved {out} and take.mid" in words and "of the model" in words
-    assert not told.errors
+    assert not reported.errors
     sound, rate_hz = soundfile.read(out)
     assert rate_hz == 48_000
     assert 0.001 < abs(sound).max() < 1
@@ -91,7 +91,7 @@ def test_what_is_played_is_recorded_as_wav_and_midi(
 
 
 def test_a_recording_replaces_no_file_that_nobody_asked_about(
-    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
 ) -> None:
     (tmp_path / "song.mid").write_bytes(b"mine")
     record(played)
@@ -106,7 +106,7 @@ def test_a_recording_replaces_no_file_that_nobody_asked_about(
 
 
 def test_a_recording_is_kept_until_it_is_saved_or_discarded(
-    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
 ) -> None:
     bar, recorder = played.window.instrument.bar, played.performance.notes.keys.recorder
     record(played)
@@ -128,11 +128,11 @@ def test_a_recording_is_kept_until_it_is_saved_or_discarded(
     assert bar.record.menu() is None
     bar.record.click()
     assert recorder.recording
-    assert not told.errors
+    assert not reported.errors
 
 
 def test_a_recording_that_cannot_be_written_is_kept(
-    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
 ) -> None:
     record(played)
     save(qtbot, played, tmp_path / "absent" / "take.wav", "absent")
@@ -141,7 +141,7 @@ def test_a_recording_that_cannot_be_written_is_kept(
 
 
 def test_rate_format_and_level_are_those_of_the_dialog(
-    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
 ) -> None:
     record(played)
     wav = dialog_of(played).wav
@@ -156,7 +156,7 @@ def test_rate_format_and_level_are_those_of_the_dialog(
 
 @pytest.mark.parametrize("button", ["_pickup", "_stereo"])
 def test_it_is_recorded_as_it_is_heard(
-    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path, button: str
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path, button: str
 ) -> None:
     """Not as the patch was saved."""
     played.patches.change("knobs.decay", 10.0)
@@ -179,7 +179,7 @@ def test_it_is_recorded_as_it_is_heard(
 
 @pytest.mark.parametrize(("source", "words"), [("truth", "the truth"), ("difference", "at +40 dB")])
 def test_the_source_that_was_heard_is_written(
-    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path, source: str, words: str
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path, source: str, words: str
 ) -> None:
     played.session.update(a=source, heard="a", difference_gain_db=40.0)
     record(played)
@@ -196,7 +196,7 @@ def test_the_source_that_was_heard_is_written(
 
 
 def test_a_recording_that_is_dropped_says_what_it_is_and_changes_nothing(
-    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
 ) -> None:
     """It is neither a recipe nor a body."""
     record(played)
@@ -210,14 +210,14 @@ def test_a_recording_that_is_dropped_says_what_it_is_and_changes_nothing(
     assert not own_bodies().exists()
 
 
-def test_that_a_soloed_mode_is_not_recorded_alone_is_told(played: Controller, told: Told) -> None:
+def test_that_a_soloed_mode_is_not_recorded_alone_is_reported(played: Controller, reported: Reported) -> None:
     played.session.update(solo=3)
     record(played)
-    assert told.good == ["The recording has all modes, although mode 3 is soloed."]
+    assert reported.good == ["The recording has all modes, although mode 3 is soloed."]
 
 
-def test_the_window_is_not_closed_over_a_recording_without_a_question(played: Controller, told: Told) -> None:
-    told.loses = False
+def test_the_window_is_not_closed_over_a_recording_without_a_question(played: Controller, reported: Reported) -> None:
+    reported.loses = False
     record(played)
     played.window.close()
     assert played.window.isVisible()
@@ -225,13 +225,13 @@ def test_the_window_is_not_closed_over_a_recording_without_a_question(played: Co
     played.patches.recordings.record()
     played.window.close()  # nor while it is made
     assert played.window.isVisible()
-    told.loses = True
+    reported.loses = True
     played.window.close()
     assert not played.window.isVisible()
 
 
 def test_the_window_is_not_closed_over_a_recording_that_is_being_written(
-    qtbot: QtBot, played: Controller, told: Told, tmp_path: Path
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
 ) -> None:
     """An hour of playing takes minutes. Its notes are there at once; its sound is given up if the user says so."""
     record(played)
@@ -240,12 +240,12 @@ def test_the_window_is_not_closed_over_a_recording_that_is_being_written(
     assert latest is not None
     played.patches.recordings._unsaved[-1] = replace(latest, events=(latest.events[0], *hour))
     played.exports.refresh()
-    told.loses = False
+    reported.loses = False
     save(qtbot, played, tmp_path / "take.wav", "Rendering")
     qtbot.waitUntil((tmp_path / "take.mid").is_file)
     played.window.close()
     assert played.window.isVisible()
-    told.loses = True
+    reported.loses = True
     played.window.close()
     assert not played.window.isVisible()
     assert [path.name for path in tmp_path.iterdir() if "take" in path.name] == ["take.mid"]

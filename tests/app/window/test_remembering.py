@@ -15,7 +15,7 @@ from PySide6.QtCore import QObject
 from pytestqt.qtbot import QtBot
 
 from app.session.choices import Choices
-from app.window.remembering import Keeper
+from app.window.remembering import SettingsSaver
 from app.window.settings import Settings, load_settings, merged, save_settings
 
 
@@ -24,7 +24,7 @@ class Desk:
 
     def __init__(self, path: Path, owner: QObject) -> None:
         self.now = load_settings(path)[0]
-        self.keeper = Keeper(path, self.now, lambda: self.now, owner)
+        self.keeper = SettingsSaver(path, self.now, lambda: self.now, owner)
         self.keeper._timer.stop()  # the test says when it looks
 
     def choose(self, **changes: object) -> None:
@@ -73,15 +73,15 @@ def test_merged_is_mine_where_i_changed_it() -> None:
     assert merged(base, mine, theirs).favourites == ("theirs",)
 
 
-def test_a_folder_that_cannot_be_written_is_told_once(qtbot: QtBot, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_reported_once(qtbot: QtBot, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
-    owner, told = QObject(), []
+    owner, reported = QObject(), []
     desk = Desk(tmp_path / "file" / "settings.json", owner)
-    desk.keeper.failed.connect(told.append)
+    desk.keeper.failed.connect(reported.append)
     for position in (0.41, 0.42):
         desk.choose(position=position)
         desk.keeper.close()
-    assert len(told) == 1 and "cannot be written" in told[0]
+    assert len(reported) == 1 and "cannot be written" in reported[0]
 
 
 KILLED = """

@@ -56,7 +56,7 @@ def test_a_file_of_a_version_without_midi_is_read(tmp_path: Path) -> None:
         ('{"version": 2}', "version"),
     ],
 )
-def test_a_broken_file_is_set_aside_and_told(tmp_path: Path, text: str, names: str) -> None:
+def test_a_broken_file_is_set_aside_and_reported(tmp_path: Path, text: str, names: str) -> None:
     path = tmp_path / "settings.json"
     path.write_text(text)
     settings, notice = load_settings(path)

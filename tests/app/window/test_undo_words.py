@@ -37,13 +37,13 @@ def test_the_menu_names_both_steps_and_takes_them(controller: Controller) -> Non
 def test_the_key_says_what_it_has_done(qtbot: QtBot, controller: Controller) -> None:
     qtbot.waitUntil(controller.window.isActiveWindow)
     controller.session.update(width=0.2)
-    for modifiers, told in (
+    for modifiers, reported in (
         (CONTROL, "Undone: pluck width"),
         (CONTROL, "Nothing to undo"),
         (CONTROL | SHIFT, "Redone: pluck width"),
     ):
         qtbot.keyClick(controller.window, Qt.Key.Key_Z, modifiers)
-        assert QToolTip.text() == told
+        assert QToolTip.text() == reported
 
 
 def test_a_drag_whose_release_was_lost_takes_no_later_changes(qtbot: QtBot, controller: Controller) -> None:

@@ -54,7 +54,7 @@ def baseline(
     with progress("bench baseline") as report:
         measured = measured_errors({name: baseline_player(fitted.model)}, strings, rate, seed, Shares(report, 2))
     found = {column: {name: facts_of(errors[name])} for column, errors in measured.items()}
-    told = {
+    reported = {
         "parameters": sum(parameter.numel() for parameter in fitted.model.parameters()),
         "steps": fitted.steps,
         "train": fitted.train,
@@ -62,10 +62,10 @@ def baseline(
     }
     if json:
         facts = {"baseline": name, "minutes": minutes, "strings": strings, "rate_hz": rate, "seed": seed}
-        print_json({**facts, **told, **found})
+        print_json({**facts, **reported, **found})
         return
     print(
-        f"{name}: {told['parameters']:,} numbers, {fitted.steps:,} steps of {ROWS} strings and {FRAMES} "
+        f"{name}: {reported['parameters']:,} numbers, {fitted.steps:,} steps of {ROWS} strings and {FRAMES} "
         f"frames; geometric mean {number(fitted.train)} in training, {number(fitted.validation)} in validation"
     )
     for column_name, of_column in found.items():

@@ -87,8 +87,10 @@ def _naming(path: Path) -> Iterator[None]:
     try:
         yield
     except (KeyError, TypeError, ValueError, RuntimeError) as error:
-        told = one_line(repr(error), 200)
-        raise ValueError(f"{path}: no checkpoint of a baseline ({told}); delete it to start the run again") from error
+        reported = one_line(repr(error), 200)
+        raise ValueError(
+            f"{path}: no checkpoint of a baseline ({reported}); delete it to start the run again"
+        ) from error
 
 
 def fit_baseline(
@@ -151,8 +153,8 @@ def fit_baseline(
                 best, best_model = found, _weights(model)
             spent_s = saved_s = time.process_time() - started
             train_error = math.exp(total / counted)
-            told = facts | {"best": best, "train": train_error, "steps": steps, "spent_s": spent_s}
-            Checkpoint(_weights(model), best_model, {}, optimiser_moments(optimiser), told).save(path)
+            reported = facts | {"best": best, "train": train_error, "steps": steps, "spent_s": spent_s}
+            Checkpoint(_weights(model), best_model, {}, optimiser_moments(optimiser), reported).save(path)
             share = min(1.0, spent_s / (60 * minutes))
             left_s = (time.monotonic() - begun) * (1 - share) / max(share - begun_share, 1e-6)
             report(BaselineProgress(share, steps, train_error, best, left_s))

@@ -140,9 +140,9 @@ def test_one_that_is_stretched_too_long_is_faded_out() -> None:
 
 
 @pytest.mark.parametrize(
-    ("values", "told"),
+    ("values", "reported"),
     [({"mix": 1.1}, "mix"), ({"mix": float("nan")}, "mix"), ({"size": 0.1}, "size"), ({"name": "lute"}, "guitar")],
 )
-def test_what_is_out_of_range_is_told(values: dict[str, object], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+def test_what_is_out_of_range_is_reported(values: dict[str, object], reported: str) -> None:
+    with pytest.raises(ValueError, match=reported):
         Body(**values)  # type: ignore[arg-type]

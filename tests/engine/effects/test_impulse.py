@@ -19,7 +19,7 @@ def with_one(value: float) -> NDArray[np.float64]:
 
 
 @pytest.mark.parametrize(
-    ("samples", "rate_hz", "told"),
+    ("samples", "rate_hz", "reported"),
     [
         (GOOD, 4_000, "rate"),
         (GOOD, 10**9, "rate"),
@@ -36,8 +36,8 @@ def with_one(value: float) -> NDArray[np.float64]:
         (np.sin(np.arange(96_000) * 2 * np.pi * 8 / 48_000)[:, None] * np.hanning(96_000)[:, None], 48_000, "80"),
     ],
 )
-def test_what_cannot_be_used_is_told(samples: NDArray[np.float64], rate_hz: int, told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+def test_what_cannot_be_used_is_reported(samples: NDArray[np.float64], rate_hz: int, reported: str) -> None:
+    with pytest.raises(ValueError, match=reported):
         Impulse(samples, rate_hz)
 
 

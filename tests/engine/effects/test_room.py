@@ -49,7 +49,9 @@ def test_it_is_the_same_room_at_any_rate(rate_hz: int) -> None:
     assert np.linalg.norm(at_either[0] - gain * at_either[1]) < 0.02 * np.linalg.norm(at_either[0])
 
 
-@pytest.mark.parametrize(("values", "told"), [({"mix": -0.1}, "mix"), ({"t60_s": 0.1}, "t60_s"), ({"t60_s": 9}, "s")])
-def test_what_is_out_of_range_is_told(values: dict[str, float], told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+@pytest.mark.parametrize(
+    ("values", "reported"), [({"mix": -0.1}, "mix"), ({"t60_s": 0.1}, "t60_s"), ({"t60_s": 9}, "s")]
+)
+def test_what_is_out_of_range_is_reported(values: dict[str, float], reported: str) -> None:
+    with pytest.raises(ValueError, match=reported):
         Room(**values)

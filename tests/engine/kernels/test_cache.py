@@ -12,7 +12,7 @@ import pytest
 from engine.kernels import cache, warm
 
 
-def told(code: str, **environment: str) -> str:
+def reported(code: str, **environment: str) -> str:
     paths = {"PYTHONPATH": os.pathsep.join(sys.path)}
     done = subprocess.run(
         [sys.executable, "-c", code], env={**os.environ, **paths, **environment}, capture_output=True, text=True
@@ -21,9 +21,9 @@ def told(code: str, **environment: str) -> str:
     return done.stdout.strip()
 
 
-def test_it_is_told_without_the_compiler() -> None:
+def test_it_is_reported_without_the_compiler() -> None:
     code = "import sys; from engine.kernels import cache; cache.is_whole(); print('numba' in sys.modules)"
-    assert told(code) == "False"
+    assert reported(code) == "False"
 
 
 def test_all_compiled_functions_are_kept_in_one_folder() -> None:
@@ -32,7 +32,7 @@ def test_all_compiled_functions_are_kept_in_one_folder() -> None:
         "from engine.kernels import cache;"
         "print(all(str(cache.folder()) in f._cache.cache_path for f in (stream, advance)))"
     )
-    assert told(code) == "True"
+    assert reported(code) == "True"
 
 
 def test_the_users_own_folder_is_used_and_known_to_be_empty(tmp_path: Path) -> None:
@@ -40,7 +40,7 @@ def test_the_users_own_folder_is_used_and_known_to_be_empty(tmp_path: Path) -> N
         "from engine.kernels import cache, compiled;"
         "print(cache.folder(), compiled.config.CACHE_DIR, cache.is_whole(), cache.set_whole(), cache.is_whole())"
     )
-    assert told(code, NUMBA_CACHE_DIR=str(tmp_path)) == f"{tmp_path} {tmp_path} False None True"
+    assert reported(code, NUMBA_CACHE_DIR=str(tmp_path)) == f"{tmp_path} {tmp_path} False None True"
 
 
 def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_nobody() -> None:
@@ -50,7 +50,7 @@ def test_where_nothing_can_be_written_a_temporary_folder_is_taken_and_left_to_no
         "from engine.kernels.compiled import tanh;"
         "print(cache.folder(), cache.folder().is_dir(), round(tanh(9.5)), len(list(cache.folder().rglob('*.nbc'))))"
     )
-    folder, there, value, kept = told(code, NUMBA_CACHE_DIR="/dev/null/chosen").split()
+    folder, there, value, kept = reported(code, NUMBA_CACHE_DIR="/dev/null/chosen").split()
     assert (there, value, kept) == ("True", "1", "1")
     assert not Path(folder).exists()  # once the process has ended
 
@@ -62,7 +62,7 @@ def test_what_a_killed_run_left_in_the_temporary_folder_goes_at_the_next_start(t
         "print(cache.folder().name, flush=True);"
     )
     killed = code + "os._exit(0)"  # as after a kill, nothing is tidied
-    first = told(killed, TMPDIR=str(tmp_path))
+    first = reported(killed, TMPDIR=str(tmp_path))
     stem, _, _ = first.rpartition("-")
     stem, _, _ = stem.rpartition("-")
     alive = tmp_path / f"{stem}-{os.getpid()}-abcdefgh"
@@ -71,10 +71,10 @@ def test_what_a_killed_run_left_in_the_temporary_folder_goes_at_the_next_start(t
     for folder in (alive, others, aside):
         folder.mkdir()
     (tmp_path / f"{stem}-999999999-abcdefgh").symlink_to(aside)
-    second = told(killed, TMPDIR=str(tmp_path))
+    second = reported(killed, TMPDIR=str(tmp_path))
     kept = {path.name for path in tmp_path.iterdir() if path.name.startswith("learned-strings-kernels")}
     assert kept == {second, alive.name, others.name, f"{stem}-999999999-abcdefgh"}
-    told(code, TMPDIR=str(tmp_path))
+    reported(code, TMPDIR=str(tmp_path))
     assert not (tmp_path / second).exists() and aside.is_dir()
 
 
@@ -85,7 +85,7 @@ def test_without_any_folder_at_all_it_is_compiled_and_not_kept() -> None:
         "from engine.kernels.compiled import tanh;"
         "print(cache.folder(), cache.is_whole(), cache.set_whole(), cache.is_whole(), round(tanh(9.5)))"
     )
-    assert told(code) == "None False None False 1"
+    assert reported(code) == "None False None False 1"
 
 
 @pytest.mark.parametrize("whole", [True, False])

@@ -44,7 +44,7 @@ def mixer_with(effects: Effects | None, samples: NDArray[np.float32] | None = No
 
 def is_awake(mixer: Mixer) -> bool:
     assert mixer._convolver is not None
-    return bool(mixer._convolver.view(np.int64)[at.C_AWAKE])
+    return bool(mixer._convolver.view(np.int64)[at.C_ACTIVE])
 
 
 EDGES = [1, 63, 64, 65, 2 * WINDOW - 1, 2 * WINDOW, 2 * WINDOW + 1, 3 * WINDOW, 3 * WINDOW + 1, 20_000]
@@ -161,7 +161,7 @@ def test_while_nothing_is_rendered_wishes_do_not_pile_up() -> None:
     assert not mixer._impulses
 
 
-def test_after_the_end_there_is_silence_and_rest_and_then_it_begins_anew() -> None:
+def test_after_the_end_there_is_silence_and_rest_and_then_it_begins_again() -> None:
     samples, effects = noise(5000), response(7000, 2)
     mixer = mixer_with(effects, samples)
     first = mixer.render(12_032)

@@ -117,7 +117,7 @@ def test_blocks_make_no_difference(block: int) -> None:
     np.testing.assert_array_equal(limited(sound, block), limited(sound, len(sound) + AHEAD))
 
 
-def test_what_it_did_is_told() -> None:
+def test_what_it_did_is_reported() -> None:
     voice = Voice.of_samples(plain_program(RATE_HZ), burst(6400))
     mixer = Mixer(RATE_HZ)
     mixer.add(voice)

@@ -74,11 +74,13 @@ def test_samples_and_voices_are_published_when_they_are_there(published: Publish
     ("tell", "slot"),
     [
         (lambda voice: voice.listen(Ear((0.2,))), at.NEXT_WEIGHTS),
-        (lambda voice: voice.retune(StringParameters().resonator(4)), at.WISHES),
+        (lambda voice: voice.retune(StringParameters().resonator(4)), at.PENDING_MODES),
     ],
     ids=["listening points", "modes"],
 )
-def test_what_a_voice_is_told_is_published(tell: Callable[[Voice], object], slot: int, published: Published) -> None:
+def test_what_a_voice_is_reported_is_published(
+    tell: Callable[[Voice], object], slot: int, published: Published
+) -> None:
     voice = string_voice()
     tell(voice)
     assert [each for each, _ in published] == [slot]

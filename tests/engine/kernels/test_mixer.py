@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.kernels import layout as at
-from engine.kernels.limiter import BELIEVED
+from engine.kernels.limiter import LARGEST_LEVEL
 from engine.kernels.mixer import TONE_HZ, TONE_LEVEL, UNDERFLOW, call
 from engine.voices import Mixer, Voice, plain_program
 from engine.voices.mixer import VOLUME_SMOOTHING_S
@@ -76,7 +76,7 @@ def test_one_wild_sample_is_soon_forgotten() -> None:
     mixer.add(of(wild, 20_000.0))  # a gain that nothing in the app asks for
     mixer.render(128)
     level = float(mixer.memory[at.M_LIMITER])
-    assert level <= BELIEVED
+    assert level <= LARGEST_LEVEL
 
 
 def test_a_file_is_not_limited() -> None:
@@ -180,7 +180,7 @@ def test_an_underflow_counts_as_a_gap_where_something_sounds() -> None:
     assert mixer.new_gaps() == []
 
 
-def test_of_very_many_gaps_the_latest_are_told() -> None:
+def test_of_very_many_gaps_the_latest_are_reported() -> None:
     mixer = Mixer(RATE_HZ)
     mixer.add(of(noise(48_000)))
     for number in range(at.GAPS + 20):
@@ -204,7 +204,7 @@ def test_beyond_the_last_place_voices_are_refused_and_over() -> None:
     assert mixer.render(640).any()
 
 
-def test_a_full_ring_refuses_and_tells() -> None:
+def test_a_full_ring_refuses_and_reports() -> None:
     mixer = Mixer(RATE_HZ)
     samples = noise(64)
     voices = [of(samples) for _ in range(at.RING + 2)]

@@ -116,7 +116,7 @@ def test_what_has_no_samples_yet_begins_when_it_has_them() -> None:
     np.testing.assert_array_equal(found[128:], samples[128:2048, 0])  # nothing was left out, and it has faded in
 
 
-def test_every_hole_is_told() -> None:
+def test_every_hole_is_reported() -> None:
     voice, mixer = waiting(plain_program(RATE_HZ), 1.0, RATE_HZ), Mixer(RATE_HZ)
     mixer.add(voice)
     for _ in range(3):

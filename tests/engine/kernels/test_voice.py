@@ -250,7 +250,7 @@ def test_one_that_never_ends_does_not(small_info: Callable[[bool], PresetInfo], 
 
 
 @pytest.mark.parametrize("frame", [0, 1, 63, 64, 640, 641, 703])
-def test_it_begins_at_the_frame_that_it_is_told(frame: int) -> None:
+def test_it_begins_at_the_frame_that_it_is_reported(frame: int) -> None:
     voice, mixer = constant(), Mixer(RATE_HZ, limited=False)
     voice.begin_at(frame)
     assert voice.waits
@@ -298,7 +298,7 @@ def test_one_whose_frame_is_past_begins_with_the_next_quantum(frame: int) -> Non
     assert voice.began_frame == 4_032
 
 
-def test_it_is_released_at_the_quantum_that_it_is_told() -> None:
+def test_it_is_released_at_the_quantum_that_it_is_reported() -> None:
     voice, mixer = constant(), Mixer(RATE_HZ, limited=False)
     voice.release_at(1000)
     mixer.add(voice)
@@ -370,8 +370,8 @@ def test_a_runaway_never_reaches_the_mix(
         parts.append(mixer.render(64))
     assert wild.ran_away
     assert [gap.cause for gap in mixer.new_gaps()] == ["runaway"]
-    believed = 20 * float(np.abs(initial).max()) / FULL_SCALE_M + 1
-    assert np.abs(np.concatenate(parts)).max() <= believed
+    largest = 20 * float(np.abs(initial).max()) / FULL_SCALE_M + 1
+    assert np.abs(np.concatenate(parts)).max() <= largest
     expected = rung(len(parts) * 64 + 640, strike(STEEL))
     np.testing.assert_allclose(mixer.render(640), expected[-640:], atol=1e-6)  # the other voice continues
     np.testing.assert_allclose(parts[-1], expected[-704:-640], atol=1e-6)

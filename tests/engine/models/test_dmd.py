@@ -180,7 +180,7 @@ def test_impossible_sizes_are_named() -> None:
         DMD(DMDConfiguration(rank=20)).initialise("physics", Physics(STRING.resonator(25), 16_000), torch.Generator())
 
 
-def test_impossible_data_are_told() -> None:
+def test_impossible_data_are_reported() -> None:
     with pytest.raises(ValueError, match=r"shape \(batch, frames, 101\), not \(1, 9, 7\)"):
         DMD.fit(torch.zeros(1, 9, 7), DMDConfiguration())
     with pytest.raises(ValueError, match="lags of 2 needs more frames than 2"):

@@ -68,16 +68,16 @@ def test_agrees_with_a_plain_quadrature(sizes: dict) -> None:
         return z.abs().square() * torch.exp(-2 * sigma * times[:, None])
 
     def f(times: Tensor) -> Tensor:
-        told = energies(times) * model.energy_units
-        found = told @ model.K.T
+        reported = energies(times) * model.energy_units
+        found = reported @ model.K.T
         if model.g is not None:
-            network = model.g(told) - model.g(torch.zeros(12).double())
-            found = found + (network * told.sum(-1, keepdim=True) if c.second_order else network)
+            network = model.g(reported) - model.g(torch.zeros(12).double())
+            found = found + (network * reported.sum(-1, keepdim=True) if c.second_order else network)
         found = found * torch.cat([model.rate_units] * 2)
         if c.adiabatic:  # ω' ² = ω² + 2ωκ, κ of the amplitudes of these actions
-            linear = kappa = (told @ model.K.T)[:, 12:] * model.rate_units
+            linear = kappa = (reported @ model.K.T)[:, 12:] * model.rate_units
             for _ in range(FIXED_POINT_STEPS):
-                amplitudes = told * omega.sqrt() / (omega + 2 * kappa).sqrt()
+                amplitudes = reported * omega.sqrt() / (omega + 2 * kappa).sqrt()
                 kappa = (amplitudes @ model.K.T)[:, 12:] * model.rate_units
             found[:, 12:] += (omega.square() + 2 * omega * kappa).sqrt() - omega - linear
         return found

@@ -137,13 +137,13 @@ def test_a_string_that_is_heard_and_not_shown_is_refused(tmp_path: Path, fault: 
 
 
 @pytest.mark.parametrize("size", [0, 7, 200, 2000])
-def test_a_truncated_file_is_told(preset_file: Path, size: int) -> None:
+def test_a_truncated_file_is_reported(preset_file: Path, size: int) -> None:
     preset_file.write_bytes(preset_file.read_bytes()[:size])
     with pytest.raises(PresetError, match=r"not a whole safetensors file .* get the preset again"):
         load_preset(preset_file)
 
 
-def test_other_files_are_told(tmp_path: Path) -> None:
+def test_other_files_are_reported(tmp_path: Path) -> None:
     with pytest.raises(PresetError, match="no such preset file"):
         load_preset(tmp_path / "nothing.safetensors")
     with pytest.raises(PresetError, match="not a file"):
@@ -213,7 +213,7 @@ def test_loading_presets_does_not_load_torchs_compiler() -> None:
     assert loaded == "False"
 
 
-def test_plucks_outside_training_are_told(preset_file: Path) -> None:
+def test_plucks_outside_training_are_reported(preset_file: Path) -> None:
     info: PresetInfo = read_info(preset_file)
     assert outside_training(info, Pluck(0.5, 5.0, "gaussian", 0.05)) == []
     text = "; ".join(outside_training(info, Pluck(0.1, 15.0, "gaussian", 0.3)))

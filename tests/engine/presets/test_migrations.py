@@ -61,7 +61,7 @@ def test_the_chain_is_whole() -> None:
         ("koopman", "paper", ""),
     ],
 )
-def test_version_1_is_told_what_its_start_knew(model: str, initialisation: str, knows: str) -> None:
+def test_version_1_is_reported_what_its_start_knew(model: str, initialisation: str, knows: str) -> None:
     old = {"format_version": 1, "model": model, "initialisation": initialisation, "title": "as it was"}
     assert migrated(old) == {**old, "format_version": FORMAT_VERSION, "knows": knows}
     assert old["format_version"] == 1  # the input stays as it is

@@ -121,9 +121,9 @@ def test_a_string_file_without_some_parameters_names_them(tmp_path: Path) -> Non
     file.write_text("".join(line for line in TOML.splitlines(keepends=True) if "damping" not in line))
     with pytest.raises(SchemaError) as caught:
         read_string(file)
-    told = str(caught.value)
-    assert told.startswith(f"{file}: damping_d1_kg_m_s, damping_d3_kg_m_s are missing; ")
-    assert "gives all of length_m, area_m2," in told
+    reported = str(caught.value)
+    assert reported.startswith(f"{file}: damping_d1_kg_m_s, damping_d3_kg_m_s are missing; ")
+    assert "gives all of length_m, area_m2," in reported
     file.write_text(TOML.replace("tension_n = 72.2016", ""))
     with pytest.raises(SchemaError, match=r"short\.toml: tension_n is missing"):
         read_string(file)
@@ -132,7 +132,7 @@ def test_a_string_file_without_some_parameters_names_them(tmp_path: Path) -> Non
         read_string(file)
 
 
-def test_a_string_beyond_the_family_is_told() -> None:
+def test_a_string_beyond_the_family_is_reported() -> None:
     family = load_preset(find_preset("studio_any_string")).info.family
     assert family is not None
     assert family.outside(StringParameters()) == []

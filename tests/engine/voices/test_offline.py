@@ -71,7 +71,7 @@ def test_a_model_that_is_no_bank_is_rendered_and_converted(small_preset: Path, i
     np.testing.assert_allclose(higher[::12][attack:-4], found[attack:-4], atol=1e-5)
 
 
-def test_progress_is_told_and_may_end_it(preset: Preset) -> None:
+def test_progress_is_reported_and_may_end_it(preset: Preset) -> None:
     shares: list[float] = []
     arguments = (program_of("bank", preset), ModelSource(preset), preset.info, PLUCK, Ear((0.37,)), SECONDS)
     render_voice(*arguments, shares.append)
@@ -85,7 +85,7 @@ def test_progress_is_told_and_may_end_it(preset: Preset) -> None:
         render_voice(*arguments, refuse)
 
 
-def test_a_runaway_is_told_with_its_time(preset: Preset) -> None:
+def test_a_runaway_is_reported_with_its_time(preset: Preset) -> None:
     program = program_of("bank", preset)
     program.memory[program.memory.view(np.int64)[at.O_SIGMA]] = -5e-3  # an e-fold in 50 ms
     with pytest.raises(Runaway) as caught:

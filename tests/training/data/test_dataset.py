@@ -129,10 +129,10 @@ def damage(folder: Path, how: str) -> None:
 
 
 @pytest.mark.parametrize("how", ["cut", "missing", "type", "zeros", "json", "scale", "list"])
-def test_a_damaged_cache_is_told_with_its_remedy(tmp_path: Path, how: str) -> None:
+def test_a_damaged_cache_is_reported_with_its_remedy(tmp_path: Path, how: str) -> None:
     load_dataset(TINY, tmp_path)
     folder = dataset_folder(TINY, tmp_path)
     damage(folder, how)
-    with pytest.raises(ValueError, match=r"damaged data cache .*delete that folder") as told:
+    with pytest.raises(ValueError, match=r"damaged data cache .*delete that folder") as reported:
         load_dataset(TINY, tmp_path)
-    assert str(folder) in str(told.value)
+    assert str(folder) in str(reported.value)

@@ -46,7 +46,7 @@ def test_strings_lie_in_their_column(column: Column) -> None:
         assert 1 <= plucked.resonator.modes <= 99
 
 
-def test_a_string_sounds_as_it_is_told() -> None:
+def test_a_string_sounds_as_it_is_reported() -> None:
     string = string_of(110.0, 1e-4, 8.0, 0.5)
     eigenvalues = string.resonator(60).eigenvalues()
     assert math.isclose(float(eigenvalues[0].imag) / (2 * math.pi), 110.0, rel_tol=1e-9)
@@ -73,11 +73,11 @@ def test_curves_are_found_from_nothing_and_hold_on_other_strings() -> None:
     physics = Physics(plucked.string.resonator(25), RATE_HZ, 1e-3)
     model.initialise("kicks", physics, torch.Generator())
     start = geometric_mean(errors(model, validation, RATE_HZ, STEPS))
-    told = []
+    reported = []
     best = fit_curves(
-        model, train, validation, RATE_HZ, steps=3, first_frames=600, seed=0, report=lambda p: told.append(p.step)
+        model, train, validation, RATE_HZ, steps=3, first_frames=600, seed=0, report=lambda p: reported.append(p.step)
     )
-    assert told == [1, 2, 3]
+    assert reported == [1, 2, 3]
     assert best < start / 100
     assert math.isclose(best, geometric_mean(errors(model, validation, RATE_HZ, STEPS)), rel_tol=1e-9)
     with torch.no_grad():
@@ -114,12 +114,12 @@ def test_players_are_as_good_as_they_should_be() -> None:
     assert means == sorted(means)
 
 
-def test_a_column_tells_its_worst() -> None:
+def test_a_column_reports_its_worst() -> None:
     strings = tuple(StringError(100.0, 1e-4, rise, 50, error) for rise, error in ((0.1, 1e-6), (0.4, 1e-1)))
-    told = FamilyErrors(strings)
-    assert told.worst.tension_rise == 0.4
-    assert told.share_large == 0.5
-    assert math.isclose(told.geometric_mean, math.sqrt(1e-7))
+    reported = FamilyErrors(strings)
+    assert reported.worst.tension_rise == 0.4
+    assert reported.share_large == 0.5
+    assert math.isclose(reported.geometric_mean, math.sqrt(1e-7))
     parts = family_errors.by_rise(strings, (0, 0.2, 0.3, 0.5))
     assert [(edges, len(part.strings)) for edges, part in parts] == [((0, 0.2), 1), ((0.3, 0.5), 1)]
 

@@ -133,18 +133,18 @@ def test_presets_of_different_data_are_refused(field: str, other: Any) -> None:
 
 
 def test_the_starts_of_a_data_set_are_named() -> None:
-    told = [
+    reported = [
         extrapolation.describe(extrapolation.common_data([preset(initial=kind)]))
         for kind in ("gaussian", "noise", "pluck")
     ]
-    assert [words.split(", ")[1] for words in told] == [
+    assert [words.split(", ")[1] for words in reported] == [
         "Gaussian plucks",
         "noise-like starts",
         "plucks of three shapes",
     ]
 
 
-def test_what_a_figure_cannot_be_made_of_is_told() -> None:
+def test_what_a_figure_cannot_be_made_of_is_reported() -> None:
     with pytest.raises(PresetError, match="needs at least one"):
         extrapolation.common_data([])
     with pytest.raises(ValueError, match="there is no trajectory 3: the validation set has 0 … 2"):
@@ -294,7 +294,7 @@ def test_a_log_may_be_short_without_validation_or_negative(tmp_path: Path, lines
 
 
 @pytest.mark.parametrize("text", ["", "a,b\n1,2\n"])
-def test_what_is_no_log_is_told(tmp_path: Path, text: str) -> None:
+def test_what_is_no_log_is_reported(tmp_path: Path, text: str) -> None:
     path = log(tmp_path, text)
     with pytest.raises(ValueError, match=r"log\.csv: not a training log"):
         plot_run(path, path.with_suffix(".png"))

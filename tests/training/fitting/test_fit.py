@@ -166,7 +166,7 @@ def test_a_checkpoint_within_an_epoch_goes_on_within_it(
     assert all(torch.equal(left[name], right[name]) for name in left)
 
 
-def test_a_checkpoint_of_another_version_is_told(small_dataset: Dataset, runs: Path) -> None:
+def test_a_checkpoint_of_another_version_is_reported(small_dataset: Dataset, runs: Path) -> None:
     fit(small("koopman_var"), small_dataset, runs)
     path = runs / "checkpoint.safetensors"
     checkpoint = Checkpoint.load(path)

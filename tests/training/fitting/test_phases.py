@@ -160,7 +160,7 @@ def test_the_blind_recipe_is_given_nothing_of_the_string(cell: Cell) -> None:
     assert "state_size" not in configuration.model_configuration
 
 
-def test_hints_are_told() -> None:
+def test_hints_are_reported() -> None:
     koopman, phase = (
         configuration_of(Cell(model, True, "gaussian", 4000, recipe="hinted"))
         for model in ("koopman", "koopman_integrated")

@@ -109,13 +109,13 @@ def test_other_models_and_strided_data_are_refused(small_dataset: Dataset) -> No
         pursue(koopman(), strided, STEPS, torch.Generator())
 
 
-def test_a_polish_holds_weights_down_by_the_recipes_decay_and_tells_the_error_alone(small_dataset: Dataset) -> None:
+def test_a_polish_holds_weights_down_by_the_recipes_decay_and_reports_the_error_alone(small_dataset: Dataset) -> None:
     def polished(weight_decay: float) -> tuple[float, float]:
         model = koopman()
         latents = pursue(model, small_dataset, STEPS, torch.Generator().manual_seed(0))
-        told = latents.polish(model, Recipe(epochs=1, weight_decay=weight_decay))
+        reported = latents.polish(model, Recipe(epochs=1, weight_decay=weight_decay))
         size = sum(float(weight.detach().square().sum()) for weight in model.encoder.parameters() if weight.ndim > 1)
-        return size, float(told)
+        return size, float(reported)
 
     free, held = polished(0.0), polished(1e-2)
     assert held[0] < 0.7 * free[0]

@@ -82,7 +82,7 @@ def test_a_shared_coupling_is_found_again() -> None:
 def test_kernels_pass_spread_and_gather() -> None:
     shape = torch.rand(POINTS, generator=torch.Generator().manual_seed(1), dtype=torch.float64)
     kernels = Kernels(POINTS, 4)
-    kernels.pass_on(0, 1, 2.0, lag=-3)
+    kernels.add_shifted(0, 1, 2.0, lag=-3)
     kernels.spread(0, POINTS - 1, 2, shape)
     kernels.gather(0, 3, 7, shape)
     kernels.bias[5, 0] = 1.5

@@ -103,7 +103,7 @@ def test_a_trial_differs_from_the_cells_that_it_is_named_after(path: Path) -> No
         ("[[block]]", "[block", "not valid TOML"),
     ],
 )
-def test_what_cannot_be_is_told_with_its_place(path: Path, old: str, new: str, message: str) -> None:
+def test_what_cannot_be_is_reported_with_its_place(path: Path, old: str, new: str, message: str) -> None:
     with pytest.raises(SchemaError) as error:
         load_plan(change(path, old, new))
     assert str(error.value).startswith(str(path))
@@ -118,7 +118,7 @@ def test_a_plan_without_blocks_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["nothing", "nothing.toml"])
-def test_a_plan_that_is_not_there_is_told_with_those_that_are(name: str) -> None:
+def test_a_plan_that_is_not_there_is_reported_with_those_that_are(name: str) -> None:
     with pytest.raises(SchemaError, match=f"no plan '{name}'; give a .toml file or one of: tables, tiny"):
         load_plan(name)
 

@@ -175,7 +175,7 @@ class Inline(Script):
 
     def next(self, timeout_s: float) -> Event | None:
         task = self._tasks.pop()
-        return end_of(task.name, perform(write(task), lambda told: None))
+        return end_of(task.name, perform(write(task), lambda reported: None))
 
 
 @pytest.fixture

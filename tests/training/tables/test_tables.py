@@ -214,7 +214,7 @@ def test_csv_has_every_cell_and_exact_figures() -> None:
     assert (empty["seeds"], empty["rel_mse"], empty["mse_mark"]) == ("0", "", "not run")
 
 
-def test_csv_tells_diverged_runs_without_a_mark() -> None:
+def test_csv_reports_diverged_runs_without_a_mark() -> None:
     text = as_csv([row(mse=None, mae=None, status="diverged")])
     (found,) = records(text, diverged="1")
     assert (found["seeds"], found["rel_mse"], found["mse_mark"]) == ("0", "", "")

@@ -42,8 +42,8 @@ class _DaskWorkers:
         self._events: queue.SimpleQueue[Event | WorkersError] = queue.SimpleQueue()
         self._futures: dict[str, Future[dict[str, Any]]] = {}  # by key
         self._names: dict[str, str] = {}
-        client.subscribe_topic(self._topic, self._told)
-        client.subscribe_topic("all", self._scheduler_told)
+        client.subscribe_topic(self._topic, self._reported)
+        client.subscribe_topic("all", self._scheduler_reported)
 
     def close(self) -> None:
         self._client.unsubscribe_topic("all")
@@ -70,11 +70,11 @@ class _DaskWorkers:
             raise event
         return event
 
-    def _told(self, event: tuple[float, Any]) -> None:
+    def _reported(self, event: tuple[float, Any]) -> None:
         if understood := event_of(event[1]):
             self._events.put(understood)
 
-    def _scheduler_told(self, event: tuple[float, Any]) -> None:
+    def _scheduler_reported(self, event: tuple[float, Any]) -> None:
         message = event[1]
         if isinstance(message, Mapping) and message.get("action") == "remove-worker":
             for key in message.get("processing-tasks", ()):
@@ -101,7 +101,7 @@ def _perform_on_dask(task: dict[str, Any], topic: str) -> dict[str, Any]:
     from distributed import get_worker
 
     worker = get_worker()
-    return perform(task, lambda told: worker.log_event(topic, told))
+    return perform(task, lambda reported: worker.log_event(topic, reported))
 
 
 @contextmanager

@@ -62,13 +62,13 @@ def _train(task: Task, folder: Path, tell: Callable[[dict[str, Any]], None]) -> 
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
     cache = Path(task.cache) if task.cache else None
-    told = -TELL_EVERY_S
+    reported = -TELL_EVERY_S
 
     def report(progress: Progress) -> None:
-        nonlocal told
+        nonlocal reported
         now = time.monotonic()
-        if now - told >= TELL_EVERY_S:
-            told = now
+        if now - reported >= TELL_EVERY_S:
+            reported = now
             facts = {"progress": write(progress), "host": socket.gethostname(), "pid": os.getpid()}
             tell({"name": task.name, **facts})
 
@@ -105,14 +105,16 @@ def _leave_if_broken(device: str) -> None:
         os._exit(1)
 
 
-def event_of(told: Mapping[str, Any]) -> Event | None:
+def event_of(reported: Mapping[str, Any]) -> Event | None:
     """A worker's report; None where it is not understood, for example a loss that is not finite."""
     from training.fitting.fit import Progress
 
-    if "text" in told:
-        return Noted(told["name"], told["text"])
+    if "text" in reported:
+        return Noted(reported["name"], reported["text"])
     try:
-        return Progressed(told["name"], read(Progress, told["progress"], "progress"), told["host"], told["pid"])
+        return Progressed(
+            reported["name"], read(Progress, reported["progress"], "progress"), reported["host"], reported["pid"]
+        )
     except SchemaError:
         return None
 

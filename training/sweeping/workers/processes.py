@@ -73,12 +73,12 @@ class _ProcessWorkers:
         with suppress(OSError):  # a process that has died meanwhile is found by `next`
             place.connection.send(write(place.task))
 
-    def _understand(self, place: _Place, told: Mapping[str, Any]) -> Event | None:
-        if "name" in told:
-            return event_of(told)
+    def _understand(self, place: _Place, reported: Mapping[str, Any]) -> Event | None:
+        if "name" in reported:
+            return event_of(reported)
         assert place.task is not None
         name, place.task = place.task.name, None
-        return end_of(name, told)
+        return end_of(name, reported)
 
     def _bury(self, place: _Place) -> Event | None:
         pid = place.process.pid

@@ -72,7 +72,7 @@ def test_a_broken_file_is_refused(tmp_path: Path, data: bytes) -> None:
         load_record(tmp_path / "none.json")
 
 
-def test_a_folder_that_cannot_be_made_is_told(record: AbxRecord, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported(record: AbxRecord, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(WriteError, match=r"file.*cannot be written .*; choose"):
         save_record(tmp_path / "file" / "folder", record)

@@ -23,7 +23,7 @@ def rms(samples: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(samples, dtype=np.float64))))
 
 
-def test_levels_are_equal_and_gains_are_told() -> None:
+def test_levels_are_equal_and_gains_are_reported() -> None:
     model, truth = decay(200, 0.4), decay(200, 0.1)
     made = make_stimuli({"model": truth, "truth": model}, RATE_HZ)
     a, b = (made.samples[name] for name in IDENTITIES)

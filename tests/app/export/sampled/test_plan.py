@@ -72,7 +72,7 @@ def test_largest_bytes_counts_every_frame(patch: Patch, patch_of: Callable[..., 
 
 
 @pytest.mark.parametrize(
-    ("choices", "told"),
+    ("choices", "reported"),
     [
         ({"every": 0}, "every must lie in 1 … 12, not 0"),
         ({"layers": 33}, "layers must lie in 1 … 32, not 33"),
@@ -84,8 +84,8 @@ def test_largest_bytes_counts_every_frame(patch: Patch, patch_of: Callable[..., 
         ({"bits": "32f"}, "bits '32f' is not one of 16, 24"),
     ],
 )
-def test_what_cannot_be_is_refused_by_name(patch: Patch, choices: dict, told: str) -> None:
-    with pytest.raises(ValueError, match=re.escape(told)):
+def test_what_cannot_be_is_refused_by_name(patch: Patch, choices: dict, reported: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(reported)):
         SampledPlan(patch, **choices)
 
 

@@ -55,7 +55,7 @@ def test_silence_is_a_sample_too() -> None:
 
 
 @pytest.mark.parametrize(
-    ("rendered", "told"),
+    ("rendered", "reported"),
     [
         (np.full((100, 1), np.nan), "not finite"),
         (np.zeros((0, 1)), "no sound"),
@@ -63,8 +63,8 @@ def test_silence_is_a_sample_too() -> None:
         (np.zeros((100, 3)), "no sound"),
     ],
 )
-def test_what_is_no_note_is_refused(rendered: np.ndarray, told: str) -> None:
-    with pytest.raises(ValueError, match=told):
+def test_what_is_no_note_is_refused(rendered: np.ndarray, reported: str) -> None:
+    with pytest.raises(ValueError, match=reported):
         sample_of(rendered, RATE_HZ)
 
 

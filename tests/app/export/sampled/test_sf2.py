@@ -176,19 +176,19 @@ def test_another_player_reads_it(
 
 
 @pytest.mark.parametrize(
-    ("choices", "told"),
+    ("choices", "reported"),
     [
         ({"rate_hz": 96_000}, "a SoundFont's rate must lie in 400 … 50000 Hz, not 96000; lower it"),
         ({"keys": (0, 127), "layers": 16, "seconds": 60.0}, "GiB, and a SoundFont holds 4; take fewer"),
         ({"keys": (0, 127), "layers": 32, "seconds": 0.1}, ""),
     ],
 )
-def test_what_no_soundfont_holds_is_told_before(choices: dict, told: str, patch_of: PatchOf) -> None:
+def test_what_no_soundfont_holds_is_reported_before(choices: dict, reported: str, patch_of: PatchOf) -> None:
     plan = small(patch_of(range=(0, 127)), **choices)
-    if not told:
+    if not reported:
         assert planned(plan, Path("a.sf2")).bits == "24"
         return
-    with pytest.raises(ValueError, match=told):
+    with pytest.raises(ValueError, match=reported):
         planned(plan, Path("a.sf2"))
     assert planned(plan, Path("a.sfz")) == plan
 

@@ -148,22 +148,22 @@ def test_a_soundfont_leaves_no_folder(patch: Patch, render: Render, tmp_path: Pa
 
 @KINDS
 def test_cancelling_keeps_what_is_whole(kind: str, patch: Patch, render: Render, tmp_path: Path) -> None:
-    told: list[tuple[float, str, float | None]] = []
+    reported: list[tuple[float, str, float | None]] = []
 
     def progress(share: float, text: str, left_s: float | None = None) -> None:
         if text == "checking samples":
             return
-        if len(told) > 3:
+        if len(reported) > 3:
             raise Cancelled
-        told.append((share, text, left_s))
+        reported.append((share, text, left_s))
 
     out = tmp_path / f"a.{kind}"
     with pytest.raises(Cancelled):
         export_sampled(small(patch), out, render, progress=progress)
     assert not out.exists()
-    assert [share for share, _, _ in told] == [0.0, 0.1, 0.2, 0.3]
-    assert told[0][1:] == (f"key 50, velocity {small(patch).zones[0].velocity}", None)
-    assert [left_s is None for _, _, left_s in told] == [True, True, False, False]  # the first note also compiles
+    assert [share for share, _, _ in reported] == [0.0, 0.1, 0.2, 0.3]
+    assert reported[0][1:] == (f"key 50, velocity {small(patch).zones[0].velocity}", None)
+    assert [left_s is None for _, _, left_s in reported] == [True, True, False, False]  # the first note also compiles
     assert kept_samples(small(patch), out) == 4
     assert kept_samples(SampledPlan(patch, (50, 53), layers=2, seconds=0.3), out) == 4
     assert kept_samples(small(patch, source="truth"), out) == 0
@@ -256,7 +256,7 @@ def test_an_index_of_a_stranger_removes_nothing_else(patch: Patch, render: Rende
 
 
 @pytest.mark.parametrize("text", ["", "{", "[1]", '{"format": 2, "instrument": "a.sfz", "samples": {}}', "\x00" * 99])
-def test_a_broken_index_is_told(text: str, patch: Patch, render: Render, tmp_path: Path) -> None:
+def test_a_broken_index_is_reported(text: str, patch: Patch, render: Render, tmp_path: Path) -> None:
     out = tmp_path / "a.sfz"
     export_sampled(small(patch), out, render)
     (sample_folder(out) / INDEX).write_text(text)
@@ -280,14 +280,14 @@ def test_the_index_of_the_largest_instrument_is_read(patch_of: Callable[..., Pat
     assert read_index(tmp_path / INDEX) == index
 
 
-def test_a_note_that_is_not_finite_is_told(patch: Patch, tmp_path: Path) -> None:
+def test_a_note_that_is_not_finite_is_reported(patch: Patch, tmp_path: Path) -> None:
     first = small(patch).zones[0].stem
     with pytest.raises(WriteError, match=rf"{first}\.flac: the note holds values that are not finite"):
         export_sampled(small(patch), tmp_path / "a.sfz", lambda *_, advanced: np.full((100, 1), np.inf))
     assert not (tmp_path / "a.sfz").exists()
 
 
-def test_a_key_without_a_note_is_told(patch: Patch, tmp_path: Path) -> None:
+def test_a_key_without_a_note_is_reported(patch: Patch, tmp_path: Path) -> None:
     def none(*_: object, **more: object) -> np.ndarray:
         raise ValueError("key 50 has no string")
 
@@ -295,7 +295,7 @@ def test_a_key_without_a_note_is_told(patch: Patch, tmp_path: Path) -> None:
         export_sampled(small(patch), tmp_path / "a.sfz", none)
 
 
-def test_a_place_that_cannot_be_written_is_told(patch: Patch, render: Render, tmp_path: Path) -> None:
+def test_a_place_that_cannot_be_written_is_reported(patch: Patch, render: Render, tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(WriteError, match="choose another"):
         export_sampled(small(patch), tmp_path / "file" / "a.sfz", render)

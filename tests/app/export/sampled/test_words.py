@@ -18,7 +18,7 @@ from app.export.sampled.words import instrument_bytes, needed_bytes, size_words
     ("kind", "form", "bits"),
     [("sfz", "wav", "16"), ("sfz", "wav", "24"), ("sfz", "flac", "16"), ("sfz", "flac", "24"), ("sf2", "flac", "24")],
 )
-def test_no_instrument_is_larger_than_told(
+def test_no_instrument_is_larger_than_reported(
     kind: str, form: str, bits: str, points: tuple[float, ...], patch_of: Callable, tmp_path: Path
 ) -> None:
     patch = patch_of(pickup={"points": points})
@@ -29,15 +29,15 @@ def test_no_instrument_is_larger_than_told(
         return np.random.default_rng(key).uniform(-0.1, 0.1, (frames, len(points))).astype(np.float32)
 
     soundfont = kind == "sf2"
-    told = instrument_bytes(plan, soundfont)
+    reported = instrument_bytes(plan, soundfont)
     size = export_sampled(plan, tmp_path / f"a.{kind}", noise).size_bytes
-    assert size <= told
-    assert size > (0.5 if form == "flac" and not soundfont else 0.97) * told
-    assert needed_bytes(plan, soundfont) == told + (plan.largest_bytes if soundfont else 0)
+    assert size <= reported
+    assert size > (0.5 if form == "flac" and not soundfont else 0.97) * reported
+    assert needed_bytes(plan, soundfont) == reported + (plan.largest_bytes if soundfont else 0)
 
 
-def test_a_soundfont_is_told_with_what_it_takes_meanwhile(patch_of: Callable) -> None:
+def test_a_soundfont_is_reported_with_what_it_takes_meanwhile(patch_of: Callable) -> None:
     stereo = patch_of(pickup={"points": (0.2, 0.3)})
-    told = size_words(SampledPlan(stereo, (50, 59), layers=2, seconds=10), soundfont=True)
-    assert told == "at most 38 MB (16-bit), and up to 58 MB more while it is written"
+    reported = size_words(SampledPlan(stereo, (50, 59), layers=2, seconds=10), soundfont=True)
+    assert reported == "at most 38 MB (16-bit), and up to 58 MB more while it is written"
     assert size_words(SampledPlan(stereo, (50, 59), seconds=10, format="wav", bits="16"), False) == "at most 77 MB"

@@ -28,7 +28,7 @@ def test_a_readout_rests_on_its_own_words(qtbot: QtBot) -> None:
     qtbot.addWidget(readout)
     readout.resize(400, 20)
     readout.rest("every frame")
-    readout.tell("1.305 s   106 Hz", "106 Hz")
+    readout.report("1.305 s   106 Hz", "106 Hz")
     assert readout.shown == readout.toolTip() == "1.305 s   106 Hz"
-    readout.tell("")
+    readout.report("")
     assert readout.shown == "every frame"

@@ -57,7 +57,7 @@ def test_shift_in_the_middle_of_a_drag_is_finer_and_does_not_leap(qtbot: QtBot, 
     qtbot.mouseRelease(knob, LEFT)
 
 
-def test_a_drag_tells_its_begin_and_its_end(qtbot: QtBot, knob: Knob) -> None:
+def test_a_drag_reports_its_begin_and_its_end(qtbot: QtBot, knob: Knob) -> None:
     with qtbot.waitSignals([knob.drag_started, knob.drag_ended], order="strict"):
         qtbot.mousePress(knob, LEFT)
         qtbot.mouseRelease(knob, LEFT)
@@ -103,11 +103,11 @@ def test_page_keys_are_the_knobs_and_not_the_windows(knob: Knob) -> None:
 
 
 @pytest.mark.parametrize(
-    ("typed", "value", "told"),
+    ("typed", "value", "reported"),
     [("7,5", 7.5, ""), ("99", 20, "At most 20.00 mm"), ("-1", 0, "At least 0.00 mm"), ("3-", 4.0, "")],
 )
 def test_a_typed_number_is_taken_within_the_range(
-    qtbot: QtBot, knob: Knob, typed: str, value: float, told: str
+    qtbot: QtBot, knob: Knob, typed: str, value: float, reported: str
 ) -> None:
     QToolTip.hideText()
     qtbot.waitUntil(lambda: not QToolTip.isVisible())
@@ -117,7 +117,7 @@ def test_a_typed_number_is_taken_within_the_range(
     qtbot.keyClick(knob._editor, Qt.Key.Key_Return)
     assert knob.value == value
     assert knob._editor is None
-    assert (QToolTip.text() if QToolTip.isVisible() else "") == told
+    assert (QToolTip.text() if QToolTip.isVisible() else "") == reported
 
 
 def test_escape_gives_typing_up(qtbot: QtBot, knob: Knob) -> None:

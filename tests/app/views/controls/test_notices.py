@@ -18,10 +18,10 @@ def bar(qtbot: QtBot) -> NoticeBar:
 
 
 def test_a_repeated_notice_counts_up(bar: NoticeBar) -> None:
-    bar.tell("No sound.", "device 3")
-    bar.tell("Disk full.")
+    bar.report("No sound.", "device 3")
+    bar.report("Disk full.")
     for _ in range(100):
-        bar.tell("No sound.", "device 4")
+        bar.report("No sound.", "device 4")
     assert [(each.message, each.details) for each in bar.notices] == [("Disk full.", ""), ("No sound.", "device 4")]
     assert bar.text == "No sound."
     assert bar._label.text() == "No sound.  (×101)"
@@ -29,7 +29,7 @@ def test_a_repeated_notice_counts_up(bar: NoticeBar) -> None:
 
 
 def test_a_withdrawn_notice_is_still_kept(bar: NoticeBar) -> None:
-    bar.tell("No sound.")
+    bar.report("No sound.")
     bar.withdraw("Something else.")
     assert bar.text == "No sound."
     bar.withdraw("No sound.")
@@ -38,7 +38,7 @@ def test_a_withdrawn_notice_is_still_kept(bar: NoticeBar) -> None:
 
 
 def test_information_is_not_shown_as_a_fault(bar: NoticeBar) -> None:
-    bar.tell("Broken.")
+    bar.report("Broken.")
     assert bar._label.objectName() == "warning"
     bar.inform("Saved.")
     assert bar._label.objectName() == ""
@@ -51,12 +51,12 @@ def test_details_are_offered_where_they_add_something(bar: NoticeBar) -> None:
         ("Broken.", "", False),
         ("x: y", "y", False),
     ):
-        bar.tell(message, details)
+        bar.report(message, details)
         assert bar._details.isHidden() is not offered
 
 
 def test_the_bell_opens_the_list_with_the_details(qtbot: QtBot, bar: NoticeBar) -> None:
-    bar.tell("No sound.", "what the driver said")
+    bar.report("No sound.", "what the driver said")
     bar.inform("Saved.")
     bar.bell.click()
     shown = bar._list
@@ -69,7 +69,7 @@ def test_the_bell_opens_the_list_with_the_details(qtbot: QtBot, bar: NoticeBar) 
     ]
     shown._list.setCurrentRow(1)
     assert "what the driver said" in shown._details.toPlainText()
-    bar.tell("Later.")
+    bar.report("Later.")
     assert "Later." in shown._list.item(0).text()
     assert "No sound.\nwhat the driver said" in shown.report()
     assert QGuiApplication.clipboard() is not None
@@ -78,6 +78,6 @@ def test_the_bell_opens_the_list_with_the_details(qtbot: QtBot, bar: NoticeBar) 
 
 def test_the_list_is_bounded(bar: NoticeBar) -> None:
     for number in range(MOST_KEPT + 5):
-        bar.tell(f"Fault {number}.")
+        bar.report(f"Fault {number}.")
     assert len(bar.notices) == MOST_KEPT
     assert bar.text == f"Fault {MOST_KEPT + 4}."

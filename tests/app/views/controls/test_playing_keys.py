@@ -64,7 +64,7 @@ def test_while_a_browser_is_open_keys_search_in_it(qtbot: QtBot, window: QWidget
     assert heard == ["A"]
 
 
-def test_a_key_that_is_held_down_is_told_once_and_shortcuts_are_not_notes(
+def test_a_key_that_is_held_down_is_reported_once_and_shortcuts_are_not_notes(
     qtbot: QtBot, window: QWidget, heard: list[str]
 ) -> None:
     qtbot.keyPress(window, Qt.Key.Key_S)
@@ -83,46 +83,46 @@ def native(kind: QEvent.Type, time_ms: int) -> QKeyEvent:
 
 
 def test_a_repetition_that_looks_like_a_release_and_a_press_is_neither(qtbot: QtBot, window: QWidget) -> None:
-    keys, told = PlayingKeys(window, X11), list[str]()
-    keys.pressed.connect(lambda press: told.append("down"))
-    keys.released.connect(lambda press: told.append("up"))
+    keys, reported = PlayingKeys(window, X11), list[str]()
+    keys.pressed.connect(lambda press: reported.append("down"))
+    keys.released.connect(lambda press: reported.append("up"))
     QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
     for time_ms in (1_660, 1_700, 1_740):
         QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, time_ms))
         QApplication.sendEvent(window, native(QEvent.Type.KeyPress, time_ms))
     qtbot.wait(60)
-    assert told == ["down"]
+    assert reported == ["down"]
     QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, 2_000))
-    qtbot.waitUntil(lambda: told == ["down", "up"])
+    qtbot.waitUntil(lambda: reported == ["down", "up"])
 
 
 @pytest.mark.parametrize("platform", [X11, "windows"])
 def test_a_key_struck_fast_again_is_let_go_first(window: QWidget, platform: str) -> None:
-    keys, told = PlayingKeys(window, platform), list[str]()
-    keys.pressed.connect(lambda press: told.append("down"))
-    keys.released.connect(lambda press: told.append("up"))
+    keys, reported = PlayingKeys(window, platform), list[str]()
+    keys.pressed.connect(lambda press: reported.append("down"))
+    keys.released.connect(lambda press: reported.append("up"))
     QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
     QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, 1_030))
     QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_042))
-    assert told == ["down", "up", "down"]
+    assert reported == ["down", "up", "down"]
 
 
 @pytest.mark.parametrize("platform", ["windows", "cocoa", "wayland"])
 def test_a_release_is_not_held_back_where_qt_marks_repetitions(window: QWidget, platform: str) -> None:
-    keys, told = PlayingKeys(window, platform), list[str]()
-    keys.pressed.connect(lambda press: told.append("down"))
-    keys.released.connect(lambda press: told.append("up"))
+    keys, reported = PlayingKeys(window, platform), list[str]()
+    keys.pressed.connect(lambda press: reported.append("down"))
+    keys.released.connect(lambda press: reported.append("up"))
     QApplication.sendEvent(window, native(QEvent.Type.KeyPress, 1_000))
     QApplication.sendEvent(window, native(QEvent.Type.KeyRelease, 1_500))
-    assert told == ["down", "up"]
+    assert reported == ["down", "up"]
 
 
 def test_keys_let_go_together_are_all_released(qtbot: QtBot, window: QWidget) -> None:
-    keys, told = PlayingKeys(window, X11), list[str]()
-    keys.released.connect(lambda press: told.append(press.letter))
+    keys, reported = PlayingKeys(window, X11), list[str]()
+    keys.released.connect(lambda press: reported.append(press.letter))
     for key, code in ((Qt.Key.Key_S, 39), (Qt.Key.Key_D, 40)):
         for kind, time_ms in ((QEvent.Type.KeyPress, 1_000), (QEvent.Type.KeyRelease, 1_500)):
             event = QKeyEvent(kind, key, Qt.KeyboardModifier.NoModifier, code, 0, 0, chr(key))
             event.setTimestamp(time_ms)
             QApplication.sendEvent(window, event)
-    qtbot.waitUntil(lambda: sorted(told) == ["D", "S"])
+    qtbot.waitUntil(lambda: sorted(reported) == ["D", "S"])

@@ -8,14 +8,14 @@ from pytestqt.qtbot import QtBot
 from app.views.controls.segments import Segments
 
 
-def test_only_another_choice_by_the_user_is_told(qtbot: QtBot) -> None:
+def test_only_another_choice_by_the_user_is_reported(qtbot: QtBot) -> None:
     segments = Segments("Shown", [("model", "Model", ""), ("truth", "Truth", ""), ("error", "Error", "")])
     qtbot.addWidget(segments)
-    told: list[str] = []
-    segments.chosen.connect(told.append)
+    reported: list[str] = []
+    segments.chosen.connect(reported.append)
     model, truth, _ = segments._group.buttons()
     for button in (model, truth, truth):
         qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
-    assert (segments.key, told) == ("truth", ["truth"])
+    assert (segments.key, reported) == ("truth", ["truth"])
     segments.show_key("error")
-    assert (segments.key, told) == ("error", ["truth"])
+    assert (segments.key, reported) == ("error", ["truth"])

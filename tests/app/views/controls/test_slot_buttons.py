@@ -30,13 +30,13 @@ def test_a_preset_is_named_by_its_title(slots: SlotButtons) -> None:
     assert "studio_steel_e4" not in slots._buttons["a"].accessibleName()
 
 
-def test_a_matched_level_is_told_with_its_unit(slots: SlotButtons) -> None:
+def test_a_matched_level_is_reported_with_its_unit(slots: SlotButtons) -> None:
     slots.show_choices(Choices(a="model", b="truth"))
     slots.show_gains({"a": 0.1, "b": -12.3})
     assert [button.text() for button in slots._buttons.values()] == ["A  MODEL  +0.1 dB", "B  TRUTH  -12.3 dB"]
 
 
-def test_narrow_the_gain_is_told_without_its_unit_first(slots: SlotButtons) -> None:
+def test_narrow_the_gain_is_reported_without_its_unit_first(slots: SlotButtons) -> None:
     button = slots._buttons["b"]
     assert (button.width(), button.text()) == (WIDTH, "B  DIFF.  +20 dB")
     slots.set_narrow(True)

@@ -10,7 +10,7 @@ from app.session.choices import Choices
 from app.views.controls.transport_bar import TransportBar
 
 
-def test_it_tells_what_plays_and_is_left_alone_while_nothing_changes(
+def test_it_reports_what_plays_and_is_left_alone_while_nothing_changes(
     qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bar = TransportBar()

@@ -201,7 +201,7 @@ def test_without_a_device_it_cannot_start(qtbot: QtBot, open_dialog: Open) -> No
 
 
 @pytest.mark.parametrize(("model_hz", "message", "can_start"), [(400.0, SAME, False), (900.0, TRIVIAL, True)])
-def test_a_test_without_a_point_is_told(
+def test_a_test_without_a_point_is_reported(
     qtbot: QtBot, open_dialog: Open, model_hz: float, message: str, can_start: bool
 ) -> None:
     sounds = sounds_of(model_hz)
@@ -220,7 +220,7 @@ def test_a_sound_that_is_rendered_is_waited_for(qtbot: QtBot, open_dialog: Open)
     qtbot.waitUntil(dialog._setup.start.isEnabled)
 
 
-def test_a_sound_that_cannot_be_rendered_is_told(qtbot: QtBot, open_dialog: Open) -> None:
+def test_a_sound_that_cannot_be_rendered_is_reported(qtbot: QtBot, open_dialog: Open) -> None:
     rendered: Future[Sounds] = Future()
     rendered.set_exception(RuntimeError("the model's output diverges 0.1 s after the pluck"))
     dialog = open_dialog(rendered=rendered)
@@ -228,7 +228,7 @@ def test_a_sound_that_cannot_be_rendered_is_told(qtbot: QtBot, open_dialog: Open
     assert not dialog._setup.start.isEnabled()
 
 
-def test_at_another_rate_of_the_device_it_is_rendered_anew(qtbot: QtBot, sound: Sound, tmp_path: Path) -> None:
+def test_at_another_rate_of_the_device_it_is_rendered_again(qtbot: QtBot, sound: Sound, tmp_path: Path) -> None:
     asked: list[int] = []
 
     def render(rate_hz: int) -> Future[Sounds]:
@@ -247,7 +247,7 @@ def test_at_another_rate_of_the_device_it_is_rendered_anew(qtbot: QtBot, sound: 
     assert asked == [RATE_HZ, 44_100]
 
 
-def test_a_record_that_cannot_be_written_is_told_and_saved_elsewhere(
+def test_a_record_that_cannot_be_written_is_reported_and_saved_elsewhere(
     qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "records").write_text("in the way")
@@ -286,10 +286,10 @@ def test_a_result_is_opened_again(
         assert words in texts(dialog)
     dialog._result.again.click()
     path.write_bytes(b"{}")
-    told: list[str] = []
-    monkeypatch.setattr(QMessageBox, "warning", lambda *words: told.append(words[-1]))
+    reported: list[str] = []
+    monkeypatch.setattr(QMessageBox, "warning", lambda *words: reported.append(words[-1]))
     dialog._setup.open_result.click()
-    assert "or damaged" in told[0] and not dialog._result.isVisible()
+    assert "or damaged" in reported[0] and not dialog._result.isVisible()
 
 
 def test_clicks_hear_and_answer(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:

@@ -48,7 +48,7 @@ def test_a_device_that_is_away_stays_in_the_list(dialog: AudioDialog) -> None:
     assert dialog.device is None
 
 
-def test_a_fault_is_told_with_a_way_to_try_again(qtbot: QtBot, dialog: AudioDialog) -> None:
+def test_a_fault_is_reported_with_a_way_to_try_again(qtbot: QtBot, dialog: AudioDialog) -> None:
     dialog.show_state(PLAYING)
     assert dialog._problem.isHidden()
     assert "Loud" in dialog._state_label.text()
@@ -60,7 +60,7 @@ def test_a_fault_is_told_with_a_way_to_try_again(qtbot: QtBot, dialog: AudioDial
         button(dialog, "Rescan").click()
 
 
-def test_gaps_are_told_with_time_and_cause_and_the_load_as_a_share(dialog: AudioDialog) -> None:
+def test_gaps_are_reported_with_time_and_cause_and_the_load_as_a_share(dialog: AudioDialog) -> None:
     dialog.show_state(PLAYING)
     assert dialog._gaps.text() == "3, the last at 5.6 s: runaway"
     assert all(gap in dialog._gaps.toolTip() for gap in GAPS)

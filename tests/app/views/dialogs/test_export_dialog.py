@@ -108,13 +108,13 @@ def test_length_by_decay_and_its_limit(qtbot: QtBot, made, tmp_path: Path) -> No
     assert soundfile.info(tmp_path / "A small string B3 medium.wav").frames == 1200
 
 
-def test_what_a_rate_means_is_told(dialog: ExportDialog) -> None:
+def test_what_a_rate_means_is_reported(dialog: ExportDialog) -> None:
     rate = dialog.wav.rate
     rate.setCurrentIndex(rate.findData(96_000))
     assert dialog.wav.note.text() == "adds no bandwidth: the model ends at 2 kHz"
 
 
-def test_a_folder_that_is_not_there_is_told(qtbot: QtBot, dialog: ExportDialog, tmp_path: Path) -> None:
+def test_a_folder_that_is_not_there_is_reported(qtbot: QtBot, dialog: ExportDialog, tmp_path: Path) -> None:
     dialog.note.file.edit.setText(str(tmp_path / "nowhere" / "x.wav"))
     run(qtbot, dialog, "nowhere")
     assert "make the folder first" in dialog.state.text()

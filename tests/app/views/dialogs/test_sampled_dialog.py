@@ -107,7 +107,7 @@ def run(qtbot: QtBot, dialog: ExportDialog, words: str) -> None:
     qtbot.waitUntil(lambda: words in dialog.state.text())
 
 
-def test_an_sfz_is_written_as_it_was_told(
+def test_an_sfz_is_written_as_it_was_reported(
     qtbot: QtBot, made, folder: Path, notes: Notes, patch: Patch, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dialog = made(rate_hz=44_100, source="truth", form="wav", bits="16")
@@ -161,8 +161,8 @@ def test_size_follows_the_choices_and_nothing_is_written(
     assert dialog.sampler.size_text.text() == f"{counted}, at most 2.9 MB, before FLAC compression; {pitch}"
     dialog.sampler.form.setCurrentIndex(dialog.sampler.form.findData("sf2"))
     settle(qtbot, dialog)
-    told = f"{counted}, at most 1.9 MB (16-bit), and up to 2.9 MB more while it is written"
-    assert dialog.sampler.size_text.text() == f"{told}; {pitch}"
+    reported = f"{counted}, at most 1.9 MB (16-bit), and up to 2.9 MB more while it is written"
+    assert dialog.sampler.size_text.text() == f"{reported}; {pitch}"
     dialog.close_button.click()
     assert not dialog.isVisible()
     assert list(folder.iterdir()) == [] and notes.rendered == []
@@ -179,7 +179,7 @@ def test_the_error_of_pitch_is_reported_before_and_after(qtbot: QtBot, made, pat
     assert f"note starts within {cents:.1f} cents of the instrument)." in dialog.state.text()
 
 
-def test_more_than_there_is_room_for_is_told(made, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_more_than_there_is_room_for_is_reported(made, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("app.views.dialogs.export_pages.disk_usage", lambda path: SimpleNamespace(free=100_000))
     assert "; 0.1 MB are free there" in made().sampler.size_text.text()
 
@@ -194,7 +194,7 @@ def test_dry_takes_the_room_away(qtbot: QtBot, made, notes: Notes, patch: Patch)
     assert [note[0].room.mix for note in notes.rendered] == [patch.room.mix, 0.0]
 
 
-def test_a_body_that_is_not_here_is_told(made, patch: Patch, preset: PresetEntry) -> None:
+def test_a_body_that_is_not_here_is_reported(made, patch: Patch, preset: PresetEntry) -> None:
     dialog = made()
     gone = patch.model_copy(update={"body": patch.body.model_copy(update={"name": "gone", "mix": 0.5})})
     show(dialog, gone, preset)
@@ -231,8 +231,8 @@ def test_a_cancelled_export_goes_on_where_it_was(qtbot: QtBot, made, notes: Note
     dialog.close()  # as its cross does: it stays, to tell what was kept
     assert dialog.isVisible()
     notes.gate.set()
-    told = f"of {MADE} samples are kept; export again to continue from there"
-    qtbot.waitUntil(lambda: told in dialog.state.text())
+    reported = f"of {MADE} samples are kept; export again to continue from there"
+    qtbot.waitUntil(lambda: reported in dialog.state.text())
     kept = int(dialog.state.text().removeprefix("Cancelled; ").split()[0])
     assert kept == len(notes.rendered) < MADE
     assert not dialog.sampler.file.path.exists()
@@ -322,7 +322,7 @@ def test_cancelled_before_a_whole_sample_nothing_is_left(
         (lambda form, folder: broken_index(form, folder), "no index of samples"),
     ],
 )
-def test_what_cannot_be_is_told_before_it_begins(
+def test_what_cannot_be_is_reported_before_it_begins(
     qtbot: QtBot, made, folder: Path, change: Callable, words: str
 ) -> None:
     dialog = made()
@@ -372,7 +372,7 @@ def test_an_unforeseen_error_ends_the_work(qtbot: QtBot, made, monkeypatch: pyte
     assert not dialog.isVisible()
 
 
-def test_a_preset_that_is_gone_is_told(qtbot: QtBot, made, preset: PresetEntry) -> None:
+def test_a_preset_that_is_gone_is_reported(qtbot: QtBot, made, preset: PresetEntry) -> None:
     dialog = made()
     preset.path.unlink()
     run(qtbot, dialog, preset.path.name)

@@ -87,9 +87,9 @@ def test_in_a_low_window_the_knobs_take_the_place_of_the_keys(qtbot: QtBot, pane
 
 def test_what_keys_play_is_chosen_from_words(qtbot: QtBot, panel: InstrumentPanel) -> None:
     for plays, words in (("place", "Keys set pluck position"), ("pitch", "Keys play notes")):
-        with qtbot.waitSignal(panel.keys_play_asked) as told:
+        with qtbot.waitSignal(panel.keys_play_asked) as reported:
             panel._plays[plays].trigger()
-        assert told.args == [plays]
+        assert reported.args == [plays]
         panel.show_keys_play(plays, possible=True)
         assert panel.plays.text().startswith(words)
         assert panel.bar.octave.isVisible() == panel.bar.velocity.isVisible() == (plays == "pitch")

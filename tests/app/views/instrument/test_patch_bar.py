@@ -54,9 +54,9 @@ def test_macros_are_those_of_the_patch(qtbot: QtBot, bar: PatchBar, guitar: Patc
     shown = [knob for knob in bar.macros if knob.isVisible()]
     assert [knob.accessibleName() for knob in shown] == [macro.name for macro in guitar.macros]
     assert [knob.value for knob in shown] == [macro.value for macro in guitar.macros]
-    with qtbot.waitSignal(bar.macro_turned) as told:
+    with qtbot.waitSignal(bar.macro_turned) as reported:
         qtbot.keyClick(shown[1], Qt.Key.Key_Home)
-    assert told.args == [1, 0.0]
+    assert reported.args == [1, 0.0]
     eight = tuple(Macro(name=f"m{n}", targets=(Target(field="room.mix", low=0, high=1),)) for n in range(8))
     bar.show_patch(guitar.model_copy(update={"macros": eight}), own=True)
     assert sum(knob.isVisible() for knob in bar.macros) == 8
@@ -76,12 +76,12 @@ def test_the_tip_of_a_macro_says_in_words_what_it_changes(bar: PatchBar, guitar:
 
 def test_body_and_mixes(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
     assert bar.body.currentText() == "Guitar"
-    with qtbot.waitSignal(bar.body_chosen) as told:
+    with qtbot.waitSignal(bar.body_chosen) as reported:
         bar.body.activated.emit(0)
-    assert told.args == [""]
-    with qtbot.waitSignal(bar.changed) as told:
+    assert reported.args == [""]
+    with qtbot.waitSignal(bar.changed) as reported:
         qtbot.keyClick(bar.knobs["room.mix"], Qt.Key.Key_End)
-    assert told.args == ["room.mix", 1.0]
+    assert reported.args == ["room.mix", 1.0]
     unknown = guitar.model_copy(update={"body": guitar.body.model_copy(update={"name": "a lost one"})})
     bar.show_patch(unknown, own=True)
     assert (bar.body.currentText(), bar.body.currentData()) == ("a lost one", "a lost one")
@@ -89,7 +89,7 @@ def test_body_and_mixes(qtbot: QtBot, bar: PatchBar, guitar: Patch) -> None:
     assert [bar.body.itemData(row) for row in range(bar.body.count())].count("") == 1
 
 
-def test_what_the_instrument_does_is_told(qtbot: QtBot, bar: PatchBar) -> None:
+def test_what_the_instrument_does_is_reported(qtbot: QtBot, bar: PatchBar) -> None:
     bar.show_voices(1)
     assert bar.voices.text() == "1 voice"
     bar.show_voices(6, 64)
@@ -104,10 +104,10 @@ def test_what_the_instrument_does_is_told(qtbot: QtBot, bar: PatchBar) -> None:
     assert bar.velocity.text() == "velocity 17"
     bar.show_note("Choose an instrument")
     assert bar.note.objectName() == "faint"
-    with qtbot.waitSignal(bar.octave_asked) as told:
+    with qtbot.waitSignal(bar.octave_asked) as reported:
         (higher,) = (each for each in bar.findChildren(QAbstractButton) if each.accessibleName() == "Octave up")
         qtbot.mouseClick(higher, LEFT)
-    assert told.args == [1]
+    assert reported.args == [1]
 
 
 def test_the_record_button_saves_or_discards_what_is_not_saved(qtbot: QtBot, bar: PatchBar) -> None:

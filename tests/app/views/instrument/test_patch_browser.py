@@ -116,13 +116,13 @@ def test_the_first_hit_is_selected_shown_and_what_keys_are_for(qtbot: QtBot, bro
     browser.search.setText("harp")
     assert browser.selected == "harp of brass" and "<b>harp of brass</b>" in browser.card.text()
     assert current(browser) == "harp of brass"
-    with qtbot.waitSignal(browser.favourite_asked) as told:
+    with qtbot.waitSignal(browser.favourite_asked) as reported:
         qtbot.mouseClick(browser.star, LEFT)
-    assert told.args == ["harp of brass"]
+    assert reported.args == ["harp of brass"]
     assert chosen == [], "it is shown, not loaded"
-    with qtbot.waitSignal(browser.played) as told:
+    with qtbot.waitSignal(browser.played) as reported:
         qtbot.mouseClick(browser.play_button, LEFT)
-    assert told.args == chosen == ["harp of brass"]
+    assert reported.args == chosen == ["harp of brass"]
     browser.search.setText("tuba")
     assert browser.selected == "" and browser.card.text().startswith("No matching instrument")
     browser.search.clear()
@@ -191,16 +191,16 @@ def test_an_entry_that_a_search_hides_is_revealed(browser: Browser) -> None:
 
 
 def test_control_d_makes_a_favourite(qtbot: QtBot, browser: Browser) -> None:
-    with qtbot.waitSignal(browser.favourite_asked) as told:
+    with qtbot.waitSignal(browser.favourite_asked) as reported:
         qtbot.keyClick(browser.list, KEY.Key_D, Qt.KeyboardModifier.ControlModifier)
-    assert told.args == ["steel"]
+    assert reported.args == ["steel"]
 
 
 def test_enter_takes_the_first_that_was_found_and_closes(qtbot: QtBot, browser: Browser) -> None:
     browser.search.setText("harp")
-    with qtbot.waitSignal(browser.chosen) as told:
+    with qtbot.waitSignal(browser.chosen) as reported:
         qtbot.keyClick(browser.search, KEY.Key_Return)
-    assert told.args == ["harp of brass"]
+    assert reported.args == ["harp of brass"]
     assert not browser.isVisible()
 
 
@@ -208,9 +208,9 @@ def test_only_ones_own_can_be_renamed_or_deleted_and_that_is_asked_twice(qtbot: 
     assert not browser.rename.isVisible()
     assert not browser.delete.isVisible()
     browser.set_chosen("mine")
-    with qtbot.waitSignal(browser.rename_asked) as told:
+    with qtbot.waitSignal(browser.rename_asked) as reported:
         qtbot.mouseClick(browser.rename, LEFT)
-    assert told.args == ["mine"]
+    assert reported.args == ["mine"]
     deleted: list[str] = []
     browser.delete_asked.connect(deleted.append)
     qtbot.mouseClick(browser.delete, LEFT)

@@ -33,20 +33,20 @@ def test_every_field_is_shown_and_can_be_turned_to_both_ends(knobs: StringKnobs,
     assert knobs.knobs["tuning.a4_hz"].value == guitar.tuning.a4_hz
 
 
-def test_a_turn_is_told_with_its_field(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:
+def test_a_turn_is_reported_with_its_field(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:
     knobs.show_patch(guitar)
-    with qtbot.waitSignal(knobs.changed) as told:
+    with qtbot.waitSignal(knobs.changed) as reported:
         qtbot.keyClick(knobs.knobs["knobs.gauge"], Qt.Key.Key_Up)
-    assert told.args == ["knobs.gauge", pytest.approx(1.03 * guitar.knobs.gauge)]
+    assert reported.args == ["knobs.gauge", pytest.approx(1.03 * guitar.knobs.gauge)]
     with qtbot.waitSignals([knobs.drag_started, knobs.drag_ended], order="strict"):
         qtbot.mouseClick(knobs.knobs["knobs.decay"], Qt.MouseButton.LeftButton)
 
 
 def test_a_double_click_goes_back_to_what_was_saved(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:
     knobs.show_patch(guitar.with_value("pluck.position", 0.4), guitar)
-    with qtbot.waitSignal(knobs.changed) as told:
+    with qtbot.waitSignal(knobs.changed) as reported:
         qtbot.mouseDClick(knobs.knobs["pluck.position"], Qt.MouseButton.LeftButton)
-    assert told.args == ["pluck.position", guitar.pluck.position]
+    assert reported.args == ["pluck.position", guitar.pluck.position]
 
 
 def test_it_is_transposed_by_whole_keys(qtbot: QtBot, knobs: StringKnobs) -> None:
@@ -81,9 +81,9 @@ def test_the_shape_of_the_pluck_is_chosen_in_words(qtbot: QtBot, knobs: StringKn
     assert box.currentText() == "Rounded"
     shapes = [box.itemText(row) for row in range(box.count())]
     assert shapes == ["Gaussian", "Triangle", "Raised cosine", "Rounded"]
-    with qtbot.waitSignal(knobs.changed) as told:
+    with qtbot.waitSignal(knobs.changed) as reported:
         box.activated.emit(box.findText("Triangle"))
-    assert told.args == ["pluck.shape", "triangular"]
+    assert reported.args == ["pluck.shape", "triangular"]
 
 
 def test_a_knob_shows_what_it_makes_of_the_string_and_asks_for_a_figure(
@@ -96,13 +96,13 @@ def test_a_knob_shows_what_it_makes_of_the_string_and_asks_for_a_figure(
     assert knobs.knobs["knobs.length"].accessibleDescription() == "× 1.00"
     qtbot.keyClicks(tension, "9")
     assert tension._editor is not None
-    with qtbot.waitSignal(knobs.figure_asked) as told:
+    with qtbot.waitSignal(knobs.figure_asked) as reported:
         qtbot.keyClick(tension._editor, Qt.Key.Key_Return)
-    assert told.args == ["knobs.tension", 9.0]
+    assert reported.args == ["knobs.tension", 9.0]
     assert tension.value == 1.5
 
 
-def test_the_facts_are_told_in_their_units(knobs: StringKnobs) -> None:
+def test_the_facts_are_reported_in_their_units(knobs: StringKnobs) -> None:
     before = knobs.facts.grab().toImage()
     knobs.show_facts({"tension": "72.3 N", "length": "650 mm"})
     assert knobs.facts.accessibleDescription() == "tension 72.3 N, length 650 mm"

@@ -66,7 +66,7 @@ def test_a_moved_line_leaves_the_plot_as_it_was(qtbot: QtBot, plot: KeptPlot) ->
     assert plot._picture.toImage() == before
 
 
-def test_a_changed_plot_is_painted_anew(qtbot: QtBot, plot: KeptPlot) -> None:
+def test_a_changed_plot_is_painted_again(qtbot: QtBot, plot: KeptPlot) -> None:
     plot.move_line(0.4)
     qtbot.wait(30)
     plot.move_line(0.5)

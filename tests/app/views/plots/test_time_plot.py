@@ -109,7 +109,7 @@ def test_the_right_button_pans_and_stops_at_the_ends(qtbot: QtBot, plot: TimePlo
     qtbot.mouseRelease(view, right, pos=move)
 
 
-def test_shift_tells_the_place_too(qtbot: QtBot, plot: TimePlot) -> None:
+def test_shift_reports_the_place_too(qtbot: QtBot, plot: TimePlot) -> None:
     seeks: list[float] = []
     points: list[tuple[float, float]] = []
     plot.seek_asked.connect(seeks.append)

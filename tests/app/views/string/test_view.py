@@ -178,7 +178,7 @@ def test_a_double_click_resets_only_what_was_clicked_at_rest(qtbot: QtBot, view:
     assert (len(resets), len(plucks)) == (1, 3)
 
 
-def test_the_pointer_tells_what_can_be_grabbed(qtbot: QtBot, view: StringView) -> None:
+def test_the_pointer_reports_what_can_be_grabbed(qtbot: QtBot, view: StringView) -> None:
     shapes, tips = set(), set()
     axes = view._axes()
     for at in (QPoint(200, 200), handle(view), QPoint(round(axes.x(0.37)), int(axes.bottom) + 8)):
@@ -188,7 +188,7 @@ def test_the_pointer_tells_what_can_be_grabbed(qtbot: QtBot, view: StringView) -
     assert len(shapes) == len(tips) == 3
 
 
-def test_the_pointer_on_a_warning_tells_all_of_it(qtbot: QtBot, view: StringView) -> None:
+def test_the_pointer_on_a_warning_reports_all_of_it(qtbot: QtBot, view: StringView) -> None:
     view.set_warning("amplitude 15.39 mm is outside the trained 0.5 … 10 mm")
     qtbot.mouseMove(view, QPoint(200, 12))
     assert view.toolTip() == "amplitude 15.39 mm is outside the trained 0.5 … 10 mm"
@@ -196,7 +196,7 @@ def test_the_pointer_on_a_warning_tells_all_of_it(qtbot: QtBot, view: StringView
     assert "drag to pluck" in view.toolTip()
 
 
-def test_two_markers_are_told_apart_and_reset(qtbot: QtBot, view: StringView) -> None:
+def test_two_markers_are_reported_apart_and_reset(qtbot: QtBot, view: StringView) -> None:
     view.set_listening_points(0.2, 0.6)
     moved, resets = recorded(view.listening_point_moved), recorded(view.listening_point_reset)
     axes = view._axes()

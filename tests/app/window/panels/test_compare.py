@@ -62,12 +62,12 @@ def test_a_preset_that_comes_is_in_the_menu(controller: Controller, shown: Any, 
     assert set(shown._actions) == {"first", "second", "third"}
 
 
-def test_a_row_tells_its_whole_name_and_its_file(shown: Any) -> None:
+def test_a_row_reports_its_whole_name_and_its_file(shown: Any) -> None:
     row = next(row for row in shown.table.rows if row.key == "second")
     assert row.tip.splitlines() == [row.values[0], "second.safetensors"]
 
 
-def test_figures_of_an_earlier_pluck_are_told(qtbot: QtBot, controller: Controller, shown: Any) -> None:
+def test_figures_of_an_earlier_pluck_are_reported(qtbot: QtBot, controller: Controller, shown: Any) -> None:
     qtbot.waitUntil(lambda: is_computed(shown, {"first", "second"}))
     assert shown._words.text() == "2 presets on this pluck, 0.5 s"
     controller.session.update(position=0.6)

@@ -70,7 +70,7 @@ def test_arrows_move_a_cursor_and_enter_plucks(qtbot: QtBot, controller: Control
     assert plane.cursor is None
 
 
-def test_beyond_the_training_is_told(shown: Any) -> None:
+def test_beyond_the_training_is_reported(shown: Any) -> None:
     plane = shown.map
     plane._point_at((0.5, 5.0))
     assert "outside" not in shown.words

@@ -44,7 +44,7 @@ def plane_point(plane: Any, point: int) -> Any:
     return QPointF(*plane._places[point])
 
 
-def test_a_point_tells_its_mode_and_a_click_lets_it_be_heard_alone(
+def test_a_point_reports_its_mode_and_a_click_lets_it_be_heard_alone(
     qtbot: QtBot, controller: Controller, eigenvalues: Any
 ) -> None:
     plane, session = eigenvalues.plane, controller.session

@@ -127,7 +127,7 @@ def test_small_errors_have_a_scale_of_their_own(make: Make) -> None:
     assert view._wordings(0.1, 0.5, 0.3e-6)[0] == "0.1000 s   position 0.50   +0.3 µm"
 
 
-def test_levels_below_the_range_are_told(make: Make) -> None:
+def test_levels_below_the_range_are_reported(make: Make) -> None:
     view = make(SpectrogramPanel)
     view.begin_picture(2, 3, 0.1)
     view.show_columns(np.full((2, 3), -95.0, np.float32))
@@ -290,7 +290,7 @@ def test_ten_seconds_are_asked_for_with_a_button(qtbot: QtBot, make: Make) -> No
     assert not panel.longer.isEnabled()
 
 
-def test_the_spectrum_tells_level_and_nearest_partial(qtbot: QtBot, make: Make, take: Take) -> None:
+def test_the_spectrum_reports_level_and_nearest_partial(qtbot: QtBot, make: Make, take: Take) -> None:
     panel = make(SpectrumPanel)
     watch(qtbot, panel, take, lambda: bool(panel._levels_db))
     second_hz = float(take.info.string.undamped_frequencies(2)[1]) / (2 * np.pi)
@@ -443,7 +443,7 @@ def test_another_preset_is_drawn_at_its_rate_when_it_is_there(
     assert set(spectrum.levels_db(3_000)) == {source}  # the model's rate ends before
 
 
-def test_a_mode_alone_and_the_ear_are_told(
+def test_a_mode_alone_and_the_ear_are_reported(
     qtbot: QtBot, make: Make, take: Take, choose_and_hear: Callable[..., None]
 ) -> None:
     panel = make(WaveformPanel)

@@ -9,7 +9,7 @@ from training.sweeping.workers.base import Ended, Task, WorkersError, given_up
 from training.sweeping.workers.on_dask import cluster_workers
 
 
-def test_a_scheduler_that_is_not_there_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_scheduler_that_is_not_there_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "CONNECT_S", 0.2)
     with pytest.raises(WorkersError, match="no Dask scheduler answers there"), cluster_workers("tcp://127.0.0.1:9"):
         pass
