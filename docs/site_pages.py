@@ -12,10 +12,15 @@ import json
 import math
 import re
 import shutil
+import tempfile
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import soundfile
 import typer
+from matplotlib.figure import Figure
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -30,6 +35,9 @@ DOCUMENTS = {  # of the repository's root, and their pages
     "CHANGELOG.md": "changelog.md",
     "LICENSE": "license.md",
 }
+# what the cards of presets play and draw
+PLUCK = ("--position", "0.3", "--amplitude-mm", "2", "--seconds", "1.5", "--normalise")
+BOTH = ("--rate", "48000", "--source", "both")
 NOTEBOOKS = ("quickstart", "comparing_with_the_truth")
 
 
@@ -37,8 +45,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     pages = {page: (ROOT / name).read_text("utf-8").replace("](docs/", "](") for name, page in DOCUMENTS.items()}
     pages |= {f"notebooks/{name}.md": notebook(ROOT / "docs" / "notebooks" / f"{name}.ipynb") for name in NOTEBOOKS}
     pages |= {"command-line.md": command_line(), "presets.md": presets(), "api.md": api()}
-    for path, text in pages.items():
-        files.append(File.generated(config, path, content=text))
+    contents: list[tuple[str, str | bytes]] = [*pages.items(), *sounds_and_spectra()]
+    for path, content in contents:
+        files.append(File.generated(config, path, content=content))
     return files
 
 
@@ -83,18 +92,50 @@ def benchmarks() -> str:
 
 
 def presets() -> str:
-    """A card for each preset: what `presets --json` reports of it."""
+    """A card for each preset: what `presets --json` reports of it, a pluck and its spectrum."""
+    parts = [
+        "# Presets\n\nErrors are relative, over the training horizon. *Heard* is past it: see [results](results.md). "
+        "The sound is the model's, of a pluck of 2 mm at 0.3. In the spectrum amber is the model, blue the truth."
+    ]
+    return "\n\n".join([*parts, *(card(each) for each in shipped())])
+
+
+def shipped() -> list[dict[str, Any]]:
+    """What `presets --json` reports of the presets of this repository."""
     from app.commands.cli import main
 
     printed = io.StringIO()
     with contextlib.redirect_stdout(printed):
         assert main(["presets", "--json"]) == 0
-    parts = [
-        "# Presets\n\nErrors are relative, over the training horizon. *Heard* is past it: see [results](results.md)."
-    ]
-    shipped = [each for each in json.loads(printed.getvalue()) if Path(each["file"]).parent == ROOT / "presets"]
-    parts += [card(each) for each in shipped]
-    return "\n\n".join(parts)
+    return [each for each in json.loads(printed.getvalue()) if Path(each["file"]).parent == ROOT / "presets"]
+
+
+def sounds_and_spectra() -> Iterator[tuple[str, bytes]]:
+    """For the card of each preset: the name and the content of a FLAC and of a PNG."""
+    from app.commands.cli import main
+
+    with tempfile.TemporaryDirectory() as folder:
+        for each in shipped():
+            name, wav, flac = each["name"], Path(folder, "pluck.wav"), io.BytesIO()
+            with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+                assert main(["render", name, str(wav), *PLUCK, *BOTH]) == 0, name
+            both, rate_hz = soundfile.read(wav)
+            soundfile.write(flac, both[:, 0], rate_hz, format="FLAC")
+            yield f"presets/{name}.flac", flac.getvalue()
+            yield f"presets/{name}.png", spectrum(both, rate_hz)
+
+
+def spectrum(both: np.ndarray, rate_hz: int) -> bytes:
+    """A picture of the spectra of model and truth, (frames, 2), in dB below the truth's maximum."""
+    levels = np.abs(np.fft.rfft(both * np.hanning(len(both))[:, None], axis=0))
+    levels_db = 20 * np.log10(np.maximum(levels / levels[:, 1].max(), 1e-6))
+    figure, picture = Figure(figsize=(7, 2), layout="constrained"), io.BytesIO()
+    axes = figure.subplots()
+    for column, colour in ((1, "#3a8fb7"), (0, "#e69f00")):
+        axes.plot(np.fft.rfftfreq(len(both), 1 / rate_hz), levels_db[:, column], color=colour, linewidth=0.7)
+    axes.set(xscale="log", xlim=(50, 20_000), ylim=(-100, 5), xlabel="frequency (Hz)", ylabel="dB")
+    figure.savefig(picture, format="png", dpi=80)
+    return picture.getvalue()
 
 
 def card(preset: dict[str, Any]) -> str:
@@ -117,6 +158,8 @@ def card(preset: dict[str, Any]) -> str:
             f"| MSE, validation; test | {validation}; {test} |",
             f"| MAE, validation; test | {mae}; {test_mae} |",
             f"| heard | {preset['heard'] or '—'} |",
+            f"\n![Spectra of model and truth](presets/{preset['name']}.png)\n",
+            f'<audio controls preload="none" src="presets/{preset["name"]}.flac"></audio>',
         ]
     )
 

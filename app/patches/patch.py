@@ -205,7 +205,7 @@ class Polarisations(Value):
 
 
 class Losses(Value):
-    """Decay by mode, by `engine.resonators.losses`, beside d₁ and d₃ of the strings, which may be 0 then.
+    """Decay by mode, by `engine.resonators.losses`, in addition to d₁ and d₃ of the strings, which may be 0 then.
 
     Attributes:
         air: factor of the losses to the air; the decay knob multiplies it.

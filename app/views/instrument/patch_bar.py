@@ -252,7 +252,7 @@ class PatchBar(QFrame):
         self.compare.setChecked(comparing)
 
     def show_macros(self, shown: bool) -> None:
-        """Shows the macros; else, beside all knobs of the string, what they turn: the mixes of body and room."""
+        """Shows the macros; else, with all knobs of the string, what they turn: the mixes of body and room."""
         self._shows_macros = shown
         self._share_knobs()
 
