@@ -16,17 +16,17 @@ class MidiInput:
 
     Args:
         on_message: is called with what comes, in the input's thread.
-        on_let_go: is called with the events that release what came, in the thread of `let_go`, `close` or `open`.
+        on_release_all: is called with the events that release what came, in the thread of `release_all`, `close` or `open`.
     """
 
     def __init__(
         self,
         on_message: Callable[[Event], None],
         load: Callable[[], Backend] = load_backend,
-        on_let_go: Callable[[Event], object] = lambda event: None,
+        on_release_all: Callable[[Event], object] = lambda event: None,
     ) -> None:
         self._on_message = on_message
-        self._on_let_go = on_let_go
+        self._on_release_all = on_release_all
         self._load = load
         self._backend: Backend | None = None
         self._port: OpenPort | None = None
@@ -73,7 +73,7 @@ class MidiInput:
         """Releases the keys that are held through the input, and leaves its wheels and pedals at rest."""
         channels, self._channels = self._channels, set()
         for event in release_all(channels):
-            self._on_let_go(event)
+            self._on_release_all(event)
 
     def _loaded(self) -> Backend:
         if self._backend is None:

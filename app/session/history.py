@@ -1,6 +1,6 @@
 """Undo and redo of the choices that shape the sound.
 
-A step is one gesture: all that changes between `hold` and `let_go` (a drag), or changes of the same fields that
+A step is one gesture: all that changes between `hold` and `release` (a drag), or changes of the same fields that
 follow each other within half a second (keys, wheel notches, a controller). Undo restores the fields that the step
 changed and no others. Notes that are played (`Session.play`) are no steps: what they changed stays as it is.
 """
@@ -31,7 +31,7 @@ class History:
 
     Args:
         now_s: a clock, replaced in tests.
-        held: whether a gesture that has begun may still be under way: its `let_go` may never come, as where a dialog
+        held: whether a gesture that has begun may still be under way: its `release` may never come, as where a dialog
             or another window takes the mouse.
     """
 
@@ -71,11 +71,11 @@ class History:
         return next((step for step in reversed(steps) if any(here[name] != step[name] for name in step)), None)
 
     def hold(self) -> None:
-        """A gesture begins: all changes until `let_go` are one step."""
+        """A gesture begins: all changes until `release` are one step."""
         self._held = True
         self._open_fields = None
 
-    def release_all(self) -> None:
+    def release(self) -> None:
         """The gesture has ended: the next change begins a step of its own."""
         self._held = False
         self._open_fields = None
@@ -89,7 +89,7 @@ class History:
         self._restore(self._redo, self._undo)
 
     def _restore(self, source: deque[Values] | list[Values], target: deque[Values] | list[Values]) -> None:
-        self.release_all()
+        self.release()
         wanted = self._next(source)
         while source and source.pop() is not wanted:
             pass
@@ -112,7 +112,7 @@ class History:
         if self._restoring or not fields or values == self._present:  # the latter where a note was played
             return
         if self._held and not self._still_held():
-            self.release_all()
+            self.release()
         now_s, turned = self._now_s(), turned_fields(fields, self._present, values)
         soon = turned == self._open_fields and now_s - self._changed_s <= GATHER_S
         if self._open_fields is None or not (self._held or soon):

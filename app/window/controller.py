@@ -168,7 +168,7 @@ class Controller(QObject):
         window.instrument.set_unfolded(settings.instrument.unfolded)
         for dragged in (window.instrument.bar, window.instrument.knobs):
             dragged.drag_started.connect(self.history.hold)
-            dragged.drag_ended.connect(self.history.release_all)
+            dragged.drag_ended.connect(self.history.release)
         self.exports = Exports(
             self.session,
             self.library,
@@ -254,7 +254,7 @@ class Controller(QObject):
         draggable: list[StringView | DrumView | Knob] = [*views, *window.transport.knobs.values()]
         for dragged in draggable:
             dragged.drag_started.connect(history.hold)
-            dragged.drag_ended.connect(history.release_all)
+            dragged.drag_ended.connect(history.release)
 
     def _change(self, field: str, value: object) -> None:
         try:

@@ -112,7 +112,8 @@ def test_options_out_of_range_are_bad_usage(
 def test_an_unwritable_place_is_reported(run, small_preset: Path, folder: Path) -> None:
     out = folder / "missing" / "a.wav"
     assert f"{out}: cannot be written" in run(*render(small_preset, out)).failure
-    assert "not a file that can be replaced" in run(*render(small_preset, folder)).failure
+    folder.with_suffix(".wav").mkdir()
+    assert "not a file that can be replaced" in run(*render(small_preset, folder.with_suffix(".wav"))).failure
 
 
 def test_a_full_disk_leaves_no_file(run, small_preset: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

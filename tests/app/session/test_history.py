@@ -72,7 +72,7 @@ def test_a_drag_is_one_step_however_long_and_whatever_it_changes(clock: Clock) -
         for moved in range(5):
             session.update(position=start + moved / 100, amplitude_mm=4 + moved % 2)
             clock.now_s += 3
-        history.release_all()
+        history.release()
     assert positions_back(history, session) == [pytest.approx(0.44), 0.35]
 
 
@@ -83,7 +83,7 @@ def test_a_drag_back_to_its_start_is_no_step(clock: Clock) -> None:
     history.hold()
     session.update(position=0.6)
     session.update(position=0.35)
-    history.release_all()
+    history.release()
     history.undo()
     assert session.choices.seconds == 4
 
@@ -147,7 +147,7 @@ def test_a_drag_after_a_note_goes_back_to_where_the_note_was(clock: Clock) -> No
     session.update(position=0.5, amplitude_mm=2)
     session.play(position=0.3)  # played while the knob is in the other hand
     session.update(amplitude_mm=3)
-    history.release_all()
+    history.release()
     history.undo()
     assert (session.choices.position, session.choices.amplitude_mm) == (0.7, 4)
 

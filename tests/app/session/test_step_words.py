@@ -113,7 +113,7 @@ def test_a_drag_that_came_back_is_not_reported(guitar: Patch) -> None:
     history.hold()
     session.update(position=0.6)
     session.update(position=0.35)
-    history.release_all()
+    history.release()
     assert history.undo_words == "duration"
 
 

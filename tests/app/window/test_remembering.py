@@ -89,11 +89,11 @@ import sys, time
 from pathlib import Path
 from PySide6.QtCore import QCoreApplication, QTimer
 from app.session.choices import Choices
-from app.window.remembering import Keeper
+from app.window.remembering import SettingsSaver
 from app.window.settings import Settings
 application = QCoreApplication([])
 box = [Settings()]
-keeper = Keeper(Path(sys.argv[1]), box[0], lambda: box[0], application)
+keeper = SettingsSaver(Path(sys.argv[1]), box[0], lambda: box[0], application)
 QTimer.singleShot(0, lambda: box.__setitem__(0, Settings(choices=Choices(position=0.41))))
 print("ready", flush=True)
 application.exec()

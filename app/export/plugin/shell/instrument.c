@@ -300,7 +300,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
   mixer[M_SMOOTHING].real = exp(-1 / (VOLUME_SMOOTHING_S * rate_hz));
   const double *taps = (const double *)of + of->taps;
   for (int tap = 0; tap < 2 * REACH + 1; tap++) mixer[M_TAPS + tap].real = taps[tap] * rate_hz;
-  mixer[M_HERE].whole = number_of(mixer);
+  mixer[M_ADDRESS].whole = number_of(mixer);
   mixer[M_PLAYER].whole = number_of(player);
   own->model[S_RATE].real = own->truth[T_RATE].real = rate_hz;
   own->table[TABLE_PROGRAMS].whole = number_of(own->model);
@@ -503,7 +503,7 @@ void instrument_report_ends(instrument *own, note_ended ended, void *context) {
 bool instrument_silent(const instrument *own) {
   const slot *player = own->player;
   bool events = player[PLAYER_PUSHED].whole != player[PLAYER_TAKEN].whole || player[PLAYER_QUEUED].whole;
-  bool echo = own->convolver && own->convolver[C_AWAKE].whole;
+  bool echo = own->convolver && own->convolver[C_ACTIVE].whole;
   return !events && !echo && !own->waiting && !own->mixer[M_ACTIVE].whole && own->mixer[M_PEAK].real < 1e-9;
 }
 

@@ -142,7 +142,7 @@ class Sfizz:
     def press(self, key: int, velocity: int) -> None:
         self._synth._synth.note_on(0, key, velocity)
 
-    def release_all(self, key: int) -> None:
+    def release(self, key: int) -> None:
         self._synth._synth.note_off(0, key, 0)
 
     def play(self, seconds: float) -> NDArray[np.float32]:

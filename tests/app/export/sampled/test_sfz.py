@@ -134,7 +134,7 @@ def test_a_key_let_go_falls_by_60_db_in_the_damping_time(
     player = sfizz(out)
     player.press(60, 127)
     before = level_db(player.play(0.04)[0, -960:])
-    player.release_all(60)
+    player.release(60)
     player.play(0.04)
     after = level_db(player.play(0.02)[0])  # about 50 ms after the key, 60 ms after what was measured before
     assert before - after == pytest.approx(30 + 0.06 * 30, abs=1.5)
@@ -152,8 +152,8 @@ def test_strings_that_ring_on_end_where_they_are_plucked_again(
     player.press(60, 127)
     player.press(61, 127)
     player.play(0.02)
-    player.release_all(60)
-    player.release_all(61)
+    player.release(60)
+    player.release(61)
     player.play(0.03)
     assert player.voices() == 2
     player.press(60, 10)  # softer, in another layer
