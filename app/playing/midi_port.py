@@ -16,7 +16,8 @@ class MidiInput:
 
     Args:
         on_message: is called with what comes, in the input's thread.
-        on_release_all: is called with the events that release what came, in the thread of `release_all`, `close` or `open`.
+        on_release_all: is called with the events that release what came, in the thread of `release_all`,
+            `close` or `open`.
     """
 
     def __init__(
