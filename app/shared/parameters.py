@@ -111,13 +111,13 @@ TIPS = {
     "knobs.gauge": "Thickness (diameter) at the same length: thick strings are heavier, tighter and stiffer",
     "knobs.density": "Mass of the material at the same length: gut is light and slack, steel heavy and tight",
     "knobs.modulus": "Stiffness of the material (Young's modulus): how much a hard pluck glides in pitch",
-    "knobs.stiffness": "Bending stiffness alone: how far partials are spread. The figure is the inharmonicity B: "
+    "knobs.stiffness": "Bending stiffness: more is more metallic. The figure is the inharmonicity B: "
     "partial n of f lies at n f √(1 + B n²)",
-    "knobs.decay": "Damping of all partials alike: more is shorter. The figure is the T60 of the first",
-    "knobs.brightness_decay": "Damping that grows with frequency: more darkens sooner. The figure is the T60 of the "
-    "partial near 3 kHz",
+    "knobs.decay": "Damping of all partials: right is shorter. The figure is the T60 of the first",
+    "knobs.brightness_decay": "Damping of high partials: right is darker. The figure is the T60 of the partial "
+    "near 3 kHz",
     "damping.release_t60_s": "Time in which a released key falls by 60 dB",
-    "pluck.position": f"Where it is plucked; {_PLACE_TIP}",
+    "pluck.position": f"Where it is plucked: nearer an end is brighter; {_PLACE_TIP}",
     "pluck.width": "Width of the softest pluck, in lengths of the string: wide is mellow",
     "pluck.width_hard": "Width of the hardest pluck, in lengths of the string: narrow is bright",
     "pluck.softest_mm": "How far the softest key pulls the string",

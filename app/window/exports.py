@@ -164,4 +164,5 @@ def _words(title: str, choices: Choices) -> str:
         heard = "heard at the bridge"
     kind = ", magnetic pick-up" if choices.pickup == "velocity" else ""
     modes = f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""
-    return f"{title}{string}: {pluck}, {heard}{kind}{modes}"
+    latest = "Latest note, as it was played. " if isinstance(choices.instrument, Patch) else ""
+    return f"{latest}{title}{string}: {pluck}, {heard}{kind}{modes}"
