@@ -261,7 +261,7 @@ OF_CHOICES: Mapping[str, Parameter] = {
             modulation="learn",
             name="slow motion",
         ),
-        Parameter("volume_db", "volume", (-60, 12), 0.0, Taper(1, "{:+.0f} dB"), modulation="learn"),
+        Parameter("volume_db", "volume", (-60, 12), 6.0, Taper(1, "{:+.0f} dB"), modulation="learn"),
         Parameter("difference_gain_db", "difference", DIFFERENCE_GAIN_RANGE_DB, 20.0, Taper(10, "{:+.0f} dB")),
     )
 }
