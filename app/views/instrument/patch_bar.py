@@ -9,7 +9,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from PySide6.QtCore import QPoint, QRect, QSignalBlocker, Qt, Signal
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QMenu, QSizePolicy, QToolButton, QToolTip, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QComboBox,
+    QFrame,
+    QHBoxLayout,
+    QMenu,
+    QSizePolicy,
+    QToolButton,
+    QToolTip,
+    QVBoxLayout,
+    QWidget,
+)
 
 from app.patches.patch import Macro, Patch
 from app.patches.tuning import TuningChoice
@@ -20,6 +30,7 @@ from app.views.controls.parts import combo_box, faint, tool_button, vertical_rul
 from app.views.controls.plain import Label, plain_tip
 from engine.plain_text import one_line
 
+BODY_LETTERS = 8  # of the widest title of a body, in the width of an X
 ROOMY_MACROS = 6  # more of them are drawn narrow
 NARROW_NAME, NARROWEST_NAME = 180, 120  # pixels: the least, and the least with more macros
 LONGEST_SCALE_NAME = 120  # characters
@@ -184,7 +195,8 @@ class PatchBar(QFrame):
         self.body = combo_box("Body", [("No body", "")])
         self.body.setToolTip("The body of the instrument, which colours the sound of the strings")
         self.body.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Fixed)
-        self.body.setMinimumWidth(124)
+        self.body.setSizeAdjustPolicy(QComboBox.SizeAdjustPolicy.AdjustToMinimumContentsLengthWithIcon)
+        self.body.setMinimumContentsLength(BODY_LETTERS)
         self.body.activated.connect(lambda row: self.body_chosen.emit(str(self.body.itemData(row))))
         head = Label("BODY TYPE")
         head.setObjectName("knob")

@@ -212,7 +212,7 @@ def label_places(metrics: QFontMetrics, axes: StringAxes, points: Mapping[str, f
 def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> None:
     """The time that is shown, in the corner of the picture."""
     painter.setFont(theme.small_font(12))
-    painter.setPen(QColor(theme.WARNING if frame.past_horizon else theme.TEXT))
+    painter.setPen(QColor(theme.TEXT))
     area = QRectF(axes.x(0.5), axes.top + 4, axes.length / 2 - 10, 18)
     text = frame.caption + ("   past training" if frame.past_horizon else "")
     painter.drawText(area, Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter, text)
