@@ -475,7 +475,7 @@ class Notes:
     def _bound_load(self, status: SoundStatus) -> None:
         """Ends the oldest notes where the device has no time for all. In the caretaker's thread of the sound.
 
-        It looks at the keys' notes too, so that they are known to end while the window is busy.
+        It looks at the keys' notes too, so that their ends are reported while the window is busy.
         """
         self.look()
         if status.load > BUSY:

@@ -101,7 +101,7 @@ class BlowJob:
         speeds = request.strike.speeds(request.modes)
         model = self._load(request.preset).preset.model
         if not isinstance(model, KoopmanTension):
-            raise PresetError(f"{request.preset}: knows one string; drums need a preset of many strings")
+            raise PresetError(f"{request.preset}: plays one string; drums need a preset of many strings")
         return {"model": _Mover(_model(model, resonator, speeds)), "truth": _Mover(_truth(resonator, speeds))}
 
     def _blocks(self, movers: dict[str, _Mover], frames: int) -> dict[str, Array]:

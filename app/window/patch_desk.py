@@ -324,7 +324,7 @@ class PatchDesk(QObject):
         """Makes the string whose physical parameters the file has the instrument, by the model of many strings."""
         many = next((each for each in self._library.entries if each.name == MANY_STRINGS), None)
         if many is None:
-            self.reported.emit(f"{file.name}: the preset {MANY_STRINGS}, which knows many strings, was not found.")
+            self.reported.emit(f"{file.name}: the preset {MANY_STRINGS}, which plays many strings, was not found.")
             return
         string, preset = read_string(file), load_preset(many.path)
         try:

@@ -1,4 +1,4 @@
-"""Drums: the cost of a voice of many modes, of a kit beside strings, and of the picture in the window.
+"""Drums: the cost of a voice of many modes, of a kit with strings, and of the picture in the window.
 
 Costs are processor time of this thread at 48 kHz, less that of an empty mixer, as shares of a core. The least of some
 repeats counts: other processes only add.

@@ -64,7 +64,7 @@ def patch_card(entry: PatchEntry) -> str:
         lines.append(f"knobs: {', '.join(macro.name for macro in patch.macros)}")
     lines += [f"model: {patch.preset}", entry.path.name]
     by = f"   ·   {patch.author}" if patch.author else ""
-    kind = f"{patch.category.capitalize()}   ·   {'your own' if entry.own else 'shipped'}{by}"
+    kind = f"{patch.category.capitalize()}   ·   {'your own' if entry.own else 'factory'}{by}"
     facts = "<br>".join(map(escape, lines))
     return (
         f"<p style='font-size: 15px'><b>{escape(patch.name)}</b></p><p style='color: {faint}'>{escape(kind)}</p>"
