@@ -55,6 +55,13 @@ class BlowJob:
         """Takes a request for the same motion with other listening points."""
         self.request = request
 
+    def announce(self) -> None:
+        """Reports again what there is: the window may have shown another motion in between."""
+        if self.take is not None:
+            self._listener.blow_started(self.take)
+            if self._finished:
+                self._listener.blow_finished(self.take)
+
     @property
     def age_s(self) -> float:
         """Seconds since the request."""

@@ -52,6 +52,13 @@ class Job:
         """Takes a request for the same motion that differs in listening points, slow motion or other presets."""
         self.request = request
 
+    def announce(self) -> None:
+        """Reports again what there is: the window may have shown another motion in between."""
+        if self.take is not None:
+            self._listener.take_started(self.take)
+            if self._finished:
+                self._listener.take_finished(self.take, self._errors)
+
     @property
     def age_s(self) -> float:
         """Seconds since the request."""

@@ -99,6 +99,7 @@ class RenderWorker:
             if request is not None:
                 if job is not None and request.same_motion(job.request):
                     job.ask_again(request)  # type: ignore[arg-type]  # of the same kind
+                    job.announce()
                 else:
                     job = self._job(request)
             assert job is not None

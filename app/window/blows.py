@@ -102,8 +102,8 @@ class Blows:
             self._submit(request)
 
     def started(self, take: BlowTake) -> bool:
-        """Takes a motion that was begun; whether it is of the latest blow."""
-        if self._asked is None or not take.request.same_motion(self._asked[0]):
+        """Takes a motion that was begun; whether it is of the latest blow and not shown yet."""
+        if self._asked is None or take is self._shown.take or not take.request.same_motion(self._asked[0]):
             return False
         note, before = self._asked[1], self._shown
         parked = before.note is None and before.take is not None and before.take.request.strike is take.request.strike

@@ -50,6 +50,7 @@ class _Shown:
     """What the views show: a motion, and the note whose time it follows; without a note it stands at `parked_s`."""
 
     take: Take | None = None
+    finished: bool = False  # whether the views have its errors
     note: Note | KeyNote | None = None
     parked_s: float = 0.0
 
@@ -222,7 +223,7 @@ class Performance(QObject):
             self.notes.choose(asked)
             if asked is None:
                 self._forget_turn()
-                self._shown.note = None
+                self._shown = _Shown()
                 self._tell("")
                 self._window.show_growth("")
             else:
@@ -317,7 +318,7 @@ class Performance(QObject):
     # Signals of the render worker
 
     def _take_started(self, take: Take) -> None:
-        if not self._is_of_chosen(take):  # overtaken by the next one
+        if take is self._shown.take or not self._is_of_chosen(take):  # shown already, or overtaken by the next one
             return
         self._shown = _Shown(take)
         for panel in self._panels:
@@ -327,8 +328,9 @@ class Performance(QObject):
         self._window.show_growth("")
 
     def _take_finished(self, take: Take, errors: ErrorSums) -> None:
-        if take is not self.take:
+        if take is not self.take or self._shown.finished:
             return
+        self._shown.finished = True
         for panel in self._panels:
             panel.take_finished(take, errors)
         if reason := why_ran_away(take):

@@ -116,6 +116,19 @@ def test_views_of_a_string_say_that_drums_are_played(qtbot: QtBot, kit: Controll
     assert reported(kit) == []
 
 
+def test_the_motion_of_a_string_returns_after_a_drum_that_was_not_struck(qtbot: QtBot, kit: Controller) -> None:
+    """Its motion was rendered before, perhaps while the drum was already chosen."""
+    for _ in range(3):
+        kit.patches.choose("steel_string_acoustic")
+        kit.patches.choose("concert_toms")
+    kit.patches.choose("steel_string_acoustic")
+    qtbot.waitUntil(lambda: kit.performance.ready and kit.performance.settled)
+    kit.patches.choose("concert_toms")
+    assert kit.performance.take is None
+    kit.patches.choose("steel_string_acoustic")
+    qtbot.waitUntil(lambda: kit.performance.ready)
+
+
 def test_space_and_a_click_strike_the_drum_that_was_struck_last(qtbot: QtBot, kit: Controller) -> None:
     notes = kit.performance.notes
     kit.play_or_stop()
