@@ -177,7 +177,7 @@ def _render_as_recorded(preset: str, out: Path, bits: Bits) -> None:
 
 def _render_again(file: Path, out: Path | None) -> None:
     from app.export.files import default_file_name
-    from app.export.recipe import changed_preset_notice, preset_of, read_recipe, request_of
+    from app.export.recipe import changed_notices, preset_of, read_recipe, request_of
     from app.shared.version import program_version
     from engine.folders import usable_files
     from engine.presets import load_preset
@@ -189,8 +189,8 @@ def _render_again(file: Path, out: Path | None) -> None:
         if out.exists():
             raise Failure(f"{out}: is there already; say where to write, as in --recipe {file} OUT.wav")
     request = request_of(recipe, load_preset(path), file)
-    if not exact:
-        say(f"note: {changed_preset_notice(recipe)}")
+    for notice in changed_notices(recipe, exact):
+        say(f"note: {notice}")
     if recipe.version != program_version():
         say(f"note: {file} was made by version {recipe.version}, this is {program_version()}: bytes may differ")
     _write(request, out, recipe.settings)

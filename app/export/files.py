@@ -93,7 +93,7 @@ def export_sounds(
     Args:
         request: its own `source` is ignored.
         paths: the file of each source; a difference, which is heard without body and room, has none beside it where
-            the request is `through` an instrument.
+            an instrument is heard.
         measured: render both model and truth whatever the sources, to compare them.
 
     Returns:
@@ -104,7 +104,8 @@ def export_sounds(
     """
     settings = settings_of(request, settings or WavSettings())
     requests = {source: replace(request, source=source) for source in paths}
-    if request.through is not None and "difference" in paths and len(paths) > 1:
+    instrument = request.through is not None or request.struck is not None
+    if instrument and "difference" in paths and len(paths) > 1:
         raise ValueError("through an instrument, export the difference by itself")
     request = next(iter(requests.values()))
     info = request.preset.info

@@ -1,4 +1,4 @@
-"""A note as WAV files: a pluck with body, room and level, or its string alone."""
+"""A note as WAV files: a key of an instrument, a pluck with its body, room and level, or a string alone."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from pathlib import Path
 from app.export.choices import Chosen, ExportChoices
 from app.export.files import WavReport, export_sounds
 from app.export.sound import SoundRequest, Through
+from app.export.struck import Struck
 from app.shared.key_names import note_name
 from app.shared.vocabulary import Pickup, PlayedSource, Source
 from app.shared.worker import Progress
@@ -29,7 +30,8 @@ class Note:
     Attributes:
         preset: its file; preset_rate_hz: the rate of its model.
         string: the one that a preset of many plays; None: the preset's own.
-        through: the instrument's level, body and room; None: there is no instrument.
+        through: the instrument's level, body and room; None: there is no instrument, or it is `struck`.
+        struck: a key of the instrument; pluck and listening points are then those of its string alone.
         name: for its file, see `musical_name`; empty: that of the preset.
     """
 
@@ -41,7 +43,13 @@ class Note:
     pickup: Pickup = "displacement"
     string: StringParameters | None = None
     through: Through | None = None
+    struck: Struck | None = None
     name: str = ""
+
+    @property
+    def can_be_alone(self) -> bool:
+        """Whether there is an instrument, and a string that can be heard without it."""
+        return self.through is not None or (self.struck is not None and not self.struck.of_drum)
 
     def file_name(self, source: Source) -> str:
         """Its name, and the source where that is not the model."""
@@ -57,12 +65,22 @@ def musical_name(title: str, first_hz: float, softest_mm: float, hardest_mm: flo
         first_hz: frequency of the first partial, which gives the note.
         softest_mm, hardest_mm: the range of plucks, of which soft and hard are the outer thirds of its logarithm.
     """
-    short = re.split(r"[,—]| - ", title)[0]
-    plain = " ".join(re.sub(r"[^\w .+-]", " ", short[:LONGEST_NAME]).split()).lstrip(". -") or "Note"
     key = round(69 + 12 * math.log2(first_hz / 440))
-    note = note_name(key).replace("♯", "#") if 0 <= key <= 127 else f"{first_hz:.0f} Hz"
+    note = note_name(key) if 0 <= key <= 127 else f"{first_hz:.0f} Hz"
     softest_mm, amplitude_mm = max(softest_mm, LEAST_MM), max(amplitude_mm, LEAST_MM)
     share = math.log(amplitude_mm / softest_mm) / math.log(max(hardest_mm / softest_mm, 1.001))
+    return _named(title, note, share)
+
+
+def struck_name(struck: Struck) -> str:
+    """As `musical_name`, of a key; soft and hard are the outer thirds of velocities."""
+    return _named(struck.patch.name, note_name(struck.event.key), struck.event.velocity / 127)
+
+
+def _named(title: str, note: str, share: float) -> str:
+    short = re.split(r"[,—]| - ", title)[0]
+    plain = " ".join(re.sub(r"[^\w .+-]", " ", short[:LONGEST_NAME]).split()).lstrip(". -") or "Note"
+    note = note.replace("♯", "#")
     loudness = "soft" if share < 1 / 3 else "hard" if share > 2 / 3 else "medium"
     return " ".join((plain, *([] if note in plain.split() else [note]), loudness))
 
@@ -112,7 +130,8 @@ class NoteExport:
         """As `run`, with reports in place of words."""
         note, choices = self.note, self.choices
         preset = load_preset(note.preset)
-        if preset.info.family is not None:  # it plays any string at any rate
+        struck = None if choices.alone and note.can_be_alone else note.struck
+        if preset.info.family is not None and struck is None:  # it plays any string at any rate
             preset = of_string(preset, note.string, choices.rate_hz or None)
         request = SoundRequest(
             preset,
@@ -125,6 +144,7 @@ class NoteExport:
             choices.difference_gain_db if "difference" in self.paths else 0.0,
             choices.decay_db if choices.until_decayed else None,
             None if choices.alone else note.through,
+            struck,
         )
         return export_sounds(request, self.paths, choices.wav, progress=progress)[0]
 

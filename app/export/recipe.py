@@ -12,6 +12,7 @@ import soundfile
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from app.export.sound import LONGEST_S, SoundRequest, Through
+from app.export.struck import StruckKey
 from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, Bits, Pickup, PlayedSource, Source
@@ -117,6 +118,7 @@ class Recipe(BaseModel):
     string: StringParameters | None = None
     modes: int | None = Field(None, ge=1, le=SIZES["grid_points"][1])
     through: Through | None = None
+    struck: StruckKey | None = None
 
     @field_validator("string", mode="before")
     @classmethod
@@ -132,7 +134,7 @@ class Recipe(BaseModel):
             PresetError: the preset's file cannot be read any more.
         """
         info = request.preset.info
-        many = info.family is not None
+        many = info.family is not None and request.struck is None
         return cls(
             program=PROGRAM,
             version=program_version(),
@@ -149,6 +151,7 @@ class Recipe(BaseModel):
             fade_out_s=settings.fade_out_s,
             string=info.string if many else None,
             modes=info.modes if many else None,
+            struck=None if request.struck is None else StruckKey.of(request.struck),
         )
 
     def request(self, preset: Preset) -> SoundRequest:
@@ -158,12 +161,13 @@ class Recipe(BaseModel):
             preset: as loaded from its file; if it is of many strings, the recipe's string is chosen here.
 
         Raises:
-            ValueError: values do not go together.
+            ValueError: values do not go together, or the instrument is not here.
         """
         if self.string is not None:
             preset = of_string(preset, self.string, self.preset_rate_hz, self.modes)
         asked: dict[str, Any] = {name: getattr(self, name) for name in REQUESTED}
-        return SoundRequest(preset, **asked, difference_gain_db=self.difference_gain_db)
+        struck = None if self.struck is None else self.struck.found()[0]
+        return SoundRequest(preset, **asked, difference_gain_db=self.difference_gain_db, struck=struck)
 
     @property
     def settings(self) -> WavSettings:
@@ -254,6 +258,21 @@ def preset_of(recipe: Recipe | InstrumentSound, presets: Iterable[Path]) -> tupl
     )
 
 
-def changed_preset_notice(recipe: Recipe) -> str:
-    """A warning for a preset that was found by its name alone."""
-    return f"the preset {recipe.preset} is not the one that made this file (another version of it): the sound differs"
+def changed_notices(recipe: Recipe, exact: bool) -> list[str]:
+    """Warnings for a preset and an instrument that were found by their names alone.
+
+    Args:
+        exact: whether the preset is the same.
+
+    Raises:
+        ValueError: the instrument is not here.
+    """
+    struck = recipe.struck
+    others = {"the preset " + recipe.preset: exact}
+    if struck is not None:
+        others["the instrument " + struck.instrument] = struck.found()[1]
+    return [
+        f"{name} is not the one that made this file (another version of it): the sound differs"
+        for name, same in others.items()
+        if not same
+    ]

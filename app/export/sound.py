@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field
 
 from app.export.recording import BLOCK_FRAMES, Recording, Sound, blocks
+from app.export.struck import Struck
 from app.instrument.bodies import body_digest
-from app.instrument.effects import effects_from
+from app.instrument.effects import channels_of, effects_from
 from app.patches.patch import Body, Patch, Room
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PICKUPS, Pickup, Source
 from app.shared.worker import Progress
@@ -39,7 +40,7 @@ Samples = NDArray[np.float64]
 
 
 class Through(BaseModel):
-    """What an instrument adds to its strings.
+    """What an instrument adds to a string that is plucked by hand.
 
     Attributes:
         instrument: its name.
@@ -85,6 +86,8 @@ class SoundRequest:
             files of a pluck have the same length. None: it lasts `seconds`.
         through: level, body and room of an instrument; a difference is heard without body and room. None: the string
             alone.
+        struck: a key of an instrument that `preset` plays, in place of pluck, listening points and pick-up. Its
+            difference is heard without body and room too.
 
     Raises:
         ValueError: a value is out of its range; the message names it and the range.
@@ -100,6 +103,7 @@ class SoundRequest:
     difference_gain_db: float = 0.0
     decay_db: float | None = None
     through: Through | None = None
+    struck: Struck | None = None
 
     def __post_init__(self) -> None:
         for name, point in (("listening point", self.listen), ("right listening point", self.listen_right)):
@@ -110,8 +114,11 @@ class SoundRequest:
         for name, value, known in (("source", self.source, SOURCES), ("pickup", self.pickup, PICKUPS)):
             if value not in known:
                 raise ValueError(f"{name} {value!r} is not one of {', '.join(known)}")
-        if self.source == "both" and (self.listen_right is not None or self.effects is not None):
+        stereo = self.listen_right is not None or self.effects is not None or self.struck is not None
+        if self.source == "both" and stereo:
             raise ValueError("model and truth cannot share one file in stereo; choose two files, or mono")
+        if self.through is not None and self.struck is not None:
+            raise ValueError("an instrument plays a key, or is added to a pluck; leave out one of the two")
         _check("decay_db", self.decay_db, DECAY_RANGE_DB)
         _check("difference_gain_db", self.difference_gain_db, DIFFERENCE_GAIN_RANGE_DB)
 
@@ -247,6 +254,15 @@ def decayed_frames(sound: Sound, rate_hz: int, decay_db: float) -> int:
 def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Callable[[float], None]) -> Recording:
     """The samples (frames, channels) of the voice that a device would play."""
     preset, info = request.preset, request.preset.info
+    decay_db = None if request.decay_db is None else request.decay_db + DECAYED_FOR_SURE_DB
+    if request.struck is not None:
+        found = Recording(channels_of(request.struck.patch))
+        dry = request.source == "difference"
+        for block in request.struck.sound(preset, voice, rate_hz, request.seconds, decay_db, dry, progress):
+            if not np.isfinite(block).all():
+                raise Runaway(len(found) / rate_hz)
+            found.append(block)
+        return found
     program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset, rate_hz)
     ear = Ear(request.points, request.pickup)
     through, recording = request.through, None
@@ -258,7 +274,7 @@ def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Callabl
         ear,
         request.seconds,
         progress,
-        None if request.decay_db is None else request.decay_db + DECAYED_FOR_SURE_DB,
+        decay_db,
         1.0 if through is None else through.gain,
         request.effects,
     ):

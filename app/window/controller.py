@@ -174,10 +174,12 @@ class Controller(QObject):
             self.library,
             self.patches.recordings,
             self.performance.through,
+            lambda: self.instruments.struck,
             (settings.export, settings.sampled),
             window,
         )
         self.exports.reported.connect(window.notices.report)
+        self.instruments.played.connect(self.exports.refresh)
         window.transport.export_asked.connect(window.action["export"].trigger)
         self._connect_actions()
         self.keeper = SettingsSaver(settings_path, settings, self.settings, self)

@@ -10,7 +10,7 @@ import soundfile
 
 from app.audio.impulse_file import ImpulseError, cut_words
 from app.audio.note_file import NOTE_LENGTHS_S
-from app.export.recipe import NoRecipe, Recipe, RecipeError, changed_preset_notice, preset_of, read_recipe
+from app.export.recipe import NoRecipe, Recipe, RecipeError, changed_notices, preset_of, read_recipe
 from app.instrument.bodies import ENDINGS, install_body
 from app.patches.instrument import SingleString
 from app.presets.install import SUFFIX, InstallError, install_preset
@@ -83,8 +83,12 @@ def _preset(file: Path, library: Library) -> Dropped:
 def _recipe(file: Path, library: Library) -> Dropped:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
-    choices = {"instrument": SingleString(preset=path.stem), **restored_choices(recipe)}
-    notices = [] if exact else [changed_preset_notice(recipe)]
+    try:
+        played = SingleString(preset=path.stem) if recipe.struck is None else recipe.struck.found()[0].patch
+        notices = changed_notices(recipe, exact)
+    except ValueError as error:
+        return Dropped(notice=f"{file}: {error}.")
+    choices = {"instrument": played, **restored_choices(recipe)}
     if recipe.through is not None:
         notices.append(f"it was heard through {recipe.through.instrument}; choose it to hear body, room and level")
     if choices.get("seconds", recipe.seconds) != recipe.seconds:
@@ -96,24 +100,27 @@ def _recipe(file: Path, library: Library) -> Dropped:
 
 
 def restored_choices(recipe: Recipe) -> dict[str, Any]:
-    """The fields of `Choices` that a recipe sets, without the instrument, which is a single string.
+    """The fields of `Choices` that a recipe sets, without the instrument. Of a key, no pluck and no pick-up.
 
-    The patch that is there and its pick-up stay as they are.
+    Of a single string, the patch that is there and its pick-up stay as they are.
     A sound that ends by its decay has a longest duration alone, and leaves the chosen one.
     """
     found: dict[str, Any] = {
-        **asdict(recipe.pluck),
-        "string": None if recipe.string is None else asdict(recipe.string),
-        "listen": recipe.listen,
-        "stereo": recipe.listen_right is not None,
-        "pickup": recipe.pickup,
         "solo": 0,
         "a": "difference" if recipe.source == "difference" else "model",
         "b": "truth",
         "heard": "b" if recipe.source == "truth" else "a",
     }
-    if recipe.listen_right is not None:
-        found["listen_right"] = recipe.listen_right
+    if recipe.struck is None:
+        found |= {
+            **asdict(recipe.pluck),
+            "string": None if recipe.string is None else asdict(recipe.string),
+            "listen": recipe.listen,
+            "stereo": recipe.listen_right is not None,
+            "pickup": recipe.pickup,
+        }
+        if recipe.listen_right is not None:
+            found["listen_right"] = recipe.listen_right
     if recipe.decay_db is None:
         found["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
     if recipe.source == "difference":

@@ -10,10 +10,11 @@ from PySide6.QtCore import QObject, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.export.choices import ExportChoices
-from app.export.note import HeardNote, Note, musical_name
+from app.export.note import HeardNote, Note, musical_name, struck_name
 from app.export.played import PlayedExport
 from app.export.sampled.choices import SampledChoices
 from app.export.sound import Through
+from app.export.struck import Struck
 from app.patches.patch import Patch
 from app.playing.keyboard import PluckRange
 from app.presets.library import Library, PresetEntry
@@ -34,6 +35,7 @@ class Exports(QObject):
 
     Args:
         through: what the present instrument adds to a string of `Choices`; None: nothing.
+        struck: the key of the instrument that an export plays; None: a pluck is heard.
     """
 
     reported = Signal(str)
@@ -44,12 +46,13 @@ class Exports(QObject):
         library: Library,
         recordings: Recordings,
         through: Callable[[Choices], Through | None],
+        struck: Callable[[], Struck | None],
         choices: tuple[ExportChoices, SampledChoices],
         window: QWidget,
     ) -> None:
         super().__init__(window)
         self._session, self._library, self._window = session, library, window
-        self._recordings, self._through = recordings, through
+        self._recordings, self._through, self._struck = recordings, through, struck
         self._choices = choices
         self.dialog: ExportDialog | None = None
         recordings.save_asked.connect(lambda: self.open("performance"))
@@ -62,9 +65,7 @@ class Exports(QObject):
 
     def open(self, kind: Kind) -> None:
         """Opens the dialog at a page, or brings it to the front."""
-        subjects, drums = self._subjects(), self._session.choices.drums is not None
-        if kind == "note" and drums:  # of a drum
-            kind = "sampler" if subjects["performance"] is None else "performance"
+        subjects = self._subjects()
         if subjects[kind] is None:
             self.reported.emit(PAGES[kind].missing)
             return
@@ -97,7 +98,7 @@ class Exports(QObject):
         player = None if patch is None else self._library.find(patch.preset)
         instrument = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
-            "note": heard_note(choices, self._library, self._through(choices)),
+            "note": heard_note(choices, self._library, self._through(choices), self._struck()),
             "performance": played and HeardPerformance(played, None if preset is None else preset.path),
             "sampler": instrument,
             "plugin": instrument,
@@ -114,16 +115,14 @@ class Exports(QObject):
         self.dialog = None
 
 
-def heard_note(choices: Choices, library: Library, through: Through | None) -> HeardNote | None:
-    """The chosen pluck as it is heard, of another preset where that is heard.
-
-    None: there is no preset, or drums are played.
-    """
-    if choices.drums is not None:
-        return None
+def heard_note(
+    choices: Choices, library: Library, through: Through | None, struck: Struck | None = None
+) -> HeardNote | None:
+    """The chosen pluck or key as it is heard, of another preset where that is heard; None: there is no preset."""
     source, another = choices.source_heard, library.find(other_preset(choices.source_heard) or "")
     if another is not None:
         choices = choices.changed({"preset": another.name})
+        struck = None
     entry = library.find(choices.preset)
     if entry is None:
         return None
@@ -135,8 +134,9 @@ def heard_note(choices: Choices, library: Library, through: Through | None) -> H
         choices.listen_right if choices.stereo else None,
         choices.pickup,
         None if choices.string is None else choices.string.parameters,
-        through,
-        _name(choices, entry),
+        None if struck is not None else through,
+        struck,
+        _name(choices, entry) if struck is None else struck_name(struck),
     )
     saved: PlayedSource = "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
     return HeardNote(note, saved, another is not None, choices.difference_gain_db, _words(entry.title, choices))
@@ -164,5 +164,4 @@ def _words(title: str, choices: Choices) -> str:
         heard = "heard at the bridge"
     kind = ", magnetic pick-up" if choices.pickup == "velocity" else ""
     modes = f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""
-    latest = "Latest note, as it was played. " if isinstance(choices.instrument, Patch) else ""
-    return f"{latest}{title}{string}: {pluck}, {heard}{kind}{modes}"
+    return f"{title}{string}: {pluck}, {heard}{kind}{modes}"

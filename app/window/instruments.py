@@ -9,9 +9,10 @@ from typing import Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
+from app.export.struck import Struck
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
 from app.patches.instrument import SingleString
-from app.patches.patch import PhysicalString
+from app.patches.patch import Patch, PhysicalString
 from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, PluckRange, place_of, semitone_of, turn
@@ -126,6 +127,20 @@ class Instruments(QObject):
         if low <= latest <= high and drums.of_key(latest) is not None:
             return latest
         return min(max(drums.drums[0].note, low), high)
+
+    @property
+    def struck(self) -> Struck | None:
+        """The key of the instrument that an export plays: the latest note, of drums else the one shown.
+
+        None: a single string is played, or the latest note was plucked by hand.
+        """
+        patch, latest = self._session.choices.instrument, self.latest
+        if not isinstance(patch, Patch):
+            return None
+        if isinstance(latest, KeyNote) and latest.patch.name == patch.name:
+            return Struck(patch, latest.event)
+        drum = self.drum_key
+        return None if drum is None else Struck(patch, NoteOn(drum, self._session.choices.velocity, KEYS))
 
     def strike(self, x: float | None = None, y: float | None = None, velocity: float | None = None) -> None:
         """Strikes the drum that is shown.

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from app.export.choices import Chosen, ExportChoices
 from app.export.job import ExportJob
-from app.export.note import HeardNote, Note, NoteExport
+from app.export.note import HeardNote, NoteExport
 from app.export.played import Played, PlayedExport, recorded_files
 from app.export.plugin.formats import FORMATS, PluginError, check_compiler, install_folder, this_target
 from app.export.plugin.job import PluginExport
@@ -230,11 +230,11 @@ class NotePage(ExportPage):
         if self._subject is None:
             return
         note = self._subject.note
-        self.alone.setVisible(note.through is not None)
+        self.alone.setVisible(note.can_be_alone)
         source, rate_hz = self.source.currentData(), self._wav.rate.currentData()
         self.gain.setVisible(source == "difference")
-        alone = "" if note.through is None else ". The string alone" if self.alone.isChecked() else _through(note)
-        self.what.setText(self._subject.words + alone)
+        alone = note.can_be_alone and self.alone.isChecked()
+        self.what.setText(_note_words(self._subject, alone))
         beyond = f"adds no bandwidth: the model ends at {note.preset_rate_hz / 2000:g} kHz"
         own = "" if rate_hz else f"{note.preset_rate_hz / 1000:g} kHz"
         self._wav.note.setText(beyond if rate_hz > note.preset_rate_hz else own)
@@ -475,12 +475,17 @@ def _this_system() -> str:
         return next(iter(SYSTEM_NAMES))
 
 
-def _through(note: Note) -> str:
-    """What the instrument adds, in words."""
-    assert note.through is not None
-    through = note.through
-    there = "body, room and level" if through.body.name or through.room.mix > 0 else "level"
-    return f". With the {there} of {through.instrument}"
+def _note_words(heard: HeardNote, alone: bool) -> str:
+    """What is exported: a key as the instrument plays it, or a pluck and what the instrument adds."""
+    note = heard.note
+    if alone:
+        return f"{heard.words}. The string alone"
+    if note.struck is not None:
+        return f"Latest note: {note.struck.words}, held; body, room and macros as they are now"
+    if note.through is None:
+        return heard.words
+    there = "body, room and level" if note.through.body.name or note.through.room.mix > 0 else "level"
+    return f"{heard.words}. With the {there} of {note.through.instrument}"
 
 
 def _lay_out(page: QWidget, rows: Rows) -> QFormLayout:

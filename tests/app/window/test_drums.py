@@ -200,7 +200,7 @@ def test_what_is_drummed_is_recorded_and_exported(qtbot: QtBot, kit: Controller,
     kit.patches.recordings.record()
     played = kit.patches.recordings.latest
     assert played is not None
-    kit.exports.open("note")  # of drums: what was recorded
+    kit.exports.open("performance")
     dialog = kit.exports.dialog
     assert dialog is not None
     dialog.save.click()
@@ -209,6 +209,24 @@ def test_what_is_drummed_is_recorded_and_exported(qtbot: QtBot, kit: Controller,
     assert np.abs(sound[: rate_hz // 2]).max() > 0.01
     midi = mido.MidiFile(next(iter(tmp_path.rglob("*.mid"))))
     assert {message.note for message in midi if message.type == "note_on" and message.velocity} == {36, 38, 41}
+
+
+def test_a_blow_is_exported_as_a_note(qtbot: QtBot, kit: Controller, tmp_path: Path) -> None:
+    """Of the drum that was struck last, as hard; dropped on the window, it chooses the instrument."""
+    kit.exports._choices = ExportChoices(folder=str(tmp_path)), kit.exports.choices[1]
+    kit.window.instrument.pressed.emit(38, 120)
+    kit.exports.open("note")
+    dialog = kit.exports.dialog
+    assert dialog is not None
+    assert "Concert toms, D2 at velocity 120" in dialog.note.what.text()
+    assert not dialog.note.alone.isVisible(), "there is no string"
+    dialog.save.click()
+    qtbot.waitUntil(lambda: "Saved" in dialog.state.text(), timeout=30_000)
+    file = tmp_path / "Concert toms D2 hard.wav"
+    assert np.abs(soundfile.read(file)[0]).max() > 0.05
+    kit.patches.choose("steel_string_acoustic")
+    kit.take_file(file)
+    assert kit.session.choices.drums is not None
 
 
 def test_drums_are_exported_as_a_plug_in_too(kit: Controller) -> None:

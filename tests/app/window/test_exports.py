@@ -15,10 +15,11 @@ from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
 from app.export.recipe import read_recipe
+from app.instrument.offline import render_note
 from app.patches.library import find_patch
 from app.patches.patch import PhysicalString
 from app.window.controller import Controller
-from engine.presets import find_string, read_string
+from engine.presets import find_string, load_preset, read_string
 from engine.presets.finding import SHIPPED
 
 LEFT = Qt.MouseButton.LeftButton
@@ -67,12 +68,39 @@ def test_a_note_is_exported_through_the_instrument_that_is_heard(
     qtbot.waitUntil(lambda: short.session.choices.string is not None)
     export(qtbot, short, "Saved")
     (file,) = tmp_path.glob("*.wav")
-    recipe = read_recipe(file)
-    assert recipe.through is not None and recipe.string is not None
-    assert (recipe.through.body, recipe.through.room) == (guitar.body, guitar.room)
-    assert recipe.through.gain == short.performance.notes.keys.gain_of(recipe.string) != 1
+    assert file.name == "Classical guitar C4 hard.wav"
+    struck = read_recipe(file).struck
+    assert struck is not None and struck.instrument == guitar.name
+    assert (struck.key, struck.velocity) == (60, 100)
+    heard = render_note(guitar, load_preset(SHIPPED / "studio_any_string.safetensors"), 60, 100, 9.0, 0.3, 48_000)
+    written = soundfile.read(file)[0]
+    faded = round(0.02 * 48_000)  # at its end
+    np.testing.assert_allclose(written[:-faded], heard[:-faded], atol=2.0**-22)
+    short.session.update(preset="first")
     short.take_file(file)
-    assert "heard through Classical guitar" in short.window.notices.text
+    assert short.session.choices.instrument == guitar
+
+
+def test_a_knob_that_was_turned_is_heard_in_the_file(
+    qtbot: QtBot, short: Controller, tmp_path: Path, preset_folder: Path
+) -> None:
+    """Since the note was played."""
+    shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
+    short.library.refresh()
+    short.session.update(instrument=find_patch("Classical guitar").patch)
+    qtbot.waitUntil(lambda: short.performance.notes.keys.player is not None)
+    short.window.instrument.pressed.emit(60, 100)
+    qtbot.waitUntil(lambda: short.session.choices.string is not None)
+    patch = short.session.choices.patch
+    assert patch is not None
+    short.session.update(patch=patch.with_value("pluck.position", 0.4))
+    export(qtbot, short, "Saved")
+    (file,) = tmp_path.glob("*.wav")
+    preset = load_preset(SHIPPED / "studio_any_string.safetensors")
+    turned = render_note(patch.with_value("pluck.position", 0.4), preset, 60, 100, 9.0, 0.3, 48_000)
+    np.testing.assert_allclose(soundfile.read(file)[0][:9_000], turned[:9_000], atol=2.0**-22)
+    short.take_file(file)
+    assert "instrument Classical guitar is not the one" in short.window.notices.text
 
 
 def test_the_windows_own_files_are_not_dropped_on_it(qtbot: QtBot, controller: Controller, tmp_path: Path) -> None:

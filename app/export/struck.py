@@ -1,0 +1,134 @@
+"""A key of an instrument, struck and held: what its sound follows from, and how a file names it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Annotated
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field
+
+from app.instrument.bodies import body_digest
+from app.instrument.events import KEYS, NoteOn, TimedEvent
+from app.instrument.offline import render_events
+from app.patches.drums import Drums
+from app.patches.fields import Name
+from app.patches.library import list_patches
+from app.patches.patch import Body, Patch, Room
+from app.shared.key_names import note_name
+from engine.presets import Preset
+
+QUIET_FOR_S = 1.0  # longer than strings beat
+Side = Annotated[float, Field(ge=-1, le=1)]
+
+
+class StruckKey(BaseModel):
+    """Names the instrument, as the library has it, and says how its key is struck.
+
+    Attributes:
+        instrument_sha256: of its content and of the file of its body.
+        channel: of MIDI, which chooses the string of a guitar; `KEYS`: none.
+        place: where a drum is struck, from its centre in half-lengths; None: at its own place.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    instrument: Name
+    instrument_sha256: str
+    key: int = Field(ge=0, le=127)
+    velocity: int = Field(ge=1, le=127)
+    channel: int = Field(KEYS, ge=0, le=KEYS)
+    place: tuple[Side, Side] | None = None
+
+    @classmethod
+    def of(cls, struck: Struck) -> StruckKey:
+        event, patch = struck.event, struck.patch
+        return cls(
+            instrument=patch.name,
+            instrument_sha256=_digest(patch),
+            key=event.key,
+            velocity=event.velocity,
+            channel=event.channel,
+            place=event.place,
+        )
+
+    def found(self) -> tuple[Struck, bool]:
+        """The instrument of that name with this key, and whether it is the same to the last value.
+
+        Raises:
+            ValueError: there is none.
+        """
+        for entry in list_patches()[0]:
+            if entry.patch.name == self.instrument:
+                event = NoteOn(self.key, self.velocity, self.channel, self.place)
+                return Struck(entry.patch, event), _digest(entry.patch) == self.instrument_sha256
+        raise ValueError(f"the instrument {self.instrument} is not here; get its file and add it")
+
+
+def _digest(patch: Patch) -> str:
+    content = patch.model_dump_json() + body_digest(patch.body.name)
+    return hashlib.sha256(content.encode()).hexdigest()
+
+
+@dataclass(frozen=True)
+class Struck:
+    """A key of an instrument, held."""
+
+    patch: Patch
+    event: NoteOn
+
+    @property
+    def of_drum(self) -> bool:
+        return isinstance(self.patch.strings, Drums)
+
+    @property
+    def words(self) -> str:
+        """For people."""
+        return f"{self.patch.name}, {note_name(self.event.key)} at velocity {self.event.velocity}"
+
+    def sound(
+        self,
+        preset: Preset,
+        source: str,
+        rate_hz: int,
+        seconds: float,
+        decay_db: float | None,
+        dry: bool,
+        progress: Callable[[float], None],
+    ) -> Iterator[NDArray[np.float32]]:
+        """Blocks (frames, channels) of model or truth, as the instrument plays them; without variation.
+
+        Args:
+            preset: plays the instrument.
+            seconds: the duration, or the longest.
+            decay_db: it may end where it has fallen this far below its peak; None: it does not.
+            dry: without body and room.
+
+        Raises:
+            ValueError: the key has no string.
+        """
+        patch = self.patch
+        if dry:
+            patch = patch.model_copy(update={"body": Body(), "room": Room()})
+        blocks = render_events(
+            patch,
+            preset,
+            [TimedEvent(0.0, self.event)],
+            rate_hz,
+            source,
+            seconds,
+            limited=False,
+            advanced=lambda done_s: progress(min(done_s / seconds, 1.0)),
+            varied=False,
+        )
+        peak, quiet = 0.0, 0
+        for block in blocks:
+            yield block
+            loudest = float(np.abs(block).max(initial=0.0))
+            peak = max(peak, loudest)
+            quiet = quiet + len(block) if loudest < peak * 10 ** (-(decay_db or np.inf) / 20) else 0
+            if decay_db is not None and quiet > QUIET_FOR_S * rate_hz:
+                return
