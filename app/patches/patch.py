@@ -254,6 +254,15 @@ class Macro(Value):
     value: Share = 0.5
     targets: Annotated[tuple[Target, ...], Field(min_length=1, max_length=MOST_TARGETS)]
 
+    def nearest(self, patch: Patch) -> float:
+        """The position, 0 … 1, that is nearest to a patch's values: the mean over targets, each within its ends."""
+        places = [
+            min(1.0, max(0.0, (patch.value(target.field) - target.low) / (target.high - target.low)))
+            for target in self.targets
+            if target.high != target.low
+        ]
+        return sum(places) / len(places) if places else self.value
+
 
 class Patch(Value):
     """The whole instrument.
@@ -340,6 +349,17 @@ class Patch(Value):
             name, replacement = patch._replacement(field, value)
             patch = Patch.model_validate({**dict(patch), name: replacement})
         return patch
+
+    def with_knob(self, field: str, value: float) -> Patch:
+        """As `with_value`; macros that turn this field follow it."""
+        patch = self.with_value(field, value)
+        macros = tuple(
+            macro.model_copy(update={"value": macro.nearest(patch)})
+            if any(target.field == field for target in macro.targets)
+            else macro
+            for macro in patch.macros
+        )
+        return patch.model_copy(update={"macros": macros})
 
     def turned(self, macro: int, value: float) -> Patch:
         """The patch with a macro (by number, from 0) turned to `value`, 0 … 1, and the fields of its targets set."""

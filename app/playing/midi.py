@@ -62,7 +62,7 @@ def turned(patch: Patch, field: str, value: float) -> Patch:
         if field in MACROS:
             number = list(MACROS).index(field)
             return patch.turned(number, value) if number < len(patch.macros) else patch
-        return patch.with_value(field, value)
+        return patch.with_knob(field, value)
     except ValueError:
         return patch
 

@@ -190,7 +190,7 @@ class PatchDesk(QObject):
             return
         try:
             if field in ASSIGNABLE:
-                changed = patch.with_value(field, float(value))
+                changed = patch.with_knob(field, float(value))
             else:
                 part, _, name = field.partition(".")
                 inner = {**dict(getattr(patch, part)), name: value} if name else value

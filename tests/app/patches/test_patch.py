@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from app.patches.library import SHIPPED, list_patches
+from app.patches.library import SHIPPED, find_patch, list_patches
 from app.patches.patch import ASSIGNABLE, Macro, OpenString, Patch, Pickup, PluckChoices, StringSet, Target
 from tests.app.patches.conftest import STRING
 
@@ -125,3 +125,19 @@ def test_a_macro_writes_its_targets(make_patch: Make) -> None:
     assert turned.knobs.decay == pytest.approx(1.0) and turned.pluck.position == pytest.approx(0.325)
     assert turned.macros[0].value == 0.25
     assert first.turned(0, 7).knobs.decay == pytest.approx(2.5)
+
+
+def test_a_macro_follows_a_knob_that_it_turns() -> None:
+    """To the position that would give its value; with several targets to their mean."""
+    guitar = find_patch("Steel-string acoustic").patch
+    names = [macro.name for macro in guitar.macros]
+    room, tone = names.index("Room"), names.index("Tone")
+    followed = guitar.with_knob("room.mix", 0.3)
+    assert followed.macros[room].value == pytest.approx(0.5)
+    assert followed.turned(room, 0.5).value("room.mix") == pytest.approx(0.3)
+    assert followed.macros[:room] == guitar.macros[:room]
+    bright = guitar.turned(tone, 0.8)
+    again = bright.with_knob("pluck.width", bright.value("pluck.width"))
+    assert again.macros[tone].value == pytest.approx(0.8)
+    darker = bright.with_knob("pluck.width", 0.5)
+    assert 0.5 < darker.macros[tone].value < 0.8
