@@ -52,8 +52,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    up = "../" * page.file.src_uri.count("/")
     for name, target in DOCUMENTS.items():
-        markdown = re.sub(rf"\]\((\.\./)*{re.escape(name)}([)#])", rf"]({target}\2", markdown)
+        markdown = re.sub(rf"\]\((\.\./)*{re.escape(name)}([)#])", rf"]({up}{target}\2", markdown)
     return markdown.replace("<!-- generated: fields -->", fields()).replace(
         "<!-- generated: benchmarks -->", benchmarks()
     )
