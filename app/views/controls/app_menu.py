@@ -50,6 +50,9 @@ MENUS: dict[str, tuple[Entry, ...]] = {
     "&Edit": (
         Entry("undo", "Undo", "Ctrl+Z", "undo: instrument and its knobs, preset, pluck, listening point, duration"),
         Entry("redo", "Redo", "Ctrl+Shift+Z", "redo"),
+        Entry("save", "Save instrument", "Ctrl+S", "save the instrument"),
+        Entry("revert", "Revert instrument"),
+        Entry("compare", "Hear saved instrument"),
     ),
     "&Play": (
         Entry("play", "Pluck or stop", "Space", "pluck, or stop"),

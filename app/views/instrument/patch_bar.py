@@ -67,7 +67,7 @@ class PatchBar(QFrame):
         super().__init__(parent)
         self.setAccessibleName("Patch")
         self._macros: tuple[Macro, ...] = ()
-        self._compact = False
+        self._compact = self._tight = False
         self._shows_macros = True
         self._recorded_s: float | None = None
         self._unsaved = 0
@@ -215,8 +215,12 @@ class PatchBar(QFrame):
     # What is shown
 
     def set_compact(self, compact: bool, tight: bool = False) -> None:
-        """For a window with little room; `tight`: with very little, where the browser alone renames."""
+        """For a window with little room; `tight`: with very little; the browser renames and the menu reverts."""
+        self._tight = tight
         self.rename.setVisible(not tight)
+        self.revert.setVisible(not tight)
+        self._show_compare()
+        self._make_room()
         if compact != self._compact:
             self._compact = compact
             self._share_width()
@@ -262,6 +266,14 @@ class PatchBar(QFrame):
     def show_comparing(self, comparing: bool) -> None:
         """Whether keys play the patch as it was saved."""
         self.compare.setChecked(comparing)
+        self._show_compare()
+
+    def _make_room(self) -> None:
+        """Where there is very little, a tuning takes the place of the number of voices."""
+        self.voices.setVisible(not self._tight or self.scala.isHidden())
+
+    def _show_compare(self) -> None:
+        self.compare.setVisible(not self._tight or self.compare.isChecked())
 
     def show_macros(self, shown: bool) -> None:
         """Shows the macros; else, with all knobs of the string, what they turn: the mixes of body and room."""
@@ -290,6 +302,7 @@ class PatchBar(QFrame):
         """What of Scala tunes the patch; a click removes it."""
         scale, keymap = bool(tuning.scale.strip()), bool(tuning.keymap.strip())
         self.scala.setVisible(scale or keymap)
+        self._make_room()
         lines = [f"Tuned by the Scala scale: {_scale_name(tuning.scale) or 'without a name'}"] if scale else []
         if keymap:
             lines.append("A Scala keyboard mapping says which key plays which step, and gives the reference pitch")
