@@ -58,6 +58,7 @@ WIDE, HIGH = (
     1100,
     560,
 )  # pixels: a narrower window hides brand, keys and ABX button; a lower the preset's facts
+WIDE_LAB = 1500  # pixels: in Lab a narrower one leaves the brand's room to the preset's name
 COMPACT_BELOW_PX, TIGHT = 1240, 900  # pixels: in a narrower window the controls are compact, and more so
 ALL_HIGH = 640  # pixels: a lower window shows the instrument instead of the views
 KNOBS_HIGH, AIRY = (
@@ -320,7 +321,7 @@ class MainWindow(QMainWindow):
         return self.height() / theme.present.scale
 
     def _share_width(self) -> None:
-        self._brand.setVisible(self._wide >= WIDE)
+        self._brand.setVisible(self._wide >= (WIDE if self.face == "play" else WIDE_LAB))
         for button in (self._keys_button, self._test_button):  # the menu has them too
             button.setVisible(self._wide >= WIDE and self._shows("test"))
 

@@ -35,7 +35,7 @@ class PresetBar(QWidget):
         following.clicked.connect(lambda: self.step_asked.emit(1))
         self.name = NameButton("Reading presets …")
         self.name.setMinimumWidth(100)
-        self.name.setMaximumWidth(420)
+        self.name.setMaximumWidth(560)
         self.name.clicked.connect(self.browse_asked)
         self.filtered = tool_button("", "Clear the filter")
         self.filtered.setObjectName("filter")
