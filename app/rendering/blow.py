@@ -22,14 +22,13 @@ from app.rendering.take import SOURCES, Listened
 from engine.resonators.base import Array
 from engine.resonators.drum import DrumModes
 from engine.resonators.surface import Circle, Surface
-from engine.strike import Strike
+from engine.strike import FULL_SCALE_PA, Strike
 from engine.voices import Ear
 
 MOST_SHOWN = 160  # modes in a picture: their waves are wider than three points of its grid
 GRID = 57  # points of a picture along the longer side; odd: one is the centre
 MOST_HEADS = 24  # that are kept, of 2 MB at most
 RATE_HZ = 48_000
-FULL_SCALE_PA = 20.0  # as `app.instrument.drum_keys` has it
 WINDOW_PERIODS = 2.0  # of the lowest mode, in which the error is measured
 
 
