@@ -15,7 +15,6 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPen
 from app.session.shown import ShownSource, readable_unit
 from app.views import theme
 from app.views.drum.axes import HeadAxes, Place
-from app.views.plots.colour_maps import error_map
 from app.views.stage import MARGIN_X, paint_labels, paint_mark
 
 COLOURS = 511  # odd: the middle one is rest
@@ -55,16 +54,19 @@ def image_of(picture_m: NDArray[np.float32], scale_m: float) -> QImage:
     """Displacement in colours: amber up, blue down, the panel's colour at rest."""
     half = COLOURS // 2
     index = np.clip(np.rint(picture_m * np.float32(half / scale_m)), -half, half).astype(np.intp) + half
-    colours = np.ascontiguousarray(_colours(theme.PANEL)[index])
+    colours = np.ascontiguousarray(_colours(theme.TRUTH, theme.PANEL, theme.MODEL)[index])
     rows, columns = colours.shape
     return QImage(colours.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32).copy()
 
 
 @lru_cache(maxsize=4)
-def _colours(panel: str) -> NDArray[np.uint32]:
-    """(COLOURS,) as 0xffRRGGBB; `panel` says which theme they are of."""
-    table = error_map().map(np.linspace(0, 1, COLOURS), mode="byte").astype(np.uint32)
-    return np.asarray(0xFF000000 | table[:, 0] << 16 | table[:, 1] << 8 | table[:, 2], np.uint32)
+def _colours(*ends_and_rest: str) -> NDArray[np.uint32]:
+    """(COLOURS,) as 0xffRRGGBB, evenly between the colours of down, rest and up."""
+    colours = [QColor(name) for name in ends_and_rest]
+    stops = np.array([(each.red(), each.green(), each.blue()) for each in colours], np.float64)
+    places = np.linspace(-1, 1, COLOURS)
+    red, green, blue = (np.rint(np.interp(places, (-1, 0, 1), part)).astype(np.uint32) for part in stops.T)
+    return np.asarray(0xFF000000 | red << 16 | green << 8 | blue, np.uint32)
 
 
 def paint_motion(

@@ -244,6 +244,14 @@ def test_knobs_say_which_drum_is_meant_and_which_of_them_do_nothing(kit: Control
     assert knobs.knobs["knobs.decay"].isEnabled()
 
 
+def test_buttons_name_what_is_played(kit: Controller) -> None:
+    bar, panel = kit.window.transport, kit.window.instrument
+    assert (bar._play.text(), bar._play.accessibleName()) == ("▶  Strike", "Strike or stop")
+    assert panel._fold.text() == "Drum knobs"
+    kit.patches.choose("steel_string_acoustic")
+    assert (bar._play.text(), panel._fold.text()) == ("▶  Pluck", "String knobs")
+
+
 def test_the_surface_of_strings_shows_the_keys_of_drums(kit: Controller) -> None:
     panel = kit.window.instrument
     panel.show_surface("neck")
