@@ -21,6 +21,7 @@ from engine.resonators.base import Array
 from engine.resonators.drum import DrumModes
 
 HERTZ = -0.2  # power of the speed in the time of contact
+FULL_SCALE_PA = 20.0  # the sound pressure at 1 m that is 0 dBFS, before the gain of a key
 
 
 @dataclass(frozen=True)

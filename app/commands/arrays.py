@@ -1,7 +1,8 @@
-"""Displacements in NumPy files: U0.npy (batch, points) is read, OUT.npy (batch, frames, points) written."""
+"""Displacements in NumPy files: U0.npy (batch, points) is read, OUT.npy (batch, frames, points) is written."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -63,23 +64,34 @@ def write_motion(path: Path, initial: Array, steps: int, motion: Motion, report:
     """Writes float64 (batch, steps + 1, points) in m, whole or not at all, a few trajectories at a time.
 
     Raises:
-        Failure: the motion is not finite.
-        WriteError: the file cannot be written.
+        As `write_array`.
     """
     batch, points = initial.shape
     rows = max(1, BYTES_AT_ONCE // (8 * (steps + 1) * points))
-    header = {"descr": "<f8", "fortran_order": False, "shape": (batch, steps + 1, points)}
-    done = 0
-    with whole_file(path) as file:
-        npy.write_array_header_1_0(file, header)
+
+    def blocks() -> Iterator[Array]:
         for few in np.split(initial, range(rows, batch, rows)):
             frames: Iterator[Array] = motion(few)
-            if len(few) > 1:  # a trajectory's frames lie together in the file
-                frames = iter([np.concatenate(list(frames), axis=1)])
-            for block in frames:
-                file.write(_finite(block).astype("<f8").tobytes())
-                done += block.shape[0] * block.shape[1]
-                report(done / (batch * (steps + 1)))
+            # a trajectory's frames lie together in the file
+            yield from [np.concatenate(list(frames), axis=1)] if len(few) > 1 else frames
+
+    write_array(path, (batch, steps + 1, points), blocks(), report)
+
+
+def write_array(path: Path, shape: tuple[int, ...], blocks: Iterator[Array], report: Report) -> None:
+    """Writes float64 of a shape, whole or not at all, from blocks that follow one another.
+
+    Raises:
+        Failure: the motion is not finite.
+        WriteError: the file cannot be written.
+    """
+    done = 0
+    with whole_file(path) as file:
+        npy.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
+        for block in blocks:
+            file.write(_finite(block).astype("<f8").tobytes())
+            done += block.size
+            report(done / math.prod(shape))
 
 
 def blocks_of(steps: int) -> Iterator[int]:

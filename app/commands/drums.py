@@ -1,65 +1,74 @@
-"""drums: modes of a drum, its sound, and the model compared with the truth."""
+"""drums: modes of a drum, its motion by the physics and by a model, their errors, and its sound."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.commands.motion import Solver
+from app.commands.render import BitsOption
 from app.shared.vocabulary import PlayedSource
 from training.cli import arguments
 from training.cli.arguments import Json
 from training.cli.console import Failure, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
+    from app.commands.arrays import Array
     from app.instrument.drum_keys import DrumKey
     from app.patches.patch import Patch
     from engine.resonators.drum import DrumModes
     from engine.strike import Strike
+    from training.family.drums import Blocks, DrumPlayer, StruckDrum
 
-drums = typer.Typer(help="Modes and sounds of drums.", no_args_is_help=True)
-PatchOption = Annotated[str, typer.Argument(metavar="PATCH", help="An instrument of drums, by name or as a file.")]
-KeyOption = Annotated[int, typer.Argument(metavar="KEY", min=0, max=127, help="A MIDI key of it.")]
-Velocity = Annotated[int, typer.Option(min=1, max=127, help="Of the key.")]
+drums = typer.Typer(help="Motions and sounds of drums.", no_args_is_help=True)
+DrumName = Annotated[
+    str, typer.Argument(metavar="DRUM.toml|INSTRUMENT", help="A drum's file, or an instrument of drums with --key.")
+]
+KeyOption = Annotated[
+    int | None, typer.Option("--key", min=0, max=127, metavar="KEY", help="The MIDI key of an instrument's drum.")
+]
+Velocity = Annotated[int, typer.Option(min=1, max=127, help="Of the key; of a drum's file 0.2 to 8 m/s.")]
 Seconds = Annotated[float, typer.Option(metavar="S", help="Duration in s.")]
 Place = Annotated[
     tuple[float, float] | None,
     typer.Option(metavar="X Y", help="Where it is struck, from the centre in half-lengths; default its own place."),
 ]
-Rate = Annotated[int, typer.Option(metavar="HZ", help="Sample rate.")]
+Rate = Annotated[int, typer.Option(min=8_000, max=192_000, metavar="HZ", help="Sample rate.")]
+OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (steps + 1, rows, columns) in m.")]
+Steps = Annotated[int, typer.Option(min=1, help="Frames after the blow.")]
+Points = Annotated[
+    int, typer.Option(min=3, max=513, metavar="N", help="Points of the grid along the longer side, rounded to odd.")
+]
+PresetOption = Annotated[
+    str | None, typer.Option("--preset", metavar="PRESET", help="A preset of many strings; default the instrument's.")
+]
 LONGEST_S = 60.0
-HIGHEST_HZ = 20_000.0
+HIGHEST_HZ = 20_000.0  # of a drum's file
+FILE_KEY = 60  # on which the drum of a file is played
+FRAMES_AT_ONCE = 1_200
 
 
 @drums.callback()
 def _group() -> None:
-    """Modes and sounds of drums."""
+    """Motions and sounds of drums."""
 
 
 @drums.command()
 def modes(
-    drum: Annotated[str, typer.Argument(metavar="DRUM.toml|PATCH", help="A drum's file, or an instrument of drums.")],
-    key: Annotated[int | None, typer.Argument(metavar="KEY", help="A MIDI key of the instrument.")] = None,
+    drum: DrumName,
+    key: KeyOption = None,
     count: Annotated[int, typer.Option(min=1, max=1_600, help="So many modes, the lowest.")] = 12,
     json: Json = False,
 ) -> None:
-    """Print frequencies and decays of a drum's modes, with air; of a key also its pitch drop."""
-    facts: dict[str, Any] = {}
-    if drum.endswith(".toml"):
-        found = _of_file(Path(drum), count)
-    else:
-        if key is None:
-            raise typer.BadParameter("is missing; give a MIDI key of the instrument", param_hint="KEY")
-        patch, struck = _key_of(drum, key)
-        found = struck.modes
-        facts = {
-            "modes": len(found),
-            "hardest_m_s": struck.played.hardest_m_s,
-            "drop_cents": {
-                str(velocity): struck.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)
-            },
-        }
+    """Print frequencies and decays of a drum's modes, with air, and its pitch drop."""
+    patch, struck = _drum_of(drum, key)
+    found = struck.modes
+    drops = {str(velocity): struck.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)}
+    facts = {"modes": len(found), "hardest_m_s": struck.played.hardest_m_s, "drop_cents": drops}
     rows = [
         {"m": m, "n": n, "hz": hz, "t60_s": t60, "air_mass": mass}
         for m, n, hz, t60, mass in _rows(found, min(count, len(found)))
@@ -71,16 +80,64 @@ def modes(
         ("m", "n", "Hz", "T60 s", "mass with air / without"),
         [[r["m"], r["n"], round(r["hz"], 2), round(r["t60_s"], 3), round(r["air_mass"], 3)] for r in rows],
     )
-    if facts:
-        drops = ", ".join(f"{cents:.0f} cents at velocity {v}" for v, cents in facts["drop_cents"].items())
-        print(f"{facts['modes']} modes; pitch drop {drops}; hardest blow {facts['hardest_m_s']:g} m/s")
+    words = ", ".join(f"{cents:.0f} cents at velocity {velocity}" for velocity, cents in drops.items())
+    print(f"{len(found)} modes; pitch drop {words}; hardest blow {struck.played.hardest_m_s:g} m/s")
 
 
 @drums.command()
-def strike(
-    patch: PatchOption,
-    key: KeyOption,
+def simulate(
+    drum: DrumName,
+    out: OutputFile,
+    steps: Steps,
+    key: KeyOption = None,
+    velocity: Velocity = 100,
+    place: Place = None,
+    rate: Rate = 48_000,
+    points: Points = 33,
+    linear: Annotated[bool, typer.Option("--linear", help="Without tension modulation.")] = False,
+    solver: Annotated[
+        Solver, typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against.")
+    ] = "fast",
+) -> None:
+    """Simulate the motion of a struck drum by the physics.
+
+    OUT has its displacement on a grid, the first row at the top, 0 outside the drum.
+    """
+    from training.family.drums import linear_drum, true_motion
+
+    blow = _blow_of(drum, key, velocity, place)
+    if solver == "dop853":
+        motion = _dop853(blow.struck(linear), rate, steps)
+    else:
+        motion = (linear_drum if linear else true_motion)(blow.struck(), rate)
+    _write(out, blow, motion, steps, points)
+
+
+@drums.command()
+def predict(
+    drum: DrumName,
+    out: OutputFile,
+    steps: Steps,
+    key: KeyOption = None,
+    velocity: Velocity = 100,
+    place: Place = None,
+    rate: Rate = 48_000,
+    points: Points = 33,
+    preset: PresetOption = None,
+) -> None:
+    """Predict the motion of a struck drum with the model of a preset of many strings.
+
+    OUT is as that of `drums simulate`.
+    """
+    blow = _blow_of(drum, key, velocity, place, preset)
+    _write(out, blow, blow.player()(blow.struck(), rate), steps, points)
+
+
+@drums.command()
+def render(
+    drum: DrumName,
     out: Annotated[Path, typer.Argument(metavar="OUT.wav", help="The file to write.")],
+    key: KeyOption = None,
     velocity: Velocity = 100,
     place: Place = None,
     seconds: Seconds = 3.0,
@@ -88,25 +145,28 @@ def strike(
         PlayedSource, typer.Option(help="The learned model, the truth (the solved physics), or their difference.")
     ] = "model",
     rate: Rate = 48_000,
+    bits: BitsOption = "24",
+    preset: PresetOption = None,
 ) -> None:
-    """Render a blow on a drum to a WAV file of 24 bits."""
+    """Render a blow on a drum to a WAV file."""
     arguments.check_range("--seconds", seconds, 0.01, LONGEST_S, "s")
-    chosen, struck = _key_of(patch, key)
-    _strike_of(struck, velocity, place)
+    arguments.check_suffix("OUT.wav", out, ".wav")
+    blow = _blow_of(drum, key, velocity, place, preset)
     from app.export.played import write_played
     from app.export.wav import WavSettings
     from app.instrument.events import NoteOn, TimedEvent
 
-    loaded, events = arguments.open_preset(chosen.preset), [TimedEvent(0.0, NoteOn(key, velocity, place=place))]
-    with progress(f"{chosen.name}") as report:
+    events = [TimedEvent(0.0, NoteOn(blow.key.key, velocity, place=place))]
+    loaded = arguments.open_preset(blow.patch.preset)
+    with progress(blow.patch.name) as report:
         written = write_played(
             out,
-            chosen,
+            blow.patch,
             loaded,
             events,
             "",
             source,
-            WavSettings("24", rate),
+            WavSettings(bits, rate),
             seconds,
             lambda done_s: report(min(0.99, done_s / seconds)),
         )
@@ -115,78 +175,174 @@ def strike(
 
 @drums.command()
 def compare(
-    patch: PatchOption,
-    key: KeyOption,
+    drum: DrumName,
+    key: KeyOption = None,
     velocity: Velocity = 127,
     place: Place = None,
     seconds: Seconds = 1.0,
     rate: Rate = 48_000,
+    preset: PresetOption = None,
     json: Json = False,
 ) -> None:
-    """Compare model and linear drum with the truth, over the whole surface."""
+    """Compare model, backward error analysis and linear drum with the truth, over the whole surface.
+
+    Prints relative errors in total and by second.
+    """
     arguments.check_range("--seconds", seconds, 0.01, LONGEST_S, "s")
-    chosen, struck = _key_of(patch, key)
-    import numpy as np
+    blow = _blow_of(drum, key, velocity, place, preset)
     import torch
 
-    from training.family.drums import StruckDrum, linear_drum, model_player, motion_errors
+    from training.family.drums import linear_drum, motion_errors, untrained_player
 
-    speeds = _strike_of(struck, velocity, place, chosen.pluck.curve).speeds(struck.modes)
-    resonator = struck.modes.resonator(np.zeros((1, 2)))
-    rise = float(resonator.relative_tension_rise(speeds / resonator.omega))
-    start = np.zeros_like(speeds)
-    drum = StruckDrum("tom", struck.modes.drum, resonator, start, speeds, struck.modes.scale**2, rise)
     torch.set_num_threads(1)
     players = {
-        chosen.preset: model_player(arguments.open_preset(chosen.preset).model),
+        blow.patch.preset: blow.player(),
+        "r = p = 1/12": untrained_player("series"),
         "linear drum": linear_drum,
     }
-    errors = motion_errors(drum, players, rate, round(seconds * rate))
+    struck = blow.struck()
+    with progress("drums compare") as report:
+        whole, *windows = motion_errors(struck, players, rate, round(seconds * rate), report)
     if json:
-        print_json({"modes": resonator.modes, "tension_rise": rise, "rel_mse": errors})
+        print_json(
+            {
+                "modes": struck.resonator.modes,
+                "tension_rise": struck.tension_rise,
+                "rel_mse": whole.rel_mse,
+                "windows": [asdict(each) for each in windows],
+            }
+        )
         return
     print(
-        f"{struck.played.name}, {resonator.modes} modes, rise of tension {rise:.3g}, first {seconds:g} s at {rate} Hz"
+        f"{blow.key.played.name}, {struck.resonator.modes} modes, rise of tension {struck.tension_rise:.3g}, "
+        f"{rate} Hz; relative MSE over the surface:"
     )
-    print_table(("", "rel. MSE over the surface"), [[name, number(error)] for name, error in errors.items()])
+    rows = [[f"{w.start_s:g} … {w.stop_s:g} s", *map(number, w.rel_mse.values())] for w in (*windows, whole)]
+    print_table(("", *players), rows if len(windows) > 1 else rows[1:])
 
 
-def _strike_of(struck: DrumKey, velocity: int, place: tuple[float, float] | None, curve: float = 0.0) -> Strike:
-    """The blow at a place. Raises typer.BadParameter: it is not on the drum."""
+@dataclass(frozen=True)
+class _Blow:
+    """A drum of an instrument, and a blow on it."""
+
+    patch: Patch
+    key: DrumKey
+    strike: Strike
+
+    def struck(self, linear: bool = False) -> StruckDrum:
+        """Its start; `linear`: of the drum without tension modulation."""
+        import numpy as np
+
+        from training.family.drums import StruckDrum
+
+        found = self.key.modes
+        speeds = self.strike.speeds(found)
+        resonator = found.resonator(np.zeros((1, 2)), tension_modulated=not linear)
+        rise = float(resonator.relative_tension_rise(speeds / resonator.omega))
+        return StruckDrum("tom", found.drum, resonator, np.zeros_like(speeds), speeds, found.scale**2, rise)
+
+    def player(self) -> DrumPlayer:
+        """Of the instrument's preset. Raises Failure: its model learned one string."""
+        from training.family.drums import model_player
+
+        try:
+            return model_player(arguments.open_preset(self.patch.preset).model)
+        except ValueError as error:
+            raise Failure(f"{self.patch.preset}: {error}") from error
+
+
+def _blow_of(
+    drum: str, key: int | None, velocity: int, place: tuple[float, float] | None, preset: str | None = None
+) -> _Blow:
+    """Raises typer.BadParameter: the place is not on the drum."""
     import numpy as np
 
     from engine.strike import Strike
 
-    own = struck.strike(velocity, curve)
+    patch, struck = _drum_of(drum, key)
+    if preset is not None:
+        patch = patch.model_copy(update={"preset": preset})
+    own = struck.strike(velocity, patch.pluck.curve)
     if place is None:
-        return own
+        return _Blow(patch, struck, own)
     if not struck.modes.surface.inside(np.array([place])):
         raise typer.BadParameter(
             f"must be on the drum, not {place[0]:g} {place[1]:g}; choose one nearer the centre", param_hint="--place"
         )
-    return Strike(place, own.speed_m_s, own.mallet)
+    return _Blow(patch, struck, Strike(place, own.speed_m_s, own.mallet))
 
 
-def _of_file(path: Path, count: int) -> DrumModes:
-    from engine.presets.of_string import read_drum
+def _drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
+    """The drum of a file, or of a key of an instrument.
 
-    return read_drum(path)[0].modes(HIGHEST_HZ, count)
-
-
-def _key_of(name: str, key: int) -> tuple[Patch, DrumKey]:
+    Raises:
+        Failure, PatchError, SchemaError: there is none.
+        typer.BadParameter: an instrument is named without a key.
+    """
     from app.instrument.drum_keys import DrumKeys
     from app.patches.drums import Drums
     from app.patches.library import find_patch
     from engine.voices import Ear
 
-    patch = find_patch(name).patch
+    if name.endswith(".toml"):
+        patch, key = _with_file(Path(name)), FILE_KEY
+    else:
+        patch = find_patch(name).patch
     if not isinstance(patch.strings, Drums):
         raise Failure(f"{patch.name} has no drums; choose one of those that `instruments` lists under drums")
+    played = ", ".join(str(each.note) for each in patch.strings.drums)
+    if key is None:
+        raise typer.BadParameter(
+            f"is missing; give a MIDI key of {patch.name}: its drums have {played}", param_hint="--key"
+        )
     found = DrumKeys(patch, Ear(tuple(patch.pickup.points))).of_key(key)
     if found is None:
-        played = ", ".join(str(each.note) for each in patch.strings.drums)
         raise Failure(f"{patch.name} has no drum on key {key}; its drums have the keys {played}")
     return patch, found
+
+
+def _with_file(path: Path) -> Patch:
+    """An instrument of one drum, struck by a stick."""
+    from app.patches.drums import Drums, PhysicalDrum, PlayedDrum
+    from app.patches.patch import Patch
+    from engine.presets.of_string import read_drum
+
+    drum = PlayedDrum(note=FILE_KEY, name="Drum", drum=PhysicalDrum(**asdict(read_drum(path)[0])))
+    return Patch(name="Drum", category="drums", strings=Drums(drums=(drum,), highest_hz=HIGHEST_HZ))
+
+
+def _dop853(struck: StruckDrum, rate_hz: int, steps: int) -> Blocks:
+    import torch
+
+    from engine.truth import ModalState, solve_dop853
+
+    state = ModalState(*(torch.from_numpy(part)[None] for part in (struck.amplitudes_m, struck.speeds_m_s)))
+    frames = iter(solve_dop853(struck.resonator, state, rate_hz, steps)[0, 1:].split(FRAMES_AT_ONCE))
+    return lambda count: next(frames)
+
+
+def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int) -> None:
+    """Writes the displacement (steps + 1, rows, columns) in m, from the blow on."""
+    import numpy as np
+
+    from app.commands import arrays
+    from app.rendering.blow import grid_of
+
+    found = blow.key.modes
+    inside, places = grid_of(found.surface, (found.drum.length_m, found.drum.width_m), points)
+    shapes = found.shapes(places)
+    arrays.check_result_size(1, steps + 1, inside.size)
+
+    def pictures() -> Iterator[Array]:
+        yield np.zeros((1, *inside.shape))
+        for first in range(0, steps, FRAMES_AT_ONCE):
+            amplitudes = motion(min(FRAMES_AT_ONCE, steps - first)).numpy()
+            block = np.zeros((len(amplitudes), *inside.shape))
+            block[:, inside] = amplitudes @ shapes
+            yield block
+
+    with progress(out.name) as report:
+        arrays.write_array(out, (steps + 1, *inside.shape), pictures(), report)
 
 
 def _rows(found: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:

@@ -20,10 +20,9 @@ from engine.kernels import playing_layout as of
 from engine.resonators.base import Array
 from engine.resonators.drum import DrumModes, DrumParameters
 from engine.resonators.surface import Circle
-from engine.strike import Strike
+from engine.strike import FULL_SCALE_PA, Strike
 from engine.voices import Ear
 
-FULL_SCALE_PA = 20.0  # the sound pressure at 1 m that is 0 dBFS, before the gain of a key
 TUNINGS = 6  # rounds of a secant method
 NEAR = 1e-4  # of a frequency, where it ends
 LOW_MODES_HZ, LOW_MODES = 3.0, 6  # among which its pitch is: below so many times the lowest, without air

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.compiled import InstrumentPlayer
+from app.instrument.drum_keys import DrumKeys
 from app.instrument.effects import channels_of, effects_of
 from app.instrument.events import (
     MOD_WHEEL,
@@ -20,12 +21,14 @@ from app.instrument.events import (
     TimedEvent,
     moves_effects,
 )
+from app.instrument.loud_keys import LoudKeys
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.layout import AHEAD, QUANTUM
 from engine.presets import Preset
-from engine.voices import Mixer
+from engine.voices import Ear, Mixer
 
+SOURCES = ("model", "truth")
 BLOCK_FRAMES = 4_096
 LONGEST_TAIL_S = 60.0
 SILENT_DB = -90.0  # re full scale: after the last event it ends where the peak of a block is lower
@@ -191,3 +194,27 @@ def render_note(
     if not math.isfinite(float(np.abs(sound).max())):
         raise ValueError(f"key {key} at velocity {velocity}: its sound is not finite")
     return sound
+
+
+def render_blow(
+    patch: Patch, preset: Preset, blow: NoteOn, ear: Ear, seconds: float, rate_hz: int
+) -> dict[str, NDArray[np.float32]]:
+    """Model and truth of one blow on a drum by source, (frames, points of the ear) each.
+
+    Body, room, limiter and the gain of other sources are left out.
+
+    Raises:
+        ValueError: the key has no drum.
+    """
+    found: dict[str, NDArray[np.float32]] = {}
+    keys: LoudKeys | DrumKeys | None = None
+    for source in SOURCES:
+        player = InstrumentPlayer(patch, preset, rate_hz, {source: 1.0}, ear, varied=False, keys=keys)
+        keys, mixer = player.keys, Mixer(rate_hz, limited=False)
+        if player.silent(blow.key):
+            raise ValueError(f"{patch.name} has no drum on key {blow.key}; choose another key")
+        mixer.set_player(player.compiled)
+        player.handle(blow)
+        blocks = [mixer.render(QUANTUM) for _ in range(-(-round(seconds * rate_hz) // QUANTUM))]
+        found[source] = np.concatenate(blocks)[: round(seconds * rate_hz), : len(ear.points)]
+    return found

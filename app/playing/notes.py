@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from app.audio.sound import Sound, SoundStatus
 from app.instrument.events import Event, NoteOn, PluckAt
+from app.instrument.offline import render_blow
 from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
@@ -269,6 +270,19 @@ class Notes:
                     program, loaded.model, loaded.preset.info, request.pluck, request.ear, request.seconds
                 )
             return found
+
+        return self._helper.submit(work)
+
+    def render_blow(
+        self, patch: Patch, blow: NoteOn, ear: Ear, seconds: float, rate_hz: int
+    ) -> Future[Mapping[str, NDArray[np.float32]]]:
+        """The same of a blow on a drum; see `app.instrument.offline.render_blow`. The patch is the one that plays."""
+
+        def work() -> Mapping[str, NDArray[np.float32]]:
+            player = self.keys.player
+            if player is None or player.patch.preset != patch.preset:
+                raise ValueError(f"{patch.name} is still being loaded; open the test again")
+            return render_blow(patch, player.preset, blow, ear, seconds, rate_hz)
 
         return self._helper.submit(work)
 

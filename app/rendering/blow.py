@@ -22,14 +22,13 @@ from app.rendering.take import SOURCES, Listened
 from engine.resonators.base import Array
 from engine.resonators.drum import DrumModes
 from engine.resonators.surface import Circle, Surface
-from engine.strike import Strike
+from engine.strike import FULL_SCALE_PA, Strike
 from engine.voices import Ear
 
 MOST_SHOWN = 160  # modes in a picture: their waves are wider than three points of its grid
 GRID = 57  # points of a picture along the longer side; odd: one is the centre
 MOST_HEADS = 24  # that are kept, of 2 MB at most
 RATE_HZ = 48_000
-FULL_SCALE_PA = 20.0  # as `app.instrument.drum_keys` has it
 WINDOW_PERIODS = 2.0  # of the lowest mode, in which the error is measured
 
 
@@ -76,19 +75,25 @@ class Head:
     @classmethod
     def of(cls, surface: Surface, sides: tuple[float, float]) -> Head:
         """`sides`: length and width, for the numbers of columns and rows."""
-        longer = max(sides)
-        columns, rows = (max(3, 2 * round((GRID - 1) / 2 * side / longer) + 1) for side in sides)
-        x, y = (np.arange(-(n // 2), n // 2 + 1) / (n // 2) for n in (columns, rows))
-        grid = np.stack([part.ravel() for part in np.meshgrid(x, y[::-1])], axis=1)
-        inside = np.hypot(*grid.T) <= 1 if isinstance(surface, Circle) else np.ones(len(grid), bool)
-        shapes = surface.picked(np.arange(min(len(surface.wavenumber), MOST_SHOWN))).shapes(grid[inside])
-        return cls(inside.reshape(rows, columns), shapes.astype(np.float32), grid[inside])
+        inside, places = grid_of(surface, sides)
+        shapes = surface.picked(np.arange(min(len(surface.wavenumber), MOST_SHOWN))).shapes(places)
+        return cls(inside, shapes.astype(np.float32), places)
 
     def picture(self, amplitudes: NDArray[np.floating]) -> NDArray[np.float32]:
         """Displacement (rows, columns) of modal amplitudes (modes,), in their unit; 0 outside the drum."""
         found = np.zeros(self.inside.shape, np.float32)
         found[self.inside] = amplitudes.astype(np.float32) @ self.shapes[: len(amplitudes)]
         return found
+
+
+def grid_of(surface: Surface, sides: tuple[float, float], points: int = GRID) -> tuple[NDArray[np.bool_], Array]:
+    """Points over a drum, an odd number of them along the longer side: `inside` and `places` as `Head` has them."""
+    longer = max(sides)
+    columns, rows = (max(3, 2 * round((points - 1) / 2 * side / longer) + 1) for side in sides)
+    x, y = (np.arange(-(n // 2), n // 2 + 1) / (n // 2) for n in (columns, rows))
+    grid = np.stack([part.ravel() for part in np.meshgrid(x, y[::-1])], axis=1)
+    inside = np.hypot(*grid.T) <= 1 if isinstance(surface, Circle) else np.ones(len(grid), bool)
+    return inside.reshape(rows, columns), grid[inside]
 
 
 def head_of(modes: DrumModes) -> Head:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 
@@ -12,6 +11,7 @@ import torch
 
 from app.rendering.blow import RATE_HZ, BlowListener, BlowRequest, BlowTake, ModalMotion, head_of
 from app.rendering.loaded import Loaded
+from app.rendering.rendering import Rendering
 from app.rendering.strobe import FLASH_HZ
 from app.rendering.subject import Subject
 from app.rendering.take import SOURCES, Listened, Signal
@@ -30,72 +30,39 @@ TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its 
 Advance = Callable[[int], Array]
 
 
-class BlowJob:
-    """Renders a blow; `advance` does the next block of it. The worker uses it as it uses a `Job`.
-
-    Args:
-        load: returns a preset's model and truth; raises PresetError.
-        listener: called in the thread that calls `advance`.
-        helper: another thread, so that model and truth are rendered at the same time.
-    """
+class BlowJob(Rendering[BlowRequest, BlowTake]):
+    """Renders a blow of a preset of many strings; `listener` is called in the thread that calls `advance`."""
 
     def __init__(
         self, request: BlowRequest, load: Callable[[Subject], Loaded], listener: BlowListener, helper: Executor
     ) -> None:
-        self.request = request
-        self._load, self._listener, self._helper = load, listener, helper
-        self.take: BlowTake | None = None
+        super().__init__(request, load, helper)
+        self._listener = listener
         self._movers: dict[str, _Mover] = {}
         self._weights = np.zeros((0, 0))  # of the signals that are rendered
         self._coming: tuple[Listened, dict[str, _Mover]] | None = None  # signals of other listening points
-        self._finished = False  # whether the listener has been called for it
-        self._begun_s = time.monotonic()
 
-    def ask_again(self, request: BlowRequest) -> None:
-        """Takes a request for the same motion with other listening points."""
-        self.request = request
+    def _report_started(self, take: BlowTake) -> None:
+        self._listener.blow_started(take)
 
-    def announce(self) -> None:
-        """Reports again what there is: the window may have shown another motion in between."""
-        if self.take is not None:
-            self._listener.blow_started(self.take)
-            if self._finished:
-                self._listener.blow_finished(self.take)
+    def _report_finished(self, take: BlowTake) -> None:
+        self._listener.blow_finished(take)
 
-    @property
-    def age_s(self) -> float:
-        """Seconds since the request."""
-        return time.monotonic() - self._begun_s
+    def _seconds_of(self, take: BlowTake) -> float:
+        return take.ready_frames / RATE_HZ
 
-    @property
-    def rendered_s(self) -> float:
-        """Seconds of the motion that are rendered."""
-        return 0.0 if self.take is None else self.take.ready_frames / RATE_HZ
+    def _complete(self, take: BlowTake) -> bool:
+        return take.complete
 
-    @property
-    def idle(self) -> bool:
-        """Whether there is nothing left to do."""
-        take = self.take
-        return take is not None and self._finished and self._coming is None and take.listened.ear == self.request.ear
+    def _satisfied(self, take: BlowTake) -> bool:
+        return self._coming is None and take.listened.ear == self.request.ear
 
-    def advance(self) -> None:
-        """Renders a block of both sources, or of the signals at other listening points.
-
-        Raises:
-            PresetError: the preset cannot be used, or is not of many strings.
-        """
-        take = self.take
-        if take is None:
-            take = self.take = self._begin()
+    def _continue(self, take: BlowTake) -> None:
+        """A block of both sources, or of the signals at other listening points."""
+        if not take.complete:
             self._render(take)
-            self._listener.blow_started(take)
-        elif not take.complete:
-            self._render(take)
-        elif take.listened.ear != self.request.ear or self._coming is not None:
+        elif not self._satisfied(take):
             self._listen(take)
-        if take.complete and not self._finished:
-            self._finished = True
-            self._listener.blow_finished(take)
 
     def _begin(self) -> BlowTake:
         take = BlowTake(self.request, head_of(self.request.modes))

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 from concurrent.futures import Executor
 
 from app.rendering.line import Line
 from app.rendering.loaded import Loaded
+from app.rendering.rendering import Rendering
 from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.strobe import Strobe
 from app.rendering.subject import Subject
@@ -22,85 +22,49 @@ FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
 BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for
 
 
-class Job:
-    """Renders a request; `advance` does the next block of it.
+class Job(Rendering[RenderRequest, Take]):
+    """Renders a pluck; `listener` is called in the thread that calls `advance`.
 
-    Args:
-        load: returns a preset's model and truth; raises PresetError.
-        listener: called in the thread that calls `advance`.
-        helper: another thread, so that two sources are rendered at the same time.
-
-    Attributes:
-        take: the result, which grows; None before the first block.
+    Requests for the same motion differ in listening points, slow motion or other presets.
     """
 
     def __init__(
         self, request: RenderRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
     ) -> None:
-        self.request = request
-        self._load, self._listener, self._helper = load, listener, helper
+        super().__init__(request, load, helper)
+        self._listener = listener
         self._lines: dict[str, Line] = {}
-        self.take: Take | None = None
         self._strobe: Strobe | None = None
         self._coming: Listened | None = None  # signals at new listening points, until they are complete
         self._errors = ErrorSums(0)
         self._measured = 1  # pictures; the first is no prediction
-        self._finished = False  # whether the listener has been called for it
-        self._begun_s = time.monotonic()
 
-    def ask_again(self, request: RenderRequest) -> None:
-        """Takes a request for the same motion that differs in listening points, slow motion or other presets."""
-        self.request = request
+    def _report_started(self, take: Take) -> None:
+        self._listener.take_started(take)
 
-    def announce(self) -> None:
-        """Reports again what there is: the window may have shown another motion in between."""
-        if self.take is not None:
-            self._listener.take_started(self.take)
-            if self._finished:
-                self._listener.take_finished(self.take, self._errors)
+    def _report_finished(self, take: Take) -> None:
+        self._listener.take_finished(take, self._errors)
 
-    @property
-    def age_s(self) -> float:
-        """Seconds since the request."""
-        return time.monotonic() - self._begun_s
+    def _seconds_of(self, take: Take) -> float:
+        return take.ready_frames / take.picture_hz
 
-    @property
-    def rendered_s(self) -> float:
-        """Seconds of the motion that are rendered."""
-        return 0.0 if self.take is None else self.take.ready_frames / self.take.picture_hz
+    def _complete(self, take: Take) -> bool:
+        return take.complete and take.listened.complete
 
-    @property
-    def idle(self) -> bool:
-        """Whether there is nothing left to do."""
-        take = self.take
+    def _satisfied(self, take: Take) -> bool:
         return (
-            self._finished
-            and take is not None
-            and self._coming is None
+            self._coming is None
             and take.listened.ear == self.request.ear
             and self._strobe == self._wanted_strobe(take)
             and all(name in self._lines and self._lines[name].complete for name in self._wanted())
         )
 
-    def advance(self) -> None:
-        """Renders a block of each source.
-
-        Raises:
-            PresetError: the preset cannot be used.
-            ValueError: its model cannot start from a displaced string at rest alone.
-        """
-        begins = self.take is None
-        take = self.take = self.take or self._begin()
+    def _continue(self, take: Take) -> None:
         self._find_others(take)
         self._show(take)
         self._listen(take)
         self._advance_lines(take)
         self._measure(take)
-        if begins:
-            self._listener.take_started(take)
-        if take.complete and take.listened.complete and not self._finished:
-            self._finished = True
-            self._listener.take_finished(take, self._errors)
 
     def _begin(self) -> Take:
         request, loaded = self.request, self._load(self.request.preset)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from app.audio.sound import Sound
 from app.instrument.drum_keys import DrumKeys
@@ -11,16 +11,8 @@ from app.playing.key_note import KeyNote
 from app.presets.library import Library
 from app.rendering import BlowRequest, BlowTake
 from app.session.choices import Session
+from app.window.playhead import Playhead
 from engine.strike import Strike
-
-
-@dataclass
-class _Shown:
-    """A motion and the note whose time it follows; without a note it stands at `parked_s`."""
-
-    take: BlowTake | None = None
-    note: KeyNote | None = None
-    parked_s: float = 0.0
 
 
 class Blows:
@@ -35,7 +27,7 @@ class Blows:
     ) -> None:
         self._session, self._library, self._sound, self._submit = session, library, sound, submit
         self._asked: tuple[BlowRequest, KeyNote] | None = None  # the latest blow, rendered or not
-        self._shown = _Shown()
+        self._shown: Playhead[BlowTake] = Playhead()
 
     @property
     def take(self) -> BlowTake | None:
@@ -45,19 +37,12 @@ class Blows:
     @property
     def position_s(self) -> float:
         """The playhead: the time in the shown motion that is heard now, or where it stands."""
-        shown = self._shown
-        if shown.take is None:
-            return 0.0
-        heard_s = shown.parked_s
-        if shown.note is not None:
-            heard_s = max(shown.note.seconds - self._sound.mixer.output_latency_s, 0.0)
-        return min(heard_s, shown.take.seconds)
+        return self._shown.position_s(self._sound.mixer.output_latency_s)
 
     @property
     def moving(self) -> bool:
         """Whether the playhead moves."""
-        note, take = self._shown.note, self._shown.take
-        return note is not None and take is not None and not note.over and note.seconds < take.seconds
+        return self._shown.moving
 
     @property
     def settled(self) -> bool:
@@ -82,7 +67,7 @@ class Blows:
         request = BlowRequest(entry.path, found.modes, strike, choices.seconds, choices.ear)
         self._asked = request, note
         if self._shown.take is not None and request.same_motion(self._shown.take.request):
-            self._shown = _Shown(self._shown.take, note)
+            self._shown = Playhead(self._shown.take, note)
         self._submit(request)
 
     def listen(self) -> None:
@@ -107,7 +92,7 @@ class Blows:
             return False
         note, before = self._asked[1], self._shown
         parked = before.note is None and before.take is not None and before.take.request.strike is take.request.strike
-        self._shown = _Shown(take, None, before.parked_s) if parked else _Shown(take, note)
+        self._shown = Playhead(take, None, before.parked_s) if parked else Playhead(take, note)
         return True
 
     def seek(self, position_s: float) -> None:
@@ -122,4 +107,4 @@ class Blows:
 
     def forget(self) -> None:
         """Another instrument is played."""
-        self._asked, self._shown = None, _Shown()
+        self._asked, self._shown = None, Playhead()

@@ -311,24 +311,19 @@ class Controller(QObject):
             self.window.transport.show_playing(self.performance.playing)
 
     def listening_test(self) -> None:
-        """Opens the ABX test of the chosen pluck; until it is closed nothing else plays."""
-        entry = self.entry
-        if self.session.choices.drums is not None:
-            self.window.notices.report(
-                "The listening test compares model and truth of a plucked string, and drums are played: choose an "
-                "instrument of strings first. The slots A and B compare drums while you play."
-            )
-            return
+        """Opens the ABX test of the chosen pluck, or blow on a drum; until it is closed nothing else plays."""
+        entry, choices, key = self.entry, self.session.choices, self.instruments.drum_key
+        blow = None if key is None else NoteOn(key, choices.velocity, place=self.drum.place)
         if entry is None:
             self.window.notices.report("The listening test needs a preset that can be plucked: choose one first.")
             return
         try:
-            material = material_of(entry, self.session.choices)
+            material = material_of(entry, choices, blow)
         except PresetError as error:
             self.window.notices.report(str(error))
             return
         self.performance.stop()
-        render = partial(self.performance.render_sound, self.session.choices)
+        render = partial(self.performance.render_sound, choices, blow)
         self.performance.hear_dry(True)
         self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window)
         self._abx.finished.connect(self._listening_test_ended)

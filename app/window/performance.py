@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Future
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
 from app.export.sound import Through
-from app.instrument.events import PluckAt
+from app.instrument.events import NoteOn, PluckAt
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
@@ -38,21 +38,12 @@ from app.shared.vocabulary import DIFFERENCE
 from app.window.blows import Blows
 from app.window.main_window import MainWindow
 from app.window.panels import Moment, Panel
+from app.window.playhead import Playhead
 from app.window.render_signals import RenderSignals
 from engine.metrics import ErrorSums
 
 GROWN, NOTICEABLE = 3.0, 0.01  # times the preset's own error, and the least share, from which an error has grown
 PLACED = {"instrument", *PluckedString.model_fields} - {"position"}  # what plucks at ten places depend on
-
-
-@dataclass
-class _Shown:
-    """What the views show: a motion, and the note whose time it follows; without a note it stands at `parked_s`."""
-
-    take: Take | None = None
-    finished: bool = False  # whether the views have its errors
-    note: Note | KeyNote | None = None
-    parked_s: float = 0.0
 
 
 class Performance(QObject):
@@ -65,7 +56,7 @@ class Performance(QObject):
         self._window, self._session, self._library, self._sound = window, session, library, sound
         self._panels = panels
         self._asked: RenderRequest | None = None
-        self._shown = _Shown()
+        self._shown: Playhead[Take] = Playhead()
         self._next_turn: Note | None = None  # of the loop, which waits in the mixer for its frame
         self._waiting_words = self._error_words = ""
         mail = self._mail = RenderSignals()
@@ -122,21 +113,14 @@ class Performance(QObject):
         """The playhead: the time in the shown motion that is heard now, or where it stands."""
         if self._of_drums:
             return self._blows.position_s
-        shown = self._shown
-        if shown.take is None:
-            return 0.0
-        heard_s = shown.parked_s
-        if shown.note is not None:
-            heard_s = max(shown.note.seconds - self._sound.mixer.output_latency_s, shown.note.from_s)
-        return min(max(heard_s, 0.0), shown.take.seconds)
+        return self._shown.position_s(self._sound.mixer.output_latency_s)
 
     @property
     def moving(self) -> bool:
         """Whether the playhead moves."""
         if self._of_drums:
             return self._blows.moving
-        note, take = self._shown.note, self._shown.take
-        return note is not None and take is not None and not note.over and note.seconds < take.seconds
+        return self._shown.moving
 
     @property
     def settled(self) -> bool:
@@ -223,7 +207,7 @@ class Performance(QObject):
             self.notes.choose(asked)
             if asked is None:
                 self._forget_turn()
-                self._shown = _Shown()
+                self._shown = Playhead()
                 self._tell("")
                 self._window.show_growth("")
             else:
@@ -255,11 +239,15 @@ class Performance(QObject):
             return None
         return Through.of(patch, 1.0 if string is None else keys.gain_of(string.parameters))
 
-    def render_sound(self, choices: Choices, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
+    def render_sound(
+        self, choices: Choices, blow: NoteOn | None, rate_hz: int
+    ) -> Future[Mapping[str, NDArray[np.float32]]]:
         """Model and truth of a pluck as they are heard, (frames, channels) by source, rendered in the background.
 
-        `choices.preset` must be in the library.
+        `choices.preset` must be in the library. With a blow, that of the drum that it is on.
         """
+        if blow is not None and choices.patch is not None:
+            return self.notes.render_blow(choices.patch, blow, choices.ear, choices.seconds, rate_hz)
         asked = request_of(choices, self._library)
         assert asked is not None
         return self.notes.render(asked, rate_hz)
@@ -320,7 +308,7 @@ class Performance(QObject):
     def _take_started(self, take: Take) -> None:
         if take is self._shown.take or not self._is_of_chosen(take):  # shown already, or overtaken by the next one
             return
-        self._shown = _Shown(take)
+        self._shown = Playhead(take)
         for panel in self._panels:
             panel.take_started(take)
         self.follow()

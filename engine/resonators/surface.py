@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import j1, jn_zeros, jv, jvp
+from scipy.special import j1, jn_zeros, jv
 
 from engine.resonators.base import Array
 
@@ -40,6 +40,10 @@ class Surface(Protocol):
 
     def density(self, wavenumbers: Array) -> Array:
         """The share of each mode's square at wavenumbers (modes, n) in 1/m, over all directions: ∫ density ds = 1."""
+
+    @property
+    def distinct(self) -> tuple[Numbers, Numbers]:
+        """The modes whose `density` differs from all others', and which of these each mode (modes,) equals."""
 
     def picked(self, index: Numbers) -> Surface:
         """The same with some of the modes."""
@@ -104,18 +108,28 @@ class Circle:
         return found
 
     def density(self, wavenumbers: Array) -> Array:
-        height = 2 / jvp(self.m, self.wavenumber * self.radius_m)[:, None] ** 2  # of the radial part alone
+        height = 2 / self._slope[:, None] ** 2  # of the radial part alone
         found: Array = height * self.radius_m**2 * self._hankel(wavenumbers) ** 2 * wavenumbers
         return found
+
+    @property
+    def distinct(self) -> tuple[Numbers, Numbers]:
+        _, first, place = np.unique(self.wavenumber, return_index=True, return_inverse=True)  # both of a pair
+        return first, place
 
     def picked(self, index: Numbers) -> Circle:
         return Circle(self.radius_m, self.m[index], self.sine[index], self.wavenumber[index])
 
+    @cached_property
+    def _slope(self) -> Array:
+        """J_m'(κa), which is -J_{m+1} at a zero of J_m."""
+        slope: Array = -jv(self.m + 1, self.wavenumber * self.radius_m)
+        return slope
+
     @property
     def _height(self) -> Array:
         """1/√(∫ J² cos² dA / A)."""
-        slope = np.abs(jvp(self.m, self.wavenumber * self.radius_m))
-        height: Array = np.where(self.m == 0, 1.0, math.sqrt(2)) / slope
+        height: Array = np.where(self.m == 0, 1.0, math.sqrt(2)) / np.abs(self._slope)
         return height
 
     def _turned(self, angle: Array) -> Array:
@@ -125,7 +139,7 @@ class Circle:
     def _hankel(self, wavenumbers: Array) -> Array:
         """∫ J_m(κr) J_m(sr) r dr / a², where J_m(κa) = 0; wavenumbers: s, (modes, n)."""
         z, s, m = self.wavenumber[:, None] * self.radius_m, wavenumbers * self.radius_m, self.m[:, None]
-        slope, apart = jvp(m, z), z**2 - s**2
+        slope, apart = self._slope[:, None], z**2 - s**2
         near = np.abs(z - s) < 1e-6 * z
         found: Array = np.where(near, slope**2 / 2, -z * slope * jv(m, s) / np.where(near, 1.0, apart))
         return found
@@ -187,6 +201,11 @@ class Rectangle:
         )
         found: Array = squares * self.area_m2 * wavenumbers / (2 * math.pi)
         return found
+
+    @property
+    def distinct(self) -> tuple[Numbers, Numbers]:
+        every = np.arange(len(self.wavenumber))
+        return every, every
 
     def picked(self, index: Numbers) -> Rectangle:
         return Rectangle(self.length_m, self.width_m, self.m[index], self.n[index], self.wavenumber[index])

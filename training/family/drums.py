@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -292,22 +293,47 @@ def measure_drum(
     ]
 
 
+@dataclass(frozen=True)
+class Window:
+    """Relative squared errors over the surface between two times, by player."""
+
+    start_s: float
+    stop_s: float
+    rel_mse: Mapping[str, float]
+
+
 @torch.inference_mode()
 def motion_errors(
-    struck: StruckDrum, players: Mapping[str, DrumPlayer], rate_hz: int, frames: int
-) -> dict[str, float]:
-    """The relative squared error of each player over the surface and the first frames."""
+    struck: StruckDrum,
+    players: Mapping[str, DrumPlayer],
+    rate_hz: int,
+    frames: int,
+    report: Callable[[float], None] = lambda share: None,
+) -> list[Window]:
+    """The errors of players over the first frames: in all, then in each second."""
     true, weight = true_motion(struck, rate_hz), torch.from_numpy(struck.weight)
     playing = {name: play(struck, rate_hz) for name, play in players.items()}
-    wrong, energy, done = dict.fromkeys(players, 0.0), 0.0, 0
-    while done < frames:
-        count = min(AT_ONCE, frames - done)
-        done += count
-        expected = true(count)
-        energy += float((expected.square() @ weight).sum())
-        for name, more in playing.items():
-            wrong[name] += float(((more(count) - expected).square() @ weight).sum())
-    return {name: _finite(error / energy) for name, error in wrong.items()}
+    wrong: dict[str, list[float]] = {name: [] for name in players}
+    energy: list[float] = []
+    edges = [*range(0, frames, rate_hz), frames]
+    for first, stop in pairwise(edges):
+        for series in (energy, *wrong.values()):
+            series.append(0.0)
+        for begin in range(first, stop, AT_ONCE):
+            count = min(AT_ONCE, stop - begin)
+            expected = true(count)
+            energy[-1] += float((expected.square() @ weight).sum())
+            for name, more in playing.items():
+                wrong[name][-1] += float(((more(count) - expected).square() @ weight).sum())
+            report((begin + count) / frames)
+
+    def window(first: int, stop: int, seconds: slice) -> Window:
+        whole = sum(energy[seconds])
+        errors = {name: _finite(sum(each[seconds]) / whole) if whole else math.nan for name, each in wrong.items()}
+        return Window(first / rate_hz, stop / rate_hz, errors)
+
+    parts = [window(*ends, slice(place, place + 1)) for place, ends in enumerate(pairwise(edges))]
+    return [window(0, frames, slice(None)), *parts]
 
 
 def _finite(error: float) -> float:

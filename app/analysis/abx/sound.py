@@ -41,7 +41,7 @@ class Stimuli:
 
 
 def make_stimuli(sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, volume_db: float = 0.0) -> Stimuli:
-    """Model (A) and truth (B) of a pluck with equal RMS, and faded at their ends, because they are looped.
+    """Model (A) and truth (B) of a pluck or a blow with equal RMS, and faded at their ends, because they are looped.
 
     Args:
         sounds: samples by source, (frames, channels), of one length; ±1 is full scale.
@@ -53,7 +53,7 @@ def make_stimuli(sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, volume
     a, b = (sounds[source].astype(np.float64) for source in SOURCES)
     rms = [math.sqrt(float(np.mean(np.square(samples)))) if samples.size else 0.0 for samples in (a, b)]
     if min(rms) == 0:
-        raise ValueError(f"{SOURCES[rms.index(0)].capitalize()} is silent with this pluck and listening point.")
+        raise ValueError(f"{SOURCES[rms.index(0)].capitalize()} is silent at this listening point.")
     gains = [min(rms) / level for level in rms]
     peak = max(gain * float(np.abs(samples).max()) for gain, samples in zip(gains, (a, b), strict=True))
     peak *= 10 ** (volume_db / 20)

@@ -53,7 +53,7 @@ class TransportBar(QFrame):
         self._loop.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)
         self._loop.toggled.connect(lambda on: self.change_asked.emit("loop", on))
         self._fitted = (False, False, 1.0)  # compact, tight, scale of text
-        self._tight = False
+        self._tight, self._verb = False, ""
         self._groups: list[QHBoxLayout] = []
         self._playing: bool | None = None  # as shown; None after a click, which checks the button by itself
         self._row = row = QHBoxLayout(self)
@@ -115,6 +115,7 @@ class TransportBar(QFrame):
             self._pickup.setCurrentIndex(self._pickup.findData(choices.pickup))
         for part in (*self.areas["pluck"], self._pickup, self._loop):
             part.setEnabled(choices.drums is None)  # they are of a string
+        self._show_verb("Pluck" if choices.drums is None else "Strike")
         self.slots.show_choices(choices)
 
     def show_playing(self, playing: bool) -> None:
@@ -122,20 +123,28 @@ class TransportBar(QFrame):
             return
         self._playing = playing
         self._play.setChecked(playing)
-        words = "■  Stop" if playing else "▶  Pluck"
+        words = "■  Stop" if playing else f"▶  {self._verb}"
         self._play.setText(words[0] if self._tight else words)
+
+    def _show_verb(self, verb: str) -> None:
+        """What the button does with string or drum."""
+        if verb != self._verb:
+            self._verb = verb
+            self._play.setAccessibleName(f"{verb} or stop")
+            self._play.setToolTip(f"{verb} the {'string' if verb == 'Pluck' else 'drum'}, or stop (Space)")
+            self._forget_playing()
+            self.show_playing(self._play.isChecked())
 
     def _forget_playing(self) -> None:
         self._playing = None
 
     def _build_transport(self) -> QVBoxLayout:
-        self._play = QPushButton("▶  Pluck")
-        self._play.setAccessibleName("Pluck or stop")
+        self._play = QPushButton()
         self._play.setObjectName("play")
         self._play.setCheckable(True)
-        self._play.setToolTip("Pluck the string, or stop (Space)")
         self._play.clicked.connect(self._forget_playing)
         self._play.clicked.connect(self.play_asked)
+        self._show_verb("Pluck")
         return filled(QVBoxLayout(), self._play, self._loop)
 
     def _build_pickup(self) -> QVBoxLayout:

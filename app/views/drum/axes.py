@@ -9,9 +9,11 @@ from typing import Literal
 from PySide6.QtCore import QPointF, QRectF
 from PySide6.QtGui import QPainterPath
 
+from app.views.stage import MARGIN_BOTTOM, MARGIN_TOP, MARGIN_X
+
 Shape = Literal["circle", "rectangle", "bar"]
 Place = tuple[float, float]
-MARGIN_X, MARGIN_TOP, MARGIN_BOTTOM, GAP = 54, 38, 40, 36
+GAP = 36  # pixels between two pictures
 RIM = 0.98  # of half a drum: farther out it is not struck, for there nothing moves
 FLATTEST = 0.12  # height of a picture, of its width: a bar is narrower
 

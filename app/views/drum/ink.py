@@ -10,19 +10,18 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPen, QPolygonF
+from PySide6.QtGui import QColor, QImage, QPainter, QPen
 
 from app.session.shown import ShownSource, readable_unit
 from app.views import theme
-from app.views.drum.axes import MARGIN_X, HeadAxes, Place
-from app.views.plots.colour_maps import error_map
+from app.views.drum.axes import HeadAxes, Place
+from app.views.stage import MARGIN_X, paint_labels, paint_mark
 
 COLOURS = 511  # odd: the middle one is rest
 STEPS = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # of a colour scale, in each decade
 LEAST_M = 1e-15  # of a colour scale
 LOOSE = 1.4  # a scale shrinks only where the motion has so much room
 PLACE_RADIUS = 6.0
-FOOT = 8.0
 FOOT_WORDS = 70  # pixels: room on the left of a foot for its words
 
 
@@ -55,16 +54,19 @@ def image_of(picture_m: NDArray[np.float32], scale_m: float) -> QImage:
     """Displacement in colours: amber up, blue down, the panel's colour at rest."""
     half = COLOURS // 2
     index = np.clip(np.rint(picture_m * np.float32(half / scale_m)), -half, half).astype(np.intp) + half
-    colours = np.ascontiguousarray(_colours(theme.PANEL)[index])
+    colours = np.ascontiguousarray(_colours(theme.TRUTH, theme.PANEL, theme.MODEL)[index])
     rows, columns = colours.shape
     return QImage(colours.data, columns, rows, 4 * columns, QImage.Format.Format_RGB32).copy()
 
 
 @lru_cache(maxsize=4)
-def _colours(panel: str) -> NDArray[np.uint32]:
-    """(COLOURS,) as 0xffRRGGBB; `panel` says which theme they are of."""
-    table = error_map().map(np.linspace(0, 1, COLOURS), mode="byte").astype(np.uint32)
-    return np.asarray(0xFF000000 | table[:, 0] << 16 | table[:, 1] << 8 | table[:, 2], np.uint32)
+def _colours(*ends_and_rest: str) -> NDArray[np.uint32]:
+    """(COLOURS,) as 0xffRRGGBB, evenly between the colours of down, rest and up."""
+    colours = [QColor(name) for name in ends_and_rest]
+    stops = np.array([(each.red(), each.green(), each.blue()) for each in colours], np.float64)
+    places = np.linspace(-1, 1, COLOURS)
+    red, green, blue = (np.rint(np.interp(places, (-1, 0, 1), part)).astype(np.uint32) for part in stops.T)
+    return np.asarray(0xFF000000 | red << 16 | green << 8 | blue, np.uint32)
 
 
 def paint_motion(
@@ -125,24 +127,14 @@ def paint_place(painter: QPainter, at: QPointF, clear: bool) -> None:
 
 def paint_listening(painter: QPainter, axes: HeadAxes, points: Mapping[str, float], grabbed: str | None) -> None:
     """The directions that the drum is heard from, as feet below the first picture, with their angles."""
-    one = len(points) == 1
-    painter.setFont(theme.small_font(11))
-    edges = []
     for side, point in points.items():
         x, y = axes.x(0, point), axes.bottom
         painter.setPen(QPen(theme.translucent(theme.GOOD, 190 if side == grabbed else 120), 1))
         painter.drawLine(QLineF(x, y - 8, x, y + 2))
-        painter.setPen(QPen(QColor(theme.TEXT), 1.5) if side == grabbed else Qt.PenStyle.NoPen)
-        painter.setBrush(QColor(theme.GOOD))
-        painter.drawPolygon(QPolygonF([QPointF(x, y + 2), QPointF(x - FOOT, y + 15), QPointF(x + FOOT, y + 15)]))
-        text = f"listen {angle_words(point)}" if one else f"{side[0].upper()}: {angle_words(point)}"
-        edges.append((x, painter.fontMetrics().horizontalAdvance(text) + 2, text))
-    painter.setPen(QColor(theme.GOOD))
-    free = 0.0  # the left one makes room for the right one
-    for x, width, text in sorted(edges):
-        left = min(max(x - width / 2, free), axes.width - width)
-        painter.drawText(QRectF(left, axes.bottom + 16, width, 18), Qt.AlignmentFlag.AlignCenter, text)
-        free = left + width + 8
+        paint_mark(painter, x, y, side == grabbed)
+    names = {side: "listen" if len(points) == 1 else f"{side[0].upper()}:" for side in points}
+    labels = [(axes.x(0, point), f"{names[side]} {angle_words(point)}") for side, point in points.items()]
+    paint_labels(painter, labels, axes.width, axes.bottom)
 
 
 def angle_words(point: float) -> str:

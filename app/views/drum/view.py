@@ -9,14 +9,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QPixmap, QResizeEvent
-from PySide6.QtWidgets import QSizePolicy, QWidget
+from PySide6.QtCore import QPointF, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QWidget
 
-from app.session.shown import DEFAULT_SOURCES, ShownSource
-from app.views import theme
-from app.views.controls.parts import tool_button
-from app.views.drum.axes import MARGIN_X, HeadAxes, Place, Shape
+from app.views.drum.axes import HeadAxes, Place, Shape
 from app.views.drum.ink import (
     HeadFrame,
     angle_words,
@@ -31,11 +28,9 @@ from app.views.drum.ink import (
     paint_scale,
     place_words,
 )
-from app.views.string.ground import paint_backdrop, paint_legend, paint_remark
-from engine.pluck import DEFAULT_LISTEN
+from app.views.stage import StageView
 
-GRAB_PIXELS = 14  # how near a mark counts as on it
-STEP, FINE_STEP = 0.05, 0.01  # of the arrow keys, in half-lengths; the listening point moves by the lesser
+STEP, FINE_STEP = 0.05, 0.01  # of the arrow keys, in half-lengths
 MARK_TIP = "Drag to hear the drum from another side; double-click resets. Shift and arrow keys move it"
 TIPS: dict[str | None, str] = {  # by what the pointer is on
     None: "Click to strike the drum with the velocity of the keys; with Shift as hard as it goes.\n"
@@ -47,48 +42,23 @@ TIPS: dict[str | None, str] = {  # by what the pointer is on
 _Key, _Shift, _Control = Qt.Key, Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
 
 
-class DrumView(QWidget):
+class DrumView(StageView):
     """Places are given from the centre in half-lengths; a `side` of the listener is "left" or "right"."""
 
     struck = Signal(float, float, bool)  # place, and whether as hard as it goes
     place_moved = Signal(float, float)
     place_reset = Signal()
     drum_stepped = Signal(int)  # so many drums up or down
-    listening_point_moved = Signal(str, float)  # side, position
-    listening_point_reset = Signal(str)
-    drag_started = Signal()
-    drag_ended = Signal()
-    motion_toggled = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setMinimumSize(480, 112)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setMouseTracking(True)
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setAccessibleName("Drum")
-        self.setToolTip(TIPS[None])
+        super().__init__("Drum", TIPS[None] or "", parent)
         self._name = ""
         self._shape: Shape = "circle"
         self._sides = (1.0, 1.0)
         self._place: Place = (0.0, 0.0)
         self._frame: HeadFrame | None = None
-        self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}
-        self._warning = ""
-        self._sources: tuple[ShownSource, ...] = DEFAULT_SOURCES
         self._scales_m: dict[str, float] = {}
-        self._drag: str | None = None  # a side
-        self._hovered: str | None = None
-        self._plain = False
-        self._ground_pixmap: QPixmap | None = None
-        self._ground_key: tuple[object, ...] = ()
-        self._toggle = tool_button("Motion", "Motion", "Show the drum in motion; off saves processor time (M)")
-        self._toggle.setObjectName("chip")
-        self._toggle.setParent(self)
-        self._toggle.setCheckable(True)
-        self._toggle.setCursor(Qt.CursorShape.ArrowCursor)
-        self._toggle.clicked.connect(self.motion_toggled)
+        self._add_toggle("Motion", "Show the drum in motion; off saves processor time (M)", self.motion_toggled)
 
     # What is shown
 
@@ -117,25 +87,9 @@ class DrumView(QWidget):
         self._describe()
         self.update()
 
-    def set_warning(self, text: str) -> None:
-        """Why the drum is silent; "" where it is not."""
-        self._warning = text
-        self.update()
-
-    def set_plain(self, plain: bool) -> None:
-        """Draws the drum alone, without legend, scale and time."""
-        self._plain = plain
-        self._toggle.setVisible(not plain)
-        self.update()
-
-    def set_sources(self, sources: tuple[ShownSource, ...]) -> None:
-        """What the slots hold: a picture of each, side by side."""
-        self._sources = sources
-        self.update()
-
     def set_motion(self, shown: bool) -> None:
         """The state of the button; the frames given to `show_frame` should agree with it."""
-        self._toggle.setChecked(shown)
+        self._toggles[0].setChecked(shown)
 
     def show_frame(self, frame: HeadFrame | None) -> None:
         """A moment of the motion; None: at rest."""
@@ -165,7 +119,7 @@ class DrumView(QWidget):
         if event.button() != Qt.MouseButton.LeftButton:
             return
         axes, at = self.axes, event.position()
-        if (side := self._under(at)) is not None:
+        if (side := self._mark_under(at)) is not None:
             self.drag_started.emit()
             self._drag = side
             self.update()
@@ -173,7 +127,7 @@ class DrumView(QWidget):
             self.struck.emit(*place, bool(event.modifiers() & _Shift))
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        side = self._under(event.position())
+        side = self._mark_under(event.position())
         if event.button() == Qt.MouseButton.LeftButton and side is not None:
             self.listening_point_reset.emit(side)
         else:
@@ -198,10 +152,7 @@ class DrumView(QWidget):
         sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key, 0)
         upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key, 0)
         if sideways and held & _Shift:
-            side = "right" if held & _Control else "left"
-            if side in self._listening:
-                moved = self._listening[side] + FINE_STEP * sideways
-                self.listening_point_moved.emit(side, min(max(moved, 0.0), 1.0))
+            self._step_mark(held, sideways)
         elif (sideways or upwards) and not held & _Control:
             step = FINE_STEP if held & _Shift else STEP
             place = self._place[0] + step * sideways, self._place[1] + step * upwards
@@ -210,8 +161,7 @@ class DrumView(QWidget):
         elif upwards:
             self.drum_stepped.emit(upwards)
         elif key == _Key.Key_Delete and held & _Shift:
-            for side in self._listening:
-                self.listening_point_reset.emit(side)
+            self._reset_marks()
         elif key == _Key.Key_Delete:
             self.place_reset.emit()
         else:
@@ -223,7 +173,7 @@ class DrumView(QWidget):
             self.update()
 
     def _hover(self, at: QPointF) -> None:
-        side = self._under(at)
+        side = self._mark_under(at)
         on_drum = side is None and self.axes.place(at) is not None
         shapes = Qt.CursorShape
         self.setCursor(shapes.SizeHorCursor if side else shapes.CrossCursor if on_drum else shapes.ArrowCursor)
@@ -232,28 +182,15 @@ class DrumView(QWidget):
             self._hovered = side
             self.update()
 
-    def _under(self, at: QPointF) -> str | None:
-        """The side whose mark is there."""
-        axes = self.axes
-        if at.y() < axes.bottom - 6:
-            return None
-        near = {side: abs(at.x() - axes.x(0, point)) for side, point in self._listening.items()}
-        side = min(near, key=lambda name: near[name], default=None)
-        return side if side is not None and near[side] < GRAB_PIXELS else None
+    def _mark_x(self, point: float) -> float:
+        return self.axes.x(0, point)
 
     # Painting
-
-    def sizeHint(self) -> QSize:
-        return QSize(1100, 330)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        size = self._toggle.sizeHint()
-        self._toggle.setGeometry(self.width() - MARGIN_X - size.width(), 6, size.width(), theme.px(22))
 
     def paintEvent(self, event: QPaintEvent) -> None:
         axes, frame = self.axes, self._frame
         painter = QPainter(self)
-        painter.drawPixmap(0, 0, self._ground(axes))
+        painter.drawPixmap(0, 0, self._ground_of())
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         pictures: Mapping[str, object] = {} if frame is None else frame.pictures_m
         for head, source in enumerate(self._sources):
@@ -272,33 +209,3 @@ class DrumView(QWidget):
         paint_name(painter, axes, self._name, self._listening)
         if frame is not None and not self._plain:
             paint_caption(painter, axes, frame.caption)
-
-    def _ground(self, axes: HeadAxes) -> QPixmap:
-        """The picture behind the drum, painted again only when something in it changes."""
-        key = (
-            axes,
-            self.devicePixelRatioF(),
-            self._sources,
-            self._warning,
-            self._plain,
-            theme.present,
-            self.hasFocus(),
-        )
-        if self._ground_pixmap is None or self._ground_key != key:
-            pixmap = QPixmap(self.size() * self.devicePixelRatioF() + QSize(1, 1))
-            pixmap.setDevicePixelRatio(self.devicePixelRatioF())
-            pixmap.fill(QColor(theme.BACKGROUND))
-            painter = QPainter(pixmap)
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            paint_backdrop(painter, axes.width, axes.height)
-            if not self._plain:
-                paint_legend(painter, self._sources, self._warning, self._toggle.x() - 14)
-            elif self._warning:
-                paint_remark(painter, axes.width, self._warning)
-            if self.hasFocus():
-                painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
-                painter.setBrush(Qt.BrushStyle.NoBrush)
-                painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
-            painter.end()
-            self._ground_pixmap, self._ground_key = pixmap, key
-        return self._ground_pixmap

@@ -147,6 +147,7 @@ class InstrumentPanel(QFrame):
             self._drums = drums
             self._choice.setEnabled(not drums)
             self._choice.setToolTip(NO_STRINGS if drums else "")
+            self._fold.setText("Drum knobs" if drums else "String knobs")
             self.show_surface(self.surface)
 
     @property

@@ -11,9 +11,7 @@ from pyqtgraph.functions import create_qpolygonf, ndarray_from_qpolygonf
 from PySide6.QtCore import QPointF
 from PySide6.QtGui import QPolygonF
 
-MARGIN_X = 54
-MARGIN_TOP = 38
-MARGIN_BOTTOM = 40
+from app.views.stage import MARGIN_BOTTOM, MARGIN_TOP, MARGIN_X
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What lies behind the string: grid, scale, hatching outside the training range, and the legend above."""
+"""What lies behind the string: grid, scale, and hatching outside the training range."""
 
 from __future__ import annotations
 
@@ -6,17 +6,14 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 from PySide6.QtCore import QLineF, QRectF, Qt
-from PySide6.QtGui import QBrush, QColor, QFontMetrics, QLinearGradient, QPainter, QPen
+from PySide6.QtGui import QBrush, QColor, QPainter, QPen
 
-from app.session.shown import ShownSource
 from app.views import theme
-from app.views.plots.legend import paint_sources
-from app.views.string.axes import MARGIN_X, StringAxes
+from app.views.stage import MARGIN_X
+from app.views.string.axes import StringAxes
 
 LINE_HEIGHT = 15
 HATCHING = 70  # alpha, 0 … 255
-LEGEND_Y = 17.5  # the middle of the line above the string
-LEGEND_SHARE = 0.45  # of that line, which a warning leaves to the legend
 SCALES = ((-1, -0.5, 0, 0.5, 1), (-1, 0, 1), (0,))  # shares of the span, for less and less height
 SCALE_LINE = 13  # pixels between two figures of the scale, at least
 
@@ -30,12 +27,11 @@ class TrainedPlucks:
 
 
 def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks | None, pluck: int | None) -> None:
-    """Paints the gradient and, unless `trained` is None, the grid, the scale and the hatching.
+    """Paints the grid, the scale and the hatching; nothing where `trained` is None.
 
     `pluck`: the end of the string, 0 or 1, that the pluck is nearer to; None while the motion is shown. Only for a
     pluck are amplitudes hatched, which a string in motion all crosses, and words written, which it would cover.
     """
-    paint_backdrop(painter, axes.width, axes.height)
     if trained is None:
         return
     paint_grid(painter, axes)
@@ -44,16 +40,6 @@ def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks | N
         _paint_untrained_positions(painter, axes, trained.position, words=pluck is not None)
     if pluck is not None and trained.amplitude_mm is not None:
         _paint_untrained_amplitudes(painter, axes, trained, pluck)
-
-
-def paint_backdrop(painter: QPainter, width: float, height: float) -> None:
-    """The gradient behind a string or a drum, with a frame."""
-    gradient = QLinearGradient(0, 0, 0, height)
-    gradient.setColorAt(0, QColor(theme.present.ground_top))
-    gradient.setColorAt(1, QColor(theme.present.ground_bottom))
-    painter.setPen(QPen(QColor(theme.LINE), 1))
-    painter.setBrush(gradient)
-    painter.drawRoundedRect(QRectF(0.5, 0.5, width - 1, height - 1), 6, 6)
 
 
 def paint_grid(painter: QPainter, axes: StringAxes) -> None:
@@ -84,31 +70,6 @@ def _paint_scale(painter: QPainter, axes: StringAxes) -> None:
             Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter,
             f"{share * axes.span_mm:+g}" if share else "0 mm",
         )
-
-
-def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: str, right: float) -> None:
-    """Paints the sources and, beside them, the warning, as far as `right` in pixels.
-
-    Where both do not fit, the titles of the sources are cut first, but they keep LEGEND_SHARE of the line.
-    """
-    warned = QFontMetrics(theme.small_font(11)).horizontalAdvance(warning) + 8 if warning else 0
-    room = right - MARGIN_X
-    x = paint_sources(painter, sources, MARGIN_X, LEGEND_Y, MARGIN_X + max(room - warned, LEGEND_SHARE * room))
-    if warning:
-        painter.setPen(QColor(theme.WARNING))
-        painter.setFont(theme.small_font(11))
-        place = QRectF(x, LEGEND_Y - 10, max(0.0, right - x - 8), 20)
-        text = painter.fontMetrics().elidedText(warning, Qt.TextElideMode.ElideRight, int(place.width()))
-        painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
-
-
-def paint_remark(painter: QPainter, width: float, text: str) -> None:
-    """Paints a line in the upper left corner, why nothing is heard."""
-    painter.setPen(QColor(theme.FAINT))
-    painter.setFont(theme.small_font(11))
-    room = width - 2 * MARGIN_X
-    cut = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(room))
-    painter.drawText(QRectF(MARGIN_X, LEGEND_Y - 10, room, 20), Qt.AlignmentFlag.AlignVCenter, cut)
 
 
 def _shade(painter: QPainter, area: QRectF) -> None:

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QLine, QLineF, QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetrics, QLinearGradient, QPainter, QPen, QPolygonF
+from PySide6.QtGui import QColor, QLinearGradient, QPainter, QPen, QPolygonF
 
 from app.analysis.moment import Band, StringFrame
 from app.views import theme
@@ -19,7 +19,6 @@ from app.views.string.ground import paint_grid
 HANDLE_RADIUS = 7.0
 DASH = 4  # pixels
 PIECE, EVERY = 9, 24  # pixels: length and spacing of the pieces of a hidden line that are drawn above the other
-LABEL_GAP = 8  # pixels between the names of two listening points
 MERGED = 2.0  # pixels: of two lines that are nearer, one hides the other
 
 
@@ -173,40 +172,6 @@ def paint_listening_line(painter: QPainter, axes: StringAxes, position: float, g
     painter.setPen(QPen(theme.translucent(theme.GOOD, 190 if grabbed else 120), 1))
     painter.drawLines(_dashes(round(x), round(axes.top), round(axes.bottom)))
     painter.setRenderHint(QPainter.RenderHint.Antialiasing, True)
-
-
-def paint_listening_point(painter: QPainter, axes: StringAxes, position: float, grabbed: bool) -> None:
-    """The foot of its line, below the string."""
-    x = axes.x(position)
-    painter.setPen(QPen(QColor(theme.TEXT), 1.5) if grabbed else Qt.PenStyle.NoPen)
-    painter.setBrush(QColor(theme.GOOD))
-    y = axes.bottom
-    painter.drawPolygon(QPolygonF([QPointF(x, y + 2), QPointF(x - 8, y + 15), QPointF(x + 8, y + 15)]))
-
-
-def paint_listening_labels(painter: QPainter, axes: StringAxes, points: Mapping[str, float]) -> None:
-    """Label -> position, below their feet; two that are near each other make room for one another."""
-    painter.setPen(QColor(theme.GOOD))
-    painter.setFont(theme.small_font(11))
-    for place, text in label_places(painter.fontMetrics(), axes, points):
-        painter.drawText(place, Qt.AlignmentFlag.AlignCenter, text)
-
-
-def label_places(metrics: QFontMetrics, axes: StringAxes, points: Mapping[str, float]) -> list[tuple[QRectF, str]]:
-    """Where each label is written: under its point, but within the picture and beside its neighbour."""
-    texts = sorted((position, f"{label} {position:.2f}") for label, position in points.items())
-    widths = [metrics.horizontalAdvance(text) + 2 for _, text in texts]
-    lefts = [axes.x(position) - width / 2 for (position, _), width in zip(texts, widths, strict=True)]
-    for second in range(1, len(texts)):
-        overlap = max(0.0, lefts[second - 1] + widths[second - 1] + LABEL_GAP - lefts[second])
-        lefts[second - 1] -= overlap / 2
-        lefts[second] += overlap / 2
-    right = lefts[-1] + widths[-1]
-    aside = max(0.0, -lefts[0]) + min(0.0, axes.width - right)
-    return [
-        (QRectF(left + aside, axes.bottom + 16, width, 18), text)
-        for left, width, (_, text) in zip(lefts, widths, texts, strict=True)
-    ]
 
 
 def paint_caption(painter: QPainter, axes: StringAxes, frame: StringFrame) -> None:

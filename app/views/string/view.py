@@ -10,43 +10,34 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal, SignalInstance
+from PySide6.QtCore import QPointF, Qt, Signal
 from PySide6.QtGui import (
-    QColor,
     QKeyEvent,
     QMouseEvent,
     QPainter,
     QPaintEvent,
-    QPen,
     QPixmap,
-    QResizeEvent,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QApplication, QSizePolicy, QToolButton, QWidget
+from PySide6.QtWidgets import QApplication, QWidget
 
 from app.analysis.moment import StringFrame
-from app.session.shown import DEFAULT_SOURCES, ShownSource
-from app.views import theme
-from app.views.controls.parts import tool_button
 from app.views.controls.plain import plain_tip
-from app.views.string.axes import MARGIN_X, StringAxes
-from app.views.string.ground import TrainedPlucks, paint_ground, paint_legend, paint_remark
+from app.views.stage import GRAB_PIXELS, StageView, paint_labels, paint_mark
+from app.views.string.axes import StringAxes
+from app.views.string.ground import TrainedPlucks, paint_ground
 from app.views.string.ink import (
     ShownPluck,
     paint_caption,
     paint_ends,
     paint_envelopes,
     paint_handle,
-    paint_listening_labels,
     paint_listening_line,
-    paint_listening_point,
     paint_motion,
     paint_pluck,
 )
-from engine.pluck import DEFAULT_LISTEN
 
 SPANS_MM = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0)  # the display's half height, chosen to fit
-GRAB_PIXELS = 14  # how near a handle or a marker counts as on it
 FINE = 0.1  # with Shift
 LEAST_DRAGGED_MM = 0.5  # so that a drag that ends on the string's line is heard
 WORDS_HEIGHT = 29  # of the strip above the string: legend, warning and buttons
@@ -63,7 +54,7 @@ TIPS: dict[str | None, str] = {  # by what the pointer is on
 _Key, _Shift, _Control = Qt.Key, Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
 
 
-class StringView(QWidget):
+class StringView(StageView):
     """Positions are shares of the string's length, displacements in mm; a `side` is "left" or "right"."""
 
     pluck_drawn = Signal(float, float)  # position, amplitude: while dragging
@@ -71,59 +62,28 @@ class StringView(QWidget):
     pluck_reset = Signal()
     width_stepped = Signal(float)  # notches of the wheel
     shape_stepped = Signal(int)  # so many shapes on or back
-    listening_point_moved = Signal(str, float)  # side, position
-    listening_point_reset = Signal(str)
-    drag_started = Signal()
-    drag_ended = Signal()
-    motion_toggled = Signal(bool)
     envelope_toggled = Signal(bool)
 
     def __init__(self, parent: QWidget | None = None) -> None:
-        super().__init__(parent)
-        self.setMinimumSize(480, 112)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
-        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
-        self.setMouseTracking(True)
-        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self.setAccessibleName("String")
-        self.setToolTip(TIPS[None])
+        super().__init__("String", TIPS[None] or "", parent)
         self._frame: StringFrame | None = None
         self._pluck = ShownPluck(0.35, 4.0, np.zeros(2))
-        self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}
         self._trained = TrainedPlucks()
-        self._warning = ""
-        self._sources: tuple[ShownSource, ...] = DEFAULT_SOURCES
         self._span_mm = 5.0
-        self._drag: str | None = None  # "pluck" or a side
         self._dragged = (0.0, 0.0)  # position and displacement in mm that the drag has come to, unlimited
         self._dragged_at = QPointF()
         self._pressed_at = QPointF()
         self._on_bare_string = False  # the press was not on a handle or a marker
         self._far = False  # the drag has gone too far from the press to be a click
         self._amplitude_mm = 0.0  # at its beginning
-        self._hovered: str | None = None
         self._on_handle_first = False  # the last press was the first of a series, and on the handle
         self._last_press_ms = -10_000
         self._turned = 0.0  # notches of the wheel towards the next shape
-        self._ground_pixmap: QPixmap | None = None
-        self._ground_key: tuple[object, ...] = ()
         self._backdrop: tuple[object, object, QPixmap] | None = None  # ground, envelopes, and both in one picture
-        self._plain = False
-        self._toggles = (
-            self._toggle("Motion", "Show the string in motion; off saves processor time (M)", self.motion_toggled),
-            self._toggle(
-                "Envelope", "Show how far the string swung within the last second (N)", self.envelope_toggled
-            ),
+        self._add_toggle("Motion", "Show the string in motion; off saves processor time (M)", self.motion_toggled)
+        self._add_toggle(
+            "Envelope", "Show how far the string swung within the last second (N)", self.envelope_toggled
         )
-
-    def _toggle(self, text: str, tip: str, toggled: SignalInstance) -> QToolButton:
-        button = tool_button(text, text, tip)
-        button.setObjectName("chip")
-        button.setParent(self)
-        button.setCheckable(True)
-        button.setCursor(Qt.CursorShape.ArrowCursor)
-        button.clicked.connect(toggled)
-        return button
 
     # What is shown
 
@@ -142,23 +102,6 @@ class StringView(QWidget):
     def set_trained(self, trained: TrainedPlucks) -> None:
         """The training range, outside of which the picture is hatched."""
         self._trained = trained
-        self.update()
-
-    def set_warning(self, text: str) -> None:
-        """Why this pluck is silent, or outside the training range; "" for neither."""
-        self._warning = text
-        self.update()
-
-    def set_plain(self, plain: bool) -> None:
-        """Draws the string alone, bright, without scale, legend, hatching and time."""
-        self._plain = plain
-        for button in self._toggles:
-            button.setVisible(not plain)
-        self.update()
-
-    def set_sources(self, sources: tuple[ShownSource, ...]) -> None:
-        """What the slots hold; the frames given to `show_frame` should have these motions."""
-        self._sources = sources
         self.update()
 
     def set_shown(self, motion: bool, envelope: bool) -> None:
@@ -281,9 +224,7 @@ class StringView(QWidget):
         sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key)
         upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key)
         if sideways is not None and held & _Shift:
-            side = "right" if held & _Control else "left"
-            if side in self._listening:
-                self.listening_point_moved.emit(side, self._listening[side] + 0.01 * sideways)
+            self._step_mark(held, sideways)
         elif sideways is not None and held & _Control:
             self.shape_stepped.emit(sideways)
         elif upwards is not None and held & _Control:
@@ -294,8 +235,7 @@ class StringView(QWidget):
             step_mm = 0.5 * (FINE if held & _Shift else 1.0)
             self.pluck_drawn.emit(self._pluck.position, self._pluck.amplitude_mm + step_mm * upwards)
         elif key == _Key.Key_Delete and held & _Shift:
-            for side in self._listening:
-                self.listening_point_reset.emit(side)
+            self._reset_marks()
         elif key == _Key.Key_Delete:
             self.pluck_reset.emit()
         else:
@@ -316,9 +256,7 @@ class StringView(QWidget):
         """What can be grabbed there: "pluck", a side, or None for the bare string."""
         axes = self._axes()
         if at.y() > axes.bottom - 6:
-            near = {side: abs(at.x() - axes.x(position)) for side, position in self._listening.items()}
-            side = min(near, key=lambda name: near[name], default=None)
-            return side if side is not None and near[side] < GRAB_PIXELS else None
+            return self._mark_under(at)
         handle = self._handle(axes)
         return "pluck" if (at - handle).manhattanLength() < 1.4 * GRAB_PIXELS else None
 
@@ -343,16 +281,8 @@ class StringView(QWidget):
 
     # Painting
 
-    def sizeHint(self) -> QSize:
-        return QSize(1100, 330)
-
-    def resizeEvent(self, event: QResizeEvent) -> None:
-        right = self.width() - MARGIN_X
-        for button in reversed(self._toggles):
-            size = button.sizeHint()
-            right -= size.width()
-            button.setGeometry(right, 6, size.width(), theme.px(22))
-            right -= 6
+    def _mark_x(self, point: float) -> float:
+        return self._axes().x(point)
 
     def paintEvent(self, event: QPaintEvent) -> None:
         self._fit_span()
@@ -370,20 +300,15 @@ class StringView(QWidget):
             grabbed = side in (self._drag, self._hovered)
             paint_listening_line(painter, axes, position, grabbed)
             if below:
-                paint_listening_point(painter, axes, position, grabbed)
+                paint_mark(painter, axes.x(position), axes.bottom, grabbed)
         if below and self._listening:
-            one = len(self._listening) == 1
-            paint_listening_labels(painter, axes, {"listen": self._listening["left"]} if one else self._listening)
+            points = {"listen": self._listening["left"]} if len(self._listening) == 1 else self._listening
+            labels = [(axes.x(position), f"{label} {position:.2f}") for label, position in points.items()]
+            paint_labels(painter, labels, axes.width, axes.bottom)
         grabbed = "pluck" in (self._drag, self._hovered)
         paint_handle(painter, self._handle(axes), self._pluck, self._shows_pluck, grabbed, axes.x(1))
         if self._frame is not None and not self._shows_pluck and not self._plain:
             paint_caption(painter, axes, self._frame)
-
-    @property
-    def _heard_remark(self) -> str:
-        """What sounds instead of the model, for a picture without a legend."""
-        others = (each.title for each in self._sources if each.heard and each.source != "model")
-        return next((f"You hear: {title}" for title in others), "")
 
     @property
     def _heard(self) -> str:
@@ -408,29 +333,15 @@ class StringView(QWidget):
         return self._backdrop[2]
 
     def _ground(self, axes: StringAxes) -> QPixmap:
-        """The picture behind the string, painted again only when something in it changes."""
-        # on which side words would be in the way of the pluck, with the words at its handle
-        pluck = int(self._pluck.position > 0.4) if self._shows_pluck else None
-        chosen = (self._trained, pluck, self._sources, self._warning, self._plain)
-        key = (axes, self.devicePixelRatioF(), *chosen, theme.present, self.hasFocus())
-        if self._ground_pixmap is None or self._ground_key != key:
-            pixmap = QPixmap(self.size() * self.devicePixelRatioF() + QSize(1, 1))  # at 125 % it ends within a pixel
-            pixmap.setDevicePixelRatio(self.devicePixelRatioF())
-            pixmap.fill(QColor(theme.BACKGROUND))
-            painter = QPainter(pixmap)
-            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-            paint_ground(painter, axes, None if self._plain else self._trained, pluck)
-            if not self._plain:
-                paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
-            elif remark := self._warning or self._heard_remark:
-                paint_remark(painter, axes.width, remark)
-            if self.hasFocus():
-                painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
-                painter.setBrush(Qt.BrushStyle.NoBrush)
-                painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
-            painter.end()
-            self._ground_pixmap, self._ground_key = pixmap, key
-        return self._ground_pixmap
+        return self._ground_of(axes, self._trained, self._shown_pluck)
+
+    @property
+    def _shown_pluck(self) -> int | None:
+        """On which side words would be in the way of the pluck, with the words at its handle."""
+        return int(self._pluck.position > 0.4) if self._shows_pluck else None
+
+    def _paint_ground(self, painter: QPainter) -> None:
+        paint_ground(painter, self._axes(), None if self._plain else self._trained, self._shown_pluck)
 
 
 def _span_mm(largest_mm: float, air: float = 1.15) -> float:

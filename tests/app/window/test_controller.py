@@ -14,7 +14,7 @@ from pytestqt.qtbot import QtBot
 from app.instrument.events import NoteOn as MidiNote
 from app.playing.notes import Note
 from app.session.choices import Choices
-from app.views.string.axes import MARGIN_X
+from app.views.stage import MARGIN_X
 from app.window.controller import FRAME_MS, IDLE_MS, Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings, load_settings

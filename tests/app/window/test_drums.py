@@ -143,10 +143,28 @@ def test_space_and_a_click_strike_the_drum_that_was_struck_last(qtbot: QtBot, ki
     qtbot.waitUntil(lambda: note.began)
 
 
-def test_the_listening_test_says_that_it_needs_a_string(kit: Controller) -> None:
+def test_the_listening_test_compares_model_and_truth_of_a_blow(qtbot: QtBot, kit: Controller) -> None:
+    kit.window.instrument.pressed.emit(38, 127)
+    kit._tick()
+    kit.session.update(velocity=100, stereo=True, seconds=0.5)
+    kit.drum._aim((0.2, -0.1))
     kit.listening_test()
-    assert kit._abx is None
-    assert "drums are played" in kit.window.notices.text
+    dialog = kit._abx
+    assert dialog is not None
+    blow = {"instrument": "Concert toms", "key": 38, "velocity": 100, "place": (0.2, -0.1)}
+    assert blow.items() <= dialog._material.pluck.items()
+    assert {"seconds", "listen", "listen_right"} < dialog._material.pluck.keys()
+    assert "amplitude_mm" not in dialog._material.pluck
+    qtbot.waitUntil(lambda: dialog._stimuli is not None, timeout=30_000)
+    made = dialog._stimuli
+    assert made is not None
+    a, b = made.samples["A"], made.samples["B"]
+    assert a.shape == b.shape == (round(0.5 * made.rate_hz), 2)
+    assert np.abs(a).max() > 0.01
+    assert 0 < np.abs(a - b).max() < 1e-3 * np.abs(a).max()
+    kit.window.instrument.pressed.emit(40, 100)  # nothing else plays meanwhile
+    assert 40 not in kit.performance.notes.keys.sounding()
+    dialog.abandon()
 
 
 def test_keys_of_the_computer_play_bars_in_pitch(qtbot: QtBot, played: Controller) -> None:
@@ -242,6 +260,14 @@ def test_knobs_say_which_drum_is_meant_and_which_of_them_do_nothing(kit: Control
     assert knobs.facts._facts["drum"] == "Bass drum 22 inch"
     assert not knobs.knobs["knobs.gauge"].isEnabled()
     assert knobs.knobs["knobs.decay"].isEnabled()
+
+
+def test_buttons_name_what_is_played(kit: Controller) -> None:
+    bar, panel = kit.window.transport, kit.window.instrument
+    assert (bar._play.text(), bar._play.accessibleName()) == ("▶  Strike", "Strike or stop")
+    assert panel._fold.text() == "Drum knobs"
+    kit.patches.choose("steel_string_acoustic")
+    assert (bar._play.text(), panel._fold.text()) == ("▶  Pluck", "String knobs")
 
 
 def test_the_surface_of_strings_shows_the_keys_of_drums(kit: Controller) -> None:

@@ -8,6 +8,8 @@ from random import Random
 from typing import Protocol
 
 from app.instrument.events import Event, NoteOff, NoteOn, TimedEvent
+from app.patches.drums import Drums
+from app.patches.patch import Patch
 from tests.bench.play.midi import Cable
 from tests.bench.play.screen import Screen
 
@@ -19,6 +21,22 @@ HELD_S = 0.03
 SHORTEST_STEP_S = 0.04
 
 
+def octave_of(patch: Patch) -> int:
+    """That to which the computer's keys are transposed so that most of them sound, the nearest to 0."""
+    return max(range(-LOWEST // 12, 5), key=lambda octave: (len(_sounding(patch, octave)), -abs(octave)))
+
+
+def keys_of(patch: Patch) -> tuple[str, ...]:
+    """The computer's keys that sound then."""
+    return tuple(KEYS[place] for place in _sounding(patch, octave_of(patch)))
+
+
+def _sounding(patch: Patch, octave: int) -> list[int]:
+    (low, high), drums = patch.range, patch.strings if isinstance(patch.strings, Drums) else None
+    midi = [(place, LOWEST + 12 * octave + place) for place in range(len(KEYS))]
+    return [place for place, key in midi if low <= key <= high and (drums is None or drums.of_key(key) is not None)]
+
+
 def tap(screen: Screen, key: str) -> float:
     """Presses and releases a key; returns when it was pressed."""
     pressed_s = screen.key(key, True)
@@ -27,14 +45,14 @@ def tap(screen: Screen, key: str) -> float:
     return pressed_s
 
 
-def play(screen: Screen, random: Random, steps_s: Sequence[float]) -> list[float]:
-    """Taps random keys, `steps_s` apart; returns when each was pressed."""
+def play(screen: Screen, random: Random, steps_s: Sequence[float], keys: Sequence[str] = KEYS) -> list[float]:
+    """Taps random keys of these, `steps_s` apart; returns when each was pressed."""
     pressed_s = []
     due_s = time.monotonic()
     for step_s in steps_s:
         due_s += step_s
         time.sleep(max(due_s - time.monotonic(), 0))
-        pressed_s.append(tap(screen, random.choice(KEYS)))
+        pressed_s.append(tap(screen, random.choice(keys)))
     return pressed_s
 
 

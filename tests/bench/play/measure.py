@@ -11,7 +11,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from random import Random
@@ -169,19 +169,19 @@ def measure(
         tell("clicks")
         clicks = click_through(server)
         tell("start")
-        choices = Choices(instrument=patch)
+        choices, keys = Choices(instrument=patch, octave=hands.octave_of(patch)), hands.keys_of(patch)
         settings = Settings(choices=choices, sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
         control = stack.enter_context(steady_tone(server, folder, buffer))
         started_s = time.monotonic()
         process = stack.enter_context(program.app(folder, settings, server, screen))
         window, window_s = program.open_window(screen, process)
-        program.try_keys(screen, recorded, process, started_s)
+        program.try_keys(screen, recorded, process, started_s, keys[0])
         recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S)
-        played = [_phase(screen, server, recorded, process, random, seconds, rate_hz, b, tell) for b in busy]
+        played = [_phase(screen, server, recorded, process, random, seconds, rate_hz, b, keys, tell) for b in busy]
         tell("idle")
         idle = _idle(recorded, process)
         tell("picture")
-        seen = picture_lags(screen, recorded, PICTURES, hands.KEYS, STOP)
+        seen = picture_lags(screen, recorded, PICTURES, keys, STOP)
         size = screen.size(window)
         time.sleep(0.5)
         tell("analysis")
@@ -222,6 +222,7 @@ def _phase(
     seconds: float,
     rate_hz: float,
     busy: bool,
+    keys: Sequence[str],
     tell: Callable[[str], None],
 ) -> _Played:
     beside = " beside a busy process" if busy else ""
@@ -234,7 +235,7 @@ def _phase(
         singles_s = []
         for _ in range(SINGLES):
             time.sleep(QUIET_S + random.uniform(0, 0.1))  # at random offsets from the device's blocks
-            singles_s.append(hands.tap(screen, random.choice(hands.KEYS)))
+            singles_s.append(hands.tap(screen, random.choice(keys)))
             time.sleep(RINGS_S)
             hands.tap(screen, STOP)
         time.sleep(QUIET_S)
@@ -243,7 +244,7 @@ def _phase(
         for _ in range(HOLDING_LOOKS):
             holding.look(server)
         before_s, before_cpu_s = time.monotonic(), _cpu_s(process)
-        keys_s = hands.play(screen, random, hands.steady(random, rate_hz, seconds))
+        keys_s = hands.play(screen, random, hands.steady(random, rate_hz, seconds), keys)
         cores = (_cpu_s(process) - before_cpu_s) / (time.monotonic() - before_s)
         time.sleep(analysis.SOUNDS_S)
     return _Played(busy, load, singles_s, holding.held_s, keys_s, cores)

@@ -69,10 +69,16 @@ def open_window(screen: Screen, process: subprocess.Popen[bytes]) -> tuple[Any, 
     return window, shown_s
 
 
-def try_keys(screen: Screen, recorded: Recording, process: subprocess.Popen[bytes], started_s: float) -> None:
+def try_keys(
+    screen: Screen,
+    recorded: Recording,
+    process: subprocess.Popen[bytes],
+    started_s: float,
+    key: str = hands.KEYS[0],
+) -> None:
     deadline_s = time.monotonic() + START_PATIENCE_S
     while True:
-        hands.tap(screen, hands.KEYS[0])
+        hands.tap(screen, key)
         if recorded.wait_for_sound(started_s, TRY_EVERY_S):
             return
         if process.poll() is not None or time.monotonic() > deadline_s:

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 import torch
 
-from engine.resonators.drum import DrumParameters
+from engine.resonators import air
+from engine.resonators.drum import DrumParameters, DrumShape
+from engine.resonators.surface import Circle
 from engine.strike import Mallet, Strike, pulse_spectrum
 from engine.truth import ModalState, SplittingSolver, solve_dop853
 
@@ -61,6 +63,18 @@ def test_tension_of_the_stretch_is_bergers() -> None:
 @pytest.mark.parametrize("mode", MEASURED_HZ)
 def test_air_loads_a_single_head_as_measured(mode: tuple[int, int]) -> None:
     assert lowest(HEAD)[mode] == pytest.approx(MEASURED_HZ[mode], rel=0.05)
+
+
+@pytest.mark.parametrize("shape", ["circle", "rectangle", "bar"])
+def test_the_integral_of_the_air_has_converged(shape: DrumShape, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And both modes of a pair, which share it, have the mass that each would have alone."""
+    drum = replace(TOM, shape=shape, width_m=0.33 if shape == "circle" else 0.2, air_kg_m3=1.2)
+    few = drum.modes(1_000)
+    monkeypatch.setattr(air, "POINTS", 8 * air.POINTS)
+    many = drum.modes(1_000)
+    np.testing.assert_allclose(few.omega, many.omega, rtol=1e-6)
+    monkeypatch.setattr(Circle, "distinct", property(lambda self: (np.arange(len(self.m)),) * 2))
+    np.testing.assert_allclose(drum.modes(1_000).omega, many.omega, rtol=1e-12)
 
 
 def test_monopoles_radiate_most() -> None:

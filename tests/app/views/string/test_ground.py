@@ -8,9 +8,9 @@ import pytest
 from PySide6.QtGui import QFont, QFontMetrics, QImage, QPainter
 from pytestqt.qtbot import QtBot
 
+from app.views.stage import LABEL_GAP, label_places
 from app.views.string.axes import StringAxes
 from app.views.string.ground import TrainedPlucks, paint_ground, scale
-from app.views.string.ink import LABEL_GAP, label_places
 
 
 class Recorder(QPainter):
@@ -50,8 +50,9 @@ def test_the_scale_has_as_many_figures_as_there_is_height_for(qtbot: QtBot, heig
 @pytest.mark.parametrize("points", [(0.10, 0.15), (0.15, 0.10), (0.0, 0.01), (0.99, 1.0), (0.5, 0.5), (0.2, 0.8)])
 def test_the_names_of_two_listening_points_do_not_cover_each_other(qtbot: QtBot, points: tuple[float, float]) -> None:
     axes = StringAxes(560, 200, 5.0)
-    places = label_places(QFontMetrics(QFont()), axes, dict(zip(("left", "right"), points, strict=True)))
-    assert {text for _, text in places} == {f"left {points[0]:.2f}", f"right {points[1]:.2f}"}
+    marks = [(axes.x(point), f"{name} {point:.2f}") for name, point in zip(("left", "right"), points, strict=True)]
+    places = label_places(QFontMetrics(QFont()), marks, axes.width, axes.bottom)
+    assert {text for _, text in places} == {text for _, text in marks}
     for (before, _), (after, _) in pairwise(places):
         assert after.left() >= before.right() + LABEL_GAP - 0.01
     assert all(place.left() >= 0 and place.right() <= axes.width for place, _ in places)

@@ -1,0 +1,104 @@
+"""A motion that the worker renders, block by block: the frame of a pluck's and of a blow's job."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from concurrent.futures import Executor
+from typing import Generic, TypeVar
+
+from app.rendering.loaded import Loaded
+from app.rendering.subject import Subject
+
+Request = TypeVar("Request")
+Made = TypeVar("Made")
+
+
+class Rendering(ABC, Generic[Request, Made]):
+    """Renders a request; `advance` does the next block of it.
+
+    Args:
+        load: returns a preset's model and truth; raises PresetError.
+        helper: another thread, so that two sources are rendered at the same time.
+
+    Attributes:
+        take: the result, which grows; None before the first block.
+    """
+
+    def __init__(self, request: Request, load: Callable[[Subject], Loaded], helper: Executor) -> None:
+        self.request = request
+        self.take: Made | None = None
+        self._load, self._helper = load, helper
+        self._finished = False  # whether the listener has been called for it
+        self._begun_s = time.monotonic()
+
+    def ask_again(self, request: Request) -> None:
+        """Takes a request for the same motion: see `same_motion` for what may differ."""
+        self.request = request
+
+    def announce(self) -> None:
+        """Reports again what there is: the window may have shown another motion in between."""
+        if self.take is not None:
+            self._report_started(self.take)
+            if self._finished:
+                self._report_finished(self.take)
+
+    @property
+    def age_s(self) -> float:
+        """Seconds since the request."""
+        return time.monotonic() - self._begun_s
+
+    @property
+    def rendered_s(self) -> float:
+        """Seconds of the motion that are rendered."""
+        return 0.0 if self.take is None else self._seconds_of(self.take)
+
+    @property
+    def idle(self) -> bool:
+        """Whether there is nothing left to do."""
+        return self.take is not None and self._finished and self._satisfied(self.take)
+
+    def advance(self) -> None:
+        """Renders a block of each source.
+
+        Raises:
+            PresetError: the preset cannot be used.
+            ValueError: its model cannot start so.
+        """
+        begins = self.take is None
+        take = self.take = self.take or self._begin()
+        self._continue(take)
+        if begins:
+            self._report_started(take)
+        if not self._finished and self._complete(take):
+            self._finished = True
+            self._report_finished(take)
+
+    @abstractmethod
+    def _begin(self) -> Made:
+        """What grows from now on."""
+
+    @abstractmethod
+    def _continue(self, take: Made) -> None:
+        """The next block of it."""
+
+    @abstractmethod
+    def _complete(self, take: Made) -> bool:
+        """Whether motion, signals and errors are all there, for the first time."""
+
+    @abstractmethod
+    def _satisfied(self, take: Made) -> bool:
+        """Whether a complete one is as the latest request has it."""
+
+    @abstractmethod
+    def _seconds_of(self, take: Made) -> float:
+        """How much of the motion is rendered."""
+
+    @abstractmethod
+    def _report_started(self, take: Made) -> None:
+        """To the listener."""
+
+    @abstractmethod
+    def _report_finished(self, take: Made) -> None:
+        """To the listener."""

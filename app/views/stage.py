@@ -1,0 +1,238 @@
+"""What the pictures of a string and of a drum share: backdrop, legend, buttons, and marks of listening points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt, Signal, SignalInstance
+from PySide6.QtGui import (
+    QColor,
+    QFontMetrics,
+    QLinearGradient,
+    QPainter,
+    QPen,
+    QPixmap,
+    QPolygonF,
+    QResizeEvent,
+)
+from PySide6.QtWidgets import QSizePolicy, QToolButton, QWidget
+
+from app.session.shown import DEFAULT_SOURCES, ShownSource
+from app.views import theme
+from app.views.controls.parts import tool_button
+from app.views.plots.legend import paint_sources
+from engine.pluck import DEFAULT_LISTEN
+
+MARGIN_X, MARGIN_TOP, MARGIN_BOTTOM = 54, 38, 40  # pixels around the picture
+LEGEND_Y = 17.5  # the middle of the line above the picture
+LEGEND_SHARE = 0.45  # of that line, which a warning leaves to the legend
+GRAB_PIXELS = 14  # how near a mark counts as on it
+STEP = 0.01  # of a listening point, for a key
+FOOT = 8.0  # pixels: half the width of a mark
+LABEL_GAP = 8  # pixels between the words of two marks
+
+
+class StageView(QWidget):
+    """A picture above the decks. A `side` of the listener is "left" or "right", its points are 0 … 1 across."""
+
+    listening_point_moved = Signal(str, float)  # side, position
+    listening_point_reset = Signal(str)
+    drag_started = Signal()
+    drag_ended = Signal()
+    motion_toggled = Signal(bool)
+
+    def __init__(self, name: str, tip: str, parent: QWidget | None) -> None:
+        super().__init__(parent)
+        self.setMinimumSize(480, 112)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setMouseTracking(True)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self.setAccessibleName(name)
+        self.setToolTip(tip)
+        self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}
+        self._warning = ""
+        self._sources: tuple[ShownSource, ...] = DEFAULT_SOURCES
+        self._drag: str | None = None  # a side, or what else is dragged
+        self._hovered: str | None = None
+        self._plain = False
+        self._ground_pixmap: QPixmap | None = None
+        self._ground_key: tuple[object, ...] = ()
+        self._toggles: list[QToolButton] = []
+
+    def _add_toggle(self, text: str, tip: str, toggled: SignalInstance) -> None:
+        button = tool_button(text, text, tip)
+        button.setObjectName("chip")
+        button.setParent(self)
+        button.setCheckable(True)
+        button.setCursor(Qt.CursorShape.ArrowCursor)
+        button.clicked.connect(toggled)
+        self._toggles.append(button)
+
+    # What is shown
+
+    def set_warning(self, text: str) -> None:
+        """Why there is no sound, or what is wrong with it; "" for neither."""
+        self._warning = text
+        self.update()
+
+    def set_plain(self, plain: bool) -> None:
+        """Draws string or drum alone, without scale, legend and time."""
+        self._plain = plain
+        for button in self._toggles:
+            button.setVisible(not plain)
+        self.update()
+
+    def set_sources(self, sources: tuple[ShownSource, ...]) -> None:
+        """What the slots hold; the frames given to `show_frame` should have these motions."""
+        self._sources = sources
+        self.update()
+
+    # Marks of listening points
+
+    def _mark_x(self, point: float) -> float:
+        """Where the mark of a listening point is, in pixels."""
+        raise NotImplementedError
+
+    def _mark_under(self, at: QPointF) -> str | None:
+        """The side whose mark is there."""
+        if at.y() < self.height() - MARGIN_BOTTOM - 6:
+            return None
+        near = {side: abs(at.x() - self._mark_x(point)) for side, point in self._listening.items()}
+        side = min(near, key=lambda name: near[name], default=None)
+        return side if side is not None and near[side] < GRAB_PIXELS else None
+
+    def _step_mark(self, held: Qt.KeyboardModifier, steps: int) -> None:
+        """Moves the left mark, with Ctrl the right one."""
+        side = "right" if held & Qt.KeyboardModifier.ControlModifier else "left"
+        if side in self._listening:
+            self.listening_point_moved.emit(side, min(max(self._listening[side] + STEP * steps, 0.0), 1.0))
+
+    def _reset_marks(self) -> None:
+        for side in self._listening:
+            self.listening_point_reset.emit(side)
+
+    # Painting
+
+    def sizeHint(self) -> QSize:
+        return QSize(1100, 330)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:
+        right = self.width() - MARGIN_X
+        for button in reversed(self._toggles):
+            size = button.sizeHint()
+            right -= size.width()
+            button.setGeometry(right, 6, size.width(), theme.px(22))
+            right -= 6
+
+    @property
+    def _heard_remark(self) -> str:
+        """What sounds instead of the model, for a picture without a legend."""
+        others = (each.title for each in self._sources if each.heard and each.source != "model")
+        return next((f"You hear: {title}" for title in others), "")
+
+    def _paint_ground(self, painter: QPainter) -> None:
+        """What lies behind the motion, on the backdrop."""
+
+    def _ground_of(self, *chosen: object) -> QPixmap:
+        """The picture behind the motion, painted again only when something in it changes, as `chosen`."""
+        key = (
+            self.size(),
+            self.devicePixelRatioF(),
+            self._sources,
+            self._warning,
+            self._plain,
+            theme.present,
+            self.hasFocus(),
+            *chosen,
+        )
+        if self._ground_pixmap is None or self._ground_key != key:
+            pixmap = QPixmap(self.size() * self.devicePixelRatioF() + QSize(1, 1))  # at 125 % it ends within a pixel
+            pixmap.setDevicePixelRatio(self.devicePixelRatioF())
+            pixmap.fill(QColor(theme.BACKGROUND))
+            painter = QPainter(pixmap)
+            painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+            paint_backdrop(painter, self.width(), self.height())
+            self._paint_ground(painter)
+            if not self._plain:
+                paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
+            elif remark := self._warning or self._heard_remark:
+                paint_remark(painter, self.width(), remark)
+            if self.hasFocus():
+                painter.setPen(QPen(theme.translucent(theme.TEXT, 150), 1.5))
+                painter.setBrush(Qt.BrushStyle.NoBrush)
+                painter.drawRoundedRect(QRectF(self.rect()).adjusted(1, 1, -1, -1), 6, 6)
+            painter.end()
+            self._ground_pixmap, self._ground_key = pixmap, key
+        return self._ground_pixmap
+
+
+def paint_backdrop(painter: QPainter, width: float, height: float) -> None:
+    """The gradient behind a string or a drum, with a frame."""
+    gradient = QLinearGradient(0, 0, 0, height)
+    gradient.setColorAt(0, QColor(theme.present.ground_top))
+    gradient.setColorAt(1, QColor(theme.present.ground_bottom))
+    painter.setPen(QPen(QColor(theme.LINE), 1))
+    painter.setBrush(gradient)
+    painter.drawRoundedRect(QRectF(0.5, 0.5, width - 1, height - 1), 6, 6)
+
+
+def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: str, right: float) -> None:
+    """Paints the sources and, to their right, the warning, as far as `right` in pixels.
+
+    Where both do not fit, the titles of the sources are cut first, but they keep LEGEND_SHARE of the line.
+    """
+    warned = QFontMetrics(theme.small_font(11)).horizontalAdvance(warning) + 8 if warning else 0
+    room = right - MARGIN_X
+    x = paint_sources(painter, sources, MARGIN_X, LEGEND_Y, MARGIN_X + max(room - warned, LEGEND_SHARE * room))
+    if warning:
+        painter.setPen(QColor(theme.WARNING))
+        painter.setFont(theme.small_font(11))
+        place = QRectF(x, LEGEND_Y - 10, max(0.0, right - x - 8), 20)
+        text = painter.fontMetrics().elidedText(warning, Qt.TextElideMode.ElideRight, int(place.width()))
+        painter.drawText(place, Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter, text)
+
+
+def paint_remark(painter: QPainter, width: float, text: str) -> None:
+    """Paints a line in the upper left corner, why nothing is heard."""
+    painter.setPen(QColor(theme.FAINT))
+    painter.setFont(theme.small_font(11))
+    room = width - 2 * MARGIN_X
+    cut = painter.fontMetrics().elidedText(text, Qt.TextElideMode.ElideRight, int(room))
+    painter.drawText(QRectF(MARGIN_X, LEGEND_Y - 10, room, 20), Qt.AlignmentFlag.AlignVCenter, cut)
+
+
+def paint_mark(painter: QPainter, x: float, bottom: float, grabbed: bool) -> None:
+    """The foot of a listening point, below the picture."""
+    painter.setPen(QPen(QColor(theme.TEXT), 1.5) if grabbed else Qt.PenStyle.NoPen)
+    painter.setBrush(QColor(theme.GOOD))
+    painter.drawPolygon(
+        QPolygonF([QPointF(x, bottom + 2), QPointF(x - FOOT, bottom + 15), QPointF(x + FOOT, bottom + 15)])
+    )
+
+
+def paint_labels(painter: QPainter, marks: Sequence[tuple[float, str]], width: float, bottom: float) -> None:
+    """Words below the feet at these x; two that are near each other make room for one another."""
+    painter.setPen(QColor(theme.GOOD))
+    painter.setFont(theme.small_font(11))
+    for place, text in label_places(painter.fontMetrics(), marks, width, bottom):
+        painter.drawText(place, Qt.AlignmentFlag.AlignCenter, text)
+
+
+def label_places(
+    metrics: QFontMetrics, marks: Sequence[tuple[float, str]], width: float, bottom: float
+) -> list[tuple[QRectF, str]]:
+    """Where each label is written: under its mark, but within `width` and clear of its neighbour."""
+    texts = sorted(marks)
+    widths = [metrics.horizontalAdvance(text) + 2 for _, text in texts]
+    lefts = [x - own / 2 for (x, _), own in zip(texts, widths, strict=True)]
+    for second in range(1, len(texts)):
+        overlap = max(0.0, lefts[second - 1] + widths[second - 1] + LABEL_GAP - lefts[second])
+        lefts[second - 1] -= overlap / 2
+        lefts[second] += overlap / 2
+    right = lefts[-1] + widths[-1]
+    aside = max(0.0, -lefts[0]) + min(0.0, width - right)
+    return [
+        (QRectF(left + aside, bottom + 16, own, 18), text)
+        for left, own, (_, text) in zip(lefts, widths, texts, strict=True)
+    ]

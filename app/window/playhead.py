@@ -1,0 +1,41 @@
+"""The motion that is shown and the note whose time it follows: where the playhead stands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+from app.playing.key_note import KeyNote
+from app.playing.note import Note
+from app.rendering import BlowTake, Take
+
+Shown = TypeVar("Shown", Take, BlowTake)
+
+
+@dataclass
+class Playhead(Generic[Shown]):
+    """A motion and the note whose time it follows; without a note it stands at `parked_s`.
+
+    Attributes:
+        finished: whether the views have its errors.
+    """
+
+    take: Shown | None = None
+    note: Note | KeyNote | None = None
+    parked_s: float = 0.0
+    finished: bool = False
+
+    def position_s(self, latency_s: float) -> float:
+        """The time in the motion that is heard now, or where it stands; `latency_s`: of the output."""
+        if self.take is None:
+            return 0.0
+        heard_s = self.parked_s
+        if self.note is not None:
+            heard_s = max(self.note.seconds - latency_s, self.note.from_s)
+        return min(max(heard_s, 0.0), self.take.seconds)
+
+    @property
+    def moving(self) -> bool:
+        """Whether it moves."""
+        note, take = self.note, self.take
+        return note is not None and take is not None and not note.over and note.seconds < take.seconds
