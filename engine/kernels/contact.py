@@ -35,7 +35,7 @@ def _mixed(number: int) -> int:
     mixed = np.uint64(number) * np.uint64(0x9E3779B97F4A7C15)
     mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
     mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return np.int64(mixed ^ (mixed >> np.uint64(31)))
+    return int(np.int64(mixed ^ (mixed >> np.uint64(31))))
 
 
 @njit(**COMPILED)
@@ -130,11 +130,11 @@ def sound(player_address: int, mixer_address: int) -> None:
         noise = of.PLAYER_NOISES + number * of.NOISE_SLOTS
         if players[noise + of.NOISE_LEFT] == 0 or players[noise + of.NOISE_FRAME] >= now + at.QUANTUM:
             continue
-        begin, source = 0, before
+        begin, gain_from = 0, before
         if players[noise + of.NOISE_DONE] == 0:
-            begin, source = max(0, players[noise + of.NOISE_FRAME] - now), gain
+            begin, gain_from = max(0, players[noise + of.NOISE_FRAME] - now), gain
         end = min(at.QUANTUM, begin + players[noise + of.NOISE_LEFT])
-        _run(player, players, noise, begin, end, source, gain, mix)
+        _run(player, players, noise, begin, end, gain_from, gain, mix)
         players[noise + of.NOISE_LEFT] -= end - begin
         stops = players[noise + of.NOISE_STOPS]
         if stops > 0:
