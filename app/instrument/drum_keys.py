@@ -12,11 +12,12 @@ from functools import lru_cache
 import numpy as np
 
 from app.instrument.effects import Response, body_response
-from app.instrument.loudness import GAIN_RANGE_DB, HIGHEST_PEAK_DB, PART_S, REFERENCE_VELOCITY, WANTED_DB, k_weight
+from app.instrument.loudness import GAIN_RANGE_DB, HIGHEST_PEAK_DB, PART_S, WANTED_DB, k_weight
 from app.patches.drums import Drums, PlayedDrum
 from app.patches.patch import VELOCITIES, Patch
 from app.patches.tuning import Tuning
 from engine.kernels import playing_layout as of
+from engine.kernels.playing_layout import REFERENCE_VELOCITY
 from engine.resonators.base import Array
 from engine.resonators.drum import DrumModes, DrumParameters
 from engine.resonators.surface import Circle

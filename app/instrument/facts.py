@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from app.instrument.strings import KeyString, Strings
+from app.instrument.strings import KeyString, Strings, decay_rates
 from app.patches.drums import PlayedDrum
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
@@ -23,11 +23,11 @@ class Figure:
     """What a knob of the string changes, as it is measured on one.
 
     Attributes:
-        of: the figure of a string.
+        of: the figure of a string of a patch.
         falls: whether it falls while the knob rises.
     """
 
-    of: Callable[[StringParameters], float]
+    of: Callable[[StringParameters, Patch], float]
     falls: bool = False
 
 
@@ -36,20 +36,20 @@ def bright_mode(string: StringParameters) -> int:
     return max(1, round(BRIGHT_HZ * math.tau / string.undamped_frequency(1)))
 
 
-def t60_s(string: StringParameters, mode: int) -> float:
-    """How long a mode takes to fall by 60 dB."""
-    return math.log(1000) / max(string.decay_rate(mode), SLOWEST)
+def t60_s(string: StringParameters, mode: int, patch: Patch) -> float:
+    """How long a mode takes to fall by 60 dB, by the string's own losses."""
+    return math.log(1000) / max(float(decay_rates(patch, string, mode)[-1]), SLOWEST)
 
 
 FIGURES: Mapping[str, Figure] = {  # by the field of the patch
-    "knobs.tension": Figure(lambda string: string.tension_n),
-    "knobs.length": Figure(lambda string: 1000 * string.length_m),
-    "knobs.gauge": Figure(lambda string: 2000 * math.sqrt(string.area_m2 / math.pi)),
-    "knobs.density": Figure(lambda string: string.density_kg_m3),
-    "knobs.modulus": Figure(lambda string: string.youngs_modulus_pa / 1e9),
-    "knobs.stiffness": Figure(inharmonicity),
-    "knobs.decay": Figure(lambda string: t60_s(string, 1), falls=True),
-    "knobs.brightness_decay": Figure(lambda string: t60_s(string, bright_mode(string)), falls=True),
+    "knobs.tension": Figure(lambda string, _: string.tension_n),
+    "knobs.length": Figure(lambda string, _: 1000 * string.length_m),
+    "knobs.gauge": Figure(lambda string, _: 2000 * math.sqrt(string.area_m2 / math.pi)),
+    "knobs.density": Figure(lambda string, _: string.density_kg_m3),
+    "knobs.modulus": Figure(lambda string, _: string.youngs_modulus_pa / 1e9),
+    "knobs.stiffness": Figure(lambda string, _: inharmonicity(string)),
+    "knobs.decay": Figure(lambda string, patch: t60_s(string, 1, patch), falls=True),
+    "knobs.brightness_decay": Figure(lambda string, patch: t60_s(string, bright_mode(string), patch), falls=True),
 }
 
 
@@ -74,11 +74,10 @@ def facts_of_drum(played: PlayedDrum) -> dict[str, str]:
     return {"drum": played.name, "key": note_name(played.note), "size": size, "tension": tension}
 
 
-def figures_of(string: StringParameters) -> dict[str, str]:
-    """The figures of a string with their units, by field."""
-    return {
-        field: reported(figure.of(string), OF_PATCHES[field].figure_unit or "") for field, figure in FIGURES.items()
-    }
+def figures_of(string: StringParameters, patch: Patch) -> dict[str, str]:
+    """The figures of a patch's string with their units, by field."""
+    units = {field: OF_PATCHES[field].figure_unit or "" for field in FIGURES}
+    return {field: reported(figure.of(string, patch), units[field]) for field, figure in FIGURES.items()}
 
 
 def reported(figure: float, unit: str) -> str:
@@ -115,6 +114,6 @@ def knob_for(patch: Patch, key: tuple[int, int | None], field: str, wanted: floa
         else:
             if found is None:
                 raise ValueError(f"key {key[0]} of {patch.name} is silent; choose another")
-            above = (figure.of(found.parameters) > wanted) != figure.falls
+            above = (figure.of(found.parameters, turned) > wanted) != figure.falls
         low, high = (low, middle) if above else (middle, high)
     return math.sqrt(low * high)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKeys
-from app.instrument.strings import MOST_MODES, KeyString, Strings
+from app.instrument.strings import MOST_MODES, KeyString, Strings, decay_rates
 from app.patches.drums import Drums
 from app.patches.fields import HIGHEST_KEY
 from app.patches.patch import VELOCITIES, Patch
@@ -55,7 +55,7 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
             continue
         if string is not None:
             pulled = np.minimum(string.shortened, LARGEST_AMPLITUDE_MM / amplitudes_mm)
-            found[key] = _of_string(string, modal_m * pulled[:, None])
+            found[key] = _of_string(patch, string, modal_m * pulled[:, None])
     found.setflags(write=False)
     return found
 
@@ -73,10 +73,10 @@ def _of_drums(patch: Patch) -> NDArray[np.float64]:
     return found
 
 
-def _of_string(string: KeyString, modal_m: NDArray[np.float64]) -> NDArray[np.float64]:
+def _of_string(patch: Patch, string: KeyString, modal_m: NDArray[np.float64]) -> NDArray[np.float64]:
     """The glides (plucks,) of plucks with these modal amplitudes, (plucks, at least the string's modes)."""
     parameters, modes = string.parameters, string.modes
-    decayed = 2 * START_S * parameters.decay_rates(modes)
+    decayed = 2 * START_S * decay_rates(patch, parameters, modes)
     decayed = np.maximum(decayed, 1e-9)  # a string may be without damping
     squares = (modal_m[:, :modes] * parameters.wavenumbers(modes)) ** 2 * (-np.expm1(-decayed) / decayed)
     coupling = float(parameters.tension_coupling(1)[0]) / parameters.undamped_frequency(1) ** 2

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from app.instrument.effects import Response, body_response
-from app.instrument.loudness import HIGHEST_PEAK_DB, REFERENCE_VELOCITY, gain_of, peak_db
+from app.instrument.loudness import HIGHEST_PEAK_DB, gain_of, peak_db
 from app.instrument.strings import KeyString, Strings
 from app.patches.drums import Drums
 from app.patches.patch import Patch
-from engine.kernels.playing_layout import HIGHEST_SIGMA
+from engine.kernels.playing_layout import HIGHEST_SIGMA, REFERENCE_VELOCITY
 from engine.pluck import LARGEST_AMPLITUDE_MM, Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Resonator

@@ -22,7 +22,6 @@ PART_S = 0.4  # of the note: a loudness meter's block
 WANTED_DB = -29.0
 HIGHEST_PEAK_DB = WANTED_DB + 15.0  # of such a note of any key
 PEAK_BLOCKS = 54  # blocks of 54 frames: 60 ms
-REFERENCE_VELOCITY = 100
 GAIN_RANGE_DB = (WANTED_DB - 6.0, WANTED_DB + 66.0)
 # BS.1770: the shelf and the high-pass as analogue filters of second order
 _SHELF_HZ, _SHELF_DB, _SHELF_Q = 1681.97, 4.0, 0.7072

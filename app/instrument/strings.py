@@ -15,6 +15,7 @@ from app.patches.drums import Drums
 from app.patches.patch import Fretted, Knobs, Patch, StringSet
 from app.patches.tuning import Tuning
 from engine.kernels.playing_layout import HIGHEST_HZ, MOST_MODES, MOST_SLACKENED
+from engine.resonators.losses import Losses
 from engine.resonators.string import StringParameters
 
 HIGHEST_FRET = 24
@@ -174,3 +175,12 @@ def damped(string: StringParameters, t60_s: float) -> StringParameters:
 def _row(string: StringParameters) -> NDArray[np.float64]:
     """As the kernels take it."""
     return np.array([getattr(string, name) for name in STRING])
+
+
+def decay_rates(patch: Patch, string: StringParameters, modes: int) -> NDArray[np.float64]:
+    """σ of the modes of a patch's string in 1/s, (modes,), by its own losses: d₁, d₃, and those by mode."""
+    rates, knobs = string.decay_rates(modes), patch.knobs
+    if patch.losses is not None:
+        by_mode = Losses(**patch.losses.model_dump())
+        rates = rates + by_mode.rates(string, modes, knobs.decay, knobs.brightness_decay)
+    return rates

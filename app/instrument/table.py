@@ -5,16 +5,19 @@ from __future__ import annotations
 import contextlib
 import math
 from collections.abc import Iterable
+from dataclasses import astuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKeys, block_of
 from app.instrument.loud_keys import LoudKeys
+from app.instrument.loudness import PART_S, WANTED_DB
 from app.instrument.strings import KNOBS, STRING
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
 from app.shared.parameters import OF_PATCHES
+from engine.contact import CONTACTS
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.presets import Preset
@@ -28,6 +31,8 @@ VALUES = (
     *(f"pluck.{name}" for name in ("position", "width", "width_hard", "softest_mm", "hardest_mm", "curve")),
     "damping.release_t60_s",
     "bend_semitones",
+    "noise.onset_db",
+    "noise.release_db",
 )
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
 SHAPES = {
@@ -116,6 +121,10 @@ def table_of(
     pluck = patch.pluck
     memory[of.TABLE_RELEASE_S : of.TABLE_RELEASE_S + 2] = pluck.release_ms / 1000, pluck.release_hard_ms / 1000
     memory[of.TABLE_VARIATION] = pluck.variation if varied else 0.0
+    memory[of.TABLE_NOISE_LEVEL] = PART_S * 10 ** ((WANTED_DB + patch.level_db) / 10)
+    for place, each in enumerate(CONTACTS[patch.noise.kind]):
+        first = of.TABLE_CONTACTS + place * of.CONTACT
+        memory[first : first + len(astuple(each))] = astuple(each)
     goal = wheel_goal(patch) if patch.mod_wheel in VALUES else None
     counts[of.TABLE_WHEEL] = -1 if goal is None else VALUES.index(patch.mod_wheel)
     memory[of.TABLE_WHEEL_GOAL] = 0.0 if goal is None else goal

@@ -18,6 +18,7 @@ from app.patches.tuning import TuningChoice
 from app.shared.parameters import MOST_MACROS, OF_PATCHES, modulated_by
 from app.shared.vocabulary import Pickup as PickupKind
 from engine import bounds
+from engine.contact import Exciter
 from engine.pluck import DEFAULT_LISTEN, Pluck, Shape
 
 if TYPE_CHECKING:
@@ -217,6 +218,20 @@ class Losses(Value):
     bending: Annotated[float, ranged(*bounds.LOSSES["bending"])] = 0.02
 
 
+class Noise(Value):
+    """Noise of what touches strings, by `engine.contact`; comparisons of model and truth leave it out.
+
+    Attributes:
+        kind: what plucks or strikes.
+        onset_db, release_db: energy of the noise of a stroke at velocity 100 and of a release, in dB re the first
+            0.4 s of a note. The lowest value is off.
+    """
+
+    kind: Exciter = "finger"
+    onset_db: float = parameter("noise.onset_db")
+    release_db: float = parameter("noise.release_db")
+
+
 class Damping(Value):
     """What a released key does: nothing (`let_ring`), or all partials decay by 60 dB in `release_t60_s`."""
 
@@ -295,6 +310,7 @@ class Patch(Value):
     polarisations: Polarisations | None = None
     losses: Losses | None = None
     sympathy_s_kg: Annotated[float, ranged(0, 0.5)] = 0.0
+    noise: Noise = Noise()
     damping: Damping = Damping()
     mode: Mode = "poly"
     bend_semitones: Annotated[float, ranged(0, 48)] = 2.0

@@ -18,6 +18,7 @@ from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, W
 Modulation = Literal["none", "learn", "macro", "wheel"]  # each includes those before it
 _ORDER: tuple[Modulation, ...] = ("none", "learn", "macro", "wheel")
 PITCH, STRING, DECAY, PLUCK, PICKUP, BODY = "PITCH", "STRING", "DECAY", "PLUCK", "PICK-UP", "BODY"
+NOISE = "NOISE"
 
 
 @dataclass(frozen=True)
@@ -31,6 +32,7 @@ class Taper:
 
 TIMES = Taper(1.03, "× {:.2f}", True)
 MILLIMETRES, SECONDS = Taper(1.1, "{:.2f} mm", True), Taper(1.1, "{:.2f} s", True)
+DECIBELS = Taper(0.5, "{:+.1f} dB")
 PLACE, WIDTH, PERCENT = Taper(0.01), Taper(1.05, "{:.3f}", True), Taper(0.02, "{:.0%}")
 
 
@@ -123,6 +125,8 @@ TIPS = {
     "pluck.softest_mm": "How far the softest key pulls the string",
     "pluck.hardest_mm": "How far the hardest key pulls the string",
     "pluck.curve": "Velocity curve: above 0 middle velocities are louder, below 0 softer",
+    "noise.onset_db": "Noise of what plucks or strikes: its energy, compared with a note's. The lowest is off",
+    "noise.release_db": "Noise of the damper or finger that ends a note. The lowest is off",
     "pickup.points.0": f"Where the string is heard; {_PLACE_TIP}",
     "pickup.points.1": "Where the right channel hears the string; an instrument in mono has none",
     "body.mix": "Mix of the body: 0 % the strings alone, 100 % the body alone",
@@ -160,6 +164,7 @@ def _knob(part: str, label: str, limits: tuple[float, float], figure_unit: str, 
 
 MULTIPLIER = (0.05, 20.0)
 AMPLITUDE_MM = (0.001, LARGEST_AMPLITUDE_MM)
+NOISE_DB = (-60.0, 6.0)  # the lowest is off
 OF_PATCHES: Mapping[str, Parameter] = {
     each.id: each
     for each in (
@@ -219,6 +224,8 @@ OF_PATCHES: Mapping[str, Parameter] = {
             wheel_factor=2,
         ),
         Parameter("pluck.curve", "curve", (-1, 1), 0, Taper(0.05, "{:+.2f}"), PLUCK, "wheel", "velocity curve", 1.0),
+        Parameter("noise.onset_db", "stroke", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "stroke noise"),
+        Parameter("noise.release_db", "release", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "release noise"),
         Parameter("pickup.points.0", "place", (0, 1), DEFAULT_LISTEN, PLACE, PICKUP, "macro", "listening point"),
         Parameter(
             "pickup.points.1", "right", (0, 1), 1 - DEFAULT_LISTEN, PLACE, PICKUP, "macro", "right listening point"
@@ -229,7 +236,7 @@ OF_PATCHES: Mapping[str, Parameter] = {
         Parameter(
             "room.t60_s", "time", ROOM_T60_S, 1.2, SECONDS, BODY, "wheel", "reverberation time", wheel_factor=3
         ),
-        Parameter("level_db", "level", (-60, 24), 0, Taper(0.5, "{:+.1f} dB"), BODY, "macro"),
+        Parameter("level_db", "level", (-60, 24), 0, DECIBELS, BODY, "macro"),
     )
 }
 OF_CHOICES: Mapping[str, Parameter] = {

@@ -495,7 +495,7 @@ class PatchDesk(QObject):
         except ValueError as error:
             facts = {"string": str(error)}
         knobs.show_facts(facts if found is None else facts_of(found))
-        knobs.show_figures({} if found is None else figures_of(found.parameters))
+        knobs.show_figures({} if found is None else figures_of(found.parameters, patch))
         return found
 
     def tick(self) -> None:

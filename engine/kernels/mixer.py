@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numba import carray, cfunc, njit, types
 
+from engine.kernels import contact
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.convolver import convolve
@@ -82,8 +83,10 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     fence()
     counts[at.M_ACTIVE] = kept
     if before != 0:
+        contact.sound(before, counts[at.M_ADDRESS])
         sympathise(before, counts[at.M_ADDRESS])
     if player != 0:
+        contact.sound(player, counts[at.M_ADDRESS])
         sympathise(player, counts[at.M_ADDRESS])
     convolve(mixer)
     _finish(mixer)

@@ -26,7 +26,7 @@ import math
 import numpy as np
 from numba import carray, njit
 
-from engine.kernels import drums, recorded, strings
+from engine.kernels import contact, drums, recorded, strings
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
@@ -649,6 +649,9 @@ def _damp(
     players[note + of.NOTE_DAMPED] = 1
     if players[note + of.NOTE_PREPARED] == 0:
         _retune(player, players, table, tables, number, DAMPER_S, frame, now)
+        level_db = _value(player, players, table, tables, of.DAMPER_DB)
+        stroke = players[note + of.NOTE_AGE] if table[of.TABLE_VARIATION] > 0.0 else 0
+        contact.touch(player, players, table, of.RELEASE, level_db, 1.0, stroke, players[note + of.NOTE_KEY], frame)
         return
     t60_s = _value(player, players, table, tables, of.RELEASE_S)
     for source in range(of.MOST_SOURCES):
@@ -815,7 +818,7 @@ def _note_on(
         string = channel if count > 0 and _chosen(table, count, key) != channel else -1
     own, modes, gain, highest_m = _moment(player, 3), 0, 1.0, 0.0
     position = amplitude_mm = width = 0.0
-    pairs = 0
+    pairs, strength, stroke = 0, 1.0, 0
     if not prepared:
         pitch_hz = _pitch_hz(table, tables, key, player[event + of.EVENT_PITCH_HZ])
         gain = abs(table[of.TABLE_GAINS + key * of.GAINS + 1 + string])
@@ -834,6 +837,7 @@ def _note_on(
         share = min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve)
         harder = _value(player, players, table, tables, of.HARDEST_MM) / soft
         amplitude_mm = min(soft * harder**share * shortened, LARGEST_AMPLITUDE_MM)
+        strength = harder ** (share - ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0**-curve))
         width = _value(player, players, table, tables, of.WIDTH)
         width *= (_value(player, players, table, tables, of.WIDTH_HARD) / width) ** share
         position, slide = (
@@ -939,6 +943,9 @@ def _note_on(
         else:
             _whole(address)[at.STATE] = at.OVER
     _retune(player, players, table, tables, number, 0.0, 0, mixers[at.M_FRAMES])
+    if not prepared:
+        level_db = _value(player, players, table, tables, of.ONSET_DB)
+        contact.touch(player, players, table, of.STROKE, level_db, strength, stroke, key, frame)
     _make_room(player, players)
     slot = _report(player, players, of.BEGAN, players[event + of.EVENT_ID], channel, key, frame, velocity)
     players[slot + of.REPORT_STRING] = string
@@ -1052,6 +1059,7 @@ def _stop(player: np.ndarray, players: np.ndarray, seconds: float, frame: int) -
             _release_note(player, players, note, seconds, frame)
             players[note + of.NOTE_HAS_PLACE] = 0
     players[of.PLAYER_SYMPATHY_STOPS] = _quanta(player, max(seconds, STOP_S)) + 2
+    contact.hush(players, _quanta(player, max(seconds, STOP_S)))
 
 
 @njit(**COMPILED)

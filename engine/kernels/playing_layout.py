@@ -24,7 +24,9 @@ STIFFNESS, DECAY, BRIGHTNESS_DECAY, MODULUS_FACTOR, DENSITY_FACTOR, GAUGE, TENSI
 KNOBS = 8
 # An instrument's values, which events and the modulation wheel may change
 POSITION, WIDTH, WIDTH_HARD, SOFTEST_MM, HARDEST_MM, CURVE, RELEASE_S, BEND_SEMITONES = range(KNOBS, KNOBS + 8)
-VALUES = KNOBS + 8
+ONSET_DB, DAMPER_DB = range(KNOBS + 8, KNOBS + 10)  # noise of the stroke and of the release
+VALUES = KNOBS + 10
+REFERENCE_VELOCITY = 100  # at which keys are equally loud, and levels of noise hold
 
 # Kinds of events
 NOTE_ON, NOTE_OFF, BEND, CONTROLLER, TUNE, PARAMETER, TABLE, CANCEL, STOP, CHOKE = range(10)
@@ -87,7 +89,12 @@ TABLE_SYMPATHY_S_KG = 39  # R conductance of the bridge that drives them
 TABLE_LOSSES = 40  # R three: to the air, by friction, by bending
 TABLE_DRUMS = 43  # W slot of the slots of drums of all keys (KEYS,), 0 where a key has none; 0: strings are played
 TABLE_RECORDED = 44  # W slot of what a recording adds to the law of strings; 0: nothing
-TABLE_VALUES = 48  # R
+TABLE_NOISE_LEVEL = 45  # R energy of a noise of 0 dB, in s of full scale squared
+TABLE_CONTACTS = 48  # R (2, CONTACT): noise of the stroke and of the release, in the order of `Contact`
+STROKE, RELEASE = 0, 1
+PULSE_S, PULSE_SHARE, BURST_HZ, BURST_Q, ATTACK_S, FALL_S, FOLLOWS = range(7)
+CONTACT = 8
+TABLE_VALUES = TABLE_CONTACTS + 2 * CONTACT  # R
 TABLE_PITCHES = TABLE_VALUES + VALUES  # R of keys in Hz; 0: silent
 TABLE_GAINS = TABLE_PITCHES + KEYS  # R (KEYS, GAINS); below 0: a guess; 0: none is known; not a number: impossible
 TABLE_OPEN = TABLE_GAINS + KEYS * GAINS  # R (strings, OPEN_SLOTS), the highest string first
@@ -226,7 +233,24 @@ PLAYER_SYMPATHY_STOPS = PLAYER_SYMPATHETIC + 4  # W quanta in which all of them 
 MOST_SYMPATHETIC = 512
 SYMPATHY_OWNER, SYMPATHY_COSINE, SYMPATHY_SINE, SYMPATHY_GAIN, SYMPATHY_X, SYMPATHY_Y, SYMPATHY_PLAYED = range(7)
 PLAYER_SYMPATHY = PLAYER_SYMPATHETIC + 5  # rows (MOST_SYMPATHETIC,), as above
-PLAYER_VOICES = PLAYER_SYMPATHY + 7 * MOST_SYMPATHETIC
+MOST_NOISES = 24  # of contact, that sound at once
+NOISE_LEFT = 0  # W frames to come; 0: it is over
+NOISE_FRAME = 1  # W of the mixer at which it begins
+NOISE_DONE = 2  # W frames so far
+NOISE_SEED = 3  # W
+NOISE_PULSE = 4  # R amplitude of its pulse
+NOISE_PULSE_FRAMES = 5  # R
+NOISE_BURST = 6  # R amplitude of its burst
+NOISE_ATTACK_FRAMES = 7  # R
+NOISE_SHRINKS = 8  # R what is left of the burst in a frame
+NOISE_ENVELOPE = 9  # R
+NOISE_B0, NOISE_A1, NOISE_A2 = range(10, 13)  # R band-pass of the burst
+NOISE_PAST = 13  # R two inputs and two outputs of it
+NOISE_STOPS = 17  # W quanta in which it fades out; 0: it does not
+NOISE_SLOTS = 18
+PLAYER_NOISE_GAIN = PLAYER_SYMPATHY + 7 * MOST_SYMPATHETIC  # R at the end of the quantum before
+PLAYER_NOISES = PLAYER_NOISE_GAIN + 1
+PLAYER_VOICES = PLAYER_NOISES + MOST_NOISES * NOISE_SLOTS
 BLOCKS = 4  # of modes that a voice is to have
 
 

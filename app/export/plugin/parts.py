@@ -80,8 +80,8 @@ def levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float64]:
     """How levels of keys change as each macro moves alone, in dB: (macros, STEPS, KEYS)."""
     found, now = np.zeros((len(patch.macros), STEPS, KEYS)), _levels(patch, preset)
     for number, macro in enumerate(patch.macros):
-        if all(target.field == "room.mix" for target in macro.targets):
-            continue  # no level depends on the room
+        if all(target.field.startswith(("room.", "noise.")) for target in macro.targets):
+            continue  # no level depends on the room or on noise
         for step in range(STEPS):
             found[number, step] = _levels(patch.turned(number, step / (STEPS - 1)), preset) - now
     return found

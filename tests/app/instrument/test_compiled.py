@@ -1,7 +1,8 @@
 """The compiled player, event for event, on rendered sound.
 
-`frozen.json` has what an independent player in Python made of the same events, before it was removed: the norm of the
-sound, then its projections on eight random directions, in norms. The compiled player agreed with it to 1e-9.
+`frozen/sounds.json` has what an independent player in Python made of the same events, before it was removed: the norm
+of the sound, then its projections on eight random directions, in norms. The compiled player agreed with it to 1e-9.
+Its instruments are there as they were then, so that those of the factory may be voiced otherwise.
 """
 
 from __future__ import annotations
@@ -22,7 +23,6 @@ from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn
 from app.instrument.loud_keys import LoudKeys, on_string
 from app.instrument.strings import pitch_hz_of
 from app.instrument.table import VALUES
-from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Losses, Patch, Pickup, Polarisations
 from app.patches.tuning import TuningChoice
@@ -38,7 +38,8 @@ from tests.engine.resonators.test_recorded import recorded
 RATE_HZ = 48_000
 GAINS = {"model": 1.0, "truth": -0.5}
 CLOSE = 1e-7
-FROZEN = json.loads((Path(__file__).parent / "frozen.json").read_text())
+FROZEN_PATCHES = Path(__file__).parent / "frozen"
+FROZEN = json.loads((FROZEN_PATCHES / "sounds.json").read_text())
 Framed = Sequence[tuple[int, Event]]
 
 
@@ -92,7 +93,8 @@ def compared(name: str, patch: Patch, preset: Preset, played: Framed, quanta: in
 @pytest.fixture(scope="session")
 def shipped() -> dict[str, Patch]:
     """Without variation from stroke to stroke and strings at rest, which the frozen sounds have not."""
-    read = {path.stem: read_patch(path) for path in PATCHES.glob("*.json")}
+    paths = [path for path in FROZEN_PATCHES.glob("*.json") if path.stem != "sounds"]
+    read = {path.stem: read_patch(path) for path in paths}
     even = {name: patch.pluck.model_copy(update={"variation": 0.0}) for name, patch in read.items()}
     return {name: changed(patch, pluck=even[name], sympathy_s_kg=0.0) for name, patch in read.items()}
 

@@ -8,7 +8,7 @@ import pytest
 
 from app.instrument.facts import FIGURES, bright_mode, facts_of, figures_of, knob_for, reported, t60_s
 from app.instrument.strings import Strings
-from app.patches.patch import Fretted, Knobs, Patch, PhysicalString
+from app.patches.patch import Fretted, Knobs, Losses, Patch, PhysicalString
 from app.shared.parameters import OF_PATCHES
 from engine.resonators.string import StringParameters
 
@@ -30,7 +30,7 @@ def test_figures_are_three_digits_and_a_unit() -> None:
 
 def test_every_knob_of_the_string_has_a_figure(patch: Patch) -> None:
     assert {field.removeprefix("knobs.") for field in FIGURES} == set(Knobs.model_fields)
-    figures = figures_of(string_of(patch))
+    figures = figures_of(string_of(patch), patch)
     assert figures["knobs.tension"] == "75.0 N"
     assert figures["knobs.density"] == "7850 kg/m³"
     assert figures["knobs.modulus"] == "200 GPa"
@@ -44,7 +44,7 @@ def test_decay_is_reported_of_the_first_partial_and_of_the_one_near_three_kilohe
     string = string_of(patch)
     assert bright_mode(string) == 14  # of 220 Hz
     for mode in (1, 14):
-        assert math.exp(-string.decay_rate(mode) * t60_s(string, mode)) == pytest.approx(1e-3)
+        assert math.exp(-string.decay_rate(mode) * t60_s(string, mode, patch)) == pytest.approx(1e-3)
     high = Strings(patch.model_copy(update={"range": (28, 127)})).of_key(120)
     assert high is not None
     assert bright_mode(high.parameters) == 1
@@ -54,14 +54,24 @@ def test_decay_is_reported_of_the_first_partial_and_of_the_one_near_three_kilohe
 def test_a_figure_leads_back_to_its_knob(patch: Patch, field: str) -> None:
     figure = FIGURES[field]
     turned = patch.with_value(field, 1.7)
-    wanted = figure.of(string_of(turned))
-    assert (wanted > figure.of(string_of(patch))) != figure.falls
+    wanted = figure.of(string_of(turned), turned)
+    assert (wanted > figure.of(string_of(patch), patch)) != figure.falls
     assert knob_for(patch, (KEY, None), field, wanted) == pytest.approx(1.7)
     ends = [knob_for(patch, (KEY, None), field, far) for far in (0.0, 1e30)]
     low, high = OF_PATCHES[field].limits
     if field == "knobs.density":
         high = 1e5 / string_of(patch).density_kg_m3  # beyond it there is no such string
     assert (ends[::-1] if figure.falls else ends) == pytest.approx([low, high])
+
+
+@pytest.mark.parametrize("field", ["knobs.decay", "knobs.brightness_decay"])
+def test_decay_by_mode_is_in_the_figure(patch: Patch, field: str) -> None:
+    figure, lossy = FIGURES[field], patch.model_copy(update={"losses": Losses(friction=1e-3)})
+    string = string_of(patch)
+    assert figure.of(string, lossy) < 0.9 * figure.of(string, patch)
+    turned = lossy.with_value(field, 1.7)
+    wanted = figure.of(string_of(turned), turned)
+    assert knob_for(lossy, (KEY, None), field, wanted) == pytest.approx(1.7)
 
 
 def test_where_there_is_no_such_string_it_goes_as_far_as_there_is_one(patch: Patch) -> None:
@@ -80,5 +90,5 @@ def test_a_silent_key_is_reported(patch: Patch) -> None:
 def test_a_guitars_key_is_measured_on_the_string_that_is_played(guitar: Patch) -> None:
     lowest = Strings(guitar).of_key(57, 5)
     assert lowest is not None
-    wanted = FIGURES["knobs.length"].of(lowest.parameters)
+    wanted = FIGURES["knobs.length"].of(lowest.parameters, guitar)
     assert knob_for(guitar, (57, 5), "knobs.length", 2 * wanted) == pytest.approx(2.0, rel=1e-2)

@@ -24,7 +24,7 @@ RATE_HZ = 48_000
 )
 def test_a_rendered_note_starts_as_sharp(name: str, key: int, velocity: int, source: str, preset: Preset) -> None:
     """Keys high enough for many periods in START_S: partials of a lower one overlap in its spectrum."""
-    patch = find_patch(name).patch.with_value("room.mix", 0.0)
+    patch = find_patch(name).patch.with_values({"room.mix": 0.0, "noise.onset_db": -60.0})
     string = Strings(patch).of_key(key)
     assert string is not None
     cents = glides_cents(patch)[key, velocity]

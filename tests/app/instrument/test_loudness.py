@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from app.instrument.events import NoteOn, TimedEvent
-from app.instrument.loudness import REFERENCE_VELOCITY
 from app.instrument.offline import render_events
 from app.patches.library import SHIPPED, find_patch, list_patches
 from app.patches.patch import Patch
 from engine.kernels.limiter import CEILING
+from engine.kernels.playing_layout import REFERENCE_VELOCITY
 from engine.presets import Preset
 from tests.bench.tune import chord_of
 
