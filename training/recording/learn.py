@@ -100,10 +100,10 @@ def learn(
     fitted: dict[int, LearnedNote] = {}
     for job in jobs:
         done, share = len(fitted) / len(notes), len(job) / len(notes)
-        found = fit_takes(
+        fits = fit_takes(
             [notes[place] for place in job], progress=lambda part, d=done, s=share: progress(0.95 * (d + s * part))
         )
-        fitted |= dict(zip(job, found, strict=True))
+        fitted |= dict(zip(job, fits, strict=True))
     learned = []
     for place, ((found, source), (note, series)) in enumerate(zip(recordings, notes, strict=True)):
         physics = physics_of(fitted[place])

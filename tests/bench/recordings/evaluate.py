@@ -67,7 +67,8 @@ def dynamics(
     recordings: Recordings, *, progress: Callable[[float], None] = lambda share: None
 ) -> dict[str, list[float]]:
     """The figures of held-out dynamics alone; recordings that are refused are left out."""
-    notes, values = {}, {}
+    notes: dict[str, tuple[Note, Series]] = {}
+    values: dict[str, list[float]] = {}
     for name, (samples, rate) in recordings.items():
         note = note_of(samples, rate)
         series, _ = number_note(note)
