@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,10 +100,8 @@ def learn(
     jobs = [takes, *([place] for place in others)]
     fitted: dict[int, LearnedNote] = {}
     for job in jobs:
-        done, share = len(fitted) / len(notes), len(job) / len(notes)
-        fits = fit_takes(
-            [notes[place] for place in job], progress=lambda part, d=done, s=share: progress(0.95 * (d + s * part))
-        )
+        part = partial(_part, progress, len(fitted) / len(notes), len(job) / len(notes))
+        fits = fit_takes([notes[place] for place in job], progress=part)
         fitted |= dict(zip(job, fits, strict=True))
     learned = []
     for place, ((found, source), (note, series)) in enumerate(zip(recordings, notes, strict=True)):
@@ -113,6 +112,10 @@ def learn(
         learned.append(Learned(source, note, series, fitted[place], physics, chosen, report, found.findings, seconds))
     progress(1.0)
     return learned
+
+
+def _part(progress: Progress, done: float, share: float, of_part: float) -> None:
+    progress(0.95 * (done + share * of_part))
 
 
 def usable(found: Examined, anyway: bool, name: str) -> tuple[Note, Series]:
