@@ -58,7 +58,7 @@ def learn_files(
     anyway: bool = False,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[Learned]:
-    """Learns recordings one after the other; the first is the note that gives the string.
+    """Learns recordings; the first is the note that gives the string, and those of its pitch are fitted together.
 
     Args:
         progress: is called with the share that is done; may raise, to cancel: nothing has been written then.
@@ -71,21 +71,18 @@ def learn_files(
         file = read_note(path)
         source = Source(path.name, file.digest, file.rate_hz, len(file.samples))
         try:
-            found.append(
-                learn(
-                    file.samples,
-                    file.rate_hz,
-                    source,
-                    kind=kind,
-                    length_m=length_m,
-                    gauge_mm=gauge_mm,
-                    anyway=anyway,
-                    progress=lambda share, done=number: progress((done + share) / len(paths)),  # type: ignore[misc]
-                )
-            )
+            found.append((examined(file.samples, file.rate_hz), source))
         except RecordingError as error:
             raise RecordingError(f"{path}: {error}") from error
-    return found
+        progress(0.05 * (number + 1) / len(paths))
+    return learn(
+        found,
+        kind=kind,
+        length_m=length_m,
+        gauge_mm=gauge_mm,
+        anyway=anyway,
+        progress=lambda share: progress(0.05 + 0.95 * share),
+    )
 
 
 def reasons_against(path: Path) -> list[str]:

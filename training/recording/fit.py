@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from training.recording.intervals import Spread, spreads
 from training.recording.note import FIT_LASTS_S, Note
 from training.recording.numbering import Series
 from training.recording.refine import Fit, Pole
+from training.recording.sweeps import FIRST_DAMPING, Takes
 
 Array = NDArray[np.float64]
 
@@ -66,43 +67,97 @@ def fit_note(
         glides: False: a linear string, as a baseline.
         progress: is called with the share that is done; may raise, to cancel.
     """
-    samples, rate = note.fitted(seconds), note.rate_hz
-    count = _partials(note, series)
-    hz = series.partials_hz(count)
+    (learned,) = fit_takes(
+        [(note, series)],
+        seconds=seconds,
+        poles_a_partial=poles_a_partial,
+        free=free,
+        glides=glides,
+        progress=progress,
+    )
+    return learned
+
+
+def fit_takes(
+    notes: Sequence[tuple[Note, Series]],
+    *,
+    seconds: float = FIT_LASTS_S,
+    poles_a_partial: int = 2,
+    free: int = FREE_POLES,
+    glides: bool = True,
+    progress: Progress = lambda share: None,
+) -> list[LearnedNote]:
+    """The poles of several takes of one pitch, soft and loud ones: they share frequencies at rest and decays.
+
+    Amplitudes and glide are each take's own, and a pitch within some cents of the first.
+
+    Args: as `fit_note`.
+    """
+    count = max(_partials(note, series) for note, series in notes)
+    hz = notes[0][1].partials_hz(count)
     edges = _edges(hz)
-    fit = Fit(samples, rate, edges, hz, _first_glide(samples, rate, hz, edges) if glides else Glide.none())
-    fit.poles = [fit.start(number, 1) or [_plain(hz[number], number + 1)] for number in range(count)]
+    takes = Takes([_fit_of(note, series, notes[0][1], hz, edges, seconds, glides) for note, series in notes])
+    for number in range(count):
+        first = _loudest(takes, number).start(number, 1) or [_plain(hz[number], number + 1)]
+        for fit in takes.fits:
+            fit.poles[number] = first
     progress(0.1)
     for round_ in range(4):
-        fit.sweep(2)
+        takes.sweep(2)
         if glides:
-            fit.set_glide(fit.step_glide())
+            takes.step_glides()
         progress(0.1 + 0.05 * (round_ + 1))
     if poles_a_partial > 1:
-        residual = fit.data - fit.model()
+        residuals = [fit.data - fit.model() for fit in takes.fits]
         for number in range(count):
-            _add_pole(fit, number, residual)
+            _add_pole(takes, number, residuals)
     for round_ in range(SWEEPS):
-        fit.sweep(2)
-        fit.sweep_free(2)
+        takes.sweep(2)
+        takes.sweep_free(2)
         if glides:
-            fit.set_glide(fit.step_glide())
+            takes.step_glides()
         progress(0.3 + 0.3 * (round_ + 1) / SWEEPS)
     for number in range(free):
-        _add_free(fit)
-        fit.sweep_free(3)
-        fit.sweep(1)
+        _add_free(takes)
+        takes.sweep_free(3)
+        takes.sweep(1)
         if glides and number % 2:
-            fit.set_glide(fit.step_glide())
+            takes.step_glides()
         progress(0.6 + 0.3 * (number + 1) / free)
     for round_ in range(LAST_SWEEPS):
-        fit.sweep(2)
-        fit.sweep_free(2)
+        takes.sweep(2)
+        takes.sweep_free(2)
         if glides and round_ < LAST_SWEEPS - 1:
-            fit.set_glide(fit.step_glide())
+            takes.step_glides()
         progress(0.9 + 0.1 * (round_ + 1) / LAST_SWEEPS)
-    fit.sweep(1)
-    return LearnedNote(rate, series.f0_hz, series.stiffness, fit.glide, tuple(fit.every()), spreads(fit))
+    takes.sweep(1)
+    return [_learned(note, series, fit) for (note, series), fit in zip(notes, takes.fits, strict=True)]
+
+
+def _fit_of(note: Note, series: Series, first: Series, hz: Array, edges: Array, seconds: float, glides: bool) -> Fit:
+    samples, rate = note.fitted(seconds), note.rate_hz
+    tuned = series is not first
+    pitch = series.f0_hz / first.f0_hz - 1 if tuned else 0.0
+    glide = Glide.none()
+    if glides:
+        glide = replace(_first_glide(samples, rate, hz * (1 + pitch), edges * (1 + pitch)), pitch=pitch)
+    return Fit(samples, rate, edges, hz, glide, tuned=tuned)
+
+
+def _learned(note: Note, series: Series, fit: Fit) -> LearnedNote:
+    """With its own pitch in its poles."""
+    higher = 1 + fit.glide.pitch
+    poles = (replace(pole, s=pole.s * higher) if pole.partial else pole for pole in fit.every())
+    glide = Glide(fit.glide.shares / higher)
+    return LearnedNote(note.rate_hz, series.f0_hz, series.stiffness, glide, tuple(poles), spreads(fit))
+
+
+def _loudest(takes: Takes, number: int) -> Fit:
+    """The take with most of its energy in a band."""
+    return max(
+        takes.fits,
+        key=lambda fit: float(np.vdot(fit.data[fit.bands[number]], fit.data[fit.bands[number]]).real) / fit.energy,
+    )
 
 
 def _plain(hz: float, number: int) -> Pole:
@@ -137,46 +192,56 @@ def _first_glide(samples: Array, rate: int, hz: Array, edges: Array) -> Glide:
     return glide_of_phases(loud)
 
 
-def _add_pole(fit: Fit, number: int, residual: NDArray[np.complex128]) -> None:
+def _add_pole(takes: Takes, number: int, residuals: Sequence[NDArray[np.complex128]]) -> None:
     """A second pole of a band, from the subspace or else close to the first, where it leaves much less."""
-    where = fit.bands[number]
-    target = residual[where] + fit.part(fit.poles[number], where)
-    one, left, _ = fit.improved(fit.poles[number], target, where, 1e-2, number)
-    first = one[0]
+    wheres = [fit.bands[number] for fit in takes.fits]
+    before = [fit.poles[number] for fit in takes.fits]
+    targets = [
+        rest[where] + fit.part(own, where)
+        for fit, rest, own, where in zip(takes.fits, residuals, before, wheres, strict=True)
+    ]
+    one, left, _ = takes.improved(before, targets, wheres, FIRST_DAMPING, number)
+    first = one[0][0]
     beside = Pole(complex(2.5 * first.s.real, first.s.imag + 2.0), partial=first.partial)
     tried = [[first, beside]]
-    found = fit.start(number, 2)
+    found = _loudest(takes, number).start(number, 2)
     if len(found) == 2:
         tried.append(found)
     best = None
-    for two in tried:
-        damping = 1e-2
+    for poles in tried:
+        two, after, damping = [list(poles) for _ in takes.fits], left, FIRST_DAMPING
         for _ in range(5):
-            two, after, damping = fit.improved(two, target, where, damping, number)
+            two, after, damping = takes.improved(two, targets, wheres, damping, number)
         if best is None or after < best[0]:
             best = after, two
     assert best is not None
-    bins = 2 * (where.stop - where.start)
-    if bins * math.log(left / max(best[0], 1e-300)) > WORTH * 4 * math.log(bins):
-        fit.poles[number] = best[1]
-        fit.damping[number] = 1e-2
+    bins = sum(2 * (where.stop - where.start) for where in wheres)
+    more = 2 + 2 * len(takes.fits)  # numbers
+    if bins * math.log(left / max(best[0], 1e-300)) > WORTH * more * math.log(bins):
+        for fit, chosen in zip(takes.fits, best[1], strict=True):
+            fit.poles[number] = chosen
+        takes.damping[number] = FIRST_DAMPING
 
 
-def _add_free(fit: Fit) -> None:
-    """One more pole that does not glide, where it takes most from what is left."""
-    residual = fit.data - fit.model()
-    lowest, highest = (min(len(residual), round(hz / fit.step_hz)) for hz in FREE_RANGE_HZ)
+def _add_free(takes: Takes) -> None:
+    """One more pole that does not glide, where it takes most from what is left of one take."""
     tried = []
-    for width_hz in (2.0, 10.0, 40.0):
-        width = max(3, round(width_hz / fit.step_hz))
-        power = np.convolve(np.abs(residual) ** 2, np.ones(width), "same")
-        place = lowest + int(np.argmax(power[lowest:highest]))
-        where = slice(max(1, place - 12 * width), min(len(residual), place + 12 * width))
-        whole = float(np.vdot(residual[where], residual[where]).real)
-        for decay in (0.5 * width_hz, 1.5 * width_hz, 4 * width_hz):
-            start = [Pole(complex(-decay, fit.omega[place]))]
-            left, start, _ = fit.solve(start, residual[where], where)
-            start, left, _ = fit.improved(start, residual[where], where, 1e-2, None)
-            tried.append((left - whole, start[0]))
-    fit.free.append(min(tried, key=lambda each: each[0])[1])
-    fit.free_damping = 1e-2
+    for fit, weight in zip(takes.fits, takes.weights, strict=True):
+        residual = fit.data - fit.model()
+        alone = Takes([fit])
+        lowest, highest = (min(len(residual), round(hz / fit.step_hz)) for hz in FREE_RANGE_HZ)
+        for width_hz in (2.0, 10.0, 40.0):
+            width = max(3, round(width_hz / fit.step_hz))
+            power = np.convolve(np.abs(residual) ** 2, np.ones(width), "same")
+            place = lowest + int(np.argmax(power[lowest:highest]))
+            where = slice(max(1, place - 12 * width), min(len(residual), place + 12 * width))
+            whole = float(np.vdot(residual[where], residual[where]).real)
+            for decay in (0.5 * width_hz, 1.5 * width_hz, 4 * width_hz):
+                start = [Pole(complex(-decay, fit.omega[place]))]
+                left, start, _ = fit.solve(start, residual[where], where)
+                moved, left, _ = alone.improved([start], [residual[where]], [where], FIRST_DAMPING, None)
+                tried.append((weight * (left - whole), moved[0][0]))
+    found = min(tried, key=lambda each: each[0])[1]
+    for fit in takes.fits:
+        fit.free = [*fit.free, found]
+    takes.free_damping = FIRST_DAMPING

@@ -19,13 +19,19 @@ Array = NDArray[np.float64]
 TIMES_S = np.array([0.08, 0.3, 1.0])
 CENTS = math.log(2) / 1200
 PRIOR_CENTS = np.array([10.0, 15.0, 10.0])  # standard deviation of each c_i
+PRIOR_PITCH_CENTS = 10.0  # of a take's pitch, above that of the first
 
 
 @dataclass(frozen=True)
 class Glide:
-    """c_i of the time constants, a share of the frequency each, (3,)."""
+    """c_i of the time constants, a share of the frequency each, (3,).
+
+    Attributes:
+        pitch: the share by which all frequencies lie higher than those of the poles; of takes that share their poles.
+    """
 
     shares: Array
+    pitch: float = 0.0
 
     @staticmethod
     def none() -> Glide:
@@ -33,13 +39,13 @@ class Glide:
 
     def tau(self, t: Array) -> Array:
         """τ of times t in s after the beginning of the fit; any t, before it too."""
-        return t + basis(t) @ self.shares
+        return (1 + self.pitch) * t + basis(t) @ self.shares
 
     def times(self, tau: Array) -> Array:
         """The t of each τ."""
-        t = tau - basis(tau) @ self.shares
+        t = tau / (1 + self.pitch) - basis(tau) @ self.shares
         for _ in range(6):
-            slope = 1 + rate_basis(t) @ self.shares
+            slope = 1 + self.pitch + rate_basis(t) @ self.shares
             t = t - (self.tau(t) - tau) / slope
         return t
 
@@ -63,7 +69,7 @@ def warped(samples: Array, rate_hz: int, glide: Glide) -> tuple[Array, Array]:
     duration = (len(samples) - 1) / rate_hz
     end = float(glide.tau(np.array(duration)))
     tau = np.arange(int(end * rate_hz) + 1) / rate_hz
-    if not glide.shares.any():
+    if not glide.shares.any() and not glide.pitch:
         return samples, tau
     t = np.clip(glide.times(tau), 0.0, duration)
     grid = np.arange(len(samples)) / rate_hz

@@ -1,7 +1,8 @@
 """Several recordings of one instrument: what they share, and what each adds.
 
-The first gives the string and the recorded note. Takes of its pitch share their partials' corrections, by medians.
-Notes of every pitch share the smooth decay. So one take's accident does not become the instrument's.
+The first gives the string and the recorded note. Takes of its pitch share their poles (`fit.fit_takes`),
+and the medians of their partials' levels. Notes of every pitch share the smooth decay. So one take's accident does
+not become the instrument's.
 """
 
 from __future__ import annotations
@@ -15,12 +16,10 @@ import numpy as np
 
 from engine.resonators.recorded import OF_PARTIALS, RecordedString
 from engine.resonators.string import StringParameters
-from training.recording.learn import Learned
+from training.recording.learn import SAME_PITCH_CENTS, Learned
 from training.recording.physics import corrections
 from training.recording.preset import recorded_note, recorded_string
 from training.recording.report import figures
-
-SAME_PITCH_CENTS = 60.0
 
 
 def combined(learned: Sequence[Learned], settings: dict[str, Any]) -> RecordedString:

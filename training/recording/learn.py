@@ -1,17 +1,19 @@
-"""One note, from samples to all that is learned of it: what a window's dialog and the command call."""
+"""Notes, from samples to all that is learned of them: what a window's dialog and the command call."""
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from training.recording.fit import FREE_POLES, LearnedNote, fit_note
+from training.recording.fit import LearnedNote, fit_takes
 from training.recording.gate import Finding, examine
-from training.recording.note import FIT_LASTS_S, Note, RecordingError, note_of
+from training.recording.note import Note, RecordingError, note_of
 from training.recording.numbering import Series, number_note
 from training.recording.physics import Kind, Physics, Strung, physics_of, strung
 from training.recording.preset import Source
@@ -20,12 +22,14 @@ from training.recording.report import Report, report_of
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
+SAME_PITCH_CENTS = 60.0
+
 
 class Refused(RecordingError):
     """The gate's refusal: each reason in words, with what to do."""
 
-    def __init__(self, findings: tuple[Finding, ...]) -> None:
-        super().__init__("; ".join(f"{each.reason}: {each.remedy}" for each in findings))
+    def __init__(self, name: str, findings: tuple[Finding, ...]) -> None:
+        super().__init__(f"{name}: " + "; ".join(f"{each.reason}: {each.remedy}" for each in findings))
         self.findings = findings
 
 
@@ -69,41 +73,59 @@ def examined(samples: Array, rate_hz: int) -> Examined:
 
 
 def learn(
-    samples: Array,
-    rate_hz: int,
-    source: Source,
+    recordings: Sequence[tuple[Examined, Source]],
     *,
     kind: Kind = "guitar",
     length_m: float | None = None,
     gauge_mm: float | None = None,
     anyway: bool = False,
-    fit_s: float = FIT_LASTS_S,
     progress: Progress = lambda share: None,
-) -> Learned:
-    """Learns a recording.
+) -> list[Learned]:
+    """Learns recordings of one instrument: those of the first's pitch jointly, each other alone.
 
     Args:
-        samples: (frames,) or (frames, channels), ±1 being full scale.
+        recordings: each with its file; the first gives the string.
         anyway: whether it continues where the gate refuses.
         progress: is called with the share that is done; may raise, to cancel.
 
     Raises:
-        RecordingError: nothing can be learned from it.
+        RecordingError: nothing can be learned from one; the message names its file.
         Refused: the gate says that it is not one note of a string.
     """
     started = time.monotonic()
-    found = examined(samples, rate_hz)
-    note, series, findings = found.note, found.series, found.findings
-    progress(0.05)
-    if findings and not anyway:
-        raise Refused(findings)
-    if series is None or not series.present:
-        raise RecordingError("it has no partials; record one plucked note")
-    fitted = fit_note(
-        note, series, seconds=fit_s, free=FREE_POLES, progress=lambda share: progress(0.05 + 0.85 * share)
-    )
-    physics = physics_of(fitted)
-    chosen = strung(physics, kind, length_m, gauge_mm)
-    report = report_of(note, fitted, physics)
+    notes = [usable(found, anyway, source.name) for found, source in recordings]
+    lead = notes[0][1]
+    takes = [place for place, (_, series) in enumerate(notes) if _apart_cents(lead, series) < SAME_PITCH_CENTS]
+    others = [place for place in range(len(notes)) if place not in takes]
+    jobs = [takes, *([place] for place in others)]
+    fitted: dict[int, LearnedNote] = {}
+    for job in jobs:
+        part = partial(_part, progress, len(fitted) / len(notes), len(job) / len(notes))
+        fits = fit_takes([notes[place] for place in job], progress=part)
+        fitted |= dict(zip(job, fits, strict=True))
+    learned = []
+    for place, ((found, source), (note, series)) in enumerate(zip(recordings, notes, strict=True)):
+        physics = physics_of(fitted[place])
+        chosen = strung(physics, kind, length_m, gauge_mm)
+        report = report_of(note, fitted[place], physics)
+        seconds = time.monotonic() - started
+        learned.append(Learned(source, note, series, fitted[place], physics, chosen, report, found.findings, seconds))
     progress(1.0)
-    return Learned(source, note, series, fitted, physics, chosen, report, findings, time.monotonic() - started)
+    return learned
+
+
+def _part(progress: Progress, done: float, share: float, of_part: float) -> None:
+    progress(0.95 * (done + share * of_part))
+
+
+def usable(found: Examined, anyway: bool, name: str) -> tuple[Note, Series]:
+    """Its note and series. Raises Refused or RecordingError, which name its file."""
+    if found.findings and not anyway:
+        raise Refused(name, found.findings)
+    if found.series is None or not found.series.present:
+        raise RecordingError(f"{name}: it has no partials; record one plucked note")
+    return found.note, found.series
+
+
+def _apart_cents(first: Series, other: Series) -> float:
+    return abs(1200 * math.log2(other.f0_hz / first.f0_hz))

@@ -1,10 +1,9 @@
-"""Poles of a note by variable projection, in the spectrum of warped time.
+"""The spectrum of a note in warped time, its poles there, and the steps of its glide.
 
 The spectrum of a decaying exponential over N samples is known in closed form, (1 - q^N)/(1 - q). So a note falls into
 bands, one around each partial, that are fitted each by itself in a few hundred bins; what other bands leak into it is
-subtracted. Amplitudes are linear and eliminated (Golub, Pereyra 1973; Kaufman 1975); steps are Levenberg's and
-Marquardt's. The glide is shared by all bands: its columns border their Jacobians, and a Schur complement eliminates
-all that belongs to one band alone.
+subtracted. `sweeps` has the steps of its poles. The glide is shared by all bands: its columns border their Jacobians,
+and a Schur complement eliminates all that belongs to one band alone.
 
 Poles that do not glide (body, neighbouring strings) bend in warped time. They are one more block, fitted together;
 their spectra are computed by FFT at a lower rate.
@@ -19,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from training.recording.glide import CENTS, PRIOR_CENTS, Glide, basis, warped
+from training.recording.glide import CENTS, PRIOR_CENTS, PRIOR_PITCH_CENTS, Glide, basis, warped
 from training.recording.poles import subspace_poles
 
 Array = NDArray[np.float64]
@@ -34,9 +33,8 @@ OVERLAP = 0.5  # of a band's width, that its fit looks into its neighbours
 LEAK_HZ = 4_000.0  # how far the strongest pole is followed into other bands
 COARSE = 8  # times fewer samples for free poles
 MOST_GLIDE = (-0.02, 0.08)  # of each share
+MOST_PITCH = 0.02  # of a take, above the first or below
 LARGEST_STEP = 60.0  # of ω in rad/s
-SETTLED = 1e-6  # of the energy: a band that gained less is visited less often
-REST = 3  # sweeps, for such a band
 
 
 @dataclass(frozen=True)
@@ -66,6 +64,7 @@ class Fit:
         partials_hz: where partials are expected, (partials,).
         poles: of each band.
         free: poles that do not glide.
+        tuned: whether its pitch differs from that of the poles, which it shares with another take.
     """
 
     samples: Array
@@ -75,12 +74,10 @@ class Fit:
     glide: Glide
     poles: list[list[Pole]] = field(default_factory=list)
     free: list[Pole] = field(default_factory=list)
+    tuned: bool = False
 
     def __post_init__(self) -> None:
-        bands = len(self.partials_hz)
-        self.poles = self.poles or [[] for _ in range(bands)]
-        self.damping, self.free_damping = np.full(bands, 1e-2), 1e-2
-        self.rests = np.zeros(bands, int)
+        self.poles = self.poles or [[] for _ in self.partials_hz]
         self.width_hz = np.diff(self.edges_hz)
         self.size = COARSE * fft.next_fast_len(math.ceil((1.04 * len(self.samples) + 64) / COARSE))
         self.step_hz = self.rate_hz / self.size
@@ -180,7 +177,7 @@ class Fit:
     def solve(self, poles: list[Pole], target: Complex, where: slice) -> tuple[float, list[Pole], Complex]:
         """Amplitudes by least squares; the energy that they leave, the poles with them, and the residual."""
         columns, _ = self.columns(poles, where)
-        amplitudes = _basis(columns) @ real_rows(target)
+        amplitudes = projector(columns) @ real_rows(target)
         pairs = amplitudes.reshape(-1, 2)
         solved = [replace(pole, a=complex(*pair)) for pole, pair in zip(poles, pairs, strict=True)]
         residual = target - columns @ amplitudes
@@ -196,27 +193,7 @@ class Fit:
             bent += [0.5 * pole.s.real * (moved + mirrored), 0.5j * (moved - mirrored)]
         return np.stack(linear, 1), np.stack(bent, 1)
 
-    def improved(
-        self, poles: list[Pole], target: Complex, where: slice, damping: float, number: int | None, tries: int = 2
-    ) -> tuple[list[Pole], float, float]:
-        """Poles after one step towards a target, the energy that is left, and the next damping."""
-        left, poles, residual = self.solve(poles, target, where)
-        columns, bent = self.columns(poles, where)
-        outside = bent - columns @ (_basis(columns) @ real_rows(bent))
-        jacobian = real_rows(outside)
-        square = jacobian.T @ jacobian
-        slope = jacobian.T @ real_rows(residual)
-        scale = np.diag(np.diag(square) + 1e-9 * np.trace(square) + 1e-300)
-        for _ in range(tries):
-            step: Array = np.asarray(np.linalg.solve(square + damping * scale, slope), np.float64).reshape(-1, 2)
-            moved = [self._moved(pole, each, number) for pole, each in zip(poles, step, strict=True)]
-            after, moved, _ = self.solve(moved, target, where)
-            if after < left:
-                return moved, after, max(1e-4, 0.3 * damping)
-            damping = min(1e4, 6 * damping)
-        return poles, left, damping
-
-    def _moved(self, pole: Pole, step: Array, number: int | None) -> Pole:
+    def moved(self, pole: Pole, step: Array, number: int | None) -> Pole:
         decay = pole.decay * math.exp(float(np.clip(step[0], -1.0, 1.0)))
         omega = pole.s.imag + float(np.clip(step[1], -LARGEST_STEP, LARGEST_STEP))
         if number is not None:
@@ -242,58 +219,30 @@ class Fit:
         low, high = (round((pole.hz + side * reach) / self.step_hz) for side in (-1, 1))
         return slice(min(self.highest, max(1, low)), max(1, min(self.highest, high)))
 
-    def sweep(self, steps: int = 1) -> None:
-        """Steps of all bands in turn, each against what all others leave."""
-        residual = self.data - self.model()
-        loudest = max((abs(pole.a) for pole in self.every()), default=0.0)
-        for number, where in enumerate(self.bands):
-            before = self.poles[number]
-            if not before:
-                continue
-            if self.rests[number]:
-                self.rests[number] -= 1
-                continue
-            target = residual[where] + self.part(before, where)
-            had = float(np.vdot(residual[where], residual[where]).real)
-            after = before
-            for _ in range(steps):
-                after, left, self.damping[number] = self.improved(after, target, where, self.damping[number], number)
-            if had - left < SETTLED * self.energy:
-                self.rests[number] = REST
-            self.poles[number] = after
-            for sign, poles in ((1, before), (-1, after)):
-                for pole in poles:
-                    if pole.a:
-                        changed = self.reach(pole, loudest)
-                        residual[changed] += sign * self.part([pole], changed)
-
-    def sweep_free(self, steps: int = 1) -> None:
-        """Steps of all free poles together, against what the string leaves."""
-        if not self.free:
-            return
-        reach = max(pole.hz + 4 * pole.decay + 30 for pole in self.free)
-        where = slice(1, min(self.highest, round(reach / self.step_hz)))
-        target = self.data[where] - self.model(self.gliding())[where]
-        for _ in range(steps):
-            self.free, _, self.free_damping = self.improved(self.free, target, where, self.free_damping, None)
-
     def step_glide(self) -> Glide:
         """The glide that leaves less, to first order, when every pole of the string may follow."""
         square, right, prior, _ = self._border()
-        step = np.linalg.solve(square + np.diag(prior), right - prior * self.glide.shares)
-        return Glide(np.clip(self.glide.shares + step, *MOST_GLIDE))
+        present = np.append(self.glide.shares, self.glide.pitch)[: len(right)]
+        step = np.linalg.solve(square + np.diag(prior), right - prior * present)
+        shares = np.clip(self.glide.shares + step[: len(self.glide.shares)], *MOST_GLIDE)
+        pitch = self.glide.pitch + (step[-1] if self.tuned else 0.0)
+        return Glide(shares, float(np.clip(pitch, -MOST_PITCH, MOST_PITCH)))
 
     def glide_covariance(self) -> Array:
         """Of the shares, (3, 3)."""
         square, _, prior, variance = self._border()
-        return np.asarray(variance * np.linalg.inv(square + np.diag(prior)))
+        inverse = np.linalg.inv(square + np.diag(prior))
+        return np.asarray(variance * inverse[: len(self.glide.shares), : len(self.glide.shares)])
 
     def _border(self) -> tuple[Array, Array, Array, float]:
         """The glide's normal equations once all poles are eliminated, its prior, and the residual's variance."""
         residual = self.data - self.model()
         slope = self.model(self.gliding(), derivative=True)
         slope = fft.irfft(np.pad(slope, (0, self.size // 2 + 1 - len(slope))), self.size)
-        shifted = basis(self.times).T * slope[: self.count]
+        moves, cents = basis(self.times), PRIOR_CENTS
+        if self.tuned:
+            moves, cents = np.column_stack([moves, self.times]), np.append(cents, PRIOR_PITCH_CENTS)
+        shifted = moves.T * slope[: self.count]
         columns = fft.rfft(shifted, self.size)[:, : self.highest].T
         square, right = np.zeros((len(shifted), len(shifted))), np.zeros(len(shifted))
         left, bins = 0.0, 0
@@ -310,7 +259,7 @@ class Fit:
             left += float(rest @ rest)
             bins += 2 * (where.stop - where.start)
         variance = left / max(bins, 1)
-        return square, right, variance * GLIDE_FIRMNESS / (PRIOR_CENTS * CENTS) ** 2, variance
+        return square, right, variance * GLIDE_FIRMNESS / (cents * CENTS) ** 2, variance
 
 
 def real_rows(columns: Complex) -> Array:
@@ -318,7 +267,7 @@ def real_rows(columns: Complex) -> Array:
     return np.concatenate([columns.real, columns.imag])
 
 
-def _basis(columns: Complex) -> Array:
+def projector(columns: Complex) -> Array:
     """(2 poles, 2 bins): from real values to the amplitudes of their projection."""
     a = real_rows(columns)
     square = a.T @ a

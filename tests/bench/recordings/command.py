@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -15,6 +15,7 @@ def recordings(
     folder: Annotated[Path | None, typer.Argument(metavar="FOLDER", help="Of recordings, one note each.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="Only the own note, without baselines and halves.")] = False,
     most: Annotated[int | None, typer.Option("--most", min=1, metavar="N", help="The first N files alone.")] = None,
+    only_dynamics: Annotated[bool, typer.Option("--dynamics", help="Only held-out dynamics.")] = False,
     synthetic: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Instead: N synthetic notes, and how intervals hold them.")
     ] = None,
@@ -22,11 +23,12 @@ def recordings(
 ) -> None:
     """Print how well a folder's recordings are learned: own note, baselines, unseen half, takes, gate.
 
-    Names show takes: files whose names differ in the last letter alone are takes of one note.
+    Names show takes: files whose names differ in the last letter alone are takes of one note. The letter before it is
+    the dynamic, such as f, m or p.
     """
     from app.audio.note_file import NoteFileError, read_note
     from tests.bench.recordings.coverage import FIRST_SEED, coverage
-    from tests.bench.recordings.evaluate import evaluate, table
+    from tests.bench.recordings.evaluate import dynamics, evaluate, table
 
     if synthetic is not None:
         with progress("bench recordings") as report:
@@ -48,9 +50,15 @@ def recordings(
             continue
         found[path.stem] = (read.samples, read.rate_hz)
     with progress("bench recordings") as report:
-        results = evaluate(found, quick=quick, progress=report)
+        if only_dynamics:
+            results: dict[str, Any] = {"values": dynamics(found, progress=report)}
+        else:
+            results = evaluate(found, quick=quick, progress=report)
     if json:
         print_json(results)
+        return
+    if only_dynamics:
+        print_table(("figure", "median", "90 %", "N"), table(results))
         return
     print_table(
         ("recording", "gate", "ESR", "from 50 ms", "LSD dB", "1 pole", "2 poles", "half", "half, 2 poles"),

@@ -2,23 +2,26 @@
 
 Each recording is learned alone. The baselines are linear: one and two poles a partial, of the same series, without
 glide and without free poles. The unseen half is the part from 1.25 s to the end of the fit, after a fit of the first
-1.25 s. A held-out take is played by another take's poles and glide, at one gain, one delay and one pitch.
+1.25 s. A held-out take is played by another take's poles and glide, at one gain, one delay and one pitch. A held-out
+dynamic is played by poles that takes of other dynamics share; its amplitudes, pitch and glide are fitted.
 """
 
 from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import interpolate, optimize, signal
 
-from training.recording.fit import LearnedNote, fit_note
+from training.recording.fit import LearnedNote, fit_note, fit_takes
 from training.recording.gate import examine
+from training.recording.glide import Glide
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, Note, RecordingError, note_of
-from training.recording.numbering import number_note
+from training.recording.numbering import Series, number_note
 from training.recording.report import aligned, errors_of
 
 Array = NDArray[np.float64]
@@ -28,6 +31,7 @@ HALF_S = 1.25
 COARSE_HZ = 8_000  # takes are compared below 4 kHz
 MOST_PITCH = 0.006  # that another take may be higher or lower, as a share
 MOST_DELAY_S = 0.012
+GLIDE_STEPS = (3e-4, 4e-3, 4e-3, 3e-3)  # of pitch and shares, at first
 
 
 def evaluate(
@@ -41,12 +45,12 @@ def evaluate(
     """
     rows: list[list[Any]] = []
     values: dict[str, list[float]] = {}
-    notes: dict[str, tuple[Note, LearnedNote]] = {}
+    notes: dict[str, tuple[Note, Series, LearnedNote]] = {}
     for number, (name, (samples, rate)) in enumerate(recordings.items()):
         progress(number / len(recordings))
         try:
-            row, note, learned = _row(name, samples, rate, values, quick)
-            notes[name] = note, learned
+            row, note, series, learned = _row(name, samples, rate, values, quick)
+            notes[name] = note, series, learned
         except RecordingError as error:
             row = [name, str(error), *[None] * 7]
         rows.append(row)
@@ -54,13 +58,33 @@ def evaluate(
         for first, second in itertools.permutations(notes, 2):
             if first[:-1] == second[:-1]:
                 _takes(notes[first], notes[second], values)
+        _dynamics({name: (note, series) for name, (note, series, _) in notes.items()}, values)
     progress(1.0)
     return {"rows": rows, "values": values, "recordings": len(recordings)}
 
 
+def dynamics(
+    recordings: Recordings, *, progress: Callable[[float], None] = lambda share: None
+) -> dict[str, list[float]]:
+    """The figures of held-out dynamics alone; recordings that are refused are left out."""
+    notes: dict[str, tuple[Note, Series]] = {}
+    values: dict[str, list[float]] = {}
+    for name, (samples, rate) in recordings.items():
+        note = note_of(samples, rate)
+        series, _ = number_note(note)
+        if series is not None and series.present:
+            notes[name] = note, series
+    stems = sorted({name[:-2] for name in notes})
+    for number, stem in enumerate(stems):
+        progress(number / len(stems))
+        _dynamics({name: each for name, each in notes.items() if name[:-2] == stem}, values)
+    progress(1.0)
+    return values
+
+
 def _row(
     name: str, samples: Array, rate: int, values: dict[str, list[float]], quick: bool
-) -> tuple[list[Any], Note, LearnedNote]:
+) -> tuple[list[Any], Note, Series, LearnedNote]:
     note = note_of(samples, rate)
     series, peaks = number_note(note)
     findings = examine(samples, note, series, peaks)
@@ -100,12 +124,43 @@ def _row(
     for figure, value in found.items():
         if value is not None:
             _append(values, figure, value)
-    return [name, kinds, *found.values()], note, learned
+    return [name, kinds, *found.values()], note, series, learned
 
 
-def _takes(first: tuple[Note, LearnedNote], second: tuple[Note, LearnedNote], values: dict[str, list[float]]) -> None:
+def _dynamics(notes: Mapping[str, tuple[Note, Series]], values: dict[str, list[float]]) -> None:
+    """Each dynamic of a note, the last letter but one of its name, against a joint fit of the others."""
+    for stem in sorted({name[:-2] for name in notes}):
+        names = [name for name in notes if name[:-2] == stem]
+        for held in sorted({name[-2] for name in names}):
+            others = [name for name in names if name[-2] != held]
+            if not others:
+                continue
+            richest_first = sorted((notes[name] for name in others), key=lambda each: -max(each[1].present))
+            learned = fit_takes(richest_first)[0]
+            linear = fit_takes(richest_first, free=0, glides=False)[0]
+            for name in names:
+                if name[-2] == held:
+                    truth, t = _coarse(notes[name][0])
+                    error, by_linear = _refitted(truth, learned, t, True), _refitted(truth, linear, t, False)
+                    _append(values, "held-out dynamic, ESR", error)
+                    _append(values, "held-out dynamic, linear, 2 poles, ESR", by_linear)
+                    _append(values, "held-out dynamic, at most 0.20", float(error <= 0.2))
+                    _append(values, "held-out dynamic, below linear, 2 poles", float(error < by_linear))
+
+
+def _coarse(note: Note) -> tuple[Array, Array]:
+    """The fitted part below 4 kHz, and its times."""
+    step = max(1, note.rate_hz // COARSE_HZ)
+    own = note.fitted()
+    truth = signal.decimate(own, step, ftype="fir") if step > 1 else own
+    return truth, np.arange(len(truth)) * step / note.rate_hz
+
+
+def _takes(
+    first: tuple[Note, Series, LearnedNote], second: tuple[Note, Series, LearnedNote], values: dict[str, list[float]]
+) -> None:
     """One take against another: the recordings, the poles with their amplitudes, and with amplitudes fitted again."""
-    (note, learned), (other, _) = first, second
+    (note, _, learned), (other, _, _) = first, second
     if note.rate_hz != other.rate_hz:
         return
     truth, own = other.fitted(), note.fitted()
@@ -120,7 +175,7 @@ def _takes(first: tuple[Note, LearnedNote], second: tuple[Note, LearnedNote], va
     take = interpolate.CubicSpline(whole, samples)
     _append(values, "take against take, ESR", _held_out(truth, take, t, rate))
     _append(values, "held-out take, ESR", _held_out(truth, learned.render, t, rate))
-    _append(values, "held-out take, amplitudes refitted, ESR", _refitted(truth, learned, t))
+    _append(values, "held-out take, amplitudes refitted, ESR", _refitted(truth, learned, t, False))
 
 
 def _held_out(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: float) -> float:
@@ -146,29 +201,35 @@ def _held_out(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: 
     return float(min(found.fun, left(place)) / max(float(truth @ truth), 1e-30))
 
 
-def _refitted(truth: Array, learned: LearnedNote, t: Array) -> float:
-    """The least ESR over one pitch and all amplitudes: poles alone carry over."""
+def _refitted(truth: Array, learned: LearnedNote, t: Array, glides: bool) -> float:
+    """The least ESR over one pitch, all amplitudes, and the glide where it `glides`: poles alone carry over."""
+    poles = [pole for pole in learned.poles if pole.hz < 0.4 / (t[1] - t[0])]
+    s = np.array([pole.s for pole in poles])[:, None]
+    of_string = np.array([pole.partial > 0 for pole in poles])[:, None]
+    whole = float(truth @ truth)
 
-    def left(pitch: float) -> float:
-        tau = learned.glide.tau(t)
-        columns = []
-        for pole in learned.poles:
-            if pole.hz < 0.4 / (t[1] - t[0]):
-                shape = np.exp(pole.s * (1 + pitch) * tau if pole.partial else pole.s * t)
-                columns += [shape.real, -shape.imag]
-        matrix = np.stack(columns, 1)
-        square = matrix.T @ matrix
+    def left(pitch: float, *shares: float) -> float:
+        glide = Glide(np.array(shares), pitch) if shares else replace(learned.glide, pitch=pitch)
+        shape = np.exp(s * np.where(of_string, glide.tau(t), t))
+        rows = np.concatenate([shape.real, -shape.imag])
+        square = rows @ rows.T
         square[np.diag_indices_from(square)] *= 1 + 1e-6
-        right = matrix.T @ truth
-        return float(truth @ truth - right @ np.linalg.solve(square, right))
+        right = rows @ truth
+        return max(0.0, whole - float(right @ np.linalg.solve(square, right))) / max(whole, 1e-30)
 
-    grid = np.linspace(-0.003, 0.003, 7)
-    place = min(grid, key=left)
-    step = float(grid[1] - grid[0])
-    found = optimize.minimize_scalar(
-        left, bounds=(place - step, place + step), method="bounded", options={"xatol": 1e-5, "maxiter": 8}
-    )
-    return float(max(0.0, min(found.fun, left(place))) / max(float(truth @ truth), 1e-30))
+    grid = np.linspace(-MOST_PITCH, MOST_PITCH, 13)
+    place = float(min(grid, key=left))
+    if not glides:
+        step = float(grid[1] - grid[0])
+        bounds = place - step, place + step
+        found = optimize.minimize_scalar(
+            left, bounds=bounds, method="bounded", options={"xatol": 1e-5, "maxiter": 12}
+        )
+        return float(min(found.fun, left(place)))
+    start = np.array([place, *learned.glide.shares])
+    corners = np.stack([start, *(start + step for step in np.diag(GLIDE_STEPS))])
+    options = {"maxfev": 220, "initial_simplex": corners}
+    return float(optimize.minimize(lambda x: left(*x), start, method="Nelder-Mead", options=options).fun)
 
 
 def _append(values: dict[str, list[float]], name: str, value: float) -> None:
@@ -179,7 +240,7 @@ def table(results: Mapping[str, Any]) -> list[Sequence[Any]]:
     """Figure, median, 90th percentile, N."""
     rows: list[Sequence[Any]] = []
     for name, found in results["values"].items():
-        if name.startswith("unseen half below"):
+        if "below" in name or "at most" in name:
             rows.append((f"{name}, share", float(np.mean(found)), None, len(found)))
         else:
             rows.append((name, float(np.median(found)), float(np.percentile(found, 90)), len(found)))

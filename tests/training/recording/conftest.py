@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
-from training.recording.learn import Learned, learn
+from training.recording.learn import Learned, examined, learn
 from training.recording.preset import Source
 
 SEED = 2  # 95 Hz
@@ -19,4 +19,5 @@ def synthetic() -> SyntheticNote:
 @pytest.fixture(scope="session")
 def learned(synthetic: SyntheticNote) -> Learned:
     source = Source("note.wav", "0" * 64, synthetic.rate_hz, len(synthetic.samples))
-    return learn(synthetic.samples, synthetic.rate_hz, source, kind="guitar", length_m=0.65)
+    found = examined(synthetic.samples, synthetic.rate_hz)
+    return learn([(found, source)], kind="guitar", length_m=0.65)[0]

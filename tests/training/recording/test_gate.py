@@ -10,7 +10,7 @@ from scipy.signal import fftconvolve
 
 from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
 from training.recording.gate import examine
-from training.recording.learn import Refused, learn
+from training.recording.learn import Refused, examined, learn
 from training.recording.note import note_of
 from training.recording.numbering import number_note
 from training.recording.preset import Source
@@ -78,4 +78,4 @@ def test_a_refusal_says_what_to_do_and_can_be_overruled(synthetic: SyntheticNote
     clipped = np.clip(4 * synthetic.samples, -0.5, 0.5)
     source = Source("clipped.wav", "0" * 64, RATE_HZ, len(clipped))
     with pytest.raises(Refused, match="lower the input gain"):
-        learn(clipped, RATE_HZ, source)
+        learn([(examined(clipped, RATE_HZ), source)])

@@ -7,12 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from engine.presets import load_preset
 from tests.bench.recordings.coverage import coverage
-from tests.bench.recordings.synthetic import SyntheticNote
-from training.recording.fit import fit_note
-from training.recording.learn import Learned, learn
+from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
+from tests.training.recording.conftest import SEED
+from training.recording.fit import fit_note, fit_takes
+from training.recording.learn import Learned, examined, learn
+from training.recording.note import note_of
 from training.recording.numbering import number_note
 from training.recording.preset import Source, body_response, recorded_note, recorded_string, write_preset
 from training.recording.report import errors_of, figures
@@ -35,6 +38,25 @@ def test_the_own_note_is_met_far_better_than_by_linear_poles(learned: Learned) -
     truth = note.fitted()
     found = linear.render(np.arange(len(truth)) / note.rate_hz)
     assert errors.esr < 0.5 * errors_of(truth, found, note.rate_hz).esr
+
+
+def test_soft_and_loud_takes_share_their_poles(synthetic: SyntheticNote) -> None:
+    """Each with its own amplitudes, glide and pitch: one of them was recorded three cents higher."""
+    higher = 2 ** (3 / 1200)
+    soft = synthetic_note(SEED, rise_cents=5.0).samples
+    at = np.arange(len(soft)) * higher
+    soft = 0.2 * CubicSpline(np.arange(len(soft)), soft)(at[at < len(soft)])
+    takes = [note_of(samples, synthetic.rate_hz) for samples in (synthetic.samples, soft)]
+    notes = [(note, number_note(note)[0]) for note in takes]
+    first, second = fit_takes(notes)
+    assert [pole.partial for pole in first.poles] == [pole.partial for pole in second.poles]
+    apart = [b.s / a.s for a, b in zip(first.poles, second.poles, strict=True) if a.partial]
+    assert np.ptp(np.abs(apart)) < 1e-9
+    assert 1200 * math.log2(abs(apart[0])) == pytest.approx(3, abs=1.5)
+    assert first.glide.shares.sum() > 1.5 * second.glide.shares.sum()
+    for note, learned in zip(takes, (first, second), strict=True):
+        truth = note.fitted()
+        assert errors_of(truth, learned.render(np.arange(len(truth)) / note.rate_hz), note.rate_hz).esr < 0.01
 
 
 def test_pitch_and_stiffness_are_the_strings(learned: Learned, synthetic: SyntheticNote) -> None:
@@ -92,7 +114,7 @@ def test_progress_may_cancel(synthetic: SyntheticNote) -> None:
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        learn(synthetic.samples, synthetic.rate_hz, Source("a", "0", 44_100, 1), progress=stop)
+        learn([(examined(synthetic.samples, synthetic.rate_hz), Source("a", "0", 44_100, 1))], progress=stop)
 
 
 def test_errors_ignore_one_gain_and_one_delay(synthetic: SyntheticNote) -> None:
@@ -112,6 +134,6 @@ def test_real_notes(name: str) -> None:
         pytest.skip("the shared recordings are not here")
     soundfile = pytest.importorskip("soundfile")
     samples, rate_hz = soundfile.read(path)
-    learned = learn(samples, rate_hz, Source(path.name, "0" * 64, rate_hz, len(samples)))
+    (learned,) = learn([(examined(samples, rate_hz), Source(path.name, "0" * 64, rate_hz, len(samples)))])
     assert learned.report.errors.esr < 0.05
     assert learned.report.errors.distance_db < 5

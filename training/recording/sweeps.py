@@ -1,0 +1,138 @@
+"""Steps of the poles of one note, or of several takes that share them, by variable projection.
+
+Amplitudes are linear and eliminated (Golub, Pereyra 1973; Kaufman 1975); steps are Levenberg's and Marquardt's. Takes
+share s of each pole; amplitude, glide and pitch are each take's own. All takes count alike, however loud they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from training.recording.refine import Fit, Pole, projector, real_rows
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+SETTLED = 1e-6  # of the energy: a band that gained less is visited less often
+REST = 3  # sweeps, for such a band
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-4, 1e4
+
+
+@dataclass
+class Takes:
+    """Takes of one note; all have the same bands.
+
+    Attributes:
+        damping: of the steps of each band; `free_damping`: of the poles that do not glide.
+    """
+
+    fits: Sequence[Fit]
+    free_damping: float = FIRST_DAMPING
+    damping: Array = field(init=False)
+
+    def __post_init__(self) -> None:
+        bands = len(self.fits[0].partials_hz)
+        self.damping, self._rests = np.full(bands, FIRST_DAMPING), np.zeros(bands, int)
+        self.weights = [self.fits[0].energy / fit.energy for fit in self.fits]
+
+    def improved(
+        self,
+        poles: Sequence[list[Pole]],
+        targets: Sequence[Complex],
+        wheres: Sequence[slice],
+        damping: float,
+        number: int | None,
+        tries: int = 2,
+    ) -> tuple[list[list[Pole]], float, float]:
+        """Poles of each take after one step towards the targets, the weighted energy that is left, the next damping.
+
+        Args:
+            number: of the band; None: poles that do not glide.
+        """
+        left, solved, rests = self._solved(poles, targets, wheres)
+        square: Array = np.zeros((2 * len(poles[0]),) * 2)
+        slope: Array = np.zeros(2 * len(poles[0]))
+        for fit, own, where, rest, weight in zip(self.fits, solved, wheres, rests, self.weights, strict=True):
+            columns, bent = fit.columns(own, where)
+            jacobian = real_rows(bent - columns @ (projector(columns) @ real_rows(bent)))
+            square += weight * jacobian.T @ jacobian
+            slope += weight * jacobian.T @ real_rows(rest)
+        scale = np.diag(np.diag(square) + 1e-9 * np.trace(square) + 1e-300)
+        lead = self.fits[0]
+        for _ in range(tries):
+            step: Array = np.asarray(np.linalg.solve(square + damping * scale, slope), np.float64).reshape(-1, 2)
+            moved = [[lead.moved(pole, each, number) for pole, each in zip(own, step, strict=True)] for own in solved]
+            after, moved, _ = self._solved(moved, targets, wheres)
+            if after < left:
+                return moved, after, max(LEAST_DAMPING, 0.3 * damping)
+            damping = min(MOST_DAMPING, 6 * damping)
+        return solved, left, damping
+
+    def _solved(
+        self, poles: Sequence[list[Pole]], targets: Sequence[Complex], wheres: Sequence[slice]
+    ) -> tuple[float, list[list[Pole]], list[Complex]]:
+        """The weighted energy that is left with the best amplitudes, the poles with them, and the residuals."""
+        total, solved, rests = 0.0, [], []
+        for fit, own, target, where, weight in zip(self.fits, poles, targets, wheres, self.weights, strict=True):
+            left, with_amplitudes, rest = fit.solve(own, target, where)
+            total += weight * left
+            solved.append(with_amplitudes)
+            rests.append(rest)
+        return total, solved, rests
+
+    def sweep(self, steps: int = 1) -> None:
+        """Steps of all bands in turn, each against what all others leave."""
+        residuals = [fit.data - fit.model() for fit in self.fits]
+        loudest = [max((abs(pole.a) for pole in fit.every()), default=0.0) for fit in self.fits]
+        for number in range(len(self.damping)):
+            before = [fit.poles[number] for fit in self.fits]
+            if not before[0]:
+                continue
+            if self._rests[number]:
+                self._rests[number] -= 1
+                continue
+            wheres = [fit.bands[number] for fit in self.fits]
+            parts = list(zip(self.fits, residuals, before, wheres, strict=True))
+            targets = [rest[where] + fit.part(own, where) for fit, rest, own, where in parts]
+            had = sum(
+                weight * float(np.vdot(rest[where], rest[where]).real)
+                for weight, (_, rest, _, where) in zip(self.weights, parts, strict=True)
+            )
+            after, left = before, had
+            for _ in range(steps):
+                after, left, self.damping[number] = self.improved(
+                    after, targets, wheres, float(self.damping[number]), number
+                )
+            if had - left < SETTLED * self.fits[0].energy * len(self.fits):
+                self._rests[number] = REST
+            for place, (fit, rest, own, _) in enumerate(parts):
+                fit.poles[number] = after[place]
+                for sign, poles in ((1, own), (-1, after[place])):
+                    for pole in poles:
+                        if pole.a:
+                            changed = fit.reach(pole, loudest[place])
+                            rest[changed] += sign * fit.part([pole], changed)
+
+    def sweep_free(self, steps: int = 1) -> None:
+        """Steps of all free poles together, against what the string leaves."""
+        if not self.fits[0].free:
+            return
+        reach = max(pole.hz + 4 * pole.decay + 30 for pole in self.fits[0].free)
+        wheres = [slice(1, min(fit.highest, round(reach / fit.step_hz))) for fit in self.fits]
+        targets = [
+            fit.data[where] - fit.model(fit.gliding())[where] for fit, where in zip(self.fits, wheres, strict=True)
+        ]
+        free = [fit.free for fit in self.fits]
+        for _ in range(steps):
+            free, _, self.free_damping = self.improved(free, targets, wheres, self.free_damping, None)
+        for fit, own in zip(self.fits, free, strict=True):
+            fit.free = own
+
+    def step_glides(self) -> None:
+        """The glide of each take, and the pitch of all but the first."""
+        for fit in self.fits:
+            fit.set_glide(fit.step_glide())
