@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from app.export.faust import faust_program, key_tables, write_faust
+from app.instrument.facts import bright_mode
 from app.instrument.loud_keys import LoudKeys
 from app.instrument.offline import render_note
 from app.patches.library import SHIPPED as PATCHES
@@ -59,7 +60,7 @@ def played(program: Path, freq_hz: float, channels: int) -> NDArray[np.float64]:
 
 
 def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
-    patch = quiet("classical_guitar")
+    patch = quiet("oud")
     keys = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info)
     key = keys.of_key(60)
     assert key is not None
@@ -74,8 +75,18 @@ def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
     np.testing.assert_allclose(at_bridge, expected, rtol=1e-12)
 
 
+def test_losses_by_mode_are_right_for_the_first_partial_and_near_three_kilohertz(preset: Preset) -> None:
+    patch = quiet("classical_guitar")
+    assert patch.losses is not None
+    key = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info).of_key(60)
+    assert key is not None
+    _, _, c, d, _ = (np.array(column) for column in key_tables([key], patch=patch))
+    for mode in (1, bright_mode(key.string.parameters)):
+        assert c[0] + d[0] * mode**2 == pytest.approx(key.resonator.sigma[mode - 1], rel=1e-9)
+
+
 def test_its_decay_is_that_of_the_first_polarisation(preset: Preset) -> None:
-    patch = quiet("classical_guitar", polarisations=Polarisations(conductance_s_kg=0.02))
+    patch = quiet("oud", polarisations=Polarisations(conductance_s_kg=0.02))
     keys = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info)
     key = keys.of_key(60)
     assert key is not None
