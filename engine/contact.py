@@ -55,7 +55,7 @@ CONTACTS: Mapping[Exciter, tuple[Contact, Contact]] = {  # of the stroke, of the
         Contact(0.010, 0.3, 1_600, 0.6, 0.006, 0.018, 0.0),
     ),
     "plectrum": (
-        Contact(0.004, 0.35, 2_000, 0.5, 0.001, 0.014, 1.0),
+        Contact(0.004, 0.55, 1_800, 0.5, 0.001, 0.018, 1.0),
         Contact(0.010, 0.3, 1_800, 0.6, 0.006, 0.020, 0.0),
     ),
     "quill": (

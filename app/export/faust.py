@@ -1,7 +1,8 @@
 """A patch's quiet string as a Faust program: a bank of its modes, whose standard parameters are freq, gain and gate.
 
 What depends on the key stands in tables, and the modes follow from them by the stiff string's law: with η = μπ/ℓ,
-ω² = (T₀η² + EIη⁴) / ρA and σ = (d₁ + d₃η²) / 2ρA are polynomials of μ².
+ω² = (T₀η² + EIη⁴) / ρA and σ = (d₁ + d₃η²) / 2ρA are polynomials of μ². Losses by mode are no such polynomial: then
+σ is right for the first partial and for the one near 3 kHz.
 """
 
 from __future__ import annotations
@@ -13,8 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
+from app.instrument.facts import bright_mode
 from app.instrument.loud_keys import LoudKey, LoudKeys
-from app.instrument.strings import HIGHEST_HZ
+from app.instrument.strings import HIGHEST_HZ, decay_rates
 from app.patches.patch import Body, Patch, Room
 from app.patches.tuning import A4_KEY
 from app.shared.version import PROGRAM, program_version
@@ -70,7 +72,7 @@ def faust_program(patch: Patch, preset: PresetInfo, most_modes: int | None = Non
     bridge = patch.pickup.kind == "bridge"
     moving = loud.polarisations
     lost = 0.0 if moving is None else patch.knobs.decay * moving.conductance_s_kg
-    tables = key_tables(keys, bridge, lost)
+    tables = key_tables(keys, bridge, lost, patch)
     pulls = _pulls(patch, modes, grid_points)
     ears = [[1.0] * modes if bridge else mode_shapes(np.array([point]), modes)[:, 0].tolist() for point in ear.points]
     lines = [
@@ -149,12 +151,15 @@ def _comments(patch: Patch, modes: int) -> list[str]:
     ]
 
 
-def key_tables(keys: list[LoudKey | None], bridge: bool = False, conductance_s_kg: float = 0.0) -> list[list[float]]:
+def key_tables(
+    keys: list[LoudKey | None], bridge: bool = False, conductance_s_kg: float = 0.0, patch: Patch | None = None
+) -> list[list[float]]:
     """t, b, c, d and loudness of each key; a silent one has its neighbour's string and no loudness.
 
     Args:
         bridge: the force at the bridge is heard, ρA ω²/η of each mode; ρAℓ/π of it is in the loudness.
         conductance_s_kg: of the bridge, to which the first polarisation loses energy.
+        patch: whose losses by mode count; None: there are none.
     """
     rows: list[list[float]] = []
     for key in keys:
@@ -163,12 +168,18 @@ def key_tables(keys: list[LoudKey | None], bridge: bool = False, conductance_s_k
             continue
         string = key.string.parameters
         mass, eta2 = string.mass_per_length_kg_m, (math.pi / string.length_m) ** 2
+        steady, rising = string.damping_d1_kg_m_s / (2 * mass), string.damping_d3_kg_m_s / (2 * mass) * eta2
+        if patch is not None and patch.losses is not None:
+            bright = max(2, bright_mode(string))
+            rates = decay_rates(patch, string, bright)
+            rising = float(rates[-1] - rates[0]) / (bright**2 - 1)
+            steady = float(rates[0]) - rising
         rows.append(
             [
                 string.tension_n / mass * eta2,
                 string.youngs_modulus_pa * string.second_moment_m4 / mass * eta2**2,
-                string.damping_d1_kg_m_s / (2 * mass) + conductance_s_kg * string.tension_n / string.length_m,
-                string.damping_d3_kg_m_s / (2 * mass) * eta2,
+                steady + conductance_s_kg * string.tension_n / string.length_m,
+                rising,
                 key.gain * key.string.shortened * (mass / math.sqrt(eta2) if bridge else 1.0),
             ]
         )

@@ -44,7 +44,7 @@ def timbre(
     """
     from app.patches.library import SHIPPED, PatchError, find_patch, list_patches
     from tests.bench import timbre as of_timbre
-    from tests.bench.timbre import LEAST_DISTANCE_DB, PAIRED, REFERENCES, distance_db, references_of
+    from tests.bench.timbre import BRIGHTEST_FIRST, LEAST_DISTANCE_DB, PAIRED, REFERENCES, distance_db, references_of
 
     try:
         entries = [find_patch(name) for name in names] if names else list_patches(SHIPPED)[0]
@@ -98,10 +98,17 @@ def timbre(
     if pairs:
         print(f"Spectral distance over eight partials, at least {LEAST_DISTANCE_DB:g} dB wanted:")
         print_table(("one", "other", "dB"), [[one, other, f"{value:.1f}"] for (one, other), value in pairs.items()])
+    if all(name in found for name in BRIGHTEST_FIRST):
+        centroids = [found[name].centroid_hz for name in BRIGHTEST_FIRST]
+        order = ", ".join(f"{name} {hz:.0f} Hz" for name, hz in zip(BRIGHTEST_FIRST, centroids, strict=True))
+        print(f"Brightest first wanted: {order} {'+' if centroids == sorted(centroids, reverse=True) else '-'}")
     print("Ranges:")
     print_table(
         ("figure", "from", "to", "instruments", "how it was taken"),
-        [[r.figure, r.low, r.high, ", ".join(r.patches) or "acoustic", r.taken] for r in REFERENCES],
+        [
+            [r.figure, r.low, r.high, ", ".join(r.patches) or ("all" if r.everywhere else "acoustic"), r.taken]
+            for r in REFERENCES
+        ],
     )
 
 

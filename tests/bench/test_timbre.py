@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from app.patches.library import find_patch
+from app.patches.library import SHIPPED, find_patch
 from tests.bench import timbre as t
 
 FIRST_HZ = 200.0
@@ -63,6 +63,8 @@ def test_ranges_of_an_instrument_go_before_the_general_ones() -> None:
     steel = t.references_of("steel_string_acoustic", acoustic=True)
     assert (steel["centroid_hz"].low, steel["ripple_db"].high) == (900, 5)
     assert "ripple_db" not in t.references_of("electric_bass", acoustic=False)
+    for path in sorted(SHIPPED.glob("*.json")):  # whatever is printed has a range
+        assert t.references_of(path.stem, acoustic=False)
     for reference in t.REFERENCES:
         assert reference.taken and reference.low < reference.high
         assert all(find_patch(name) for name in reference.patches)

@@ -87,6 +87,7 @@ class Reference:
     Attributes:
         patches: names of the instruments it holds for; empty: all acoustic plucked ones.
         taken: how the range was taken.
+        everywhere: whether it holds for all instruments of strings.
     """
 
     figure: str
@@ -94,6 +95,7 @@ class Reference:
     high: float
     taken: str
     patches: tuple[str, ...] = ()
+    everywhere: bool = False
 
     def holds(self, value: float) -> bool:
         return self.low <= value <= self.high
@@ -105,7 +107,13 @@ SAMPLED = (
 PIZZICATO = "of a double bass, E3, piano and forte, measured with these functions (D. Smolken, CC0), widened a little"
 QUILLS = ("harpsichord", "harpsichord_in_meantone", "harpsichord_lute_stop")
 BRIGHT = ("steel_string_acoustic", "harpsichord", "banjo")
+ELECTRIC = (
+    *("baritone_twang", "electric_guitar_bridge_pick_up", "electric_guitar_neck_pick_up", "jazz_guitar"),
+    *("slide_guitar_in_open_d", "electric_bass", "fretless_bass", "picked_bass", "slack_bass"),
+)
 REFERENCES = (
+    Reference("t60_early_s", 0.5, 20, "aim, from short skins to long steel; not measured", everywhere=True),
+    Reference("rolloff_hz", 1_500, 6_000, "2 … 5 kHz, resonances of pick-ups with cables (Lemme), widened", ELECTRIC),
     Reference("centroid_hz", 900, 1_800, f"1128 Hz {SAMPLED}", ("steel_string_acoustic",)),
     Reference("rolloff_hz", 5_000, math.inf, f"8417 Hz {SAMPLED}", ("steel_string_acoustic",)),
     Reference("centroid_hz", 1_500, 3_000, f"1962 Hz {SAMPLED}", ("harpsichord",)),
@@ -129,6 +137,7 @@ REFERENCES = (
 )
 PAIRED = ("classical_guitar", "harpsichord", "koto", "banjo", "concert_harp", "electric_bass")
 LEAST_DISTANCE_DB = 5.0
+BRIGHTEST_FIRST = ("flamenco_guitar", "classical_guitar", "jazz_guitar")  # by the attack's centroid
 
 
 def timbre(patch: Patch, preset: Preset, source: str = "model") -> Timbre:
@@ -277,7 +286,7 @@ def distance_db(one: Timbre, other: Timbre) -> float:
 
 def references_of(name: str, acoustic: bool) -> Mapping[str, Reference]:
     """Figure -> range, for the instrument of this name; its own range goes before that of all acoustic ones."""
-    general = {each.figure: each for each in REFERENCES if acoustic and not each.patches}
+    general = {each.figure: each for each in REFERENCES if each.everywhere or (acoustic and not each.patches)}
     return {**general, **{each.figure: each for each in REFERENCES if name in each.patches}}
 
 

@@ -12,11 +12,12 @@ import pytest
 from numpy.typing import NDArray
 
 from app.export.faust import faust_program, key_tables, write_faust
+from app.instrument.facts import bright_mode
 from app.instrument.loud_keys import LoudKeys
 from app.instrument.offline import render_note
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Body, Damping, Patch, Pickup, PluckChoices, Polarisations, Room
+from app.patches.patch import Body, Damping, Noise, Patch, Pickup, PluckChoices, Polarisations, Room
 from app.patches.tuning import TuningChoice
 from engine.presets import SHIPPED, Preset, load_preset
 from engine.voices import Ear
@@ -26,7 +27,10 @@ SECONDS, HELD_S = 1.2, 0.8
 VELOCITY = 100
 QUIET: dict[str, Any] = {"softest_mm": 0.01, "hardest_mm": 0.02}
 PLAIN: dict[str, Any] = {"release_ms": 0.0, "release_hard_ms": 0.0, "variation": 0.0}
-ALONE: dict[str, Any] = {"body": Body(), "room": Room(), "polarisations": None, "sympathy_s_kg": 0.0}
+ALONE: dict[str, Any] = {
+    **{"body": Body(), "room": Room(), "noise": Noise()},
+    **{"polarisations": None, "sympathy_s_kg": 0.0, "mode": "poly"},
+}
 DRIVER = Path(__file__).with_name("faust_driver.cpp")
 needs_faust = pytest.mark.skipif(
     shutil.which("faust") is None or shutil.which("g++") is None, reason="needs faust and g++"
@@ -59,7 +63,7 @@ def played(program: Path, freq_hz: float, channels: int) -> NDArray[np.float64]:
 
 
 def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
-    patch = quiet("classical_guitar")
+    patch = quiet("oud")
     keys = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info)
     key = keys.of_key(60)
     assert key is not None
@@ -74,8 +78,18 @@ def test_its_tables_are_the_strings_modes(preset: Preset) -> None:
     np.testing.assert_allclose(at_bridge, expected, rtol=1e-12)
 
 
+def test_losses_by_mode_are_right_for_the_first_partial_and_near_three_kilohertz(preset: Preset) -> None:
+    patch = quiet("classical_guitar")
+    assert patch.losses is not None
+    key = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info).of_key(60)
+    assert key is not None
+    _, _, c, d, _ = (np.array(column) for column in key_tables([key], patch=patch))
+    for mode in (1, bright_mode(key.string.parameters)):
+        assert c[0] + d[0] * mode**2 == pytest.approx(key.resonator.sigma[mode - 1], rel=1e-9)
+
+
 def test_its_decay_is_that_of_the_first_polarisation(preset: Preset) -> None:
-    patch = quiet("classical_guitar", polarisations=Polarisations(conductance_s_kg=0.02))
+    patch = quiet("oud", polarisations=Polarisations(conductance_s_kg=0.02))
     keys = LoudKeys(patch, Ear(tuple(patch.pickup.points)), preset.info)
     key = keys.of_key(60)
     assert key is not None
@@ -118,7 +132,7 @@ def test_a_patch_without_a_string_is_reported(preset: Preset) -> None:
 def test_it_sounds_as_our_quiet_pluck(
     keys: tuple[int, ...], changes: dict[str, object], preset: Preset, tmp_path: Path
 ) -> None:
-    patch = quiet("classical_guitar", **changes)
+    patch = quiet("oud", **changes)  # without losses by mode, which a program has nearly
     program = compiled(patch, preset, tmp_path)
     for key in keys:
         ours = render_note(patch, preset, key, VELOCITY, HELD_S, SECONDS, RATE_HZ).astype(np.float64)
