@@ -224,6 +224,13 @@ class Damping(Value):
     let_ring: Flag = False
 
 
+class Amp(Value):
+    """The amplifier, through which the strings sound before the body: its drive (0: none) and its tone."""
+
+    drive_db: float = parameter("amp.drive_db")
+    tone_db: float = parameter("amp.tone_db")
+
+
 class Body(Value):
     """The body of the instrument: the name of an impulse response ("": none), its mix, its size (1: as it is)."""
 
@@ -301,6 +308,7 @@ class Patch(Value):
     bend_by: Literal["tension", "length"] = "tension"
     mod_wheel: str = "none"
     tuning: TuningChoice = TuningChoice()
+    amp: Amp = Amp()
     body: Body = Body()
     room: Room = Room()
     level_db: float = parameter("level_db")
