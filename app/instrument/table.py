@@ -28,6 +28,7 @@ VALUES = (
     *(f"pluck.{name}" for name in ("position", "width", "width_hard", "softest_mm", "hardest_mm", "curve")),
     "damping.release_t60_s",
     "bend_semitones",
+    "damping.mute",
 )
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
 SHAPES = {

@@ -218,9 +218,14 @@ class Losses(Value):
 
 
 class Damping(Value):
-    """What a released key does: nothing (`let_ring`), or all partials decay by 60 dB in `release_t60_s`."""
+    """What a released key does: nothing (`let_ring`), or all partials decay by 60 dB in `release_t60_s`.
+
+    Attributes:
+        mute: how far a hand at the bridge mutes the strings, 0 … 1.
+    """
 
     release_t60_s: float = parameter("damping.release_t60_s")
+    mute: float = parameter("damping.mute")
     let_ring: Flag = False
 
 

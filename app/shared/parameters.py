@@ -117,6 +117,8 @@ TIPS = {
     "knobs.brightness_decay": "Damping of high partials: right is darker. The figure is the T60 of the partial "
     "near 3 kHz",
     "damping.release_t60_s": "Time in which a released key falls by 60 dB",
+    "damping.mute": "Palm mute: a hand on the strings at the bridge, so that high partials stop soon. "
+    "MIDI's soft pedal (controller 67) adds to it",
     "pluck.position": f"Where it is plucked: nearer an end is brighter; {_PLACE_TIP}",
     "pluck.width": "Width of the softest pluck, in lengths of the string: wide is mellow",
     "pluck.width_hard": "Width of the hardest pluck, in lengths of the string: narrow is bright",
@@ -193,6 +195,7 @@ OF_PATCHES: Mapping[str, Parameter] = {
         _knob("decay", "decay", MULTIPLIER, "s"),
         _knob("brightness_decay", "HF damping", MULTIPLIER, "s"),
         Parameter("damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, "wheel", wheel_factor=10),
+        Parameter("damping.mute", "mute", (0, 1), 0, PERCENT, DECAY, "wheel", "palm mute", 1.0),
         Parameter("pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, "wheel", "pluck position", 0.5),
         Parameter(
             "pluck.width", "soft width", WIDTH_RANGE, 0.12, WIDTH, PLUCK, "wheel", "width (low velocity)", wheel=0.02
