@@ -57,8 +57,11 @@ def amplify(mixer: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def _begin(amp: np.ndarray, whole: np.ndarray) -> None:
-    """As if there had never been any input."""
+    """As if there had never been any input: all at rest, which is where the bias has it."""
     amp[at.A_STATE :] = 0.0
+    rest = BIAS / math.sqrt(1 + BIAS * BIAS)
+    amp[at.A_STATE + 1], amp[at.A_STATE + 2] = BIAS, rest
+    amp[at.A_SHAPED : at.A_OUT] = rest
     total = 0.0
     for tap in range(at.A_TAPS):
         place = tap - (at.A_TAPS - 1) / 2

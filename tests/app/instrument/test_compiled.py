@@ -24,7 +24,7 @@ from app.instrument.strings import pitch_hz_of
 from app.instrument.table import VALUES
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Losses, Patch, Pickup, Polarisations
+from app.patches.patch import Body, Losses, Patch, Pickup, Polarisations
 from app.patches.tuning import TuningChoice
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
@@ -91,10 +91,17 @@ def compared(name: str, patch: Patch, preset: Preset, played: Framed, quanta: in
 
 @pytest.fixture(scope="session")
 def shipped() -> dict[str, Patch]:
-    """Without variation from stroke to stroke and strings at rest, which the frozen sounds have not."""
+    """Without variation from stroke to stroke and strings at rest, which the frozen sounds have not.
+
+    Those that are heard through cabinets now have the bodies by which their keys were equally loud.
+    """
     read = {path.stem: read_patch(path) for path in PATCHES.glob("*.json")}
     even = {name: patch.pluck.model_copy(update={"variation": 0.0}) for name, patch in read.items()}
-    return {name: changed(patch, pluck=even[name], sympathy_s_kg=0.0) for name, patch in read.items()}
+    bodies = {name: patch.body for name, patch in read.items()}
+    bodies |= {"electric_bass": Body(), "jazz_guitar": Body(name="archtop", mix=0.9)}
+    return {
+        name: changed(patch, pluck=even[name], sympathy_s_kg=0.0, body=bodies[name]) for name, patch in read.items()
+    }
 
 
 def changed(patch: Patch, **parts: object) -> Patch:

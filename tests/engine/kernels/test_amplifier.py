@@ -91,6 +91,10 @@ def test_off_it_leaves_every_sample_and_is_switched_without_a_click() -> None:
     np.testing.assert_array_equal(whole[60 * at.QUANTUM :], sound[60 * at.QUANTUM :, 0])
 
 
+def test_it_is_silent_before_any_input() -> None:
+    assert np.abs(amplified(Amp(FULL_DB), np.zeros((9_600, 2)), RATE_HZ)).max() < 1e-12
+
+
 def test_silence_stays_silence_after_what_was_driven() -> None:
     sound = np.concatenate([tone(200, 1.0, 4_800)[1], np.zeros((RATE_HZ, 2))])
     found = amplified(Amp(FULL_DB), sound, RATE_HZ)

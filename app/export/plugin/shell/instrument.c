@@ -257,8 +257,10 @@ static void follow_losses(instrument *own, int64_t knob, double value) {
 /* As `engine.effects.Amp.factors`. */
 static void follow_amp(instrument *own) {
   slot *amp = own->mixer + M_AMPLIFIER;
+  const slot *gains = own->player + PLAYER_SOURCE_GAINS;
+  bool compares = gains[0].real != 0 && gains[1].real != 0;
   double drive = pow(10, own->amp[AMP_DRIVE_DB] / 20);
-  bool on = own->amp[AMP_DRIVE_DB] > 0 && !own->compares;
+  bool on = own->amp[AMP_DRIVE_DB] > 0 && !compares;
   amp[A_WANTED_GAIN].real = on ? own->of->level * sqrt(1 + pow(drive * AMP_NOMINAL, 2)) / drive : 0;
   amp[A_WANTED_TONE].real = on ? pow(10, own->amp[AMP_TONE_DB] / 20) : 0;
   amp[A_WANTED_DRIVE].real = on ? drive / own->of->level : 0;
@@ -276,10 +278,9 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
   } else if (of->kind == KIND_SOURCE) {
     int source = (int)(value + 0.5);
     own->table[TABLE_SOURCES].whole = source == SOURCE_MODEL ? 1 : 2;
-    own->compares = source == SOURCE_DIFFERENCE;
-    follow_amp(own);
     own->player[PLAYER_SOURCE_GAINS].real = source != SOURCE_TRUTH;
     own->player[PLAYER_SOURCE_GAINS + 1].real = source == SOURCE_MODEL ? 0 : source == SOURCE_TRUTH ? 1 : -1;
+    follow_amp(own);
   } else if (of->kind == KIND_MIX) {
     own->mix[of->index] = value;
   } else if (of->kind == KIND_AMP) {

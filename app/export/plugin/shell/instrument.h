@@ -56,7 +56,6 @@ typedef struct {
   int64_t frames_of_parts, mix_slots, mixing_at; /* the next slot of the response that is being mixed, -1: none is */
   double mix[2], mixing[2], weights[1 + MIX_PARTS]; /* of body and room: the latest, and those of that one */
   double amp[2];      /* drive and tone in dB; no drive: there is no amplifier */
-  bool compares;      /* the difference of model and truth is heard, which has no amplifier */
   double values[MOST_PARAMETERS];
   double added[2]; /* knobs of decay and of brightness decay beyond the instrument's own, which drums follow */
   double positions[MOST_PARAMETERS], standards[MOST_PARAMETERS]; /* of macros: as levels follow them */
