@@ -93,7 +93,7 @@ def compared(name: str, patch: Patch, preset: Preset, played: Framed, quanta: in
 def shipped() -> dict[str, Patch]:
     """Without variation from stroke to stroke and strings at rest, which the frozen sounds have not.
 
-    Those that are heard through cabinets now have the bodies by which their keys were equally loud.
+    Those that are heard through cabinets now have the bodies of the frozen sounds, on which gains of keys depend.
     """
     read = {path.stem: read_patch(path) for path in PATCHES.glob("*.json")}
     even = {name: patch.pluck.model_copy(update={"variation": 0.0}) for name, patch in read.items()}
