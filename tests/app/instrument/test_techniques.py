@@ -111,7 +111,7 @@ def test_a_hammer_on_moves_the_note_without_a_pluck_and_a_pull_off_moves_it_back
         assert abs(cents) < 6, (at_s, key)
     loud = [float(np.abs(sound[round(at_s * RATE_HZ) :][:WINDOW]).max()) for at_s in (0.2, 0.45, 0.85, 1.4)]
     assert loud[1] < 1.1 * loud[0]  # the second key is hard, and plucks nothing
-    assert loud[2] < 1.1 * loud[1]
+    assert loud[2] < 1.3 * loud[1]  # at a lower pitch the same energy is a larger motion
     assert loud[2] > 0.3 * loud[0]
     assert loud[3] < 0.05 * loud[2]  # no key is held
 
