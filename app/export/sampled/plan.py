@@ -176,7 +176,7 @@ class SampledPlan:
             "room": room.mix == 0,
         }
         unheard = UNHEARD_FIELDS | {name for name, left_out in silent.items() if left_out}
-        if self.patch.sympathy_s_kg > 0:  # damping chooses the strings that ring with a note
+        if self.patch.sympathy_s_kg > 0 or self.patch.damping.mute > 0:  # how long strings ring, and which
             unheard -= {"damping"}
         return self.patch.model_dump(mode="json", exclude=set(unheard))
 
