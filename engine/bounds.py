@@ -101,6 +101,8 @@ MOST_IMPULSE_CHANNELS = 2
 # Effects
 BODY_SIZE = (0.5, 2.0)  # in lengths of its model
 ROOM_T60_S = (0.2, 3.0)
+AMP_DRIVE_DB = (0.0, 36.0)  # at its end, aliases of 5 kHz at full scale are 80 dB below the tone
+AMP_TONE_DB = (-12.0, 12.0)
 
 # Work
 MOST_RUNS = 2_000  # of a plan

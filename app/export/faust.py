@@ -17,7 +17,7 @@ import numpy as np
 from app.instrument.facts import bright_mode
 from app.instrument.loud_keys import LoudKey, LoudKeys
 from app.instrument.strings import HIGHEST_HZ, decay_rates
-from app.patches.patch import Body, Patch, Room
+from app.patches.patch import Amp, Body, Patch, Room
 from app.patches.tuning import A4_KEY
 from app.shared.version import PROGRAM, program_version
 from engine.pluck import LARGEST_AMPLITUDE_MM
@@ -55,7 +55,7 @@ def write_faust(path: Path, patch: Patch, preset: PresetInfo, most_modes: int | 
 
 def faust_program(patch: Patch, preset: PresetInfo, most_modes: int | None = None) -> tuple[str, int]:
     """The program's text and how many modes it has, as `write_faust` writes it. Raises ValueError as it does."""
-    patch = Patch.model_validate({**dict(patch), "body": Body(), "room": Room()})
+    patch = Patch.model_validate({**dict(patch), "amp": Amp(), "body": Body(), "room": Room()})
     ear = Ear(tuple(patch.pickup.points), patch.pickup.kind)
     if preset.recorded is not None:
         raise ValueError(

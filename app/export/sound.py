@@ -18,7 +18,7 @@ from app.export.recording import BLOCK_FRAMES, Recording, Sound, blocks
 from app.export.struck import Struck
 from app.instrument.bodies import body_digest
 from app.instrument.effects import channels_of, effects_from
-from app.patches.patch import Body, Patch, Room
+from app.patches.patch import Amp, Body, Patch, Room
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PICKUPS, Pickup, Source
 from app.shared.worker import Progress
 from engine.effects import Effects
@@ -45,6 +45,7 @@ class Through(BaseModel):
     Attributes:
         instrument: its name.
         gain: the factor of the string, which makes all keys equally loud; with the instrument's level.
+        level_db: of the instrument, in `gain` too: its amplifier does not count it as drive.
         body_sha256: of the file of a body of the user's own.
     """
 
@@ -54,12 +55,22 @@ class Through(BaseModel):
     gain: float = Field(ge=0, le=MOST_GAIN)
     body: Body = Body()
     room: Room = Room()
+    amp: Amp = Amp()
+    level_db: float = 0.0
     body_sha256: str = ""
 
     @classmethod
     def of(cls, patch: Patch, gain: float) -> Through:
         digest = body_digest(patch.body.name)
-        return cls(instrument=patch.name, gain=gain, body=patch.body, room=patch.room, body_sha256=digest)
+        return cls(
+            instrument=patch.name,
+            gain=gain,
+            body=patch.body,
+            room=patch.room,
+            amp=patch.amp,
+            level_db=patch.level_db,
+            body_sha256=digest,
+        )
 
     @property
     def effects(self) -> Effects | None:
@@ -68,7 +79,7 @@ class Through(BaseModel):
             raise ValueError(
                 f"the body {self.body.name} is not the one of {self.instrument}; get its file and add it"
             )
-        return effects_from(self.body, self.room)
+        return effects_from(self.body, self.room, self.amp, self.level_db)
 
 
 @dataclass(frozen=True)
@@ -124,7 +135,7 @@ class SoundRequest:
 
     @property
     def effects(self) -> Effects | None:
-        """Body and room."""
+        """Amplifier, body and room."""
         return None if self.through is None or self.source == "difference" else self.through.effects
 
     @property

@@ -17,7 +17,7 @@ from app.instrument.offline import render_events
 from app.patches.drums import Drums
 from app.patches.fields import Name
 from app.patches.library import list_patches
-from app.patches.patch import Body, Patch, Room
+from app.patches.patch import Amp, Body, Patch, Room
 from app.shared.key_names import note_name
 from engine.presets import Preset
 
@@ -105,14 +105,14 @@ class Struck:
             preset: plays the instrument.
             seconds: the duration, or the longest.
             decay_db: it may end where it has fallen this far below its peak; None: it does not.
-            dry: without body and room.
+            dry: without amplifier, body and room.
 
         Raises:
             ValueError: the key has no string.
         """
         patch = self.patch
         if dry:
-            patch = patch.model_copy(update={"body": Body(), "room": Room()})
+            patch = patch.model_copy(update={"amp": Amp(), "body": Body(), "room": Room()})
         blocks = render_events(
             patch,
             preset,

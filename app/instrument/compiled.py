@@ -180,6 +180,14 @@ class InstrumentPlayer:
                 found.append(Bend(channel.bend, number))
             if channel.pedal:
                 found.append(Controller(events.SUSTAIN, 127, number))
+            for controller, value in (
+                (events.SOFT, channel.mute),
+                (events.LEGATO, 127 * channel.legato),
+                (events.PORTAMENTO, 127 * channel.slides),
+                (events.SLIDE_TIME, channel.slide_time),
+            ):
+                if value:
+                    found.append(Controller(controller, value, number))
             if channel.slide is not None:
                 found.append(Controller(events.SLIDE, channel.slide, number))
         wheel, moved_by = self._wheel

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from app.audio.impulse_file import ImpulseError
 from app.instrument.bodies import own_impulse
+from app.patches.patch import Amp as ChosenAmp
 from app.patches.patch import Body as ChosenBody
 from app.patches.patch import Patch
 from app.patches.patch import Room as ChosenRoom
-from engine.effects import BODIES, Body, Effects, Room
+from engine.effects import BODIES, Amp, Body, Effects, Room
 
 RESPONSE_HZ = 48_000
 _POINTS = 2**16
@@ -38,15 +39,19 @@ class Response:
 
 
 def effects_of(patch: Patch) -> Effects | None:
-    """Body and room of a patch; None: it has neither. A body that cannot be used is left out: see `body_problem`."""
-    return effects_from(patch.body, patch.room)
+    """Amplifier, body and room of a patch; None: it has none of them.
+
+    A body that cannot be used is left out: see `body_problem`.
+    """
+    return effects_from(patch.body, patch.room, patch.amp, patch.level_db)
 
 
-def effects_from(chosen: ChosenBody, room: ChosenRoom) -> Effects | None:
-    """As `effects_of`."""
+def effects_from(chosen: ChosenBody, room: ChosenRoom, amp: ChosenAmp, level_db: float) -> Effects | None:
+    """As `effects_of`; the level is behind the amplifier, and changes no drive."""
     body = _body(chosen)[0]
     made = Room(room.mix, room.t60_s) if room.mix > 0 else None
-    return None if body is None and made is None else Effects(body, made)
+    driven = Amp(amp.drive_db, amp.tone_db, level_db) if amp.drive_db > 0 else None
+    return None if body is None and made is None and driven is None else Effects(body, made, driven)
 
 
 def body_problem(patch: Patch) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from app.patches.patch import Patch
 from engine.pluck import Pluck
 
+SLIDE_TIME, PORTAMENTO, SOFT, LEGATO = 5, 65, 67, 68
 SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 123  # numbers of MIDI controllers
 VALUE, FINE_VALUE = 6, 38  # of the parameter that these choose: registered ones (RPN), and others
 REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER = 101, 100, 99, 98
@@ -15,6 +16,10 @@ PEDAL_DOWN = 64  # from this value on
 _PARAMETER = "chooses or sets a parameter, as the bend range"
 _FIXED = {  # functions of controllers that no patch changes; those from 120 on are MIDI's channel mode messages
     SUSTAIN: "is the sustain pedal",
+    SLIDE_TIME: "is the time of slides",
+    PORTAMENTO: "lets legato slide",
+    SOFT: "is the palm mute",
+    LEGATO: "is the legato footswitch",
     **dict.fromkeys((VALUE, FINE_VALUE, REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER), _PARAMETER),
     **dict.fromkeys(range(SOUND_OFF, 128), "stops or resets what is played"),
 }

@@ -33,6 +33,7 @@ VALUES = (
     "bend_semitones",
     "noise.onset_db",
     "noise.release_db",
+    "damping.mute",
 )
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
 SHAPES = {

@@ -233,10 +233,22 @@ class Noise(Value):
 
 
 class Damping(Value):
-    """What a released key does: nothing (`let_ring`), or all partials decay by 60 dB in `release_t60_s`."""
+    """What a released key does: nothing (`let_ring`), or all partials decay by 60 dB in `release_t60_s`.
+
+    Attributes:
+        mute: how far a hand at the bridge mutes the strings, 0 … 1.
+    """
 
     release_t60_s: float = parameter("damping.release_t60_s")
+    mute: float = parameter("damping.mute")
     let_ring: Flag = False
+
+
+class Amp(Value):
+    """The amplifier, through which the strings sound before the body: its drive (0: none) and its tone."""
+
+    drive_db: float = parameter("amp.drive_db")
+    tone_db: float = parameter("amp.tone_db")
 
 
 class Body(Value):
@@ -317,6 +329,7 @@ class Patch(Value):
     bend_by: Literal["tension", "length"] = "tension"
     mod_wheel: str = "none"
     tuning: TuningChoice = TuningChoice()
+    amp: Amp = Amp()
     body: Body = Body()
     room: Room = Room()
     level_db: float = parameter("level_db")

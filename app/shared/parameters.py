@@ -1,7 +1,7 @@
 """The table of parameters: each one's identity, range, unit, words and use, declared once.
 
 Knobs, MIDI controllers, the modulation wheel, macros, undo, fields of patches and of the session's choices read it.
-It needs no engine but the ranges of a pluck, a body and a room.
+It needs no engine but the ranges of a pluck, an amplifier, a body and a room.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
-from engine.bounds import BODY_SIZE, ROOM_T60_S
+from engine.bounds import AMP_DRIVE_DB, AMP_TONE_DB, BODY_SIZE, ROOM_T60_S
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 
 Modulation = Literal["none", "learn", "macro", "wheel"]  # each includes those before it
@@ -119,6 +119,8 @@ TIPS = {
     "knobs.brightness_decay": "Damping of high partials: right is darker. The figure is the T60 of the partial "
     "near 3 kHz",
     "damping.release_t60_s": "Time in which a released key falls by 60 dB",
+    "damping.mute": "Palm mute: a hand on the strings at the bridge, so that high partials stop soon. "
+    "MIDI's soft pedal (controller 67) adds to it",
     "pluck.position": f"Where it is plucked: nearer an end is brighter; {_PLACE_TIP}",
     "pluck.width": "Width of the softest pluck, in lengths of the string: wide is mellow",
     "pluck.width_hard": "Width of the hardest pluck, in lengths of the string: narrow is bright",
@@ -130,6 +132,8 @@ TIPS = {
     "pickup.points.0": f"Where the string is heard; {_PLACE_TIP}",
     "pickup.points.1": "Where the right channel hears the string; an instrument in mono has none",
     "body.mix": "Mix of the body: 0 % the strings alone, 100 % the body alone",
+    "amp.drive_db": "Drive of the amplifier before the body, which may be its cabinet; 0 dB: there is none",
+    "amp.tone_db": "Tone of the amplifier: above 0 brighter, below darker, about 700 Hz",
     "room.mix": "Mix of the room: 0 % without it, 100 % its reverberation alone",
     "level_db": "Level of the instrument; saved with it",
     "position": "Pluck position; 0 and 1 are the ends of the string",
@@ -196,6 +200,7 @@ OF_PATCHES: Mapping[str, Parameter] = {
         _knob("decay", "decay", MULTIPLIER, "s"),
         _knob("brightness_decay", "HF damping", MULTIPLIER, "s"),
         Parameter("damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, "wheel", wheel_factor=10),
+        Parameter("damping.mute", "mute", (0, 1), 0, PERCENT, DECAY, "wheel", "palm mute", 1.0),
         Parameter("pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, "wheel", "pluck position", 0.5),
         Parameter(
             "pluck.width", "soft width", WIDTH_RANGE, 0.12, WIDTH, PLUCK, "wheel", "width (low velocity)", wheel=0.02
@@ -229,6 +234,10 @@ OF_PATCHES: Mapping[str, Parameter] = {
         Parameter("pickup.points.0", "place", (0, 1), DEFAULT_LISTEN, PLACE, PICKUP, "macro", "listening point"),
         Parameter(
             "pickup.points.1", "right", (0, 1), 1 - DEFAULT_LISTEN, PLACE, PICKUP, "macro", "right listening point"
+        ),
+        Parameter("amp.drive_db", "drive", AMP_DRIVE_DB, 0, Taper(1, "{:.0f} dB"), BODY, "macro", "amplifier drive"),
+        Parameter(
+            "amp.tone_db", "amp tone", AMP_TONE_DB, 0, Taper(0.5, "{:+.1f} dB"), BODY, "macro", "amplifier tone"
         ),
         Parameter("body.mix", "mix", (0, 1), 0.5, PERCENT, BODY, "wheel", "body mix", 1.0),
         Parameter("body.size", "size", BODY_SIZE, 1.0, TIMES, BODY, "wheel", "body size", wheel_factor=2),

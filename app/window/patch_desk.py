@@ -13,7 +13,7 @@ from PySide6.QtWidgets import QInputDialog
 from app.instrument.beyond_training import outside_of_key, outside_of_string
 from app.instrument.bodies import body_titles
 from app.instrument.compiled import is_another
-from app.instrument.events import KEYS, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import KEYS, LEGATO, PORTAMENTO, SLIDE_TIME, Controller, NoteOff, NoteOn, TimedEvent
 from app.instrument.facts import facts_of, facts_of_drum, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.strings import KeyString, Strings
@@ -57,6 +57,7 @@ from engine.result_file import WriteError
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
 NOTE_REPORTED_AFTER_MS = 150
+SCREEN_SLIDE = 90  # of the time of slides, 0 … 127: 0.3 s
 MANY_STRINGS = "studio_any_string"
 C_OF_OCTAVE_0 = LOWEST_C // 12 - 1  # C3 is the lowest of the computer's keys at octave 0
 NO_PATCH = "The computer's keys pluck the chosen preset at ten places; choose an instrument to play pitches"
@@ -126,6 +127,7 @@ class PatchDesk(QObject):
         bar.revert_asked.connect(self.revert)
         bar.compare_asked.connect(self.compare)
         bar.scala_remove_asked.connect(self.remove_scala)
+        panel.touch_chosen.connect(self._choose_touch)
         panel.keys_play_asked.connect(
             lambda plays: session.play_patch() if plays == "pitch" else session.play_string()
         )
@@ -536,6 +538,12 @@ class PatchDesk(QObject):
         """Plays a key on the screen, which is one of the patch, where there is one."""
         self._session.play_patch()
         self._instruments.play(NoteOn(key, velocity, KEYS))
+
+    def _choose_touch(self, touch: str) -> None:
+        """What a key on the screen or of the computer does while another is held."""
+        for number, down in ((LEGATO, touch != "pluck"), (PORTAMENTO, touch == "slide")):
+            self._instruments.play(Controller(number, 127 * down, KEYS))
+        self._instruments.play(Controller(SLIDE_TIME, SCREEN_SLIDE, KEYS))
 
     def _move_octave(self, octaves: int) -> None:
         octave = min(max(self._session.choices.octave + octaves, LOWEST_OCTAVE), HIGHEST_OCTAVE)

@@ -1,17 +1,21 @@
-"""The effects on the sum of all voices: a body, and a gentle room. Neither has part in any error or comparison.
+"""The effects on the sum of all voices: an amplifier, a body, and a gentle room.
+
+None of them has part in any error or comparison.
 
 impulse    an impulse response as a value: checked, at another rate, as loud as what it is given
+amp        an amplifier, whose cabinet is a body
 body       from the modes of an instrument's body, or from a response that is given
-body_table fifteen bodies: their modes, with sources
+body_table seventeen bodies: their modes, with sources
 room       of a box of six walls
-effects    both as one response; the same for arrays
+effects    the amplifier, then body and room as one response; the same for arrays
 partitions that response as the compiled convolver reads it
 """
 
+from engine.effects.amp import Amp
 from engine.effects.body import Body
 from engine.effects.body_table import BODIES
 from engine.effects.effects import Effects, apply
 from engine.effects.impulse import Impulse
 from engine.effects.room import Room
 
-__all__ = ["BODIES", "Body", "Effects", "Impulse", "Room", "apply"]
+__all__ = ["BODIES", "Amp", "Body", "Effects", "Impulse", "Room", "apply"]

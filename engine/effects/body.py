@@ -79,7 +79,7 @@ def modes_of(wood: Wood, size: float, highest_hz: float) -> tuple[NDArray[np.flo
     decay = np.pi * frequency_hz / quality
     # A mode a exp(−σt) sin ωt has its peak at a/2σ, and the power a²/8σ over frequency: n of them a hertz are n a²/8σ
     lowest = [mode.sign * 10 ** (mode.peak_db / 20) for mode in wood.lowest] * (2 * decay[:low])
-    level = 1 / np.sqrt(1 + (higher_hz / wood.bright_hz) ** 2)
+    level = (1 + (higher_hz / wood.bright_hz) ** 2) ** (-wood.fall_db / 12)
     for hill in wood.hills:
         off = hill.quality * (higher_hz / hill.frequency_hz - hill.frequency_hz / higher_hz)
         level = level * (1 + (10 ** (hill.rise_db / 20) - 1) / np.sqrt(1 + off**2))

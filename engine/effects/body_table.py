@@ -56,8 +56,8 @@ class Wood:
         lowest: modes by rising frequency.
         density: of the modes above them.
         quality: of those.
-        bright_hz: from here on their mean level falls by 6 dB an octave: the bridge's mass, and radiation of a plate
-            above coincidence (Cremer and Heckl, chapter 6).
+        bright_hz: from here on their mean level falls by `fall_db` an octave: at 6 dB the bridge's mass, and
+            radiation of a plate above coincidence (Cremer and Heckl, chapter 6).
         half_width_m: with it the directions to two ears differ from about c/2π half widths on.
         seed: of 40 that with the most even response in third octaves, left, right and both.
         sources: of the figures.
@@ -73,6 +73,7 @@ class Wood:
     seed: int
     sources: str
     hills: tuple[Hill, ...] = ()
+    fall_db: float = 6.0
 
 
 def plate(area_m2: float, thickness_m: float, speeds_m_s: tuple[float, float] = SPRUCE_M_S) -> Density:

@@ -1,13 +1,14 @@
-"""Body and room together: one impulse response, for the mixer and for arrays alike."""
+"""Amplifier, then body and room together as one impulse response, for the mixer and for arrays alike."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.effects.amp import Amp, amplified
 from engine.effects.body import Body
 from engine.effects.impulse import as_loud, convolved
 from engine.effects.room import Room
@@ -15,19 +16,36 @@ from engine.effects.room import Room
 
 @dataclass(frozen=True)
 class Effects:
-    """The strings sound through the body, and that in the room. What is None, or has a mix of 0, is not there."""
+    """The strings sound through the amplifier, that through the body, and that in the room.
+
+    What is None, or has a mix or a drive of 0, is not there.
+    """
 
     body: Body | None = None
     room: Room | None = None
+    amp: Amp | None = None
 
     @property
     def neutral(self) -> bool:
         """Whether nothing is changed at all."""
-        return not any(part is not None and part.mix > 0 for part in (self.body, self.room))
+        return not self.rings and self.factors[0] == 0.0
+
+    @property
+    def rings(self) -> bool:
+        """Whether there is a body or a room."""
+        return any(part is not None and part.mix > 0 for part in (self.body, self.room))
+
+    @property
+    def factors(self) -> tuple[float, float, float]:
+        """Of the amplifier, see `Amp.factors`."""
+        return Amp().factors if self.amp is None else self.amp.factors
 
     def impulse(self, rate_hz: int) -> NDArray[np.float64]:
-        """(frames, 1 or 2): of pink noise the level stays, at any mix; remembered, and not to be written."""
-        return _impulse(self, rate_hz)
+        """Of body and room, (frames, 1 or 2): of pink noise the level stays, at any mix.
+
+        It is remembered, and not to be written.
+        """
+        return _impulse(replace(self, amp=None), rate_hz)
 
     def tail_s(self, rate_hz: int) -> float:
         """For how long it sounds on after its input, at most."""
@@ -63,5 +81,9 @@ def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) ->
     wild = ~(np.abs(stereo) < at.LARGEST).all(1)
     stereo[wild] = 0.0
     stereo[np.abs(stereo) < at.SMALLEST] = 0.0
+    if effects.amp is not None:
+        stereo = amplified(effects.amp, stereo, rate_hz)
+    if not effects.rings:
+        return stereo
     found: NDArray[np.float64] = oaconvolve(stereo, effects.impulse(rate_hz), axes=0)[: len(stereo)]
     return found

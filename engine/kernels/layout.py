@@ -249,7 +249,26 @@ M_SCRATCH = M_GAINS + AHEAD + QUANTUM
 MOST_MODES = 512
 SCRATCH_ROWS = 40
 SCRATCH_SLOTS = SCRATCH_ROWS * MOST_MODES + 4 * QUANTUM * MOST_MODES
-MIXER_SLOTS = M_SCRATCH + SCRATCH_SLOTS
+M_AMPLIFIER = M_SCRATCH + SCRATCH_SLOTS
+
+# Slots of the mixer's amplifier
+OVERSAMPLING = 12
+A_TAPS = 52 * OVERSAMPLING  # of the filter to the higher rate, and of that back
+A_WANTED_DRIVE = 0  # R factor before the shape; 0: it is off
+A_WANTED_GAIN = 1  # R factor behind it
+A_WANTED_TONE = 2  # R factor of what lies above its pivot, and 1 over that of what lies below
+A_DRIVE = 3  # R these three as they are now
+A_GAIN = 4  # R
+A_TONE = 5  # R
+A_SHARE = 6  # R 0 … 1: how far it is switched on
+A_ON = 7  # W whether its filter is there, and its memory is of the latest input
+A_QUIET = 8  # W quanta without input
+A_STATE = 10  # R input's low part, last input of the shape, its mean, the output's low part
+A_FILTER = A_STATE + 4  # R (A_TAPS,)
+A_INPUT = A_FILTER + A_TAPS  # R (A_TAPS / OVERSAMPLING + QUANTUM,)
+A_SHAPED = A_INPUT + A_TAPS // OVERSAMPLING + QUANTUM  # R (OVERSAMPLING, A_TAPS / OVERSAMPLING + QUANTUM)
+A_OUT = A_SHAPED + A_TAPS + OVERSAMPLING * QUANTUM  # R (QUANTUM,)
+MIXER_SLOTS = M_AMPLIFIER + A_OUT + QUANTUM
 
 # An impulse response for the convolver: then its spectra, (early, channels, 2, QUANTUM + 1) and (late, channels, 2,
 # WINDOW + 1), real parts before imaginary ones, over the length of their transforms

@@ -13,6 +13,7 @@ from numba import carray, cfunc, njit, types
 
 from engine.kernels import contact
 from engine.kernels import layout as at
+from engine.kernels.amplifier import amplify
 from engine.kernels.compiled import COMPILED
 from engine.kernels.convolver import convolve
 from engine.kernels.limiter import limit
@@ -68,7 +69,7 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
         voice = carray(pointer(counts[at.M_VOICES + place]), (1 << 40,), np.float64)
         whole = voice.view(np.int64)
         while whole[at.PREVIOUS_VOICE] != 0 and whole[at.BEGIN_AT] < counts[at.M_FRAMES] + at.QUANTUM:
-            take_over(voice, counts[at.M_FRAMES], mixer[at.M_SCRATCH : at.MIXER_SLOTS])
+            take_over(voice, counts[at.M_FRAMES], mixer[at.M_SCRATCH : at.M_AMPLIFIER])
     given_s = now_s + at.AHEAD / mixer[at.M_RATE] if counts[at.M_LIMITING] else now_s
     kept = 0
     for place in range(counts[at.M_ACTIVE]):
@@ -88,6 +89,7 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     if player != 0:
         contact.sound(player, counts[at.M_ADDRESS])
         sympathise(player, counts[at.M_ADDRESS])
+    amplify(mixer)
     convolve(mixer)
     _finish(mixer)
 

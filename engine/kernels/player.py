@@ -9,6 +9,10 @@ In guitar mode the first channels are the strings, the highest first, as guitars
 them alone may as well be a keyboard: until another has played, it plays any key, each on the string that the key
 chooses. So do all further channels, and the keys of the computer and the screen always.
 
+With the legato footswitch down, a key moves the note of a key that is held on its channel: it shortens the same
+string without a pluck (hammer-on), or slides there where portamento is on. A key that is released gives the note back
+to the highest one that is still down (pull-off).
+
 A channel's own wheel and pedal hold for what was struck on it. Those of the first channel hold for the keys of the
 computer and the screen too, which have none, and in MPE, as the master's, for every channel.
 
@@ -45,6 +49,7 @@ MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the ke
 MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
 WIDEST_SEMITONES = 96.0  # that messages may ask for
 DAMPER_S, BEND_S, KNOB_S = 0.012, 0.006, 0.04  # of the glide to other modes
+HAMMER_S, SLIDE_S = 0.006, (0.02, 1.0)  # of that to the length of another key; of a slide, at times of 0 and 127
 STOP_S = 0.03  # of the fade of all strings
 STOLEN_S = 0.03  # of the fade of a note that makes room
 PLUCK_STOPS_S = 0.006  # in which a string is stopped by what plucks it again
@@ -56,6 +61,7 @@ VARIES_ANGLE = math.radians(8.0)
 
 # Controllers of MIDI
 MOD_WHEEL, DATA, SUSTAIN, FINE_DATA, SLIDE = 1, 6, 64, 38, 74
+SLIDE_TIME, PORTAMENTO, SOFT, LEGATO = 5, 65, 67, 68
 FINE_OTHER, OTHER, FINE_REGISTERED, REGISTERED, SOUND_OFF, RESET, NOTES_OFF = 98, 99, 100, 101, 120, 121, 123
 PEDAL_DOWN = 64  # from this value on
 NO_PARAMETER, BEND_RANGE = 127, 0
@@ -211,6 +217,46 @@ def _is_string(players: np.ndarray, tables: np.ndarray, channel: int) -> bool:
     return channel < count and others > 0
 
 
+@njit(**COMPILED)
+def _hold(players: np.ndarray, channel: int, key: int, down: bool) -> None:
+    """Notes that a key is down, or is not."""
+    slot = _channel(channel) + of.CHANNEL_HELD + key // 64
+    bit = np.int64(1) << np.int64(key % 64)
+    players[slot] = players[slot] | bit if down else players[slot] & ~bit
+
+
+@njit(**COMPILED)
+def _is_down(players: np.ndarray, channel: int, key: int) -> bool:
+    slot = _channel(channel) + of.CHANNEL_HELD + key // 64
+    return (players[slot] >> np.int64(key % 64)) & 1 != 0
+
+
+@njit(**COMPILED)
+def _release_keys(players: np.ndarray, channel: int) -> None:
+    """No key of a channel is down."""
+    players[_channel(channel) + of.CHANNEL_HELD] = 0
+    players[_channel(channel) + of.CHANNEL_HELD + 1] = 0
+
+
+@njit(**COMPILED)
+def _connects(players: np.ndarray, mode: int, channel: int) -> bool:
+    """Whether a legato footswitch holds for a channel."""
+    for each in range(of.CHANNELS):
+        if players[_channel(each) + of.CHANNEL_LEGATO] != 0 and _acts_on(mode, each, channel):
+            return True
+    return False
+
+
+@njit(**COMPILED)
+def _moves_in_s(players: np.ndarray, mode: int, channel: int) -> float:
+    """The time in which a note moves to another key of its channel."""
+    for each in range(of.CHANNELS):
+        own = _channel(each)
+        if players[own + of.CHANNEL_SLIDES] != 0 and _acts_on(mode, each, channel):
+            return SLIDE_S[0] * (SLIDE_S[1] / SLIDE_S[0]) ** (players[own + of.CHANNEL_TIME] / 127)
+    return HAMMER_S
+
+
 # The string of a key
 
 
@@ -221,6 +267,16 @@ def _value(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: n
     if wheel != 0 and tables[of.TABLE_WHEEL] == which:
         return value + wheel / 127 * (table[of.TABLE_WHEEL_GOAL] - value)
     return value
+
+
+@njit(**COMPILED)
+def _mute(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, channel: int) -> float:
+    """How far a hand mutes what was struck on a channel, 0 … 1."""
+    share = _value(player, players, table, tables, of.MUTE)
+    for each in range(of.CHANNELS):
+        if _acts_on(tables[of.TABLE_MODE], each, channel):
+            share = max(share, player[_channel(each) + of.CHANNEL_MUTE])
+    return share
 
 
 @njit(**COMPILED)
@@ -294,7 +350,7 @@ def _string_now(
     key, mode = players[note + of.NOTE_KEY], tables[of.TABLE_MODE]
     pitch_hz, fits = _pitch_hz(table, tables, key, player[note + of.NOTE_PITCH_HZ]), True
     if pitch_hz > 0.0:
-        number = players[note + of.NOTE_STRING] if mode == of.GUITAR else -1
+        number = players[note + of.NOTE_STRING]
         wheeled = players[of.PLAYER_WHEEL] != 0 and 0 <= tables[of.TABLE_WHEEL] < of.KNOBS
         modes, _ = string_of(player, players, table, tables, key, number, pitch_hz, wheeled, out)
         fits = modes > 0 and (wheeled or not strings.overdamped(out, modes))
@@ -476,6 +532,9 @@ def _fill(
         inside * player[note + of.NOTE_LOSSES + 2],
         out,
     )
+    if player[note + of.NOTE_MUTE] > 0.0:
+        modes, pairs = players[note + of.NOTE_MODES], players[note + of.NOTE_PAIRS]
+        strings.mute(string, modes, pairs, player[note + of.NOTE_MUTE], out)
     if tables[of.TABLE_RECORDED] != 0:
         recorded.correct(table, tables, string, players[note + of.NOTE_MODES], out)
 
@@ -615,6 +674,9 @@ def _retune(
     for place in range(of.STRING):
         changed = changed or string[place] != player[note + of.NOTE_STRING_NOW + place]
         player[note + of.NOTE_STRING_NOW + place] = string[place]
+    mute = _mute(player, players, table, tables, players[note + of.NOTE_CHANNEL])
+    changed = changed or mute != player[note + of.NOTE_MUTE]
+    player[note + of.NOTE_MUTE] = mute
     if not changed:
         return
     n, filled = players[note + of.NOTE_MODES], 0
@@ -895,6 +957,10 @@ def _note_on(
         player[note + of.NOTE_HEARD + each] = table[of.TABLE_HEARD + each] if polarised else 1.0
         player[note + of.NOTE_CONDUCTANCE + each] = table[of.TABLE_CONDUCTANCE + each]
     players[note + of.NOTE_FRAME] = frame
+    player[note + of.NOTE_MUTE] = _mute(player, players, table, tables, channel)
+    player[note + of.NOTE_PLUCK] = position
+    player[note + of.NOTE_PLUCK + 1] = amplitude_mm
+    player[note + of.NOTE_PLUCK + 2] = width
     player[note + of.NOTE_GAIN] = gain
     player[note + of.NOTE_PITCH_HZ] = player[event + of.EVENT_PITCH_HZ]
     for each in range(of.STRING):
@@ -947,18 +1013,126 @@ def _note_on(
         level_db = _value(player, players, table, tables, of.ONSET_DB)
         contact.touch(player, players, table, of.STROKE, level_db, strength, stroke, key, frame)
     _make_room(player, players)
-    slot = _report(player, players, of.BEGAN, players[event + of.EVENT_ID], channel, key, frame, velocity)
-    players[slot + of.REPORT_STRING] = string
+    _report_began(player, players, tables, event, number, player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING])
+
+
+@njit(**COMPILED)
+def _report_began(
+    player: np.ndarray, players: np.ndarray, tables: np.ndarray, event: int, number: int, own: np.ndarray
+) -> None:
+    """Reports the note of an event, and the string of its key."""
+    note, frame = _note(number), players[event + of.EVENT_FRAME]
+    id, channel, key = players[note + of.NOTE_ID], players[note + of.NOTE_CHANNEL], players[note + of.NOTE_KEY]
+    slot = _report(player, players, of.BEGAN, id, channel, key, frame, player[event + of.EVENT_VALUE])
+    players[slot + of.REPORT_STRING] = players[note + of.NOTE_STRING]
     players[slot + of.REPORT_TABLE] = tables[of.TABLE_SERIAL]
-    players[slot + of.REPORT_MODES] = modes
+    players[slot + of.REPORT_MODES] = players[note + of.NOTE_MODES]
     players[slot + of.REPORT_NOTE] = number
-    player[slot + of.REPORT_POSITION] = position
-    player[slot + of.REPORT_AMPLITUDE_MM] = amplitude_mm
-    player[slot + of.REPORT_WIDTH] = width
-    player[slot + of.REPORT_GAIN] = gain
+    player[slot + of.REPORT_POSITION] = player[note + of.NOTE_PLUCK]
+    player[slot + of.REPORT_AMPLITUDE_MM] = player[note + of.NOTE_PLUCK + 1]
+    player[slot + of.REPORT_WIDTH] = player[note + of.NOTE_PLUCK + 2]
+    player[slot + of.REPORT_GAIN] = player[note + of.NOTE_GAIN]
     for each in range(of.STRING):
-        player[slot + of.REPORT_OWN + each] = player[note + of.NOTE_OWN + each]
+        player[slot + of.REPORT_OWN + each] = own[each]
     _reported(players)
+
+
+@njit(**COMPILED)
+def _move(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    number: int,
+    key: int,
+    given_hz: float,
+    frame: int,
+    now: int,
+) -> bool:
+    """Shortens or lengthens the string of a note for another key; False where it cannot play that key."""
+    note, count, mode = _note(number), tables[of.TABLE_STRINGS], tables[of.TABLE_MODE]
+    pitch_hz, string = _pitch_hz(table, tables, key, given_hz), players[note + of.NOTE_STRING]
+    if count > 0 and string < 0:
+        string = _chosen(table, count, players[note + of.NOTE_KEY])
+    if pitch_hz <= 0.0 or (count > 0 and key < table[of.TABLE_OPEN + string * of.OPEN_SLOTS + of.OPEN_NOTE]):
+        return False
+    modes, _ = string_of(player, players, table, tables, key, string, pitch_hz, False, _moment(player, 3))
+    if modes < 1:
+        return False
+    if players[note + of.NOTE_PLACE] % 256 != 0:  # a place for each key
+        players[note + of.NOTE_PLACE] += key - players[note + of.NOTE_KEY]
+        for each in range(of.MOST_NOTES):
+            other = _note(each)
+            if (
+                each != number
+                and _sounds(players, other)
+                and players[other + of.NOTE_PLACE] == players[note + of.NOTE_PLACE]
+            ):
+                players[other + of.NOTE_HAS_PLACE] = 0
+                _release_note(player, players, other, PLUCK_STOPS_S, frame)
+    players[note + of.NOTE_STRING], players[note + of.NOTE_KEY] = string, key
+    player[note + of.NOTE_PITCH_HZ] = given_hz
+    seconds = _moves_in_s(players, mode, players[note + of.NOTE_CHANNEL])
+    _retune(player, players, table, tables, number, seconds, frame, now)
+    return True
+
+
+@njit(**COMPILED)
+def _hammer_on(
+    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, event: int, frame: int, now: int
+) -> bool:
+    """Lets a key have the latest note that is held on its channel, where legato is on; whether it has one."""
+    channel, key, found, age = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY], -1, 0
+    if players[event + of.EVENT_VOICES] != 0 or not _connects(players, tables[of.TABLE_MODE], channel):
+        return False
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        held = players[note + of.NOTE_HELD] != 0 and players[note + of.NOTE_CHANNEL] == channel
+        if (
+            held
+            and players[note + of.NOTE_PREPARED] == 0
+            and players[note + of.NOTE_AGE] > age
+            and _sounds(players, note)
+        ):
+            found, age = number, players[note + of.NOTE_AGE]
+    if found < 0:
+        return False
+    note = _note(found)
+    id, before = players[note + of.NOTE_ID], players[note + of.NOTE_KEY]
+    if key == before or not _move(
+        player, players, table, tables, found, key, player[event + of.EVENT_PITCH_HZ], frame, now
+    ):
+        return False
+    _report(player, players, of.ENDED, id, channel, before, now, 0.0)
+    _reported(players)
+    players[note + of.NOTE_ID] = players[event + of.EVENT_ID]
+    _report_began(player, players, tables, event, found, _moment(player, 3))
+    return True
+
+
+@njit(**COMPILED)
+def _pull_off(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    number: int,
+    frame: int,
+    now: int,
+) -> bool:
+    """Gives the note of a released key to the highest key that is down and has none; whether there is one."""
+    channel = players[_note(number) + of.NOTE_CHANNEL]
+    if not _connects(players, tables[of.TABLE_MODE], channel):
+        return False
+    for key in range(of.KEYS - 1, -1, -1):
+        free = _is_down(players, channel, key)
+        for each in range(of.MOST_NOTES):
+            other = _note(each)
+            same = players[other + of.NOTE_KEY] == key and players[other + of.NOTE_CHANNEL] == channel
+            free = free and not (same and players[other + of.NOTE_HELD] != 0 and _sounds(players, other))
+        if free and _move(player, players, table, tables, number, key, math.nan, frame, now):
+            return True
+    return False
 
 
 @njit(**COMPILED)
@@ -976,6 +1150,8 @@ def _note_off(
         note = _note(number)
         same = players[note + of.NOTE_KEY] == key and players[note + of.NOTE_CHANNEL] == channel
         if same and players[note + of.NOTE_HELD] != 0 and _sounds(players, note):
+            if _pull_off(player, players, table, tables, number, frame, now):
+                continue
             players[note + of.NOTE_HELD] = 0
             players[note + of.NOTE_KEPT] = _pedal(players, tables[of.TABLE_MODE], channel)
             _damp(player, players, table, tables, number, frame, now)
@@ -1058,6 +1234,8 @@ def _stop(player: np.ndarray, players: np.ndarray, seconds: float, frame: int) -
         if players[note + of.NOTE_STATE] == of.RINGS:
             _release_note(player, players, note, seconds, frame)
             players[note + of.NOTE_HAS_PLACE] = 0
+    for each in range(of.CHANNELS):
+        _release_keys(players, each)
     players[of.PLAYER_SYMPATHY_STOPS] = _quanta(player, max(seconds, STOP_S)) + 2
     contact.hush(players, _quanta(player, max(seconds, STOP_S)))
 
@@ -1074,12 +1252,22 @@ def _controller(
     frame: int,
     now: int,
 ) -> None:
-    mode, own, turns = tables[of.TABLE_MODE], _channel(channel), 0 <= tables[of.TABLE_WHEEL] < of.KNOBS
+    mode, own, wheel = tables[of.TABLE_MODE], _channel(channel), tables[of.TABLE_WHEEL]
+    turns = 0 <= wheel < of.KNOBS or wheel == of.MUTE
     if number == SUSTAIN:
         players[own + of.CHANNEL_PEDAL] = value >= PEDAL_DOWN
         _damp_unkept(player, players, table, tables, frame, now)
     elif number == SLIDE:
         players[own + of.CHANNEL_SLIDE] = max(value, 0)
+    elif number == SOFT:
+        player[own + of.CHANNEL_MUTE] = min(max(value, 0), 127) / 127
+        _glide(player, players, table, tables, channel, DAMPER_S, frame, now)
+    elif number == LEGATO:
+        players[own + of.CHANNEL_LEGATO] = value >= PEDAL_DOWN
+    elif number == PORTAMENTO:
+        players[own + of.CHANNEL_SLIDES] = value >= PEDAL_DOWN
+    elif number == SLIDE_TIME:
+        players[own + of.CHANNEL_TIME] = min(max(value, 0), 127)
     elif number == MOD_WHEEL:
         players[of.PLAYER_WHEEL] = value
         players[of.PLAYER_WHEEL_BY] = channel
@@ -1088,6 +1276,9 @@ def _controller(
     elif number == SOUND_OFF:
         _stop(player, players, STOP_S, frame)
     elif number == NOTES_OFF:
+        for each in range(of.CHANNELS):
+            if _is_master(mode, channel, each):
+                _release_keys(players, each)
         for each in range(of.MOST_NOTES):
             note = _note(each)
             if _is_master(mode, channel, players[note + of.NOTE_CHANNEL]) and _sounds(players, note):
@@ -1098,6 +1289,9 @@ def _controller(
         for each in range(of.CHANNELS):
             if _is_master(mode, channel, each):
                 _rest(player, players, each, 0, 0)
+                player[_channel(each) + of.CHANNEL_MUTE] = 0.0
+                players[_channel(each) + of.CHANNEL_LEGATO] = 0
+                players[_channel(each) + of.CHANNEL_SLIDES] = 0
         if _is_master(mode, channel, players[of.PLAYER_WHEEL_BY]):
             players[of.PLAYER_WHEEL] = 0
         _damp_unkept(player, players, table, tables, frame, now)
@@ -1179,6 +1373,9 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
         return
     table, tables = _at(address), _whole(address)
     if kind == of.NOTE_ON and value > 0.0:
+        _hold(players, channel, key, True)
+        if tables[of.TABLE_DRUMS] == 0 and _hammer_on(player, players, table, tables, event, frame, now):
+            return
         if tables[of.TABLE_DRUMS] != 0 and players[event + of.EVENT_VOICES] == 0:
             number = _free_note(player, players, mixers)
             first = _slots_of_voice(players, number, 0)
@@ -1188,6 +1385,7 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
                 return
         _note_on(player, players, table, tables, mixers, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
+        _hold(players, channel, key, False)
         _note_off(player, players, table, tables, channel, key, frame, now)
     elif kind == of.BEND:
         player[_channel(channel) + of.CHANNEL_BEND] = min(max(value, -1.0), 1.0)

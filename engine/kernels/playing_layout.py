@@ -25,7 +25,8 @@ KNOBS = 8
 # An instrument's values, which events and the modulation wheel may change
 POSITION, WIDTH, WIDTH_HARD, SOFTEST_MM, HARDEST_MM, CURVE, RELEASE_S, BEND_SEMITONES = range(KNOBS, KNOBS + 8)
 ONSET_DB, DAMPER_DB = range(KNOBS + 8, KNOBS + 10)  # noise of the stroke and of the release
-VALUES = KNOBS + 10
+MUTE = KNOBS + 10  # 0 … 1: palm mute
+VALUES = KNOBS + 11
 REFERENCE_VELOCITY = 100  # at which keys are equally loud, and levels of noise hold
 
 # Kinds of events
@@ -141,7 +142,12 @@ CHANNEL_RANGE = 3  # R semitones; below 0: the instrument's
 CHANNEL_PLAYS = 4  # W whether a note has come
 CHANNEL_COARSE = 5  # W the registered parameter that is chosen
 CHANNEL_FINE = 6  # W
-CHANNEL_SLOTS = 8
+CHANNEL_MUTE = 7  # R 0 … 1
+CHANNEL_LEGATO = 8  # W whether a key moves the note of the one that is held
+CHANNEL_SLIDES = 9  # W whether it does in CHANNEL_TIME, else at once
+CHANNEL_TIME = 10  # W 0 … 127
+CHANNEL_HELD = 12  # W two: keys that are down, a bit each
+CHANNEL_SLOTS = 16
 
 # Slots of a note
 FREE, RINGS = 0, 1
@@ -172,6 +178,8 @@ NOTE_DETUNING = 28  # R as in the table it was struck by
 NOTE_CONDUCTANCE = 29  # R two
 NOTE_TUNED = 31  # R semitones, beside what wheels bend it
 NOTE_LOSSES = 32  # R three
+NOTE_MUTE = 35  # R 0 … 1
+NOTE_PLUCK = 36  # R three: position, amplitude in mm and width
 NOTE_OWN = 40  # R its string as its key had it when it was struck
 NOTE_STRING_NOW = NOTE_OWN + STRING  # R with bends, slides, dampers and knobs
 NOTE_SLOTS = NOTE_STRING_NOW + STRING

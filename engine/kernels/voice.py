@@ -197,7 +197,7 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     counts, mix_counts = voice.view(np.int64), mixer.view(np.int64)
     quantum = at.QUANTUM
     out = mixer[at.M_OUT : at.M_OUT + 4 * quantum].reshape(4, quantum)
-    scratch = mixer[at.M_SCRATCH : at.MIXER_SLOTS]
+    scratch = mixer[at.M_SCRATCH : at.M_AMPLIFIER]
     mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
     now, rate_hz = mix_counts[at.M_FRAMES], mixer[at.M_RATE]
     if counts[at.STATE] == at.WAITING:
@@ -297,5 +297,5 @@ def forward(voice: np.ndarray, mixer: np.ndarray, frames: int) -> None:
         quanta = 0
     _look_at_wishes(voice, 0)
     for _ in range(quanta):
-        _generate(voice, False, mixer[at.M_RATE], out, mixer[at.M_SCRATCH : at.MIXER_SLOTS])
+        _generate(voice, False, mixer[at.M_RATE], out, mixer[at.M_SCRATCH : at.M_AMPLIFIER])
     counts[at.FRAME] = counts[at.GENERATED]

@@ -134,7 +134,7 @@ class Mixer:
         ]
 
     def set_effects(self, effects: Effects | None) -> None:
-        """All voices sound through these from now on: body and room, before the volume. Any thread.
+        """All voices sound through these from now on: amplifier, body and room, before the volume. Any thread.
 
         What has been played rings on in them. They are faded to within three windows of the convolver (64 ms at
         48 kHz, of which the last is the fade), at once where nothing has been rendered yet. It takes the caller some
@@ -145,7 +145,9 @@ class Mixer:
             if effects == self.effects:
                 return
             address = 0
-            if not effects.neutral:
+            for place, factor in enumerate(effects.factors):
+                self.memory[at.M_AMPLIFIER + place] = factor
+            if effects.rings:
                 if self._convolver is None:
                     self._convolver = convolver(self.rate_hz)
                 memory = partitioned(effects.impulse(self.rate_hz))

@@ -148,6 +148,10 @@ class Channel:
     pedal: bool
     slide: int | None
     range_semitones: float | None
+    mute: int
+    legato: bool
+    slides: bool
+    slide_time: int
 
 
 @dataclass(eq=False)
@@ -404,6 +408,10 @@ class CompiledPlayer:
             bool(counts[of.CHANNEL_PEDAL]),
             slide if slide >= 0 else None,
             wide if wide >= 0 else None,
+            round(127 * float(slots[of.CHANNEL_MUTE])),
+            bool(counts[of.CHANNEL_LEGATO]),
+            bool(counts[of.CHANNEL_SLIDES]),
+            int(counts[of.CHANNEL_TIME]),
         )
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.export.plugin.parts import MIXES, STEPS, drum_keys, levels, losses, mixed, parts_of
+from app.export.plugin.parts import AMP, MIXES, STEPS, driven, drum_keys, levels, losses, mixed, parts_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.table import VALUES, wheel_goal
 from app.patches.drums import Drums
@@ -23,6 +23,7 @@ from app.patches.patch import Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
 from engine import bounds
 from engine.effects import body, impulse, room
+from engine.effects.amp import NOMINAL
 from engine.effects.partitions import FADE_S
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
@@ -39,7 +40,7 @@ MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
 LARGEST_WHOLE = 2**31 - 1
 NOISE_BYTES = 8  # of a frame
 NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
-SOURCE, VOLUME, VALUE, POINT, MACRO, MIX = range(6)  # kinds of the shell's parameters
+SOURCE, VOLUME, VALUE, POINT, MACRO, MIX, AMPLIFIER = range(7)  # kinds of the shell's parameters
 SOURCE_ID = "source"
 SOURCES = ("model", "truth", "difference")
 OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "pluck.curve", "damping.release_t60_s")  # that drums follow
@@ -116,6 +117,7 @@ class _Header(ctypes.Structure):
         ),
         ("longest_s", ctypes.c_double),
         ("wheel_goal", ctypes.c_double),
+        ("level", ctypes.c_double),
         ("id", ctypes.c_char * 128),
         ("name", ctypes.c_char * 64),
         ("description", ctypes.c_char * 512),
@@ -209,6 +211,7 @@ def image_of(patch: Patch, preset: Preset, levelled: bool = True) -> Image:
     header.levels, header.level_steps = put(heights.tobytes()) // 8, STEPS
     header.wheel_mix = MIXES.index(patch.mod_wheel) if patch.mod_wheel in MIXES else -1
     header.wheel_goal = wheel_goal(patch) or 0.0
+    header.level = 10 ** (patch.level_db / 20)
 
     if drums:
         slots = np.zeros(of.KEYS, np.int64)
@@ -281,6 +284,9 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     for id in mixed(patch):
         parameter = OF_PATCHES[id]
         yield _record(id, MIX, MIXES.index(id), patch.value(id), parameter, parameter.group.capitalize())
+    for id in driven(patch):
+        parameter = OF_PATCHES[id]
+        yield _record(id, AMPLIFIER, AMP.index(id), patch.value(id), parameter, "Amplifier", parameter.name)
     fixed = drums or patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
     points = () if fixed else patch.pickup.points
     for index, point in enumerate(points):
@@ -306,7 +312,8 @@ def layout_header(version: str) -> str:
     wanted = {
         at: "QUANTUM AHEAD EARLY WINDOW REACH MIXER_SLOTS M_RATE M_FRAMES M_ACTIVE M_WANTED_VOLUME M_VOLUME "
         "M_RELEASE M_REDUCTION M_PEAK M_LEFT M_CHANNELS M_SMOOTHING M_LIMITING M_CONVOLVER M_EFFECTS "
-        "M_EFFECTS_NOW M_EFFECTS_NEXT M_PLAYER M_TAPS M_GAINS M_ADDRESS I_HEADER C_CAPACITY C_FADE_WINDOWS "
+        "M_EFFECTS_NOW M_EFFECTS_NEXT M_PLAYER M_TAPS M_GAINS M_ADDRESS M_AMPLIFIER A_WANTED_DRIVE A_WANTED_GAIN "
+        "A_WANTED_TONE I_HEADER C_CAPACITY C_FADE_WINDOWS "
         "C_ACTIVE C_STEP C_COSINES C_SINES C_WORK C_LATE S_RATE T_RATE",
         of: "NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CANCEL CHOKE ANY EVENT_FRAME EVENT_KIND "
         "EVENT_CHANNEL EVENT_KEY EVENT_VALUE EVENT_ID EVENT_POSITION EVENT_PITCH_HZ EVENT_TABLE EVENT_SLOTS "
@@ -328,6 +335,7 @@ def layout_header(version: str) -> str:
         f"#define VOICE_SLOTS_FIXED {none}",
         f"#define VOICE_SLOTS_A_MODE {of.voice_slots(1) - none}",
         f"#define CONVOLVER_FADE_S {FADE_S}",
+        f"#define AMP_NOMINAL {NOMINAL}",
         f"#define LIMITER_RELEASE_S {LIMITER_RELEASE_S}",
         f"#define VOLUME_SMOOTHING_S {VOLUME_SMOOTHING_S}",
     ]

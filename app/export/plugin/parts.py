@@ -22,6 +22,7 @@ from engine.presets import PresetInfo
 from engine.voices import Ear
 
 MIXES = ("body.mix", "room.mix")
+AMP = ("amp.drive_db", "amp.tone_db")
 STEPS = 5  # positions of a macro at which levels are known
 
 
@@ -51,9 +52,18 @@ class Parts:
         return self.body_s + heard_s + self.room_t60_s
 
 
+def driven(patch: Patch) -> tuple[str, ...]:
+    """The parameters of the amplifier, where it is on or a macro drives it."""
+    return AMP if patch.amp.drive_db > 0 or AMP[0] in _moved(patch) else ()
+
+
+def _moved(patch: Patch) -> set[str]:
+    return {target.field for macro in patch.macros for target in macro.targets}
+
+
 def mixed(patch: Patch) -> tuple[str, ...]:
     """The mixes that are above 0, or that a macro or the modulation wheel moves."""
-    moved = {target.field for macro in patch.macros for target in macro.targets} | {patch.mod_wheel}
+    moved = _moved(patch) | {patch.mod_wheel}
     there = {"body.mix": bool(patch.body.name), "room.mix": True}
     return tuple(each for each in MIXES if there[each] and (each in moved or patch.value(each) > 0))
 

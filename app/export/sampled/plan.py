@@ -170,9 +170,13 @@ class SampledPlan:
     def _heard_fields(self) -> dict[str, Any]:
         """Of the patch: all that its samples depend on."""
         body, room = self.patch.body, self.patch.room
-        silent = {"body": not body.name or body.mix == 0, "room": room.mix == 0}
+        silent = {
+            "amp": self.patch.amp.drive_db == 0,
+            "body": not body.name or body.mix == 0,
+            "room": room.mix == 0,
+        }
         unheard = UNHEARD_FIELDS | {name for name, left_out in silent.items() if left_out}
-        if self.patch.sympathy_s_kg > 0:  # damping chooses the strings that ring with a note
+        if self.patch.sympathy_s_kg > 0 or self.patch.damping.mute > 0:  # how long strings ring, and which
             unheard -= {"damping"}
         return self.patch.model_dump(mode="json", exclude=set(unheard))
 

@@ -50,12 +50,30 @@ _SURFACES = (
 )
 
 
+_TOUCHES = (  # what a key does while another is held
+    ("pluck", "Pluck", "Every key plucks its string"),
+    (
+        "legato",
+        "Legato",
+        "Hammer-on and pull-off: a key moves the note of the one that is held, without a pluck. "
+        "Of MIDI keyboards the legato footswitch does this (controller 68)",
+    ),
+    (
+        "slide",
+        "Slide",
+        "A key slides the note of the one that is held along its string. Of MIDI keyboards portamento does this "
+        "(controllers 65 and 5, with 68)",
+    ),
+)
+
+
 class InstrumentPanel(QFrame):
     """Its parts are public: `bar`, `keys`, `neck`, `knobs`."""
 
     pressed = Signal(int, int)  # key, velocity
     released = Signal(int)
     keys_play_asked = Signal(str)  # of KEYS_PLAY
+    touch_chosen = Signal(str)  # of _TOUCHES
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -69,6 +87,8 @@ class InstrumentPanel(QFrame):
             played.pressed.connect(self._press)
             played.released.connect(self.released)
         self._drums = False
+        self.touch = Segments("Key while another is held", _TOUCHES)
+        self.touch.chosen.connect(self.touch_chosen)
         self._choice = Segments("Surface", _SURFACES)
         self._choice.chosen.connect(self.show_surface)
         self._choice.clicked.connect(self._uncover_surface)
@@ -96,6 +116,7 @@ class InstrumentPanel(QFrame):
         side.addWidget(self._choice)
         side.addWidget(self._fold)
         side.addWidget(self.plays)
+        side.addWidget(self.touch)
         side.addStretch(1)
         self._grid = QGridLayout(self)
         self._grid.setHorizontalSpacing(8)
@@ -148,6 +169,7 @@ class InstrumentPanel(QFrame):
             self._choice.setEnabled(not drums)
             self._choice.setToolTip(NO_STRINGS if drums else "")
             self._fold.setText("Drum knobs" if drums else "String knobs")
+            self.touch.setEnabled(not drums)
             self.show_surface(self.surface)
 
     @property

@@ -39,7 +39,8 @@ SAID_ABOVE = 44  # pixels
 COMPARE_TIP = (
     "While this is on, keys play the instrument as it was saved; the knobs keep your changes. Any change ends it"
 )
-MIXES = ("body.mix", "room.mix", "level_db")
+AMP = ("amp.drive_db", "amp.tone_db")
+MIXES = (*AMP, "body.mix", "room.mix", "level_db")
 
 
 class PatchBar(QFrame):
@@ -256,6 +257,9 @@ class PatchBar(QFrame):
         self.rename.setEnabled(own)
         self._show_macros(patch.macros)
         self._show_scala(patch.tuning)
+        self.knobs["amp.drive_db"].set_value(patch.amp.drive_db)
+        self.knobs["amp.tone_db"].set_value(patch.amp.tone_db)
+        self.knobs["amp.tone_db"].setEnabled(patch.amp.drive_db > 0)
         self.knobs["body.mix"].set_value(patch.body.mix)
         self.knobs["body.mix"].setEnabled(bool(patch.body.name))
         self.knobs["room.mix"].set_value(patch.room.mix)
@@ -290,13 +294,16 @@ class PatchBar(QFrame):
         self._share_width()
 
     def _share_knobs(self) -> None:
-        """Every value has one knob: a mix that is a macro's only target is that macro's while macros are shown."""
+        """Every value has one knob: a mix that is a macro's only target is that macro's while macros are shown.
+
+        The amplifier's stand with the string's.
+        """
         for number, knob in enumerate(self.macros):
             knob.setVisible(self._shows_macros and number < len(self._macros))
         self._before_macros.setVisible(self._shows_macros and bool(self._macros))
         alone = {macro.targets[0].field for macro in self._macros if len(macro.targets) == 1}
         for field, knob in self.knobs.items():
-            knob.setVisible(not (self._shows_macros and field in alone))
+            knob.setVisible(not (self._shows_macros and (field in alone or field in AMP)))
 
     def _show_scala(self, tuning: TuningChoice) -> None:
         """What of Scala tunes the patch; a click removes it."""

@@ -163,7 +163,11 @@ class StringKnobs(QWidget):
 
 def _why_barred(patch: Patch, field: str) -> str:
     """Why a field means nothing in this patch; "" where it does."""
-    if patch.strings.kind == "drums" and field.startswith(("knobs.", "pluck.")) and field not in OF_DRUMS:
+    if (
+        patch.strings.kind == "drums"
+        and field.startswith(("knobs.", "pluck.", "damping.mute"))
+        and field not in OF_DRUMS
+    ):
         return NO_STRING
     if field in SHAPED and patch.pluck.shape == "triangular":
         return NO_WIDTH

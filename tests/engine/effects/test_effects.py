@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.effects import Body, Effects, Room, apply
+from engine.effects import Amp, Body, Effects, Room, apply
 from engine.effects.impulse import LOUDNESS_HZ, Impulse
 from engine.kernels import layout as at
 from engine.voices import Mixer, Voice, plain_program
@@ -33,7 +33,7 @@ CHOICES = [
 ]
 
 
-@pytest.mark.parametrize("effects", CHOICES)
+@pytest.mark.parametrize("effects", [*CHOICES, Effects(amp=Amp(20.0)), Effects(Body(0.8), Room(0.2, 0.8), Amp(12.0))])
 def test_the_mixer_gives_the_same_as_arrays_are_given(effects: Effects) -> None:
     sound = pink(60_000).astype(np.float32)
     voice = Voice.of_samples(plain_program(RATE_HZ), sound)
@@ -53,7 +53,7 @@ def test_loudness_stays(effects: Effects) -> None:
 
 def test_what_has_no_mix_changes_nothing() -> None:
     sound = pink(1000)
-    for effects in (None, Effects(), Effects(Body(0.0), Room(0.0))):
+    for effects in (None, Effects(), Effects(Body(0.0), Room(0.0), Amp(0.0))):
         np.testing.assert_array_equal(apply(effects, sound, RATE_HZ), np.repeat(sound, 2, 1))
     np.testing.assert_array_equal(Effects().impulse(RATE_HZ), [[1.0]])
 

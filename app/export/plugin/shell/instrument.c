@@ -254,6 +254,18 @@ static void follow_losses(instrument *own, int64_t knob, double value) {
   }
 }
 
+/* As `engine.effects.Amp.factors`. */
+static void follow_amp(instrument *own) {
+  slot *amp = own->mixer + M_AMPLIFIER;
+  const slot *gains = own->player + PLAYER_SOURCE_GAINS;
+  bool compares = gains[0].real != 0 && gains[1].real != 0;
+  double drive = pow(10, own->amp[AMP_DRIVE_DB] / 20);
+  bool on = own->amp[AMP_DRIVE_DB] > 0 && !compares;
+  amp[A_WANTED_GAIN].real = on ? own->of->level * sqrt(1 + pow(drive * AMP_NOMINAL, 2)) / drive : 0;
+  amp[A_WANTED_TONE].real = on ? pow(10, own->amp[AMP_TONE_DB] / 20) : 0;
+  amp[A_WANTED_DRIVE].real = on ? drive / own->of->level : 0;
+}
+
 static void apply(instrument *own, int32_t place, double value, int64_t frame) {
   const parameter *of = &parameters_of(own->of)[place];
   if (of->kind == KIND_VALUE) {
@@ -268,8 +280,12 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
     own->table[TABLE_SOURCES].whole = source == SOURCE_MODEL ? 1 : 2;
     own->player[PLAYER_SOURCE_GAINS].real = source != SOURCE_TRUTH;
     own->player[PLAYER_SOURCE_GAINS + 1].real = source == SOURCE_MODEL ? 0 : source == SOURCE_TRUTH ? 1 : -1;
+    follow_amp(own);
   } else if (of->kind == KIND_MIX) {
     own->mix[of->index] = value;
+  } else if (of->kind == KIND_AMP) {
+    own->amp[of->index] = value;
+    follow_amp(own);
   } else if (of->kind == KIND_MACRO) {
     follow_levels(own, of->index, value);
   }
@@ -313,6 +329,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
   for (int32_t place = 0; place < of->parameter_count; place++) {
     const parameter *each = &parameters_of(of)[place];
     if (each->kind == KIND_MIX) own->mix[each->index] = own->values[place];
+    if (each->kind == KIND_AMP) own->amp[each->index] = own->values[place];
     if (each->kind == KIND_MACRO) own->positions[each->index] = own->standards[each->index] = each->standard;
   }
   if (!begin_responses(own)) {

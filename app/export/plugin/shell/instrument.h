@@ -10,8 +10,9 @@
 
 typedef union { double real; int64_t whole; } slot;
 
-enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_POINT, KIND_MACRO, KIND_MIX };
+enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_POINT, KIND_MACRO, KIND_MIX, KIND_AMP };
 enum { MIX_BODY, MIX_ROOM };
+enum { AMP_DRIVE_DB, AMP_TONE_DB };
 enum { PART_BODY, PART_ROOM, PART_BOTH, MIX_PARTS };
 enum { POWER_BODY = 1, POWER_ROOM = 2, POWER_CASES = 4 }; /* which of both are heard: a sum of these */
 enum { SOURCE_MODEL, SOURCE_TRUTH, SOURCE_DIFFERENCE };
@@ -38,7 +39,7 @@ typedef struct {
   int64_t losses;              /* of drums: of each key the slot of two rows, 1/s that knobs of decay add at 1; 0: strings */
   int64_t wheel_mix;           /* which mix the modulation wheel moves, -1: none */
   int64_t modes, most_notes;
-  double longest_s, wheel_goal;
+  double longest_s, wheel_goal, level;
   char id[128], name[64], description[512], maker[64], features[128];
   uint8_t uid[16]; /* of VST3 */
 } image;
@@ -54,6 +55,7 @@ typedef struct {
   double powers[POWER_CASES][16];    /* of `responses` */
   int64_t frames_of_parts, mix_slots, mixing_at; /* the next slot of the response that is being mixed, -1: none is */
   double mix[2], mixing[2], weights[1 + MIX_PARTS]; /* of body and room: the latest, and those of that one */
+  double amp[2];      /* drive and tone in dB; no drive: there is no amplifier */
   double values[MOST_PARAMETERS];
   double added[2]; /* knobs of decay and of brightness decay beyond the instrument's own, which drums follow */
   double positions[MOST_PARAMETERS], standards[MOST_PARAMETERS]; /* of macros: as levels follow them */

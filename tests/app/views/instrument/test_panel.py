@@ -96,3 +96,11 @@ def test_what_keys_play_is_chosen_from_words(qtbot: QtBot, panel: InstrumentPane
     panel.show_keys_play("place", possible=False)
     assert not panel.plays.isEnabled()
     assert "Choose an instrument" in panel.plays.toolTip()
+
+
+def test_what_a_key_does_while_another_is_held_is_chosen(qtbot: QtBot, panel: InstrumentPanel) -> None:
+    for name in ("legato", "slide", "pluck"):
+        with qtbot.waitSignal(panel.touch_chosen, check_params_cb=lambda chosen, name=name: chosen == name):
+            qtbot.mouseClick(panel.touch.findChild(QAbstractButton, name), Qt.MouseButton.LeftButton)
+    panel.set_drums(True)
+    assert not panel.touch.isEnabled()

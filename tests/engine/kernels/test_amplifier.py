@@ -1,0 +1,107 @@
+"""The amplifier: harmonics as its shape gives them, without aliases; level; silence where it is off."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.effects.amp import NOMINAL, Amp, amplified
+from engine.kernels import amplifier
+from engine.kernels import layout as at
+
+RATE_HZ = 48_000
+SIZE = 2**15
+FULL_DB = 36.0
+
+
+def tone(hz: float, peak: float, frames: int = 2 * SIZE, rate_hz: int = RATE_HZ) -> tuple[int, NDArray[np.float64]]:
+    """A sine (frames, 2) with a whole and odd number of periods in SIZE frames, and that number."""
+    periods = round(hz / rate_hz * SIZE) | 1
+    wave = peak * np.sin(2 * np.pi * periods * np.arange(frames) / SIZE)
+    return periods, np.repeat(wave[:, None], 2, 1)
+
+
+def spectrum(sound: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Peaks of the last SIZE frames, by periods in these."""
+    return np.abs(np.fft.rfft(sound[-SIZE:, 0])) * 2 / SIZE
+
+
+@pytest.mark.parametrize("drive_db", [6.0, 20.0, FULL_DB])
+def test_harmonics_are_those_of_its_shape(drive_db: float) -> None:
+    """By a sum over one period of x/√(1 + x²), which knows neither filters nor rates."""
+    periods, sound = tone(1_000, 0.1)
+    amp = Amp(drive_db)
+    found = spectrum(amplified(amp, sound, RATE_HZ))
+    hz = periods * RATE_HZ / SIZE
+    drive, gain, _ = amp.factors
+    low = amplifier.COUPLING_HZ / hz
+    angle = 2 * np.pi * np.arange(4096) / 4096
+    x = amplifier.BIAS + drive * 0.1 / np.sqrt(1 + low**2) * np.sin(angle)
+    expected = np.abs(np.fft.rfft(gain * x / np.sqrt(1 + x * x))) * 2 / 4096
+    for harmonic in (1, 2, 3, 5):
+        assert 20 * np.log10(found[harmonic * periods] / expected[harmonic]) == pytest.approx(0, abs=0.25), harmonic
+
+
+@pytest.mark.parametrize("rate_hz", [44_100, 48_000, 96_000])
+def test_aliases_of_5_khz_at_full_drive_are_80_db_below(rate_hz: int) -> None:
+    periods, sound = tone(5_000, 1.0, rate_hz=rate_hz)
+    found = spectrum(amplified(Amp(FULL_DB), sound, rate_hz))
+    harmonic = np.zeros(len(found), bool)
+    harmonic[::periods] = True
+    assert found[3 * periods] > 0.2 * found[periods]  # it is driven hard
+    assert 20 * np.log10(found[~harmonic].max() / found[periods]) < -80
+
+
+@pytest.mark.parametrize("drive_db", [1.0, 12.0, FULL_DB])
+def test_a_tone_of_nominal_level_keeps_it(drive_db: float) -> None:
+    _, sound = tone(1_000, NOMINAL)
+    found = amplified(Amp(drive_db), sound, RATE_HZ)
+    assert 20 * np.log10(found[-SIZE:].std() / sound.std()) == pytest.approx(0, abs=3)
+
+
+def test_the_level_of_an_instrument_changes_no_drive() -> None:
+    _, sound = tone(300, 0.1, 9_600)
+    louder = amplified(Amp(20.0, 3.0, level_db=6.0), sound * 10 ** (6 / 20), RATE_HZ)
+    np.testing.assert_allclose(louder, amplified(Amp(20.0, 3.0), sound, RATE_HZ) * 10 ** (6 / 20), atol=1e-12)
+
+
+def test_tone_raises_one_side_and_lowers_the_other() -> None:
+    for hz, sign in ((100, -1), (6_000, 1)):
+        _, sound = tone(hz, 0.01)
+        plain, bright = (amplified(Amp(1.0, each), sound, RATE_HZ)[-SIZE:].std() for each in (0.0, 6.0))
+        assert 20 * np.log10(bright / plain) == pytest.approx(sign * 6, abs=1.5)
+
+
+def test_off_it_leaves_every_sample_and_is_switched_without_a_click() -> None:
+    _, sound = tone(200, 0.1, 64 * at.QUANTUM)
+    np.testing.assert_array_equal(amplified(Amp(), sound, RATE_HZ), sound)
+    mixer = np.zeros(at.MIXER_SLOTS)
+    mixer[at.M_RATE] = RATE_HZ
+    mix, found = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2), []
+    for number, first in enumerate(range(0, len(sound), at.QUANTUM)):
+        mixer[at.M_AMPLIFIER : at.M_AMPLIFIER + 3] = Amp(6.0 if 10 <= number < 40 else 0.0).factors
+        mix[:] = sound[first : first + at.QUANTUM]
+        amplifier.amplify(mixer)
+        mixer.view(np.int64)[at.M_FRAMES] += at.QUANTUM
+        found.append(mix.copy())
+    whole = np.concatenate(found)[:, 0]
+    assert np.abs(np.diff(whole)).max() < 1.6 * np.abs(np.diff(sound[:, 0])).max()
+    assert not np.array_equal(whole[30 * at.QUANTUM : 31 * at.QUANTUM], sound[30 * at.QUANTUM : 31 * at.QUANTUM, 0])
+    np.testing.assert_array_equal(whole[60 * at.QUANTUM :], sound[60 * at.QUANTUM :, 0])
+
+
+def test_it_is_silent_before_any_input() -> None:
+    assert np.abs(amplified(Amp(FULL_DB), np.zeros((9_600, 2)), RATE_HZ)).max() < 1e-12
+
+
+def test_silence_stays_silence_after_what_was_driven() -> None:
+    sound = np.concatenate([tone(200, 1.0, 4_800)[1], np.zeros((RATE_HZ, 2))])
+    found = amplified(Amp(FULL_DB), sound, RATE_HZ)
+    assert np.abs(found[-2_400:]).max() < 1e-5
+
+
+@pytest.mark.parametrize(("name", "value"), [("drive_db", -1.0), ("drive_db", 37.0), ("tone_db", 13.0)])
+def test_values_out_of_range_are_refused_by_name(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=name):
+        Amp(**{name: value})
