@@ -9,7 +9,7 @@ from app.instrument.glide import START_S, glides_cents
 from app.instrument.offline import render_note
 from app.instrument.strings import Strings
 from app.patches.library import find_patch
-from app.patches.patch import Patch
+from app.patches.patch import Amp, Body, Patch, Room
 from app.patches.tuning import TuningChoice
 from engine.presets import Preset
 from tests.bench.tune import pitch_hz
@@ -23,8 +23,9 @@ RATE_HZ = 48_000
     [("Slack bass", 44, 127), ("Slack bass", 50, 100), ("Electric bass", 45, 127), ("Harpsichord", 84, 127)],
 )
 def test_a_rendered_note_starts_as_sharp(name: str, key: int, velocity: int, source: str, preset: Preset) -> None:
-    """Keys high enough for many periods in START_S: partials of a lower one overlap in its spectrum."""
-    patch = find_patch(name).patch.with_values({"room.mix": 0.0, "noise.onset_db": -60.0})
+    """Of the string alone. Keys high enough for many periods in START_S: partials of a lower one overlap."""
+    patch = find_patch(name).patch.with_values({"noise.onset_db": -60.0})
+    patch = patch.model_copy(update={"amp": Amp(), "body": Body(), "room": Room()})
     string = Strings(patch).of_key(key)
     assert string is not None
     cents = glides_cents(patch)[key, velocity]
