@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.lib.stride_tricks import sliding_window_view
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
@@ -14,7 +15,7 @@ from app.instrument.midi_file import midi_bytes, read_song
 from app.instrument.offline import render_events, render_note
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, read_patch
-from app.patches.patch import Patch
+from app.patches.patch import Patch, Room
 from engine.kernels import playing_layout as of
 from engine.presets import SHIPPED, load_preset
 from engine.voices import Ear, Mixer
@@ -23,6 +24,8 @@ PRESET = load_preset(SHIPPED / "studio_any_string.safetensors")
 KIT, TOM, TIMPANI = (read_patch(PATCHES / f"{name}.json") for name in ("concert_toms", "tuned_toms", "timpani"))
 PADS = range(36, 52)
 RATE_HZ = 48_000
+CONTACT_FRAMES = 240  # after which a blow has begun
+LARGEST_STEP = 2e-5  # twice: a step is then 100 dB below full scale
 
 
 def rendered(patch: Patch, key: int, velocity: int = 100, source: str = "model", seconds: float = 0.5) -> np.ndarray:
@@ -43,6 +46,21 @@ def test_model_and_truth_sound_alike(key: int) -> None:
     model, truth = (rendered(KIT, key, 127, source) for source in ("model", "truth"))
     assert 0.05 < np.abs(truth).max() < 1
     assert np.square(model - truth).sum() < 1e-7 * np.square(truth).sum()
+
+
+@pytest.mark.parametrize("source", ["model", "truth"])
+@pytest.mark.parametrize("key", [41, 47, 49])
+def test_modes_that_have_decayed_leave_without_a_step(key: int, source: str) -> None:
+    """A step stands out of the third difference, as twice its size; where modes ring it is smooth."""
+    blow = [TimedEvent(0.0, NoteOn(key, 90))]
+    dry = KIT.model_copy(update={"room": Room(mix=0.0)})
+    blocks = render_events(dry, PRESET, blow, RATE_HZ, source, seconds=0.6, limited=False)
+    sound = np.concatenate(list(blocks)).astype(float)[:, 0]
+    assert np.abs(sound).max() > 0.05
+    third = np.abs(np.diff(sound[CONTACT_FRAMES:], 3))
+    usual = np.median(sliding_window_view(third, 41), axis=1)
+    alone = third[20:-20] > 8 * usual
+    assert third[20:-20][alone].max(initial=0.0) < LARGEST_STEP
 
 
 def test_the_kernel_strikes_as_the_engine_does() -> None:
