@@ -80,7 +80,7 @@ def peak_db(
     begins, within = (np.exp(np.multiply.outer(steps, eigenvalues)) for steps in (blocks * PEAK_BLOCKS, blocks))
     sounds = []
     for point in amplitudes.T:
-        turned = ((begins * point) @ within.T).ravel()
+        turned = np.einsum("bm,wm->bw", begins * point, within).ravel()  # threads of a BLAS take longer
         sound = turned.imag if ear.pickup == "velocity" else turned.real
         if response is not None:
             frames, impulse = len(sound), response.impulse[: len(sound)]  # later ones are heard after it

@@ -6,6 +6,7 @@ import contextlib
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +24,9 @@ from engine.voices import Ear
 
 MIXES = ("body.mix", "room.mix")
 AMP = ("amp.drive_db", "amp.tone_db")
-STEPS = 5  # positions of a macro at which levels are known
+STEPS = 17  # positions of a macro at which levels are known
+SPARSE = 4  # every so many of them are computed; those between, where levels bend
+NEAR_DB = 0.05  # off a straight line: less is no bend
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +95,19 @@ def levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float64]:
     for number, macro in enumerate(patch.macros):
         if all(target.field.startswith(("room.", "noise.")) for target in macro.targets):
             continue  # no level depends on the room or on noise
-        for step in range(STEPS):
-            found[number, step] = _levels(patch.turned(number, step / (STEPS - 1)), preset) - now
+
+        def level(step: int, number: int = number) -> NDArray[np.float64]:
+            return _levels(patch.turned(number, step / (STEPS - 1)), preset) - now
+
+        coarse = np.stack([level(step) for step in range(0, STEPS, SPARSE)])
+        bends = np.abs(np.diff(coarse, 2, axis=0)).max(1) / 8  # half-way, as of a parabola
+        for part, (left, right) in enumerate(pairwise(coarse)):
+            first = part * SPARSE
+            bent = max(bends[max(part - 1, 0) : part + 1]) > NEAR_DB
+            for step in range(first, first + SPARSE):
+                share = (step - first) / SPARSE
+                found[number, step] = level(step) if bent and step > first else left + share * (right - left)
+        found[number, -1] = coarse[-1]
     return found
 
 

@@ -142,7 +142,7 @@ static void take_event(shell *own, const clap_event *event, uint32_t at) {
     if (each->id == CLAP_EXPRESSION_TUNING)
       instrument_tune(to, at, each->note_id >= 0 ? each->note_id + 1 : 0, each->channel, each->key, each->value);
     else if (each->id == CLAP_EXPRESSION_BRIGHTNESS)
-      instrument_controller(to, at, each->channel < 0 ? 0 : each->channel, 74, (int32_t)(127 * (each->value > 0 ? each->value < 1 ? each->value : 1 : 0)));
+      instrument_controller(to, at, each->channel < 0 ? 0 : each->channel, 74, (int32_t)(0.5 + 127 * (each->value > 0 ? each->value < 1 ? each->value : 1 : 0)));
   } else if (event->type == CLAP_MIDI) {
     instrument_midi(to, at, ((const clap_event_midi *)event)->data);
   }

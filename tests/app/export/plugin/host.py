@@ -200,6 +200,10 @@ def tune(frame: int, semitones: float, note_id: int) -> Event:
     return Event(frame, ExpressionEvent(Header(40, 0, 0, EXPRESSION, 0), 3, note_id, 0, -1, -1, semitones))
 
 
+def brighten(frame: int, value: float, channel: int) -> Event:
+    return Event(frame, ExpressionEvent(Header(40, 0, 0, EXPRESSION, 0), 5, -1, 0, channel, -1, value))
+
+
 def midi(frame: int, *data: int) -> Event:
     return Event(frame, MidiEvent(Header(24, 0, 0, MIDI, 0), 0, (c.c_uint8 * 3)(*data)))
 

@@ -29,9 +29,10 @@ NAMES = (
     "timpani",  # drums
     "thin_bars",  # drums that are bars
     "learned",  # from a recording
+    "member_channels",  # MPE
 )
 MOVED, BARS = "classical_guitar", "thin_bars"  # those whose levels follow their macros
-LEARNED = "learned"
+LEARNED, MEMBERS = "learned", "member_channels"
 LONG = os.environ.get("LEARNED_STRINGS_FUZZ") == "long"  # by `run.py test --fuzz`
 SECONDS = 1.6
 EQUAL_DB = -140.0
@@ -40,6 +41,9 @@ EQUAL_DB = -140.0
 def patch_of(name: str) -> Patch:
     if name == LEARNED:
         return read_patch(INSTRUMENTS / "falling_nylon.json").model_copy(update={"name": "Learned"})
+    if name == MEMBERS:
+        guitar = read_patch(INSTRUMENTS / "classical_guitar.json")
+        return guitar.model_copy(update={"name": "Member channels", "mode": "mpe", "bend_semitones": 12.0})
     return read_patch(INSTRUMENTS / f"{name}.json")
 
 

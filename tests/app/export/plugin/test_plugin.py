@@ -38,6 +38,8 @@ from tests.app.export.plugin.pieces import (
 pytestmark = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang, the extra [plugin]")
 
 
+NEARLY_DB = -32.0  # of levels that are 0.2 dB off
+TOGETHER_DB = -16.0  # and 1.4 dB, where two that change levels are moved
 LARGEST_BYTES = 3_000_000  # the code has a third of a megabyte more
 
 
@@ -153,6 +155,30 @@ def test_macros_move_body_and_room_and_keys_stay_as_loud(bank: Library) -> None:
     for macro, value in ((room, 0.0), (room, 0.7), (body, 0.0), (body, 0.5), (place, 0.25), (place, 1.0)):
         wanted = rendered(patch.turned(macro, value), 48_000)
         assert difference_db(played(with_macro(bank, MOVED, macro, value), patch, 48_000), wanted) < EQUAL_DB
+
+
+@pytest.mark.parametrize(
+    ("values", "most_db"),
+    (
+        ({"pluck.position": 0.41}, NEARLY_DB),
+        ({"body.mix": 0.66}, NEARLY_DB),
+        ({"knobs.decay": 0.3, "room.mix": 0.9}, NEARLY_DB),
+        ({"pluck.position": 0.35, "body.mix": 0.7}, TOGETHER_DB),
+    ),
+)
+def test_between_known_positions_keys_are_nearly_as_loud(
+    bank: Library, values: dict[str, float], most_db: float
+) -> None:
+    patch = patch_of(MOVED)
+    names = [macro.targets[0].field for macro in patch.macros]
+    instance, turned = instance_of(bank, MOVED), patch
+    for name, value in values.items():
+        id = instance.parameters[patch.macros[names.index(name)].name].id
+        instance.block(64, [param(instance.frame, id, value)])
+        turned = turned.turned(names.index(name), value)
+    instance.deactivate()
+    instance.activate(48_000)
+    assert difference_db(played(instance, patch, 48_000), rendered(turned, 48_000)) < most_db
 
 
 def test_decay_of_drums_follows_a_macro(bank: Library) -> None:
