@@ -227,6 +227,7 @@ class PatchBar(QFrame):
             self._share_width()
 
     def _share_width(self) -> None:
+        self._make_room()
         many = len(self._macros) > ROOMY_MACROS
         close = self._compact or many
         self.category.setVisible(not close and bool(self.category.text()))
@@ -273,8 +274,9 @@ class PatchBar(QFrame):
         self._show_compare()
 
     def _make_room(self) -> None:
-        """Where there is very little, a tuning takes the place of the number of voices."""
-        self.voices.setVisible(not self._tight or self.scala.isHidden())
+        """Where there is very little, a tuning or a sixth macro takes the place of the number of voices."""
+        roomy = self.scala.isHidden() and len(self._macros) < ROOMY_MACROS
+        self.voices.setVisible(roomy or not self._tight)
 
     def _show_compare(self) -> None:
         self.compare.setVisible(not self._tight or self.compare.isChecked())
