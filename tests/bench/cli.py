@@ -75,7 +75,7 @@ def voices(json: Json = False) -> None:
 
 @bench.command()
 def drums(json: Json = False) -> None:
-    """Cost of a drum's voice by its modes, and of a kit of 16 beside 8 strings."""
+    """Cost of a drum's voice by its modes, of a kit of 16 with 8 strings, of pictures, and of choosing drums."""
     _measure("drums", json)
 
 

@@ -1,4 +1,4 @@
-"""Drums: the cost of a voice of many modes, of a kit with strings, and of the picture in the window.
+"""Drums: the cost of a voice of many modes, of a kit with strings, of the picture, and of choosing an instrument.
 
 Costs are processor time of this thread at 48 kHz, less that of an empty mixer, as shares of a core. The least of some
 repeats counts: other processes only add.
@@ -34,6 +34,7 @@ REPEATS = 5
 STEP_FRAMES = 480
 VELOCITY = 110
 PICTURES = (("concert_toms", 36), ("concert_toms", 47), ("timpani", 50), ("soft_plate", 60), ("thin_bars", 72))
+INSTRUMENTS = ("concert_toms", "tuned_toms", "frame_drum", "conga", "timpani", "soft_plate", "thin_bars")
 T = TypeVar("T")
 SIZES = (400, 800, 1500)  # modes
 HARD = PhysicalMallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)  # so that all modes move
@@ -77,11 +78,21 @@ class PictureCost:
 
 
 @dataclass(frozen=True)
+class ChoiceCost:
+    """Of an instrument that is chosen for the first time: modes, radiation and gains of all its keys."""
+
+    instrument: str
+    keys: int
+    seconds: float
+
+
+@dataclass(frozen=True)
 class DrumsBenchmark:
     machine: Machine
     rate_hz: int
     drums: tuple[DrumCost, ...]
     pictures: tuple[PictureCost, ...]
+    choices: tuple[ChoiceCost, ...]
 
 
 def measure(report: Callable[[float, str], None]) -> DrumsBenchmark:
@@ -100,7 +111,26 @@ def measure(report: Callable[[float, str], None]) -> DrumsBenchmark:
         found.append(_cost("kit and strings", 0, (kit, pads), (guitar, STRINGS)))
         report((len(SIZES) + 1) / (len(SIZES) + 2), "pictures")
         pictures = tuple(_picture(*drum) for drum in PICTURES)
-        return DrumsBenchmark(Machine.here(), RATE_HZ, tuple(found), pictures)
+        choices = tuple(_choice(name) for name in INSTRUMENTS)
+        return DrumsBenchmark(Machine.here(), RATE_HZ, tuple(found), pictures, choices)
+
+
+def _choice(name: str) -> ChoiceCost:
+    from app.instrument.drum_keys import DrumKeys, tuned
+    from engine.resonators import surface
+    from engine.voices import Ear
+
+    patch = read_patch(PATCHES / f"{name}.json")
+    low, high = patch.range
+
+    def choose() -> int:
+        tuned.cache_clear()
+        surface._known_zeros.cache_clear()
+        keys = DrumKeys(patch, Ear((0.4, 0.6)))
+        return sum(keys.of_key(key) is not None for key in range(low, high + 1))
+
+    seconds, count = _timed(choose, 3)
+    return ChoiceCost(name, count, seconds)
 
 
 def _picture(patch: str, key: int) -> PictureCost:

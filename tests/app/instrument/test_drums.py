@@ -118,7 +118,7 @@ def test_every_pad_has_a_drum_and_others_are_refused() -> None:
 
 
 def test_the_pitch_drop_follows_velocity() -> None:
-    """At the hardest within what is published of drums: Fletcher and Rossing (1998), 18.3, have up to about 10 %."""
+    """At the hardest within up to about 10 %, which Fletcher and Rossing (1998), 18.3, have: from memory."""
     keys = DrumKeys(TOM, Ear((0.5,)))
     found = keys.of_key(47)
     assert found is not None
