@@ -14,9 +14,9 @@ from pathlib import Path
 
 import numpy as np
 
-from app.instrument.facts import bright_mode
+from app.instrument.facts import by_two_numbers
 from app.instrument.loud_keys import LoudKey, LoudKeys
-from app.instrument.strings import HIGHEST_HZ, decay_rates
+from app.instrument.strings import HIGHEST_HZ
 from app.patches.patch import Amp, Body, Patch, Room
 from app.patches.tuning import A4_KEY
 from app.shared.version import PROGRAM, program_version
@@ -166,14 +166,9 @@ def key_tables(
         if key is None:
             rows.append([math.nan] * 4 + [0.0])
             continue
-        string = key.string.parameters
+        string = key.string.parameters if patch is None else by_two_numbers(patch, key.string.parameters)
         mass, eta2 = string.mass_per_length_kg_m, (math.pi / string.length_m) ** 2
         steady, rising = string.damping_d1_kg_m_s / (2 * mass), string.damping_d3_kg_m_s / (2 * mass) * eta2
-        if patch is not None and patch.losses is not None:
-            bright = max(2, bright_mode(string))
-            rates = decay_rates(patch, string, bright)
-            rising = float(rates[-1] - rates[0]) / (bright**2 - 1)
-            steady = float(rates[0]) - rising
         rows.append(
             [
                 string.tension_n / mass * eta2,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 
 from app.instrument.events import NoteOn
+from app.instrument.facts import by_two_numbers
 from app.instrument.loud_keys import on_string
 from app.instrument.strings import Strings
 from app.patches.patch import Patch
@@ -28,7 +29,9 @@ def outside_of_key(info: PresetInfo, patch: Patch, event: NoteOn, string: int | 
         found = None
     if found is None:
         return []
-    return outside_of_string(info, found.parameters, on_string(found, patch.pluck.pluck(event.velocity)))
+    return outside_of_string(
+        info, by_two_numbers(patch, found.parameters), on_string(found, patch.pluck.pluck(event.velocity))
+    )
 
 
 def outside_of_string(info: PresetInfo, string: StringParameters, pluck: Pluck) -> list[str]:

@@ -22,6 +22,7 @@ from engine.presets import Preset
 from engine.resonators.string import StringParameters
 from engine.voices import CompiledPlayer, Ear
 from engine.voices.player import Report, Ringing, Table
+from engine.voices.programs import DRUM_SILENCE, HEARD_SILENCE
 
 STOP_S = 0.03
 
@@ -104,12 +105,13 @@ class InstrumentPlayer:
             )
         self._preset, self.grid_points, self.most_notes = preset, preset.info.grid_points, most_notes
         self._sources = tuple(gains)
-        self._programs = programs_of(preset, rate_hz, self._sources)
+        self._of_drums = isinstance(patch.strings, Drums)
+        silence = DRUM_SILENCE if self._of_drums else HEARD_SILENCE
+        self._programs = programs_of(preset, rate_hz, self._sources, silence)
         self._lock, self._varied = threading.Lock(), varied
         self._serial = self._instrument = 0
         self._wheel = 0, 0  # the modulation wheel as events have left it, and the channel that moved it
         self.table: Table | None = None
-        self._of_drums = isinstance(patch.strings, Drums)
         modes = of.MOST_DRUM_MODES if self._of_drums else min(of.MOST_MODES, self.grid_points - 2)
         self.compiled = CompiledPlayer(rate_hz, modes, most_notes)
         self.set_gains(gains)

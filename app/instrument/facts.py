@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from app.instrument.strings import KeyString, Strings, decay_rates
 from app.patches.drums import PlayedDrum
@@ -39,6 +39,18 @@ def bright_mode(string: StringParameters) -> int:
 def t60_s(string: StringParameters, mode: int, patch: Patch) -> float:
     """How long a mode takes to fall by 60 dB, by the string's own losses."""
     return math.log(1000) / max(float(decay_rates(patch, string, mode)[-1]), SLOWEST)
+
+
+def by_two_numbers(patch: Patch, string: StringParameters) -> StringParameters:
+    """The string with d₁ and d₃ in place of losses by mode: alike at its first partial and near BRIGHT_HZ."""
+    if patch.losses is None:
+        return string
+    bright = max(2, bright_mode(string))
+    rates = decay_rates(patch, string, bright)
+    rising = float(rates[-1] - rates[0]) / (bright**2 - 1)
+    twice_mass, eta2 = 2 * string.mass_per_length_kg_m, (math.pi / string.length_m) ** 2
+    d1, d3 = twice_mass * (float(rates[0]) - rising), twice_mass * rising / eta2
+    return replace(string, damping_d1_kg_m_s=max(d1, 0.0), damping_d3_kg_m_s=max(d3, 0.0))
 
 
 FIGURES: Mapping[str, Figure] = {  # by the field of the patch

@@ -73,10 +73,12 @@ def wheeled(patch: Patch, wheel: int, *parts: str) -> Patch:
     return patch.with_value(patch.mod_wheel, value + wheel / 127 * (goal - value))
 
 
-def programs_of(preset: Preset, rate_hz: int, sources: Iterable[str]) -> tuple[NDArray[np.float64], ...]:
-    """What the kernels read of each source."""
-    model = tension_memory(preset.weights, preset.configuration, rate_hz)
-    return tuple(solver_memory(rate_hz) if each == "truth" else model for each in sources)
+def programs_of(
+    preset: Preset, rate_hz: int, sources: Iterable[str], silence: float
+) -> tuple[NDArray[np.float64], ...]:
+    """What the kernels read of each source; `silence`: of a mode that is laid to rest."""
+    model = tension_memory(preset.weights, preset.configuration, rate_hz, silence)
+    return tuple(solver_memory(rate_hz, silence=silence) if each == "truth" else model for each in sources)
 
 
 def table_of(

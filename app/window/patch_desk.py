@@ -14,7 +14,7 @@ from app.instrument.beyond_training import outside_of_key, outside_of_string
 from app.instrument.bodies import body_titles
 from app.instrument.compiled import is_another
 from app.instrument.events import KEYS, LEGATO, PORTAMENTO, SLIDE_TIME, Controller, NoteOff, NoteOn, TimedEvent
-from app.instrument.facts import facts_of, facts_of_drum, figures_of, knob_for
+from app.instrument.facts import by_two_numbers, facts_of, facts_of_drum, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.strings import KeyString, Strings
 from app.patches.drums import Drums
@@ -474,7 +474,10 @@ class PatchDesk(QObject):
             return outside_of_key(entry.info, patch, latest.event, latest.string)
         if choices.string is None:
             return []
-        return outside_of_string(entry.info, choices.string.parameters, choices.pluck)
+        string = choices.string.parameters
+        if patch is not None and choices.plays_patch:
+            string = by_two_numbers(patch, string)
+        return outside_of_string(entry.info, string, choices.pluck)
 
     def _shown_key(self, patch: Patch) -> tuple[int, int | None]:
         """Whose string is shown: the key that was struck last, on its string, or the middle of the patch's range."""

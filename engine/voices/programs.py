@@ -25,9 +25,9 @@ from engine.presets import Preset, PresetInfo
 from engine.resonators.base import Array, Resonator
 from engine.voices.ear import Ear
 
-# Of a mode's amplitude, of all: what is left out where it is heard is 134 dB down. Drums radiate high modes well:
-# at 4e-6 they left with steps of up to 83 dB below full scale, which were found as clicks; now of at most 104 dB.
-HEARD_SILENCE = 2e-7
+HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
+# Drums radiate high modes better than low ones: at 4e-6 they would leave with audible steps.
+DRUM_SILENCE = 2e-7
 STRING_SILENT_DB = 120.0  # its slowest mode, below its start
 HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below audibility
 FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
@@ -103,12 +103,14 @@ def tension_program(
     return _with_modes(at.TENSION, tension_memory(weights, c, rate_hz), resonator, rate_hz)
 
 
-def tension_memory(weights: Mapping[str, Array], c: KoopmanTensionConfiguration, rate_hz: int) -> Array:
-    """What the kernels read of the model, whatever the resonator."""
+def tension_memory(
+    weights: Mapping[str, Array], c: KoopmanTensionConfiguration, rate_hz: int, silence: float = HEARD_SILENCE
+) -> Array:
+    """What the kernels read of the model, whatever the resonator; `silence`: of a mode that is laid to rest."""
     reals = {
         at.S_NODE_PHASE: c.node_phase,
         at.S_HIGHEST_PHASE: c.highest_phase,
-        at.S_SILENCE: HEARD_SILENCE,
+        at.S_SILENCE: silence,
         at.S_LOUDNESS: -math.log(FULL_SCALE_M),
         at.S_RATE: float(rate_hz),
     }
@@ -136,11 +138,11 @@ def solver_program(
     return _with_modes(at.TRUTH, solver_memory(rate_hz, coarser), resonator, rate_hz, aliased)
 
 
-def solver_memory(rate_hz: int, coarser: int = HEARD_COARSER) -> Array:
-    """What the kernels read of the solver, whatever the resonator."""
+def solver_memory(rate_hz: int, coarser: int = HEARD_COARSER, silence: float = HEARD_SILENCE) -> Array:
+    """What the kernels read of the solver, as `tension_memory`."""
     reals = {
         at.T_SUBSTEPS: SUBSTEPS_IN_A_PERIOD / coarser,
-        at.T_SILENCE: HEARD_SILENCE,
+        at.T_SILENCE: silence,
         at.T_LOUDNESS: -math.log(FULL_SCALE_M),
         at.T_RATE: float(rate_hz),
         **{at.T_ROTATIONS + stage: share for stage, share in enumerate(ROTATIONS[: at.STAGES // 2])},

@@ -13,7 +13,7 @@ from app.instrument.events import Controller, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Body, Patch, Room
+from app.patches.patch import Body, Noise, Patch, Room
 from app.patches.tuning import Tuning
 from engine.presets import SHIPPED, load_preset
 from tests.bench.play import hearing, score
@@ -31,7 +31,7 @@ def patch() -> Patch:
     """One direction, released at once, each stroke alike: what is judged has no beats of its own."""
     patch = read_patch(PATCHES / "classical_guitar.json")
     pluck = patch.pluck.model_copy(update={"variation": 0.0, "release_ms": 0.0, "release_hard_ms": 0.0})
-    plain: dict[str, object] = {"pluck": pluck, "polarisations": None, "sympathy_s_kg": 0.0}
+    plain: dict[str, object] = {"pluck": pluck, "polarisations": None, "sympathy_s_kg": 0.0, "noise": Noise()}
     return Patch.model_validate({**dict(patch), "body": Body(), "room": Room(), **plain})
 
 

@@ -27,7 +27,7 @@ class Glide:
     """c_i of the time constants, a share of the frequency each, (3,).
 
     Attributes:
-        pitch: the share by which all frequencies lie higher than those of the poles; of takes that share their poles.
+        pitch: share of all frequencies above those of the poles; of takes that share their poles.
     """
 
     shares: Array

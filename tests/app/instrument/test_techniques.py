@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from app.instrument.events import (
     LEGATO,
+    MOD_WHEEL,
     PORTAMENTO,
     SLIDE_TIME,
     SOFT,
@@ -87,6 +88,9 @@ def test_the_parameter_and_the_pedal_mute_alike(patch: Patch, preset: Preset) ->
     by_pedal = play(patch, preset, 0.3, (0.0, Controller(SOFT, 127)), (0.0, NoteOn(KEY, 60)))
     turned = Patch.model_validate({**dict(patch), "damping": Damping(release_t60_s=0.15, mute=1.0)})
     np.testing.assert_array_equal(play(turned, preset, 0.3, (0.0, NoteOn(KEY, 60))), by_pedal)
+    wheel = Patch.model_validate({**dict(patch), "mod_wheel": "damping.mute"})
+    by_wheel = play(wheel, preset, 0.3, (0.0, Controller(MOD_WHEEL, 127)), (0.0, NoteOn(KEY, 60)))
+    np.testing.assert_array_equal(by_wheel, by_pedal)
 
 
 @pytest.mark.parametrize("source", ["model", "truth"])

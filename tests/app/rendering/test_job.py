@@ -111,7 +111,7 @@ def test_pictures_and_flashes_are_frames_of_the_motion(preset: Any, job: Render,
 def test_a_signal_is_what_is_heard_of_the_motion(
     preset: Any, ear: Ear, job: Render, sources: Sources, derivative: Callable[..., np.ndarray]
 ) -> None:
-    """From the first frame to the last, except the truth's voice, which leaves out what is 134 dB below the rest."""
+    """From the first frame to the last, except the truth's voice, which leaves out what is 108 dB below the rest."""
     take, loaded = finished(job(preset, ear=ear)), sources.load(preset)
     rate_hz = take.info.rate_hz
     for name, source in (("model", loaded.model), ("truth", loaded.truth)):

@@ -20,7 +20,7 @@ import numpy as np
 
 from app.audio.choices import Buffer, SoundChoice
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
-from app.patches.patch import Body, Patch, Room
+from app.patches.patch import Body, Noise, Patch, Room
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
 from app.window.settings import Settings
@@ -106,7 +106,7 @@ def measure(by: By, buffer: Buffer, seed: int, patch: Patch, report: Callable[..
     """
     need_programs(*SOUND_AND_SCREEN, *(() if by == "keys" else ("jackd",)))
     pluck = patch.pluck.model_copy(update={"variation": 0.0, "release_ms": 0.0, "release_hard_ms": 0.0})
-    plain = {"pluck": pluck, "polarisations": None, "sympathy_s_kg": 0.0}
+    plain = {"pluck": pluck, "polarisations": None, "sympathy_s_kg": 0.0, "noise": Noise()}
     dry = Patch.model_validate({**dict(patch), "body": Body(), "room": Room(), **plain})
     piece = score.parts(Random(seed), *dry.range)
     kinds = ("midi", "keys") if by == "both" else (by,)

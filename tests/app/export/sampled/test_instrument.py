@@ -14,7 +14,7 @@ from app.export.sampled.job import export_sampled, note_renderer
 from app.export.sampled.plan import SampledPlan
 from app.instrument.offline import render_note
 from app.patches.library import find_patch
-from app.patches.patch import Patch
+from app.patches.patch import Amp, Body, Patch, Room
 from engine.presets import find_preset, load_preset
 from tests.bench.tune import pitch_hz
 
@@ -68,7 +68,7 @@ def test_it_sounds_as_the_note_itself(
 @pytest.mark.parametrize(("key", "layers"), [(28, 2), (28, 4), (33, 4)])
 def test_a_note_starts_within_the_reported_error(key: int, layers: int, play: Callable, tmp_path: Path) -> None:
     """Rendered at the hardest velocity of its layer, a note would start about twice as far off."""
-    bass = find_patch("Electric bass").patch.with_value("room.mix", 0.0)
+    bass = find_patch("Electric bass").patch.model_copy(update={"amp": Amp(), "body": Body(), "room": Room()})
     render, part = note_renderer(load_preset(find_preset(bass.preset)), "model"), slice(480, 12_000)
     plan = SampledPlan(bass, (key, key), layers=layers, seconds=0.5)
     export_sampled(plan, tmp_path / "a.sf2", render)
