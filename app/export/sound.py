@@ -95,10 +95,10 @@ class SoundRequest:
         difference_gain_db: gain of the difference.
         decay_db: the sound ends where both model and truth have fallen this far below their maximum, so that all
             files of a pluck have the same length. None: it lasts `seconds`.
-        through: level, body and room of an instrument; a difference is heard without body and room. None: the string
+        through: level, amplifier, body and room of an instrument; a difference has its level alone. None: the string
             alone.
         struck: a key of an instrument that `preset` plays, in place of pluck, listening points and pick-up. Its
-            difference is heard without body and room too.
+            difference is heard without amplifier, body and room too.
 
     Raises:
         ValueError: a value is out of its range; the message names it and the range.

@@ -17,7 +17,7 @@ from app.instrument.offline import render_events
 from app.patches.drums import Drums
 from app.patches.fields import Name
 from app.patches.library import list_patches
-from app.patches.patch import Amp, Body, Patch, Room
+from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from engine.presets import Preset
 
@@ -110,11 +110,8 @@ class Struck:
         Raises:
             ValueError: the key has no string.
         """
-        patch = self.patch
-        if dry:
-            patch = patch.model_copy(update={"amp": Amp(), "body": Body(), "room": Room()})
         blocks = render_events(
-            patch,
+            self.patch,
             preset,
             [TimedEvent(0.0, self.event)],
             rate_hz,
@@ -123,6 +120,7 @@ class Struck:
             limited=False,
             advanced=lambda done_s: progress(min(done_s / seconds, 1.0)),
             varied=False,
+            dry=dry,
         )
         peak, quiet = 0.0, 0
         for block in blocks:

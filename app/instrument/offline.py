@@ -43,10 +43,18 @@ class _Stage:
     Args:
         gains: of the sources that are heard together; a difference, of two, is heard without body and room.
         varied: whether plucks vary from stroke to stroke; those of a difference do not.
+        dry: without amplifier, body and room.
     """
 
     def __init__(
-        self, patch: Patch, preset: Preset, rate_hz: int, gains: Mapping[str, float], limited: bool, varied: bool
+        self,
+        patch: Patch,
+        preset: Preset,
+        rate_hz: int,
+        gains: Mapping[str, float],
+        limited: bool,
+        varied: bool,
+        dry: bool,
     ) -> None:
         self.mixer = Mixer(rate_hz, limited=limited)
         compared = len(gains) > 1
@@ -54,7 +62,7 @@ class _Stage:
             patch, preset, rate_hz, gains, most_notes=MOST_RINGING, varied=varied and not compared
         )
         self.mixer.set_player(self.player.compiled)
-        self._dry = compared
+        self._dry = compared or dry
         self.tail_s = 0.0
         self._set_effects()
 
@@ -95,6 +103,7 @@ def render_events(
     advanced: Callable[[float], None] = lambda seconds: None,
     difference_gain_db: float = 0.0,
     varied: bool = True,
+    dry: bool = False,
 ) -> Iterator[NDArray[np.float32]]:
     """The sound of a patch that plays events, in blocks (frames, channels), ±1 being full scale. Deterministic.
 
@@ -106,11 +115,12 @@ def render_events(
         limited: through the limiter, as it is heard; without it, samples may pass full scale.
         advanced: is called with the seconds rendered so far; may raise, to end it.
         varied: whether plucks vary from stroke to stroke, as the patch says; in a difference they never do.
+        dry: without amplifier, body and room; the gains of the keys stay. A difference is always so.
 
     Raises:
         ValueError: a key has no possible string, or there is no such `source`.
     """
-    stage = _Stage(patch, preset, rate_hz, _gains(source, difference_gain_db), limited, varied)
+    stage = _Stage(patch, preset, rate_hz, _gains(source, difference_gain_db), limited, varied, dry)
     channels = channels_played(patch, timed)
     skipped = AHEAD if limited else 0  # the delay of the limiter
     done, events = 0, sorted(timed, key=lambda each: each.time_s)

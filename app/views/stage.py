@@ -69,7 +69,7 @@ class StageView(QWidget):
         button.clicked.connect(toggled)
         self._toggles.append(button)
 
-    # What is shown
+    # State
 
     def set_warning(self, text: str) -> None:
         """Why there is no sound, or what is wrong with it; "" for neither."""

@@ -1,4 +1,4 @@
-"""A guitar amplifier on the sum of all voices: drive and tone. What it is heard through, a cabinet, is a response.
+"""A guitar amplifier on the sum of all voices: drive and tone. Its cabinet is a body.
 
 One channel, the mean of both. A high-pass as between stages, then gain, a bias and the shape x/√(1 + x²), whose
 integral √(1 + x²) is known: its mean over each step of the input replaces its values (first-order antiderivative

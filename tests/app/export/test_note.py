@@ -13,7 +13,10 @@ from app.export.files import export_sound
 from app.export.note import HeardNote, Note, NoteExport, musical_name
 from app.export.recipe import read_recipe, request_of
 from app.export.sound import SoundRequest, Through
+from app.export.struck import Struck
 from app.instrument.effects import effects_of
+from app.instrument.events import NoteOn, TimedEvent
+from app.instrument.offline import render_events
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from engine.pluck import Pluck
@@ -116,3 +119,35 @@ def test_a_file_is_named_as_musicians_would(title: str, first_hz: float, amplitu
     assert musical_name(title, first_hz, 0.1, 10.0, amplitude_mm) == name
     assert a_note(name=name).file_name("model") == f"{name}.wav"
     assert a_note(name=name).file_name("truth") == f"{name} truth.wav"
+
+
+def test_the_difference_of_a_key_has_neither_amplifier_nor_body(tmp_path: Path) -> None:
+    """It is as loud as those of the key's own model and truth: its gain is that of the whole instrument."""
+    electric = read_patch(PATCHES / "electric_guitar_bridge_pick_up.json")
+    assert electric.amp.drive_db > 0
+    event = NoteOn(52, 100)
+    preset = SHIPPED / "studio_any_string.safetensors"
+    note = Note(preset, 48_000, Pluck(), 0.1, struck=Struck(electric, event))
+    found = write(note, tmp_path / "a.wav", source="difference")
+    dry = {
+        source: np.concatenate(
+            list(
+                render_events(
+                    electric,
+                    load_preset(preset),
+                    [TimedEvent(0.0, event)],
+                    48_000,
+                    source,
+                    0.3,
+                    limited=False,
+                    varied=False,
+                    dry=True,
+                )
+            )
+        )
+        for source in ("model", "truth")
+    }
+    until = len(found) - round(0.010 * 48_000)
+    expected = 10 ** (FIXED.difference_gain_db / 20) * (dry["model"].astype(np.float64) - dry["truth"])
+    np.testing.assert_allclose(found[:until], expected[:until], atol=1e-9)
+    assert np.abs(found).max() > 0
