@@ -154,21 +154,21 @@ def measure(
     whole_s = 60 + one_s * len(busy)
     began_s = time.monotonic()
 
-    def show_progress(text: str) -> None:
+    def shown(text: str) -> None:
         report(min((time.monotonic() - began_s) / whole_s, 0.99), text)
 
     random = Random(seed)
     with contextlib.ExitStack() as stack:
         stack.enter_context(program.ended_politely())
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="play")))
-        show_progress("sound card and screen")
+        shown("sound card and screen")
         server = stack.enter_context(sound_server(folder))
         screen = stack.enter_context(private_screen())
         recorded = stack.enter_context(recording(server, folder / "recording"))
         time.sleep(0.5)
-        show_progress("clicks")
+        shown("clicks")
         clicks = click_through(server)
-        show_progress("start")
+        shown("start")
         choices, keys = Choices(instrument=patch, octave=hands.octave_of(patch)), hands.keys_of(patch)
         settings = Settings(choices=choices, sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
         control = stack.enter_context(steady_tone(server, folder, buffer))
@@ -177,16 +177,14 @@ def measure(
         window, window_s = program.open_window(screen, process)
         program.try_keys(screen, recorded, process, started_s, keys[0])
         recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S)
-        played = [
-            _phase(screen, server, recorded, process, random, seconds, rate_hz, b, keys, show_progress) for b in busy
-        ]
-        show_progress("idle")
+        played = [_phase(screen, server, recorded, process, random, seconds, rate_hz, b, keys, shown) for b in busy]
+        shown("idle")
         idle = _idle(recorded, process)
-        show_progress("picture")
+        shown("picture")
         seen = picture_lags(screen, recorded, PICTURES, keys, STOP)
         size = screen.size(window)
         time.sleep(0.5)
-        show_progress("analysis")
+        shown("analysis")
         clock, way = recorded.clock(), transit(clicks, recorded)
         sound = recorded.sound()
         phases = tuple(_judged(each, sound, clock, way, control) for each in played)
@@ -225,7 +223,7 @@ def _phase(
     rate_hz: float,
     busy: bool,
     keys: Sequence[str],
-    show_progress: Callable[[str], None],
+    shown: Callable[[str], None],
 ) -> _Played:
     beside = " beside a busy process" if busy else ""
     load = os.getloadavg()
@@ -233,7 +231,7 @@ def _phase(
     with contextlib.ExitStack() as stack:
         if busy:
             stack.enter_context(child([sys.executable, "-c", "while True: pass"], os.environ))
-        show_progress(f"single plucks{beside}")
+        shown(f"single plucks{beside}")
         singles_s = []
         for _ in range(SINGLES):
             time.sleep(QUIET_S + random.uniform(0, 0.1))  # at random offsets from the device's blocks
@@ -241,7 +239,7 @@ def _phase(
             time.sleep(RINGS_S)
             hands.tap(screen, STOP)
         time.sleep(QUIET_S)
-        show_progress(f"{rate_hz:g} plucks a second{beside}")
+        shown(f"{rate_hz:g} plucks a second{beside}")
         holding = Holding()
         for _ in range(HOLDING_LOOKS):
             holding.look(server)
