@@ -64,7 +64,7 @@ SYSTEM_NAMES = {
     "macos-x64": "macOS (Intel)",
 }
 PLUGIN_NOTE = "The first one takes a minute, later ones some seconds."
-RECIPE_NOTE = "Each file stores its settings: drop it on the window to restore its preset and pluck."
+RECIPE_NOTE = "Drop the file on the window to restore its instrument, or its preset and pluck."
 MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
 RESUMES = "A cancelled export keeps its samples, and continues from there the next time."
 
@@ -481,7 +481,7 @@ def _note_words(heard: HeardNote, alone: bool) -> str:
     if alone:
         return f"{heard.words}. The string alone"
     if note.struck is not None:
-        return f"Latest note: {note.struck.words}, held; body, room and macros as they are now"
+        return f"Latest note: {note.struck.words}, held, with the present settings"
     if note.through is None:
         return heard.words
     there = "body, room and level" if note.through.body.name or note.through.room.mix > 0 else "level"
