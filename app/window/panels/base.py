@@ -58,7 +58,12 @@ class Moment:
     def standing(self, choices: Choices) -> tuple[object, ...]:
         """What a picture of the take depends on: while it is equal and nothing plays, the picture is the same."""
         sounding = self.sounding
-        return sounding, sounding.progress if sounding is not None else (), self.position_s, choices
+        return sounding, sounding.progress if sounding is not None else (), self.position_s, self.playing, choices
+
+    def in_motion(self, choices: Choices) -> bool:
+        """Whether a picture shows the motion, not the state of rest: in Play as long as the playhead moves."""
+        parked = self.position_s > 0 and choices.face != "play"
+        return choices.motion and (self.playing or parked)
 
 
 class Panel(QWidget):

@@ -98,8 +98,7 @@ class DrumPanel(Panel):
         if not moment.playing and standing == self._standing:
             return
         self._standing = standing
-        seen = blow is not None and choices.motion and (moment.playing or moment.position_s > 0)
-        if blow is None or not seen or not self._looks_like(blow):
+        if blow is None or not moment.in_motion(choices) or not self._looks_like(blow):
             self.view.show_frame(None)
             return
         position_s = min(moment.position_s, blow.ready_s)  # the sound may be ahead of the motions: all at one time

@@ -101,7 +101,7 @@ class StringPanel(Panel):
         if not moment.playing and standing == self._standing:
             return
         self._standing = standing
-        if not choices.motion or take is None or not (moment.playing or position_s > 0):
+        if take is None or not moment.in_motion(choices):
             self.view.show_frame(None)
             self._shown = ()
             return

@@ -250,6 +250,7 @@ def test_another_listening_point_and_speed_are_of_the_same_take(
     """Nothing that is seen of it is rendered again; signals and slow motion follow."""
     session, take = window.session, performance.take
     assert take is not None
+    session.update(face="lab")
     pictures = take.motion_m("truth").copy()
     for choices in ({"listen": 0.8}, {"pickup": "velocity", "stereo": True}, {"solo": 2}, {"speed": 0.1}):
         session.update(**choices)
@@ -266,6 +267,8 @@ def test_another_listening_point_and_speed_are_of_the_same_take(
     other_m = take.motions["model"].shape_m(0.3)
     assert abs(other_m - shape_m).max() > 1e-5
     qtbot.waitUntil(lambda: abs(string._frame.shapes["model"] / 1000 - other_m).max() < 1e-9)
+    session.update(face="play")  # where the string is at rest unless it moves
+    qtbot.waitUntil(lambda: string._frame is None)
     assert performance.take is take
     assert (take.motion_m("truth") == pictures).all()
 
