@@ -52,6 +52,7 @@ def app(
         **(more or {}),
     }
     environment.pop("WAYLAND_DISPLAY", None)
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # as at a user's second start
     command = [sys.executable, "-m", "app.commands.cli"]
     with (folder / "app.log").open("wb") as log, child(command, environment, stdout=log, stderr=log) as process:
         yield process
