@@ -26,6 +26,7 @@ import shutil
 import subprocess
 import sys
 import threading
+import time
 from pathlib import Path
 
 # Before any annotation, and in words that Python 3.6 can read, so that an old Python gets as far as this.
@@ -90,6 +91,7 @@ OTHER_INSTALLERS = {
 NVIDIA = Path("/proc/driver/nvidia")
 CPU_BUILDS = "https://download.pytorch.org/whl/cpu"
 ANSWER_S = 3.0
+TICK_S = 20.0  # between two signs of life of a step
 # Whether system packages can be installed here without asking anyone: Debian or its kin, as root.
 APT = sys.platform == "linux" and shutil.which("apt-get") is not None and os.geteuid() == 0
 
@@ -214,7 +216,7 @@ def compile_kernels() -> None:
     """Compile what makes the sound; the window would else have its user wait for it."""
     if compiled():  # by a set-up that this one waited for
         return
-    say("compiling the sound engine: a minute, once for each version of it")
+    say("compiling the sound engine, once for each version of it: one to five minutes")
     trouble = "the sound engine was not compiled, for the reason above; remedy: delete .venv, then try again"
     run_step([PYTHON, "-m", "engine.kernels.warm"], trouble)
     COMPILED.write_text(kernels(), "utf-8")
@@ -372,7 +374,7 @@ def torch_source() -> list[str]:
     if reachable(CPU_BUILDS + "/torch/"):
         say("no NVIDIA card: taking PyTorch's build without CUDA")
         return ["--extra-index-url", CPU_BUILDS]
-    say("no NVIDIA card, but PyTorch's builds without CUDA cannot be reached: the usual one may bring gigabytes")
+    say("no NVIDIA card, and PyTorch's build without CUDA is out of reach: going on with the large one, up to 3 GB")
     return []
 
 
@@ -398,7 +400,7 @@ def run_step(command: list, trouble: str, **options) -> None:
     shown = ("Collecting", "Installing", "Setting up")
     tail = collections.deque(maxlen=15)
     options |= {"stdin": subprocess.DEVNULL, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-    with subprocess.Popen(command, cwd=ROOT, encoding="utf-8", errors="replace", **options) as process:
+    with ticking(), subprocess.Popen(command, cwd=ROOT, encoding="utf-8", errors="replace", **options) as process:
         for line in process.stdout:
             tail.append(line.rstrip())
             if line.strip().startswith(shown):
@@ -406,6 +408,24 @@ def run_step(command: list, trouble: str, **options) -> None:
     if process.returncode:
         print(*tail, sep="\n", file=sys.stderr)
         raise SetupError(trouble)
+
+
+@contextlib.contextmanager
+def ticking():
+    """Say now and then how long the step has taken, so that a quiet one does not look dead."""
+    begun, over = time.monotonic(), threading.Event()
+
+    def tick() -> None:
+        while not over.wait(TICK_S):
+            say(f"  ... {time.monotonic() - begun:.0f} s")
+
+    thread = threading.Thread(target=tick, daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
 
 
 def system_packages(action: str) -> list[str]:

@@ -299,7 +299,7 @@ def test_builds_out_of_reach_cost_little_time_and_that_is_said(cardless, fault, 
         began_s = time.monotonic()
         assert cardless.torch_source() == []
         assert time.monotonic() - began_s < 2
-    assert "cannot be reached" in capsys.readouterr().err
+    assert "out of reach" in capsys.readouterr().err
 
 
 def test_a_new_environment_keeps_nothing_but_the_lock(run, monkeypatch):

@@ -33,7 +33,7 @@ class ExportChoices(BaseModel):
     decay_db: float = 60.0
     longest_s: float = 30.0
     seconds: float = 4.0
-    normalise: bool = False
+    normalise: bool = True
     difference_gain_db: float = 20.0
     alone: bool = False
 

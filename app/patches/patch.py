@@ -210,7 +210,7 @@ class Losses(Value):
 
     Attributes:
         air: factor of the losses to the air; the decay knob multiplies it.
-        friction, bending: loss factors inside the string; the knob HF damping multiplies them.
+        friction, bending: loss factors inside the string; the knob HF loss multiplies them.
     """
 
     air: Annotated[float, ranged(*bounds.LOSSES["air"])] = 1.0

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
 
 # of the device's buffer, which is nearly all that sound waits for
 LATENCY_S: dict[Buffer, float] = {"low": 0.006, "medium": 0.012, "high": 0.04}
+FREQUENT, FREQUENT_WITHIN_S = 3, 10.0  # gaps that are worth a word
+FREQUENT_GAPS = (
+    "The sound has gaps. A longer buffer prevents them: Audio …, or Ctrl+comma. So does closing other programs."
+)
 LIST_EVERY = 5  # calls of `show` between two looks at the list of devices
 
 
@@ -43,6 +47,7 @@ class AudioControl(QObject):
         self._last_known: Gap | None = None  # the user's zero: gaps up to this one are not counted
         self._listed: list[DeviceChoice] | None = None
         self._moments = 0
+        self._advised = False  # of frequent gaps, with this buffer
         self._dialog: AudioDialog | None = None
 
     def open(self, rescan: bool = False) -> None:
@@ -78,6 +83,7 @@ class AudioControl(QObject):
             if status.changes_done == self._changes and status.device is not None:
                 self.device, self.sound = self._wish
         self._latencies_s = notes.latencies_s
+        self._watch_gaps(status)
         if take is not None:
             self._show_badge(status, take.info.rate_hz)
         if self._dialog is not None and self._dialog.isVisible():
@@ -85,6 +91,14 @@ class AudioControl(QObject):
             self._dialog.show_state(self._state(status))
             if self._moments % LIST_EVERY == 0 and self._listed is not None:
                 self._list_devices()
+
+    def _watch_gaps(self, status: SoundStatus) -> None:
+        """Names the remedy once for a buffer, when gaps have come close together."""
+        if not self._advised and len(status.gaps) >= FREQUENT:
+            last = status.gaps[-FREQUENT:]
+            if last[-1].time_s - last[0].time_s < FREQUENT_WITHIN_S:
+                self._advised = True
+                self._window.notices.inform(FREQUENT_GAPS)
 
     def show_dialog(self) -> None:
         if self._dialog is None:
@@ -102,6 +116,7 @@ class AudioControl(QObject):
 
     def _choose(self, device: DeviceChoice | None, sound: SoundChoice) -> None:
         self._wish = (device, sound)
+        self._advised = False
         self.open()
 
     def _reset_gaps(self) -> None:

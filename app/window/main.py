@@ -180,6 +180,7 @@ def run(
     application.setApplicationName("Learned Strings")
     apply_theme(application, settings.look.theme, settings.look.size_percent)
     window = MainWindow()
+    window.show_face(settings.choices.face)
     window.restore_geometry(settings.window_geometry)
     faults = Faults(window)
     start = _Start(window, settings, path, notice, alive, faults, files)

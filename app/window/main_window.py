@@ -53,7 +53,7 @@ from engine.kernels import cache  # and not the compiler
 from engine.plain_text import one_line
 
 FAILED = "The models cannot be loaded."
-LOADING, COMPILING = "Loading the models …", "Preparing the sound engine (once; about a minute) …"
+LOADING, COMPILING = "Loading the models …", "Preparing the sound engine, once: one to five minutes …"
 WIDE, HIGH = (
     1100,
     560,
@@ -133,7 +133,7 @@ class MainWindow(QMainWindow):
         self._keys_button.toggled.connect(self.show_keys)
         self.faces = Segments("Face", TITLES)
         self.faces.chosen.connect(self.face_asked)
-        self.growth_sign = Label("ⓘ")
+        self.growth_sign = Label("i")
         self.growth_sign.setObjectName("badge")
         self.growth_sign.setAccessibleName("Error of the model")
         self.outside_label = words_label()

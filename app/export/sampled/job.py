@@ -56,7 +56,7 @@ class SampledReport:
 
 def plain_stem(text: str) -> str:
     """`text` with ASCII letters, digits and `_.+-` alone, which every SFZ player accepts on every system."""
-    return re.sub(r"[^A-Za-z0-9_.+-]", "_", text[:LONGEST_STEM]).strip("._-") or "patch"
+    return re.sub(r"[^A-Za-z0-9_.+-]+", "_", text[:LONGEST_STEM]).strip("._-") or "patch"
 
 
 def sample_folder(out: Path) -> Path:

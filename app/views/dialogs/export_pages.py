@@ -63,7 +63,7 @@ SYSTEM_NAMES = {
     "macos-arm64": "macOS",
     "macos-x64": "macOS (Intel)",
 }
-PLUGIN_NOTE = "The first one takes a minute, later ones some seconds."
+PLUGIN_NOTE = "The first one takes one to three minutes, later ones some seconds."
 RECIPE_NOTE = "Drop the file on the window to restore its instrument, or its preset and pluck."
 MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
 RESUMES = "A cancelled export keeps its samples, and continues from there the next time."
@@ -98,8 +98,11 @@ class WavForm(QWidget):
         self.note = faint()
         self.bits = combo_box("Format", [(name, bits) for bits, name in BITS_NAMES.items()], export.bits)
         self.bits.setToolTip("16 bits are dithered; floating point never clips")
-        tip = "Off: as loud as it is played at 0 dB; of a string alone, 10 mm are full scale"
-        self.normalise = check_box("Normalise to −1 dBFS, one gain for model and truth", export.normalise, tip)
+        tip = (
+            "One gain for model and truth. Off: as loud as at a volume of 0 dB; "
+            "of a string alone, 10 mm are full scale"
+        )
+        self.normalise = check_box("Normalise to −1 dBFS", export.normalise, tip)
         rows: Rows = {
             "Sample rate": row_of(self.rate, self.note),
             "Format": row_of(self.bits),

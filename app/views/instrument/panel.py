@@ -100,6 +100,7 @@ class InstrumentPanel(QFrame):
         self._build_plays()
         self._low = False
         self._stack = QStackedWidget()
+        self._hinted = False
         self._hint = Label(HINTS["keys"], self._stack)
         self._hint.setObjectName("hint")
         self._hint.setAttribute(Qt.WidgetAttribute.WA_TransparentForMouseEvents)
@@ -257,6 +258,12 @@ class InstrumentPanel(QFrame):
 
     def hide_hint(self) -> None:
         self._hint.hide()
+        self._hinted = True
+
+    def changeEvent(self, event: QEvent) -> None:
+        super().changeEvent(event)
+        if event.type() == QEvent.Type.EnabledChange:
+            self._hint.setVisible(self.isEnabled() and not self._hinted)
 
     def release_all(self) -> None:
         """Releases all keys that are down."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -14,7 +15,7 @@ from app.audio.devices import AudioDevice
 from app.audio.problems import AudioProblem, ProblemKind, stalled
 from app.audio.sound import SoundStatus
 from app.window import audio_control
-from app.window.audio_control import AudioControl
+from app.window.audio_control import FREQUENT_GAPS, AudioControl
 from app.window.main_window import MainWindow
 from engine.voices import Gap
 
@@ -128,6 +129,20 @@ def test_gaps_count_from_the_reset(control: AudioControl, output: FakeSound) -> 
     assert counter.text() == "1, the last at 7.2 s: rendering"
     show(control, SoundStatus(device=SPEAKERS, gaps=(late,)))
     assert counter.text() == "1, the last at 7.2 s: rendering"
+
+
+def test_frequent_gaps_are_reported_once_for_a_buffer(control: AudioControl) -> None:
+    close = tuple(Gap(time_s, "the sound device was late", 5.0) for time_s in (20.0, 21.0, 22.0))
+    apart = tuple(replace(gap, time_s=20 * gap.time_s) for gap in close)
+    for gaps, reported in ((close[:2], False), (apart, False), (close, True)):
+        show(control, SoundStatus(device=SPEAKERS, gaps=gaps))
+        assert (control._window.notices.text == FREQUENT_GAPS) == reported
+    control._window.notices.withdraw(FREQUENT_GAPS)
+    show(control, SoundStatus(device=SPEAKERS, gaps=close))
+    assert control._window.notices.isHidden()
+    control._choose(None, SoundChoice(buffer="high"))
+    show(control, SoundStatus(device=SPEAKERS, gaps=close))
+    assert not control._window.notices.isHidden()
 
 
 def test_the_latency_that_was_measured_is_reported(control: AudioControl) -> None:

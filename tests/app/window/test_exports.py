@@ -28,7 +28,7 @@ LEFT = Qt.MouseButton.LeftButton
 @pytest.fixture
 def short(controller: Controller, tmp_path: Path) -> Controller:
     """With a dialog that was last set to a short sound."""
-    chosen = ExportChoices(folder=str(tmp_path), until_decayed=False, seconds=0.3)
+    chosen = ExportChoices(folder=str(tmp_path), until_decayed=False, seconds=0.3, normalise=False)
     controller.exports._choices = chosen, controller.exports.choices[1]
     return controller
 

@@ -197,5 +197,5 @@ def test_no_name_becomes_a_path_or_an_opcode(name: str, patch: Patch, render: Re
 
 
 def test_a_folder_name_has_no_sign_that_sfz_reads() -> None:
-    assert plain_stem("a b=c$d<e>//f;g") == "a_b_c_d_e___f_g"
+    assert plain_stem("a b=c$d<e>//f;g") == "a_b_c_d_e_f_g"
     assert sample_folder(Path("x") / "My song.v2.sfz") == Path("x") / "My_song.v2_samples"

@@ -70,7 +70,7 @@ def test_the_tip_of_a_macro_says_in_words_what_it_changes(bar: PatchBar, guitar:
         bar.show_patch(guitar.model_copy(update={"macros": (macro,)}), own=True)
         return bar.macros[0].toolTip().splitlines()[0]
 
-    assert tip("pluck.position", "knobs.brightness_decay") == "Tone: changes pluck position, HF damping"
+    assert tip("pluck.position", "knobs.brightness_decay") == "Tone: changes pluck position, HF loss"
     assert tip("pickup.points.0") == "Tone: changes listening point"  # of the same name, with other targets
 
 
