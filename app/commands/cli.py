@@ -17,9 +17,7 @@ from typing import Annotated
 import typer
 
 from app.commands import (
-    batch,
     drums,
-    faust,
     info,
     learn,
     listing,
@@ -73,14 +71,10 @@ for command in (
     listing.presets,
     listing.models,
     listing.instruments,
-    motion.simulate,
-    motion.predict,
     render.render,
     learn.learn,
     play.play,
-    batch.batch,
     sampled.sampled,
-    faust.faust,
     plugin.plugin,
     info.info,
     motion.compare,

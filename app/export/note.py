@@ -146,7 +146,7 @@ class NoteExport:
             None if choices.alone else note.through,
             struck,
         )
-        return export_sounds(request, self.paths, choices.wav, progress=progress)[0]
+        return export_sounds(request, self.paths, choices.wav, progress=progress)
 
     def cancelled(self) -> str:
         return "no file was written."

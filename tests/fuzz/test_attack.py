@@ -19,7 +19,6 @@ import torch
 
 from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
-from app.commands.arrays import read_displacements
 from app.export.recipe import InstrumentSound, Recipe, RecipeError, read_recipe, request_of
 from app.export.sampled.store import SampleIndex, StoredSample, read_index
 from app.export.sound import SoundRequest
@@ -52,7 +51,6 @@ from engine.voices import Ear, model_program, render_voice, truth_program
 from tests.fuzz.costs import MOST_MB, Costs
 from tests.fuzz.mutations import HOSTILE, attacked, damaged_bytes, damaged_preset, damaged_text, damaged_value
 from training.cell import load
-from training.cli.console import Failure
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import COLUMNS, read_heard
 from training.results import Row, add_rows, read_results
@@ -339,7 +337,6 @@ TARGETS = (
     ),
     Target("rows.csv", row_file, read_results, (SchemaError,)),
     Target("heard.csv", lambda p: HEARD, heard, ()),
-    Target("u0.npy", lambda p: saved(np.zeros((2, 101))), read_displacements, (Failure,)),
     Target("checkpoint.safetensors", checkpoint, Checkpoint.load, (ValueError,)),
     Target("patch.json", lambda p: PATCH.read_bytes(), read_patch, (PatchError,), json_or_bytes),
     Target("index.json", sample_index, read_index, (WriteError,), json_or_bytes),

@@ -54,7 +54,7 @@ rates_hz = [4000]
 horizons = [60]
 """
 MANY = 100  # times that a small file is saved
-WORKS = ("render", "batch", "dataset", "train", "train_lru", "sweep", "save_patches", "save_many_settings")
+WORKS = ("render", "dataset", "train", "train_lru", "sweep", "save_patches", "save_many_settings")
 # of two runs, however equal; a developer may commit meanwhile
 UNLIKE = ("seconds", "training_seconds", "finished", "commit")
 
@@ -75,11 +75,6 @@ def render(folder: Path) -> None:
             ]
         )
     )
-
-
-def batch(folder: Path) -> None:
-    words = ["--positions", "0.3,0.45", "--amplitudes", "1,2", "--seconds", "0.5", "--sources", "model,truth"]
-    _done(main(["batch", "--presets", str(PRESET), *words, "--out", str(folder / "out")]))
 
 
 def dataset(folder: Path) -> None:

@@ -225,7 +225,7 @@ def test_both_sources_lie_side_by_side_or_in_two_files_of_one_gain(request_: Sou
     model, truth = (render_sound(replace(request_, source=s)) for s in ("model", "truth"))  # type: ignore[arg-type]
     assert (render_sound(replace(request_, source="both")) == np.stack([model, truth], axis=1)).all()
     paths = {"model": tmp_path / "m.wav", "truth": tmp_path / "t.wav", "difference": tmp_path / "d.wav"}
-    reports, _ = export_sounds(request_, paths, WavSettings("32f", normalise=True, fade_out_s=0))  # type: ignore[arg-type]
+    reports = export_sounds(request_, paths, WavSettings("32f", normalise=True, fade_out_s=0))  # type: ignore[arg-type]
     assert [report.path for report in reports] == list(paths.values())
     assert len({report.gain_db for report in reports}) == 1
     m, t, d = (soundfile.read(path)[0] for path in paths.values())
