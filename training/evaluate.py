@@ -77,13 +77,11 @@ class MotionErrors:
         string: over the whole string, as in the tables.
         sound: at the listening point; its `null_depth_db` is what subtraction leaves of the sound.
         spectra: of the sound, one for each window that was asked for.
-        sounds: of the last trajectories, the model's and the true one from frame 0 on, (2, trajectories, frames).
     """
 
     string: ErrorSums
     sound: ErrorSums
     spectra: list[SpectralDistance]
-    sounds: Tensor
 
 
 @dataclass(frozen=True)
@@ -146,7 +144,7 @@ def evaluate_past_horizon(
                 report((part + first / steps) / len(parts))
             distances.append([spectral_distances(*sounds[..., 1:][..., span]) for span in spans])
     spectra = [_mean_distance(of_window) for of_window in zip(*distances, strict=True)]
-    return MotionErrors(string, sound, spectra, sounds)
+    return MotionErrors(string, sound, spectra)
 
 
 @torch.inference_mode()

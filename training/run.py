@@ -67,19 +67,14 @@ def _trained(
             log.add(progress)
         report(progress)
 
-    try:
-        result = fit(
-            configuration,
-            dataset,
-            run_folder,
-            device=device,
-            report=log_and_report,
-            checkpoint_every_s=checkpoint_every_s,
-        )
-    except Diverged:
-        _plot(log.path)
-        raise
-    _plot(log.path)
+    result = fit(
+        configuration,
+        dataset,
+        run_folder,
+        device=device,
+        report=log_and_report,
+        checkpoint_every_s=checkpoint_every_s,
+    )
     model = result.model.cpu()
     sums = {"validation": result.validation, "test": evaluate_model(model, dataset, "test", configuration.steps)}
     figures = row_errors(model, dataset, sums, configuration.steps)
@@ -257,12 +252,3 @@ def trained_range(data: DatasetConfiguration) -> TrainedRange:
     if data.initial == "noise":
         return TrainedRange(None, None, PEAK_RANGE_M, data.largest_tension_rise)
     return TrainedRange(CENTRE_RANGE, {"gaussian": WIDTH_RANGE}, PEAK_RANGE_M, data.largest_tension_rise)
-
-
-def _plot(log: Path) -> None:
-    """A picture of the run beside its log; none where it ended before its first epoch."""
-    if not log.exists():
-        return
-    from training.figures.run_plot import plot_run  # Matplotlib only where there is something to draw
-
-    plot_run(log, log.with_suffix(".png"))

@@ -106,7 +106,6 @@ def test_a_row_reports_what_its_preset_measures(tmp_path: Path) -> None:
         count_parameters(preset.model),
     )
     assert preset.info.horizon_steps == 420
-    assert (tmp_path / "runs" / CELL.name / "log.png").stat().st_size > 10_000
 
 
 def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from training.cli.arguments import Json, PresetName, check_range, open_preset
+from training.cli.arguments import Json, PresetName, open_preset
 from training.cli.console import Failure, Shares, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
@@ -15,22 +15,11 @@ if TYPE_CHECKING:
 
     from engine.presets import Preset
     from training.family.errors import FamilyErrors, StringError
-    from training.family.partials import StringPartials
     from training.family.strings import Column
 
 family = typer.Typer(help="Train and measure one model of many strings.", no_args_is_help=True)
 DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "processor s a second", "worst at")
 RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
-PARTIALS = {  # figures of `_partials_facts`
-    "quiet_first_cents": "quiet pluck, the first mode's pitch, cents",
-    "quiet_cents_largest": "quiet pluck, any partial, cents",
-    "level_db_mean": "level of the partials by energy, dB",
-    "level_db_largest": "level of any, dB",
-    "t60_percent_mean": "T60 by energy, %",
-    "t60_percent_largest": "T60 of any, %",
-    "glide_cents_mean": "glide by energy, cents",
-    "glide_cents_largest": "glide of any, cents",
-}
 Strings = Annotated[
     int, typer.Option(min=1, max=10_000, help="Held-out strings inside the family, and as many beyond.")
 ]
@@ -171,50 +160,6 @@ def evaluate(
 
 
 @family.command()
-def partials(
-    preset: PresetName,
-    strings: Strings = 200,
-    seconds: Annotated[float, typer.Option(help="How long after each pluck.")] = 0.5,
-    rate: Rate = 48_000,
-    seed: Seed = 0,
-    json: Json = False,
-) -> None:
-    """Pitch, level, decay and glide of partials on held-out strings.
-
-    Those of one string, mode by mode: `evaluate PRESET --string NAME --partials`.
-    """
-    import torch
-
-    from training.family.errors import player
-    from training.family.partials import QUIET_RISE, measure_partials
-    from training.family.strings import COLUMNS
-
-    check_range("--seconds", seconds, 0.25, 10, "s")  # thirds of it tell the glide of a low string
-    torch.set_num_threads(1)
-    loaded = _open_preset_of_many(preset)
-    play = player(loaded.model)
-    found: dict[str, dict[str, Any]] = {}
-    with progress("family partials") as report:
-        shares = Shares(report, len(COLUMNS))
-        for column in COLUMNS:
-            of_strings = measure_partials(
-                play, column, "test", strings, rate, seconds, seed=seed, report=shares.next()
-            )
-            found[column] = _partials_facts(of_strings)
-    if json:
-        facts = {"preset": loaded.name, "strings": strings, "seconds": seconds, "rate_hz": rate, "seed": seed}
-        print_json({**facts, "quiet_rise": QUIET_RISE, **found})
-        return
-    print(
-        f"{strings} strings a column, {seconds:g} s at {rate} Hz: errors of partials, of the middle string and of "
-        f"the worst; a quiet pluck raises the tension by {QUIET_RISE:g}, the other plucks are each string's own"
-    )
-    for column_name, figures in found.items():
-        rows = [[text, *figures[name].values()] for name, text in PARTIALS.items()]
-        print_table((column_name, "median", "worst", "worst at"), rows)
-
-
-@family.command()
 def shelf(preset: Annotated[str, typer.Argument(metavar="PRESET")] = "studio_any_string") -> None:
     """Write a preset of each shipped string with what PRESET learned."""
     from engine.presets import SHIPPED
@@ -315,22 +260,7 @@ def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) ->
     return {"strings": len(pairs), **facts_of(late), "over_first": late.geometric_mean / early.geometric_mean}
 
 
-def _partials_facts(strings: list[StringPartials]) -> dict[str, Any]:
-    """Of each figure the median over the strings and the worst; of a string's partials the mean or the largest."""
-    from training.family.partials import middle_and_worst
-
-    figures: dict[str, list[float]] = {"quiet_first_cents": [one.quiet_first_cents for one in strings]}
-    for name in ("quiet_cents", "level_db", "t60_percent", "glide_cents"):
-        for kind in ("mean", "largest"):
-            figures[f"{name}_{kind}"] = [getattr(getattr(one, name), kind) for one in strings]
-    facts = {}
-    for name, values in figures.items():
-        median, worst, place = middle_and_worst(values)
-        facts[name] = {"median": median, "worst": worst, "worst_at": "" if place is None else _place(strings[place])}
-    return facts
-
-
-def _place(string: StringError | StringPartials) -> str:
+def _place(string: StringError) -> str:
     return f"{string.pitch_hz:.0f} Hz, B {string.inharmonicity:.1e}, rise {string.tension_rise:.2f}"
 
 

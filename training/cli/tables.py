@@ -9,9 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from engine.plain_text import printable
-from engine.pluck import DEFAULT_LISTEN
 from engine.result_file import whole_file
-from training.cli.arguments import check_range, open_preset
 from training.cli.console import Failure, progress, say
 
 if TYPE_CHECKING:
@@ -25,7 +23,6 @@ Output = Annotated[
     Path | None, typer.Option(help="The file; its suffix gives the format. Default FIGURE.png in this folder.")
 ]
 MARKER = "<!-- tables -->"  # all that follows it in a document is made by `table --into`
-LISTEN_RANGE = (0.01, 0.99)
 
 
 def table(
@@ -74,40 +71,6 @@ def _before(document: Path) -> str:
     if not marker:
         raise Failure(f"{document}: has no line {MARKER}; put it where the tables are to begin")
     return f"{kept}{marker}\n"
-
-
-@figure.command()
-def extrapolation(
-    presets: Annotated[
-        list[str], typer.Argument(metavar="PRESET...", help="Names of presets or paths of their files.")
-    ],
-    seconds: Annotated[
-        float | None, typer.Option(metavar="S", help="Time shown, in s; default twice the training horizon.")
-    ] = None,
-    trajectory: Annotated[int, typer.Option(min=0, help="Number of the trajectory in the validation set.")] = 0,
-    trajectories: Annotated[
-        int, typer.Option(min=1, help="How many of the validation set the error is taken over, from the first on.")
-    ] = 10,
-    listen: Annotated[
-        float, typer.Option(metavar="X", help="Listening point, 0 … 1 of the length; 0.37 is the paper's 24 cm.")
-    ] = DEFAULT_LISTEN,
-    output: Output = None,
-) -> None:
-    """Figure 3 of the paper: past the training horizon.
-
-    Waveforms, spectra and errors, up to the horizon and past it.
-    """
-    from training.figures import extrapolation as drawing
-
-    check_range("--listen", listen, *LISTEN_RANGE)
-    if seconds is not None:
-        check_range("--seconds", seconds, 0, drawing.LONGEST_S, "s")
-    loaded = [open_preset(name) for name in presets]
-    _save(
-        output,
-        "extrapolation",
-        lambda report: drawing.extrapolation(loaded, seconds, trajectory, trajectories, listen, report),
-    )
 
 
 @figure.command()

@@ -6,24 +6,17 @@ No global state: figures are made and written within `styled`, and never known t
 from __future__ import annotations
 
 import io
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from engine.whole_file import whole_file
 
-TRUTH = "#222222"
-# Okabe and Ito's, without the yellow, which is faint on white
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-DASHES = ("-", "--", ":")
-MARKED = "#777777"  # what is said beside the data: horizons, circles
 DPI = 200
-LARGEST_ERROR = 100.0  # relative, that is drawn
 FORMATS = (".png", ".svg", ".pdf")
 
 STYLE: dict[Any, Any] = {
@@ -62,11 +55,6 @@ def styled() -> Iterator[None]:
         yield
 
 
-def colour(index: int) -> dict[str, Any]:
-    """Colour and dashes of the n-th model."""
-    return {"color": COLOURS[index % len(COLOURS)], "linestyle": DASHES[index // len(COLOURS) % len(DASHES)]}
-
-
 def check_format(path: Path) -> None:
     """Raises ValueError where a file's suffix is of no format that is written."""
     if path.suffix.lower() not in FORMATS:
@@ -93,28 +81,3 @@ def save_figure(figure: Figure, path: Path) -> None:
     check_format(path)
     with whole_file(path) as unfinished:
         unfinished.write_bytes(figure_bytes(figure, path.suffix))
-
-
-def scale_errors(axes: Axes) -> None:
-    """A logarithmic scale on which a model that runs away does not squeeze the others."""
-    axes.set_yscale("log")
-    lowest, highest = axes.get_ylim()
-    if highest > LARGEST_ERROR:
-        axes.set_ylim(min(lowest, LARGEST_ERROR / 10), LARGEST_ERROR)
-
-
-def add_legend(figure: Figure, axes: Iterable[Axes]) -> None:
-    """One legend below all, with what these axes name; nothing twice."""
-    named = {label: handle for one in axes for handle, label in zip(*one.get_legend_handles_labels(), strict=True)}
-    figure.legend(list(named.values()), list(named), loc="outside lower center", ncols=len(named))
-
-
-def mark_horizon(axes: Axes, horizon: float, words: str = "") -> None:
-    """A line at the end of training, and a shade over what is drawn past it. The axis has its limits already."""
-    first, last = axes.get_xlim()
-    if horizon < last:
-        axes.axvspan(max(first, horizon), last, color="#D55E00", alpha=0.07, linewidth=0, zorder=0)
-    if first < horizon <= last:
-        axes.axvline(horizon, color=MARKED, linewidth=1.2, linestyle="--", zorder=1)
-        place = ((horizon, 1), (4, -4), ("data", "axes fraction"))
-        axes.annotate(words, *place, textcoords="offset points", va="top", fontsize=9, color=MARKED)
