@@ -16,7 +16,6 @@ import pytest
 from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.export.recipe import RecipeError, read_recipe
-from app.export.sampled.store import read_index
 from app.instrument.midi_file import MOST_EVENTS, MidiFileError, read_midi
 from app.patches.library import PatchError, read_patch
 from app.patches.tuning import Tuning, TuningChoice, read_scala
@@ -180,7 +179,6 @@ PIPES: dict[str, tuple[Callable[[Path], object], type[Exception] | tuple[type[Ex
     "c.safetensors": (Checkpoint.load, ValueError),
     "abx_1.json": (load_record, SchemaError),
     "patch.json": (read_patch, PatchError),
-    "index.json": (read_index, Exception),
     "a.scl": (read_scala, ValueError),
     "any": (lambda path: read_bounded(path, 10), UnusableFile),
 }

@@ -16,6 +16,8 @@ from matplotlib.figure import Figure
 
 from engine.whole_file import whole_file
 
+# Okabe and Ito's, without the yellow, which is faint on white
+COLOURS = ("#0072B2", "#D55E00")
 DPI = 200
 FORMATS = (".png", ".svg", ".pdf")
 
