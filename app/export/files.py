@@ -28,7 +28,6 @@ from app.shared.worker import Progress
 from engine.pluck import Pluck
 from engine.result_file import WriteError, explain, whole_file
 
-END_OF_TRAINING = "end of training"  # the name of the marker at the training horizon
 LONGEST_NAME = 150  # characters of a preset's name in a file's name
 DECAY_FADE_S = 0.05  # the fade-out where a sound ends by its decay
 
@@ -122,11 +121,10 @@ def export_sounds(
         for source, file in opened.items():
             path, sound = paths[source], sounds[source]
             with _explained(path):
-                labels = {} if source == "truth" else {END_OF_TRAINING: info.horizon_s}
                 tags = _tags(info.title, recipes[source])
-                level = write_wav(file, sound, rate_hz, settings, tags, beside, labels)
+                level = write_wav(file, sound, rate_hz, settings, tags, beside)
             report = _report(path, file, len(sound), rate_hz, level)
-            past_s = max(0.0, report.seconds - info.horizon_s) if labels else 0.0
+            past_s = 0.0 if source == "truth" else max(0.0, report.seconds - info.horizon_s)
             reports.append(replace(report, past_training_s=past_s, decayed=voices.ended))
     return reports
 

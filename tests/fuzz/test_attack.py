@@ -17,7 +17,6 @@ import pytest
 import soundfile
 import torch
 
-from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.export.recipe import InstrumentSound, Recipe, RecipeError, read_recipe, request_of
 from app.export.sound import SoundRequest
@@ -338,7 +337,6 @@ TARGETS = (
     Target("float.wav", lambda p: impulse(p, "WAV", "FLOAT"), sounded, (ImpulseError,)),
     Target("pcm.wav", lambda p: impulse(p, "WAV", "PCM_16"), sounded, (ImpulseError,)),
     Target("body.flac", lambda p: impulse(p, "FLAC", "PCM_24"), sounded, (ImpulseError,)),
-    Target("record.json", lambda p: b'{"trials": [], "version": 1}', load_record, (SchemaError,), json_or_bytes),
 )
 
 

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
 from app.export.recipe import RecipeError, read_recipe
 from app.instrument.midi_file import MOST_EVENTS, MidiFileError, read_midi
@@ -137,12 +136,6 @@ def test_settings_with_some_faults_keep_the_rest(tmp_path: Path) -> None:
     cheap(attempt)
 
 
-def test_a_record_with_very_many_faults(tmp_path: Path) -> None:
-    path = tmp_path / "abx_1.json"
-    path.write_text(many("trials", 1))
-    refused(load_record, path, SchemaError)
-
-
 @pytest.mark.parametrize("text", ["\n" * 2**21, ",\n" * 2**20, "digest\n" + "a\n" * 2**20])
 def test_tables_of_nothing(text: str, tmp_path: Path) -> None:
     path = tmp_path / "rows.csv"
@@ -177,7 +170,6 @@ PIPES: dict[str, tuple[Callable[[Path], object], type[Exception] | tuple[type[Ex
     "run.toml": (lambda path: load(str(path)), SchemaError),
     "rows.csv": (read_results, SchemaError),
     "c.safetensors": (Checkpoint.load, ValueError),
-    "abx_1.json": (load_record, SchemaError),
     "patch.json": (read_patch, PatchError),
     "a.scl": (read_scala, ValueError),
     "any": (lambda path: read_bounded(path, 10), UnusableFile),
