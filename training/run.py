@@ -32,7 +32,6 @@ from training.data.draws import (
 from training.evaluate import evaluate_model
 from training.fitting.fit import Diverged, FitResult, Progress, fit
 from training.fitting.log import TrainingLog
-from training.migration import carried_over
 from training.results import QUARTERS, Row
 from training.row_errors import REPEATED, configuration_of, row_errors
 from training.start import knowledge_of
@@ -118,7 +117,7 @@ def run_row(
     with _held(folder / "run.lock", waits):
         file = folder / "row.json"
         output = preset or folder / f"{name}.safetensors"
-        known = carried_over(_read_row(file), configuration) if file.exists() else None
+        known = _read_row(file) if file.exists() else None
         if known is not None and known.digest != configuration.digest:
             known = None
         if known is not None and _made_by(configuration, output):

@@ -126,7 +126,7 @@ def compare(
     preset: PresetOption = None,
     json: Json = False,
 ) -> None:
-    """Compare model, backward error analysis and linear drum with the truth, over the whole surface.
+    """Compare model, series and linear drum with the truth, over the surface.
 
     Prints relative errors in total and by second.
     """
