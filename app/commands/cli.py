@@ -85,7 +85,6 @@ for command in (
     tables.table,
 ):
     cli.command()(command)
-cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
 cli.add_typer(family.family, name="family")
 cli.add_typer(drums.drums, name="drums")

@@ -55,7 +55,7 @@ def modes(
     count: Annotated[int, typer.Option(min=1, max=1_600, help="So many modes, the lowest.")] = 12,
     json: Json = False,
 ) -> None:
-    """Print frequencies and decays of a drum's modes, with air, and its pitch drop."""
+    """Print frequencies and decays of a drum's modes. Air counts, and the drop of pitch is added."""
     patch, struck = _drum_of(drum, key)
     found = struck.modes
     drops = {str(velocity): struck.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)}
@@ -126,9 +126,10 @@ def compare(
     preset: PresetOption = None,
     json: Json = False,
 ) -> None:
-    """Compare model, series and linear drum with the truth, over the surface.
+    """Compare a drum's models with the truth.
 
-    Prints relative errors in total and by second.
+    Prints relative errors over the whole surface, in total and by second: of the model, of a series of backward
+    error analysis, and of the linear drum.
     """
     arguments.check_range("--seconds", seconds, 0.01, LONGEST_S, "s")
     blow = _blow_of(drum, key, velocity, place, preset)

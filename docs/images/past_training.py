@@ -8,13 +8,13 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import style
 import torch
 from matplotlib.figure import Figure
 
 from engine.presets import find_preset, load_preset
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_past_horizon
-from training.figures import style
 from training.row_errors import data_of
 
 HERE = Path(__file__).resolve().parent
@@ -26,7 +26,6 @@ MODELS = {
     "koopman": "Koopman",
     "lru": "LRU",
 }
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")  # Okabe and Ito's
 SECONDS, TRAJECTORIES, SMOOTHED_S = 1.0, 10, 0.01
 
 
@@ -43,8 +42,10 @@ def main() -> None:
             )
             mse, _ = found.string.per_frame()
             time_s = np.arange(1, len(mse) + 1) / data.rate_hz
-            axes.plot(time_s, mse, linewidth=0.5, alpha=0.25, color=COLOURS[place])
-            axes.plot(time_s, smoothed(mse, round(SMOOTHED_S * data.rate_hz)), label=label, color=COLOURS[place])
+            axes.plot(time_s, mse, linewidth=0.5, alpha=0.25, color=style.COLOURS[place])
+            axes.plot(
+                time_s, smoothed(mse, round(SMOOTHED_S * data.rate_hz)), label=label, color=style.COLOURS[place]
+            )
         axes.set_yscale("log")
         axes.set_ylim(top=min(axes.get_ylim()[1], 100.0))  # a model that runs away must not squeeze the others
         axes.set_xlim(0, SECONDS)

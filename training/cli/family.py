@@ -75,13 +75,6 @@ def evaluate(
     runs: Annotated[
         Path | None, typer.Option(help="Folder of the errors on drums: a stopped measurement continues there.")
     ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Draw the distribution of errors by rise of tension: .png, .svg, .pdf.",
-        ),
-    ] = None,
     drums: Annotated[
         int,
         typer.Option(
@@ -108,10 +101,6 @@ def evaluate(
         return
     if tenth > strings:
         raise typer.BadParameter(f"is {tenth} of {strings} strings; give at most as many", param_hint="--tenth")
-    if picture is not None:
-        from training.figures.style import check_format
-
-        check_format(picture)
     loaded = _open_preset_of_many(preset)
     players: dict[str, Player] = {loaded.name: player(loaded.model)}
     if baselines:
@@ -133,12 +122,6 @@ def evaluate(
                 span_s, reported = (9.0, 10.0), shares.next()
                 last = measure(alone, column, "test", tenth, rate, span_s, seed=seed, report=reported)[loaded.name]
                 facts["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
-    if picture is not None:
-        from training.figures.family_errors import family_errors
-        from training.figures.style import save_figure
-
-        columns: dict[str, Sequence[StringError]] = {c: errors[loaded.name].strings for c, errors in measured.items()}
-        save_figure(family_errors(columns, loaded.name), picture)
     if json:
         print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **found})
         return

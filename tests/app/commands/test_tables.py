@@ -84,17 +84,3 @@ def test_a_list_of_commands_cuts_no_summary(run, group: str, monkeypatch: pytest
     listed = run(group, "--help").out.partition("Commands:")[2].strip().splitlines()
     assert len(listed) >= 2
     assert all(line.endswith(".") and not line.endswith("...") for line in listed)
-
-
-def test_the_map_of_ratios_is_drawn_from_the_rows(run, results: Path, folder: Path) -> None:
-    nonlinear = Cell("s5", True, "noise", 4000, recipe="paper")
-    facts: dict[str, Any] = {"model": "s5", "string": "nonlinear", "initial": "noise", "rate_hz": 4000}
-    figures: dict[str, Any] = {"horizon": 4000, "recipe": "paper", "seed": 0, "initialisation": "paper"}
-    digest = configuration_of(nonlinear).digest
-    add_rows(results, [Row(digest, nonlinear.name, "done", **facts, **figures, rel_mse=0.001, rel_mae=0.01)])
-    path = folder / "ratios.svg"
-    assert run("figure", "ratios", "--results", results, "--output", path).out == f"{path}\n"
-    drawn = path.read_text(encoding="utf-8")
-    assert drawn.count(">0.052<") == 1  # 0.01 over the paper's 0.1916
-    assert drawn.count(">–<") == 6 * 8 - 1
-    assert "suffixes" in run("figure", "ratios", "--results", results, "--output", folder / "a.bmp").usage

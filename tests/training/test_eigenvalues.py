@@ -1,21 +1,16 @@
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import torch
-from matplotlib.figure import Figure
-from matplotlib.image import imread
 
 from engine.models import build_model
 from engine.models.base import Physics
 from engine.presets import Preset, PresetInfo, TrainedRange
 from engine.schema import write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
-from training.figures import style
 
 HORIZON = 40
 SIZES: dict[str, dict[str, Any]] = {
@@ -68,35 +63,3 @@ def test_every_model_with_linear_dynamics_has_eigenvalues(model: str, layers: in
     linear = torch.from_numpy(one.info.string.resonator(5).eigenvalues() / 4000)
     nearest = (found[0].exp()[:, None] - linear.exp()).abs().amin(0)
     assert float(nearest.max()) < 1e-5  # all of them started from the string's
-
-
-# ---- files ----
-
-
-def small() -> Figure:
-    figure = Figure(figsize=(3, 2))
-    figure.add_subplot().plot([1, 2], [3, 4])
-    return figure
-
-
-@pytest.mark.parametrize(("suffix", "start"), [(".png", b"\x89PNG"), (".svg", b"<?xml"), (".PDF", b"%PDF")])
-def test_files_are_of_their_format_and_repeat(tmp_path: Path, suffix: str, start: bytes) -> None:
-    path = tmp_path / f"figure{suffix}"
-    style.save_figure(small(), path)
-    assert path.read_bytes().startswith(start)
-    assert list(tmp_path.iterdir()) == [path]
-    assert style.figure_bytes(small(), suffix) == path.read_bytes()
-
-
-def test_a_picture_has_the_size_of_its_figure() -> None:
-    figure = small()
-    width, height = figure.get_size_inches()
-    found = imread(io.BytesIO(style.figure_bytes(figure, ".png")))
-    assert found.shape[:2] == (round(height * style.DPI), round(width * style.DPI))
-    assert len(np.unique(found)) > 10
-
-
-def test_an_unknown_format_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"is written as \.png, \.svg, \.pdf"):
-        style.save_figure(Figure(), tmp_path / "figure.bmp")
-    assert not list(tmp_path.iterdir())
