@@ -78,7 +78,6 @@ for command in (
     plugin.plugin,
     info.info,
     motion.compare,
-    training.dataset,
     training.train,
     sweep.sweep,
     evaluation.evaluate,

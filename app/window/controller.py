@@ -348,7 +348,7 @@ class Controller(QObject):
     def take_file(self, file: Path) -> None:
         """Takes a dropped file: installs and chooses a preset, restores a WAV's recipe; asks what other sounds are.
 
-        Patches, strings, scales and MIDI files go to `patches`.
+        Patches, scales and MIDI files go to `patches`.
         """
         if file.suffix.lower() in TAKEN_FILES:
             self.patches.take_file(file)

@@ -22,6 +22,7 @@ from app.window.settings import Settings, save_settings
 from engine.kernels import warm
 from engine.presets import SHIPPED, load_preset
 from training.cell import load
+from training.data.dataset import load_dataset
 from training.results import read_results
 from training.run import run_row
 
@@ -79,7 +80,7 @@ def render(folder: Path) -> None:
 
 def dataset(folder: Path) -> None:
     configuration = _configuration(folder, "koopman_var", "{ state_size = 8, multiplier_widths = [4] }", 400)
-    _done(main(["dataset", str(configuration), "--cache", str(folder / "cache")]))
+    load_dataset(load(str(configuration)).data, folder / "cache")
 
 
 def train(folder: Path) -> None:

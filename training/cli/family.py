@@ -76,7 +76,7 @@ def evaluate(
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Errors on held-out strings, drawn inside the family and beyond it."""
+    """Errors on held-out strings, inside the family and beyond."""
     import torch
 
     from training.family.errors import Player, by_rise, measure, player

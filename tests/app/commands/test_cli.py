@@ -22,7 +22,6 @@ COMMANDS = [
     "info",
     "sampled",
     "compare",
-    "dataset",
     "train",
     "evaluate",
 ]
