@@ -102,7 +102,6 @@ def evaluate_past_horizon(
     horizon: int | None = None,
     windows_s: Windows = (),
     trajectories: slice = ALL,
-    listen: float = DEFAULT_LISTEN,
     frames_at_once: int = FRAMES_AT_ONCE,
     report: Callable[[float], None] = _silent,
 ) -> MotionErrors:
@@ -114,7 +113,6 @@ def evaluate_past_horizon(
         horizon: in frames; None is all of the data's.
         windows_s: of the spectral distances; none may be empty.
         trajectories: of the split.
-        listen: the listening point, in lengths.
         frames_at_once: of a block; the result does not depend on it.
         report: receives the share that is done.
     """
@@ -122,7 +120,7 @@ def evaluate_past_horizon(
     steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)
     device = next(model.parameters()).device
     synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m)
-    ear = torch.from_numpy(listening_weights(np.array([listen]), c.grid_points)).float()
+    ear = torch.from_numpy(listening_weights(np.array([DEFAULT_LISTEN]), c.grid_points)).float()
     spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
     string, sound, distances = ErrorSums(steps), ErrorSums(steps), []
     parts = _parts(c, split, trajectories)

@@ -173,6 +173,8 @@ class ExportDialog(QDialog):
         self.bar.show()
         self._tell("Rendering …")
         self._background.start(lambda work: job.run(work.progress))
+        if (parent := self.parentWidget()) is not None:
+            parent.window().activateWindow()  # whose keys play on
 
     def _show_progress(self, share: float, text: str, left_s: float | None) -> None:
         self.bar.setValue(round(1000 * share))
