@@ -16,7 +16,6 @@ LARGEST_TEXT_BYTES = 2**20  # of JSON
 LARGEST_TOML_BYTES = 2**16
 MOST_JSON_ENTRIES = 50_000  # of all lists and tables together: a check may report an error for each
 MOST_DOTS = 16  # of a key of TOML: its parser keeps every beginning of it
-LARGEST_TABLE_BYTES = 16 * 2**20  # of CSV
 LARGEST_IMPULSE_BYTES = 64 * 2**20  # of an impulse response in a sound file
 DEEPEST_NESTING = 32
 LONGEST_STRING = 10_000  # characters of one value

@@ -16,7 +16,7 @@ from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, without_retired, write
 from training.start import BLIND_PURSUIT, PHASES, PURSUIT, starts_of
 
-DIGEST_VERSION = 3  # of the rule that distinguishes runs; see `training.migration`
+DIGEST_VERSION = 3  # of the rule that distinguishes runs
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
 
 
@@ -169,7 +169,7 @@ class TrainingConfiguration:
 
         Of data and recipe, whose defaults are never changed, fields that have theirs are left out, so that one which
         comes later leaves earlier runs their digest; sizes that are no longer there count with the value that they
-        had. Where a model's sizes change otherwise, or this rule does, rows are carried over by `training.migration`.
+        had.
         """
         sizes = write(read_model_configuration(self.model, self.model_configuration, "model_configuration"))
         return digest_of(

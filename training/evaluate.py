@@ -77,13 +77,11 @@ class MotionErrors:
         string: over the whole string, as in the tables.
         sound: at the listening point; its `null_depth_db` is what subtraction leaves of the sound.
         spectra: of the sound, one for each window that was asked for.
-        sounds: of the last trajectories, the model's and the true one from frame 0 on, (2, trajectories, frames).
     """
 
     string: ErrorSums
     sound: ErrorSums
     spectra: list[SpectralDistance]
-    sounds: Tensor
 
 
 @dataclass(frozen=True)
@@ -104,7 +102,6 @@ def evaluate_past_horizon(
     horizon: int | None = None,
     windows_s: Windows = (),
     trajectories: slice = ALL,
-    listen: float = DEFAULT_LISTEN,
     frames_at_once: int = FRAMES_AT_ONCE,
     report: Callable[[float], None] = _silent,
 ) -> MotionErrors:
@@ -116,7 +113,6 @@ def evaluate_past_horizon(
         horizon: in frames; None is all of the data's.
         windows_s: of the spectral distances; none may be empty.
         trajectories: of the split.
-        listen: the listening point, in lengths.
         frames_at_once: of a block; the result does not depend on it.
         report: receives the share that is done.
     """
@@ -124,7 +120,7 @@ def evaluate_past_horizon(
     steps = (c.steps if horizon is None else horizon) + round(seconds * c.rate_hz)
     device = next(model.parameters()).device
     synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m)
-    ear = torch.from_numpy(listening_weights(np.array([listen]), c.grid_points)).float()
+    ear = torch.from_numpy(listening_weights(np.array([DEFAULT_LISTEN]), c.grid_points)).float()
     spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
     string, sound, distances = ErrorSums(steps), ErrorSums(steps), []
     parts = _parts(c, split, trajectories)
@@ -146,7 +142,7 @@ def evaluate_past_horizon(
                 report((part + first / steps) / len(parts))
             distances.append([spectral_distances(*sounds[..., 1:][..., span]) for span in spans])
     spectra = [_mean_distance(of_window) for of_window in zip(*distances, strict=True)]
-    return MotionErrors(string, sound, spectra, sounds)
+    return MotionErrors(string, sound, spectra)
 
 
 @torch.inference_mode()

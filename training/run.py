@@ -32,7 +32,6 @@ from training.data.draws import (
 from training.evaluate import evaluate_model
 from training.fitting.fit import Diverged, FitResult, Progress, fit
 from training.fitting.log import TrainingLog
-from training.migration import carried_over
 from training.results import QUARTERS, Row
 from training.row_errors import REPEATED, configuration_of, row_errors
 from training.start import knowledge_of
@@ -67,19 +66,14 @@ def _trained(
             log.add(progress)
         report(progress)
 
-    try:
-        result = fit(
-            configuration,
-            dataset,
-            run_folder,
-            device=device,
-            report=log_and_report,
-            checkpoint_every_s=checkpoint_every_s,
-        )
-    except Diverged:
-        _plot(log.path)
-        raise
-    _plot(log.path)
+    result = fit(
+        configuration,
+        dataset,
+        run_folder,
+        device=device,
+        report=log_and_report,
+        checkpoint_every_s=checkpoint_every_s,
+    )
     model = result.model.cpu()
     sums = {"validation": result.validation, "test": evaluate_model(model, dataset, "test", configuration.steps)}
     figures = row_errors(model, dataset, sums, configuration.steps)
@@ -123,7 +117,7 @@ def run_row(
     with _held(folder / "run.lock", waits):
         file = folder / "row.json"
         output = preset or folder / f"{name}.safetensors"
-        known = carried_over(_read_row(file), configuration) if file.exists() else None
+        known = _read_row(file) if file.exists() else None
         if known is not None and known.digest != configuration.digest:
             known = None
         if known is not None and _made_by(configuration, output):
@@ -257,12 +251,3 @@ def trained_range(data: DatasetConfiguration) -> TrainedRange:
     if data.initial == "noise":
         return TrainedRange(None, None, PEAK_RANGE_M, data.largest_tension_rise)
     return TrainedRange(CENTRE_RANGE, {"gaussian": WIDTH_RANGE}, PEAK_RANGE_M, data.largest_tension_rise)
-
-
-def _plot(log: Path) -> None:
-    """A picture of the run beside its log; none where it ended before its first epoch."""
-    if not log.exists():
-        return
-    from training.figures.run_plot import plot_run  # Matplotlib only where there is something to draw
-
-    plot_run(log, log.with_suffix(".png"))

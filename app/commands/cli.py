@@ -17,9 +17,7 @@ from typing import Annotated
 import typer
 
 from app.commands import (
-    batch,
     drums,
-    faust,
     info,
     learn,
     listing,
@@ -73,25 +71,19 @@ for command in (
     listing.presets,
     listing.models,
     listing.instruments,
-    motion.simulate,
-    motion.predict,
     render.render,
     learn.learn,
     play.play,
-    batch.batch,
     sampled.sampled,
-    faust.faust,
     plugin.plugin,
     info.info,
     motion.compare,
-    training.dataset,
     training.train,
     sweep.sweep,
     evaluation.evaluate,
     tables.table,
 ):
     cli.command()(command)
-cli.add_typer(tables.figure, name="figure")
 cli.add_typer(sweep.results, name="results")
 cli.add_typer(family.family, name="family")
 cli.add_typer(drums.drums, name="drums")

@@ -216,7 +216,7 @@ def _notes(request: SoundRequest, written: WavReport) -> list[str]:
     if request.source != "truth":
         notes += [f"warning: {words}" for words in outside_training(info, request.pluck)]
     if written.past_training_s > 0:
-        notes.append(f"note: from {info.horizon_s:g} s on, the model is past its training (marked in the file)")
+        notes.append(f"note: from {info.horizon_s:g} s on, the model is past its training")
     if not written.decayed:
         notes.append(f"note: the sound had not fallen by {request.decay_db:g} dB after {written.seconds:g} s")
     return notes

@@ -49,17 +49,15 @@ def sampled(
 ) -> None:
     """Render an instrument for samplers.
 
-    Each key is rendered at several velocities, without loops. The same command continues an export that was stopped:
-    whole samples are kept as long as the instrument is the same.
+    Each key is rendered at several velocities, without loops.
     """
     from app.export.sampled.job import export_sampled, note_renderer, planned
     from app.export.sampled.plan import SampledPlan
     from app.export.sampled.words import counted, megabytes, needed_bytes, notes, pitch_words, size_words
-    from app.instrument.bodies import body_digest
     from app.instrument.effects import body_problem
     from app.patches.library import find_patch
     from engine.folders import usable_files
-    from engine.presets import find_preset, preset_digest
+    from engine.presets import find_preset
 
     soundfont = out.suffix.lower() == ".sf2"
     if soundfont and (form or bits):
@@ -83,8 +81,6 @@ def sampled(
             form or "flac",
             bits or "24",
             source,
-            preset_digest(preset_path),
-            body_digest(chosen.body.name),
         )
         planned(plan, out)
     except ValueError as error:
@@ -103,8 +99,7 @@ def sampled(
         made = export_sampled(plan, out, render, progress=report)
     for note in notes(plan, made, "--dry leaves"):
         say(f"note: {note}")
-    samples = f"{made.rendered} samples rendered, {made.samples - made.rendered} kept"
-    print(f"{one_line(str(out))}: {samples}, {megabytes(made.size_bytes)}; {pitch}")
+    print(f"{one_line(str(out))}: {made.samples} samples, {megabytes(made.size_bytes)}; {pitch}")
 
 
 def _keys(text: str | None) -> tuple[int, int] | None:

@@ -20,7 +20,6 @@ from app.export.sound import (
     Mixed,
     SoundRequest,
     Source,
-    Voices,
     render_voices,
 )
 from app.export.wav import Level, WavSettings, write_wav
@@ -29,7 +28,6 @@ from app.shared.worker import Progress
 from engine.pluck import Pluck
 from engine.result_file import WriteError, explain, whole_file
 
-END_OF_TRAINING = "end of training"  # the name of the marker at the training horizon
 LONGEST_NAME = 150  # characters of a preset's name in a file's name
 DECAY_FADE_S = 0.05  # the fade-out where a sound ends by its decay
 
@@ -76,7 +74,7 @@ def export_sound(
         Cancelled: `progress` raised it; no file is left.
         Runaway: the model's output grew without bound or is not finite.
     """
-    (report,) = export_sounds(request, {request.source: path}, settings, progress=progress)[0]
+    (report,) = export_sounds(request, {request.source: path}, settings, progress=progress)
     return report
 
 
@@ -85,19 +83,17 @@ def export_sounds(
     paths: Mapping[Source, Path],
     settings: WavSettings | None = None,
     *,
-    measured: bool = False,
     progress: Progress = lambda *_: None,
-) -> tuple[list[WavReport], Voices]:
+) -> list[WavReport]:
     """Renders a pluck once and writes a file for each source, model and truth with one gain.
 
     Args:
         request: its own `source` is ignored.
         paths: the file of each source; a difference, which is heard without body and room, has none beside it where
             an instrument is heard.
-        measured: render both model and truth whatever the sources, to compare them.
 
     Returns:
-        The reports in the order of `paths`, and what was rendered.
+        The reports in the order of `paths`.
 
     Raises:
         As `export_sound`.
@@ -115,8 +111,7 @@ def export_sounds(
         opened = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
         rate_hz = settings.rate_hz or info.rate_hz
         try:
-            both = measured or settings.normalise
-            voices = render_voices(request, paths, rate_hz, all_voices=both, progress=progress)
+            voices = render_voices(request, paths, rate_hz, all_voices=settings.normalise, progress=progress)
         except OSError as error:  # the recordings lie in temporary files
             raise WriteError(explain(Path(tempfile.gettempdir()), error)) from error
         sounds = {source: Mixed(voices, source, request.difference_gain_db) for source in paths}
@@ -126,13 +121,12 @@ def export_sounds(
         for source, file in opened.items():
             path, sound = paths[source], sounds[source]
             with _explained(path):
-                labels = {} if source == "truth" else {END_OF_TRAINING: info.horizon_s}
                 tags = _tags(info.title, recipes[source])
-                level = write_wav(file, sound, rate_hz, settings, tags, beside, labels)
+                level = write_wav(file, sound, rate_hz, settings, tags, beside)
             report = _report(path, file, len(sound), rate_hz, level)
-            past_s = max(0.0, report.seconds - info.horizon_s) if labels else 0.0
+            past_s = 0.0 if source == "truth" else max(0.0, report.seconds - info.horizon_s)
             reports.append(replace(report, past_training_s=past_s, decayed=voices.ended))
-    return reports, voices
+    return reports
 
 
 def settings_of(request: SoundRequest, settings: WavSettings) -> WavSettings:

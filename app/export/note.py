@@ -146,7 +146,7 @@ class NoteExport:
             None if choices.alone else note.through,
             struck,
         )
-        return export_sounds(request, self.paths, choices.wav, progress=progress)[0]
+        return export_sounds(request, self.paths, choices.wav, progress=progress)
 
     def cancelled(self) -> str:
         return "no file was written."
@@ -159,7 +159,7 @@ def _words(reports: list[WavReport]) -> list[str]:
         lines.append(f"Saved {report.path} ({report.seconds:.2f} s, {level}).")
     if past_s := max(report.past_training_s for report in reports):
         trained_s = max(report.seconds for report in reports) - past_s
-        lines.append(f"The model was trained on the first {trained_s:.2f} s; a marker is at their end.")
+        lines.append(f"The model was trained on the first {trained_s:.2f} s.")
     if not reports[0].decayed:
         lines.append("Not decayed at the maximum length: faded out there.")
     if any(report.clipped for report in reports):

@@ -6,6 +6,7 @@ libsndfile only stores: all that changes a number is done here, in NumPy, where 
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -16,7 +17,6 @@ import soundfile
 from numpy.typing import NDArray
 
 from app.export.recording import Sound, blocks
-from app.export.wav_chunks import Marker, finish
 from app.shared.vocabulary import BITS, Bits
 
 RATE_RANGE_HZ = (1_000, 384_000)
@@ -24,6 +24,7 @@ LONGEST_TAG_BYTES = 2_000  # libsndfile does not read back INFO texts of 2048 by
 NORMALISED_PEAK = 10 ** (-1 / 20)  # -1 dBFS: leaves headroom for peaks between samples
 
 _SUBTYPES: dict[Bits, str] = {"16": "PCM_16", "24": "PCM_24", "32f": "FLOAT"}
+HEAD_BYTES = 2**16  # of the file, in which all chunks before the samples lie
 _DITHER_SEED = 0  # the same sound makes the same file
 
 
@@ -72,7 +73,6 @@ def write_wav(
     settings: WavSettings,
     tags: Mapping[str, str],
     beside: Sequence[Sound] = (),
-    labels: Mapping[str, float] | None = None,
 ) -> Level:
     """Writes a WAV file of a sound, (frames,) or (frames, channels), where ±1 is full scale.
 
@@ -83,7 +83,6 @@ def write_wav(
         rate_hz: of the sound; `settings.rate_hz` is ignored.
         tags: INFO texts by soundfile's names (title, software, comment), each of at most 2000 bytes.
         beside: other sounds that share the gain when normalising.
-        labels: names of markers and their times in s; those past the end are left out.
 
     Raises:
         ValueError: a sample is not finite, there are none, or a tag is too long.
@@ -111,7 +110,7 @@ def write_wav(
             noting.check()
             clipped += cut
     noting.check()
-    finish(file, [Marker(frame, label) for label, frame in _places(labels or {}, rate_hz) if frame < len(sound)])
+    _undate(file, channels)
     return Level(_decibel(peak * gain), clipped, _decibel(gain))
 
 
@@ -136,8 +135,13 @@ class _Noting:
             raise self._error
 
 
-def _places(labels: Mapping[str, float], rate_hz: int) -> list[tuple[str, int]]:
-    return [(label, round(time_s * rate_hz)) for label, time_s in labels.items()]
+def _undate(file: BinaryIO, channels: int) -> None:
+    """Zeroes the time of writing in the chunk PEAK, so that the same sound makes the same bytes."""
+    file.seek(0)
+    place = file.read(HEAD_BYTES).find(b"PEAK" + struct.pack("<II", 8 * (1 + channels), 1))
+    if place >= 0:
+        file.seek(place + 12)  # behind name, size and version
+        file.write(bytes(4))
 
 
 def _faded(block: NDArray[np.floating], first: int, total: int, frames: int) -> NDArray[np.float64]:

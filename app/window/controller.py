@@ -145,7 +145,6 @@ class Controller(QObject):
         )
         self.instruments.played.connect(self.performance.follow)
         self.instruments.played.connect(self._show_struck)
-        self.drum.view.drum_stepped.connect(self._step_drum)
         self.instruments.reported.connect(window.notices.report)
         self.instruments.start()
         self.patches = PatchDesk(
@@ -348,7 +347,7 @@ class Controller(QObject):
     def take_file(self, file: Path) -> None:
         """Takes a dropped file: installs and chooses a preset, restores a WAV's recipe; asks what other sounds are.
 
-        Patches, strings, scales and MIDI files go to `patches`.
+        Patches, scales and MIDI files go to `patches`.
         """
         if file.suffix.lower() in TAKEN_FILES:
             self.patches.take_file(file)
@@ -482,18 +481,6 @@ class Controller(QObject):
         self._struck = latest
         if (played := drums.of_key(latest.event.key)) is not None:
             self.drum.show_key(latest.event.key, latest.event.place or played.place)
-
-    def _step_drum(self, steps: int) -> None:
-        """Shows another drum of the kit, or the drum of a higher or lower key."""
-        patch, drums, key = self.session.choices.patch, self.session.choices.drums, self.instruments.drum_key
-        if patch is None or drums is None or key is None:
-            return
-        low, high = patch.range
-        keys = [each.note for each in drums.drums] if drums.keys == "pads" else list(range(low, high + 1))
-        if key in keys:
-            key = keys[min(max(keys.index(key) + steps, 0), len(keys) - 1)]
-            self.instruments.latest_key = key, None
-            self.drum.show_key(key)
 
     def _wake(self) -> None:
         """Something may move: runs the timer at its full rate for LIVELY_S."""

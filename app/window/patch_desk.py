@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from dataclasses import asdict
 from pathlib import Path
 
 from PySide6.QtCore import QObject, QTimer, Signal
@@ -19,7 +18,6 @@ from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.strings import KeyString, Strings
 from app.patches.drums import Drums
 from app.patches.fields import explained
-from app.patches.instrument import SingleString
 from app.patches.library import (
     SUFFIX,
     PatchEntry,
@@ -30,7 +28,7 @@ from app.patches.library import (
     rename_patch,
     save_patch,
 )
-from app.patches.patch import ASSIGNABLE, Body, Patch, PhysicalString, StringSet
+from app.patches.patch import ASSIGNABLE, Body, Patch, StringSet
 from app.patches.tuning import SCALA_FILES, TuningChoice, read_scala
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octaves_of
@@ -50,20 +48,16 @@ from app.window.performance import Performance
 from app.window.recordings import Recordings
 from app.window.song import Song
 from engine.plain_text import one_line
-from engine.presets import PresetError, load_preset
-from engine.presets.of_string import of_string, read_string
 from engine.result_file import WriteError
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
 NOTE_REPORTED_AFTER_MS = 150
 SCREEN_SLIDE = 90  # of the time of slides, 0 … 127: 0.3 s
-MANY_STRINGS = "studio_any_string"
 C_OF_OCTAVE_0 = LOWEST_C // 12 - 1  # C3 is the lowest of the computer's keys at octave 0
 NO_PATCH = "The computer's keys pluck the chosen preset at ten places; choose an instrument to play pitches"
 MIDI_FILES = (".mid", ".midi")
-STRING_FILE = ".toml"
-TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES, STRING_FILE)
+TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES)
 
 
 class PatchDesk(QObject):
@@ -302,17 +296,15 @@ class PatchDesk(QObject):
         self._panel.bar.show_comparing(entry is not None)
 
     def take_file(self, file: Path) -> None:
-        """One of TAKEN_FILES that was dropped: a patch or a string is chosen, a MIDI file played, a scale tunes."""
+        """One of TAKEN_FILES that was dropped: a patch is chosen, a MIDI file played, a scale tunes."""
         try:
             if file.suffix.lower() in MIDI_FILES:
                 self._play_file(file)
             elif file.suffix.lower() in SCALA_FILES:
                 self._tune(file)
-            elif file.suffix.lower() == STRING_FILE:
-                self._take_string(file)
             else:
                 self._session.update(instrument=read_patch(file))
-        except (MidiFileError, PatchError, PresetError, OSError, ValueError) as error:
+        except (MidiFileError, PatchError, OSError, ValueError) as error:
             self.reported.emit(one_line(str(error)))
 
     def _play_file(self, file: Path) -> None:
@@ -321,22 +313,6 @@ class PatchDesk(QObject):
             self.informed.emit(f"{song.left_out}.")
         self._session.play_patch()
         self._song.load(file.name, song.events)
-
-    def _take_string(self, file: Path) -> None:
-        """Makes the string whose physical parameters the file has the instrument, by the model of many strings."""
-        many = next((each for each in self._library.entries if each.name == MANY_STRINGS), None)
-        if many is None:
-            self.reported.emit(f"{file.name}: the preset {MANY_STRINGS}, which plays many strings, was not found.")
-            return
-        string, preset = read_string(file), load_preset(many.path)
-        try:
-            of_string(preset, string)  # it can be plucked
-        except PresetError as error:
-            raise PresetError(f"{file.name}: {error}") from error
-        self._session.update(instrument=SingleString(preset=many.name), string=PhysicalString(**asdict(string)))
-        outside = [one.words for one in many.info.family.outside(string)] if many.info.family is not None else []
-        beyond = f" Beyond training: {'; '.join(outside)}." if outside else ""
-        self.informed.emit(f"{file.name} is plucked by {many.info.title}.{beyond}")
 
     def _tune(self, file: Path) -> None:
         """Tunes the patch by a Scala file. Where scale and mapping do not fit each other, the new one stays."""

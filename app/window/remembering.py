@@ -6,19 +6,17 @@ import threading
 from collections.abc import Callable
 from pathlib import Path
 
-from filelock import FileLock
 from PySide6.QtCore import QObject, QTimer, Signal
 
-from app.window.settings import Settings, merged, read_settings, save_settings
+from app.window.settings import Settings, save_settings
 
 LOOK_EVERY_MS = 1_000
-LOCK_S = 2.0  # waited for another instance that is saving
 
 
 class SettingsSaver(QObject):
     """Looks at the settings each second, and writes them when they have changed and then stayed for one look.
 
-    Only fields that this instance has changed are written over those of the file, which another one may have changed.
+    Of two instances the one that writes last is remembered.
 
     Args:
         current: what is to be remembered, as it is now.
@@ -42,7 +40,7 @@ class SettingsSaver(QObject):
         rested, self._seen = now == self._seen, now
         if not rested or now == self._base or (self._writing is not None and self._writing.is_alive()):
             return
-        self._writing = threading.Thread(target=self._write, args=(self._base, now), name="settings")
+        self._writing = threading.Thread(target=self._write, args=(now,), name="settings")
         self._writing.start()
 
     def close(self) -> None:
@@ -52,14 +50,11 @@ class SettingsSaver(QObject):
             self._writing.join()
         now = self._current()
         if now != self._base or not self._path.exists():
-            self._write(self._base, now)
+            self._write(now)
 
-    def _write(self, base: Settings, now: Settings) -> None:
+    def _write(self, now: Settings) -> None:
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            with FileLock(self._path.with_name(f".{self._path.name}.lock"), timeout=LOCK_S):
-                theirs = read_settings(self._path)
-                save_settings(self._path, now if theirs is None else merged(base, now, theirs))
+            save_settings(self._path, now)
             self._base = now  # not where it failed: it is tried again
         except OSError as error:
             if not self._reported:  # once: it would come again with every change

@@ -96,32 +96,6 @@ def load_settings(path: Path) -> tuple[Settings, str]:
         return kept or Settings(), one_line(reported)
 
 
-def read_settings(path: Path) -> Settings | None:
-    """The settings of a file; None where it is missing or cannot be used as a whole. Never raises."""
-    try:
-        return _parsed(_bytes(path))
-    except (OSError, ValueError, OverflowError):
-        return None
-
-
-def merged(base: Settings, mine: Settings, theirs: Settings) -> Settings:
-    """The changes of two instances since `base`: of each field mine where I have changed it, else theirs.
-
-    Fields of `choices` are merged one by one.
-    """
-    own = {name: getattr(mine, name) for name in _changed(base, mine) - {"choices"}}
-    choices = {name: getattr(mine.choices, name) for name in _changed(base.choices, mine.choices)}
-    try:
-        both = Choices.model_validate({**theirs.choices.model_dump(), **choices})
-    except ValidationError:  # they do not go together
-        both = mine.choices
-    return theirs.model_copy(update={**own, "choices": both})
-
-
-def _changed(base: BaseModel, now: BaseModel) -> set[str]:
-    return {name for name in type(base).model_fields if getattr(base, name) != getattr(now, name)}
-
-
 def _bytes(path: Path) -> bytes:
     return read_bounded(path, bounds.LARGEST_TEXT_BYTES)
 

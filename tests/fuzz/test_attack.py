@@ -17,11 +17,8 @@ import pytest
 import soundfile
 import torch
 
-from app.analysis.abx.record import load_record
 from app.audio.impulse_file import ImpulseError, read_impulse
-from app.commands.arrays import read_displacements
 from app.export.recipe import InstrumentSound, Recipe, RecipeError, read_recipe, request_of
-from app.export.sampled.store import SampleIndex, StoredSample, read_index
 from app.export.sound import SoundRequest
 from app.export.wav import WavSettings
 from app.instrument.bodies import own_bodies
@@ -45,14 +42,12 @@ from engine.presets import (
     read_string,
 )
 from engine.resonators.sine_transform import project
-from engine.result_file import WriteError
 from engine.schema import SchemaError, write
 from engine.sources import ModelSource, Runaway, TruthSource
 from engine.voices import Ear, model_program, render_voice, truth_program
 from tests.fuzz.costs import MOST_MB, Costs
 from tests.fuzz.mutations import HOSTILE, attacked, damaged_bytes, damaged_preset, damaged_text, damaged_value
 from training.cell import load
-from training.cli.console import Failure
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import COLUMNS, read_heard
 from training.results import Row, add_rows, read_results
@@ -325,11 +320,6 @@ multiplier_widths = [8]
 HEARD = f"{','.join(COLUMNS)}\na,{'0' * 64},4,0.5,-1,0,0.1,,,1\n".encode()
 
 
-def sample_index(_: Path) -> bytes:
-    sample = StoredSample(made_from="0" * 64, sha256="1" * 64, frames=64, channels=2, gain_db=3.0, level_db=-20.0)
-    return SampleIndex(instrument="a.sfz", samples={"key060_vel127.flac": sample}).model_dump_json().encode()
-
-
 TARGETS = (
     Target("settings.json", lambda p: Settings().model_dump_json().encode(), settings, (), json_or_bytes),
     Target("plan.toml", lambda p: PLAN, lambda p: load_plan(str(p)), (SchemaError,), toml_or_bytes),
@@ -339,17 +329,14 @@ TARGETS = (
     ),
     Target("rows.csv", row_file, read_results, (SchemaError,)),
     Target("heard.csv", lambda p: HEARD, heard, ()),
-    Target("u0.npy", lambda p: saved(np.zeros((2, 101))), read_displacements, (Failure,)),
     Target("checkpoint.safetensors", checkpoint, Checkpoint.load, (ValueError,)),
     Target("patch.json", lambda p: PATCH.read_bytes(), read_patch, (PatchError,), json_or_bytes),
-    Target("index.json", sample_index, read_index, (WriteError,), json_or_bytes),
     Target("song.mid", lambda p: SONG, song, (MidiFileError,)),
     Target("scale.scl", lambda p: SCALE, scala, (ValueError,), scala_or_bytes),
     Target("keys.kbm", lambda p: KEYMAP, scala, (ValueError,), scala_or_bytes),
     Target("float.wav", lambda p: impulse(p, "WAV", "FLOAT"), sounded, (ImpulseError,)),
     Target("pcm.wav", lambda p: impulse(p, "WAV", "PCM_16"), sounded, (ImpulseError,)),
     Target("body.flac", lambda p: impulse(p, "FLAC", "PCM_24"), sounded, (ImpulseError,)),
-    Target("record.json", lambda p: b'{"trials": [], "version": 1}', load_record, (SchemaError,), json_or_bytes),
 )
 
 

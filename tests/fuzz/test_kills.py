@@ -18,9 +18,8 @@ from tests.fuzz import works
 from tests.fuzz.conftest import LONG
 
 KILLS = {  # 200 in all with `run.py test --fuzz`
-    "render": (2, 40),
-    "batch": (2, 40),
-    "dataset": (2, 30),
+    "render": (2, 60),
+    "dataset": (2, 50),
     "train": (1, 20),
     "train_lru": (1, 15),
     "sweep": (0, 10),  # its workers load torch again each time

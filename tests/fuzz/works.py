@@ -22,6 +22,7 @@ from app.window.settings import Settings, save_settings
 from engine.kernels import warm
 from engine.presets import SHIPPED, load_preset
 from training.cell import load
+from training.data.dataset import load_dataset
 from training.results import read_results
 from training.run import run_row
 
@@ -54,7 +55,7 @@ rates_hz = [4000]
 horizons = [60]
 """
 MANY = 100  # times that a small file is saved
-WORKS = ("render", "batch", "dataset", "train", "train_lru", "sweep", "save_patches", "save_many_settings")
+WORKS = ("render", "dataset", "train", "train_lru", "sweep", "save_patches", "save_many_settings")
 # of two runs, however equal; a developer may commit meanwhile
 UNLIKE = ("seconds", "training_seconds", "finished", "commit")
 
@@ -77,14 +78,9 @@ def render(folder: Path) -> None:
     )
 
 
-def batch(folder: Path) -> None:
-    words = ["--positions", "0.3,0.45", "--amplitudes", "1,2", "--seconds", "0.5", "--sources", "model,truth"]
-    _done(main(["batch", "--presets", str(PRESET), *words, "--out", str(folder / "out")]))
-
-
 def dataset(folder: Path) -> None:
     configuration = _configuration(folder, "koopman_var", "{ state_size = 8, multiplier_widths = [4] }", 400)
-    _done(main(["dataset", str(configuration), "--cache", str(folder / "cache")]))
+    load_dataset(load(str(configuration)).data, folder / "cache")
 
 
 def train(folder: Path) -> None:

@@ -58,7 +58,7 @@ def test_the_papers_recipe_is_the_papers() -> None:
 
 
 def test_a_digest_is_for_good() -> None:
-    """Rows are known by it: where this fails, a default has changed; leave it, or carry rows over (`migration`)."""
+    """Rows are known by it: where this fails, a default has changed; leave it."""
     cells = [
         Cell("koopman_var", True, "noise", 4000, 400, "paper"),
         Cell("koopman_integrated", False, "noise", 16000),

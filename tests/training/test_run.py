@@ -1,7 +1,6 @@
 from __future__ import annotations
 
 import csv
-import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,14 +9,12 @@ import pytest
 from engine.metrics import RelativeError
 from engine.models.base import count_parameters
 from engine.presets import load_preset
-from engine.schema import write
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, TrainingConfiguration
 from training.data.dataset import load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import Progress
 from training.fitting.log import Epoch, TrainingLog
-from training.migration import earlier_digest
 from training.run import run_row, trained_range
 
 
@@ -106,7 +103,6 @@ def test_a_row_reports_what_its_preset_measures(tmp_path: Path) -> None:
         count_parameters(preset.model),
     )
     assert preset.info.horizon_steps == 420
-    assert (tmp_path / "runs" / CELL.name / "log.png").stat().st_size > 10_000
 
 
 def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_path: Path) -> None:
@@ -118,9 +114,6 @@ def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_pa
 
     assert run_row(CELL.name, "ours", configuration(), **places, report=trained) == row
     file = tmp_path / "runs" / CELL.name / "row.json"
-    earlier = {**write(row), "digest": earlier_digest(configuration())}
-    file.write_text(json.dumps(earlier))
-    assert run_row(CELL.name, "ours", configuration(), **places, report=trained) == row
     with pytest.raises(ValueError, match="belongs to another configuration"):
         run_row(CELL.name, "ours", configuration(epochs=3), **places)
     file.write_text("{")

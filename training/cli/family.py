@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from training.cli.arguments import Json, PresetName, check_range, open_preset
+from training.cli.arguments import Json, PresetName, open_preset
 from training.cli.console import Failure, Shares, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
@@ -15,22 +15,11 @@ if TYPE_CHECKING:
 
     from engine.presets import Preset
     from training.family.errors import FamilyErrors, StringError
-    from training.family.partials import StringPartials
     from training.family.strings import Column
 
 family = typer.Typer(help="Train and measure one model of many strings.", no_args_is_help=True)
 DESCRIBED = ("geometric mean", "worst", "share above 1e-2", "processor s a second", "worst at")
 RISES = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 0.8)
-PARTIALS = {  # figures of `_partials_facts`
-    "quiet_first_cents": "quiet pluck, the first mode's pitch, cents",
-    "quiet_cents_largest": "quiet pluck, any partial, cents",
-    "level_db_mean": "level of the partials by energy, dB",
-    "level_db_largest": "level of any, dB",
-    "t60_percent_mean": "T60 by energy, %",
-    "t60_percent_largest": "T60 of any, %",
-    "glide_cents_mean": "glide by energy, cents",
-    "glide_cents_largest": "glide of any, cents",
-}
 Strings = Annotated[
     int, typer.Option(min=1, max=10_000, help="Held-out strings inside the family, and as many beyond.")
 ]
@@ -78,57 +67,22 @@ def evaluate(
     strings: Strings = 200,
     tenth: Annotated[
         int,
-        typer.Option(min=0, max=1_000, help="Measure so many over ten seconds, too; drums of longer decays."),
+        typer.Option(min=0, max=1_000, help="Measure so many over ten seconds, too."),
     ] = 0,
-    baselines: Annotated[
-        bool, typer.Option("--baselines", help="Measure what knows the physics alone, too.")
-    ] = False,
-    runs: Annotated[
-        Path | None, typer.Option(help="Folder of the errors on drums: a stopped measurement continues there.")
-    ] = None,
-    picture: Annotated[
-        Path | None,
-        typer.Option(
-            metavar="FILE",
-            help="Draw the distribution of errors by rise of tension: .png, .svg, .pdf.",
-        ),
-    ] = None,
-    drums: Annotated[
-        int,
-        typer.Option(
-            min=0, max=10_000, metavar="N", help="Measure on so many drums instead, which no model has seen."
-        ),
-    ] = 0,
-    keep: Annotated[bool, typer.Option("--keep", help="Add the errors on drums to training/drums.csv.")] = False,
     rate: Rate = 48_000,
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Errors on held-out strings, or on drums.
-
-    Strings are drawn inside the family and beyond it. Errors on drums are written to a table in `--runs`, or the
-    folder of runs, after each drum: a stopped measurement continues.
-    """
+    """Errors on held-out strings, inside the family and beyond."""
     import torch
 
     from training.family.errors import Player, by_rise, measure, player
 
     torch.set_num_threads(1)
-    if drums:
-        _evaluate_drums(preset, drums, tenth, runs, rate, seed, keep, json)
-        return
     if tenth > strings:
         raise typer.BadParameter(f"is {tenth} of {strings} strings; give at most as many", param_hint="--tenth")
-    if picture is not None:
-        from training.figures.style import check_format
-
-        check_format(picture)
-    loaded = _open_preset_of_many(preset)
+    loaded = open_preset_of_many(preset)
     players: dict[str, Player] = {loaded.name: player(loaded.model)}
-    if baselines:
-        from training.research.players import knowing_physics
-
-        players |= knowing_physics()
     with progress("family evaluate") as report:
         shares = Shares(report, 2 * (1 + (tenth > 0)))
         measured = measured_errors(players, strings, rate, seed, shares)
@@ -144,12 +98,6 @@ def evaluate(
                 span_s, reported = (9.0, 10.0), shares.next()
                 last = measure(alone, column, "test", tenth, rate, span_s, seed=seed, report=reported)[loaded.name]
                 facts["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
-    if picture is not None:
-        from training.figures.family_errors import family_errors
-        from training.figures.style import save_figure
-
-        columns: dict[str, Sequence[StringError]] = {c: errors[loaded.name].strings for c, errors in measured.items()}
-        save_figure(family_errors(columns, loaded.name), picture)
     if json:
         print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **found})
         return
@@ -171,50 +119,6 @@ def evaluate(
 
 
 @family.command()
-def partials(
-    preset: PresetName,
-    strings: Strings = 200,
-    seconds: Annotated[float, typer.Option(help="How long after each pluck.")] = 0.5,
-    rate: Rate = 48_000,
-    seed: Seed = 0,
-    json: Json = False,
-) -> None:
-    """Pitch, level, decay and glide of partials on held-out strings.
-
-    Those of one string, mode by mode: `evaluate PRESET --string NAME --partials`.
-    """
-    import torch
-
-    from training.family.errors import player
-    from training.family.partials import QUIET_RISE, measure_partials
-    from training.family.strings import COLUMNS
-
-    check_range("--seconds", seconds, 0.25, 10, "s")  # thirds of it tell the glide of a low string
-    torch.set_num_threads(1)
-    loaded = _open_preset_of_many(preset)
-    play = player(loaded.model)
-    found: dict[str, dict[str, Any]] = {}
-    with progress("family partials") as report:
-        shares = Shares(report, len(COLUMNS))
-        for column in COLUMNS:
-            of_strings = measure_partials(
-                play, column, "test", strings, rate, seconds, seed=seed, report=shares.next()
-            )
-            found[column] = _partials_facts(of_strings)
-    if json:
-        facts = {"preset": loaded.name, "strings": strings, "seconds": seconds, "rate_hz": rate, "seed": seed}
-        print_json({**facts, "quiet_rise": QUIET_RISE, **found})
-        return
-    print(
-        f"{strings} strings a column, {seconds:g} s at {rate} Hz: errors of partials, of the middle string and of "
-        f"the worst; a quiet pluck raises the tension by {QUIET_RISE:g}, the other plucks are each string's own"
-    )
-    for column_name, figures in found.items():
-        rows = [[text, *figures[name].values()] for name, text in PARTIALS.items()]
-        print_table((column_name, "median", "worst", "worst at"), rows)
-
-
-@family.command()
 def shelf(preset: Annotated[str, typer.Argument(metavar="PRESET")] = "studio_any_string") -> None:
     """Write a preset of each shipped string with what PRESET learned."""
     from engine.presets import SHIPPED
@@ -224,60 +128,7 @@ def shelf(preset: Annotated[str, typer.Argument(metavar="PRESET")] = "studio_any
         print(path)
 
 
-def _evaluate_drums(
-    preset: str, drums: int, tenth: int, runs: Path | None, rate_hz: int, seed: int, keep: bool, json: bool
-) -> None:
-    from dataclasses import asdict
-
-    from training.family import drums as of_drums
-    from training.run import default_runs
-
-    if tenth > drums:
-        raise typer.BadParameter(f"is {tenth} of {drums} drums; give at most as many", param_hint="--tenth")
-    loaded = _open_preset_of_many(preset)
-    players: dict[str, of_drums.DrumPlayer] = {
-        loaded.name: of_drums.model_player(loaded.model),
-        "backward error analysis (1/12)": of_drums.untrained_player("series"),
-        "kicks without corrections": of_drums.untrained_player("kicks"),
-        "linear drum": of_drums.linear_drum,
-    }
-    checkpoint = of_drums.checkpoint_file(runs or default_runs(), loaded.name, rate_hz, seed)
-    with progress("family evaluate") as report:
-        errors = of_drums.measure_drums(players, drums, tenth, rate_hz, seed, checkpoint, report)
-    rows = [of_drums.summary(errors, name, rate_hz, seed) for name in players]
-    if keep:
-        of_drums.store(rows)
-    if json:
-        print_json({"drums": drums, "rate_hz": rate_hz, "seed": seed, "players": [asdict(row) for row in rows]})
-        return
-    print(f"{drums} drums of {rows[0].modes} modes below 4 kHz, first second at {rate_hz} Hz, over the whole surface")
-    print_table(
-        ("", "geometric mean", "worst", "blows", "pressed", "processor s a second", "worst at"),
-        [
-            [
-                row.player,
-                *map(number, (row.geometric_mean, row.worst, row.blows, row.pressed, row.processor_s)),
-                row.worst_at,
-            ]
-            for row in rows
-        ],
-    )
-    if tenth:
-        print_table(
-            (
-                f"tenth second, {rows[0].tenth_drums} of {tenth} drums of long decays still sound",
-                "geometric mean",
-                "worst",
-                "first",
-            ),
-            [
-                [row.player, *map(number, (row.tenth_geometric_mean, row.tenth_worst, row.tenth_first))]
-                for row in rows
-            ],
-        )
-
-
-def _open_preset_of_many(name_or_path: str) -> Preset:
+def open_preset_of_many(name_or_path: str) -> Preset:
     loaded = open_preset(name_or_path)
     if loaded.info.family is None:
         raise Failure(f"{loaded.path}: learned one string; give a preset of many, as studio_any_string")
@@ -315,22 +166,7 @@ def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) ->
     return {"strings": len(pairs), **facts_of(late), "over_first": late.geometric_mean / early.geometric_mean}
 
 
-def _partials_facts(strings: list[StringPartials]) -> dict[str, Any]:
-    """Of each figure the median over the strings and the worst; of a string's partials the mean or the largest."""
-    from training.family.partials import middle_and_worst
-
-    figures: dict[str, list[float]] = {"quiet_first_cents": [one.quiet_first_cents for one in strings]}
-    for name in ("quiet_cents", "level_db", "t60_percent", "glide_cents"):
-        for kind in ("mean", "largest"):
-            figures[f"{name}_{kind}"] = [getattr(getattr(one, name), kind) for one in strings]
-    facts = {}
-    for name, values in figures.items():
-        median, worst, place = middle_and_worst(values)
-        facts[name] = {"median": median, "worst": worst, "worst_at": "" if place is None else _place(strings[place])}
-    return facts
-
-
-def _place(string: StringError | StringPartials) -> str:
+def _place(string: StringError) -> str:
     return f"{string.pitch_hz:.0f} Hz, B {string.inharmonicity:.1e}, rise {string.tension_rise:.2f}"
 
 

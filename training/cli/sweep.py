@@ -105,16 +105,12 @@ def merge(
     ],
     results: Results = None,
 ) -> None:
-    """Add the rows of other results files. Of several rows of a run the latest is kept, a finished one before others.
-
-    Rows of an earlier version get the digests of this version where their names still mean the same runs.
-    """
-    from training.migration import migrated
+    """Add the rows of other results files. Of a run the latest row is kept, a finished one before others."""
     from training.results import RESULTS, add_rows, read_results
 
     file = results or RESULTS
     before = len(read_results(file))
-    rows = migrated(row for other in others for row in read_results(other))
+    rows = [row for other in others for row in read_results(other)]
     after = len(add_rows(file, rows))
     print(f"{one_line(str(file))}: {after} rows, {after - before} of them new")
 

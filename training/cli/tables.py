@@ -1,31 +1,17 @@
-"""table, figure: our results with the paper's, and figures of presets."""
+"""table: our results with the paper's."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import typer
 
 from engine.plain_text import printable
-from engine.pluck import DEFAULT_LISTEN
 from engine.result_file import whole_file
-from training.cli.arguments import check_range, open_preset
-from training.cli.console import Failure, progress, say
+from training.cli.console import Failure, say
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-    from training.cli.console import Report
-
-figure = typer.Typer(help="Draw figures of presets and the truth, as PNG, SVG or PDF.", no_args_is_help=True)
-
-Output = Annotated[
-    Path | None, typer.Option(help="The file; its suffix gives the format. Default FIGURE.png in this folder.")
-]
 MARKER = "<!-- tables -->"  # all that follows it in a document is made by `table --into`
-LISTEN_RANGE = (0.01, 0.99)
 
 
 def table(
@@ -74,64 +60,3 @@ def _before(document: Path) -> str:
     if not marker:
         raise Failure(f"{document}: has no line {MARKER}; put it where the tables are to begin")
     return f"{kept}{marker}\n"
-
-
-@figure.command()
-def extrapolation(
-    presets: Annotated[
-        list[str], typer.Argument(metavar="PRESET...", help="Names of presets or paths of their files.")
-    ],
-    seconds: Annotated[
-        float | None, typer.Option(metavar="S", help="Time shown, in s; default twice the training horizon.")
-    ] = None,
-    trajectory: Annotated[int, typer.Option(min=0, help="Number of the trajectory in the validation set.")] = 0,
-    trajectories: Annotated[
-        int, typer.Option(min=1, help="How many of the validation set the error is taken over, from the first on.")
-    ] = 10,
-    listen: Annotated[
-        float, typer.Option(metavar="X", help="Listening point, 0 … 1 of the length; 0.37 is the paper's 24 cm.")
-    ] = DEFAULT_LISTEN,
-    output: Output = None,
-) -> None:
-    """Figure 3 of the paper: past the training horizon.
-
-    Waveforms, spectra and errors, up to the horizon and past it.
-    """
-    from training.figures import extrapolation as drawing
-
-    check_range("--listen", listen, *LISTEN_RANGE)
-    if seconds is not None:
-        check_range("--seconds", seconds, 0, drawing.LONGEST_S, "s")
-    loaded = [open_preset(name) for name in presets]
-    _save(
-        output,
-        "extrapolation",
-        lambda report: drawing.extrapolation(loaded, seconds, trajectory, trajectories, listen, report),
-    )
-
-
-@figure.command()
-def ratios(
-    results: Annotated[Path | None, typer.Option(help="The results file; default the project's.")] = None,
-    metric: Annotated[Literal["mse", "mae"], typer.Option(help="Relative error.")] = "mae",
-    output: Output = None,
-) -> None:
-    """Heat map of our errors over the paper's."""
-    from training.figures.ratios import ratios as drawing
-    from training.results import RESULTS, read_results
-
-    rows = read_results(results or RESULTS)
-    _save(output, "ratios", lambda report: drawing(rows, f"rel_{metric}"))
-
-
-def _save(output: Path | None, kind: str, draw: Callable[[Report], Figure]) -> None:
-    from training.figures.style import check_format, figure_bytes
-
-    path = output or Path(f"{kind}.png")
-    try:
-        check_format(path)
-    except ValueError as error:
-        raise typer.BadParameter(str(error), param_hint="--output") from error
-    with whole_file(path) as file, progress(f"figure {kind}") as report:
-        file.write(figure_bytes(draw(report), path.suffix))
-    print(path)

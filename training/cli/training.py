@@ -1,15 +1,15 @@
-"""dataset, train: a run's data set and its training."""
+"""train: a run's training."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from engine.plain_text import duration
-from training.cli.arguments import Cache, Device, Json, Runs
-from training.cli.console import Failure, number, print_json, progress, say
+from training.cli.arguments import Cache, Device, Runs
+from training.cli.console import Failure, number, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -26,41 +26,6 @@ Configuration = Annotated[
         help="The name of a run (a cell of the tables, or a file of training/configurations), or a .toml file.",
     ),
 ]
-
-
-def dataset(config: Configuration, cache: Cache = None, json: Json = False) -> None:
-    """Make and describe the data set of a run.
-
-    A data set that is in the cache is not made again.
-    """
-    import numpy as np
-
-    from training.cell import load
-    from training.data.dataset import dataset_folder, dataset_key, draw_initial
-
-    configuration = load(config).data
-    made = load_data(configuration, cache)
-    rise = configuration.resonator.relative_tension_rise(draw_initial(configuration))
-    facts: dict[str, Any] = {
-        "folder": str(dataset_folder(configuration, cache)),
-        "key": dataset_key(configuration),
-        "shape": list(made.amplitudes.shape),
-        "scale_m": made.scale_m,
-        "tension_rise": {
-            "median": float(np.quantile(rise, 0.5)),
-            "percentile_95": float(np.quantile(rise, 0.95)),
-            "max": float(rise.max()),
-        },
-    }
-    if json:
-        print_json(facts)
-        return
-    print(f"folder        {facts['folder']}")
-    print(f"key           {facts['key']}")
-    print(f"shape         {tuple(made.amplitudes.shape)} (trajectories, frames, modes), float32 in m")
-    print(f"scale         {1000 * made.scale_m:.4g} mm")
-    rise_percent = [f"{100 * value:.2g} %" for value in facts["tension_rise"].values()]
-    print("tension rise  median {}, 95th percentile {}, largest {}".format(*rise_percent))
 
 
 def train(

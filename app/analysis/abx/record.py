@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 from platformdirs import user_documents_path
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, computed_field
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, computed_field
 
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, Trial, p_value
 from app.instrument.events import NoteOn
@@ -16,11 +16,8 @@ from app.session.choices import Choices, PluckedString
 from app.session.listener import Listener
 from app.shared.version import program_version
 from engine.presets import preset_digest
-from engine.read_file import read_bounded
 from engine.result_file import WriteError, explain, whole_file
-from engine.schema import SchemaError, parse_json
 
-LARGEST_FILE_BYTES = 2**20  # 200 trials are a tenth of that
 PLUCK_FIELDS = {"seconds", *PluckedString.model_fields, *Listener.model_fields} - {"listen_right", "stereo"}
 BLOW_FIELDS = {"seconds", "listen"}
 MEANING = (
@@ -142,13 +139,3 @@ def save_record(folder: Path, record: AbxRecord) -> Path:
     with whole_file(path) as file:
         file.write(record.model_dump_json(indent=2).encode("utf-8"))
     return path
-
-
-def load_record(path: Path) -> AbxRecord:
-    """Reads a result, of this version or an earlier one. Raises SchemaError: it is missing, damaged, or none."""
-    try:
-        return AbxRecord.model_validate(parse_json(read_bounded(path, LARGEST_FILE_BYTES), "the result"))
-    except OSError as error:
-        raise SchemaError(f"{path}: {error.strerror}; choose the result of a listening test") from error
-    except (SchemaError, ValidationError, OverflowError) as error:
-        raise SchemaError(f"{path}: not the result of a listening test, or damaged ({error})") from error

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from app.export.sampled.job import export_sampled, kept_samples, note_renderer
+from app.export.sampled.job import export_sampled, note_renderer
 from app.export.sampled.plan import SampledPlan
 from app.export.sampled.words import SMALLEST_REPORTED_DB, megabytes, notes, number_of, pitch_words
 from app.shared.worker import Progress
@@ -34,8 +34,7 @@ class SampledExport:
         report = export_sampled(
             plan, self.out, note_renderer(load_preset(self.preset), plan.source), progress=progress
         )
-        kept = report.samples - report.rendered
-        samples = f"{number_of(report.rendered, 'sample')} rendered, {kept} kept, {megabytes(report.size_bytes)}"
+        samples = f"{number_of(report.samples, 'sample')}, {megabytes(report.size_bytes)}"
         alike = ", as loud as the instrument" if abs(report.gain_db) < SMALLEST_REPORTED_DB else ""
         level = f"peak {report.peak_db:.1f} dBFS{alike}"
         lines = [f"Saved {report.path} ({samples}, {level}, {pitch_words(plan.pitch_error_cents)})."]
@@ -43,7 +42,4 @@ class SampledExport:
         return "\n".join(lines)
 
     def cancelled(self) -> str:
-        kept = kept_samples(self.plan, self.out)
-        if not kept:
-            return "nothing was written."
-        return f"{kept} of {len(self.plan.zones)} samples are kept; export again to continue from there."
+        return "nothing was written."

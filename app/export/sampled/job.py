@@ -1,24 +1,25 @@
-"""The export of a patch as SFZ or SoundFont 2: samples rendered or kept, then the file that plays them.
-
-A stopped export continues with the same call: whole samples are kept, unless what they sound of has changed.
-"""
+"""The export of a patch as SFZ or SoundFont 2: samples, then the file that plays them."""
 
 from __future__ import annotations
 
 import re
+import shutil
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import soundfile
 
 from app.export.sampled.levels import headroom_db
-from app.export.sampled.plan import NoteRenderer, SampledPlan, SampledSource
+from app.export.sampled.plan import NoteRenderer, SampledPlan, SampledSource, Zone
+from app.export.sampled.sample import StoredSample, encoded, sample_of
 from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
-from app.export.sampled.store import INDEX, SampleStore, read_index
-from app.shared.worker import Cancelled, Progress
+from app.shared.worker import Progress
 from engine.result_file import WriteError, explain, whole_file
 
 if TYPE_CHECKING:
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".sfz", ".sf2")
 LONGEST_STEM = 60
+_OURS = re.compile(r"key\d{3}_vel\d{3}\.(flac|wav)|\.?index\.(json|lock)")  # an index: of earlier versions
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,7 @@ class SampledReport:
     """What was written.
 
     Attributes:
-        samples: how many the instrument has; rendered: how many of them were not there yet.
+        samples: how many the instrument has.
         size_bytes: of the instrument with all its samples.
         cut: samples that still rang at their end, and were faded out.
         gain_db: by how much the whole is louder than the patch: an SFZ is softer where a note would clip, a SoundFont
@@ -47,7 +49,6 @@ class SampledReport:
 
     path: Path
     samples: int
-    rendered: int
     size_bytes: int
     cut: int
     gain_db: float
@@ -60,9 +61,8 @@ def plain_stem(text: str) -> str:
 
 
 def sample_folder(out: Path) -> Path:
-    """Where the samples of an instrument's file lie; a SoundFont's only until it is whole."""
-    kind = "samples" if out.suffix.lower() == ".sfz" else "sf2_samples"
-    return out.with_name(f"{plain_stem(out.stem)}_{kind}")
+    """Where the samples of an SFZ lie."""
+    return out.with_name(f"{plain_stem(out.stem)}_samples")
 
 
 def planned(plan: SampledPlan, out: Path) -> SampledPlan:
@@ -84,40 +84,77 @@ def export_sampled(
 ) -> SampledReport:
     """Renders the samples of a plan and writes OUT.sfz beside their folder, or OUT.sf2 with all of them in it.
 
+    Until all samples are rendered, nothing else is changed.
+
     Raises:
         ValueError: see `planned`.
-        Cancelled: `progress` raised it; whole samples stay for the next time, without any no folder stays.
+        Cancelled: `progress` raised it; nothing is written.
         WriteError: a file cannot be written, or a note not rendered.
     """
-    plan = planned(plan, out)
-    store = SampleStore(sample_folder(out), out.name)
-    with store.locked():
-        try:
-            samples, rendered = store.fill(plan, render, progress)
-        except Cancelled:
-            if store.empty:
-                store.remove()
-            raise
-        try:
-            with whole_file(out) as file:
-                if out.suffix.lower() == ".sfz":
-                    file.write(sfz_text(plan, samples, store.folder.name).encode())
-                    gain_db = sfz_gain_db(plan.patch, samples)
-                else:
-                    gain_db = write_sf2(file, plan, samples, store.folder, progress)
-            size = out.stat().st_size
-            if out.suffix.lower() == ".sfz":
-                size += sum(store.path(plan.file_name(zone)).stat().st_size for zone in samples)
-        except OSError as error:
-            raise WriteError(explain(out, error)) from error
-        except soundfile.LibsndfileError as error:
-            raise WriteError(f"{store.folder}: a sample cannot be read ({error.error_string}); try again") from error
-    if out.suffix.lower() == ".sf2":
-        store.remove()
+    plan, soundfont = planned(plan, out), out.suffix.lower() == ".sf2"
+    folder = sample_folder(out)
+    if not soundfont:
+        _check_replaceable(folder, out)
+    try:
+        with TemporaryDirectory(prefix=f".{folder.name}_", dir=out.parent) as unfinished:
+            made = Path(unfinished) / folder.name
+            made.mkdir()
+            samples = _rendered(plan, made, render, progress)
+            if soundfont:
+                with whole_file(out) as file:
+                    gain_db = write_sf2(file, plan, samples, made, progress)
+                size = out.stat().st_size
+            else:
+                size = sum(path.stat().st_size for path in made.iterdir())
+                if folder.exists():
+                    shutil.rmtree(folder)
+                made.replace(folder)
+                with whole_file(out) as file:
+                    size += file.write(sfz_text(plan, samples, folder.name).encode())
+                gain_db = sfz_gain_db(plan.patch, samples)
+    except OSError as error:
+        raise WriteError(explain(out, error)) from error
+    except soundfile.LibsndfileError as error:
+        raise WriteError(f"{out}: a sample cannot be read ({error.error_string}); try again") from error
     cut = sum(sample.cut for sample in samples.values())
     headrooms_db = headroom_db(plan.patch, samples)
     loudest_db = max(sample.peak_db + headrooms_db[zone] for zone, sample in samples.items())
-    return SampledReport(out, len(samples), rendered, size, cut, gain_db, loudest_db + gain_db)
+    return SampledReport(out, len(samples), size, cut, gain_db, loudest_db + gain_db)
+
+
+def _check_replaceable(folder: Path, out: Path) -> None:
+    """Raises WriteError where a folder of samples is not of this instrument, or holds anything else."""
+    try:
+        others = [path for path in folder.iterdir() if not _OURS.fullmatch(path.name)]
+    except FileNotFoundError:
+        return
+    except OSError as error:
+        raise WriteError(explain(folder, error)) from error
+    if others or not out.exists():
+        raise WriteError(f"{folder}: holds other files; remove it, or choose another name for {out.name}")
+
+
+def _rendered(plan: SampledPlan, folder: Path, render: NoteRenderer, progress: Progress) -> dict[Zone, StoredSample]:
+    """Writes the sample of each zone into a folder."""
+    made = {}
+    started = time.monotonic()
+    for done, zone in enumerate(plan.zones):
+        share, text = done / len(plan.zones), f"key {zone.key}, velocity {zone.velocity}"
+        if done == 1:
+            started = time.monotonic()  # the first note also loads and compiles
+        left_s = (time.monotonic() - started) * (len(plan.zones) - done) / (done - 1) if done > 1 else None
+        report = partial(progress, share, text, left_s)
+        report()
+        path = folder / plan.file_name(zone)
+        note = (plan.patch, zone.key, zone.velocity, plan.seconds, plan.seconds, plan.rate_hz)
+        try:
+            sample = sample_of(render(*note, advanced=lambda _, report=report: report()), plan.rate_hz)  # type: ignore[misc]
+        except ValueError as error:
+            raise WriteError(f"{path.name}: {error}") from error
+        path.write_bytes(encoded(sample, plan.rate_hz, plan.format, plan.bits))
+        frames, channels = sample.sound.shape
+        made[zone] = StoredSample(frames, channels, sample.gain_db, round(sample.level_db, 3), sample.cut)
+    return made
 
 
 def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
@@ -137,18 +174,3 @@ def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
         return render_note(patch, preset, key, velocity, held_s, seconds, rate_hz, source, advanced)
 
     return rendered
-
-
-def kept_samples(plan: SampledPlan, out: Path) -> int:
-    """How many samples of a plan are there already from an export that was stopped, by its index.
-
-    Raises:
-        ValueError: see `planned`.
-        WriteError: there is an index that cannot be read.
-    """
-    plan = planned(plan, out)
-    index = read_index(sample_folder(out) / INDEX)
-    if index is None or index.instrument != out.name:
-        return 0
-    found = ((zone, index.samples.get(plan.file_name(zone))) for zone in plan.zones)
-    return sum(sample is not None and sample.made_from == plan.digest(zone) for zone, sample in found)

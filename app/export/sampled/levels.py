@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.export.sampled.plan import Zone
-from app.export.sampled.sample import INAUDIBLE_DBFS
-from app.export.sampled.store import StoredSample
+from app.export.sampled.sample import INAUDIBLE_DBFS, StoredSample
 from app.patches.patch import VELOCITIES, Patch
 
 Levels = NDArray[np.float64]  # in dB, (128,), by velocity; 0 is as 1

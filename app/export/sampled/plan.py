@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, Protocol, get_args
+from typing import Literal, Protocol, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +13,6 @@ from numpy.typing import NDArray
 from app.instrument.effects import channels_of
 from app.patches.patch import VELOCITIES, Patch
 from app.patches.tuning import Tuning
-from app.shared.version import program_version
 
 SampleFormat = Literal["flac", "wav"]
 SampleBits = Literal["16", "24"]
@@ -27,12 +24,6 @@ MOST_LAYERS = 32
 WIDEST_STEP = 12  # keys from one sample to the next
 SECONDS_RANGE = (0.1, 60.0)
 SAMPLED_RATE_RANGE_HZ = (8_000, 192_000)
-# Fields of a patch that no sample depends on. A macro's targets hold what it wrote; a sample is one key that is held
-# to its end, with no hand on a wheel: it is neither damped nor bent, and the same in every mode.
-UNHEARD_FIELDS = frozenset(
-    {"name", "category", "description", "author", "macros"}
-    | {"damping", "mode", "bend_semitones", "bend_by", "mod_wheel"}
-)
 
 
 class NoteRenderer(Protocol):
@@ -82,8 +73,6 @@ class SampledPlan:
         layers: velocity layers, of equal widths; each is rendered at the velocity whose pitch glide is nearest to the
             middle of all that it sounds for.
         seconds: the longest sample. One that is silent sooner ends there; one that still rings is faded out.
-        preset_sha256: of the model that plays the patch, so that samples of an earlier one are not kept.
-        body_sha256: of the impulse response of the user's own that is its body, for the same reason.
 
     Raises:
         ValueError: a value is out of its range; the message names it.
@@ -98,8 +87,6 @@ class SampledPlan:
     format: SampleFormat = "flac"
     bits: SampleBits = "24"
     source: SampledSource = "model"
-    preset_sha256: str = ""
-    body_sha256: str = ""
 
     def __post_init__(self) -> None:
         for name, value, known in (("format", self.format, FORMATS), ("bits", self.bits, SAMPLE_BITS)):
@@ -152,33 +139,6 @@ class SampledPlan:
 
     def file_name(self, zone: Zone) -> str:
         return f"{zone.stem}.{self.format}"
-
-    def digest(self, zone: Zone) -> str:
-        """SHA-256 of all that the sound of a zone's file depends on; names and descriptions are not among it."""
-        reported = {
-            "patch": self._heard_fields,
-            "preset": self.preset_sha256,
-            **({"body": self.body_sha256} if self.body_sha256 and "body" in self._heard_fields else {}),
-            "source": self.source,
-            "note": [zone.key, zone.velocity, self.seconds, self.rate_hz],
-            "file": [self.format, self.bits],
-            "version": program_version(),
-        }
-        return hashlib.sha256(json.dumps(reported, sort_keys=True).encode()).hexdigest()
-
-    @cached_property
-    def _heard_fields(self) -> dict[str, Any]:
-        """Of the patch: all that its samples depend on."""
-        body, room = self.patch.body, self.patch.room
-        silent = {
-            "amp": self.patch.amp.drive_db == 0,
-            "body": not body.name or body.mix == 0,
-            "room": room.mix == 0,
-        }
-        unheard = UNHEARD_FIELDS | {name for name, left_out in silent.items() if left_out}
-        if self.patch.sympathy_s_kg > 0 or self.patch.damping.mute > 0:  # how long strings ring, and which
-            unheard -= {"damping"}
-        return self.patch.model_dump(mode="json", exclude=set(unheard))
 
     def _zone(self, keys: tuple[int, int], velocities: tuple[int, int]) -> Zone:
         """Of equally good velocities the hardest is rendered."""

@@ -40,6 +40,22 @@ class Sample:
     cut: bool
 
 
+@dataclass(frozen=True)
+class StoredSample:
+    """A sample in its file; `gain_db`, `level_db` and `cut` as in `Sample`."""
+
+    frames: int
+    channels: int
+    gain_db: float
+    level_db: float
+    cut: bool = False
+
+    @property
+    def peak_db(self) -> float:
+        """Of the note as rendered, relative to full scale."""
+        return PEAK_DBFS - self.gain_db if self.level_db > INAUDIBLE_DBFS else INAUDIBLE_DBFS
+
+
 def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
     """Prepares a rendered note, (frames, channels), where ±1 is full scale.
 

@@ -18,7 +18,7 @@ import soundfile
 
 from app.export.sampled.levels import by_key, headroom_db, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
-from app.export.sampled.store import StoredSample
+from app.export.sampled.sample import StoredSample
 from app.export.wav import quantised
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version

@@ -12,7 +12,7 @@ import numpy as np
 
 from app.export.sampled.levels import Levels, by_key, headroom_db, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
-from app.export.sampled.store import StoredSample
+from app.export.sampled.sample import StoredSample
 from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
 from engine.plain_text import one_line

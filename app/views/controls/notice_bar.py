@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import datetime
 
-from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, QTimer
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPaintEvent, QPen
+from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
 
-from app.views import theme
 from app.views.controls.notice import Notice
 from app.views.controls.notice_list import NoticeList
 from app.views.controls.parts import tool_button
@@ -126,41 +124,16 @@ class NoticeBar(QFrame):
 
 
 class Bell(QToolButton):
-    """The button that opens the list; a number says how many notices have not been seen there."""
+    """The button that opens the list, with the number of notices that have not been seen there."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.unseen = 0
         self.set_unseen(0)
 
-    def sizeHint(self) -> QSize:
-        return QSize(theme.px(44), super().sizeHint().height())
-
     def set_unseen(self, unseen: int) -> None:
         self.unseen = unseen
         state = f"{unseen} unread" if unseen else "none unread"
+        self.setText(f"⚑ {min(unseen, 99)}" if unseen else "⚑")
         self.setAccessibleName(f"Notices, {state}")
         self.setToolTip(f"Notices since the start: {state} (F8)")
-        self.update()
-
-    def paintEvent(self, event: QPaintEvent) -> None:
-        super().paintEvent(event)
-        painter = QPainter(self)
-        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        middle = QPointF(self.width() / 2 - (6 if self.unseen else 0), self.height() / 2)
-        painter.translate(middle)
-        bell = QPainterPath(QPointF(-6, 4))
-        bell.cubicTo(QPointF(-4, 1), QPointF(-5, -6), QPointF(0, -6))
-        bell.cubicTo(QPointF(5, -6), QPointF(4, 1), QPointF(6, 4))
-        bell.closeSubpath()
-        painter.setPen(QPen(QColor(theme.TEXT if self.unseen else theme.FAINT), 1.4))
-        painter.drawPath(bell)
-        painter.drawArc(QRectF(-2, 4, 4, 4), 180 * 16, 180 * 16)
-        if self.unseen:
-            painter.setFont(theme.small_font(10, bold=True))
-            painter.setPen(QColor(theme.WARNING))
-            painter.drawText(
-                QRectF(8, -theme.px(8), theme.px(18), theme.px(16)),
-                Qt.AlignmentFlag.AlignVCenter,
-                str(min(self.unseen, 99)),
-            )

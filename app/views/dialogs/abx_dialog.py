@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QStackedWidget, QVBoxLayout, QWidget
 
-from app.analysis.abx.record import AbxRecord, default_folder, load_record, save_record
+from app.analysis.abx.record import AbxRecord, default_folder, save_record
 from app.analysis.abx.sound import Stimuli, make_stimuli
 from app.analysis.abx.trials import AbxChoices, Identity, Run, Sound
 from app.audio.sound import Sound as SoundOutput
@@ -24,7 +24,6 @@ from app.audio.sound import SoundStatus
 from app.playing.pair import Pair
 from app.views.dialogs.abx_pages import ResultPage, SetupPage, TrialPage
 from engine.result_file import WriteError
-from engine.schema import SchemaError
 
 Render = Callable[[int], "Future[Mapping[str, NDArray[np.float32]]]"]
 
@@ -110,7 +109,6 @@ class AbxDialog(QDialog):
     def _connect(self) -> None:
         setup, trial, result = self._setup, self._trial, self._result
         setup.start.clicked.connect(self._start)
-        setup.open_result.clicked.connect(self._open_result)
         setup.audition_asked.connect(self._audition)
         trial.audition_asked.connect(self._audition)
         trial.replay_asked.connect(lambda: self._audition(self._sounding or "X", again=True))
@@ -220,20 +218,6 @@ class AbxDialog(QDialog):
         self._hush()
         self._pages.setCurrentWidget(self._result)
         self._result.show_record(record)
-
-    def _open_result(self) -> None:
-        """Shows a result that was saved."""
-        folder = self._folder or str(default_folder())
-        path, _ = QFileDialog.getOpenFileName(self, "Open the result of a listening test", folder, "JSON (*.json)")
-        if not path:
-            return
-        try:
-            record = load_record(Path(path))
-        except SchemaError as error:
-            QMessageBox.warning(self, "Listening test", str(error))
-            return
-        self._show_result(record)
-        self._result.show_saved(path, failed=False)
 
     def _save(self, folder: Path) -> None:
         assert self._record is not None

@@ -50,7 +50,6 @@ class SetupPage(QWidget):
         self._needed, self._warning = label("faint"), label("warning")
         self.start = push_button("Start the test", "Begin the first trial")
         self.start.setObjectName("play")
-        self.open_result = push_button("Open result …", "Show a result that was saved")
         self.close_button = push_button("Close", "Close the listening test")
         self._listen = []
         form = QFormLayout()
@@ -62,7 +61,7 @@ class SetupPage(QWidget):
         form.addRow(form_label("Trials"), row_of(self.trials, self._needed))
         form.addRow(form_label("Switch"), self.restart)
         self._needed.setMinimumWidth(320)
-        buttons = filled(QHBoxLayout(), self.open_result, None, self.close_button, self.start)
+        buttons = filled(QHBoxLayout(), None, self.close_button, self.start)
         _stack(self, label(text=RULES), form, label("faint", MEANING), None, self._warning, buttons)
         self._show_trials(choices.trials)
 

@@ -9,8 +9,8 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
-from PySide6.QtCore import QCoreApplication, QEvent, Qt, QTimer, QUrl, Signal
-from PySide6.QtGui import QDesktopServices, QKeyEvent
+from PySide6.QtCore import Qt, QTimer, QUrl, Signal
+from PySide6.QtGui import QDesktopServices
 from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QPushButton, QTabBar, QVBoxLayout, QWidget
 
 from app.export.choices import ExportChoices
@@ -39,8 +39,6 @@ MEANWHILE = "You can play on meanwhile."
 class ExportDialog(QDialog):
     """Follows what the window plays (`show_subjects`) until an export begins.
 
-    While one runs, the keyboard goes to the parent's window; Escape in the dialog still cancels.
-
     Attributes:
         state: a line or more on what is to come, on progress, or on the result.
         save: the button that starts.
@@ -52,7 +50,6 @@ class ExportDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Export")
         self.setMinimumWidth(680)
-        self._window = None if parent is None else parent.window()
         self._export = export
         self._background = Background("export", self, expected=EXPECTED)
         self._background.progressed.connect(self._show_progress)
@@ -176,25 +173,8 @@ class ExportDialog(QDialog):
         self.bar.show()
         self._tell("Rendering …")
         self._background.start(lambda work: job.run(work.progress))
-        self._lend_keyboard(True)
-
-    def _lend_keyboard(self, lent: bool) -> None:
-        """While a tool window has the focus, its parent's shortcuts work."""
-        if self._window is None:
-            return
-        kind = Qt.WindowType.Tool if lent else Qt.WindowType.Dialog
-        self.overrideWindowFlags((self.windowFlags() & ~Qt.WindowType.WindowType_Mask) | kind)
-        if lent:
-            self._window.activateWindow()
-
-    def event(self, event: QEvent) -> bool:
-        """Passes keys on to the parent's window while a job lends it the keyboard, all but Escape."""
-        if isinstance(event, QKeyEvent) and self.job is not None and self._window is not None:
-            if event.key() == Qt.Key.Key_Escape:
-                event.accept()  # no shortcut of the window
-            elif event.type() != QEvent.Type.ShortcutOverride:
-                return QCoreApplication.sendEvent(self._window, event)
-        return super().event(event)
+        if (parent := self.parentWidget()) is not None:
+            parent.window().activateWindow()  # whose keys play on
 
     def _show_progress(self, share: float, text: str, left_s: float | None) -> None:
         self.bar.setValue(round(1000 * share))
@@ -217,7 +197,6 @@ class ExportDialog(QDialog):
 
     def _end(self, text: str, failed: bool = False) -> None:
         """The job is over, with this result."""
-        self._lend_keyboard(False)
         self.bar.hide()
         for part in (*self._choosers, self.save):
             part.setEnabled(True)

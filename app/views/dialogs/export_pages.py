@@ -28,11 +28,10 @@ from app.export.plugin.job import PluginExport
 from app.export.recipe import source_words
 from app.export.sampled.choices import SampledChoices
 from app.export.sampled.export import SampledExport
-from app.export.sampled.job import kept_samples, plain_stem
+from app.export.sampled.job import plain_stem, planned
 from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampledPlan
 from app.export.sampled.words import counted, megabytes, needed_bytes, number_of, pitch_words, size_words
 from app.export.sound import DECAY_RANGE_DB, LONGEST_S
-from app.instrument.bodies import body_digest
 from app.instrument.effects import body_problem
 from app.instrument.events import NoteOn
 from app.patches.patch import Patch
@@ -41,7 +40,6 @@ from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Bits, Source
 from app.views.controls.form import FilePicker, check_box, count_box, form_label, row_of, spin_box
 from app.views.controls.note_box import NoteBox
 from app.views.controls.parts import combo_box, faint, label
-from engine.presets import PresetError, preset_digest
 from engine.result_file import WriteError, explain
 
 Rows = dict[str, QWidget | QLayout]
@@ -66,7 +64,6 @@ SYSTEM_NAMES = {
 PLUGIN_NOTE = "The first one takes one to three minutes, later ones some seconds."
 RECIPE_NOTE = "Drop the file on the window to restore its instrument, or its preset and pluck."
 MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
-RESUMES = "A cancelled export keeps its samples, and continues from there the next time."
 
 
 @dataclass(frozen=True)
@@ -292,7 +289,7 @@ class SamplerPage(ExportPage):
     def __init__(self, choices: SampledChoices) -> None:
         super().__init__()
         self._subject: HeardInstrument | None = None
-        self._chosen_keys, self._digest = choices.keys, ""
+        self._chosen_keys = choices.keys
         self.what = label()
         self.form = combo_box("Format", FORM_NAMES, choices.form)
         self.form.setToolTip("An SFZ has a folder of samples beside it; a SoundFont is one file, of 16 bits")
@@ -334,15 +331,10 @@ class SamplerPage(ExportPage):
 
     def show_subject(self, subject: HeardInstrument | None) -> None:
         """Another patch, or the same that was turned: chosen keys stay as far as it has them."""
-        keys, before, self._subject = self.keys(), self._subject, subject
+        keys, self._subject = self.keys(), subject
         if subject is None:
             return
         patch, preset = subject.patch, subject.preset
-        if before is None or before.preset != preset or not self._digest:
-            try:
-                self._digest = preset_digest(preset.path)
-            except (OSError, PresetError):  # reported when it is played
-                self._digest = ""
         low, high = patch.range
         chosen = keys if keys and low <= keys[0] <= keys[1] <= high else patch.range
         for box, key in zip((self.lowest, self.highest), chosen, strict=True):
@@ -389,8 +381,6 @@ class SamplerPage(ExportPage):
             chosen.seconds,
             chosen.rate_hz,
             source=chosen.source,
-            preset_sha256=self._digest,
-            body_sha256=body_digest(patch.body.name),
         )
         if chosen.form != "sf2":
             plan = replace(plan, format=chosen.form, bits=chosen.bits)
@@ -401,14 +391,14 @@ class SamplerPage(ExportPage):
         job = self.job()
         plan, out, soundfont = job.plan, job.out, job.out.suffix.lower() == ".sf2"
         try:
-            kept, free = kept_samples(plan, out), disk_usage(out.parent).free
+            planned(plan, out)
+            free = disk_usage(out.parent).free
         except OSError as error:
             raise WriteError(explain(out.parent, error)) from error
         short = f"; {megabytes(free)} are free there" if needed_bytes(plan, soundfont) > free else ""
         pitch = pitch_words(plan.pitch_error_cents)
         self.size_text.setText(f"{counted(plan)}, {size_words(plan, soundfont)}{short}; {pitch}")
-        words = f"{kept} of {len(plan.zones)} samples are there already, and are kept." if kept else RESUMES
-        return "Replace" if out.is_file() else "Continue" if kept else "Export", words
+        return "Replace" if out.is_file() else "Export", ""
 
     def _suggest_name(self) -> None:
         soundfont = self.form.currentData() == "sf2"

@@ -34,7 +34,7 @@ STEP, FINE_STEP = 0.05, 0.01  # of the arrow keys, in half-lengths
 MARK_TIP = "Drag to hear the drum from another side; double-click resets. Shift and arrow keys move it"
 TIPS: dict[str | None, str] = {  # by what the pointer is on
     None: "Click to strike the drum with the velocity of the keys; with Shift as hard as it goes.\n"
-    "Arrow keys move the place, Enter strikes there; with Ctrl Up and Down choose another drum of a kit",
+    "Arrow keys move the place, Enter strikes there",
     "left": MARK_TIP,
     "right": MARK_TIP.replace("Shift", "Ctrl, Shift"),
 }
@@ -48,7 +48,6 @@ class DrumView(StageView):
     struck = Signal(float, float, bool)  # place, and whether as hard as it goes
     place_moved = Signal(float, float)
     place_reset = Signal()
-    drum_stepped = Signal(int)  # so many drums up or down
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Drum", TIPS[None] or "", parent)
@@ -158,8 +157,6 @@ class DrumView(StageView):
             place = self._place[0] + step * sideways, self._place[1] + step * upwards
             if self.axes.holds(place):
                 self.place_moved.emit(*place)
-        elif upwards:
-            self.drum_stepped.emit(upwards)
         elif key == _Key.Key_Delete and held & _Shift:
             self._reset_marks()
         elif key == _Key.Key_Delete:

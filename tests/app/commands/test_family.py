@@ -1,21 +1,17 @@
-"""family on the command line: errors on strings of the family, and their picture."""
+"""family on the command line: errors on strings of the family."""
 
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 
-def test_evaluate_draws_the_errors(run, folder: Path) -> None:
-    picture = folder / "map.svg"
+def test_evaluate_has_errors_by_rise_of_tension(run) -> None:
     words = (
         "family",
         "evaluate",
         "studio_any_string",
         "--strings",
         2,
-        "--picture",
-        picture,
         "--rate",
         8_000,
     )
@@ -25,30 +21,8 @@ def test_evaluate_draws_the_errors(run, folder: Path) -> None:
         parts = facts[column]["studio_any_string"]["by_rise"]
         assert sum(part["strings"] for part in parts) == 2
         assert all(0 < part["geometric_mean"] <= 1.001 * part["worst"] for part in parts)
-    drawn = picture.read_text()
-    assert "studio_any_string: 4 strings" in drawn
-    assert "beyond the family" in drawn
     shown = run(*words)
     assert "rise of tension" in shown.out
-    assert picture.read_text() == drawn
-    assert "choose one of these suffixes" in run(*words[:-4], "--picture", folder / "map.bmp").failure
-
-
-def test_partials_over_the_family(run) -> None:
-    words = ("family", "partials", "studio_any_string", "--strings", 2, "--seconds", 0.25, "--rate", 8_000)
-    found = json.loads(run(*words, "--json").out)
-    for column in ("inside", "beyond"):
-        assert found[column]["quiet_first_cents"]["worst"] < 1e-4
-        assert found[column]["quiet_first_cents"]["worst"] <= found[column]["quiet_cents_largest"]["worst"]
-        for name in ("quiet_cents", "level_db", "t60_percent", "glide_cents"):
-            mean, largest = (found[column][f"{name}_{kind}"] for kind in ("mean", "largest"))
-            assert 0 < mean["median"] < mean["worst"] <= largest["worst"] < 1
-            assert "Hz, B " in mean["worst_at"]
-    shown = run(*words)
-    assert "quiet pluck, the first mode's pitch, cents" in shown.out
-    assert shown.out.count("glide of any, cents") == 2
-    assert "must lie in 0.25 … 10 s" in run(*words[:5], "--seconds", 0.1).usage
-    assert "learned one string" in run("family", "partials", "studio_steel_e4").failure
 
 
 def test_more_strings_for_the_tenth_second_than_there_are_is_reported_at_once(run) -> None:

@@ -74,7 +74,7 @@ def test_what_lies_past_or_outside_the_training_is_reported(run, small_preset: P
     found = run(*render(small_preset, folder / "a.wav", "--seconds", 0.2, position=0.1))
     assert found.err.splitlines() == [
         "learned-strings: warning: position 0.1 is outside the trained 0.3 … 0.7",
-        "learned-strings: note: from 0.1 s on, the model is past its training (marked in the file)",
+        "learned-strings: note: from 0.1 s on, the model is past its training",
     ]
 
 

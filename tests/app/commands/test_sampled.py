@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import soundfile
 
 from app.commands.sampled import _keys
 from app.export.sampled.plan import SampledPlan
@@ -37,7 +37,7 @@ def notes(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
 def test_an_sfz_with_its_samples(run, notes: list[tuple], folder: Path) -> None:
     found = run("sampled", PATCH, folder / "a.sfz", *SMALL, "--source", "truth", "--rate", 44_100)
     assert found.status == 0
-    assert found.out.startswith(f"{folder / 'a.sfz'}: 6 samples rendered, 0 kept, ")
+    assert found.out.startswith(f"{folder / 'a.sfz'}: 6 samples, ")
     assert "6 samples (3 keys, 2 velocity layers), at most 0.3 MB" in found.err
     preset = find_patch(PATCH).patch.preset
     plan = SampledPlan(find_patch(PATCH).patch, (60, 62), layers=2)
@@ -45,10 +45,6 @@ def test_an_sfz_with_its_samples(run, notes: list[tuple], folder: Path) -> None:
     pitch = f"; note starts within {plan.pitch_error_cents:.1f} cents of the instrument\n"
     assert found.out.endswith(pitch) and pitch in found.err
     assert len(list((folder / "a_samples").glob("*.flac"))) == 6
-    assert (
-        "0 samples rendered, 6 kept"
-        in run("sampled", PATCH, folder / "a.sfz", *SMALL, "--source", "truth", "--rate", 44_100).out
-    )
 
 
 def test_a_soundfont_is_one_file(run, notes: list[tuple], folder: Path) -> None:
@@ -61,10 +57,9 @@ def test_a_soundfont_is_one_file(run, notes: list[tuple], folder: Path) -> None:
 
 def test_format_and_bits(run, notes: list[tuple], folder: Path) -> None:
     run("sampled", PATCH, folder / "a.sfz", *SMALL, "--format", "wav", "--bits", "16")
-    index = json.loads((folder / "a_samples" / "index.json").read_bytes())
-    for name, sample in index["samples"].items():
-        size = (folder / "a_samples" / name).stat().st_size
-        assert size == 44 + 2 * sample["channels"] * sample["frames"]
+    for path in (folder / "a_samples").iterdir():
+        facts = soundfile.info(path)
+        assert path.stat().st_size == 44 + 2 * facts.channels * facts.frames
 
 
 def test_a_dry_one_has_no_room(run, notes: list[tuple], folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,26 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from matplotlib.image import imread
 
 from training.cell import Cell, configuration_of
 from training.results import Row, add_rows
-
-TINY = """
-title = "Tiny"
-model = "koopman_var"
-model_configuration = { state_size = 8, multiplier_widths = [4] }
-[data]
-initial = "gaussian"
-rate_hz = 4000
-modes = 5
-steps = 50
-count = 20
-[recipe]
-epochs = 1
-steps_per_batch = 8
-first_horizon = 10
-"""
 
 
 @pytest.fixture
@@ -39,19 +22,6 @@ def results(tmp_path: Path) -> Path:
         digest = configuration_of(cell).digest
         rows.append(Row(digest, cell.name, "done", **facts, recipe="paper", seed=seed, **figures))
     add_rows(path, rows)
-    return path
-
-
-@pytest.fixture(scope="module")
-def tiny(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A trained preset, which knows its data set."""
-    from app.commands.cli import main
-
-    folder = tmp_path_factory.mktemp("tiny")
-    (folder / "tiny.toml").write_text(TINY, encoding="utf-8")
-    path = folder / "tiny.safetensors"
-    words = ["train", folder / "tiny.toml", "--output", path, "--runs", folder / "runs", "--cache", folder / "cache"]
-    assert main([str(word) for word in words]) == 0
     return path
 
 
@@ -108,51 +78,9 @@ def test_a_file_that_is_no_results_file_is_reported(run, folder: Path) -> None:
     assert "not a results file" in run("table", "--results", folder / "other.csv").failure
 
 
-def test_the_figure_is_drawn(run, tiny: Path, folder: Path) -> None:
-    path = folder / "figure.png"
-    found = run("figure", "extrapolation", tiny, "--output", path)
-    assert (found.status, found.err, found.out) == (0, "", f"{path}\n")
-    height, width, _ = imread(path).shape
-    assert min(height, width) > 1000
-    assert list(folder.iterdir()) == [path]
-
-
-@pytest.mark.parametrize("group", ["family", "figure"])
+@pytest.mark.parametrize("group", ["family", "drums"])
 def test_a_list_of_commands_cuts_no_summary(run, group: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     listed = run(group, "--help").out.partition("Commands:")[2].strip().splitlines()
     assert len(listed) >= 2
     assert all(line.endswith(".") and not line.endswith("...") for line in listed)
-
-
-def test_the_map_of_ratios_is_drawn_from_the_rows(run, results: Path, folder: Path) -> None:
-    nonlinear = Cell("s5", True, "noise", 4000, recipe="paper")
-    facts: dict[str, Any] = {"model": "s5", "string": "nonlinear", "initial": "noise", "rate_hz": 4000}
-    figures: dict[str, Any] = {"horizon": 4000, "recipe": "paper", "seed": 0, "initialisation": "paper"}
-    digest = configuration_of(nonlinear).digest
-    add_rows(results, [Row(digest, nonlinear.name, "done", **facts, **figures, rel_mse=0.001, rel_mae=0.01)])
-    path = folder / "ratios.svg"
-    assert run("figure", "ratios", "--results", results, "--output", path).out == f"{path}\n"
-    drawn = path.read_text(encoding="utf-8")
-    assert drawn.count(">0.052<") == 1  # 0.01 over the paper's 0.1916
-    assert drawn.count(">–<") == 6 * 8 - 1
-    assert "suffixes" in run("figure", "ratios", "--results", results, "--output", folder / "a.bmp").usage
-
-
-def test_a_figure_stands_here_by_default(run, tiny: Path, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(folder)
-    assert run("figure", "extrapolation", tiny).out == "extrapolation.png\n"
-    assert (folder / "extrapolation.png").exists()
-
-
-def test_bad_usage_of_figures_is_reported(run, tiny: Path, small_preset: Path, folder: Path) -> None:
-    draw = ("figure", "extrapolation")
-    assert "suffixes" in run(*draw, tiny, "--output", folder / "figure.bmp").usage
-    assert "--seconds" in run(*draw, tiny, "--seconds", 1e6).usage
-    assert "--listen" in run(*draw, tiny, "--listen", 2).usage
-    path = folder / "figure.svg"
-    assert "there is no trajectory 9" in run(*draw, tiny, "--trajectory", 9, "--output", path).failure
-    assert "metadata.training" in run(*draw, small_preset, "--output", path).failure
-    assert "no preset 'nothing'" in run(*draw, "nothing", "--output", path).failure
-    assert "make the folder first" in run(*draw, tiny, "--output", folder / "a" / "b.png").failure
-    assert not list(folder.iterdir())

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 import csv
 import errno
-import json
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,8 +11,9 @@ import pytest
 import torch
 
 from engine.presets import load_preset, preset_digest
-from engine.result_file import REMEDIES
 from tests.app.commands.conftest import FullDisk
+from training.cell import load
+from training.data.dataset import load_dataset
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import read_heard
 from training.heard_words import heard_word
@@ -128,33 +128,23 @@ def test_a_run_of_another_configuration_is_refused(run, place: Place) -> None:
     assert "belongs to another configuration; delete it" in run(*words).failure
 
 
-def test_a_data_set_is_described(run, place: Place) -> None:
-    facts = json.loads(run("dataset", place.configuration, *place.cache, "--json").out)
-    assert facts["shape"] == [20, 51, 5]
-    assert Path(facts["folder"], "amplitudes.npy").exists()
-    assert 0 < facts["tension_rise"]["median"] < facts["tension_rise"]["max"] < 1
-    reported = run("dataset", place.configuration, *place.cache)
-    assert (reported.status, facts["key"] in reported.out, "tension rise" in reported.out) == (0, True, True)
-
-
 @pytest.mark.parametrize("bytes_left", [0, 100, 15_000])
-def test_a_full_disk_leaves_no_half_data_set(run, place: Place, bytes_left: int, full_disk: FullDisk) -> None:
-    words = ["dataset", place.configuration, *place.cache]
-    run(*words)
+def test_a_full_disk_leaves_no_half_data_set(place: Place, bytes_left: int, full_disk: FullDisk) -> None:
+    configuration, cache = load(str(place.configuration)).data, place.folder / "cache"
+    load_dataset(configuration, cache)
     (made,) = (path for path in (place.folder / "cache" / "datasets").iterdir() if path.is_dir())
     whole = {path.name: path.read_bytes() for path in made.iterdir()}
     shutil.rmtree(made)
-    with full_disk(bytes_left):
-        reported = run(*words).failure
-    assert reported == f"learned-strings: {made}: cannot be written (File too large); {REMEDIES[errno.EFBIG]}"
+    with full_disk(bytes_left), pytest.raises(OSError) as full:
+        load_dataset(configuration, cache)
+    assert (full.value.filename, full.value.errno) == (str(made), errno.EFBIG)
     assert [path.suffix for path in made.parent.iterdir()] == [".lock"]
-    assert run(*words).status == 0
+    load_dataset(configuration, cache)
     assert {path.name: path.read_bytes() for path in made.iterdir()} == whole
 
 
-@pytest.mark.parametrize("command", ["dataset", "train"])
-def test_a_configuration_that_is_not_there_is_reported(run, command: str) -> None:
-    assert "no training configuration 'nothing'" in run(command, "nothing").failure
+def test_a_configuration_that_is_not_there_is_reported(run) -> None:
+    assert "no training configuration 'nothing'" in run("train", "nothing").failure
 
 
 def test_a_wrong_field_is_reported(run, place: Place) -> None:

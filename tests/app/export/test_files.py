@@ -20,7 +20,6 @@ from app.export.files import (
 from app.export.recipe import Recipe
 from app.export.sound import SoundRequest, Voices, render_sound
 from app.export.wav import WavSettings
-from app.export.wav_chunks import Marker
 from app.playing.ahead import AheadVoice
 from app.shared.vocabulary import BITS, Bits, Source
 from app.shared.worker import Cancelled
@@ -32,7 +31,6 @@ from engine.result_file import WriteError
 from engine.sources import ModelSource, TruthSource
 from engine.voices import Ear, Mixer, Voice, model_program, offline, truth_program
 from engine.voices.voice import ATTACK_S
-from tests.app.export.markers import read_markers
 
 PLAIN = WavSettings("32f", fade_out_s=0)
 
@@ -225,7 +223,7 @@ def test_both_sources_lie_side_by_side_or_in_two_files_of_one_gain(request_: Sou
     model, truth = (render_sound(replace(request_, source=s)) for s in ("model", "truth"))  # type: ignore[arg-type]
     assert (render_sound(replace(request_, source="both")) == np.stack([model, truth], axis=1)).all()
     paths = {"model": tmp_path / "m.wav", "truth": tmp_path / "t.wav", "difference": tmp_path / "d.wav"}
-    reports, _ = export_sounds(request_, paths, WavSettings("32f", normalise=True, fade_out_s=0))  # type: ignore[arg-type]
+    reports = export_sounds(request_, paths, WavSettings("32f", normalise=True, fade_out_s=0))  # type: ignore[arg-type]
     assert [report.path for report in reports] == list(paths.values())
     assert len({report.gain_db for report in reports}) == 1
     m, t, d = (soundfile.read(path)[0] for path in paths.values())
@@ -272,15 +270,3 @@ def test_files_of_a_decay_have_one_length_and_an_unfinished_one_is_reported(
     assert model.decayed
     assert truth.past_training_s == 0 < model.past_training_s
     assert not export_sound(replace(decaying, seconds=0.1), tmp_path / "m.wav").decayed
-
-
-@pytest.mark.parametrize("bits", BITS)
-def test_the_end_of_training_is_marked_in_the_file(request_: SoundRequest, bits: Bits, tmp_path: Path) -> None:
-    for source, marks in (("model", [Marker(1200, "end of training")]), ("truth", [])):
-        path = tmp_path / f"{source}.wav"
-        export_sound(replace(request_, source=source), path, WavSettings(bits, 12_000))  # type: ignore[arg-type]
-        assert read_markers(path.read_bytes()) == marks
-        with soundfile.SoundFile(path) as file:
-            assert file.frames == 2400
-            assert ("Cue ID :  1  Pos :  1200" in file.extra_info) == bool(marks)  # as libsndfile reads it
-            assert ("labl : 1 : end of training" in file.extra_info) == bool(marks)

@@ -37,9 +37,9 @@ def test_any_blocks_make_the_same_bytes(bits: wav.Bits, normalise: bool, monkeyp
     sound = np.random.default_rng(0).normal(size=(1000, 2)) / 3
     settings = wav.WavSettings(bits, normalise=normalise)
     whole, again = io.BytesIO(), io.BytesIO()
-    level = wav.write_wav(whole, sound, 8000, settings, {"title": "a"}, [2 * sound], {"here": 0.05})
+    level = wav.write_wav(whole, sound, 8000, settings, {"title": "a"}, [2 * sound])
     monkeypatch.setattr(recording.blocks, "__defaults__", (7,))
-    assert wav.write_wav(again, sound, 8000, settings, {"title": "a"}, [2 * sound], {"here": 0.05}) == level
+    assert wav.write_wav(again, sound, 8000, settings, {"title": "a"}, [2 * sound]) == level
     assert again.getvalue() == whole.getvalue() and (level.clipped > 0) == (bits != "32f" and not normalise)
 
 

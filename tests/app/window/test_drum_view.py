@@ -229,14 +229,8 @@ def test_a_kit_shows_the_drum_that_is_struck(qtbot: QtBot, drummed: Controller) 
         name = kit.strings.of_key(key).name  # type: ignore[union-attr]
         qtbot.waitUntil(lambda name=name: name in drummed.drum.view.accessibleDescription())  # type: ignore[misc]
     drummed.drum.view.setFocus()
-    QTest.keyClick(drummed.drum.view, Qt.Key.Key_Up, Qt.KeyboardModifier.ControlModifier)
-    name = kit.strings.of_key(37).name  # type: ignore[union-attr]
-    assert name in drummed.drum.view.accessibleDescription()
     QTest.keyClick(drummed.drum.view, Qt.Key.Key_Return)
-    assert note(drummed).event.key == 37
-    QTest.keyClick(drummed.drum.view, Qt.Key.Key_Down, Qt.KeyboardModifier.ControlModifier)
-    QTest.keyClick(drummed.drum.view, Qt.Key.Key_Down, Qt.KeyboardModifier.ControlModifier)
-    assert drummed.instruments.drum_key == 36, "the lowest"
+    assert note(drummed).event.key == 36
     qtbot.waitUntil(lambda: shown(drummed) is not None)
     drummed.session.update(instrument=read_patch(PATCHES / "tuned_toms.json"))
     assert shown(drummed) is None

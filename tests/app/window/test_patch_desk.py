@@ -22,7 +22,6 @@ from app.rendering.subject import string_of
 from app.shared.key_names import note_name
 from app.window.controller import Controller
 from app.window.patch_desk import NOTE_REPORTED_AFTER_MS
-from engine.presets.of_string import STRINGS, read_string
 from tests.app.instrument.seen import Seen, sounding
 
 
@@ -282,29 +281,6 @@ def test_dropped_files_are_played_and_chosen(qtbot: QtBot, played: Controller, t
     informed: list[str] = []
     played.patches.reported.connect(reported.append)
     played.patches.informed.connect(informed.append)
-    played.take_file(STRINGS / "steel_g3.toml")
-    assert played.session.choices.string is not None
-    assert played.session.choices.string.parameters == read_string(STRINGS / "steel_g3.toml")
-    assert "steel_g3.toml is plucked" in informed.pop()
-    assert not reported  # it is no error
-    (tmp_path / "bad.toml").write_text("length_m = -1")
-    played.take_file(tmp_path / "bad.toml")
-    assert "bad.toml" in reported.pop()
-    (tmp_path / "short.toml").write_text("length_m = 0.65")
-    played.take_file(tmp_path / "short.toml")
-    assert "short.toml: area_m2, " in reported[-1]
-    assert "are missing" in reported.pop()
-    steel = (STRINGS / "steel_g3.toml").read_text(encoding="utf-8")
-    heavy = steel.replace("d1_kg_m_s = 0.00098472", "d1_kg_m_s = 900.0")
-    (tmp_path / "heavy.toml").write_text(heavy, encoding="utf-8")
-    played.take_file(tmp_path / "heavy.toml")
-    assert "heavy.toml: " in reported[-1]
-    assert "overdamped" in reported.pop()
-    assert played.session.choices.string.parameters == read_string(STRINGS / "steel_g3.toml")
-    slack = steel.replace("tension_n = 74.173", "tension_n = 0.74173")
-    (tmp_path / "slack.toml").write_text(slack, encoding="utf-8")
-    played.take_file(tmp_path / "slack.toml")
-    assert "Beyond training: pitch" in informed.pop()
     (tmp_path / "bad.mid").write_bytes(b"no")
     played.take_file(tmp_path / "bad.mid")
     assert "bad.mid" in reported[0]

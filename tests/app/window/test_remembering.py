@@ -1,4 +1,4 @@
-"""Settings outlive a kill, two instances keep each other's, and any file lets the app start."""
+"""Settings outlive a kill, and any file lets the app start."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pytestqt.qtbot import QtBot
 
 from app.session.choices import Choices
 from app.window.remembering import SettingsSaver
-from app.window.settings import Settings, load_settings, merged, save_settings
+from app.window.settings import Settings, load_settings, save_settings
 
 
 class Desk:
@@ -49,28 +49,6 @@ def test_a_change_is_saved_once_it_rests(qtbot: QtBot, tmp_path: Path) -> None:
     desk.look()
     desk.keeper.close()
     assert path.stat().st_mtime_ns == before  # nothing new, nothing written
-
-
-def test_two_instances_keep_what_the_other_changed(qtbot: QtBot, tmp_path: Path) -> None:
-    owner, path = QObject(), tmp_path / "settings.json"
-    one, other = Desk(path, owner), Desk(path, owner)
-    one.choose(position=0.41)
-    one.keeper.close()
-    other.choose(amplitude_mm=2.5)
-    other.now = other.now.model_copy(update={"favourites": ("mine",)})
-    other.keeper.close()
-    found, notice = load_settings(path)
-    assert (found.choices.position, found.choices.amplitude_mm, found.favourites) == (0.41, 2.5, ("mine",))
-    assert notice == ""
-    assert [each.name for each in tmp_path.glob("*.json")] == ["settings.json"]
-
-
-def test_merged_is_mine_where_i_changed_it() -> None:
-    base = Settings()
-    mine = base.model_copy(update={"window_geometry": "mine"})
-    theirs = base.model_copy(update={"window_geometry": "theirs", "favourites": ("theirs",)})
-    assert merged(base, mine, theirs).window_geometry == "mine"
-    assert merged(base, mine, theirs).favourites == ("theirs",)
 
 
 def test_a_folder_that_cannot_be_written_is_reported_once(qtbot: QtBot, tmp_path: Path) -> None:

@@ -180,8 +180,7 @@ class Inline(Script):
 
 @pytest.fixture
 def alone(options: Options, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Options:
-    """Another place for the same runs, without their plots, in this process."""
-    monkeypatch.setattr("training.run._plot", lambda *arguments: None)
+    """Another place for the same runs, in this process."""
     return replace(options, results=tmp_path / "alone.csv", runs=tmp_path / "alone")
 
 

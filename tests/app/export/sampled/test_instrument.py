@@ -90,46 +90,6 @@ def test_a_note_starts_within_the_reported_error(key: int, layers: int, play: Ca
     assert max(at_hardest) > 1.6 * max(errors) > 3
 
 
-UNHEARD: list[dict[str, object]] = [
-    {"damping": {"release_t60_s": 5.0}},
-    {"damping": {"let_ring": True}},
-    {"mode": "guitar"},
-    {"mode": "mpe"},
-    {"bend_semitones": 12.0},
-    {"bend_by": "length"},
-    {"mod_wheel": "knobs.decay"},
-    {"body": {"name": "", "mix": 1.0, "size": 2.0}},
-    {"body": {"name": "guitar", "mix": 0.0, "size": 2.0}},
-    {"room": {"mix": 0.0, "t60_s": 3.0}},
-    {"macros": [{"name": "dark", "targets": [{"field": "knobs.decay", "low": 1.0, "high": 2.0}]}]},
-]
-HEARD: list[dict[str, object]] = [
-    {"knobs": {"decay": 2.0}},
-    {"pluck": {"curve": 0.5}},
-    {"pickup": {"points": (0.2,)}},
-    {"tuning": {"a4_hz": 442.0}},
-    {"body": {"name": "guitar", "mix": 0.5}},
-    {"room": {"mix": 0.5, "t60_s": 0.3}},
-    {"level_db": -6.0},
-    {"sympathy_s_kg": 0.02, "damping": {"let_ring": True}},
-]
-
-
-@pytest.mark.parametrize(("fields", "same"), [*((one, True) for one in UNHEARD), *((one, False) for one in HEARD)])
-def test_a_sample_is_kept_where_it_sounds_the_same(
-    fields: dict[str, object], same: bool, harp: Patch, note: Callable
-) -> None:
-    bare: dict[str, object] = {"body": {}, "damping": {}, "pickup": {}, "pluck": {}, "sympathy_s_kg": 0.0}
-    plain = Patch.model_validate({**dict(harp), **bare})
-    turned = Patch.model_validate({**dict(plain), **fields})
-    assert turned != plain
-    zone = SampledPlan(plain, KEYS, layers=3).zones[0]
-    one, other = (note(each, zone.key, zone.velocity, 0.05, 0.05, RATE_HZ) for each in (plain, turned))
-    assert np.array_equal(one, other) == same
-    one_digest, other_digest = (SampledPlan(each, KEYS).digest(zone) for each in (plain, turned))
-    assert (one_digest == other_digest) == same
-
-
 def drift_cents(heard: NDArray, direct: NDArray) -> float:
     """How much higher one sound is than another that is nearly the same, by their strongest partials."""
 

@@ -7,15 +7,14 @@ import pytest
 
 from app.export.sampled.levels import by_key, headroom_db, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
-from app.export.sampled.store import StoredSample
+from app.export.sampled.sample import StoredSample
 from app.patches.patch import Patch
 
 PatchOf = Callable[..., Patch]
-NONE = "0" * 64
 
 
 def stored(level_db: float) -> StoredSample:
-    return StoredSample(made_from=NONE, sha256=NONE, frames=64, channels=1, gain_db=0.0, level_db=level_db)
+    return StoredSample(frames=64, channels=1, gain_db=0.0, level_db=level_db)
 
 
 def rendered(patch: Patch, layers: int) -> list[int]:

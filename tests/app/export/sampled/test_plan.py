@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from app.export.sampled.plan import MOST_LAYERS, WIDEST_STEP, SampledPlan, Zone
+from app.export.sampled.plan import MOST_LAYERS, WIDEST_STEP, SampledPlan
 from app.instrument.glide import glides_cents
 from app.patches.patch import Fretted, Patch, PhysicalString
 from engine.resonators.string import StringParameters
@@ -95,32 +95,6 @@ def test_a_scale_of_its_own_is_never_transposed(patch_of: Callable[..., Patch]) 
     assert SampledPlan(tuned).every == 1
     with pytest.raises(ValueError, match="every must be 1"):
         SampledPlan(tuned, every=2)
-
-
-def test_the_digest_is_of_what_is_heard(patch: Patch) -> None:
-    zone = Zone(50, 64, (50, 50), (1, 64))
-    plan = SampledPlan(patch)
-    renamed = SampledPlan(patch.model_copy(update={"name": "Another", "description": "new", "author": "me"}))
-    assert plan.digest(zone) == renamed.digest(zone)
-    others = [
-        SampledPlan(patch.with_value("knobs.decay", 2.0)),
-        SampledPlan(patch, seconds=3),
-        SampledPlan(patch, rate_hz=44_100),
-        SampledPlan(patch, bits="16"),
-        SampledPlan(patch, format="wav"),
-        SampledPlan(patch, source="truth"),
-        SampledPlan(patch, preset_sha256="0" * 64),
-    ]
-    digests = {plan.digest(zone), plan.digest(Zone(51, 64, (51, 51), (1, 64))), *(one.digest(zone) for one in others)}
-    assert len(digests) == 2 + len(others)
-    assert SampledPlan(patch, layers=7, every=2).digest(zone) == plan.digest(zone)  # the same note, other neighbours
-
-
-def test_the_file_of_a_body_counts_where_it_is_heard(patch_of: Callable[..., Patch]) -> None:
-    zone = Zone(50, 64, (50, 50), (1, 64))
-    for mix, digests in ((0.5, 2), (0.0, 1)):
-        patch = patch_of(body={"name": "mine", "mix": mix})
-        assert len({SampledPlan(patch, body_sha256=sha256 * 64).digest(zone) for sha256 in "01"}) == digests
 
 
 def test_keys_that_the_tuning_leaves_out_have_no_sample(patch_of: Callable[..., Patch]) -> None:

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractButton, QFileDialog, QLabel, QMessageBox, QWidget
+from PySide6.QtWidgets import QAbstractButton, QLabel, QMessageBox, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.analysis.abx.record import AbxRecord, Candidate, load_record, save_record
-from app.analysis.abx.trials import AbxChoices, Trial, draw_order
+from app.analysis.abx.record import AbxRecord, Candidate
+from app.analysis.abx.trials import AbxChoices, draw_order
 from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
@@ -89,7 +89,7 @@ def texts(widget: QWidget) -> str:
 
 def saved(tmp_path: Path) -> AbxRecord:
     (path,) = (tmp_path / "records").iterdir()
-    return load_record(path)
+    return AbxRecord.model_validate_json(path.read_bytes())
 
 
 def test_a_whole_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
@@ -272,24 +272,6 @@ def test_trials_are_chosen_and_remembered(open_dialog: Open) -> None:
     setup.trials.setValue(4)
     assert "Too few" in texts(dialog)
     assert dialog.choices().trials == 4
-
-
-def test_a_result_is_opened_again(
-    qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    trials = tuple(Trial(x="A", answer="A") for _ in range(10))
-    path = save_record(tmp_path, MATERIAL.model_copy(update={"planned_trials": 10, "trials": trials}))
-    monkeypatch.setattr(QFileDialog, "getOpenFileName", lambda *_: (str(path), ""))
-    dialog = open_dialog()
-    dialog._setup.open_result.click()
-    for words in ("10 of 10 right", "p < 0.001", "You can tell them apart", "Model and Truth of small", str(path)):
-        assert words in texts(dialog)
-    dialog._result.again.click()
-    path.write_bytes(b"{}")
-    reported: list[str] = []
-    monkeypatch.setattr(QMessageBox, "warning", lambda *words: reported.append(words[-1]))
-    dialog._setup.open_result.click()
-    assert "or damaged" in reported[0] and not dialog._result.isVisible()
 
 
 def test_clicks_hear_and_answer(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -24,7 +23,7 @@ from app.patches.library import find_patch
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry, list_presets
 from app.views.dialogs.export_dialog import ExportDialog
-from app.views.dialogs.export_pages import RESUMES, HeardInstrument
+from app.views.dialogs.export_pages import HeardInstrument
 
 SMALL = {"keys": (60, 62), "layers": 2, "seconds": 0.2}
 MADE = 3 * 2
@@ -113,10 +112,9 @@ def test_an_sfz_is_written_as_it_was_reported(
     dialog = made(rate_hz=44_100, source="truth", form="wav", bits="16")
     assert "6 samples (3 keys, 2 velocity layers), at most 0.2 MB" in dialog.sampler.size_text.text()
     assert dialog.sampler.what.text().startswith(patch.name)
-    assert dialog.state.text() == RESUMES
     run(qtbot, dialog, "Saved")
     out = folder / "Classical_guitar.sfz"
-    assert f"Saved {out} (6 samples rendered, 0 kept" in dialog.state.text()
+    assert f"Saved {out} (6 samples, " in dialog.state.text()
     assert "peak -1.0 dBFS" in dialog.state.text()
     assert "softer than the instrument, so that no note clips" in dialog.state.text()
     zones = SampledPlan(patch, SMALL["keys"], layers=SMALL["layers"]).zones
@@ -189,7 +187,7 @@ def test_dry_takes_the_room_away(qtbot: QtBot, made, notes: Notes, patch: Patch)
     dialog = made(keys=(60, 60), layers=1)
     run(qtbot, dialog, "Dry leaves the room to the sampler")
     dialog.sampler.dry.setChecked(True)
-    run(qtbot, dialog, "1 sample rendered, 0 kept")
+    run(qtbot, dialog, "1 sample, ")
     assert "the room" not in dialog.state.text()
     assert [note[0].room.mix for note in notes.rendered] == [patch.room.mix, 0.0]
 
@@ -221,61 +219,35 @@ def test_progress_is_shown_and_the_choices_wait(
     assert dialog.bar.isHidden()
 
 
-@pytest.mark.parametrize("form", ["flac", "sf2"])
-def test_a_cancelled_export_goes_on_where_it_was(qtbot: QtBot, made, notes: Notes, folder: Path, form: str) -> None:
-    notes.last = 3
-    dialog = made(form=form)
-    dialog.save.click()
-    qtbot.waitUntil(lambda: len(notes.rendered) == 3)
-    assert dialog.close_button.text() == "Cancel"
-    dialog.close()  # as its cross does: it stays, to tell what was kept
-    assert dialog.isVisible()
-    notes.gate.set()
-    reported = f"of {MADE} samples are kept; export again to continue from there"
-    qtbot.waitUntil(lambda: reported in dialog.state.text())
-    kept = int(dialog.state.text().removeprefix("Cancelled; ").split()[0])
-    assert kept == len(notes.rendered) < MADE
-    assert not dialog.sampler.file.path.exists()
-    assert dialog.save.text() == "Continue"
-    again = made(form=form)  # the window was started again
-    assert f"{kept} of {MADE} samples are there already, and are kept" in again.state.text()
-    run(qtbot, again, f"{MADE - kept} samples rendered, {kept} kept")
-    assert len(notes.rendered) == MADE
-    assert again.sampler.file.path.is_file()
-
-
-def test_cancelled_where_the_index_is_gone_bad_it_says_so(
-    qtbot: QtBot, made, notes: Notes, folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    notes.last = 3
-    dialog = made()
-    dialog.save.click()
-    qtbot.waitUntil(lambda: len(notes.rendered) == 3)
-    dialog.close_button.click()
-    notes.gate.set()
-    dialog._background._worker.close(None)  # its report has not arrived
-    (folder / "Classical_guitar_samples" / "index.json").write_text("{}")
-    qtbot.waitUntil(lambda: "no index of samples" in dialog.state.text())
-    assert dialog.state.objectName() == "warning"
-    assert dialog.sampler.isEnabled()
-    assert dialog.close_button.text() == "Close"
-
-
 def test_what_the_choices_mean_is_computed_once_they_settle(
     qtbot: QtBot, made, patch: Patch, preset: PresetEntry, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     dialog = made()
     settle(qtbot, dialog)
     computed: list[int] = []
-    monkeypatch.setattr(
-        "app.views.dialogs.export_pages.kept_samples", lambda plan, out: computed.append(len(plan.zones)) or 0
-    )
+    monkeypatch.setattr("app.views.dialogs.export_pages.planned", lambda plan, out: computed.append(len(plan.zones)))
     for layers in (3, 4, 5):
         dialog.sampler.layers.setValue(layers)
         show(dialog, patch.with_value("knobs.decay", layers), preset)
     assert computed == []
     settle(qtbot, dialog)
     assert computed == [15]
+
+
+@pytest.mark.parametrize("form", ["flac", "sf2"])
+def test_a_cancelled_export_leaves_nothing(qtbot: QtBot, made, notes: Notes, folder: Path, form: str) -> None:
+    notes.last = 3
+    dialog = made(form=form)
+    dialog.save.click()
+    qtbot.waitUntil(lambda: len(notes.rendered) == 3)
+    assert dialog.close_button.text() == "Cancel"
+    dialog.close()  # as its cross does: it stays, to report what was written
+    assert dialog.isVisible()
+    notes.gate.set()
+    qtbot.waitUntil(lambda: "Cancelled; nothing was written" in dialog.state.text())
+    assert len(notes.rendered) < MADE
+    assert list(folder.iterdir()) == []
+    assert dialog.save.text() == "Export"
 
 
 def test_an_export_takes_choices_that_have_not_settled(qtbot: QtBot, made, notes: Notes) -> None:
@@ -287,16 +259,6 @@ def test_an_export_takes_choices_that_have_not_settled(qtbot: QtBot, made, notes
     dialog.save.click()
     assert "the lowest is above the highest" in dialog.state.text()
     assert len(notes.rendered) == 3
-
-
-def test_other_choices_have_nothing_to_go_on_from(qtbot: QtBot, made, notes: Notes) -> None:
-    dialog = made()
-    run(qtbot, dialog, "Saved")
-    dialog.sampler.file.edit.setText(str(dialog.sampler.file.path))
-    assert dialog.save.text() == "Replace"
-    dialog.sampler.source.setCurrentIndex(1)
-    settle(qtbot, dialog)
-    assert dialog.state.text() == RESUMES
 
 
 def test_cancelled_before_a_whole_sample_nothing_is_left(
@@ -319,7 +281,6 @@ def test_cancelled_before_a_whole_sample_nothing_is_left(
         (lambda form, folder: edit(form, ""), "choose where"),
         (lambda form, folder: edit(form, str(folder / "nowhere" / "x.sfz")), "make the folder first"),
         (lambda form, folder: (form.form.setCurrentIndex(2), form.rate.setCurrentIndex(2)), "a SoundFont's rate"),
-        (lambda form, folder: broken_index(form, folder), "no index of samples"),
     ],
 )
 def test_what_cannot_be_is_reported_before_it_begins(
@@ -342,12 +303,6 @@ def test_what_cannot_be_is_reported_before_it_begins(
 def edit(form, text: str) -> None:
     form.file.edit.setText(text)
     form.file.edit.textEdited.emit(text)
-
-
-def broken_index(form, folder: Path) -> None:
-    (folder / "b_samples").mkdir()
-    (folder / "b_samples" / "index.json").write_text("{}")
-    edit(form, str(folder / "b.sfz"))
 
 
 def test_an_error_of_the_work_is_one_line(qtbot: QtBot, made, notes: Notes, folder: Path) -> None:
@@ -391,7 +346,6 @@ def test_its_state_is_remembered(made, folder: Path, patch: Patch) -> None:
         folder=str(folder), form="wav", bits="16", rate_hz=44_100, every=2, source="truth", dry=True, **SMALL
     )
     assert made(**choices.model_dump()).sampled_choices() == choices
-    assert json.loads(choices.model_dump_json())["keys"] == [60, 62]
     whole = made(keys=None)
     assert (whole.sampler.lowest.value(), whole.sampler.highest.value()) == patch.range
     assert whole.sampled_choices().keys is None
@@ -425,10 +379,10 @@ def test_a_patch_that_is_turned_meanwhile_waits_for_the_next_time(
     qtbot.waitUntil(lambda: len(notes.rendered) == 1)
     show(dialog, patch.with_value("knobs.decay", 3.0), preset)
     notes.gate.set()
-    qtbot.waitUntil(lambda: "6 samples rendered" in dialog.state.text())
+    qtbot.waitUntil(lambda: "6 samples, " in dialog.state.text())
     assert {note[0].knobs.decay for note in notes.rendered} == {patch.knobs.decay}
     run(qtbot, dialog, "Loading")
-    qtbot.waitUntil(lambda: "6 samples rendered" in dialog.state.text())
+    qtbot.waitUntil(lambda: "6 samples, " in dialog.state.text())
     assert notes.rendered[-1][0].knobs.decay == 3.0
 
 

@@ -1,8 +1,6 @@
-"""Rows of earlier versions keep their meaning."""
+"""Configurations of earlier versions keep their meaning."""
 
 from __future__ import annotations
-
-from dataclasses import replace
 
 import pytest
 
@@ -10,36 +8,9 @@ from engine.models import build_model
 from engine.schema import SchemaError, write
 from training.cell import Cell, configuration_of
 from training.configuration import read_configuration
-from training.migration import earlier_digest, migrated
-from training.results import RESULTS, Row, read_results
+from training.results import RESULTS, read_results
 
 CELL = Cell("lru", True, "gaussian", 4000, 400)
-
-
-def row(name: str, digest: str) -> Row:
-    return Row(digest, name, "done", "lru", "nonlinear", "gaussian", 4000, 400, "ours", 0, rel_mae=0.125)
-
-
-def test_a_row_of_the_run_that_its_name_means_gets_the_present_digest_and_keeps_all_else() -> None:
-    configuration = configuration_of(CELL)
-    earlier = row(CELL.name, earlier_digest(configuration))
-    assert earlier.digest != configuration.digest
-    (found,) = migrated([earlier])
-    assert found == replace(earlier, digest=configuration.digest)
-    assert migrated([found]) == [found]
-
-
-def test_no_row_is_lost_and_none_becomes_a_figure_that_it_was_not() -> None:
-    other_recipe = row(CELL.name, "0123456789abcdef")
-    other_run = row(replace(CELL, seed=1).name, earlier_digest(configuration_of(CELL)))
-    no_cell = row("a_string_of_my_own", earlier_digest(configuration_of(CELL)))
-    rows = [other_recipe, other_run, no_cell]
-    assert migrated(rows) == rows
-
-
-def test_the_committed_rows_are_carried_over() -> None:
-    rows = read_results(RESULTS)
-    assert migrated(rows) == rows
 
 
 def test_a_configuration_of_an_earlier_version_is_the_same_run_as_today() -> None:
