@@ -13,11 +13,11 @@ import torch
 from tests.bench.baselines import fit as fitting
 from tests.bench.baselines.fit import BaselineProgress, checkpoint_file, fit_baseline, trained_baseline
 from tests.bench.baselines.models import BASELINES, ModalSynthesis, baseline_player, in_own_units, units
-from tests.bench.baselines.physics import linear_string
 from training.cli.console import number
 from training.family.preset import FamilyConfiguration
 from training.family.strings import PluckedString, draw_string
 from training.fitting.checkpoint import Checkpoint
+from training.research.players import linear_string
 
 RATE_HZ = 48_000
 SMALL = FamilyConfiguration("Two", "", 25, strings=2, validation_strings=1, rate_hz=8_000)

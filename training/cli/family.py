@@ -69,6 +69,9 @@ def evaluate(
         int,
         typer.Option(min=0, max=1_000, help="Measure so many over ten seconds, too."),
     ] = 0,
+    baselines: Annotated[
+        bool, typer.Option("--baselines", help="Measure what knows the physics alone, too.")
+    ] = False,
     rate: Rate = 48_000,
     seed: Seed = 0,
     json: Json = False,
@@ -83,6 +86,10 @@ def evaluate(
         raise typer.BadParameter(f"is {tenth} of {strings} strings; give at most as many", param_hint="--tenth")
     loaded = open_preset_of_many(preset)
     players: dict[str, Player] = {loaded.name: player(loaded.model)}
+    if baselines:
+        from training.research.players import knowing_physics
+
+        players |= knowing_physics()
     with progress("family evaluate") as report:
         shares = Shares(report, 2 * (1 + (tenth > 0)))
         measured = measured_errors(players, strings, rate, seed, shares)

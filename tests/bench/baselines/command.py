@@ -13,10 +13,7 @@ from training.cli.family import Rate, Seed, Strings, facts_of, measured_errors, 
 
 
 def baseline(
-    name: Annotated[
-        str,
-        typer.Argument(metavar="NAME", help="koopman_var or dmsp, made to take any string; or physics, untrained."),
-    ],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="koopman_var or dmsp, made to take any string.")],
     minutes: Annotated[float, typer.Option(min=0.01, max=10_000, help="Processor minutes of one core.")] = 40.0,
     train_strings: Annotated[
         int | None,
@@ -36,19 +33,12 @@ def baseline(
 
     from tests.bench.baselines.fit import FRAMES, ROWS, checkpoint_file, fit_baseline
     from tests.bench.baselines.models import BASELINES, baseline_player
-    from tests.bench.baselines.physics import knowing_physics
     from training.family.preset import read_configuration
     from training.run import default_runs
 
     torch.set_num_threads(1)
-    if name == "physics":
-        with progress("bench baseline") as report:
-            of_physics = measured_errors(knowing_physics(), strings, rate, seed, Shares(report, 2))
-        for column, errors in of_physics.items():
-            print_column(column, {who: facts_of(one) for who, one in errors.items()}, strings, rate)
-        return
     if name not in BASELINES:
-        raise typer.BadParameter(f"{name!r} is not one of physics, {', '.join(BASELINES)}", param_hint="NAME")
+        raise typer.BadParameter(f"{name!r} is not one of {', '.join(BASELINES)}", param_hint="NAME")
     with progress(f"bench baseline {name}") as report:
         fitted = fit_baseline(
             name,
