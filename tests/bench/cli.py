@@ -12,7 +12,6 @@ import typer
 
 from app.commands.cli import carry_out
 from tests.bench.baselines.command import baseline
-from tests.bench.drum_errors import drum_errors
 from tests.bench.instruments import timbre
 from tests.bench.printing import show
 from tests.bench.recordings.command import recordings
@@ -124,7 +123,6 @@ def tune(
 bench.command()(timbre)
 bench.command()(recordings)
 bench.command()(baseline)
-bench.command()(drum_errors)
 
 
 @bench.command()

@@ -67,24 +67,41 @@ def evaluate(
     strings: Strings = 200,
     tenth: Annotated[
         int,
-        typer.Option(min=0, max=1_000, help="Measure so many over ten seconds, too."),
+        typer.Option(min=0, max=1_000, help="Measure so many over ten seconds, too; drums of longer decays."),
     ] = 0,
     baselines: Annotated[
         bool, typer.Option("--baselines", help="Measure what knows the physics alone, too.")
     ] = False,
+    runs: Annotated[
+        Path | None, typer.Option(help="Folder of the errors on drums: a stopped measurement continues there.")
+    ] = None,
+    drums: Annotated[
+        int,
+        typer.Option(
+            min=0, max=10_000, metavar="N", help="Measure on so many drums instead, which no model has seen."
+        ),
+    ] = 0,
+    keep: Annotated[bool, typer.Option("--keep", help="Add the errors on drums to training/drums.csv.")] = False,
     rate: Rate = 48_000,
     seed: Seed = 0,
     json: Json = False,
 ) -> None:
-    """Errors on held-out strings, inside the family and beyond."""
+    """Errors on held-out strings, or on drums.
+
+    Strings are drawn inside the family and beyond it. Errors on drums are written to a table in `--runs`, or the
+    folder of runs, after each drum: a stopped measurement continues.
+    """
     import torch
 
     from training.family.errors import Player, by_rise, measure, player
 
     torch.set_num_threads(1)
+    if drums:
+        _evaluate_drums(preset, drums, tenth, runs, rate, seed, keep, json)
+        return
     if tenth > strings:
         raise typer.BadParameter(f"is {tenth} of {strings} strings; give at most as many", param_hint="--tenth")
-    loaded = open_preset_of_many(preset)
+    loaded = _open_preset_of_many(preset)
     players: dict[str, Player] = {loaded.name: player(loaded.model)}
     if baselines:
         from training.research.players import knowing_physics
@@ -135,7 +152,60 @@ def shelf(preset: Annotated[str, typer.Argument(metavar="PRESET")] = "studio_any
         print(path)
 
 
-def open_preset_of_many(name_or_path: str) -> Preset:
+def _evaluate_drums(
+    preset: str, drums: int, tenth: int, runs: Path | None, rate_hz: int, seed: int, keep: bool, json: bool
+) -> None:
+    from dataclasses import asdict
+
+    from training.family import drums as of_drums
+    from training.run import default_runs
+
+    if tenth > drums:
+        raise typer.BadParameter(f"is {tenth} of {drums} drums; give at most as many", param_hint="--tenth")
+    loaded = _open_preset_of_many(preset)
+    players: dict[str, of_drums.DrumPlayer] = {
+        loaded.name: of_drums.model_player(loaded.model),
+        "backward error analysis (1/12)": of_drums.untrained_player("series"),
+        "kicks without corrections": of_drums.untrained_player("kicks"),
+        "linear drum": of_drums.linear_drum,
+    }
+    checkpoint = of_drums.checkpoint_file(runs or default_runs(), loaded.name, rate_hz, seed)
+    with progress("family evaluate") as report:
+        errors = of_drums.measure_drums(players, drums, tenth, rate_hz, seed, checkpoint, report)
+    rows = [of_drums.summary(errors, name, rate_hz, seed) for name in players]
+    if keep:
+        of_drums.store(rows)
+    if json:
+        print_json({"drums": drums, "rate_hz": rate_hz, "seed": seed, "players": [asdict(row) for row in rows]})
+        return
+    print(f"{drums} drums of {rows[0].modes} modes below 4 kHz, first second at {rate_hz} Hz, over the whole surface")
+    print_table(
+        ("", "geometric mean", "worst", "blows", "pressed", "processor s a second", "worst at"),
+        [
+            [
+                row.player,
+                *map(number, (row.geometric_mean, row.worst, row.blows, row.pressed, row.processor_s)),
+                row.worst_at,
+            ]
+            for row in rows
+        ],
+    )
+    if tenth:
+        print_table(
+            (
+                f"tenth second, {rows[0].tenth_drums} of {tenth} drums of long decays still sound",
+                "geometric mean",
+                "worst",
+                "first",
+            ),
+            [
+                [row.player, *map(number, (row.tenth_geometric_mean, row.tenth_worst, row.tenth_first))]
+                for row in rows
+            ],
+        )
+
+
+def _open_preset_of_many(name_or_path: str) -> Preset:
     loaded = open_preset(name_or_path)
     if loaded.info.family is None:
         raise Failure(f"{loaded.path}: learned one string; give a preset of many, as studio_any_string")

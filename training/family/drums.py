@@ -1,33 +1,67 @@
-"""Drums whose motion models of many strings play, and their errors: the same equation in two dimensions."""
+"""Drums that no model has seen, and how well models of many strings play them: the same equation in two dimensions.
+
+Drums differ in kind, size, pitch, decay and blow. Half of the membranes are loaded by air. Decay rates scatter by
+20 % from mode to mode. Half of the blows are those of a mallet (speeds alone), half begin pressed down, at rest.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+import time
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from pathlib import Path
+from typing import Any, Literal, get_args
 
 import numpy as np
 import torch
+from filelock import FileLock
 from torch import Tensor
 
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
 from engine.models.koopman_tension import KoopmanTension
+from engine.resonators.air import DENSITY_KG_M3
 from engine.resonators.base import Array, Resonator
-from engine.resonators.drum import DrumParameters
+from engine.resonators.drum import DrumModes, DrumParameters
+from engine.resonators.surface import spread
+from engine.strike import pulse_spectrum
+from engine.table import checked, read_table, write_table
 from engine.truth import ModalState, SplittingSolver
-from training.family.errors import SCALE_M
+from training.family.errors import SCALE_M, UNHEARD
 from training.family.motions import substeps_of
 
+Kind = Literal["tom", "frame drum", "small head", "rectangular membrane", "steel plate", "narrow plate"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+DRUMS_VERSION = 1  # of what a seed means
+HIGHEST_HZ = 4_000.0
+BRIGHT_HZ = 3_000.0
+LEAST_MODES = 10
+SLOWER = 8.0  # decays of drums that are measured in the tenth second
 SILENCE = 1e-10  # of a mode, of all: the solver leaves it out
 AT_ONCE = 1_200  # frames; 1,600 modes of them are 15 MB
+LARGEST_BYTES = 2**21
+ROWS = Path(__file__).parents[1] / "drums.csv"
+
+# of a kind: length in m, width in lengths, thickness in m, pitch in Hz (of the first mode in a vacuum)
+Ranges = tuple[tuple[float, float], ...]
+RANGES: Mapping[Kind, Ranges] = {
+    "tom": ((0.22, 0.40), (1.0, 1.0), (1.5e-4, 3e-4), (70, 180)),
+    "frame drum": ((0.30, 0.50), (1.0, 1.0), (2e-4, 5e-4), (60, 140)),
+    "small head": ((0.12, 0.24), (1.0, 1.0), (1.5e-4, 4e-4), (150, 400)),
+    "rectangular membrane": ((0.20, 0.45), (0.4, 0.95), (1.5e-4, 4e-4), (70, 200)),
+    "steel plate": ((0.15, 0.50), (0.4, 0.95), (3e-4, 1.2e-3), (0, 0)),
+    "narrow plate": ((0.15, 0.40), (0.05, 0.15), (5e-4, 2e-3), (0, 0)),
+}
+T60_S, BRIGHT_T60_S, RISE, RADIUS_M, CONTACT_S = (0.4, 2.5), (0.08, 0.35), (0.02, 0.5), (0.005, 0.04), (1e-3, 5e-3)
+SCATTER = 0.2
+AIRLESS: tuple[Kind, ...] = ("steel plate", "narrow plate")
 
 
 @dataclass(frozen=True, eq=False)
 class StruckDrum:
-    """Modes of a drum, and a start of it.
+    """A drum with all its modes below 4 kHz, and a start of it.
 
     Attributes:
         amplitudes_m, speeds_m_s: mass-normalised, (modes,).
@@ -35,7 +69,7 @@ class StruckDrum:
         tension_rise: ΔT/T₀ that the start would reach, if all of it were displacement.
     """
 
-    kind: str
+    kind: Kind
     drum: DrumParameters
     resonator: Resonator
     amplitudes_m: Array
@@ -48,7 +82,82 @@ class StruckDrum:
         return float(self.resonator.omega[0]) / (2 * math.pi)
 
 
-# each call gives the next frames, (frames, modes) in m
+def draw_drum(number: int, seed: int = 0) -> StruckDrum:
+    """The drum of a number; the same for ever, however many are drawn."""
+    random = np.random.default_rng((DRUMS_VERSION, seed, number))
+    kind = KINDS[number % len(KINDS)]
+    while True:
+        drum = _drawn(random, kind)
+        try:
+            modes = drum.modes(HIGHEST_HZ)
+        except ValueError:
+            continue  # a plate so stiff that none is so low
+        if len(modes) >= LEAST_MODES:
+            break
+    circle = drum.shape == "circle"
+    place = _place(random, circle)
+    resonator = modes.resonator(np.array([place]))
+    scatter = random.uniform(1 - SCATTER, 1 + SCATTER, len(modes))
+    resonator = replace(resonator, sigma=np.minimum(resonator.sigma * scatter, 0.9 * resonator.omega))
+    q, v = _start(random, modes, place, number // len(KINDS) % 2 == 0)
+    rise = _between(random, RISE)
+    share = math.sqrt(rise / float(resonator.relative_tension_rise(np.hypot(q, v / resonator.omega))))
+    return StruckDrum(kind, drum, resonator, q * share, v * share, modes.scale**2, rise)
+
+
+def _drawn(random: np.random.Generator, kind: Kind) -> DrumParameters:
+    length, ratio, thickness, pitch = (_between(random, ends) for ends in RANGES[kind])
+    circle = kind in ("tom", "frame drum", "small head")
+    metal = kind in AIRLESS
+    drum = DrumParameters(
+        shape="circle" if circle else "rectangle",
+        length_m=length,
+        width_m=length * ratio,
+        thickness_m=min(thickness, 0.09 * length * ratio),
+        density_kg_m3=7850.0 if metal else 1390.0,
+        youngs_modulus_pa=2e11 if metal else 3.5e9,
+        poisson=0.3 if metal else 0.38,
+        tension_n_m=0.0,
+        uneven=float(random.uniform(0, 0.01)) if circle else 0.0,
+        air_kg_m3=DENSITY_KG_M3 if not metal and random.random() < 0.5 else 0.0,
+    )
+    kappa = 2 * 2.4048 / length if circle else math.hypot(math.pi / length, math.pi / (length * ratio))
+    if not metal:
+        drum = replace(drum, tension_n_m=drum.mass_kg_m2 * (2 * math.pi * pitch / kappa) ** 2)
+    slow, fast = (math.log(1000) / _between(random, ends) for ends in (T60_S, BRIGHT_T60_S))
+    fast = max(fast, 1.5 * slow)
+    stiff = drum.tension_n_m + drum.bending_nm * kappa**2
+    bright = kappa * max(2.0, (2 * math.pi * BRIGHT_HZ) / (kappa * math.sqrt(stiff / drum.mass_kg_m2)))
+    d3 = 2 * drum.mass_kg_m2 * (fast - slow) / (bright**2 - kappa**2)
+    d1 = max(0.0, 2 * drum.mass_kg_m2 * slow - d3 * kappa**2)
+    return replace(drum, damping_d1_kg_m2_s=d1, damping_d3_kg_s=d3)
+
+
+def _start(
+    random: np.random.Generator, modes: DrumModes, place: tuple[float, float], blow: bool
+) -> tuple[Array, Array]:
+    radius_m, contact_s = _between(random, RADIUS_M), _between(random, CONTACT_S)
+    still = np.zeros(len(modes))
+    if blow:
+        return still, modes.struck(place, radius_m) * pulse_spectrum(modes.omega, contact_s)
+    pressed = modes.shapes(np.array([place]))[:, 0] * spread(modes.surface.wavenumber, radius_m)
+    return pressed / modes.omega**2, still
+
+
+def _place(random: np.random.Generator, circle: bool) -> tuple[float, float]:
+    if circle:
+        r, angle = 0.9 * math.sqrt(random.random()), random.uniform(0, 2 * math.pi)
+        return r * math.cos(angle), r * math.sin(angle)
+    return float(random.uniform(-0.9, 0.9)), float(random.uniform(-0.9, 0.9))
+
+
+def _between(random: np.random.Generator, ends: tuple[float, float]) -> float:
+    low, high = ends
+    return low if low == high else math.exp(random.uniform(math.log(low), math.log(high)))
+
+
+# What plays them: each call gives the next frames, (frames, modes) in m
+
 Blocks = Callable[[int], Tensor]
 DrumPlayer = Callable[[StruckDrum, int], Blocks]
 
@@ -107,6 +216,83 @@ def untrained_player(how: str) -> DrumPlayer:
     return model_player(model)
 
 
+# How well
+
+
+@dataclass(frozen=True)
+class DrumError:
+    """Of one drum and player: relative squared errors over the surface in the first second and in the tenth.
+
+    Attributes:
+        tenth: None: not measured, or the drum is silent by then.
+        processor_s: for the first second of all modes.
+        slower: how many times as slowly the drum decays, to be there in the tenth second.
+    """
+
+    number: int
+    player: str
+    kind: str
+    pitch_hz: float
+    modes: int
+    tension_rise: float
+    blow: str
+    first: float
+    tenth: float | None = None
+    processor_s: float = 0.0
+    slower: float = 1.0
+
+    @property
+    def slow(self) -> bool:
+        return self.slower > 1
+
+
+@torch.inference_mode()
+def measure_drum(
+    number: int, players: Mapping[str, DrumPlayer], rate_hz: int, tenth: bool, seed: int
+) -> list[DrumError]:
+    """The errors of players on the drum of a number; in the tenth second, too, where it decays `SLOWER` times."""
+    struck = draw_drum(number, seed)
+    if tenth:
+        slow = replace(struck.resonator, sigma=struck.resonator.sigma / SLOWER)
+        struck = replace(struck, resonator=slow)
+    seconds = 10 if tenth else 1
+    true = true_motion(struck, rate_hz)
+    playing = {name: play(struck, rate_hz) for name, play in players.items()}
+    weight = torch.from_numpy(struck.weight)
+    wrong = {name: np.zeros(2) for name in players}
+    energy, spent = np.zeros(2), dict.fromkeys(players, 0.0)
+    for second in range(seconds):
+        window, done = (0 if second == 0 else 1), 0
+        while done < rate_hz:
+            frames = min(AT_ONCE, rate_hz - done)
+            done += frames
+            expected, counts = true(frames), second in (0, 9)
+            energy[window] += float((expected.square() @ weight).sum()) if counts else 0.0
+            for name, more in playing.items():
+                begun = time.process_time()
+                found = more(frames)
+                spent[name] += (time.process_time() - begun) if second == 0 else 0.0
+                if counts:
+                    wrong[name][window] += float(((found - expected).square() @ weight).sum())
+    size = np.square(struck.amplitudes_m) + np.square(struck.speeds_m_s / struck.resonator.omega)
+    sounds = energy[1] > UNHEARD * float(size @ struck.weight) * rate_hz
+    reported = (struck.kind, struck.pitch_hz, struck.resonator.modes, struck.tension_rise)
+    blow = "blow" if struck.speeds_m_s.any() else "pressed"
+    return [
+        DrumError(
+            number,
+            name,
+            *reported,
+            blow,
+            _finite(wrong[name][0] / energy[0]),
+            _finite(wrong[name][1] / energy[1]) if tenth and sounds else None,
+            spent[name],
+            SLOWER if tenth else 1.0,
+        )
+        for name in players
+    ]
+
+
 @dataclass(frozen=True)
 class Window:
     """Relative squared errors over the surface between two times, by player."""
@@ -143,12 +329,108 @@ def motion_errors(
 
     def window(first: int, stop: int, seconds: slice) -> Window:
         whole = sum(energy[seconds])
-        errors = {name: finite(sum(each[seconds]) / whole) if whole else math.nan for name, each in wrong.items()}
+        errors = {name: _finite(sum(each[seconds]) / whole) if whole else math.nan for name, each in wrong.items()}
         return Window(first / rate_hz, stop / rate_hz, errors)
 
     parts = [window(*ends, slice(place, place + 1)) for place, ends in enumerate(pairwise(edges))]
     return [window(0, frames, slice(None)), *parts]
 
 
-def finite(error: float) -> float:
+def _finite(error: float) -> float:
     return float(error) if math.isfinite(error) else math.inf
+
+
+def measure_drums(
+    players: Mapping[str, DrumPlayer],
+    count: int,
+    tenth: int,
+    rate_hz: int,
+    seed: int,
+    checkpoint: Path | None,
+    report: Callable[[float], None] = lambda share: None,
+) -> list[DrumError]:
+    """The errors of players on so many drums; those that a checkpoint holds are not measured again.
+
+    Raises:
+        SchemaError: the checkpoint is no table of errors.
+    """
+    found: list[DrumError] = []
+    if checkpoint is not None and checkpoint.exists():
+        found = list(checked(read_table(DrumError, checkpoint, "table of drums", LARGEST_BYTES)))
+    wanted = [(number, False) for number in range(count)] + [(number, True) for number in range(tenth)]
+    for done, (number, slow) in enumerate(wanted, 1):
+        known = {one.player for one in found if (one.number, one.slow) == (number, slow)}
+        lacking = {name: play for name, play in players.items() if name not in known}
+        if lacking:
+            found += measure_drum(number, lacking, rate_hz, slow, seed)
+            if checkpoint is not None:
+                checkpoint.parent.mkdir(parents=True, exist_ok=True)
+                write_table(checkpoint, DrumError, found)
+        report(done / len(wanted))
+    return [one for one in found if (one.number, one.slow) in wanted and one.player in players]
+
+
+def checkpoint_file(runs: Path, preset: str, rate_hz: int, seed: int) -> Path:
+    return runs / f"drums_{preset}_{rate_hz}_seed{seed}_v{DRUMS_VERSION}.csv"
+
+
+@dataclass(frozen=True)
+class DrumsRow:
+    """The errors of one player on many drums; see `DrumError`. `tenth_drums` still sound in the tenth second."""
+
+    player: str
+    drums: int
+    rate_hz: int
+    seed: int
+    modes: str = ""
+    geometric_mean: float | None = None
+    worst: float | None = None
+    worst_at: str = ""
+    blows: float | None = None
+    pressed: float | None = None
+    tenth_drums: int = 0
+    tenth_geometric_mean: float | None = None
+    tenth_worst: float | None = None
+    tenth_first: float | None = None
+    processor_s: float | None = None
+    finished: str = ""
+
+
+def summary(errors: Iterable[DrumError], player: str, rate_hz: int, seed: int) -> DrumsRow:
+    """Of one player's errors; `tenth_first` is the first second's mean of the drums that sound in the tenth."""
+    of_player = [one for one in errors if one.player == player]
+    own, slow = ([one for one in of_player if one.slow == kind] for kind in (False, True))
+    worst = max(own, key=lambda one: one.first)
+    late = [one for one in slow if one.tenth is not None]
+    modes = sorted(one.modes for one in own)
+    return DrumsRow(
+        player,
+        len(own),
+        rate_hz,
+        seed,
+        f"{modes[0]} … {modes[-1]}",
+        _mean(one.first for one in own),
+        worst.first,
+        f"{worst.kind}, {worst.pitch_hz:.0f} Hz, {worst.modes} modes, rise {worst.tension_rise:.2f}",
+        _mean(one.first for one in own if one.blow == "blow"),
+        _mean(one.first for one in own if one.blow == "pressed"),
+        len(late),
+        _mean(one.tenth for one in late),
+        max((one.tenth for one in late if one.tenth is not None), default=None),
+        _mean(one.first for one in late),
+        float(np.median([one.processor_s for one in own])),
+        time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
+    )
+
+
+def _mean(errors: Iterable[float | None]) -> float | None:
+    known = [max(error, 1e-300) for error in errors if error is not None]
+    return math.exp(sum(map(math.log, known)) / len(known)) if known else None
+
+
+def store(rows: Iterable[DrumsRow], path: Path = ROWS) -> None:
+    """Adds rows to the table of results; a row of the same player, drums, rate and seed is replaced."""
+    with FileLock(f"{path}.lock"):
+        present = list(checked(read_table(DrumsRow, path, "table of drums", LARGEST_BYTES))) if path.exists() else []
+        by_key = {(row.player, row.drums, row.rate_hz, row.seed): row for row in (*present, *rows)}
+        write_table(path, DrumsRow, [by_key[key] for key in sorted(by_key)])
