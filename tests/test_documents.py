@@ -77,7 +77,7 @@ def test_commands_and_their_options_exist() -> None:
 def test_presets_and_instruments_that_are_named_exist() -> None:
     shipped = {path.stem for path in (ROOT / "presets").glob("*.safetensors")}
     for where, words in commands():
-        if words[0] in ("render", "compare"):
+        if words[0] in ("render", "compare", "predict"):
             presets = [word for word in words if re.match(r"(nylon|studio)_\w+$", word)]
             presets = [word for word in presets if not (ROOT / "presets" / "strings" / f"{word}.toml").exists()]
             assert not set(presets) - shipped, where

@@ -71,6 +71,8 @@ for command in (
     listing.presets,
     listing.models,
     listing.instruments,
+    motion.simulate,
+    motion.predict,
     render.render,
     learn.learn,
     play.play,

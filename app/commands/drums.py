@@ -1,13 +1,15 @@
-"""drums: modes of a drum, errors of its motion by a model, and its sound."""
+"""drums: modes of a drum, its motion by the physics and by a model, their errors, and its sound."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from app.commands.motion import Solver
 from app.commands.render import BitsOption
 from app.shared.vocabulary import PlayedSource
 from training.cli import arguments
@@ -15,11 +17,12 @@ from training.cli.arguments import Json
 from training.cli.console import Failure, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
+    from app.commands.arrays import Array
     from app.instrument.drum_keys import DrumKey
     from app.patches.patch import Patch
     from engine.resonators.drum import DrumModes
     from engine.strike import Strike
-    from training.family.drums import DrumPlayer, StruckDrum
+    from training.family.drums import Blocks, DrumPlayer, StruckDrum
 
 drums = typer.Typer(help="Motions and sounds of drums.", no_args_is_help=True)
 DrumName = Annotated[
@@ -35,12 +38,18 @@ Place = Annotated[
     typer.Option(metavar="X Y", help="Where it is struck, from the centre in half-lengths; default its own place."),
 ]
 Rate = Annotated[int, typer.Option(min=8_000, max=192_000, metavar="HZ", help="Sample rate.")]
+OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (steps + 1, rows, columns) in m.")]
+Steps = Annotated[int, typer.Option(min=1, help="Frames after the blow.")]
+Points = Annotated[
+    int, typer.Option(min=3, max=513, metavar="N", help="Points of the grid along the longer side, rounded to odd.")
+]
 PresetOption = Annotated[
     str | None, typer.Option("--preset", metavar="PRESET", help="A preset of many strings; default the instrument's.")
 ]
 LONGEST_S = 60.0
 HIGHEST_HZ = 20_000.0  # of a drum's file
 FILE_KEY = 60  # on which the drum of a file is played
+FRAMES_AT_ONCE = 1_200
 
 
 @drums.callback()
@@ -73,6 +82,55 @@ def modes(
     )
     words = ", ".join(f"{cents:.0f} cents at velocity {velocity}" for velocity, cents in drops.items())
     print(f"{len(found)} modes; pitch drop {words}; hardest blow {struck.played.hardest_m_s:g} m/s")
+
+
+@drums.command()
+def simulate(
+    drum: DrumName,
+    out: OutputFile,
+    steps: Steps,
+    key: KeyOption = None,
+    velocity: Velocity = 100,
+    place: Place = None,
+    rate: Rate = 48_000,
+    points: Points = 33,
+    linear: Annotated[bool, typer.Option("--linear", help="Without tension modulation.")] = False,
+    solver: Annotated[
+        Solver, typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against.")
+    ] = "fast",
+) -> None:
+    """Simulate the motion of a struck drum by the physics.
+
+    OUT has its displacement on a grid, the first row at the top, 0 outside the drum.
+    """
+    from training.family.drums import linear_drum, true_motion
+
+    blow = _blow_of(drum, key, velocity, place)
+    if solver == "dop853":
+        motion = _dop853(blow.struck(linear), rate, steps)
+    else:
+        motion = (linear_drum if linear else true_motion)(blow.struck(), rate)
+    _write(out, blow, motion, steps, points)
+
+
+@drums.command()
+def predict(
+    drum: DrumName,
+    out: OutputFile,
+    steps: Steps,
+    key: KeyOption = None,
+    velocity: Velocity = 100,
+    place: Place = None,
+    rate: Rate = 48_000,
+    points: Points = 33,
+    preset: PresetOption = None,
+) -> None:
+    """Predict the motion of a struck drum with the model of a preset of many strings.
+
+    OUT is as that of `drums simulate`.
+    """
+    blow = _blow_of(drum, key, velocity, place, preset)
+    _write(out, blow, blow.player()(blow.struck(), rate), steps, points)
 
 
 @drums.command()
@@ -172,15 +230,15 @@ class _Blow:
     key: DrumKey
     strike: Strike
 
-    def struck(self) -> StruckDrum:
-        """Its start."""
+    def struck(self, linear: bool = False) -> StruckDrum:
+        """Its start; `linear`: of the drum without tension modulation."""
         import numpy as np
 
         from training.family.drums import StruckDrum
 
         found = self.key.modes
         speeds = self.strike.speeds(found)
-        resonator = found.resonator(np.zeros((1, 2)))
+        resonator = found.resonator(np.zeros((1, 2)), tension_modulated=not linear)
         rise = float(resonator.relative_tension_rise(speeds / resonator.omega))
         return StruckDrum("tom", found.drum, resonator, np.zeros_like(speeds), speeds, found.scale**2, rise)
 
@@ -252,6 +310,40 @@ def _with_file(path: Path) -> Patch:
 
     drum = PlayedDrum(note=FILE_KEY, name="Drum", drum=PhysicalDrum(**asdict(read_drum(path)[0])))
     return Patch(name="Drum", category="drums", strings=Drums(drums=(drum,), highest_hz=HIGHEST_HZ))
+
+
+def _dop853(struck: StruckDrum, rate_hz: int, steps: int) -> Blocks:
+    import torch
+
+    from engine.truth import ModalState, solve_dop853
+
+    state = ModalState(*(torch.from_numpy(part)[None] for part in (struck.amplitudes_m, struck.speeds_m_s)))
+    frames = iter(solve_dop853(struck.resonator, state, rate_hz, steps)[0, 1:].split(FRAMES_AT_ONCE))
+    return lambda count: next(frames)
+
+
+def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int) -> None:
+    """Writes the displacement (steps + 1, rows, columns) in m, from the blow on."""
+    import numpy as np
+
+    from app.commands import arrays
+    from app.rendering.blow import grid_of
+
+    found = blow.key.modes
+    inside, places = grid_of(found.surface, (found.drum.length_m, found.drum.width_m), points)
+    shapes = found.shapes(places)
+    arrays.check_result_size(1, steps + 1, inside.size)
+
+    def pictures() -> Iterator[Array]:
+        yield np.zeros((1, *inside.shape))
+        for first in range(0, steps, FRAMES_AT_ONCE):
+            amplitudes = motion(min(FRAMES_AT_ONCE, steps - first)).numpy()
+            block = np.zeros((len(amplitudes), *inside.shape))
+            block[:, inside] = amplitudes @ shapes
+            yield block
+
+    with progress(out.name) as report:
+        arrays.write_array(out, (steps + 1, *inside.shape), pictures(), report)
 
 
 def _rows(found: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:

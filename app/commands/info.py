@@ -13,7 +13,7 @@ from training.cli.console import print_json, say
 
 
 def info(
-    file: Annotated[Path, typer.Argument(metavar="FILE.wav", help="A file that render or the app wrote.")],
+    file: Annotated[Path, typer.Argument(metavar="FILE.wav", help="A file that render, batch or the app wrote.")],
     json: Json = False,
 ) -> None:
     """Show what a WAV file is: the recipe of a pluck, or what was played on an instrument.

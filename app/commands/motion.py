@@ -1,25 +1,145 @@
-"""compare: the motion of the whole string by a model against the physics."""
+"""simulate, predict, compare: the motion of the whole string, by the physics and by models."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
 from app.commands import options
 from engine.plain_text import one_line
 from training.cli import arguments
-from training.cli.console import number, print_json, print_table, progress, say
+from training.cli.console import Failure, number, print_json, print_table, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
+    from app.commands.arrays import Array, Motion
     from engine.metrics import ErrorSums
     from engine.pluck import Pluck
     from engine.presets import Preset, PresetInfo
+    from engine.resonators import Resonator, StringParameters
 
+InputFile = Annotated[Path, typer.Argument(metavar="U0.npy", help="Initial displacement (batch, points) in m.")]
+OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (batch, steps + 1, points) in m.")]
+Steps = Annotated[int, typer.Option(min=1, help="Frames after the initial one.")]
+STRING_KINDS = ("linear", "nonlinear")
+Solver = Literal["fast", "dop853"]
 LONGEST_S = 600.0  # the longest comparison
-FRAMES_AT_ONCE = 4096
+
+
+def simulate(
+    u0: InputFile,
+    out: OutputFile,
+    string: Annotated[
+        str,
+        typer.Option(
+            metavar="KIND|NAME|STRING.toml",
+            help='The paper\'s nylon B3, "linear" or "nonlinear" (tension-modulated); or a nonlinear string by name '
+            "(steel_e4) or as a file of its parameters.",
+        ),
+    ],
+    steps: Steps,
+    rate: Annotated[float, typer.Option(metavar="HZ", help="Sample rate.")] = 48_000,
+    modes: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="M",
+            help="Number of modes; default all below 20 kHz and half the rate, as many as the grid of U0 holds.",
+        ),
+    ] = None,
+    solver: Annotated[
+        Solver, typer.Option(help="fast: a splitting method; dop853: the slow reference that it is checked against.")
+    ] = "fast",
+    substeps: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            metavar="N",
+            help="Sub-steps of the fast solver per sample: fewer are faster, and less accurate. Default: enough for "
+            "a relative error of 1e-7 on the paper's data.",
+        ),
+    ] = None,
+) -> None:
+    """Simulate the motion of a string by the physics.
+
+    U0 is its displacement at rest, in metres, on any grid of at least M + 2 points.
+    """
+    arguments.check_range("--rate", rate, 1, 1_000_000, "Hz")
+    parameters, tension_modulated = _string_of(string)
+    if substeps is not None and (solver != "fast" or not tension_modulated):
+        raise typer.BadParameter(
+            "only the fast solver of the nonlinear string has sub-steps", param_hint="--substeps"
+        )
+    from app.commands import arrays
+    from engine.presets.of_string import HIGHEST_HZ
+
+    initial = arrays.read_displacements(u0)
+    points = initial.shape[1]
+    highest_hz = min(HIGHEST_HZ, rate / 2)
+    if modes is None:
+        modes = min(parameters.modes_below(highest_hz), points - 2)
+    if modes < 1:
+        raise Failure(f"{string}: no mode is below {highest_hz:g} Hz, or {u0} has no point between its ends")
+    if modes > points - 2:
+        raise typer.BadParameter(
+            f"a grid of {points} points holds 1 … {points - 2} modes, not {modes}", param_hint="--modes"
+        )
+    arrays.check_result_size(len(initial), steps + 1, points)
+    try:
+        parameters.check_motion(modes, points, rate, tension_modulated)
+    except ValueError as error:
+        raise Failure(f"{string}: {error}") from error
+    resonator = parameters.resonator(modes, tension_modulated=tension_modulated, grid_points=points)
+    fast = solver == "fast"
+    motion = _fast(resonator, rate, steps, substeps) if fast else _dop853(resonator, rate, steps)
+    with progress("simulate") as report:
+        arrays.write_motion(out, initial, steps, motion, report)
+    if (peak_m := float(abs(initial).max())) > arrays.IMPLAUSIBLE_PEAK_M:
+        say(f"note: {u0} rises to {peak_m:g} m; displacement is in metres")
+
+
+def predict(
+    preset: arguments.PresetName,
+    u0: InputFile,
+    out: OutputFile,
+    steps: Steps,
+    string: arguments.StringName = None,
+    rate: arguments.StringRate = None,
+    modes: arguments.StringModes = None,
+) -> None:
+    """Predict the motion of a string with a preset's model.
+
+    U0 is its displacement at rest, in metres, on the preset's grid.
+    """
+    loaded = arguments.open_preset_of_string(preset, string, rate, modes)
+    from app.commands import arrays
+
+    initial = arrays.read_displacements(u0)
+    points = loaded.info.grid_points
+    if initial.shape[1] != points:
+        raise Failure(
+            f"{u0}: has shape {tuple(initial.shape)}, expected (batch, {points}), the grid of {loaded.name}; "
+            f"sample the displacement at {points} points with both ends"
+        )
+    arrays.check_result_size(len(initial), steps + 1, points)
+    with progress("predict") as report:
+        arrays.write_motion(out, initial, steps, _predicted(loaded, steps), report)
+    for words in _outside_family(loaded.info, initial):
+        say(f"warning: {words}")
+
+
+def _outside_family(info: PresetInfo, initial: Array) -> list[str]:
+    """How a string and its displacements differ from those of a preset of many where the error grows."""
+    if info.family is None:
+        return []
+    found = info.family.warnings(info.string)
+    rise = float(info.resonator.relative_tension_rise(info.resonator.to_modes(initial)).max())
+    if rise > (limit := info.family.tension_rise[1]):
+        found.append(f"the displacement raises the tension by {rise:.0%}, beyond the trained {limit:.0%}")
+    return found
 
 
 def compare(
@@ -101,6 +221,7 @@ def window_edges(seconds: float, info: PresetInfo) -> list[float]:
 
 
 def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
+    from app.commands import arrays
     from engine.metrics import ErrorSums
     from engine.resonators.sine_transform import project
     from engine.sources import ModelSource, TruthSource
@@ -111,7 +232,7 @@ def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
     model_state, truth_state = model.start(initial), truth.start(initial)
     sums, done = ErrorSums(steps), 0
     with progress("compare") as report:
-        for count in _blocks_of(steps):
+        for count in arrays.blocks_of(steps):
             predicted, model_state = model.advance(model_state, count)
             true, truth_state = truth.advance(truth_state, count)
             sums.add(predicted, true, first=done)
@@ -120,7 +241,59 @@ def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
     return sums
 
 
-def _blocks_of(steps: int) -> Iterator[int]:
-    """The lengths of the blocks of at most `FRAMES_AT_ONCE` frames that make up `steps`."""
-    for first in range(0, steps, FRAMES_AT_ONCE):
-        yield min(FRAMES_AT_ONCE, steps - first)
+def _string_of(kind_or_file: str) -> tuple[StringParameters, bool]:
+    """A string, and whether its tension is modulated by its stretch. Raises typer.BadParameter."""
+    from engine.presets import PresetError, find_string, read_string
+    from engine.resonators import StringParameters
+
+    if kind_or_file in STRING_KINDS:
+        return StringParameters(), kind_or_file == "nonlinear"
+    try:
+        return read_string(find_string(kind_or_file)), True
+    except PresetError as error:
+        kinds = " or ".join(STRING_KINDS)
+        raise typer.BadParameter(f"must be {kinds}, or a string: {error}", param_hint="--string") from error
+
+
+def _fast(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None) -> Motion:
+    from app.commands.arrays import blocks_of
+    from engine.truth import ModalState, SplittingSolver
+
+    solver = SplittingSolver(resonator, rate_hz, substeps=substeps)
+
+    def motion(initial: Array) -> Iterator[Array]:
+        state = ModalState.at_rest(resonator.to_modes(initial))
+        yield resonator.to_grid(state.amplitude.numpy()[:, None])
+        for count in blocks_of(steps):
+            amplitudes, state = solver.advance(state, count)
+            yield resonator.to_grid(amplitudes.numpy())
+
+    return motion
+
+
+def _dop853(resonator: Resonator, rate_hz: float, steps: int) -> Motion:
+    from engine.truth import ModalState, solve_dop853
+
+    def motion(initial: Array) -> Iterator[Array]:
+        start = ModalState.at_rest(resonator.to_modes(initial))
+        yield resonator.to_grid(solve_dop853(resonator, start, rate_hz, steps).numpy())
+
+    return motion
+
+
+def _predicted(preset: Preset, steps: int) -> Motion:
+    from app.commands.arrays import blocks_of
+    from engine.resonators.sine_transform import project
+    from engine.sources import ModelSource
+
+    source = ModelSource(preset)
+
+    def motion(initial: Array) -> Iterator[Array]:
+        start = project(initial, preset.info.modes)
+        yield start[:, None]
+        state = source.start(start)
+        for count in blocks_of(steps):
+            frames, state = source.advance(state, count)
+            yield frames
+
+    return motion

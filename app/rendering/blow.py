@@ -86,10 +86,10 @@ class Head:
         return found
 
 
-def grid_of(surface: Surface, sides: tuple[float, float]) -> tuple[NDArray[np.bool_], Array]:
+def grid_of(surface: Surface, sides: tuple[float, float], points: int = GRID) -> tuple[NDArray[np.bool_], Array]:
     """Points over a drum, an odd number of them along the longer side: `inside` and `places` as `Head` has them."""
     longer = max(sides)
-    columns, rows = (max(3, 2 * round((GRID - 1) / 2 * side / longer) + 1) for side in sides)
+    columns, rows = (max(3, 2 * round((points - 1) / 2 * side / longer) + 1) for side in sides)
     x, y = (np.arange(-(n // 2), n // 2 + 1) / (n // 2) for n in (columns, rows))
     grid = np.stack([part.ravel() for part in np.meshgrid(x, y[::-1])], axis=1)
     inside = np.hypot(*grid.T) <= 1 if isinstance(surface, Circle) else np.ones(len(grid), bool)

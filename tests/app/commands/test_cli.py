@@ -18,6 +18,8 @@ ROOT = Path(__file__).parents[3]
 COMMANDS = [
     "presets",
     "models",
+    "simulate",
+    "predict",
     "render",
     "info",
     "sampled",
@@ -64,7 +66,7 @@ def test_commands_need_neither_window_nor_sound_packages() -> None:
         "import sys\n"
         "for name in ('PySide6', 'pyqtgraph', 'sounddevice', 'soundfile', 'psygnal'):\n"
         "    sys.modules[name] = None\n"
-        "import training.run\n"
+        "import app.commands.arrays, training.run\n"
         "from app.commands.cli import main\n"
         "assert main(['models', '--json']) == 0\n"
         "pluck = ['--position', '.5', '--amplitude-mm', '1', '--seconds', '1']\n"

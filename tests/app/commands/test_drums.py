@@ -56,6 +56,48 @@ def test_the_head_of_a_timpani_is_as_measured(run) -> None:
         assert found[number, 1] == pytest.approx(measured_hz, rel=0.04)
 
 
+def test_model_and_solver_move_a_drum_as_the_oracle_does(run, tmp_path: Path) -> None:
+    """A bar of an instrument, on a grid, from rest; its ends stay at rest. Without tension modulation it differs."""
+    motions = {}
+    for name, command in {
+        "fast": ("simulate",),
+        "dop853": ("simulate", "--solver", "dop853"),
+        "linear": ("simulate", "--linear"),
+        "linear dop853": ("simulate", "--linear", "--solver", "dop853"),
+        "model": ("predict",),
+    }.items():
+        out = tmp_path / f"{name}.npy"
+        options = ("--key", "72", "--velocity", "127", "--steps", "1500", "--points", "21")
+        done = run("drums", command[0], "thin_bars", out, *options, *command[1:])
+        assert done.status == 0, done.err
+        motions[name] = np.load(out)
+    truth, linear = motions["dop853"], motions["linear dop853"]
+    assert truth.shape == (1501, 7, 21)
+    assert (truth[0] == 0).all()
+    assert (np.abs(truth[:, :, [0, -1]]) < 1e-15).all()
+    assert np.ptp(truth, axis=1).max() < 1e-12, "a bar moves alike across its width"
+    size = np.square(truth).mean()
+    assert np.square(motions["fast"] - truth).mean() < 1e-9 * size
+    assert np.square(motions["linear"] - linear).mean() < 1e-9 * size
+    assert np.square(motions["model"] - truth).mean() < 1e-9 * size
+    assert np.square(linear - truth).mean() > 1e-6 * size
+
+
+def test_the_motion_of_a_drums_file_is_within_its_circle(run, tmp_path: Path) -> None:
+    (file,) = (file for file in FILES if file.stem == "tom_13")
+    out = tmp_path / "tom.npy"
+    done = run(
+        "drums", "simulate", file, out, "--steps", "100", "--points", "12", "--place", "0.5", "0", "--rate", "8000"
+    )
+    assert done.status == 0, done.err
+    motion = np.load(out)
+    assert motion.shape == (101, 13, 13)
+    y, x = np.mgrid[1:-1:13j, -1:1:13j]
+    assert (motion[:, np.hypot(x, y) > 1] == 0).all()
+    first = np.abs(motion[4])
+    assert np.unravel_index(first.argmax(), first.shape) == (6, 9), "it moves first where it is struck"
+
+
 def test_errors_are_printed_by_second(run) -> None:
     done = run("drums", "compare", "thin_bars", "--key", "72", "--seconds", "1.5", "--rate", "16000", "--json")
     windows = json.loads(done.out)["windows"]
