@@ -187,6 +187,9 @@ class InstrumentPlayer:
                 (events.LEGATO, 127 * channel.legato),
                 (events.PORTAMENTO, 127 * channel.slides),
                 (events.SLIDE_TIME, channel.slide_time),
+                (events.HARMONICS, 127 * channel.harmonics),
+                (events.TREMOLO, 127 * channel.tremolo),
+                (events.STRUM, 127 * channel.strums),
             ):
                 if value:
                     found.append(Controller(controller, value, number))

@@ -9,7 +9,9 @@ from app.patches.patch import Patch
 from engine.pluck import Pluck
 
 SLIDE_TIME, PORTAMENTO, SOFT, LEGATO = 5, 65, 67, 68
+HARMONICS, TREMOLO, STRUM = 80, 81, 82  # MIDI's general-purpose buttons
 SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 123  # numbers of MIDI controllers
+SWITCHES = (LEGATO, PORTAMENTO, SLIDE_TIME, HARMONICS, TREMOLO, STRUM)  # how keys are played
 VALUE, FINE_VALUE = 6, 38  # of the parameter that these choose: registered ones (RPN), and others
 REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER = 101, 100, 99, 98
 PEDAL_DOWN = 64  # from this value on
@@ -20,6 +22,9 @@ _FIXED = {  # functions of controllers that no patch changes; those from 120 on 
     PORTAMENTO: "lets legato slide",
     SOFT: "is the palm mute",
     LEGATO: "is the legato footswitch",
+    HARMONICS: "is the footswitch of harmonics",
+    TREMOLO: "is the footswitch of tremolo",
+    STRUM: "is the footswitch of strums",
     **dict.fromkeys((VALUE, FINE_VALUE, REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER), _PARAMETER),
     **dict.fromkeys(range(SOUND_OFF, 128), "stops or resets what is played"),
 }

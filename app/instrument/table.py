@@ -34,6 +34,7 @@ VALUES = (
     "noise.onset_db",
     "noise.release_db",
     "damping.mute",
+    *(f"technique.{name}" for name in ("harmonic", "strum_ms", "strokes", "tremolo_hz")),
 )
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
 SHAPES = {

@@ -244,6 +244,22 @@ class Damping(Value):
     let_ring: Flag = False
 
 
+class Technique(Value):
+    """How keys are played. MIDI's footswitches 80, 81 and 82 switch on what is off here.
+
+    Attributes:
+        harmonic: which partial is the lowest that a finger leaves, which touches the string there as it is plucked.
+        strum_ms: from one string of a chord to the next. A chord is what begins within 30 ms.
+        strokes: of strums: 0 from low to high, 1 from high to low, 2 by turns.
+        tremolo_hz: how often a string is plucked while its key is held.
+    """
+
+    harmonic: float = parameter("technique.harmonic")
+    strum_ms: float = parameter("technique.strum_ms")
+    strokes: float = parameter("technique.strokes")
+    tremolo_hz: float = parameter("technique.tremolo_hz")
+
+
 class Amp(Value):
     """The amplifier, through which the strings sound before the body: its drive (0: none) and its tone."""
 
@@ -324,6 +340,7 @@ class Patch(Value):
     sympathy_s_kg: Annotated[float, ranged(0, 0.5)] = 0.0
     noise: Noise = Noise()
     damping: Damping = Damping()
+    technique: Technique = Technique()
     mode: Mode = "poly"
     bend_semitones: Annotated[float, ranged(0, 48)] = 2.0
     bend_by: Literal["tension", "length"] = "tension"

@@ -14,7 +14,7 @@ from pathlib import Path
 from app.instrument.compiled import InstrumentPlayer, is_another
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.effects import body_problem, effects_of
-from app.instrument.events import Controller, Event, NoteOn, PatchTurned, moves_effects
+from app.instrument.events import RESET, SWITCHES, Controller, Event, NoteOn, PatchTurned, moves_effects
 from app.patches.drums import Drums
 from app.patches.patch import Patch, Pickup
 from app.playing.due import Due
@@ -79,6 +79,7 @@ class Keys:
         self._latest: KeyNote | None = None
         self._effects: Effects | None = None  # as set
         self._dry = False
+        self._switches: dict[tuple[int, int], Controller] = {}  # the latest of each channel, which players take over
         self._reported_body = ""  # the fault of the body that was reported last
 
     @property
@@ -126,6 +127,8 @@ class Keys:
             begun: is called with the note; under the lock, so that notes of a key keep their order.
         """
         with self._lock:
+            if isinstance(event, Controller):
+                self._note_switch(event)
             player, mixer = self._present(), self._mixer()
             if player is None:
                 return None
@@ -145,6 +148,12 @@ class Keys:
             self._latest = note
             begun(note)
             return note
+
+    def _note_switch(self, event: Controller) -> None:
+        if event.number in SWITCHES:
+            self._switches[event.number, event.channel] = event
+        elif event.number == RESET:
+            self._switches = {at: each for at, each in self._switches.items() if each.channel != event.channel}
 
     def look(self) -> list[KeyNote]:
         """Follows the player's reports; the notes that began since it was asked for the last time. Any thread."""
@@ -328,6 +337,8 @@ class Keys:
                 return
             if mixer.rate_hz != rate_hz:  # the device has changed meanwhile
                 player = player.again(mixer.rate_hz)
+            for event in self._switches.values():
+                player.handle(event)
             self._path = path
             self._give(player, mixer)
             self.recorder.take(_turned(player))

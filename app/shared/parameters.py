@@ -18,7 +18,7 @@ from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, W
 Modulation = Literal["none", "learn", "macro", "wheel"]  # each includes those before it
 _ORDER: tuple[Modulation, ...] = ("none", "learn", "macro", "wheel")
 PITCH, STRING, DECAY, PLUCK, PICKUP, BODY = "PITCH", "STRING", "DECAY", "PLUCK", "PICK-UP", "BODY"
-NOISE = "NOISE"
+NOISE, TECHNIQUE = "NOISE", "TECHNIQUE"
 
 
 @dataclass(frozen=True)
@@ -50,6 +50,7 @@ class Parameter:
         wheel: its value at the modulation wheel's end; None: `wheel_factor` times its own value.
         figure_unit: unit of the physical figure that its knob shows, see `app.instrument.facts`; None: none.
         whole: whether it is an integer.
+        words: for the integers from its lowest on; empty: they are shown as numbers.
     """
 
     id: str
@@ -64,6 +65,7 @@ class Parameter:
     wheel_factor: float = 1.0
     figure_unit: str | None = None
     whole: bool = False
+    words: tuple[str, ...] = ()
     tip: str = field(init=False, default="")
 
     def __post_init__(self) -> None:
@@ -92,6 +94,8 @@ class Parameter:
 
     def shown(self, value: float) -> str:
         """The value with its unit."""
+        if self.words:
+            return self.words[round(self.clamped(value) - self.limits[0])]
         return self.taper.text.format(value)
 
     @property
@@ -127,6 +131,11 @@ TIPS = {
     "pluck.softest_mm": "How far the softest key pulls the string",
     "pluck.hardest_mm": "How far the hardest key pulls the string",
     "pluck.curve": "Velocity curve: above 0 middle velocities are louder, below 0 softer",
+    "technique.harmonic": "Harmonics: a finger touches the string at 1/n of its length as it is plucked, so that "
+    "partial n is the lowest. 1: it does not",
+    "technique.strum_ms": "Strum: time from one string of a chord to the next. 0: all at once",
+    "technique.strokes": "Strokes of strums: from low to high (down), from high to low (up), or by turns (both)",
+    "technique.tremolo_hz": "Tremolo: how often a key that is held plucks its string. 0: once",
     "noise.onset_db": "Noise of what plucks or strikes: its energy, compared with a note's. The lowest is off",
     "noise.release_db": "Noise of the damper or finger that ends a note. The lowest is off",
     "pickup.points.0": f"Where the string is heard; {_PLACE_TIP}",
@@ -231,6 +240,25 @@ OF_PATCHES: Mapping[str, Parameter] = {
         Parameter("pluck.curve", "curve", (-1, 1), 0, Taper(0.05, "{:+.2f}"), PLUCK, "wheel", "velocity curve", 1.0),
         Parameter("noise.onset_db", "stroke", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "stroke noise"),
         Parameter("noise.release_db", "release", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "release noise"),
+        Parameter(
+            "technique.harmonic", "harmonic", (1, 5), 1, Taper(1, "{:.0f}"), TECHNIQUE, "wheel", wheel=2, whole=True
+        ),
+        Parameter("technique.strum_ms", "strum", (0, 60), 0, Taper(1, "{:.0f} ms"), TECHNIQUE, "wheel", wheel=40),
+        Parameter(
+            "technique.strokes",
+            "strokes",
+            (0, 2),
+            0,
+            Taper(1, "{:.0f}"),
+            TECHNIQUE,
+            "macro",
+            "strokes of strums",
+            whole=True,
+            words=("down", "up", "both"),
+        ),
+        Parameter(
+            "technique.tremolo_hz", "tremolo", (0, 16), 0, Taper(0.5, "{:.1f} Hz"), TECHNIQUE, "wheel", wheel=12
+        ),
         Parameter("pickup.points.0", "place", (0, 1), DEFAULT_LISTEN, PLACE, PICKUP, "macro", "listening point"),
         Parameter(
             "pickup.points.1", "right", (0, 1), 1 - DEFAULT_LISTEN, PLACE, PICKUP, "macro", "right listening point"

@@ -15,7 +15,7 @@ Area = Literal[
     "slots",  # A and B
     "pluck",  # shape, position, amplitude and width of the drawn pluck
     "time",  # loop, duration and slow motion
-    "patch",  # the instrument's bar and the knobs of its string
+    "patch",  # the instrument's bar, the knobs of its string and of techniques
     "growth",  # header: a sign where the error grew
 ]  # the string, its listening point, the keys and the output are in both
 

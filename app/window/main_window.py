@@ -194,8 +194,10 @@ class MainWindow(QMainWindow):
         for splitter in (decks, self._stage):
             splitter.setChildrenCollapsible(False)
             splitter.setHandleWidth(8)
+        self.transport.add_group(self.instrument.knobs.technique)
         self._areas: dict[Area, tuple[QWidget, ...]] = {
             "preset": (self.presets,),
+            "patch": (self.instrument.knobs.technique,),
             **self.transport.areas,
         }
         self._column = column = QVBoxLayout()

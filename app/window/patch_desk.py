@@ -12,7 +12,19 @@ from PySide6.QtWidgets import QInputDialog
 from app.instrument.beyond_training import outside_of_key, outside_of_string
 from app.instrument.bodies import body_titles
 from app.instrument.compiled import is_another
-from app.instrument.events import KEYS, LEGATO, PORTAMENTO, SLIDE_TIME, Controller, NoteOff, NoteOn, TimedEvent
+from app.instrument.events import (
+    HARMONICS,
+    KEYS,
+    LEGATO,
+    PORTAMENTO,
+    SLIDE_TIME,
+    STRUM,
+    TREMOLO,
+    Controller,
+    NoteOff,
+    NoteOn,
+    TimedEvent,
+)
 from app.instrument.facts import by_two_numbers, facts_of, facts_of_drum, figures_of, knob_for
 from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.strings import KeyString, Strings
@@ -122,6 +134,7 @@ class PatchDesk(QObject):
         bar.compare_asked.connect(self.compare)
         bar.scala_remove_asked.connect(self.remove_scala)
         panel.touch_chosen.connect(self._choose_touch)
+        panel.technique_switched.connect(self._switch_technique)
         panel.keys_play_asked.connect(
             lambda plays: session.play_patch() if plays == "pitch" else session.play_string()
         )
@@ -523,6 +536,11 @@ class PatchDesk(QObject):
         for number, down in ((LEGATO, touch != "pluck"), (PORTAMENTO, touch == "slide")):
             self._instruments.play(Controller(number, 127 * down, KEYS))
         self._instruments.play(Controller(SLIDE_TIME, SCREEN_SLIDE, KEYS))
+
+    def _switch_technique(self, name: str, on: bool) -> None:
+        """Whether keys of the screen and of the computer are played with a technique."""
+        number = {"strum": STRUM, "tremolo": TREMOLO, "harmonics": HARMONICS}[name]
+        self._instruments.play(Controller(number, 127 * on, KEYS))
 
     def _move_octave(self, octaves: int) -> None:
         octave = min(max(self._session.choices.octave + octaves, LOWEST_OCTAVE), HIGHEST_OCTAVE)

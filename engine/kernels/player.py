@@ -13,6 +13,10 @@ With the legato footswitch down, a key moves the note of a key that is held on i
 string without a pluck (hammer-on), or slides there where portamento is on. A key that is released gives the note back
 to the highest one that is still down (pull-off).
 
+Three techniques have a parameter and a footswitch each. Harmonics: a finger touches the string at a node as it is
+plucked, and leaves after some periods. Tremolo: a key that is held plucks again and again. Strum: notes that come
+within some milliseconds are one chord; its first begins at once, the others wait their turns in the queue.
+
 A channel's own wheel and pedal hold for what was struck on it. Those of the first channel hold for the keys of the
 computer and the screen too, which have none, and in MPE, as the master's, for every channel.
 
@@ -54,6 +58,12 @@ STOP_S = 0.03  # of the fade of all strings
 STOLEN_S = 0.03  # of the fade of a note that makes room
 PLUCK_STOPS_S = 0.006  # in which a string is stopped by what plucks it again
 
+# Techniques: estimates. A touch lasts long enough for the fifth harmonic: its lowest neighbour then falls by 72 dB
+TOUCH_PERIODS, LIFT_S = 12.0, 0.004  # of the string; of the glide as the finger leaves
+HARMONIC_REACH = 0.4  # of the way to the first node, where harmonics are plucked at the farthest
+CHORD_S = 0.03  # in which notes come that are one chord
+USUAL_HARMONIC, USUAL_STRUM_MS, USUAL_TREMOLO_HZ = 2.0, 12.0, 10.0  # of a footswitch where the parameter is off
+
 # By how much a pluck varies from stroke to stroke, at most, where an instrument varies by 1. Estimates: repeats then
 # differ by about -20 dB; those of a player that was recorded do by -4 … -12 dB
 VARIES_PLACE, VARIES_DB, VARIES_WIDTH, VARIES_RELEASE = 0.08, 1.0, 0.12, 0.2  # shares, dB
@@ -62,8 +72,10 @@ VARIES_ANGLE = math.radians(8.0)
 # Controllers of MIDI
 MOD_WHEEL, DATA, SUSTAIN, FINE_DATA, SLIDE = 1, 6, 64, 38, 74
 SLIDE_TIME, PORTAMENTO, SOFT, LEGATO = 5, 65, 67, 68
+HARMONICS, TREMOLO, STRUM = 80, 81, 82
 FINE_OTHER, OTHER, FINE_REGISTERED, REGISTERED, SOUND_OFF, RESET, NOTES_OFF = 98, 99, 100, 101, 120, 121, 123
 PEDAL_DOWN = 64  # from this value on
+SWITCHES = (of.CHANNEL_LEGATO, of.CHANNEL_SLIDES, of.CHANNEL_HARMONICS, of.CHANNEL_TREMOLO, of.CHANNEL_STRUMS)
 NO_PARAMETER, BEND_RANGE = 127, 0
 
 
@@ -239,12 +251,12 @@ def _release_keys(players: np.ndarray, channel: int) -> None:
 
 
 @njit(**COMPILED)
-def _connects(players: np.ndarray, mode: int, channel: int) -> bool:
-    """Whether a legato footswitch holds for a channel."""
+def _switched(players: np.ndarray, mode: int, channel: int, which: int) -> bool:
+    """Whether a footswitch, by its slot of a channel, holds for a channel."""
+    down = False
     for each in range(of.CHANNELS):
-        if players[_channel(each) + of.CHANNEL_LEGATO] != 0 and _acts_on(mode, each, channel):
-            return True
-    return False
+        down = down or (players[_channel(each) + which] != 0 and _acts_on(mode, each, channel))
+    return down
 
 
 @njit(**COMPILED)
@@ -277,6 +289,34 @@ def _mute(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np
         if _acts_on(tables[of.TABLE_MODE], each, channel):
             share = max(share, player[_channel(each) + of.CHANNEL_MUTE])
     return share
+
+
+@njit(**COMPILED)
+def _technique(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    channel: int,
+    which: int,
+    switch: int,
+    usual: float,
+) -> float:
+    """The value of a technique for a channel; the usual one where its footswitch is down and the value is off."""
+    value, off = _value(player, players, table, tables, which), 1.0 if which == of.HARMONIC else 0.0
+    if value <= off and _switched(players, tables[of.TABLE_MODE], channel, switch):
+        return usual
+    return value
+
+
+@njit(**COMPILED)
+def _node(
+    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, channel: int, partials: int
+) -> int:
+    """At 1 over how much of its length a string is touched as it is plucked; 0: it is not."""
+    switch = of.CHANNEL_HARMONICS
+    node = round(_technique(player, players, table, tables, channel, of.HARMONIC, switch, USUAL_HARMONIC))
+    return node if 1 < node <= partials else 0
 
 
 @njit(**COMPILED)
@@ -535,6 +575,9 @@ def _fill(
     if player[note + of.NOTE_MUTE] > 0.0:
         modes, pairs = players[note + of.NOTE_MODES], players[note + of.NOTE_PAIRS]
         strings.mute(string, modes, pairs, player[note + of.NOTE_MUTE], out)
+    if players[note + of.NOTE_TOUCHED] > 0:
+        modes, pairs = players[note + of.NOTE_MODES], players[note + of.NOTE_PAIRS]
+        strings.touch(string, modes, pairs, players[note + of.NOTE_TOUCHED], out)
     if tables[of.TABLE_RECORDED] != 0:
         recorded.correct(table, tables, string, players[note + of.NOTE_MODES], out)
 
@@ -677,6 +720,9 @@ def _retune(
     mute = _mute(player, players, table, tables, players[note + of.NOTE_CHANNEL])
     changed = changed or mute != player[note + of.NOTE_MUTE]
     player[note + of.NOTE_MUTE] = mute
+    if players[note + of.NOTE_TOUCHED] != 0 and max(frame, now) >= players[note + of.NOTE_LIFTED]:
+        players[note + of.NOTE_TOUCHED] = 0
+        changed = True
     if not changed:
         return
     n, filled = players[note + of.NOTE_MODES], 0
@@ -880,7 +926,7 @@ def _note_on(
         string = channel if count > 0 and _chosen(table, count, key) != channel else -1
     own, modes, gain, highest_m = _moment(player, 3), 0, 1.0, 0.0
     position = amplitude_mm = width = 0.0
-    pairs, strength, stroke = 0, 1.0, 0
+    pairs, strength, stroke, touched = 0, 1.0, 0, 0
     if not prepared:
         pitch_hz = _pitch_hz(table, tables, key, player[event + of.EVENT_PITCH_HZ])
         gain = abs(table[of.TABLE_GAINS + key * of.GAINS + 1 + string])
@@ -924,6 +970,9 @@ def _note_on(
             width *= 1 + varies * VARIES_WIDTH * _varied(stroke, key, 2)
             release_s *= 1 + varies * VARIES_RELEASE * _varied(stroke, key, 3)
             turned = varies * VARIES_ANGLE * _varied(stroke, key, 4)
+        touched = _node(player, players, table, tables, channel, modes)
+        if touched > 0 and not given > 0.0:
+            position = min(position, HARMONIC_REACH / touched)
         highest_m = _pull(player, table, tables, modes, position, amplitude_mm / 1000, width)
         _release_pluck(player, own, modes, release_s)
         if tables[of.TABLE_RECORDED] != 0:
@@ -957,6 +1006,13 @@ def _note_on(
         player[note + of.NOTE_HEARD + each] = table[of.TABLE_HEARD + each] if polarised else 1.0
         player[note + of.NOTE_CONDUCTANCE + each] = table[of.TABLE_CONDUCTANCE + each]
     players[note + of.NOTE_FRAME] = frame
+    players[note + of.NOTE_BEGAN] = max(frame, mixers[at.M_FRAMES])
+    player[note + of.NOTE_VELOCITY] = velocity
+    player[note + of.NOTE_GIVEN] = player[event + of.EVENT_POSITION]
+    if touched > 0:
+        players[note + of.NOTE_TOUCHED] = touched
+        lasts = _frames(player, TOUCH_PERIODS / strings.pitch_hz(own))
+        players[note + of.NOTE_LIFTED] = players[note + of.NOTE_BEGAN] + lasts
     player[note + of.NOTE_MUTE] = _mute(player, players, table, tables, channel)
     player[note + of.NOTE_PLUCK] = position
     player[note + of.NOTE_PLUCK + 1] = amplitude_mm
@@ -1083,7 +1139,9 @@ def _hammer_on(
 ) -> bool:
     """Lets a key have the latest note that is held on its channel, where legato is on; whether it has one."""
     channel, key, found, age = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY], -1, 0
-    if players[event + of.EVENT_VOICES] != 0 or not _connects(players, tables[of.TABLE_MODE], channel):
+    if players[event + of.EVENT_VOICES] != 0 or not _switched(
+        players, tables[of.TABLE_MODE], channel, of.CHANNEL_LEGATO
+    ):
         return False
     for number in range(of.MOST_NOTES):
         note = _note(number)
@@ -1122,7 +1180,7 @@ def _pull_off(
 ) -> bool:
     """Gives the note of a released key to the highest key that is down and has none; whether there is one."""
     channel = players[_note(number) + of.NOTE_CHANNEL]
-    if not _connects(players, tables[of.TABLE_MODE], channel):
+    if not _switched(players, tables[of.TABLE_MODE], channel, of.CHANNEL_LEGATO):
         return False
     for key in range(of.KEYS - 1, -1, -1):
         free = _is_down(players, channel, key)
@@ -1190,6 +1248,211 @@ def _choke(player: np.ndarray, players: np.ndarray, event: int, frame: int) -> N
             players[note + of.NOTE_HAS_PLACE] = 0
 
 
+# Chords, tremolo, harmonics
+
+
+@njit(**COMPILED)
+def _height(players: np.ndarray, tables: np.ndarray, event: int) -> int:
+    """Rises from the lowest note of a chord to the highest: by strings where channels are strings, else by keys."""
+    channel = players[event + of.EVENT_CHANNEL]
+    string = of.CHANNELS - channel if _is_string(players, tables, channel) else 0
+    return string * of.KEYS + players[event + of.EVENT_KEY]
+
+
+@njit(**COMPILED)
+def _strums_in(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, event: int) -> int:
+    """Frames from string to string of a chord that the note of an event is in; 0: notes begin as they come."""
+    note_on = players[event + of.EVENT_KIND] == of.NOTE_ON and player[event + of.EVENT_VALUE] > 0.0
+    channel = players[event + of.EVENT_CHANNEL]
+    if not note_on or not 0 <= channel < of.CHANNELS or players[event + of.EVENT_VOICES] != 0:
+        return 0
+    if tables[of.TABLE_DRUMS] != 0:
+        return 0
+    switch = of.CHANNEL_STRUMS
+    milliseconds = _technique(player, players, table, tables, channel, of.STRUM_MS, switch, USUAL_STRUM_MS)
+    return _frames(player, milliseconds / 1000) if milliseconds > 0.0 else 0
+
+
+@njit(**COMPILED)
+def _continues(player: np.ndarray, players: np.ndarray, frame: int) -> bool:
+    """Whether a note that comes at a frame belongs to the latest chord."""
+    since = frame - players[of.PLAYER_CHORD_BEGAN]
+    return players[of.PLAYER_CHORD] != 0 and 0 <= since <= _frames(player, CHORD_S)
+
+
+@njit(**COMPILED)
+def _goes_up(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray) -> bool:
+    """Whether the next strum goes from the highest note to the lowest."""
+    strokes = round(_value(player, players, table, tables, of.STROKES))
+    return strokes == of.UP or (strokes == of.ALTERNATE and players[of.PLAYER_NEXT_UP] != 0)
+
+
+@njit(**COMPILED)
+def _swap(players: np.ndarray, first: int, second: int) -> None:
+    """Exchanges two events; each place keeps its frame."""
+    for slot in range(of.EVENT_SLOTS):
+        if slot != of.EVENT_FRAME:
+            kept = players[first + slot]
+            players[first + slot] = players[second + slot]
+            players[second + slot] = kept
+
+
+@njit(**COMPILED)
+def _arrange(player: np.ndarray, players: np.ndarray, now: int, first: int, count: int, place: int, end: int) -> None:
+    """Lets the first string of a chord come first, of notes that come at the same frame.
+
+    Args:
+        first, count: slot and number of the events of a ring, of which `place` is played next, and `end` is the last
+            one's successor.
+    """
+    address, event = players[of.PLAYER_TABLE], first + place % count * of.EVENT_SLOTS
+    if address == 0 or players[event + of.EVENT_CHORD] != 0:
+        return
+    table, tables, frame = _at(address), _whole(address), max(players[event + of.EVENT_FRAME], now)
+    if _strums_in(player, players, table, tables, event) == 0 or _continues(player, players, frame):
+        return
+    up, best = _goes_up(player, players, table, tables), event
+    for each in range(place + 1, end):
+        other = first + each % count * of.EVENT_SLOTS
+        together = max(players[other + of.EVENT_FRAME], now) == frame and players[other + of.EVENT_CHORD] == 0
+        if not together or _strums_in(player, players, table, tables, other) == 0:
+            break
+        higher = _height(players, tables, other) > _height(players, tables, best)
+        if higher == up:
+            best = other
+    _swap(players, event, best)
+
+
+@njit(**COMPILED)
+def _strum(
+    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, event: int, now: int
+) -> bool:
+    """Lets a note wait for its turn in a chord; False: it begins now."""
+    chord = players[of.PLAYER_CHORD]
+    if players[event + of.EVENT_CHORD] != 0:  # its turn has come
+        players[of.PLAYER_CHORD_BEGUN] += players[event + of.EVENT_CHORD] == chord
+        players[event + of.EVENT_CHORD] = 0
+        return False
+    step, frame = _strums_in(player, players, table, tables, event), max(players[event + of.EVENT_FRAME], now)
+    if step == 0:
+        return False
+    if not _continues(player, players, frame):
+        players[of.PLAYER_CHORD] += 1
+        players[of.PLAYER_CHORD_BEGAN] = frame
+        players[of.PLAYER_CHORD_BEGUN] = 1
+        players[of.PLAYER_CHORD_UP] = _goes_up(player, players, table, tables)
+        return False
+    if players[of.PLAYER_QUEUED] == of.QUEUED:
+        return False
+    players[of.PLAYER_NEXT_UP] = 1 - players[of.PLAYER_CHORD_UP]
+    turn = players[of.PLAYER_CHORD_BEGUN]
+    for place in range(players[of.PLAYER_QUEUED]):
+        turn += players[of.PLAYER_QUEUE + place * of.EVENT_SLOTS + of.EVENT_CHORD] == chord
+    players[event + of.EVENT_CHORD], players[event + of.EVENT_CAME] = chord, frame
+    players[event + of.EVENT_FRAME] = max(players[of.PLAYER_CHORD_BEGAN] + turn * step, frame)
+    player[event + of.EVENT_STRUCK_S] = 0.0  # its latency is meant
+    _queue(players, event)
+    players[event + of.EVENT_CHORD] = 0
+    later, up = 0, players[of.PLAYER_CHORD_UP] != 0
+    for place in range(players[of.PLAYER_QUEUED] - 1, -1, -1):  # from the new one, which is the last, to its turn
+        each = of.PLAYER_QUEUE + place * of.EVENT_SLOTS
+        if players[each + of.EVENT_CHORD] != chord:
+            continue
+        if later != 0:
+            if (_height(players, tables, each) < _height(players, tables, later)) != up:
+                break
+            _swap(players, each, later)
+        later = each
+    return True
+
+
+@njit(**COMPILED)
+def _waits(players: np.ndarray, event: int, now: int) -> bool:
+    """Puts what is meant for a note behind it where that waits for its turn in a chord; whether it does."""
+    id, channel, key = players[event + of.EVENT_ID], players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
+    by_id = id != 0 and players[event + of.EVENT_KIND] in (of.TUNE, of.CHOKE)
+    for place in range(players[of.PLAYER_QUEUED]):
+        each = of.PLAYER_QUEUE + place * of.EVENT_SLOTS
+        if players[each + of.EVENT_CHORD] == 0:
+            continue
+        meant = players[each + of.EVENT_CHANNEL] == channel and players[each + of.EVENT_KEY] == key
+        if by_id:
+            meant = players[each + of.EVENT_ID] == id
+        if meant and players[of.PLAYER_QUEUED] < of.QUEUED:
+            later = players[each + of.EVENT_FRAME] - players[each + of.EVENT_CAME]
+            players[event + of.EVENT_FRAME] = max(players[event + of.EVENT_FRAME], now) + later
+            _queue(players, event)
+            return True
+    return False
+
+
+@njit(**COMPILED)
+def _forget_turns(player: np.ndarray, players: np.ndarray, mode: int, channel: int) -> None:
+    """Forgets notes that wait for their turns in a chord: those of a channel, or all, -1."""
+    for place in range(players[of.PLAYER_QUEUED]):
+        event = of.PLAYER_QUEUE + place * of.EVENT_SLOTS
+        meant = channel < 0 or _is_master(mode, channel, players[event + of.EVENT_CHANNEL])
+        if players[event + of.EVENT_CHORD] != 0 and meant:
+            _refuse(player, players, event)
+            players[event + of.EVENT_CHORD] = 0
+            players[event + of.EVENT_KIND] = of.NOTHING
+
+
+@njit(**COMPILED)
+def _follow_hands(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, now: int) -> None:
+    """Lifts fingers from strings that they touch, and plucks again what a tremolo plucks, in the next quantum."""
+    address = players[of.PLAYER_TABLE]
+    if address == 0:
+        return
+    table, tables, end = _at(address), _whole(address), now + at.QUANTUM
+    if tables[of.TABLE_DRUMS] != 0:
+        return
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        if players[note + of.NOTE_STATE] != of.RINGS or players[note + of.NOTE_PREPARED] != 0:
+            continue
+        if players[note + of.NOTE_TOUCHED] != 0 and players[note + of.NOTE_LIFTED] < end:
+            _retune(player, players, table, tables, number, LIFT_S, players[note + of.NOTE_LIFTED], now)
+        if players[note + of.NOTE_HELD] == 0 or players[note + of.NOTE_RELEASED] != 0 or not _sounds(players, note):
+            continue
+        channel, switch = players[note + of.NOTE_CHANNEL], of.CHANNEL_TREMOLO
+        hz = _technique(player, players, table, tables, channel, of.TREMOLO_HZ, switch, USUAL_TREMOLO_HZ)
+        due = players[note + of.NOTE_BEGAN] + _frames(player, 1 / hz) if hz > 0.0 else end
+        if due < end:
+            _pluck_again(player, players, table, tables, mixers, note, max(due, now))
+
+
+@njit(**COMPILED)
+def _pluck_again(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    mixers: np.ndarray,
+    note: int,
+    frame: int,
+) -> None:
+    """Plucks the string of a note again: another note with its number, which ends without a report of its own."""
+    event = of.PLAYER_AGAIN
+    for slot in range(of.EVENT_SLOTS):
+        players[event + slot] = 0
+    players[event + of.EVENT_FRAME], players[event + of.EVENT_KIND] = frame, of.NOTE_ON
+    players[event + of.EVENT_CHANNEL] = players[note + of.NOTE_CHANNEL]
+    players[event + of.EVENT_KEY] = players[note + of.NOTE_KEY]
+    players[event + of.EVENT_ID] = players[note + of.NOTE_ID]
+    player[event + of.EVENT_VALUE] = player[note + of.NOTE_VELOCITY]
+    player[event + of.EVENT_POSITION] = player[note + of.NOTE_GIVEN]
+    player[event + of.EVENT_PITCH_HZ] = player[note + of.NOTE_PITCH_HZ]
+    players[note + of.NOTE_ID], players[note + of.NOTE_BEGAN] = 0, frame
+    tuned, before = player[note + of.NOTE_TUNED], players[of.PLAYER_AGE]
+    _note_on(player, players, table, tables, mixers, event)
+    for number in range(of.MOST_NOTES):
+        made = _note(number)
+        if tuned != 0.0 and players[made + of.NOTE_STATE] == of.RINGS and players[made + of.NOTE_AGE] > before:
+            player[made + of.NOTE_TUNED] = tuned
+            _retune(player, players, table, tables, number, 0.0, 0, mixers[at.M_FRAMES])
+
+
 # Controllers
 
 
@@ -1236,6 +1499,8 @@ def _stop(player: np.ndarray, players: np.ndarray, seconds: float, frame: int) -
             players[note + of.NOTE_HAS_PLACE] = 0
     for each in range(of.CHANNELS):
         _release_keys(players, each)
+    _forget_turns(player, players, of.POLY, -1)
+    players[of.PLAYER_NEXT_UP] = 0
     players[of.PLAYER_SYMPATHY_STOPS] = _quanta(player, max(seconds, STOP_S)) + 2
     contact.hush(players, _quanta(player, max(seconds, STOP_S)))
 
@@ -1266,6 +1531,12 @@ def _controller(
         players[own + of.CHANNEL_LEGATO] = value >= PEDAL_DOWN
     elif number == PORTAMENTO:
         players[own + of.CHANNEL_SLIDES] = value >= PEDAL_DOWN
+    elif number == HARMONICS:
+        players[own + of.CHANNEL_HARMONICS] = value >= PEDAL_DOWN
+    elif number == TREMOLO:
+        players[own + of.CHANNEL_TREMOLO] = value >= PEDAL_DOWN
+    elif number == STRUM:
+        players[own + of.CHANNEL_STRUMS] = value >= PEDAL_DOWN
     elif number == SLIDE_TIME:
         players[own + of.CHANNEL_TIME] = min(max(value, 0), 127)
     elif number == MOD_WHEEL:
@@ -1279,6 +1550,7 @@ def _controller(
         for each in range(of.CHANNELS):
             if _is_master(mode, channel, each):
                 _release_keys(players, each)
+        _forget_turns(player, players, mode, channel)
         for each in range(of.MOST_NOTES):
             note = _note(each)
             if _is_master(mode, channel, players[note + of.NOTE_CHANNEL]) and _sounds(players, note):
@@ -1290,8 +1562,8 @@ def _controller(
             if _is_master(mode, channel, each):
                 _rest(player, players, each, 0, 0)
                 player[_channel(each) + of.CHANNEL_MUTE] = 0.0
-                players[_channel(each) + of.CHANNEL_LEGATO] = 0
-                players[_channel(each) + of.CHANNEL_SLIDES] = 0
+                for switch in SWITCHES:
+                    players[_channel(each) + switch] = 0
         if _is_master(mode, channel, players[of.PLAYER_WHEEL_BY]):
             players[of.PLAYER_WHEEL] = 0
         _damp_unkept(player, players, table, tables, frame, now)
@@ -1361,6 +1633,8 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
     if kind == of.STOP:
         _stop(player, players, value, frame)
         return
+    if kind in (of.CHOKE, of.TUNE) and _waits(players, event, now):
+        return
     if kind == of.CHOKE:
         _choke(player, players, event, frame)
         return
@@ -1373,6 +1647,8 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
         return
     table, tables = _at(address), _whole(address)
     if kind == of.NOTE_ON and value > 0.0:
+        if _strum(player, players, table, tables, event, now):
+            return
         _hold(players, channel, key, True)
         if tables[of.TABLE_DRUMS] == 0 and _hammer_on(player, players, table, tables, event, frame, now):
             return
@@ -1385,6 +1661,8 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
                 return
         _note_on(player, players, table, tables, mixers, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
+        if _waits(players, event, now):
+            return
         _hold(players, channel, key, False)
         _note_off(player, players, table, tables, channel, key, frame, now)
     elif kind == of.BEND:
@@ -1488,6 +1766,7 @@ def play(player_address: int, mixer_address: int) -> None:
         if at_once and players[event + of.EVENT_FRAME] <= now and _superseded(players, event, following):
             pass
         elif players[event + of.EVENT_FRAME] <= now or players[event + of.EVENT_KIND] == of.CANCEL:
+            _arrange(player, players, now, of.PLAYER_EVENTS, of.EVENTS, taken, pushed)
             _handle(player, players, mixers, event)
         elif players[of.PLAYER_QUEUED] < of.QUEUED:
             _queue(players, event)
@@ -1505,11 +1784,13 @@ def play(player_address: int, mixer_address: int) -> None:
         frame = players[event + of.EVENT_FRAME]
         together = done < players[of.PLAYER_QUEUED] and players[following + of.EVENT_FRAME] == frame
         if not (together and _superseded(players, event, following)):
+            _arrange(player, players, now, of.PLAYER_QUEUE, of.QUEUED, done - 1, players[of.PLAYER_QUEUED])
             _handle(player, players, mixers, event)
     if done > 0:
         players[of.PLAYER_QUEUED] -= done
         for each in range(players[of.PLAYER_QUEUED] * of.EVENT_SLOTS):
             players[of.PLAYER_QUEUE + each] = players[of.PLAYER_QUEUE + done * of.EVENT_SLOTS + each]
+    _follow_hands(player, players, mixers, now)
     _hear(player, players)
 
 

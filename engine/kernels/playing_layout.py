@@ -26,11 +26,17 @@ KNOBS = 8
 POSITION, WIDTH, WIDTH_HARD, SOFTEST_MM, HARDEST_MM, CURVE, RELEASE_S, BEND_SEMITONES = range(KNOBS, KNOBS + 8)
 ONSET_DB, DAMPER_DB = range(KNOBS + 8, KNOBS + 10)  # noise of the stroke and of the release
 MUTE = KNOBS + 10  # 0 … 1: palm mute
-VALUES = KNOBS + 11
+HARMONIC = KNOBS + 11  # which partial is the lowest that a touch leaves; 1: there is no touch
+STRUM_MS = KNOBS + 12  # from one string of a chord to the next; 0: all at once
+STROKES = KNOBS + 13  # of strums: one of the three below
+TREMOLO_HZ = KNOBS + 14  # strokes of a key that is held; 0: one
+VALUES = KNOBS + 15
+DOWN, UP, ALTERNATE = range(3)
 REFERENCE_VELOCITY = 100  # at which keys are equally loud, and levels of noise hold
 
 # Kinds of events
 NOTE_ON, NOTE_OFF, BEND, CONTROLLER, TUNE, PARAMETER, TABLE, CANCEL, STOP, CHOKE = range(10)
+NOTHING = -1  # of an event that was forgotten
 ANY = -1  # channel or key of the notes that are tuned or choked
 # Slots of an event (W: whole number, R: real)
 EVENT_FRAME = 0  # W of the mixer, at which it counts; 0: at once
@@ -47,7 +53,9 @@ EVENT_VOICES = 10  # W four addresses of voices that were prepared; 0: none
 MOST_SOURCES = 4
 EVENT_STRUCK = 14  # W address of the speeds (modes,) that 1 N s gives a drum at another place; 0: its own place
 EVENT_STRUCK_MODES = 15  # W how many they are
-EVENT_SLOTS = 16
+EVENT_CHORD = 16  # W the chord in which a note waits for its turn; 0: none
+EVENT_CAME = 17  # W the frame at which it would have begun alone
+EVENT_SLOTS = 18
 
 # Slots of an instrument's table
 POLY, GUITAR, MPE = 0, 1, 2
@@ -146,7 +154,10 @@ CHANNEL_MUTE = 7  # R 0 … 1
 CHANNEL_LEGATO = 8  # W whether a key moves the note of the one that is held
 CHANNEL_SLIDES = 9  # W whether it does in CHANNEL_TIME, else at once
 CHANNEL_TIME = 10  # W 0 … 127
+CHANNEL_HARMONICS = 11  # W whether its footswitch is down, as the next two
 CHANNEL_HELD = 12  # W two: keys that are down, a bit each
+CHANNEL_TREMOLO = 14  # W
+CHANNEL_STRUMS = 15  # W
 CHANNEL_SLOTS = 16
 
 # Slots of a note
@@ -180,7 +191,12 @@ NOTE_TUNED = 31  # R semitones, beside what wheels bend it
 NOTE_LOSSES = 32  # R three
 NOTE_MUTE = 35  # R 0 … 1
 NOTE_PLUCK = 36  # R three: position, amplitude in mm and width
-NOTE_OWN = 40  # R its string as its key had it when it was struck
+NOTE_TOUCHED = 39  # W at 1 over how much of its length a finger touches it; 0: none does
+NOTE_LIFTED = 40  # W frame of the mixer at which the finger leaves
+NOTE_BEGAN = 41  # W frame of the mixer
+NOTE_VELOCITY = 42  # R
+NOTE_GIVEN = 43  # R position given with it; not a number: the instrument's
+NOTE_OWN = 44  # R its string as its key had it when it was struck
 NOTE_STRING_NOW = NOTE_OWN + STRING  # R with bends, slides, dampers and knobs
 NOTE_SLOTS = NOTE_STRING_NOW + STRING
 MOST_NOTES = 128
@@ -222,7 +238,12 @@ PLAYER_AGE = 10  # W of the youngest note
 PLAYER_CUT = 11  # W notes that were cut, for all places of notes were taken
 PLAYER_RATE = 12  # R frames a second
 PLAYER_HERE = 13  # W its own address
+PLAYER_CHORD = 14  # W the latest chord that is strummed, from 1; 0: none was
+PLAYER_CHORD_BEGAN = 15  # W frame of the mixer
 PLAYER_SOURCE_GAINS = 16  # R four
+PLAYER_CHORD_BEGUN = 20  # W notes of it that have begun
+PLAYER_CHORD_UP = 21  # W whether it goes from the highest to the lowest
+PLAYER_NEXT_UP = 22  # W whether the next does, where strokes alternate
 PLAYER_VALUES = 24  # R
 PLAYER_CHANNELS = PLAYER_VALUES + VALUES
 PLAYER_EVENTS = PLAYER_CHANNELS + CHANNELS * CHANNEL_SLOTS
@@ -258,7 +279,8 @@ NOISE_STOPS = 17  # W quanta in which it fades out; 0: it does not
 NOISE_SLOTS = 18
 PLAYER_NOISE_GAIN = PLAYER_SYMPATHY + 7 * MOST_SYMPATHETIC  # R at the end of the quantum before
 PLAYER_NOISES = PLAYER_NOISE_GAIN + 1
-PLAYER_VOICES = PLAYER_NOISES + MOST_NOISES * NOISE_SLOTS
+PLAYER_AGAIN = PLAYER_NOISES + MOST_NOISES * NOISE_SLOTS  # W the event of a tremolo's stroke, for a moment
+PLAYER_VOICES = PLAYER_AGAIN + EVENT_SLOTS
 BLOCKS = 4  # of modes that a voice is to have
 
 

@@ -20,6 +20,7 @@ _BOUNDS = tuple(bounds.STRING.values())
 _MAY_BE_ZERO = (of.MOMENT, of.MODULUS, of.D1, of.D3)
 ROUNDS = 4  # σ₁ depends on the length, a little
 MUTED_M, MUTED_SHARE, MUTED_SIGMA = 0.05, 0.25, 300.0  # of a palm mute: m, of the string at most, 1/s
+TOUCH_RESISTANCE = 1.0  # of a finger that touches a string, over the string's own √(TρA): an estimate
 
 
 @njit(**EXACT)
@@ -166,6 +167,20 @@ def mute(string: np.ndarray, modes: int, pairs: int, share: float, out: np.ndarr
         turn = 2 * math.pi * partial_of(mode, pairs) * covered
         before, most = out[modes + mode], of.HIGHEST_SIGMA * math.sqrt(out[mode])
         out[modes + mode] = max(before, min(before + share * MUTED_SIGMA * (1 - math.sin(turn) / turn), most))
+
+
+@njit(**EXACT)
+def touch(string: np.ndarray, modes: int, pairs: int, node: int, out: np.ndarray) -> None:
+    """Adds to σ, in `out` as of `rows`, what a finger adds that touches the string at 1/node of its length.
+
+    A resistance R at x gives σ_n = R/(ρAℓ) sin²(nπx/ℓ), to first order (Rayleigh, Theory of Sound, § 102): partials
+    with a node there stay as they are. With R = √(TρA) the largest is 2 f₁.
+    """
+    largest = TOUCH_RESISTANCE * math.sqrt(string[of.TENSION] / mass(string)) / string[of.LENGTH]
+    for mode in range(modes):
+        moves = math.sin(math.pi * partial_of(mode, pairs) / node) ** 2
+        before, most = out[modes + mode], of.HIGHEST_SIGMA * math.sqrt(out[mode])
+        out[modes + mode] = max(before, min(before + largest * moves, most))
 
 
 @njit(inline="always", **EXACT)

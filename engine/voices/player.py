@@ -38,6 +38,8 @@ EVENT = np.dtype(
         ("voices", np.int64, of.MOST_SOURCES),
         ("struck", np.int64),
         ("struck_modes", np.int64),
+        ("chord", np.int64),
+        ("came", np.int64),
     ]
 )
 REPORT = np.dtype(
@@ -152,6 +154,9 @@ class Channel:
     legato: bool
     slides: bool
     slide_time: int
+    harmonics: bool
+    tremolo: bool
+    strums: bool
 
 
 @dataclass(eq=False)
@@ -241,7 +246,9 @@ class CompiledPlayer:
             if voices:
                 self._prepared = [each for each in self._prepared if not each.over]
                 self._prepared.append(_Prepared(tuple(voices)))
-            self._push((frame, kind, channel, key, value, id, position, pitch_hz, 0, struck_s, addresses, row, modes))
+            self._push(
+                (frame, kind, channel, key, value, id, position, pitch_hz, 0, struck_s, addresses, row, modes, 0, 0)
+            )
         return number
 
     def take(self, table: Table, frame: int = 0) -> None:
@@ -250,7 +257,9 @@ class CompiledPlayer:
             self._tables.append(table)
             while self._tables[0].serial < int(self._counts[of.PLAYER_SERIAL]):
                 self._tables.popleft()
-            self._push((frame, of.TABLE, 0, 0, 0.0, 0, NONE, NONE, table.address, 0.0, [0] * of.MOST_SOURCES, 0, 0))
+            self._push(
+                (frame, of.TABLE, 0, 0, 0.0, 0, NONE, NONE, table.address, 0.0, [0] * of.MOST_SOURCES, 0, 0, 0, 0)
+            )
 
     def _push(self, record: tuple[object, ...]) -> None:
         self._backlog.append(record)
@@ -412,6 +421,9 @@ class CompiledPlayer:
             bool(counts[of.CHANNEL_LEGATO]),
             bool(counts[of.CHANNEL_SLIDES]),
             int(counts[of.CHANNEL_TIME]),
+            bool(counts[of.CHANNEL_HARMONICS]),
+            bool(counts[of.CHANNEL_TREMOLO]),
+            bool(counts[of.CHANNEL_STRUMS]),
         )
 
 

@@ -1,11 +1,12 @@
 """The benchmarks' command line: `python3 run.py bench NAME`.
 
-Exit status: as of `learned-strings`; `unplug` and `soak` exit with 1 where a target is missed.
+Exit status: as of `learned-strings`; `tour`, `unplug` and `soak` exit with 1 where a target is missed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
@@ -165,6 +166,31 @@ def play(
     with progress("bench play") as report:
         found = measure(seconds, rate, chosen, (False, True) if busy is None else (busy,), seed, found_patch, report)
     show(found, json)
+
+
+@bench.command()
+def tour(
+    patch: Annotated[
+        list[str] | None, typer.Argument(metavar="INSTRUMENT", help="Names or files of instruments; default: all.")
+    ] = None,
+    buffer: BufferName = "medium",
+    out: Annotated[Path | None, typer.Option(help="WAV file of the recording.")] = None,
+    json: Json = False,
+) -> None:
+    """Holes, clicks and levels of every factory instrument. Status 1 where one has a hole, or a key is not heard.
+
+    Each is chosen in the window's browser and plays a phrase by keys. Linux only. Needs PulseAudio and Xvfb; starts a
+    sound server and a screen of its own, and leaves yours alone.
+    """
+    from app.patches.library import SHIPPED, list_patches
+    from tests.bench.play.tour import measure
+
+    chosen = [_patch(name) for name in patch] if patch else [entry.patch for entry in list_patches(SHIPPED)[0]]
+    with progress("bench tour") as report:
+        found = measure(chosen, _buffer(buffer), out, report)
+    show(found, json)
+    if not found.passed:
+        raise typer.Exit(1)
 
 
 @bench.command()

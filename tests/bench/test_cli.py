@@ -68,7 +68,7 @@ def test_bench_notes_says_what_is_missing(run, monkeypatch: pytest.MonkeyPatch) 
     assert run("notes", "--buffer", "huge").status == 2
 
 
-@pytest.mark.parametrize("words", [[], ["solver"], ["train"], ["play"], ["soak"]])
+@pytest.mark.parametrize("words", [[], ["solver"], ["train"], ["play"], ["tour"], ["soak"]])
 def test_every_benchmark_has_help(run, words: list[str]) -> None:
     done = run(*words, "--help")
     assert done.status == 0

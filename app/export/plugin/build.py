@@ -161,7 +161,7 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
             stepped = " lv2:portProperty lv2:integer, lv2:enumeration ;" if each.steps else ""
             points = "".join(
                 f' lv2:scalePoint [ rdfs:label "{word}" ; rdf:value {value} ] ;'
-                for value, word in enumerate(each.steps)
+                for value, word in enumerate(each.steps, round(each.low))
             )
             ports.append(
                 f'a lv2:InputPort, lv2:ControlPort ; lv2:index {4 + number} ; lv2:symbol "{symbol}" ;\n'

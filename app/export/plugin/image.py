@@ -51,13 +51,14 @@ class _Parameter(ctypes.Structure):
         ("id", ctypes.c_uint32),
         ("kind", ctypes.c_int32),
         ("index", ctypes.c_int32),
-        ("stepped", ctypes.c_int32),
+        ("steps", ctypes.c_int32),
         ("low", ctypes.c_double),
         ("high", ctypes.c_double),
         ("standard", ctypes.c_double),
         ("name", ctypes.c_char * 64),
         ("module", ctypes.c_char * 64),
         ("unit", ctypes.c_char * 16),
+        ("words", ctypes.c_char * 64),
     )
 
 
@@ -237,7 +238,7 @@ def image_of(patch: Patch, preset: Preset, levelled: bool = True) -> Image:
     header.bytes = len(whole)
     whole[: ctypes.sizeof(_Header)] = bytes(header)
     controls = (
-        Control(id, each.name.decode(), each.low, each.high, each.standard, SOURCES if each.stepped else ())
+        Control(id, each.name.decode(), each.low, each.high, each.standard, tuple(each.words.decode().split()))
         for id, each in parameters
     )
     return Image(id, patch.name, bytes(whole), tuple(controls), left_out, round(parts.room_t60_s * room.RATE_HZ))
@@ -257,17 +258,19 @@ def _record(
 ) -> tuple[str, _Parameter]:
     low, high = parameter.limits
     unit = parameter.taper.text.rpartition("}")[2].strip()
+    words = [parameter.shown(low + step) for step in range(round(high - low) + 1)] if parameter.whole else []
     return name, _Parameter(
         _id(name),
         kind,
         index,
-        0,
+        len(words),
         low,
         high,
         value,
         _bytes(label or parameter.name, 63),
         _bytes(module, 63),
         _bytes(unit, 15),
+        _bytes(" ".join(words), 63),
     )
 
 
@@ -275,7 +278,12 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     for number, macro in enumerate(patch.macros):
         id = f"macros.{number}"
         yield _record(id, MACRO, number, macro.value, MACROS[id], "Macros", macro.name)
-    yield SOURCE_ID, _Parameter(_id(SOURCE_ID), SOURCE, 0, 1, 0.0, 2.0, 0.0, b"Source", b"", b"")
+    yield (
+        SOURCE_ID,
+        _Parameter(
+            _id(SOURCE_ID), SOURCE, 0, len(SOURCES), 0.0, 2.0, 0.0, b"Source", b"", b"", " ".join(SOURCES).encode()
+        ),
+    )
     yield _record("volume_db", VOLUME, 0, 0.0, OF_CHOICES["volume_db"], "")
     drums = isinstance(patch.strings, Drums)
     for index, id in enumerate(VALUES):

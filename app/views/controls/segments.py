@@ -1,11 +1,12 @@
-"""A segmented control: a row of small buttons, one of which is checked."""
+"""Rows of small buttons: a segmented control, of which one is checked, and switches, each on or off."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 
 from PySide6.QtCore import QSignalBlocker, Signal
-from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QButtonGroup, QHBoxLayout, QToolButton, QWidget
 
 from app.views.controls.parts import tool_button
 
@@ -28,11 +29,8 @@ class Segments(QWidget):
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(2)
         for key, text, tip in choices:
-            button = tool_button(text, f"{name}: {text}", tip)
-            button.setObjectName(key)
-            button.setCheckable(True)
+            button = _button(key, text, name, tip)
             button.setChecked(not self._keys)
-            button.setStyleSheet(SMALL)
             self._group.addButton(button, len(self._keys))
             self._keys.append(key)
             row.addWidget(button)
@@ -51,3 +49,29 @@ class Segments(QWidget):
     def _toggled(self, row: int, down: bool) -> None:
         if down:
             self.chosen.emit(self._keys[row])
+
+
+class Switches(QWidget):
+    """Choices are known by their keys; all are off at the start."""
+
+    switched = Signal(str, bool)  # a key, and whether it is on now
+
+    def __init__(self, name: str, choices: Iterable[tuple[str, str, str]], parent: QWidget | None = None) -> None:
+        """`choices`: (key, text, tip) each."""
+        super().__init__(parent)
+        self.setAccessibleName(name)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(2)
+        for key, text, tip in choices:
+            button = _button(key, text, name, tip)
+            button.toggled.connect(partial(self.switched.emit, key))
+            row.addWidget(button)
+
+
+def _button(key: str, text: str, name: str, tip: str) -> QToolButton:
+    button = tool_button(text, f"{name}: {text}", tip)
+    button.setObjectName(key)
+    button.setCheckable(True)
+    button.setStyleSheet(SMALL)
+    return button

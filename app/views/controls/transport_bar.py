@@ -9,6 +9,7 @@ from PySide6.QtWidgets import (
     QLayout,
     QPushButton,
     QSizePolicy,
+    QSpacerItem,
     QVBoxLayout,
     QWidget,
 )
@@ -72,10 +73,15 @@ class TransportBar(QFrame):
         row.addLayout(self._build_transport())
         for group in (self.areas["slots"][0], self.areas["pluck"][0], listener, self.areas["time"][1]):
             row.addWidget(group)
-        row.addStretch(1)
+        self._space = QSpacerItem(0, 0, QSizePolicy.Policy.Expanding)
+        row.addItem(self._space)
         row.addWidget(vertical_rule())
         row.addWidget(knobs["volume_db"])
         row.addLayout(self._build_output())
+
+    def add_group(self, group: QWidget) -> None:
+        """Puts controls of others behind its own, before the volume."""
+        self._row.insertWidget(self._row.indexOf(self._space), group)
 
     def set_compact(self, compact: bool, tight: bool = False) -> None:
         """Narrower by a fifth, for a window with little room; `tight`: with very little, symbols for words."""

@@ -1,6 +1,7 @@
 """The instrument's strip: the patch bar, the string's knobs (if shown), the keys or the neck, and what keys play.
 
-In a low window the string's knobs take the place of the keys, so that the strip is no higher with them.
+In a low window the string's knobs take the place of the keys and the switches of techniques, so that the strip is no
+higher with them.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from PySide6.QtWidgets import (
 from app.views import theme
 from app.views.controls.parts import tool_button
 from app.views.controls.plain import Label
-from app.views.controls.segments import Segments
+from app.views.controls.segments import Segments, Switches
 from app.views.controls.sideways import Sideways
 from app.views.instrument.neck import Neck
 from app.views.instrument.patch_bar import PatchBar
@@ -65,6 +66,16 @@ _TOUCHES = (  # what a key does while another is held
         "(controllers 65 and 5, with 68)",
     ),
 )
+_TECHNIQUES = (  # that keys are played with; their amounts have knobs
+    ("strum", "Strum", "The keys of a chord are plucked string by string. Of MIDI: controller 82"),
+    ("tremolo", "Tremolo", "A key that is held plucks again and again. Of MIDI: controller 81"),
+    (
+        "harmonics",
+        "Harm.",
+        "Harmonics: a finger touches the string at its middle, or at another node, as it is plucked. "
+        "Of MIDI: controller 80",
+    ),
+)
 
 
 class InstrumentPanel(QFrame):
@@ -74,6 +85,7 @@ class InstrumentPanel(QFrame):
     released = Signal(int)
     keys_play_asked = Signal(str)  # of KEYS_PLAY
     touch_chosen = Signal(str)  # of _TOUCHES
+    technique_switched = Signal(str, bool)  # of _TECHNIQUES, and whether it is on
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -89,6 +101,8 @@ class InstrumentPanel(QFrame):
         self._drums = False
         self.touch = Segments("Key while another is held", _TOUCHES)
         self.touch.chosen.connect(self.touch_chosen)
+        self.techniques = Switches("Technique", _TECHNIQUES)
+        self.techniques.switched.connect(self.technique_switched)
         self._choice = Segments("Surface", _SURFACES)
         self._choice.chosen.connect(self.show_surface)
         self._choice.clicked.connect(self._uncover_surface)
@@ -118,6 +132,7 @@ class InstrumentPanel(QFrame):
         side.addWidget(self._fold)
         side.addWidget(self.plays)
         side.addWidget(self.touch)
+        side.addWidget(self.techniques)
         side.addStretch(1)
         self._grid = QGridLayout(self)
         self._grid.setHorizontalSpacing(8)
@@ -171,6 +186,7 @@ class InstrumentPanel(QFrame):
             self._choice.setToolTip(NO_STRINGS if drums else "")
             self._fold.setText("Drum knobs" if drums else "String knobs")
             self.touch.setEnabled(not drums)
+            self.techniques.setEnabled(not drums)
             self.show_surface(self.surface)
 
     @property
@@ -216,7 +232,8 @@ class InstrumentPanel(QFrame):
         self._fold.setToolTip(LOW_TIP if self._low else FOLD_TIP)
         unfolded = self.unfolded and self._patch_area
         self._knobs_row.setVisible(unfolded)
-        self._stack.setVisible(not (self._low and unfolded))
+        for part in (self._stack, self.techniques):
+            part.setVisible(not (self._low and unfolded))
         self.bar.show_macros(not unfolded)
 
     def set_range(self, low: int, high: int) -> None:

@@ -9,10 +9,10 @@ from PySide6.QtGui import QColor, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from app.patches.patch import Patch
-from app.shared.parameters import DECAY, OF_PATCHES, PITCH, PLUCK, STRING, in_group
+from app.shared.parameters import DECAY, OF_PATCHES, PITCH, PLUCK, STRING, TECHNIQUE, in_group
 from app.views import theme
 from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob
-from app.views.controls.parts import faint, vertical_rule
+from app.views.controls.parts import faint, filled, vertical_rule
 from app.views.controls.plain import Label, plain_tip
 from app.views.controls.shape_box import NO_WIDTH, shape_box
 from engine.pluck import SHAPES
@@ -71,7 +71,10 @@ class Facts(QWidget):
 
 
 class StringKnobs(QWidget):
-    """Gestures emit `changed`; `show_patch` shows what became of them."""
+    """Gestures emit `changed`; `show_patch` shows what became of them.
+
+    `technique` is a group by itself, which stands elsewhere.
+    """
 
     changed = Signal(str, object)  # a field of a patch and its new value
     figure_asked = Signal(str, float)  # a knob's field, and the figure that it is to have, in the unit that is shown
@@ -93,6 +96,8 @@ class StringKnobs(QWidget):
                 row.addWidget(vertical_rule())
             row.addLayout(self._group(group))
         row.addStretch(1)
+        self.technique = QWidget()
+        filled(QHBoxLayout(self.technique), vertical_rule(), self._group(TECHNIQUE)).setContentsMargins(0, 0, 0, 0)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
         column.setSpacing(SPACING)
@@ -165,7 +170,7 @@ def _why_barred(patch: Patch, field: str) -> str:
     """Why a field means nothing in this patch; "" where it does."""
     if (
         patch.strings.kind == "drums"
-        and field.startswith(("knobs.", "pluck.", "damping.mute"))
+        and field.startswith(("knobs.", "pluck.", "damping.mute", "technique."))
         and field not in OF_DRUMS
     ):
         return NO_STRING

@@ -405,9 +405,12 @@ def test_the_wheel_turns_what_the_patch_says(patch: Patch, preset: Preset) -> No
     assert [each.position for each in stage.begun()] == [pytest.approx(0.2), pytest.approx(0.5)]
 
 
-@pytest.mark.parametrize("field", [field for field in WHEEL if field != "damping.mute"])  # `test_techniques` has it
+@pytest.mark.parametrize("field", [field for field in WHEEL if field != "damping.mute" and "technique" not in field])
 def test_the_wheel_turns_whatever_it_may(patch: Patch, preset: Preset, field: str) -> None:
-    """Softly and hard, held and released: something of the next note, or of what it is heard through, is another."""
+    """Softly and hard, held and released: something of the next note, or of what it is heard through, is another.
+
+    `test_techniques` and `test_strokes` have the others.
+    """
 
     def heard(value: int) -> object:
         wheel = changed(patch, mod_wheel=field, body=Body(name="guitar"), room=Room(mix=0.1))

@@ -11,7 +11,7 @@ import pytest
 from pydantic import ValidationError
 
 from app.patches.library import SHIPPED, find_patch, list_patches
-from app.patches.patch import ASSIGNABLE, Macro, OpenString, Patch, Pickup, PluckChoices, StringSet, Target
+from app.patches.patch import ASSIGNABLE, Macro, OpenString, Patch, Pickup, PluckChoices, StringSet, Target, Technique
 from tests.app.patches.conftest import STRING
 
 Make = Callable[..., Patch]
@@ -108,7 +108,7 @@ def test_the_curve_keeps_the_ends_and_bends_the_middle(curve: float) -> None:
 
 
 def test_each_assignable_field_can_be_read_and_changed(make_patch: Make) -> None:
-    first = make_patch(pickup=Pickup(points=(0.2, 0.3)), level_db=1)
+    first = make_patch(pickup=Pickup(points=(0.2, 0.3)), level_db=1, technique=Technique(harmonic=2))
     for field in ASSIGNABLE:
         value = first.value(field)
         changed = first.with_value(field, value * 0.95)

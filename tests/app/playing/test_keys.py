@@ -15,9 +15,13 @@ from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import (
     KEYS,
+    LEGATO,
     NOTES_OFF,
+    RESET,
     SOUND_OFF,
+    STRUM,
     SUSTAIN,
+    TREMOLO,
     Bend,
     Controller,
     NoteOff,
@@ -574,3 +578,16 @@ def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(
     wait(lambda: played.keys.player is not None and played.keys.player.patch == patch)
     assert len(computed) == 1
     strike(played, NoteOn(45, 60))
+
+
+def test_switches_hold_for_another_instruments_player_too(played: Notes, patch: Patch, wait: Wait) -> None:
+    switches = [Controller(number, 127, KEYS) for number in (LEGATO, TREMOLO)]
+    for event in (*switches, Controller(STRUM, 127), Controller(RESET, 0)):
+        played.handle(event)
+    for other in (read_patch(PATCHES / "frame_drum.json"), patch):
+        played.set_instrument(other, EAR)
+        wait(lambda other=other: played.keys.player is not None and played.keys.player.patch == other)
+    player = played.keys.player
+    assert player is not None
+    player.compiled.catch_up(played.mixer)
+    assert player.at_hand == switches

@@ -273,6 +273,41 @@ def clicks(
     ]
 
 
+@dataclass(frozen=True)
+class Faults:
+    """What is wrong with the sound of some keys, as places in it.
+
+    Attributes:
+        expected: where something must sound.
+        plucked: for each key the beginning of its pluck; None: it was not found at the usual time.
+        fades: those that meet no hole.
+    """
+
+    expected: tuple[Span, ...]
+    plucked: tuple[int | None, ...]
+    holes: tuple[Span, ...]
+    fades: tuple[Span, ...]
+    untimely: tuple[int, ...]
+    clicks: tuple[int, ...]
+
+
+def faults(sound: NDArray[np.float32], keys: Sequence[int], usual: int, rate_hz: int) -> Faults:
+    """Those of the sound (frames, channels) of keys that were pressed at these frames.
+
+    Args:
+        usual: frames from a key to its pluck.
+    """
+    expected = expected_sound(sound, keys, rate_hz)
+    silent = holes(sound, expected, rate_hz)
+    gaps = [fade for fade in fades(sound[:, 0], expected, rate_hz) if not any(map(fade.meets, silent))]
+    rest = unpredicted(sound[:, 0], rate_hz)
+    found = events(rest, rate_hz)
+    plucked = matched(keys, found, rest.by_past, usual, rate_hz)
+    late = untimely(found, plucked, rate_hz)
+    clicked = clicks(found, [*plucked, *late], [*silent, *gaps], expected, rate_hz)
+    return Faults(*map(tuple, (expected, plucked, silent, gaps, late, clicked)))  # type: ignore[arg-type]
+
+
 def onset(sound: NDArray[np.floating], key: int, rate_hz: int) -> int | None:
     """The first frame, of one channel, of the pluck that a key began, or None where none began within half a second.
 

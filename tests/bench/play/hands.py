@@ -37,6 +37,12 @@ def _sounding(patch: Patch, octave: int) -> list[int]:
     return [place for place, key in midi if low <= key <= high and (drums is None or drums.of_key(key) is not None)]
 
 
+def press(screen: Screen, key: str) -> None:
+    """Presses a key and releases it at once."""
+    screen.key(key, True)
+    screen.key(key, False)
+
+
 def tap(screen: Screen, key: str) -> float:
     """Presses and releases a key; returns when it was pressed."""
     pressed_s = screen.key(key, True)
@@ -53,6 +59,17 @@ def play(screen: Screen, random: Random, steps_s: Sequence[float], keys: Sequenc
         due_s += step_s
         time.sleep(max(due_s - time.monotonic(), 0))
         pressed_s.append(tap(screen, random.choice(keys)))
+    return pressed_s
+
+
+def play_in_turn(screen: Screen, keys: Sequence[str], step_s: float) -> list[float]:
+    """Taps these keys, `step_s` apart, each held for most of it; returns when each was pressed."""
+    pressed_s = []
+    for key in keys:
+        pressed_s.append(screen.key(key, True))
+        time.sleep(0.8 * step_s)
+        screen.key(key, False)
+        time.sleep(0.2 * step_s)
     return pressed_s
 
 
@@ -105,16 +122,12 @@ class KeyHand:
         while not 0 <= event.key - LOWEST - 12 * octave < len(KEYS):
             octave += 1 if event.key - LOWEST - 12 * octave > 0 else -1
         for _ in range(abs(octave - self._octave)):
-            self._touch(OCTAVE_UP if octave > self._octave else OCTAVE_DOWN)
+            press(self._screen, OCTAVE_UP if octave > self._octave else OCTAVE_DOWN)
         if event.velocity != self._velocity:
-            self._touch(DIGITS[event.velocity])
+            press(self._screen, DIGITS[event.velocity])
         self._octave, self._velocity = octave, event.velocity
         letter = self._down[event.key] = KEYS[event.key - LOWEST - 12 * octave]
         return self._screen.key(letter, True)
-
-    def _touch(self, key: str) -> None:
-        self._screen.key(key, True)
-        self._screen.key(key, False)
 
 
 def perform(hand: Hand, events: Sequence[TimedEvent], seconds: float) -> list[TimedEvent]:

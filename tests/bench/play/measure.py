@@ -293,17 +293,8 @@ def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit, 
     begin = clock.frame(played.keys_s[0]) - RATE_HZ // 10
     part = sound[begin : clock.frame(played.keys_s[-1]) + RATE_HZ]
     keys = [clock.frame(key_s) - begin for key_s in played.keys_s]
-    expected = analysis.expected_sound(part, keys, RATE_HZ)
-    holes = analysis.holes(part, expected, RATE_HZ)
-    fades = analysis.fades(part[:, 0], expected, RATE_HZ)
-    gaps = [fade for fade in fades if not any(map(fade.meets, holes))]
-    rest = analysis.unpredicted(part[:, 0], RATE_HZ)
-    events = analysis.events(rest, RATE_HZ)
     usual = round(np.median(latencies_s) * RATE_HZ) if latencies_s else 0
-    plucked = analysis.matched(keys, events, rest.by_past, usual, RATE_HZ)
-    untimely = analysis.untimely(events, plucked, RATE_HZ)
-    clicks = analysis.clicks(events, [*plucked, *untimely], [*holes, *gaps], expected, RATE_HZ)
-
+    found = analysis.faults(part, keys, usual, RATE_HZ)
     control_ms = holes_ms(control, played.keys_s[0], played.keys_s[-1] + analysis.SOUNDS_S)
 
     def since_s(frame: int) -> float:
@@ -319,15 +310,15 @@ def _judged(played: _Played, sound: np.ndarray, clock: CardClock, way: Transit, 
         None if device_s is None else 1000 * device_s,
         len(keys),
         played.keys_s[-1] - played.keys_s[0],
-        len(holes),
-        sum(hole.frames for hole in holes) * 1000 / RATE_HZ,
-        max((hole.frames for hole in holes), default=0) * 1000 / RATE_HZ,
-        len(gaps),
-        len(untimely),
-        len(clicks),
-        tuple(since_s(hole.start) for hole in holes),
-        tuple(since_s(fade.start) for fade in gaps),
-        tuple(since_s(click) for click in clicks),
+        len(found.holes),
+        sum(hole.frames for hole in found.holes) * 1000 / RATE_HZ,
+        max((hole.frames for hole in found.holes), default=0) * 1000 / RATE_HZ,
+        len(found.fades),
+        len(found.untimely),
+        len(found.clicks),
+        tuple(since_s(hole.start) for hole in found.holes),
+        tuple(since_s(fade.start) for fade in found.fades),
+        tuple(since_s(click) for click in found.clicks),
         float(np.abs(part).max()),
         played.cpu_cores,
         len(control_ms),

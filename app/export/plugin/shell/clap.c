@@ -1,5 +1,6 @@
 /* The instrument as a CLAP plug-in. */
 
+#include <math.h>
 #include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -70,7 +71,7 @@ static bool param_info(const clap_plugin *plugin, uint32_t index, clap_param *in
   const parameter *own = &parameters_of(of)[index];
   memset(info, 0, sizeof *info);
   info->id = own->id;
-  info->flags = CLAP_PARAM_AUTOMATABLE | (own->stepped ? CLAP_PARAM_STEPPED | CLAP_PARAM_ENUM : 0);
+  info->flags = CLAP_PARAM_AUTOMATABLE | (own->steps ? CLAP_PARAM_STEPPED | CLAP_PARAM_ENUM : 0);
   snprintf(info->name, sizeof info->name, "%s", own->name);
   snprintf(info->module, sizeof info->module, "%s", own->module);
   info->low = own->low;
@@ -87,15 +88,24 @@ static bool param_value(const clap_plugin *plugin, uint32_t id, double *value) {
   return true;
 }
 
-static const char *const SOURCE_WORDS[] = {"model", "truth", "difference"};
+/* The word of a step and its length. */
+static const char *word_of(const parameter *own, int32_t step, int *length) {
+  const char *word = own->words;
+  for (; step > 0; step--) word += strcspn(word, " ") + 1;
+  *length = (int)strcspn(word, " ");
+  return word;
+}
 
 static bool param_to_text(const clap_plugin *plugin, uint32_t id, double value, char *text, uint32_t room) {
   const image *of = shell_of(plugin)->own.of;
   int32_t place = parameter_with_id(of, id);
   if (place < 0) return false;
   const parameter *own = &parameters_of(of)[place];
-  if (own->kind == KIND_SOURCE) snprintf(text, room, "%s", SOURCE_WORDS[value < 0.5 ? 0 : value < 1.5 ? 1 : 2]);
-  else snprintf(text, room, "%.4g%s%s", value, own->unit[0] ? " " : "", own->unit);
+  if (own->steps) {
+    int length, step = (int)fmin(fmax(value - own->low + 0.5, 0), own->steps - 1);
+    const char *word = word_of(own, step, &length);
+    snprintf(text, room, "%.*s", length, word);
+  } else snprintf(text, room, "%.4g%s%s", value, own->unit[0] ? " " : "", own->unit);
   return true;
 }
 
@@ -103,9 +113,12 @@ static bool param_from_text(const clap_plugin *plugin, uint32_t id, const char *
   const image *of = shell_of(plugin)->own.of;
   int32_t place = parameter_with_id(of, id);
   if (place < 0) return false;
-  if (parameters_of(of)[place].kind == KIND_SOURCE)
-    for (int word = 0; word < 3; word++)
-      if (!strcmp(text, SOURCE_WORDS[word])) return *value = word, true;
+  const parameter *own = &parameters_of(of)[place];
+  for (int32_t step = 0; step < own->steps; step++) {
+    int length;
+    const char *word = word_of(own, step, &length);
+    if (strlen(text) == (size_t)length && !strncmp(text, word, (size_t)length)) return *value = own->low + step, true;
+  }
   char *end;
   *value = strtod(text, &end);
   return end != text;

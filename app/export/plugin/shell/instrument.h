@@ -20,9 +20,9 @@ enum { MOST_PARAMETERS = 64, MOST_MACRO_TARGETS = 8, MOST_CHANGES = 512 };
 
 typedef struct {
   uint32_t id;
-  int32_t kind, index, stepped;
+  int32_t kind, index, steps; /* steps: of whole numbers, each with its word, with spaces between; 0: it is real */
   double low, high, standard;
-  char name[64], module[64], unit[16];
+  char name[64], module[64], unit[16], words[64];
 } parameter;
 
 typedef struct { int32_t count, spare; struct { int32_t parameter, spare; double low, high; } targets[MOST_MACRO_TARGETS]; } macro;

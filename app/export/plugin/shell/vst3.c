@@ -427,9 +427,9 @@ static int32_t parameter_info(void *interface, int32_t index, vst_parameter *inf
   }
   const parameter *own = &parameters_of(of)[index];
   info->id = own->id;
-  info->steps = own->stepped ? (int32_t)(own->high - own->low) : 0;
+  info->steps = own->steps ? own->steps - 1 : 0;
   info->standard = from_plain(own, own->standard);
-  info->flags = VST_CAN_AUTOMATE | (own->stepped ? VST_LIST : 0);
+  info->flags = VST_CAN_AUTOMATE | (own->steps ? VST_LIST : 0);
   write_text(info->title, 128, own->name);
   write_text(info->short_title, 128, own->name);
   write_text(info->units, 128, own->unit);

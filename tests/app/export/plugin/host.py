@@ -158,6 +158,7 @@ class Params(c.Structure):
         ("info", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.POINTER(ParamInfo))),
         ("value", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.POINTER(c.c_double))),
         ("to_text", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.c_double, c.c_char_p, c.c_uint32)),
+        ("from_text", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, c.c_char_p, c.POINTER(c.c_double))),
     )
 
 
@@ -285,6 +286,14 @@ class Instance:
         found = c.c_double()
         assert self.extension("clap.params", Params).value(self.at, id, found)  # type: ignore[attr-defined]
         return found.value
+
+    def text(self, id: int, value: float) -> str:
+        """A value in words, which lead back to it."""
+        params, found, back = self.extension("clap.params", Params), c.create_string_buffer(64), c.c_double()
+        assert params.to_text(self.at, id, value, found, len(found))  # type: ignore[attr-defined]
+        assert params.from_text(self.at, id, found.value, back)  # type: ignore[attr-defined]
+        assert back.value == value
+        return found.value.decode()
 
     @property
     def latency(self) -> int:

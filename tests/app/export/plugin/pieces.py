@@ -86,19 +86,30 @@ def to_host(event: NoteOn | NoteOff | Bend | Controller, frame: int) -> Event:
 
 
 def played(
-    instance: Instance, patch: Patch, rate_hz: int, block: int = 512, more: tuple[Event, ...] = ()
+    instance: Instance,
+    patch: Patch,
+    rate_hz: int,
+    block: int = 512,
+    more: tuple[Event, ...] = (),
+    before: tuple[Event, ...] = (),
 ) -> NDArray[np.float32]:
-    """The piece, without the latency."""
-    events = [to_host(event, round(time_s * rate_hz)) for time_s, event in piece(patch)] + list(more)
+    """The piece, without the latency; other events after and before it."""
+    own = [to_host(event, round(time_s * rate_hz)) for time_s, event in piece(patch)]
+    events = [*before, *own, *more]
     latency = instance.latency
     return instance.render(round(SECONDS * rate_hz) + latency, events, block)[latency:]
 
 
 def rendered(
-    patch: Patch, rate_hz: int, source: str = "model", gain_db: float = 0.0, more: tuple[TimedEvent, ...] = ()
+    patch: Patch,
+    rate_hz: int,
+    source: str = "model",
+    gain_db: float = 0.0,
+    more: tuple[TimedEvent, ...] = (),
+    before: tuple[TimedEvent, ...] = (),
 ) -> NDArray[np.float32]:
     preset = preset_of(LEARNED if patch.name == "Learned" else "concert_harp")
-    timed = [TimedEvent(time_s, event) for time_s, event in piece(patch)] + list(more)
+    timed = [*before, *(TimedEvent(time_s, event) for time_s, event in piece(patch)), *more]
     sound = render_events(patch, preset, timed, rate_hz, source, SECONDS, difference_gain_db=gain_db)
     return np.broadcast_to(np.concatenate(list(sound)), (round(SECONDS * rate_hz), 2))
 

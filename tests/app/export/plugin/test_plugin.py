@@ -16,7 +16,8 @@ from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import TARGETS, this_target
 from app.export.plugin.image import Image, image_of
 from app.export.plugin.objects import object_of
-from app.instrument.events import Controller, PatchTurned, TimedEvent
+from app.instrument.events import HARMONICS, STRUM, TREMOLO, Controller, PatchTurned, TimedEvent
+from app.patches.patch import Technique
 from tests.app.export.plugin import host
 from tests.app.export.plugin.host import Event, Instance, Library, choke, midi, note_off, note_on, param, tune
 from tests.app.export.plugin.pieces import (
@@ -137,6 +138,31 @@ def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank: Library) -> No
     assert not other.load(b"\x07" + state[1:])
     assert not other.load(state[:5])
     assert other.save() == state
+
+
+def test_techniques_are_as_in_the_app(bank: Library) -> None:
+    patch = patch_of("classical_guitar")
+    values = {"harmonic": 3.0, "strum": 12.0, "strokes of strums": 1.0, "tremolo": 9.0}
+    fields = ("harmonic", "strum_ms", "strokes", "tremolo_hz")
+    turned = patch.model_copy(update={"technique": Technique(**dict(zip(fields, values.values(), strict=True)))})
+    instance = instance_of(bank, "classical_guitar")
+    ids = {name: instance.parameters[name].id for name in values}
+    instance.block(64, [param(0, ids[name], value) for name, value in values.items()])
+    state = instance.save()
+    assert [instance.text(ids["strokes of strums"], value) for value in range(3)] == ["down", "up", "both"]
+    assert [instance.text(ids["harmonic"], value) for value in (1, 5)] == ["1", "5"]
+    other = instance_of(bank, "classical_guitar")
+    assert other.load(state)
+    other.deactivate()
+    other.activate(48_000)
+    assert difference_db(played(other, patch, 48_000), rendered(turned, 48_000)) < EQUAL_DB
+    switched = (HARMONICS, TREMOLO, STRUM)
+    events = tuple(midi(0, 0xB0, number, 127) for number in switched)
+    timed = tuple(TimedEvent(0.0, Controller(number, 127)) for number in switched)
+    third = instance_of(bank, "classical_guitar")
+    assert (
+        difference_db(played(third, patch, 48_000, before=events), rendered(patch, 48_000, before=timed)) < EQUAL_DB
+    )
 
 
 def with_macro(bank: Library, name: str, macro: int, value: float) -> Instance:

@@ -98,9 +98,14 @@ def test_what_keys_play_is_chosen_from_words(qtbot: QtBot, panel: InstrumentPane
     assert "Choose an instrument" in panel.plays.toolTip()
 
 
-def test_what_a_key_does_while_another_is_held_is_chosen(qtbot: QtBot, panel: InstrumentPanel) -> None:
+def test_what_keys_do_is_chosen(qtbot: QtBot, panel: InstrumentPanel) -> None:
     for name in ("legato", "slide", "pluck"):
         with qtbot.waitSignal(panel.touch_chosen, check_params_cb=lambda chosen, name=name: chosen == name):
             qtbot.mouseClick(panel.touch.findChild(QAbstractButton, name), Qt.MouseButton.LeftButton)
+    for name, on in (("strum", True), ("tremolo", True), ("strum", False), ("harmonics", True)):
+        with qtbot.waitSignal(panel.technique_switched) as switched:
+            qtbot.mouseClick(panel.techniques.findChild(QAbstractButton, name), Qt.MouseButton.LeftButton)
+        assert switched.args == [name, on]
     panel.set_drums(True)
     assert not panel.touch.isEnabled()
+    assert not panel.techniques.isEnabled()

@@ -1,0 +1,22 @@
+"""The table of parameters: values, steps and words."""
+
+from __future__ import annotations
+
+import pytest
+
+from app.shared.parameters import OF_PATCHES
+
+
+@pytest.mark.parametrize("id", [id for id, each in OF_PATCHES.items() if each.words])
+def test_each_whole_value_has_its_word(id: str) -> None:
+    parameter = OF_PATCHES[id]
+    low, high = parameter.limits
+    assert parameter.whole
+    assert len(set(parameter.words)) == len(parameter.words) == high - low + 1
+    assert [parameter.shown(low + step) for step in range(len(parameter.words))] == list(parameter.words)
+    assert all(" " not in word for word in parameter.words)  # plug-ins keep them with spaces between
+
+
+def test_a_value_beyond_the_words_has_the_nearest() -> None:
+    parameter = OF_PATCHES["technique.strokes"]
+    assert [parameter.shown(value) for value in (-1.0, 0.6, 9.0)] == ["down", "up", "both"]
