@@ -61,10 +61,13 @@ def learn_files(
     """Learns recordings; the first is the note that gives the string, and those of its pitch are fitted together.
 
     Args:
-        progress: is called with the share that is done; may raise, to cancel: nothing has been written then.
+        progress: is called with the share that is done; may raise, to cancel: the same call continues later, with
+            the same result, from a checkpoint in `unfinished_folder`.
 
     Raises:
         NoteFileError, RecordingError: a file cannot be learned from; the message names it and the remedy.
+        SchemaError: a checkpoint is damaged; the message names it.
+        WriteError, OSError: a checkpoint cannot be written or read.
     """
     found = []
     for number, path in enumerate(paths):
@@ -82,7 +85,13 @@ def learn_files(
         gauge_mm=gauge_mm,
         anyway=anyway,
         progress=lambda share: progress(0.05 + 0.95 * share),
+        checkpoints=unfinished_folder(),
     )
+
+
+def unfinished_folder() -> Path:
+    """Of checkpoints of recordings that are being learned; they are deleted at the end."""
+    return user_folder() / "unfinished"
 
 
 def reasons_against(path: Path) -> list[str]:

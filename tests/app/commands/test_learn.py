@@ -3,6 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +14,7 @@ import pytest
 import soundfile
 
 from tests.bench.recordings.synthetic import synthetic_note
+from training.recording.checkpoint import restore, save
 
 
 @pytest.fixture(scope="module")
@@ -49,6 +54,59 @@ def test_a_note_becomes_an_instrument(run, recording, folder: Path, monkeypatch:
 
     taken = run("learn", recording, "--name", "My string")
     assert "exists already" in taken.failure
+
+
+def test_a_killed_command_continues_with_the_same_result(
+    run, recording, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = ["learn", str(recording), "--name", "Mine"]
+    whole, cut = folder / "whole", folder / "cut"
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(whole))
+    assert run(*words).status == 0
+
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(cut))
+    command = [sys.executable, "-m", "app.commands.cli", *words]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL, env=dict(os.environ)) as process:
+        while process.poll() is None and steps_of(cut) <= 8:
+            time.sleep(0.01)
+        process.kill()
+    assert steps_of(cut) > 8 and not (cut / "mine.safetensors").exists()
+
+    restored = []
+
+    def restore_and_note(*given: object) -> int:
+        restored.append(restore(*given))
+        return restored[-1]
+
+    monkeypatch.setattr("training.recording.fit.restore", restore_and_note)
+    assert run(*words).status == 0
+    assert restored[0] > 8
+    assert not any((cut / "unfinished").iterdir())
+    assert (cut / "mine.safetensors").read_bytes() == (whole / "mine.safetensors").read_bytes()
+
+
+def steps_of(folder: Path) -> int:
+    """How many steps of a fit the folder's checkpoint has."""
+    files = list((folder / "unfinished").glob("*.json"))
+    return json.loads(files[0].read_text())["steps"] if files else 0
+
+
+def test_an_interrupted_command_says_how_it_continues(run, recording, folder: Path, monkeypatch) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
+
+    def save_and_stop(*given: object) -> None:
+        save(*given)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("training.recording.fit.save", save_and_stop)
+        stopped = run("learn", recording, "--name", "Mine")
+    assert stopped.status == 130
+    assert "the same command continues there" in stopped.err
+    (checkpoint,) = (folder / "unfinished").iterdir()
+    checkpoint.write_text("{}")
+    damaged = run("learn", recording, "--name", "Mine").failure
+    assert "damaged checkpoint" in damaged and "delete it to start again" in damaged
 
 
 def test_what_cannot_be_learned_is_reported_and_leaves_nothing(
