@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import soundfile
 
+from app.shared.parameters import NOISE_DB
 from tests.bench.recordings.synthetic import synthetic_note
 from training.recording.checkpoint import restore, save
 
@@ -34,7 +35,7 @@ def test_a_note_becomes_an_instrument(run, recording, folder: Path, monkeypatch:
     assert Path(data["preset"]) == folder / "my_string.safetensors"
     assert (folder / "bodies" / "my_string.wav").is_file() and (folder / "patches" / "my_string.json").is_file()
 
-    out = folder / "again.wav"
+    out = folder / "again.wav"  # which is without the attack
     assert run("render", "my_string", out, "--as-recorded").status == 0
     truth, rate_hz = soundfile.read(recording)
     sound, rendered_hz = soundfile.read(out)
@@ -51,6 +52,17 @@ def test_a_note_becomes_an_instrument(run, recording, folder: Path, monkeypatch:
     preset = load_preset(folder / "my_string.safetensors")
     for key in (low, (low + high) // 2, high):
         assert np.abs(render_note(patch, preset, key, 100, 0.2, 0.3, 44_100)).max() > 1e-3
+
+    # the recorded attack sounds with the stroke, as loud at every rate, and has a switch
+    assert patch.noise.kind == "recorded"
+    loud, off = (patch.with_value("noise.onset_db", each) for each in (0.0, NOISE_DB[0]))
+    key, energies = (low + high) // 2, []
+    for rate in (44_100, 96_000):
+        first, second = (render_note(each, preset, key, 100, 0.4, 0.4, rate) for each in (loud, off))
+        only = (first - second)[:, 0].astype(float)
+        energies.append(float(only @ only) / rate)
+        assert np.abs(only[round(0.36 * rate) :]).max() < 1e-2 * np.abs(only).max()
+    assert energies[0] > 1e-6 and energies[0] == pytest.approx(energies[1], rel=0.25)
 
     taken = run("learn", recording, "--name", "My string")
     assert "exists already" in taken.failure
