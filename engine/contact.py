@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-Exciter = Literal["finger", "nail", "plectrum", "quill", "hammer"]
+Exciter = Literal["finger", "nail", "plectrum", "quill", "hammer", "recorded"]
 
 
 @dataclass(frozen=True)
@@ -45,11 +45,12 @@ class Contact:
     follows: float
 
 
+_FINGER = (
+    Contact(0.006, 0.7, 900, 0.6, 0.002, 0.012, 1.0),
+    Contact(0.010, 0.3, 1_200, 0.6, 0.008, 0.020, 0.0),
+)
 CONTACTS: Mapping[Exciter, tuple[Contact, Contact]] = {  # of the stroke, of the release
-    "finger": (
-        Contact(0.006, 0.7, 900, 0.6, 0.002, 0.012, 1.0),
-        Contact(0.010, 0.3, 1_200, 0.6, 0.008, 0.020, 0.0),
-    ),
+    "finger": _FINGER,
     "nail": (
         Contact(0.004, 0.5, 3_200, 0.7, 0.001, 0.007, 1.0),
         Contact(0.010, 0.3, 1_600, 0.6, 0.006, 0.018, 0.0),
@@ -66,4 +67,5 @@ CONTACTS: Mapping[Exciter, tuple[Contact, Contact]] = {  # of the stroke, of the
         Contact(0.004, 0.7, 700, 0.6, 0.001, 0.018, 1.0),
         Contact(0.012, 0.4, 500, 0.6, 0.006, 0.030, 0.0),
     ),
+    "recorded": _FINGER,  # where a preset has no recorded attack
 }

@@ -30,7 +30,7 @@ def learn(
     """Learn the string of a recorded note: a preset and an instrument, with its errors against the recording.
 
     Of more files, takes of the same pitch share the partials, all of them the damping. Interrupt it at any time:
-    nothing is written before the end.
+    the same command continues there. Preset and instrument are written at the end.
     """
     from app.instrument.learned import check_name, keep, learn_files
     from training.recording.table import as_data, as_text
@@ -40,10 +40,14 @@ def learn(
     if gauge is not None:
         arguments.check_range("--gauge", gauge, 0.05, 10.0, "mm")
     check_name(name)
-    with progress("learn") as report:
-        learned = learn_files(
-            notes, kind=instrument, length_m=scale_length, gauge_mm=gauge, anyway=anyway, progress=report
-        )
+    try:
+        with progress("learn") as report:
+            learned = learn_files(
+                notes, kind=instrument, length_m=scale_length, gauge_mm=gauge, anyway=anyway, progress=report
+            )
+    except KeyboardInterrupt:
+        say("stopped; the same command continues there")
+        raise
     kept = keep(name, learned, instrument)
     if json:
         files = {

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +18,17 @@ from numpy.typing import NDArray
 from scipy.signal import resample_poly
 
 from app.audio.note_file import NoteFileError, read_note
+from app.instrument import effects
 from app.instrument.bodies import own_bodies
+from app.instrument.loudness import PART_S, k_weight
 from app.patches.fields import explained
 from app.patches.library import PatchError, file_stem, own_patches, save_patch
-from app.patches.patch import Body, Category, Fretted, Patch, PhysicalString, Pickup, PluckChoices
+from app.patches.patch import Body, Category, Fretted, Noise, Patch, PhysicalString, Pickup, PluckChoices
+from app.shared.parameters import NOISE_DB
 from engine.folders import usable_files, user_folder
+from engine.resonators.recorded import RecordedAttack
 from engine.result_file import WriteError, explain, whole_file
+from training.recording.attack import attack_force
 from training.recording.fit import FREE_POLES
 from training.recording.joint import combined
 from training.recording.learn import Learned, examined, learn
@@ -61,10 +66,13 @@ def learn_files(
     """Learns recordings; the first is the note that gives the string, and those of its pitch are fitted together.
 
     Args:
-        progress: is called with the share that is done; may raise, to cancel: nothing has been written then.
+        progress: is called with the share that is done; may raise, to cancel: the same call continues later, with
+            the same result, from a checkpoint in `unfinished_folder`.
 
     Raises:
         NoteFileError, RecordingError: a file cannot be learned from; the message names it and the remedy.
+        SchemaError: a checkpoint is damaged; the message names it.
+        WriteError, OSError: a checkpoint cannot be written or read.
     """
     found = []
     for number, path in enumerate(paths):
@@ -82,7 +90,13 @@ def learn_files(
         gauge_mm=gauge_mm,
         anyway=anyway,
         progress=lambda share: progress(0.05 + 0.95 * share),
+        checkpoints=unfinished_folder(),
     )
+
+
+def unfinished_folder() -> Path:
+    """Of checkpoints of recordings that are being learned; they are deleted at the end."""
+    return user_folder() / "unfinished"
 
 
 def reasons_against(path: Path) -> list[str]:
@@ -145,13 +159,32 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
         body.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise WriteError(explain(body.parent, error)) from error
-    write_preset(preset, name, first.strung, recorded)
     response = body_response(first.physics, first.strung, len(recorded.cents), BODY_RATE_HZ)
     with whole_file(body) as file:
         soundfile.write(file, 0.9 * response, BODY_RATE_HZ, subtype="PCM_24", format="WAV")
+    heard_through = effects.body_response(patch)
+    assert heard_through is not None
+    force = attack_force(first.note, recorded.note, heard_through.impulse, effects.RESPONSE_HZ)
+    if force is not None:
+        recorded = replace(recorded, attack=RecordedAttack.of(force, first.note.rate_hz))
+        noise = Noise(kind="recorded", onset_db=_level_db(force, first))
+        patch = patch.model_copy(update={"noise": noise})
+    write_preset(preset, name, first.strung, recorded)
     with whole_file(report) as file:
         file.write(json.dumps([as_data(each) for each in learned], indent=2).encode())
     return Kept(preset, save_patch(patch).path, body, report)
+
+
+def _level_db(force: NDArray[np.float64], learned: Learned) -> float:
+    """The energy of an attack, in dB re that of its note, as `noise.onset_db` has it."""
+    note = learned.note
+    part = note.part(0, PART_S)
+    size = 2 * len(part)
+    hz = np.fft.rfftfreq(size, 1 / note.rate_hz)
+    heard = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(part, size)) ** 2
+    energy = 2 * float(heard.sum()) / size
+    level_db = 10 * math.log10(float(force @ force) / max(energy, 1e-30))
+    return round(min(max(level_db, NOISE_DB[0]), NOISE_DB[1]), 2)
 
 
 def _patch(name: str, stem: str, learned: Learned, partials: int, kind: Kind) -> Patch:

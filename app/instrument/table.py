@@ -22,7 +22,7 @@ from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.presets import Preset
 from engine.resonators.polarised import PAIRS
-from engine.resonators.recorded import OF_PARTIALS, RecordedString
+from engine.resonators.recorded import OF_PARTIALS, RecordedAttack, RecordedString
 from engine.voices.player import Table
 from engine.voices.programs import solver_memory, tension_memory
 
@@ -141,6 +141,8 @@ def table_of(
         return Table(_with_drums(memory, loud), programs)
     if loud.recorded is not None:
         memory = _with_recorded(memory, loud.recorded, grid_points)
+        if patch.noise.kind == "recorded" and loud.recorded.attack is not None:
+            memory = _with_attack(memory, loud.recorded.attack)
         counts = memory.view(np.int64)
     for key in range(of.KEYS):
         memory[of.TABLE_PITCHES + key] = loud.strings.pitch_hz(key) or 0.0
@@ -190,6 +192,15 @@ def _with_recorded(memory: NDArray[np.float64], own: RecordedString, grid_points
     memory.view(np.int64)[of.TABLE_RECORDED] = len(memory)
     rows = [getattr(own, name) for name in OF_PARTIALS]
     return np.concatenate([memory, header, np.log(own.smooth_hz), np.log(own.smooth_ratio), *rows])
+
+
+def _with_attack(memory: NDArray[np.float64], attack: RecordedAttack) -> NDArray[np.float64]:
+    """The table with a recorded attack as the noise of strokes."""
+    samples, header = attack.samples, np.zeros(of.ATTACK_HEADER)
+    header[of.ATTACK_RATE] = attack.rate_hz
+    header.view(np.int64)[of.ATTACK_FRAMES] = len(samples)
+    memory.view(np.int64)[of.TABLE_ATTACK] = len(memory)
+    return np.concatenate([memory, header, samples])
 
 
 def fill_gain(table: Table, loud: LoudKeys | DrumKeys, key: int, string: int | None = None) -> None:

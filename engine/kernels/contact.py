@@ -6,6 +6,7 @@ w is white noise, h a band-pass of second order, and e rises in a straight line 
 pulse and burst their shares of an energy in dB re that of a note. A harder stroke is louder; its pulse is shorter, as
 contact of bodies is by Hertz's law (T ~ v^-1/5), and its band higher (an estimate).
 
+A string that was learned from a recording may have the attack of that instead, at the amplitude of the stroke.
 The noise of a stroke is the same for the same strokes: a counter makes it. It is no part of the string's equation, so
 it sounds where one source alone is heard, and never where model and truth sound together.
 """
@@ -94,6 +95,14 @@ def touch(
     player[noise + of.NOISE_A2] = (1 - alpha) / (1 + alpha)
     for each in range(4):
         player[noise + of.NOISE_PAST + each] = 0.0
+    tables = table.view(np.int64)
+    attack = tables[of.TABLE_ATTACK] if which == of.STROKE else 0
+    players[noise + of.NOISE_RECORDED] = attack != 0
+    if attack != 0:
+        player[noise + of.NOISE_PULSE] = math.sqrt(energy / rate_hz)
+        frames = tables[attack + of.ATTACK_FRAMES] * rate_hz / table[attack + of.ATTACK_RATE]
+        players[noise + of.NOISE_LEFT] = int(frames) + 1
+        return
     falls = attack_frames + LEFT_DB * math.log(10.0) / 20 / math.log(shrinks)
     players[noise + of.NOISE_LEFT] = int(max(pulse_frames, falls)) + 1
 
@@ -113,6 +122,7 @@ def sound(player_address: int, mixer_address: int) -> None:
     address = players[of.PLAYER_TABLE]
     if address == 0:
         return
+    table = carray(pointer(address), (1 << 40,), np.float64)
     tables = carray(pointer(address), (1 << 40,), np.int64)
     gain, heard = 0.0, 0
     for source in range(tables[of.TABLE_SOURCES]):
@@ -134,7 +144,10 @@ def sound(player_address: int, mixer_address: int) -> None:
         if players[noise + of.NOISE_DONE] == 0:
             begin, gain_from = max(0, players[noise + of.NOISE_FRAME] - now), gain
         end = min(at.QUANTUM, begin + players[noise + of.NOISE_LEFT])
-        _run(player, players, noise, begin, end, gain_from, gain, mix)
+        if players[noise + of.NOISE_RECORDED] == 0:
+            _run(player, players, noise, begin, end, gain_from, gain, mix)
+        elif tables[of.TABLE_ATTACK] != 0:
+            _play(player, players, table, tables, noise, begin, end, gain_from, gain, mix)
         players[noise + of.NOISE_LEFT] -= end - begin
         stops = players[noise + of.NOISE_STOPS]
         if stops > 0:
@@ -186,4 +199,42 @@ def _run(
         done += 1
     past[0], past[1], past[2], past[3] = x1, x2, y1, y2
     player[noise + of.NOISE_ENVELOPE] = envelope
+    players[noise + of.NOISE_DONE] = done
+
+
+@njit(**COMPILED)
+def _play(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    noise: int,
+    begin: int,
+    end: int,
+    before: float,
+    gain: float,
+    mix: np.ndarray,
+) -> None:
+    """As `_run`, of the table's recorded attack: even between its samples."""
+    first = tables[of.TABLE_ATTACK]
+    frames, step = tables[first + of.ATTACK_FRAMES], table[first + of.ATTACK_RATE] / player[of.PLAYER_RATE]
+    first += of.ATTACK_HEADER
+    amplitude, done, stops = (
+        player[noise + of.NOISE_PULSE],
+        players[noise + of.NOISE_DONE],
+        players[noise + of.NOISE_STOPS],
+    )
+    for frame in range(begin, end):
+        place = done * step
+        number = int(place)
+        if number < frames:
+            after = table[first + number + 1] if number + 1 < frames else 0.0
+            force = amplitude * (table[first + number] + (place - number) * (after - table[first + number]))
+            share = (frame + 1) / at.QUANTUM
+            level = before + (gain - before) * share
+            if stops > 0:
+                level *= 1 - share / stops
+            mix[frame, 0] += level * force
+            mix[frame, 1] += level * force
+        done += 1
     players[noise + of.NOISE_DONE] = done

@@ -99,6 +99,7 @@ TABLE_LOSSES = 40  # R three: to the air, by friction, by bending
 TABLE_DRUMS = 43  # W slot of the slots of drums of all keys (KEYS,), 0 where a key has none; 0: strings are played
 TABLE_RECORDED = 44  # W slot of what a recording adds to the law of strings; 0: nothing
 TABLE_NOISE_LEVEL = 45  # R energy of a noise of 0 dB, in s of full scale squared
+TABLE_ATTACK = 46  # W slot of a recorded attack, the noise of strokes; 0: they have that of a contact
 TABLE_CONTACTS = 48  # R (2, CONTACT): noise of the stroke and of the release, in the order of `Contact`
 STROKE, RELEASE = 0, 1
 PULSE_S, PULSE_SHARE, BURST_HZ, BURST_Q, ATTACK_S, FALL_S, FOLLOWS = range(7)
@@ -133,6 +134,11 @@ RECORDED_MODES = 3  # W at most
 RECORDED_REST = 4  # R five: what each fades to with the distance in pitch
 CENTS, RATIO, SECOND_CENTS, SECOND_RATIO, SECOND_SHARE = range(5)
 RECORDED_HEADER = RECORDED_REST + 5  # R log of frequencies and of ratios (points,), then five rows (partials,)
+
+# Slots of a recorded attack
+ATTACK_RATE = 0  # R of its samples
+ATTACK_FRAMES = 1  # W
+ATTACK_HEADER = 2  # R samples (frames,) of an energy of 1 s of full scale squared
 
 
 def table_slots(grid_points: int) -> int:
@@ -276,7 +282,8 @@ NOISE_ENVELOPE = 9  # R
 NOISE_B0, NOISE_A1, NOISE_A2 = range(10, 13)  # R band-pass of the burst
 NOISE_PAST = 13  # R two inputs and two outputs of it
 NOISE_STOPS = 17  # W quanta in which it fades out; 0: it does not
-NOISE_SLOTS = 18
+NOISE_RECORDED = 18  # W whether it is the recorded attack; NOISE_PULSE is its amplitude then
+NOISE_SLOTS = 19
 PLAYER_NOISE_GAIN = PLAYER_SYMPATHY + 7 * MOST_SYMPATHETIC  # R at the end of the quantum before
 PLAYER_NOISES = PLAYER_NOISE_GAIN + 1
 PLAYER_AGAIN = PLAYER_NOISES + MOST_NOISES * NOISE_SLOTS  # W the event of a tremolo's stroke, for a moment

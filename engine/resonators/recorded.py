@@ -27,6 +27,8 @@ from engine.resonators.string import StringParameters
 FADES_SEMITONES = 3.0  # a note's own corrections fall as a Gaussian of this width
 MOST_CENTS = 60.0
 RATIOS = (0.05, 20.0)
+ATTACK_PEAK = 32_767
+LONGEST_ATTACK_S = 0.2
 OF_PARTIALS = ("cents", "ratio", "second_cents", "second_ratio", "second_share")
 
 
@@ -97,6 +99,46 @@ class RecordedNote:
 
 
 @dataclass(frozen=True)
+class RecordedAttack:
+    """What a recording has at its attack and the modes have not, as it drives the body.
+
+    Attributes:
+        rows: samples, of a full scale of `ATTACK_PEAK`: at most 1000 in a row, as lists in files are bounded.
+    """
+
+    rate_hz: int
+    rows: tuple[tuple[int, ...], ...]
+
+    def __post_init__(self) -> None:
+        bounds.check("rate_hz", self.rate_hz, (1_000, 48_000), "Hz")
+        count = sum(map(len, self.rows))
+        bounds.check("samples of an attack", count, (1, LONGEST_ATTACK_S * self.rate_hz))
+        if not any(map(any, self.rows)):
+            raise ValueError("an attack must not be silent")
+        for row in self.rows:
+            for sample in row:
+                bounds.check("sample", sample, (-ATTACK_PEAK, ATTACK_PEAK))
+
+    @staticmethod
+    def of(samples: Array, rate_hz: int) -> RecordedAttack:
+        """Of samples (frames,) of any level."""
+        whole = np.rint(samples / np.abs(samples).max() * ATTACK_PEAK).astype(int).tolist()
+        return RecordedAttack(
+            rate_hz,
+            tuple(
+                tuple(whole[first : first + bounds.MOST_ENTRIES])
+                for first in range(0, len(whole), bounds.MOST_ENTRIES)
+            ),
+        )
+
+    @property
+    def samples(self) -> Array:
+        """With an energy of 1 s of full scale squared, (frames,)."""
+        samples = np.array([each for row in self.rows for each in row], float)
+        return np.asarray(samples / math.sqrt(float(samples @ samples) / self.rate_hz))
+
+
+@dataclass(frozen=True)
 class RecordedString:
     """What a recording adds to a string's law.
 
@@ -107,6 +149,7 @@ class RecordedString:
         second_cents, second_ratio: of the second polarisation, the higher one, beside the first.
         second_share: of the amplitude that the second polarisation has.
         note: the recorded note itself.
+        attack: of the note, which instruments may play as the noise of a stroke; None: there is none.
         digest: SHA-256 of the recording's file.
         assumed: what the recording cannot give, in words.
         settings: of the fit.
@@ -124,6 +167,7 @@ class RecordedString:
     note: RecordedNote
     file: str
     digest: str
+    attack: RecordedAttack | None = None
     assumed: tuple[str, ...] = ()
     settings: dict[str, Any] = field(default_factory=dict)
     errors: dict[str, float] = field(default_factory=dict)

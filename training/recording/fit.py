@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
+from training.recording.checkpoint import restore, save
 from training.recording.glide import Glide, glide_of_phases
 from training.recording.intervals import Spread, spreads
 from training.recording.note import FIT_LASTS_S, Note
@@ -23,6 +26,7 @@ MOST_PARTIALS = 80
 HIGHEST_HZ = 10_000.0
 FREE_POLES = 10
 FREE_RANGE_HZ = (25.0, 1_500.0)
+FIRST_SWEEPS = 4
 SWEEPS = 6
 LAST_SWEEPS = 6
 WORTH = 3.0  # times the bits that BIC asks of a second pole
@@ -86,52 +90,81 @@ def fit_takes(
     free: int = FREE_POLES,
     glides: bool = True,
     progress: Progress = lambda share: None,
+    checkpoint: Path | None = None,
 ) -> list[LearnedNote]:
     """The poles of several takes of one pitch, soft and loud ones: they share frequencies at rest and decays.
 
     Amplitudes and glide are each take's own, and a pitch within some cents of the first.
 
-    Args: as `fit_note`.
+    Args: as `fit_note`, and
+        checkpoint: the file that the fit writes after each step and continues from; None: there is none.
+
+    Raises:
+        SchemaError, OSError: the checkpoint cannot be read.
+        WriteError: it cannot be written.
     """
     count = max(_partials(note, series) for note, series in notes)
     hz = notes[0][1].partials_hz(count)
     edges = _edges(hz)
     takes = Takes([_fit_of(note, series, notes[0][1], hz, edges, seconds, glides) for note, series in notes])
-    for number in range(count):
-        first = _loudest(takes, number).start(number, 1) or [_plain(hz[number], number + 1)]
-        for fit in takes.fits:
-            fit.poles[number] = first
-    progress(0.1)
-    for round_ in range(4):
-        takes.sweep(2)
-        if glides:
+    steps = _steps(takes, hz, poles_a_partial, free, glides)
+    done = 0 if checkpoint is None else restore(checkpoint, takes, len(steps))
+    for number, (share, step) in enumerate(steps[done:], done + 1):
+        step()
+        if checkpoint is not None:
+            save(checkpoint, takes, number)
+        progress(share)
+    return [_learned(note, series, fit) for (note, series), fit in zip(notes, takes.fits, strict=True)]
+
+
+def _steps(
+    takes: Takes, hz: Array, poles_a_partial: int, free: int, glides: bool
+) -> list[tuple[float, Callable[[], None]]]:
+    """The steps of a fit in order, each with the share that is done after it."""
+
+    def glide(when: bool = True) -> None:
+        if glides and when:
             takes.step_glides()
-        progress(0.1 + 0.05 * (round_ + 1))
-    if poles_a_partial > 1:
+
+    def start() -> None:
+        for number in range(len(hz)):
+            first = _loudest(takes, number).start(number, 1) or [_plain(hz[number], number + 1)]
+            for fit in takes.fits:
+                fit.poles[number] = first
+
+    def first_sweep() -> None:
+        takes.sweep(2)
+        glide()
+
+    def second_poles() -> None:
         residuals = [fit.data - fit.model() for fit in takes.fits]
-        for number in range(count):
+        for number in range(len(hz)):
             _add_pole(takes, number, residuals)
-    for round_ in range(SWEEPS):
+
+    def sweep() -> None:
         takes.sweep(2)
         takes.sweep_free(2)
-        if glides:
-            takes.step_glides()
-        progress(0.3 + 0.3 * (round_ + 1) / SWEEPS)
-    for number in range(free):
+        glide()
+
+    def add_free(number: int) -> None:
         _add_free(takes)
         takes.sweep_free(3)
         takes.sweep(1)
-        if glides and number % 2:
-            takes.step_glides()
-        progress(0.6 + 0.3 * (number + 1) / free)
-    for round_ in range(LAST_SWEEPS):
+        glide(number % 2 == 1)
+
+    def last_sweep(round_: int) -> None:
         takes.sweep(2)
         takes.sweep_free(2)
-        if glides and round_ < LAST_SWEEPS - 1:
-            takes.step_glides()
-        progress(0.9 + 0.1 * (round_ + 1) / LAST_SWEEPS)
-    takes.sweep(1)
-    return [_learned(note, series, fit) for (note, series), fit in zip(notes, takes.fits, strict=True)]
+        glide(round_ < LAST_SWEEPS - 1)
+
+    steps: list[tuple[float, Callable[[], None]]] = [(0.1, start)]
+    steps += [(0.1 + 0.2 * (each + 1) / FIRST_SWEEPS, first_sweep) for each in range(FIRST_SWEEPS)]
+    if poles_a_partial > 1:
+        steps.append((0.3, second_poles))
+    steps += [(0.3 + 0.3 * (each + 1) / SWEEPS, sweep) for each in range(SWEEPS)]
+    steps += [(0.6 + 0.3 * (each + 1) / free, partial(add_free, each)) for each in range(free)]
+    steps += [(0.9 + 0.1 * (each + 1) / LAST_SWEEPS, partial(last_sweep, each)) for each in range(LAST_SWEEPS)]
+    return [*steps, (1.0, takes.sweep)]
 
 
 def _fit_of(note: Note, series: Series, first: Series, hz: Array, edges: Array, seconds: float, glides: bool) -> Fit:

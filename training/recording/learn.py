@@ -7,10 +7,12 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from training.recording.checkpoint import checkpoint_of
 from training.recording.fit import LearnedNote, fit_takes
 from training.recording.gate import Finding, examine
 from training.recording.note import Note, RecordingError, note_of
@@ -80,6 +82,7 @@ def learn(
     gauge_mm: float | None = None,
     anyway: bool = False,
     progress: Progress = lambda share: None,
+    checkpoints: Path | None = None,
 ) -> list[Learned]:
     """Learns recordings of one instrument: those of the first's pitch jointly, each other alone.
 
@@ -87,10 +90,13 @@ def learn(
         recordings: each with its file; the first gives the string.
         anyway: whether it continues where the gate refuses.
         progress: is called with the share that is done; may raise, to cancel.
+        checkpoints: a folder of unfinished fits, from which the same call continues with the same result.
 
     Raises:
         RecordingError: nothing can be learned from one; the message names its file.
         Refused: the gate says that it is not one note of a string.
+        SchemaError: a checkpoint is damaged; the message names it.
+        WriteError, OSError: a checkpoint cannot be written or read.
     """
     started = time.monotonic()
     notes = [usable(found, anyway, source.name) for found, source in recordings]
@@ -99,18 +105,24 @@ def learn(
     others = [place for place in range(len(notes)) if place not in takes]
     jobs = [takes, *([place] for place in others)]
     fitted: dict[int, LearnedNote] = {}
+    unfinished: list[Path] = []
     for job in jobs:
         part = partial(_part, progress, len(fitted) / len(notes), len(job) / len(notes))
-        fits = fit_takes([notes[place] for place in job], progress=part)
+        chosen = [notes[place] for place in job]
+        path = None if checkpoints is None else checkpoint_of(checkpoints, chosen)
+        fits = fit_takes(chosen, progress=part, checkpoint=path)
+        unfinished += [path] if path is not None else []
         fitted |= dict(zip(job, fits, strict=True))
     learned = []
     for place, ((found, source), (note, series)) in enumerate(zip(recordings, notes, strict=True)):
         physics = physics_of(fitted[place])
-        chosen = strung(physics, kind, length_m, gauge_mm)
+        own = strung(physics, kind, length_m, gauge_mm)
         report = report_of(note, fitted[place], physics)
         seconds = time.monotonic() - started
-        learned.append(Learned(source, note, series, fitted[place], physics, chosen, report, found.findings, seconds))
+        learned.append(Learned(source, note, series, fitted[place], physics, own, report, found.findings, seconds))
     progress(1.0)
+    for path in unfinished:
+        path.unlink(missing_ok=True)
     return learned
 
 

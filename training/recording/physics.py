@@ -7,7 +7,7 @@ area, moduli and amplitude follow. They are asked for, else assumed and marked.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -17,15 +17,13 @@ from scipy import optimize
 from engine.resonators.recorded import MOST_CENTS, RATIOS
 from engine.resonators.string import StringParameters
 from training.recording.fit import LearnedNote
-from training.recording.refine import Pole
+from training.recording.refine import Pole, polarisations
 
 Array = NDArray[np.float64]
 Kind = Literal["guitar", "bass", "harp", "piano"]
 
 SMOOTH_OCTAVES = 0.4  # half width of the window in which decays are averaged
 MOST_NODES = 24
-MOST_SPLIT_CENTS = 25.0  # between two polarisations
-MOST_DECAYS_APART = 8.0
 MOST_BESIDE_SMOOTH = 5.0
 LEAST_SHARE = 1e-8  # of the strongest partial's energy, for a partial whose decay counts
 
@@ -106,12 +104,15 @@ class Strung:
 
 
 def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
-    """The partials with their poles; those without energy are left out."""
+    """The partials with their poles, at rest; those without energy are left out."""
     found = []
     for number in sorted({pole.partial for pole in learned.poles if pole.partial}):
-        poles = _polarisations([pole for pole in learned.poles if pole.partial == number and pole.a])
+        poles = polarisations([pole for pole in learned.poles if pole.partial == number and pole.a])
         if not poles:
             continue
+        if number in learned.spreads:
+            higher = 2 ** (learned.spreads[number].rest_cents / 1200)
+            poles = [replace(pole, s=complex(pole.s.real, higher * pole.s.imag)) for pole in poles]
         s, a = np.array([pole.s for pole in poles]), np.array([pole.a for pole in poles])
         sums = s[:, None] + s[None].conj()
         pairs = a[:, None] * a[None].conj()
@@ -123,23 +124,6 @@ def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
         found.append(Partial(number, hz, 0.5 * energy / moment, float(np.abs(a).sum()), energy, tuple(poles)))
     loudest = max((each.energy for each in found), default=0.0)
     return tuple(each for each in found if each.energy > LEAST_SHARE * loudest)
-
-
-def _polarisations(poles: list[Pole]) -> list[Pole]:
-    """The loudest pole of a partial and the one that may be its other polarisation, the lower one first.
-
-    A pole that is far off, or decays at another rate altogether, is the body's.
-    """
-    if not poles:
-        return []
-    main = max(poles, key=lambda pole: abs(pole.a) ** 2 / pole.decay)
-    kept = [
-        pole
-        for pole in poles
-        if abs(1200 * math.log2(pole.hz / main.hz)) < MOST_SPLIT_CENTS
-        and 1 / MOST_DECAYS_APART < pole.decay / main.decay < MOST_DECAYS_APART
-    ]
-    return sorted(kept, key=lambda pole: pole.hz)
 
 
 def physics_of(learned: LearnedNote) -> Physics:

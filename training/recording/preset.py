@@ -71,6 +71,7 @@ def recorded_string(
     errors: dict[str, float],
 ) -> RecordedString:
     """What the recording adds to the law of its string."""
+    own: dict[str, Any] = corrections(physics, strung.string)
     return RecordedString(
         pitch_hz=float(strung.string.undamped_frequency(1) / (2 * math.pi)),
         note=note,
@@ -79,7 +80,7 @@ def recorded_string(
         assumed=strung.assumed,
         settings=settings,
         errors={name: float(value) for name, value in errors.items() if math.isfinite(value)},
-        **corrections(physics, strung.string),
+        **own,
     )
 
 

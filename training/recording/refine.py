@@ -35,6 +35,8 @@ COARSE = 8  # times fewer samples for free poles
 MOST_GLIDE = (-0.02, 0.08)  # of each share
 MOST_PITCH = 0.02  # of a take, above the first or below
 LARGEST_STEP = 60.0  # of ω in rad/s
+MOST_SPLIT_CENTS = 25.0  # between two polarisations
+MOST_DECAYS_APART = 8.0
 
 
 @dataclass(frozen=True)
@@ -221,21 +223,15 @@ class Fit:
 
     def step_glide(self) -> Glide:
         """The glide that leaves less, to first order, when every pole of the string may follow."""
-        square, right, prior, _ = self._border()
+        square, right, prior = self._border()
         present = np.append(self.glide.shares, self.glide.pitch)[: len(right)]
         step = np.linalg.solve(square + np.diag(prior), right - prior * present)
         shares = np.clip(self.glide.shares + step[: len(self.glide.shares)], *MOST_GLIDE)
         pitch = self.glide.pitch + (step[-1] if self.tuned else 0.0)
         return Glide(shares, float(np.clip(pitch, -MOST_PITCH, MOST_PITCH)))
 
-    def glide_covariance(self) -> Array:
-        """Of the shares, (3, 3)."""
-        square, _, prior, variance = self._border()
-        inverse = np.linalg.inv(square + np.diag(prior))
-        return np.asarray(variance * inverse[: len(self.glide.shares), : len(self.glide.shares)])
-
-    def _border(self) -> tuple[Array, Array, Array, float]:
-        """The glide's normal equations once all poles are eliminated, its prior, and the residual's variance."""
+    def _border(self) -> tuple[Array, Array, Array]:
+        """The glide's normal equations once all poles are eliminated, and its prior."""
         residual = self.data - self.model()
         slope = self.model(self.gliding(), derivative=True)
         slope = fft.irfft(np.pad(slope, (0, self.size // 2 + 1 - len(slope))), self.size)
@@ -259,7 +255,24 @@ class Fit:
             left += float(rest @ rest)
             bins += 2 * (where.stop - where.start)
         variance = left / max(bins, 1)
-        return square, right, variance * GLIDE_FIRMNESS / (cents * CENTS) ** 2, variance
+        return square, right, variance * GLIDE_FIRMNESS / (cents * CENTS) ** 2
+
+
+def polarisations(poles: list[Pole]) -> list[Pole]:
+    """The loudest pole of a partial and the one that may be its other polarisation, the lower one first.
+
+    A pole that is far off, or decays at another rate altogether, is the body's.
+    """
+    if not poles:
+        return []
+    main = max(poles, key=lambda pole: abs(pole.a) ** 2 / pole.decay)
+    kept = [
+        pole
+        for pole in poles
+        if abs(1200 * math.log2(pole.hz / main.hz)) < MOST_SPLIT_CENTS
+        and 1 / MOST_DECAYS_APART < pole.decay / main.decay < MOST_DECAYS_APART
+    ]
+    return sorted(kept, key=lambda pole: pole.hz)
 
 
 def real_rows(columns: Complex) -> Array:

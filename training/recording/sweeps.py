@@ -28,15 +28,17 @@ class Takes:
 
     Attributes:
         damping: of the steps of each band; `free_damping`: of the poles that do not glide.
+        rests: sweeps in which each band is not visited.
     """
 
     fits: Sequence[Fit]
     free_damping: float = FIRST_DAMPING
     damping: Array = field(init=False)
+    rests: NDArray[np.int_] = field(init=False)
 
     def __post_init__(self) -> None:
         bands = len(self.fits[0].partials_hz)
-        self.damping, self._rests = np.full(bands, FIRST_DAMPING), np.zeros(bands, int)
+        self.damping, self.rests = np.full(bands, FIRST_DAMPING), np.zeros(bands, int)
         self.weights = [self.fits[0].energy / fit.energy for fit in self.fits]
 
     def improved(
@@ -92,8 +94,8 @@ class Takes:
             before = [fit.poles[number] for fit in self.fits]
             if not before[0]:
                 continue
-            if self._rests[number]:
-                self._rests[number] -= 1
+            if self.rests[number]:
+                self.rests[number] -= 1
                 continue
             wheres = [fit.bands[number] for fit in self.fits]
             parts = list(zip(self.fits, residuals, before, wheres, strict=True))
@@ -108,7 +110,7 @@ class Takes:
                     after, targets, wheres, float(self.damping[number]), number
                 )
             if had - left < SETTLED * self.fits[0].energy * len(self.fits):
-                self._rests[number] = REST
+                self.rests[number] = REST
             for place, (fit, rest, own, _) in enumerate(parts):
                 fit.poles[number] = after[place]
                 for sign, poles in ((1, own), (-1, after[place])):

@@ -257,7 +257,7 @@ class LearnDialog(QDialog):
         self.start.setEnabled(True)
 
     def _cancelled(self) -> None:
-        self._ready("Cancelled; nothing was written.")
+        self._ready("Cancelled. Learn continues there.")
         self.start.setEnabled(True)
 
     def _ready(self, words: str) -> None:

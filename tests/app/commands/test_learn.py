@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 import soundfile
 
+from app.shared.parameters import NOISE_DB
 from tests.bench.recordings.synthetic import synthetic_note
+from training.recording.checkpoint import restore, save
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +35,7 @@ def test_a_note_becomes_an_instrument(run, recording, folder: Path, monkeypatch:
     assert Path(data["preset"]) == folder / "my_string.safetensors"
     assert (folder / "bodies" / "my_string.wav").is_file() and (folder / "patches" / "my_string.json").is_file()
 
-    out = folder / "again.wav"
+    out = folder / "again.wav"  # which is without the attack
     assert run("render", "my_string", out, "--as-recorded").status == 0
     truth, rate_hz = soundfile.read(recording)
     sound, rendered_hz = soundfile.read(out)
@@ -47,8 +53,72 @@ def test_a_note_becomes_an_instrument(run, recording, folder: Path, monkeypatch:
     for key in (low, (low + high) // 2, high):
         assert np.abs(render_note(patch, preset, key, 100, 0.2, 0.3, 44_100)).max() > 1e-3
 
+    # the recorded attack sounds with the stroke, as loud at every rate, and has a switch
+    assert patch.noise.kind == "recorded"
+    loud, off = (patch.with_value("noise.onset_db", each) for each in (0.0, NOISE_DB[0]))
+    key, energies = (low + high) // 2, []
+    for rate in (44_100, 96_000):
+        first, second = (render_note(each, preset, key, 100, 0.4, 0.4, rate) for each in (loud, off))
+        only = (first - second)[:, 0].astype(float)
+        energies.append(float(only @ only) / rate)
+        assert np.abs(only[round(0.36 * rate) :]).max() < 1e-2 * np.abs(only).max()
+    assert energies[0] > 1e-6 and energies[0] == pytest.approx(energies[1], rel=0.25)
+
     taken = run("learn", recording, "--name", "My string")
     assert "exists already" in taken.failure
+
+
+def test_a_killed_command_continues_with_the_same_result(
+    run, recording, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    words = ["learn", str(recording), "--name", "Mine"]
+    whole, cut = folder / "whole", folder / "cut"
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(whole))
+    assert run(*words).status == 0
+
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(cut))
+    command = [sys.executable, "-m", "app.commands.cli", *words]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL, env=dict(os.environ)) as process:
+        while process.poll() is None and steps_of(cut) <= 8:
+            time.sleep(0.01)
+        process.kill()
+    assert steps_of(cut) > 8 and not (cut / "mine.safetensors").exists()
+
+    restored = []
+
+    def restore_and_note(*given: object) -> int:
+        restored.append(restore(*given))
+        return restored[-1]
+
+    monkeypatch.setattr("training.recording.fit.restore", restore_and_note)
+    assert run(*words).status == 0
+    assert restored[0] > 8
+    assert not any((cut / "unfinished").iterdir())
+    assert (cut / "mine.safetensors").read_bytes() == (whole / "mine.safetensors").read_bytes()
+
+
+def steps_of(folder: Path) -> int:
+    """How many steps of a fit the folder's checkpoint has."""
+    files = list((folder / "unfinished").glob("*.json"))
+    return json.loads(files[0].read_text())["steps"] if files else 0
+
+
+def test_an_interrupted_command_says_how_it_continues(run, recording, folder: Path, monkeypatch) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
+
+    def save_and_stop(*given: object) -> None:
+        save(*given)
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr("training.recording.fit.save", save_and_stop)
+        stopped = run("learn", recording, "--name", "Mine")
+    assert stopped.status == 130
+    assert "the same command continues there" in stopped.err
+    (checkpoint,) = (folder / "unfinished").iterdir()
+    checkpoint.write_text("{}")
+    damaged = run("learn", recording, "--name", "Mine").failure
+    assert "damaged checkpoint" in damaged and "delete it to start again" in damaged
 
 
 def test_what_cannot_be_learned_is_reported_and_leaves_nothing(

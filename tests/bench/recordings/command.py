@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from training.cli.arguments import Json
 from training.cli.console import Failure, print_json, print_table, progress, say
+
+COLUMNS = ("figure", "median", "90 %", "N")
 
 
 def recordings(
@@ -16,6 +18,16 @@ def recordings(
     quick: Annotated[bool, typer.Option("--quick", help="Only the own note, without baselines and halves.")] = False,
     most: Annotated[int | None, typer.Option("--most", min=1, metavar="N", help="The first N files alone.")] = None,
     only_dynamics: Annotated[bool, typer.Option("--dynamics", help="Only held-out dynamics.")] = False,
+    only_attacks: Annotated[
+        bool, typer.Option("--attacks", help="Only the own key with and without attack.")
+    ] = False,
+    only_neighbours: Annotated[bool, typer.Option("--neighbours", help="Only keys of neighbouring pitch.")] = False,
+    blind: Annotated[
+        int | None,
+        typer.Option(
+            "--pitches", min=0, metavar="N", help="Only blind pitch: of N synthetic notes, and of the folder's."
+        ),
+    ] = None,
     synthetic: Annotated[
         int | None, typer.Option(min=1, metavar="N", help="Instead: N synthetic notes, and how intervals hold them.")
     ] = None,
@@ -29,15 +41,20 @@ def recordings(
     from app.audio.note_file import NoteFileError, read_note
     from tests.bench.recordings.coverage import FIRST_SEED, coverage
     from tests.bench.recordings.evaluate import dynamics, evaluate, table
+    from tests.bench.recordings.instrument import attacks, neighbours
+    from tests.bench.recordings.pitch import pitches, pitches_of
 
     if synthetic is not None:
         with progress("bench recordings") as report:
             held = coverage(range(FIRST_SEED, FIRST_SEED + synthetic), lambda done: report(done / synthetic))
         print_json(held) if json else print_table(tuple(held), [tuple(held.values())])
         return
+    if folder is None and blind:
+        with progress("bench recordings") as report:
+            _print_values(pitches(blind, report), json)
+        return
     if folder is None or not folder.is_dir():
-        raise typer.BadParameter("give a folder of recordings, or --synthetic", param_hint="FOLDER")
-
+        raise typer.BadParameter("give a folder of recordings, or --synthetic or --pitches", param_hint="FOLDER")
     files = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".wav", ".flac", ".aif", ".aiff"))
     if not files:
         raise Failure(f"{folder}: no WAV, FLAC or AIFF file; give a folder of recordings")
@@ -50,19 +67,26 @@ def recordings(
             continue
         found[path.stem] = (read.samples, read.rate_hz)
     with progress("bench recordings") as report:
-        if only_dynamics:
-            results: dict[str, Any] = {"values": dynamics(found, progress=report)}
-        else:
-            results = evaluate(found, quick=quick, progress=report)
+        if blind is not None:
+            _print_values({**pitches(blind, report), **pitches_of(found)}, json)
+            return
+        for chosen, part in ((only_dynamics, dynamics), (only_attacks, attacks), (only_neighbours, neighbours)):
+            if chosen:
+                _print_values(part(found, progress=report), json)
+                return
+        results = evaluate(found, quick=quick, progress=report)
     if json:
         print_json(results)
-        return
-    if only_dynamics:
-        print_table(("figure", "median", "90 %", "N"), table(results))
         return
     print_table(
         ("recording", "gate", "ESR", "from 50 ms", "LSD dB", "1 pole", "2 poles", "half", "half, 2 poles"),
         results["rows"],
     )
-    print_table(("figure", "median", "90 %", "N"), table(results))
+    print_table(COLUMNS, table(results["values"]))
     print(f"N = {len(found)} recordings of {folder}; run.py bench recordings {folder}{' --quick' if quick else ''}")
+
+
+def _print_values(values: dict[str, list[float]], json: bool) -> None:
+    from tests.bench.recordings.evaluate import table
+
+    print_json(values) if json else print_table(COLUMNS, table(values))

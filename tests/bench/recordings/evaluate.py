@@ -236,11 +236,11 @@ def _append(values: dict[str, list[float]], name: str, value: float) -> None:
     values.setdefault(name, []).append(value)
 
 
-def table(results: Mapping[str, Any]) -> list[Sequence[Any]]:
+def table(values: Mapping[str, Sequence[float]]) -> list[Sequence[Any]]:
     """Figure, median, 90th percentile, N."""
     rows: list[Sequence[Any]] = []
-    for name, found in results["values"].items():
-        if "below" in name or "at most" in name:
+    for name, found in values.items():
+        if set(found) <= {0.0, 1.0}:
             rows.append((f"{name}, share", float(np.mean(found)), None, len(found)))
         else:
             rows.append((name, float(np.median(found)), float(np.percentile(found, 90)), len(found)))

@@ -43,12 +43,20 @@ class SyntheticNote:
     partials: tuple[TruePartial, ...]
 
 
-def synthetic_note(seed: int, seconds: float = 2.8, snr_db: float = 50.0, rise_cents: float = 15.0) -> SyntheticNote:
-    """A note drawn by its seed: a string of 60 to 350 Hz, plucked anywhere, two polarisations, six body modes."""
+def synthetic_note(
+    seed: int,
+    seconds: float = 2.8,
+    snr_db: float = 50.0,
+    rise_cents: float = 15.0,
+    f0_range_hz: tuple[float, float] = (60.0, 350.0),
+    highest_hz: float = HIGHEST_HZ,
+) -> SyntheticNote:
+    """A note drawn by its seed: a string, plucked anywhere, two polarisations, six body modes."""
     random = np.random.default_rng(seed)
-    f0 = float(np.exp(random.uniform(math.log(60), math.log(350))))
+    low, high = map(math.log, f0_range_hz)
+    f0 = float(np.exp(random.uniform(low, high)))
     stiffness = float(10 ** random.uniform(-5, -3.7))
-    count = max(3, min(30, int(HIGHEST_HZ / f0)))
+    count = max(3, min(30, int(highest_hz / f0)))
     length, mass, modulus, area = 0.65, 1e-3, 2e11, 1e-7
     tension = mass * (2 * length * f0) ** 2
     d1 = 2 * mass * random.uniform(0.6, 2.0)

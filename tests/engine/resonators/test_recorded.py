@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engine.resonators.recorded import RecordedNote, RecordedString
+from engine.resonators.recorded import RecordedAttack, RecordedNote, RecordedString
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, write
 
@@ -79,3 +79,16 @@ def test_it_is_written_and_read_and_checked() -> None:
             read(RecordedString, write(recorded()) | {field: value}, "metadata")
     with pytest.raises(SchemaError):
         read(RecordedNote, write(NOTE) | {"begins": 99_999_999}, "metadata")
+
+
+def test_an_attack_is_kept_whole_and_checked() -> None:
+    samples = np.random.default_rng(0).standard_normal(2_500)
+    attack = RecordedAttack.of(samples, 48_000)
+    assert [len(row) for row in attack.rows] == [1_000, 1_000, 500]
+    own = replace(recorded(), attack=attack)
+    assert read(RecordedString, write(own), "metadata") == own
+    assert np.corrcoef(attack.samples, samples)[0, 1] > 0.9999
+    assert np.sum(attack.samples**2) / 48_000 == pytest.approx(1)
+    for field, value in (("rate_hz", 10), ("rows", [[0, 0]]), ("rows", [[99_999]]), ("rows", [[1] * 1_000] * 10)):
+        with pytest.raises(SchemaError):
+            read(RecordedAttack, write(attack) | {field: value}, "metadata")

@@ -1,0 +1,150 @@
+"""Learned notes as instruments: the attack of the own key, and keys of neighbouring pitch against recordings."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import os
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from app.instrument.learned import keep
+from app.instrument.loudness import PART_S
+from app.instrument.offline import render_note
+from app.patches.library import find_patch
+from app.patches.patch import Patch
+from app.shared.parameters import NOISE_DB
+from engine.folders import FOLDER_VARIABLE
+from engine.presets import Preset, load_preset
+from training.recording.learn import Learned, examined, learn
+from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, RecordingError
+from training.recording.preset import Source
+from training.recording.report import bands_of, errors_of
+
+Array = NDArray[np.float64]
+Recordings = Mapping[str, tuple[Array, int]]
+Progress = Callable[[float], None]
+
+VELOCITY = 100  # of the recorded note
+ATTACK_S = 0.03
+ATTACK_FLOOR_DB = -60.0
+SEMITONES = (1.5, 4.5)  # between neighbours: a whole tone to a major third
+HIGHEST_PARTIAL = 12  # whose frequency is compared
+MOST_CENTS, MOST_DECAY_OFF, MOST_DISTANCE_DB = 3.0, 0.3, 8.0
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What `learn` makes of one recording."""
+
+    learned: Learned
+    patch: Patch
+    preset: Preset
+
+    def sound(self, f0_hz: float, seconds: float, rate_hz: int, attack: bool = True) -> Array:
+        """The key that is nearest to a pitch, tuned to it, (frames,)."""
+        key = round(69 + 12 * math.log2(f0_hz / 440))
+        patch = self.patch.with_value("tuning.a4_hz", f0_hz * 2 ** ((69 - key) / 12))
+        if not attack:
+            patch = patch.with_value("noise.onset_db", NOISE_DB[0])
+        return render_note(patch, self.preset, key, VELOCITY, seconds, seconds, rate_hz)[:, 0].astype(np.float64)
+
+
+def attacks(recordings: Recordings, progress: Progress) -> dict[str, list[float]]:
+    """Log spectral distance of the first 30 ms of the own key, with and without the recorded attack."""
+    values: dict[str, list[float]] = {}
+    with _instruments(recordings, progress) as instruments:
+        for each in instruments.values():
+            note = each.learned.note
+            truth = note.part(0, PART_S)
+            for name, attack in (("without", False), ("with", True)):
+                found = each.sound(each.learned.physics.f0_hz, PART_S, note.rate_hz, attack)[: len(truth)]
+                distance = _first_distance_db(truth, found, note.rate_hz)
+                values.setdefault(f"first 30 ms {name} the attack, distance in dB", []).append(distance)
+    without, with_ = values.values()
+    values["attack below none"] = [float(b < a) for a, b in zip(without, with_, strict=True)]
+    return values
+
+
+def _first_distance_db(truth: Array, found: Array, rate_hz: int) -> float:
+    """Of equally loud notes, through one Hann window."""
+    found = found * math.sqrt(float(truth @ truth) / max(float(found @ found), 1e-30))
+    size = round(ATTACK_S * rate_hz)
+    theirs, ours = (np.abs(np.fft.rfft(each[:size] * np.hanning(size))) for each in (truth, found))
+    floor = float(theirs.max()) * 10 ** (ATTACK_FLOOR_DB / 20)
+    return float(np.sqrt(np.mean((20 * np.log10(np.maximum(theirs, floor) / np.maximum(ours, floor))) ** 2)))
+
+
+def neighbours(recordings: Recordings, progress: Progress) -> dict[str, list[float]]:
+    """Keys a whole tone to a major third away, against recordings of that pitch and the same dynamic.
+
+    The pitch is given, as a key gives it. Predicted are the twelfth partial through B, the decay of octaves, and the
+    sound, of which the log spectral distance is measured.
+    """
+    values: dict[str, list[float]] = {}
+    with _instruments(recordings, progress) as instruments:
+        for first, second in itertools.permutations(instruments, 2):
+            played, other = instruments[first], instruments[second].learned
+            ratio = other.physics.f0_hz / played.learned.physics.f0_hz
+            low, high = SEMITONES
+            near = low < abs(12 * math.log2(ratio)) < high
+            if not near or first[-2] != second[-2] or other.note.rate_hz != played.learned.note.rate_hz:
+                continue
+            _compare(values, played, other, ratio)
+    return values
+
+
+def _compare(values: dict[str, list[float]], played: Instrument, other: Learned, ratio: float) -> None:
+    physics, note = other.physics, other.note
+    predicted = played.learned.physics.stiffness * ratio**2  # of a string that is shortened
+    square = HIGHEST_PARTIAL**2
+    cents = 600 * math.log2((1 + predicted * square) / (1 + physics.stiffness * square))
+    truth = note.fitted()
+    found = played.sound(physics.f0_hz, FIT_BEGINS_S + FIT_LASTS_S, note.rate_hz, attack=False)
+    found = found[round(FIT_BEGINS_S * note.rate_hz) :][: len(truth)]
+    distance = errors_of(truth, found, note.rate_hz, note.noise_power).distance_db
+    bands = [each for each in bands_of(truth, found, note.rate_hz, note.noise_power) if math.isfinite(each.learned_s)]
+    decays = [abs(each.learned_s / each.recorded_s - 1) for each in bands]
+    figures = {
+        "neighbour, 12th partial off by B, cents": abs(cents),
+        "neighbour, at most 3 cents by B": float(abs(cents) <= MOST_CENTS),
+        "neighbour, distance in dB": distance,
+        "neighbour, distance at most 8 dB": float(distance <= MOST_DISTANCE_DB),
+    }
+    for name, value in figures.items():
+        values.setdefault(name, []).append(value)
+    values.setdefault("neighbour, decay of octaves off, share", []).extend(decays)
+    values.setdefault("neighbour, decay of octaves at most 30 % off", []).extend(
+        float(each <= MOST_DECAY_OFF) for each in decays
+    )
+
+
+@contextmanager
+def _instruments(recordings: Recordings, progress: Progress) -> Iterator[dict[str, Instrument]]:
+    """All recordings that are strings, each learned and kept in a folder that is removed at the end."""
+    found: dict[str, Instrument] = {}
+    before = os.environ.get(FOLDER_VARIABLE)
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ[FOLDER_VARIABLE] = str(Path(folder))
+        try:
+            for number, (name, (samples, rate_hz)) in enumerate(recordings.items()):
+                progress(number / len(recordings))
+                try:
+                    examination = examined(samples, rate_hz)
+                    (learned,) = learn([(examination, Source(name, "0" * 64, rate_hz, len(samples)))])
+                except RecordingError:
+                    continue
+                kept = keep(name, [learned])
+                found[name] = Instrument(learned, find_patch(name).patch, load_preset(kept.preset))
+            yield found
+        finally:
+            if before is None:
+                del os.environ[FOLDER_VARIABLE]
+            else:
+                os.environ[FOLDER_VARIABLE] = before

@@ -1,0 +1,42 @@
+"""What a recording has at its attack and the learned note has not: contact, knock, and all that is no free vibration.
+
+An instrument plays it as the noise of a stroke, before the body. So the body is taken out of it, by Wiener's filter.
+No error against the recording is stated with it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft, signal
+
+from engine.resonators.recorded import RecordedNote
+from training.recording.note import Note
+
+Array = NDArray[np.float64]
+
+WHOLE_S, FADED_S = 0.05, 0.1  # it is whole until the first, and fades until the second
+LEAST_DB = -30.0  # of the body's largest gain: what lies deeper is not amplified any more
+
+
+def attack_force(note: Note, learned: RecordedNote, impulse: Array, impulse_hz: int) -> Array | None:
+    """The force that the body turns into the attack, at the note's rate, (frames,); None: there is nothing.
+
+    Args:
+        impulse: of the body that it is played through.
+    """
+    rate = note.rate_hz
+    sound = learned.sound(rate)[: len(note.samples)]
+    end = min(len(sound), note.onset + round(FADED_S * rate))
+    heard = (note.samples[: len(sound)] - sound)[note.onset : end]
+    shared = math.gcd(rate, impulse_hz)
+    body = signal.resample_poly(impulse, rate // shared, impulse_hz // shared) * impulse_hz / rate
+    size = fft.next_fast_len(len(heard) + len(body), real=True)
+    gain = fft.rfft(body, size)
+    least = float(np.abs(gain).max()) ** 2 * 10 ** (LEAST_DB / 10)
+    force = fft.irfft(fft.rfft(heard, size) * gain.conj() / (np.abs(gain) ** 2 + least), size)[: len(heard)]
+    whole = min(len(force), round(WHOLE_S * rate))
+    force[whole:] *= np.cos(np.linspace(0, math.pi / 2, len(force) - whole)) ** 2
+    return force if np.abs(force).max() > 0 else None

@@ -1,0 +1,87 @@
+"""Frequencies at rest: what is left of each partial's frequency when the glide has ended.
+
+A fit knows the curve of pitch, but not where it ends: a glide that is slower than the note trades against f0. The
+string decides. Its tension rises with its energy, so that the glide is a sum of its partials' decays of energy, with
+weights above 0. The constant that such a sum leaves belongs to the frequencies at rest.
+
+A partial also bends its own pitch, by half as much again as it bends that of all others: of q³ with q = a cos, 3/4 a³
+is at its frequency; of q r² with another one, 1/2 (Nayfeh, Mook 1979, ch. 6). A sound does not give its share of
+the tension. A triangle pulled anywhere gives a mean and a spread.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import optimize
+
+from training.recording.glide import Glide
+from training.recording.refine import Pole
+
+Array = NDArray[np.float64]
+
+LAW_S, LAW_POINTS = 1.2, 300
+LAW_PARTIALS = 3  # the lowest, which have most of the tension
+LEAST_WEIGHT = 1e-3
+MEAN_S, MEAN_POINTS = 2.4, 1200
+PLACES = np.linspace(0.05, 0.5, 200)  # of plucks
+OWN = 0.5  # what a partial adds to its own glide, of what it adds to all
+
+
+@dataclass(frozen=True)
+class Rest:
+    """How far a partial's frequency at rest lies above that of its poles, in cents, and the standard error of it."""
+
+    cents: float
+    error: float
+
+
+def at_rest(glide: Glide, poles: dict[int, list[Pole]]) -> dict[int, Rest]:
+    """By the number of each partial.
+
+    Args:
+        poles: of each partial, with amplitudes.
+    """
+    if not poles or not glide.shares.any():
+        return {number: Rest(0.0, 0.0) for number in poles}
+    low = sorted(poles)[:LAW_PARTIALS]
+    t = np.linspace(0, LAW_S, LAW_POINTS)
+    energies = np.stack([_energy(poles[number], t) for number in low], 1)
+    energies /= energies[0]
+    known = np.sum([_energy(own, t) * own[0].hz ** 2 for own in poles.values()], axis=0)
+    weight = np.sqrt(known / known.max() + LEAST_WEIGHT)
+    rows = np.column_stack([energies, np.ones(len(t)), -np.ones(len(t))])
+    found, _ = optimize.nnls(rows * weight[:, None], glide.cents(t) * weight)
+    t = np.linspace(0, MEAN_S, MEAN_POINTS)
+    energies = np.stack([_energy(poles[number], t) for number in low], 1)
+    law = energies / energies[0] @ found[: len(low)]
+    off = glide.cents(t) - law
+    rests = {}
+    for number, own in poles.items():
+        seen = _energy(own, t)
+        seen = seen / seen.sum()
+        share, spread = share_of_tension(number)
+        own_cents = OWN * float(seen @ law)
+        rests[number] = Rest(float(seen @ off) - share * own_cents, spread * own_cents)
+    return rests
+
+
+@lru_cache(maxsize=128)
+def share_of_tension(number: int) -> tuple[float, float]:
+    """Of a partial of a plucked string: mean and standard deviation over places of the pluck.
+
+    A triangle's partials have amplitudes ∝ sin(π k p)/k² and shares of the tension ∝ the squares of k times these.
+    """
+    shares = np.sin(number * math.pi * PLACES) ** 2 / number**2
+    shares /= 0.5 * math.pi**2 * PLACES * (1 - PLACES)  # the sum over all k
+    return float(shares.mean()), float(shares.std())
+
+
+def _energy(poles: list[Pole], t: Array) -> Array:
+    """|Σ a exp(st)|² of a partial, with its beats."""
+    s, a = np.array([pole.s for pole in poles]), np.array([pole.a for pole in poles])
+    return np.asarray(np.abs(np.exp(np.outer(t, s)) @ a) ** 2, np.float64)
