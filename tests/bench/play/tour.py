@@ -21,7 +21,7 @@ from app.audio.choices import Buffer, SoundChoice
 from app.export.wav import WavSettings, write_wav
 from app.patches.patch import Patch
 from app.session.choices import Choices
-from app.window.settings import Settings, read_settings
+from app.window.settings import Settings, load_settings
 from tests.bench.machine import Machine
 from tests.bench.play import analysis, hands, hearing, program
 from tests.bench.play.children import SOUND_AND_SCREEN, need_programs
@@ -155,7 +155,7 @@ def _octave_of_chosen(path: Path, patch: Patch, process: subprocess.Popen[bytes]
     """The octave of the computer's keys, once the settings file has the instrument. Raises RuntimeError: never."""
     deadline_s = time.monotonic() + CHOSEN_PATIENCE_S
     while time.monotonic() < deadline_s and process.poll() is None:
-        settings = read_settings(path)
+        settings = load_settings(path)[0]
         chosen = None if settings is None else settings.choices.patch
         if settings is not None and chosen is not None and chosen.name == patch.name:
             return settings.choices.octave
