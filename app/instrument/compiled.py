@@ -22,7 +22,6 @@ from engine.presets import Preset
 from engine.resonators.string import StringParameters
 from engine.voices import CompiledPlayer, Ear
 from engine.voices.player import Report, Ringing, Table
-from engine.voices.programs import DRUM_SILENCE, HEARD_SILENCE
 
 STOP_S = 0.03
 
@@ -106,8 +105,7 @@ class InstrumentPlayer:
         self._preset, self.grid_points, self.most_notes = preset, preset.info.grid_points, most_notes
         self._sources = tuple(gains)
         self._of_drums = isinstance(patch.strings, Drums)
-        silence = DRUM_SILENCE if self._of_drums else HEARD_SILENCE
-        self._programs = programs_of(preset, rate_hz, self._sources, silence)
+        self._programs = programs_of(preset, rate_hz, self._sources, self._of_drums)
         self._lock, self._varied = threading.Lock(), varied
         self._serial = self._instrument = 0
         self._wheel = 0, 0  # the modulation wheel as events have left it, and the channel that moved it

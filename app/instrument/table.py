@@ -24,7 +24,14 @@ from engine.presets import Preset
 from engine.resonators.polarised import PAIRS
 from engine.resonators.recorded import OF_PARTIALS, RecordedAttack, RecordedString
 from engine.voices.player import Table
-from engine.voices.programs import solver_memory, tension_memory
+from engine.voices.programs import (
+    DRUM_SILENCE,
+    DRUM_STILL,
+    DRUM_UNHEARD,
+    HEARD_SILENCE,
+    solver_memory,
+    tension_memory,
+)
 
 VALUES = (
     *(f"knobs.{name}" for name in KNOBS),
@@ -74,11 +81,12 @@ def wheeled(patch: Patch, wheel: int, *parts: str) -> Patch:
     return patch.with_value(patch.mod_wheel, value + wheel / 127 * (goal - value))
 
 
-def programs_of(
-    preset: Preset, rate_hz: int, sources: Iterable[str], silence: float
-) -> tuple[NDArray[np.float64], ...]:
-    """What the kernels read of each source; `silence`: of a mode that is laid to rest."""
-    model = tension_memory(preset.weights, preset.configuration, rate_hz, silence)
+def programs_of(preset: Preset, rate_hz: int, sources: Iterable[str], drums: bool) -> tuple[NDArray[np.float64], ...]:
+    """What the kernels read of each source; `drums`: of drums in place of strings."""
+    model_silence, unheard, silence = HEARD_SILENCE, 0.0, HEARD_SILENCE
+    if drums:
+        model_silence, unheard, silence = DRUM_STILL, DRUM_UNHEARD, DRUM_SILENCE
+    model = tension_memory(preset.weights, preset.configuration, rate_hz, model_silence, unheard)
     return tuple(solver_memory(rate_hz, silence=silence) if each == "truth" else model for each in sources)
 
 

@@ -45,7 +45,7 @@ STRUCK_S = 14  # R the device clock's time of the gesture
 BEGAN_S = 15  # R and of the callback that gave the device its first samples
 STARVED = 16  # W frames in which it should have sounded and had nothing to
 MODES = 17  # W latents, or modes, or 0
-MOVING = 18  # W modes of the truth, or latents that share a tension, that still move
+MOVING = 18  # W modes of the truth, or latents that share a tension, up to the highest that is not silent
 NODE = 19  # W the node from which a bank's integral continues
 SEGMENT_VALID = 20  # W whether a bank knows where its last segment ended
 LOUDNESS = 21  # R nepers below full scale that the loudest latent, or all of the string, has now
@@ -60,7 +60,7 @@ LENGTH = 29  # W of them in all; after the last the voice is over
 DRY = 30  # W whether it had nothing to play in the last quantum
 ATTACK = 31  # W frames of the fade-in at the pluck
 BEGAN_FRAME = 32  # W the mixer's frame at which it began, after any samples it waited for; -1 until then
-REFRESH = 33  # W quanta until a bank looks again which of its modulation can be heard
+REFRESH = 33  # W quanta until it looks again what can be heard: of a bank's modulation, of a drum's modes
 ROWS = 34  # W latents whose modulation can be heard
 COLUMNS = 35  # W latents that can be heard in others' modulation
 BEGIN_AT = 36  # W the mixer's frame at which it begins; in the past: with the next quantum
@@ -86,7 +86,10 @@ ENDS_IN = 53  # W frames of that fade
 STOPS_IN = 54  # W frames of the fade in which it stops the voice before; 0: it is added to that motion
 LATE = 55  # W frames after the beginning of the mixer's quantum at which its own begins, below QUANTUM
 PENDING_MODES = 56  # W address of the first modes that it was to have; each names the next
-HEADER = 57
+HEARD = 57  # W modes that move and are heard, the first of the row ORDER
+FELT = 58  # W those and the next, which stretch a drum; the others, up to MOVING, rest
+RESTED = 59  # W quanta in which those did not even decay
+HEADER = 60
 
 
 @njit(inline="always", **COMPILED)
@@ -133,8 +136,9 @@ BANK_ROWS = 21
 OMEGA_SQUARED, SIGMA, COUPLING, STRETCH = 2, 3, 4, 5
 FOLLOWING = 6
 TRUTH_ROWS = FOLLOWING + 16  # the flows of half a palindrome, of four rows each
-PHYSICAL = FOLLOWING + 8  # behind the rows of `kernels.tension.node`, κ p and ω²: amplitudes and speeds for a moment
-TENSION_ROWS = PHYSICAL + 2
+PHYSICAL = FOLLOWING + 8  # behind the rows of `kernels.tension.advance`: amplitudes and speeds for a moment
+ORDER = PHYSICAL + 2  # whole numbers: modes
+TENSION_ROWS = ORDER + 1
 
 # Slots of the modes that a voice is to have, then the four rows above
 B_QUANTA = 0  # W of the way there
@@ -189,7 +193,8 @@ S_HIGHEST_PHASE = 2  # R
 S_SILENCE = 3  # R
 S_LOUDNESS = 4  # R nepers: log of full scale's share of a metre
 S_RATE = 5  # R frames a second
-S_HEADER = 6
+S_UNHEARD = 6  # R of what is heard: a mode that is quieter, and hardly stretches a drum, rests; 0: none does
+S_HEADER = 7
 
 # Slots of a rendered voice's program
 R_TAPS = 0  # W of the filter, to either side

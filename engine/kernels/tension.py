@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
+from engine.kernels import lanes
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.modes import damped, following, glide, gliding, rest_above, row
@@ -19,68 +20,99 @@ ENERGY_BOUND = 1.5  # of the energy at the start, as in the model
 HARDEST_KICK, MOST_NODES = 0.3, 3  # as in the model
 NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller change is the last
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
+UNFELT = 1e-9  # of S, on average: what a mode adds to it that need not move
+LOOKS_QUANTA = 8  # from one look at which modes of a drum move to the next
 
 
 @njit(**COMPILED)
-def node(
-    x: np.ndarray,
-    y: np.ndarray,
-    moving: int,
-    largest_stretch: float,
-    cosine: np.ndarray,
-    sine: np.ndarray,
-    kick: np.ndarray,
-    second_kick: np.ndarray,
-    stretch: np.ndarray,
-    second_stretch: np.ndarray,
-) -> None:
-    """The kick of the common tension and the turn to the next node, in place, of the lowest modes that move.
+def _load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
+    """Copies modes, in this order, into blocks of `kernels.lanes`; unused lanes are zero.
 
-    Rows (modes,): λ's parts, h k A/ω, h k κ r/ω, η² A and η² κ r.
+    Args:
+        rows: (8, modes), see `advance`.
     """
-    first = second = 0.0
-    for n in range(moving):
-        square = x[n] * x[n]
-        first += stretch[n] * square
-        second += second_stretch[n] * square
-    first = min(first, largest_stretch)
-    linear, squared = first * (1 - 2 * second), first * first
-    for n in range(moving):
-        kicked = y[n] + (kick[n] * linear - second_kick[n] * squared) * x[n]
-        turned = cosine[n] * x[n] - sine[n] * kicked
-        y[n] = sine[n] * x[n] + cosine[n] * kicked
-        x[n] = turned
+    for number in range(lanes.LANES * lanes.blocks_of(len(order))):
+        slot = first + lanes.place(number)
+        for each in range(lanes.EARS):
+            memory[slot + each * lanes.LANES] = 0.0
+        if number < len(order):
+            mode = order[number]
+            memory[slot], memory[slot + lanes.LANES] = x[mode], y[mode]
+            for each in range(8):
+                memory[slot + (lanes.COSINE + each) * lanes.LANES] = rows[each, mode]
 
 
 @njit(**COMPILED)
-def settle(
-    x: np.ndarray, y: np.ndarray, moving: int, silence: float, largest_energy: float, squared_frequencies: np.ndarray
-) -> tuple[int, float]:
-    """Holds Σ ω² |z|² below the largest, lays the highest modes to rest that are silent; those left, and Σ |z|²."""
-    total = energy = 0.0
-    for n in range(moving):
-        size = x[n] * x[n] + y[n] * y[n]
-        total += size
-        energy += squared_frequencies[n] * size
-    if not energy <= largest_energy:  # also where it is not a number
+def _load_weights(
+    weights: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int
+) -> None:
+    """What one of the ears hears modes with, beside `_load`."""
+    for number in range(lanes.LANES * lanes.blocks_of(len(order))):
+        slot = first + lanes.place(number) + (lanes.EARS + 2 * ear) * lanes.LANES
+        memory[slot] = memory[slot + lanes.LANES] = 0.0
+        if number < len(order):
+            mode = order[number]
+            memory[slot], memory[slot + lanes.LANES] = weights[mode], weights[mode] * rows[6, mode]
+
+
+@njit(**COMPILED)
+def _save(x: np.ndarray, y: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
+    """Copies modes back from their blocks."""
+    for number in range(len(order)):
+        slot = first + lanes.place(number)
+        x[order[number]], y[order[number]] = memory[slot], memory[slot + lanes.LANES]
+
+
+@njit(inline="always", **COMPILED)
+def _node(
+    memory: np.ndarray,
+    first: int,
+    near: int,
+    far: int,
+    ears: int,
+    sums: tuple[float, float],
+    largest_stretch: float,
+    heard: np.ndarray,
+) -> tuple[float, float]:
+    """The kick of the common tension and the turn to the next node, in place: from S and R here to those there."""
+    tension = min(sums[0], largest_stretch)
+    linear, squared = tension * (1 - 2 * sums[1]), tension * tension
+    return lanes.turn(memory, first, near, far, ears, linear, squared, heard)
+
+
+@njit(**COMPILED)
+def _hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> tuple[float, bool]:
+    """Holds Σ ω² |z|² of blocks below the largest; returns Σ |z|², and whether anything has changed."""
+    total, energy = lanes.energies(memory, first, blocks)
+    held = not energy <= largest_energy  # also where it is not a number
+    if held:
         factor = math.sqrt(largest_energy / energy) if energy < np.inf else 0.0
-        for n in range(moving):
-            x[n] *= factor
-            y[n] *= factor
-            if not (abs(x[n]) < np.inf and abs(y[n]) < np.inf):
-                x[n] = y[n] = 0.0
+        for number in range(lanes.LANES * blocks):
+            x = first + lanes.place(number)
+            y = x + lanes.LANES
+            memory[x] *= factor
+            memory[y] *= factor
+            if not (abs(memory[x]) < np.inf and abs(memory[y]) < np.inf):
+                memory[x] = memory[y] = 0.0
         total *= factor * factor
         if not total < np.inf:
             total = 0.0
+    return total, held
+
+
+@njit(**COMPILED)
+def _trim(memory: np.ndarray, first: int, moving: int, silence: float, total: float) -> int:
+    """Lays the highest modes to rest that are silent; those left."""
     while moving > 1:
-        n = moving - 1
-        if not x[n] * x[n] + y[n] * y[n] < silence * silence * total + NOTHING:
+        x = first + lanes.place(moving - 1)
+        y = x + lanes.LANES
+        if not memory[x] * memory[x] + memory[y] * memory[y] < silence * silence * total + NOTHING:
             break
-        x[n] = y[n] = 0.0
-        moving = n
+        memory[x] = memory[y] = 0.0
+        moving -= 1
     if total < NOTHING:
-        x[0] = y[0] = 0.0
-    return moving, total
+        memory[first] = memory[first + lanes.LANES] = 0.0
+    return moving
 
 
 @njit(**COMPILED)
@@ -102,25 +134,31 @@ def advance(
         largest_stretches: of S, (batch,).
         nodes: of a frame.
         silence: the highest modes rest from when their amplitude is below this share of that of all together.
-        rows: (8, modes): the six that `node` takes, κ p, and ω².
+        rows: (8, modes): λ's parts, h k A/ω, h k κ r/ω, η² A, η² κ r, κ p and ω².
     """
     batch, steps, modes = out.shape
+    memory, order, nobody = np.empty(lanes.slots(modes)), np.arange(modes), np.empty(0)
+    first = lanes.aligned(memory)
     for string in range(batch):
-        xs, ys = x[string], y[string]
-        moving = modes
+        _load(x[string], y[string], rows, order, memory, first)
+        moving, blocks = modes, lanes.blocks_of(modes)
+        sums = lanes.add_up(memory, first, blocks, 0, 0, nobody)
         for step in range(steps):
             for _ in range(nodes):
-                node(xs, ys, moving, largest_stretches[string], rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
+                sums = _node(memory, first, blocks, 0, 0, sums, largest_stretches[string], nobody)
             largest_energies[string] *= decay
-            moving, _ = settle(xs, ys, moving, silence, largest_energies[string], rows[7])
-            tension = 0.0
-            for n in range(moving):
-                tension += rows[4, n] * xs[n] * xs[n]
+            total, held = _hold(memory, first, blocks, largest_energies[string])
+            before, moving = moving, _trim(memory, first, moving, silence, total)
+            if held or moving < before or total < NOTHING:
+                blocks = lanes.blocks_of(moving)
+                sums = lanes.add_up(memory, first, blocks, 0, 0, nobody)
             frame = out[string, step]
             for n in range(moving):
-                frame[n] = xs[n] * (1 - rows[6, n] * tension)
+                slot = first + lanes.place(n)
+                frame[n] = memory[slot] * (1 - memory[slot + lanes.SEEN * lanes.LANES] * sums[0])
             for n in range(moving, modes):
                 frame[n] = 0.0
+        _save(x[string], y[string], order, memory, first)
 
 
 @njit(**COMPILED)
@@ -163,13 +201,86 @@ def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray
         rows[2, m], rows[3, m] = angle * growth, angle * kappa * r
         rows[4, m], rows[5, m] = stretches[m] * growth, stretches[m] * kappa * r
         rows[6, m], rows[7, m] = kappa * p, omega * omega
-    counts[at.STEPS] = nodes
+    counts[at.STEPS], counts[at.REFRESH] = nodes, 0
     voice[at.DECAY] = math.exp(-2 * slowest / rate)
+    order = row(voice, n, at.ORDER).view(np.int64)
+    for m in range(n):
+        order[m] = m
+
+
+@njit(**COMPILED)
+def _fall(voice: np.ndarray) -> None:
+    """Modes that rest because nobody hears or feels them decay to the present; their phase is nobody's."""
+    counts = voice.view(np.int64)
+    n, frames = counts[at.MODES], counts[at.RESTED] * at.QUANTUM
+    if frames == 0:
+        return
+    x, y, rows = row(voice, n, 0), row(voice, n, 1), following(voice, n)
+    order = row(voice, n, at.ORDER).view(np.int64)
+    for place in range(counts[at.FELT], counts[at.MOVING]):
+        m = order[place]
+        left = (rows[0, m] * rows[0, m] + rows[1, m] * rows[1, m]) ** (0.5 * counts[at.STEPS] * frames)
+        x[m] *= left
+        y[m] *= left
+    counts[at.RESTED] = 0
+
+
+@njit(**COMPILED)
+def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray) -> None:
+    """Orders the modes of a drum: those that are heard, others that stretch it, and those that rest.
+
+    The highest that are silent are laid to rest for good.
+
+    Args:
+        sets: of weights that hear it.
+        scratch: room for two rows (modes,).
+    """
+    counts = voice.view(np.int64)
+    _fall(voice)
+    n, moving = counts[at.MODES], counts[at.MOVING]
+    x, y, stretches = row(voice, n, 0), row(voice, n, 1), following(voice, n)[4]
+    order = row(voice, n, at.ORDER).view(np.int64)
+    sizes, heard = scratch[:moving], scratch[moving : 2 * moving]
+    total = stretch = 0.0
+    for m in range(moving):
+        sizes[m], heard[m] = x[m] * x[m] + y[m] * y[m], 0.0
+        total += sizes[m]
+        stretch += stretches[m] * sizes[m]
+    for which in range(sets):
+        for point in range(counts[at.POINTS]):
+            place = at.weights(n, which, point, 0)
+            weights, loudness = voice[place : place + n], 0.0
+            for m in range(moving):
+                loudness += weights[m] * weights[m] * sizes[m]
+            share = 1 / loudness if loudness > 0 else 0.0
+            for m in range(moving):
+                heard[m] = max(heard[m], share * weights[m] * weights[m] * sizes[m])
+    while moving > 1 and sizes[moving - 1] < program[at.S_SILENCE] ** 2 * total + NOTHING:
+        moving -= 1
+        x[moving] = y[moving] = heard[moving] = 0.0
+        order[moving] = moving
+    audible = program[at.S_UNHEARD] ** 2
+    place = 0
+    for m in range(moving):
+        if heard[m] > audible:
+            order[place] = m
+            place += 1
+    counts[at.HEARD] = place
+    for m in range(moving):
+        if heard[m] <= audible and stretches[m] * sizes[m] > UNFELT * stretch:
+            order[place] = m
+            place += 1
+    counts[at.FELT], counts[at.MOVING] = place, moving
+    for m in range(moving):
+        if heard[m] <= audible and not stretches[m] * sizes[m] > UNFELT * stretch:
+            order[place] = m
+            place += 1
+    counts[at.REFRESH] = LOOKS_QUANTA
 
 
 @njit(**COMPILED)
 def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.ndarray, sign: float) -> None:
-    """Half of what `node` does first, forward or back, in place of y."""
+    """Half of what `_node` does first, forward or back, in place of y."""
     first = second = 0.0
     for m in range(len(x)):
         square = x[m] * x[m]
@@ -186,6 +297,7 @@ def physical(voice: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
     """Amplitudes in m and speeds in m/s, (modes,), of a voice as it is now: the inverse of `set_out`, to rounding."""
     counts = voice.view(np.int64)
     n = counts[at.MODES]
+    _fall(voice)
     x, y = row(voice, n, 0), row(voice, n, 1)
     rows = following(voice, n)
     sigmas, stretches = row(voice, n, at.SIGMA), row(voice, n, at.STRETCH)
@@ -280,34 +392,52 @@ def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
 
 
 @njit(**COMPILED)
-def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray) -> None:
+def generate(
+    voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
+) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     _bring_up_to_date(voice, program)
     counts = voice.view(np.int64)
-    n = counts[at.MODES]
-    x, y = row(voice, n, 0), row(voice, n, 1)
-    rows = following(voice, n)
-    moving, nodes, points = counts[at.MOVING], counts[at.STEPS], counts[at.POINTS]
-    sets = 2 if fading else 1
-    total = 0.0
+    n, nodes, points = counts[at.MODES], counts[at.STEPS], counts[at.POINTS]
+    sets, rests = 2 if fading else 1, program[at.S_UNHEARD] > 0
+    ears = sets * points if heard else 0
+    if not rests:
+        counts[at.HEARD] = counts[at.FELT] = counts[at.MOVING]
+    elif fading or counts[at.REFRESH] == 0:
+        _look(voice, program, sets, scratch)
+    x, y, rows = row(voice, n, 0), row(voice, n, 1), following(voice, n)
+    order = row(voice, n, at.ORDER).view(np.int64)
+    loud, quiet = order[: counts[at.HEARD]], order[counts[at.HEARD] : counts[at.FELT]]
+    first, near, far = lanes.aligned(scratch), lanes.blocks_of(len(loud)), lanes.blocks_of(len(quiet))
+    ear_sums, behind = scratch[first + lanes.slots(n) :][: 2 * lanes.MOST_EARS], first + near * lanes.BLOCK
+    _load(x, y, rows, loud, scratch, first)
+    _load(x, y, rows, quiet, scratch, behind)
+    for ear in range(ears):
+        place = at.weights(n, ear // points, ear % points, 0)
+        _load_weights(voice[place : place + n], rows, loud, scratch, first, ear)
+    moving, total, apart, largest = len(loud), 0.0, 2 if points == 1 else 1, voice[at.LARGEST_STRETCH]
+    sums = lanes.add_up(scratch, first, near, far, ears, ear_sums)
     for frame in range(at.QUANTUM):
-        if heard:
-            tension = 0.0
-            for m in range(moving):
-                tension += rows[4, m] * x[m] * x[m]
-            for which in range(sets):
-                for point in range(points):
-                    place = at.weights(n, which, point, 0)
-                    weights = voice[place : place + n]
-                    found = 0.0
-                    for m in range(moving):
-                        found += weights[m] * (x[m] - rows[6, m] * tension * x[m])
-                    out[2 * which + point, frame] = found
-        for _ in range(nodes):
-            node(x, y, moving, voice[at.LARGEST_STRETCH], rows[0], rows[1], rows[2], rows[3], rows[4], rows[5])
+        for ear in range(ears):
+            out[apart * ear, frame] = ear_sums[2 * ear] - sums[0] * ear_sums[2 * ear + 1]
+        for _ in range(nodes - 1):
+            sums = _node(scratch, first, near, far, 0, sums, largest, ear_sums)
+        sums = _node(scratch, first, near, far, ears, sums, largest, ear_sums)
         voice[at.LARGEST_ENERGY] *= voice[at.DECAY]
         if frame % 16 == 15:
-            moving, total = settle(x, y, moving, program[at.S_SILENCE], voice[at.LARGEST_ENERGY], rows[7])
-    counts[at.MOVING] = moving
+            total, held = _hold(scratch, first, near + far, voice[at.LARGEST_ENERGY])
+            before = moving
+            if not rests:
+                moving = _trim(scratch, first, moving, program[at.S_SILENCE], total)
+                near = lanes.blocks_of(moving)
+            if held or moving < before or total < NOTHING:
+                sums = lanes.add_up(scratch, first, near, far, ears, ear_sums)
+    _save(x, y, loud, scratch, first)
+    _save(x, y, quiet, scratch, behind)
+    if rests:
+        counts[at.REFRESH] -= 1
+        counts[at.RESTED] += 1
+    else:
+        counts[at.MOVING] = moving
     counts[at.GENERATED] += at.QUANTUM
     voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.S_LOUDNESS]

@@ -33,7 +33,7 @@ def _generate(voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, s
     if kind == at.BANK:
         bank.generate(voice, program, fading, heard, out, scratch)
     elif kind == at.TENSION:
-        tension.generate(voice, program, fading, heard, out)
+        tension.generate(voice, program, fading, heard, out, scratch)
     else:
         truth.generate(voice, program, fading, heard, out)
     if fading:

@@ -28,6 +28,9 @@ from engine.voices.ear import Ear
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
 # Drums radiate high modes better than low ones: at 4e-6 they would leave with audible steps.
 DRUM_SILENCE = 2e-7
+# Of the model's drums: shares of the sound, below which a mode rests if it hardly stretches the drum, and of all
+# amplitudes, below which it is laid to rest for good.
+DRUM_UNHEARD, DRUM_STILL = 1e-7, 1e-8
 STRING_SILENT_DB = 120.0  # its slowest mode, below its start
 HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below audibility
 FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
@@ -104,15 +107,25 @@ def tension_program(
 
 
 def tension_memory(
-    weights: Mapping[str, Array], c: KoopmanTensionConfiguration, rate_hz: int, silence: float = HEARD_SILENCE
+    weights: Mapping[str, Array],
+    c: KoopmanTensionConfiguration,
+    rate_hz: int,
+    silence: float = HEARD_SILENCE,
+    unheard: float = 0.0,
 ) -> Array:
-    """What the kernels read of the model, whatever the resonator; `silence`: of a mode that is laid to rest."""
+    """What the kernels read of the model, whatever the resonator.
+
+    Args:
+        silence: of a mode, of all together, from which on the highest are laid to rest.
+        unheard: see `DRUM_UNHEARD`; 0: all modes move.
+    """
     reals = {
         at.S_NODE_PHASE: c.node_phase,
         at.S_HIGHEST_PHASE: c.highest_phase,
         at.S_SILENCE: silence,
         at.S_LOUDNESS: -math.log(FULL_SCALE_M),
         at.S_RATE: float(rate_hz),
+        at.S_UNHEARD: unheard,
     }
     curves = [weights[name] for name in CURVES]
     return np.concatenate([header(at.S_HEADER, reals, {at.S_COEFFICIENTS: c.degree + 1}), *curves])

@@ -1,12 +1,14 @@
 """Drums are played: by the same events and player as strings, softly and hard, alone and in rolls."""
 
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
 
+from app.instrument import table
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import Bend, NoteOff, NoteOn, TimedEvent
@@ -32,6 +34,13 @@ def rendered(patch: Patch, key: int, velocity: int = 100, source: str = "model",
     return render_note(patch, PRESET, key, velocity, seconds, seconds, RATE_HZ, source)
 
 
+def dry_blow(key: int, source: str = "model") -> np.ndarray:
+    dry = KIT.model_copy(update={"room": Room(mix=0.0)})
+    blow = [TimedEvent(0.0, NoteOn(key, 90))]
+    blocks = render_events(dry, PRESET, blow, RATE_HZ, source, seconds=0.6, limited=False)
+    return np.concatenate(list(blocks)).astype(np.float64)[:, 0]
+
+
 def lowest_hz(sound: np.ndarray, low_hz: float, high_hz: float) -> float:
     """Of the highest peak in a band, by the spectrum of a window."""
     points = 2**17
@@ -52,15 +61,51 @@ def test_model_and_truth_sound_alike(key: int) -> None:
 @pytest.mark.parametrize("key", [41, 47, 49])
 def test_modes_that_have_decayed_leave_without_a_step(key: int, source: str) -> None:
     """A step stands out of the third difference, as twice its size; where modes ring it is smooth."""
-    blow = [TimedEvent(0.0, NoteOn(key, 90))]
-    dry = KIT.model_copy(update={"room": Room(mix=0.0)})
-    blocks = render_events(dry, PRESET, blow, RATE_HZ, source, seconds=0.6, limited=False)
-    sound = np.concatenate(list(blocks)).astype(float)[:, 0]
+    sound = dry_blow(key, source)
     assert np.abs(sound).max() > 0.05
     third = np.abs(np.diff(sound[CONTACT_FRAMES:], 3))
     usual = np.median(sliding_window_view(third, 41), axis=1)
     alone = third[20:-20] > 8 * usual
     assert third[20:-20][alone].max(initial=0.0) < LARGEST_STEP
+
+
+@pytest.mark.parametrize("key", [36, 49])
+def test_modes_that_rest_are_not_missed(key: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compared with a drum whose modes all move until they are 240 dB down."""
+    resting = dry_blow(key)
+    monkeypatch.setattr(table, "DRUM_UNHEARD", 0.0)
+    monkeypatch.setattr(table, "DRUM_STILL", 1e-12)
+    moving = dry_blow(key)
+    assert np.abs(moving).max() > 0.05
+    assert 0 < np.abs(resting - moving).max() < LARGEST_STEP / 8
+
+
+def test_modes_that_rested_are_heard_where_the_listener_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From above, where the head's rings alone are heard, to the side: as loud as if all modes had moved."""
+
+    def sound() -> np.ndarray:
+        player = InstrumentPlayer(KIT, PRESET, RATE_HZ, {"model": 1.0}, ear=Ear((0.5,)))
+        mixer = Mixer(RATE_HZ, limited=False)
+        mixer.set_player(player.compiled)
+        player.handle(NoteOn(47, 110))
+        before = mixer.render(4_800)[:, 0]
+        player.take(player.tabled(player.loud_keys(KIT, Ear((0.05,)))))
+        return np.concatenate([before, mixer.render(9_600)[:, 0]]).astype(np.float64)
+
+    resting = sound()
+    monkeypatch.setattr(table, "DRUM_UNHEARD", 0.0)
+    monkeypatch.setattr(table, "DRUM_STILL", 1e-12)
+    moving = sound()
+    window = np.hanning(4_800)
+    bands = np.array([50, 300, 600, 1_200, 2_400])
+    hz = np.fft.rfftfreq(4_800, 1 / RATE_HZ)
+    for begin in (5_800, 9_600):
+        levels_db = []
+        for each in (resting, moving):
+            power = np.abs(np.fft.rfft(each[begin : begin + 4_800] * window)) ** 2
+            found = [power[(hz >= low) & (hz < high)].sum() for low, high in pairwise(bands)]
+            levels_db.append(10 * np.log10(found))
+        assert np.abs(np.diff(levels_db, axis=0)).max() < 0.5
 
 
 def test_the_kernel_strikes_as_the_engine_does() -> None:

@@ -1,0 +1,206 @@
+"""Modes in blocks of four, side by side: the inner loops of latents that share a tension, as vector instructions.
+
+A block is one piece of memory, `BLOCK` numbers: rows (LANES,) of four modes. All of a mode's numbers thus come from
+one stream, on a boundary that vector instructions like; unused lanes are zero. Loops that a compiler makes into
+vectors by itself must first find out whether two rows overlap, and take the last few modes one by one: at ten to a
+hundred modes that took longer than the work.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from engine.kernels.compiled import COMPILED
+
+# mypy: disable-error-code="no-untyped-def"
+
+LANES = 4
+# Rows of a block: z = x + iy, those of `kernels.tension.prepare`, and what is heard
+X, Y, COSINE, SINE, KICK, SECOND_KICK, STRETCH, SECOND_STRETCH, SEEN, SQUARE = range(10)
+EARS = 10  # two for each: the weight, and the weight times κ p
+MOST_EARS = 4
+ROWS = EARS + 2 * MOST_EARS
+BLOCK = ROWS * LANES
+
+_VECTOR = ir.VectorType(ir.DoubleType(), LANES)
+_WHOLE, _LANE = ir.IntType(64), ir.IntType(32)
+
+
+@njit(inline="always", **COMPILED)
+def place(number: int) -> int:
+    """Slot of the first row of the mode with this number, from the first block on; rows are LANES apart."""
+    return number // LANES * BLOCK + number % LANES
+
+
+@njit(inline="always", **COMPILED)
+def blocks_of(modes: int) -> int:
+    return (modes + LANES - 1) // LANES
+
+
+@njit(inline="always", **COMPILED)
+def slots(modes: int) -> int:
+    """Room for the blocks of so many modes in two groups, wherever the memory begins."""
+    return (blocks_of(modes) + 2) * BLOCK
+
+
+@intrinsic
+def aligned(typing_context: Any, memory: Any):
+    """The first slot of memory, float64 (n,), at which a block may begin."""
+
+    def generate(context, builder, signature, arguments):
+        data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
+        address = builder.udiv(builder.ptrtoint(data, _WHOLE), _WHOLE(8))
+        return builder.and_(builder.neg(address), _WHOLE(LANES - 1))
+
+    return types.int64(memory), generate
+
+
+class _Blocks:
+    """Writes the code of a loop over blocks of four modes, and of sums over all of them."""
+
+    def __init__(self, context, builder, memory_type, memory, sums: int) -> None:
+        self.builder = builder
+        self._data = context.make_array(memory_type)(context, builder, memory).data
+        self._sums = [cgutils.alloca_once_value(builder, ir.Constant(_VECTOR, [0.0] * LANES)) for _ in range(sums)]
+
+    def spread(self, value):
+        """The same number in all lanes."""
+        nothing = ir.Constant(_VECTOR, ir.Undefined)
+        one = self.builder.insert_element(nothing, value, _LANE(0))
+        return self.builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(_LANE, LANES), [0] * LANES))
+
+    def begin(self, first, block) -> None:
+        self._place = self.builder.add(first, self.builder.mul(block, _WHOLE(BLOCK)))
+
+    def row(self, which: int):
+        return self.builder.load(self._row(which), align=8 * LANES)
+
+    def set_row(self, which: int, value) -> None:
+        self.builder.store(value, self._row(which), align=8 * LANES)
+
+    def _row(self, which: int):
+        slot = self.builder.add(self._place, _WHOLE(which * LANES))
+        return self.builder.bitcast(self.builder.gep(self._data, [slot]), _VECTOR.as_pointer())
+
+    def add(self, which: int, one, other) -> None:
+        """Adds a product to a sum."""
+        product = self.builder.fmul(one, other)
+        self.builder.store(self.builder.fadd(self.builder.load(self._sums[which]), product), self._sums[which])
+
+    def totals(self) -> list[Any]:
+        """The sums, over the lanes too, always in one order."""
+        found = []
+        for each in self._sums:
+            total, width = self.builder.load(each), LANES
+            while width > 1:
+                width //= 2
+                halves = [
+                    ir.Constant(ir.VectorType(_LANE, width), [*range(first, first + width)]) for first in (0, width)
+                ]
+                low, high = (self.builder.shuffle_vector(total, total, half) for half in halves)
+                total = self.builder.fadd(low, high)
+            found.append(self.builder.extract_element(total, _LANE(0)))
+        return found
+
+
+def _sweep(turns: bool, ears: int):
+    """The kick of the common tension and the turn to the next node, or only the sums at the present one.
+
+    Returns a function of `near` blocks, which ears hear, and the `far` ones behind them. It gives Σ η² A x² and
+    Σ η² κ r x² at the node where they are then, and writes two sums for each ear to `heard`: that of the weights, and
+    that of the weights times κ p.
+    """
+
+    @intrinsic
+    def sweep(typing_context, memory, first, near, far, linear, squared, heard):
+        def generate(context, builder, signature, arguments):
+            code = _Blocks(context, builder, signature.args[0], arguments[0], 2 + 2 * ears)
+            first, near, far = arguments[1:4]
+            linear, squared = (code.spread(each) for each in arguments[4:6])
+            behind = builder.add(first, builder.mul(near, _WHOLE(BLOCK)))
+            for begin, blocks, hearing in ((first, near, ears), (behind, far, 0)):
+                with cgutils.for_range(builder, blocks) as loop:
+                    code.begin(begin, loop.index)
+                    x = code.row(X)
+                    if turns:
+                        kick = builder.fsub(
+                            builder.fmul(code.row(KICK), linear), builder.fmul(code.row(SECOND_KICK), squared)
+                        )
+                        y = builder.fadd(code.row(Y), builder.fmul(kick, x))
+                        cosine, sine = code.row(COSINE), code.row(SINE)
+                        code.set_row(Y, builder.fadd(builder.fmul(sine, x), builder.fmul(cosine, y)))
+                        x = builder.fsub(builder.fmul(cosine, x), builder.fmul(sine, y))
+                        code.set_row(X, x)
+                    square = builder.fmul(x, x)
+                    code.add(0, code.row(STRETCH), square)
+                    code.add(1, code.row(SECOND_STRETCH), square)
+                    for each in range(2 * hearing):
+                        code.add(2 + each, code.row(EARS + each), x)
+            stretch, second, *found = code.totals()
+            data = context.make_array(signature.args[6])(context, builder, arguments[6]).data
+            for slot, total in enumerate(found):
+                builder.store(total, builder.gep(data, [_WHOLE(slot)]))
+            return context.make_tuple(builder, signature.return_type, (stretch, second))
+
+        return types.UniTuple(types.float64, 2)(memory, first, near, far, linear, squared, heard), generate
+
+    return sweep
+
+
+_sum, _sum_1, _sum_2, _sum_4 = (_sweep(False, ears) for ears in (0, 1, 2, 4))
+_turn, _turn_1, _turn_2, _turn_4 = (_sweep(True, ears) for ears in (0, 1, 2, 4))
+
+
+@njit(inline="always", **COMPILED)
+def turn(
+    memory: np.ndarray, first: int, near: int, far: int, ears: int, linear: float, squared: float, heard: np.ndarray
+) -> tuple[float, float]:
+    """Kicks and turns blocks; returns their sums at the next node, as `_sweep` says.
+
+    Args:
+        ears: 0, 1, 2 or 4, that hear the near blocks.
+        linear, squared: S (1 - 2R) and S².
+    """
+    if ears == 0:
+        return _turn(memory, first, near, far, linear, squared, heard)
+    if ears == 1:
+        return _turn_1(memory, first, near, far, linear, squared, heard)
+    if ears == 2:
+        return _turn_2(memory, first, near, far, linear, squared, heard)
+    return _turn_4(memory, first, near, far, linear, squared, heard)
+
+
+@njit(inline="always", **COMPILED)
+def add_up(memory: np.ndarray, first: int, near: int, far: int, ears: int, heard: np.ndarray) -> tuple[float, float]:
+    """The sums of blocks as they are, as `turn`."""
+    if ears == 0:
+        return _sum(memory, first, near, far, 0.0, 0.0, heard)
+    if ears == 1:
+        return _sum_1(memory, first, near, far, 0.0, 0.0, heard)
+    if ears == 2:
+        return _sum_2(memory, first, near, far, 0.0, 0.0, heard)
+    return _sum_4(memory, first, near, far, 0.0, 0.0, heard)
+
+
+@intrinsic
+def energies(typing_context: Any, memory: Any, first: Any, blocks: Any):
+    """Σ |z|² and Σ ω² |z|² of blocks."""
+
+    def generate(context, builder, signature, arguments):
+        code = _Blocks(context, builder, signature.args[0], arguments[0], 2)
+        ones = ir.Constant(_VECTOR, [1.0] * LANES)
+        with cgutils.for_range(builder, arguments[2]) as loop:
+            code.begin(arguments[1], loop.index)
+            x, y = code.row(X), code.row(Y)
+            size = builder.fadd(builder.fmul(x, x), builder.fmul(y, y))
+            code.add(0, size, ones)
+            code.add(1, size, code.row(SQUARE))
+        return context.make_tuple(builder, signature.return_type, code.totals())
+
+    return types.UniTuple(types.float64, 2)(memory, first, blocks), generate
