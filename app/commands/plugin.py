@@ -57,7 +57,7 @@ def plugin(
             chosen = [find_patch(name).patch for name in instruments]
         images = []
         for patch in chosen:
-            images.append(image_of(patch, open_preset(patch.preset), levelled=not dry_run))
+            images.append(image_of(patch, open_preset(patch.preset)))
             if images[-1].left_out:
                 say(f"note: {patch.name}: macros do not move {', '.join(images[-1].left_out)} in the plug-in")
         if dry_run:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,7 @@ from app.instrument import events
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.loud_keys import LoudKeys
-from app.instrument.table import fill_gain, programs_of, strings_of, table_of, wheeled
+from app.instrument.table import programs_of, strings_of, table_of, wheeled
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.kernels import playing_layout as of
@@ -212,10 +212,10 @@ class InstrumentPlayer:
         return DrumKeys(patch, ear, near if isinstance(near, DrumKeys) else None)
 
     def loud_keys(self, patch: Patch, ear: Ear | None = None, nearly: bool = False) -> LoudKeys | DrumKeys:
-        """What `tabled` needs of a patch. It takes milliseconds, in which keys are played.
+        """What `tabled` needs of a patch. Another body takes milliseconds, in which keys are played.
 
         Args:
-            nearly: whether body and peaks may be those of the present patch, for which it takes no time.
+            nearly: whether keys may be as loud as through the body of the present patch, which takes no time.
 
         Raises:
             ValueError: the tuning is impossible, or the patch has drums for a player of strings.
@@ -225,7 +225,7 @@ class InstrumentPlayer:
 
     def tabled(self, keys: LoudKeys | DrumKeys) -> Tabled:
         """The table of keys, which takes milliseconds, of drums more."""
-        return Tabled(keys, table_of(keys, self.grid_points, self._sources, self._programs, self.table, self._varied))
+        return Tabled(keys, table_of(keys, self.grid_points, self._sources, self._programs, self._varied))
 
     def take(self, made: Tabled, frame: int = 0) -> None:
         """Plays these keys from a frame on, at once; strings that ring glide to them.
@@ -241,21 +241,6 @@ class InstrumentPlayer:
             counts[of.TABLE_SERIAL], counts[of.TABLE_INSTRUMENT] = self._serial, self._instrument
             self._loud, self.table = made.keys, made.table
             self.compiled.take(self.table, frame)
-
-    def prepare(self, keys: Sequence[int] | None = None) -> None:
-        """Computes the gains of keys, so that a strike need not. None: all keys of the patch."""
-        low, high = self.patch.range
-        for key in keys if keys is not None else range(low, high + 1):
-            for string in (None, *range(strings_of(self.patch))):
-                try:
-                    self._fill(key, string)
-                except ValueError:
-                    continue  # raised again when it is struck
-
-    def _fill(self, key: int, string: int | None) -> None:
-        table, loud = self.table, self._loud
-        assert table is not None
-        fill_gain(table, loud, key, string)
 
     def gain_of(self, key: int, string: int | None, parameters: StringParameters, known: float) -> float:
         """The factor that a string would be struck with now; `known` where its key has another string now.
@@ -298,7 +283,7 @@ class InstrumentPlayer:
             return 0
         struck = None
         if isinstance(event, NoteOn) and event.velocity > 0:
-            self._make_ready(event)
+            self._check(event)
             struck = self._struck(event)
         elif isinstance(event, Controller):
             self._follow_wheel(event)
@@ -307,15 +292,17 @@ class InstrumentPlayer:
             record.kind, record.channel, record.key, record.value, frame, struck_s=struck_s, struck=struck
         )
 
-    def _make_ready(self, event: NoteOn) -> None:
-        """The gains of a key on the strings on which the event may play it."""
-        played = False  # on the string of its channel, where that plays
-        if event.channel < strings_of(self.patch):
+    def _check(self, event: NoteOn) -> None:
+        """Raises ValueError: no string on which an event may play its key is possible."""
+        keys = self._loud
+        if isinstance(keys, DrumKeys):
+            keys.of_key(event.key)
+            return
+        if event.channel < strings_of(self.patch):  # the string of its channel, where that plays
             with contextlib.suppress(ValueError):
-                self._fill(event.key, event.channel)
-                played = True
-        with contextlib.suppress(ValueError) if played else contextlib.nullcontext():
-            self._fill(event.key, None)
+                keys.string_of(event.key, event.channel)
+                return
+        keys.string_of(event.key)
 
     def _struck(self, event: NoteOn) -> NDArray[np.float64] | None:
         """What a blow at a place of its own gives a drum's modes; None: its own place."""

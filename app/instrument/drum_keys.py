@@ -1,6 +1,6 @@
-"""The keys of a patch of drums before anybody plays them: modes, what a blow and an ear make of them, and gains.
+"""The keys of a patch of drums before anybody plays them: modes, and what a blow and an ear make of them.
 
-What `LoudKeys` is for strings.
+What `LoudKeys` is for strings; the compiled player computes gains.
 """
 
 from __future__ import annotations
@@ -11,13 +11,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from app.instrument.effects import Response, body_response
-from app.instrument.loudness import GAIN_RANGE_DB, HIGHEST_PEAK_DB, PART_S, WANTED_DB, k_weight
+from app.instrument.effects import body_curves
 from app.patches.drums import Drums, PlayedDrum
 from app.patches.patch import VELOCITIES, Patch
 from app.patches.tuning import Tuning
 from engine.kernels import playing_layout as of
-from engine.kernels.playing_layout import REFERENCE_VELOCITY
 from engine.resonators.base import Array
 from engine.resonators.drum import DrumModes, DrumParameters
 from engine.resonators.surface import Circle
@@ -28,7 +26,6 @@ TUNINGS = 6  # rounds of a secant method
 NEAR = 1e-4  # of a frequency, where it ends
 LOW_MODES_HZ, LOW_MODES = 3.0, 6  # among which its pitch is: below so many times the lowest, without air
 J01 = 2.404825557695773  # the first zero of J₀
-LOUDEST_S = 0.03  # after the blow: the peak is looked for there
 NEAREST_RIM = 0.98  # of half a drum: at the rim itself nothing moves
 
 
@@ -39,14 +36,12 @@ class DrumKey:
     Attributes:
         modes: with the patch's knobs, tuned to the key.
         heard: weights of amplitudes in m, of full scale, (points, modes).
-        gain: that makes it as loud as others are.
     """
 
     key: int
     played: PlayedDrum
     modes: DrumModes
     heard: Array
-    gain: float = 1.0
 
     def struck(self, place: tuple[float, float]) -> Array:
         """The speeds (modes,) that 1 N s of its mallet gives at a place, in half-lengths from the centre.
@@ -93,7 +88,7 @@ class DrumKeys:
         assert isinstance(patch.strings, Drums)
         self.patch, self.ear, self.drums = patch, ear, patch.strings
         self._tuning = Tuning(patch.tuning)
-        self._response: Response | None = body_response(patch) if near is None else near._response
+        self.body: Array | None = body_curves(patch) if near is None else near.body
         self._known: dict[int, DrumKey | None] = {}
 
     def of_key(self, key: int, string: int | None = None) -> DrumKey | None:
@@ -118,8 +113,7 @@ class DrumKeys:
             raise ValueError(f"key {key} of {self.patch.name}, {played.name}: {error}") from error
         directions = [(2 * point - 1, 0.0) for point in self.ear.points]
         heard = np.stack([modes.radiated(direction) for direction in directions]) / FULL_SCALE_PA
-        found = DrumKey(key, played, modes, heard)
-        return replace(found, gain=self._gain(found))
+        return DrumKey(key, played, modes, heard)
 
     def _modes(self, played: PlayedDrum, ratio: float) -> DrumModes:
         knobs, drum = self.patch.knobs, played.drum.parameters
@@ -131,27 +125,6 @@ class DrumKeys:
         )
         undamped = replace(drum, damping_d1_kg_m2_s=0.0, damping_d3_kg_s=0.0)  # a knob of decay takes no time
         return tuned(undamped, ratio, self.drums.highest_hz).damped(drum.damping_d1_kg_m2_s, drum.damping_d3_kg_s)
-
-    def _gain(self, found: DrumKey) -> float:
-        """In closed form as for strings: the quiet drum's modes decay each by itself."""
-        speeds = found.strike(REFERENCE_VELOCITY).speeds(found.modes)
-        omega, sigma = found.modes.omega, found.modes.sigma
-        amplitudes = found.heard * (speeds / omega)
-        falls = 2 * sigma * PART_S
-        mean = np.where(falls > 1e-6, -np.expm1(-falls) / np.maximum(falls, 1e-6), 1.0)
-        hz = omega / math.tau
-        body = self._response.power_at(hz) if self._response is not None else 1.0
-        power = float((0.5 * amplitudes**2 * mean * k_weight(hz) * body).sum(1).mean())
-        if power <= 0:
-            return 1.0
-        low, high = GAIN_RANGE_DB
-        level_db = 10 * math.log10(power)
-        t = np.arange(0, LOUDEST_S, 1 / 8_000)
-        swing = np.exp(-np.multiply.outer(t, sigma)) * np.sin(np.multiply.outer(t, omega))
-        peak_db = 20 * math.log10(max(float(np.abs(swing @ amplitudes.T).max()), 1e-9))
-        gain_db = min(max(WANTED_DB - level_db, low), high)
-        gain_db -= max(0.0, peak_db + gain_db - HIGHEST_PEAK_DB)
-        return float(10 ** ((gain_db + self.patch.level_db) / 20))
 
     @property
     def curve(self) -> float:

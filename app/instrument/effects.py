@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -15,27 +12,7 @@ from app.patches.patch import Body as ChosenBody
 from app.patches.patch import Patch
 from app.patches.patch import Room as ChosenRoom
 from engine.effects import BODIES, Amp, Body, Effects, Room
-
-RESPONSE_HZ = 48_000
-_POINTS = 2**16
-
-
-@dataclass(frozen=True, eq=False)
-class Response:
-    """What a body does to a sound.
-
-    Attributes:
-        impulse: its response (frames,) at RESPONSE_HZ, of the first channel.
-        power: the square of its gain at `frequencies_hz`, (frequencies,) both; the mean of the channels.
-    """
-
-    impulse: NDArray[np.float64]
-    frequencies_hz: NDArray[np.float64]
-    power: NDArray[np.float64]
-
-    def power_at(self, frequencies_hz: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The square of the gain, of the shape of `frequencies_hz`."""
-        return np.interp(frequencies_hz, self.frequencies_hz, self.power)
+from engine.effects.curves import curves_of
 
 
 def effects_of(patch: Patch) -> Effects | None:
@@ -75,10 +52,10 @@ def channels_of(patch: Patch, wheeled: bool = False) -> int:
     return 2 if len(patch.pickup.points) == 2 or patch.room.mix > 0 or wide else 1
 
 
-def body_response(patch: Patch) -> Response | None:
-    """The response of a patch's body, whose resonances favour some keys; None: it has no body."""
-    body = _body(patch.body)[0]
-    return None if body is None else _response(body)
+def body_curves(patch: Patch) -> NDArray[np.float64] | None:
+    """The curves of a patch's body, whose resonances favour some keys, at whatever mix; None: it has no body."""
+    body = _body(patch.body.model_copy(update={"mix": 1.0}))[0]
+    return None if body is None else curves_of(body)
 
 
 def _body(chosen: ChosenBody) -> tuple[Body | None, str]:
@@ -92,10 +69,3 @@ def _body(chosen: ChosenBody) -> tuple[Body | None, str]:
         return Body(mix, size, impulse=own_impulse(name)), ""
     except ImpulseError as error:
         return None, str(error)
-
-
-@lru_cache(maxsize=16)
-def _response(body: Body) -> Response:
-    impulse = Effects(body).impulse(RESPONSE_HZ)
-    power = (np.abs(np.fft.rfft(impulse, _POINTS, axis=0)) ** 2).mean(1)
-    return Response(impulse[:, 0], np.asarray(np.fft.rfftfreq(_POINTS, 1 / RESPONSE_HZ), np.float64), power)

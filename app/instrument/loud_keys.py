@@ -3,26 +3,27 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from app.instrument.effects import Response, body_response
-from app.instrument.loudness import HIGHEST_PEAK_DB, gain_of, peak_db
+from app.instrument.effects import body_curves
 from app.instrument.strings import KeyString, Strings
 from app.patches.drums import Drums
 from app.patches.patch import Patch
-from engine.kernels.playing_layout import HIGHEST_SIGMA, REFERENCE_VELOCITY
-from engine.pluck import LARGEST_AMPLITUDE_MM, Pluck
+from engine.excitation import release_factor
+from engine.kernels import playing_layout as of
+from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, LARGEST_AMPLITUDE_MM, Pluck
 from engine.presets import PresetInfo
-from engine.resonators.base import Resonator
+from engine.resonators.base import Array, Resonator
 from engine.resonators.losses import Losses
 from engine.resonators.polarised import Polarisations, layout, partials_of
 from engine.resonators.string import StringParameters
 from engine.voices import Ear
 
-LOOKED_AT = (0, 0.25, 0.5, 0.75, 1)  # of the range: whose peaks are known
+_NO_BODY = np.zeros(0)
+_NO_BODY.setflags(write=False)  # as curves are
 
 
 @dataclass(frozen=True)
@@ -35,11 +36,10 @@ class LoudKey:
 class LoudKeys:
     """Of one patch, heard at `ear`, played by a preset. A soloed mode is as loud as it is in the whole note.
 
-    What all keys share is computed when it is made, in up to 40 ms: the body's response, and how far peaks are too
-    high. Each key takes half a millisecond more.
+    The compiled player computes the gains of keys by itself, with the same `engine.kernels.loudness`.
 
     Args:
-        near: keys of nearly the same patch, of which both are taken instead, in no time.
+        near: keys of nearly the same patch, of which the body's curves are taken instead, in no time.
     """
 
     def __init__(self, patch: Patch, ear: Ear, preset: PresetInfo, near: LoudKeys | None = None) -> None:
@@ -49,55 +49,80 @@ class LoudKeys:
         self.patch, self.ear = patch, ear
         self._whole, self._preset = replace(ear, solo=0), preset
         self.strings = Strings(patch)
-        self._release_s = patch.pluck.release_s(REFERENCE_VELOCITY)
         self.polarisations, self.recorded = polarisations_of(patch, preset), preset.recorded
-        self._response: Response | None = body_response(patch) if near is None else near._response
-        self._over_db: float = self._peaks_over_db() if near is None else near._over_db
+        self.body: Array | None = body_curves(patch) if near is None else near.body
 
     def of_key(self, key: int, string: int | None = None) -> LoudKey | None:
         """None for a key that is silent. `string`: on which of a set it is played, as in `Strings.of_key`.
 
+        It takes half a millisecond, and the first time some more.
+
         Raises:
             ValueError: the key has no possible string.
         """
-        found = self._alone(key, string)
-        level = float(10 ** ((self.patch.level_db - self._over_db) / 20))
-        return None if found is None else replace(found, gain=found.gain * level)
+        found = self.strings.of_key(key, string)
+        if found is None:
+            return None
+        resonator = resonator_of(found, self.patch, self._preset)
+        level = float(10 ** (self.patch.level_db / 20))
+        return LoudKey(found, resonator, self._gain(self._sound(found, resonator)) * self._limit * level)
 
     def string_of(self, key: int, string: int | None = None) -> KeyString | None:
         """As `of_key`, the string alone, which takes no time."""
         found = self.strings.of_key(key, string)
-        if found is not None and any(
+        if found is None:
+            return None
+        if self.recorded is not None and self.ear.pickup == "bridge":
+            raise ValueError(f"{self.patch.name}: a string learned from a recording has no force at a bridge")
+        if any(
             not found.parameters.decay_rate(mode) < found.parameters.undamped_frequency(mode)
             for mode in (1, found.modes)  # then of all between: see `engine.bounds.check_motion`
         ):
             raise ValueError(f"key {key} of {self.patch.name}: a mode is overdamped; lower the damping")
         return found
 
-    def _peaks_over_db(self) -> float:
-        """By how much the peaks of some keys are too high."""
-        low, high = self.patch.range
-        peaks_db = []
-        for key in {low + round(share * (high - low)) for share in LOOKED_AT}:
+    @cached_property
+    def _limit(self) -> float:
+        """The factor that keeps all keys below the highest peak."""
+        from engine.kernels import loudness  # Numba only when it is needed
+
+        highest, (low, high) = 0.0, self.patch.range
+        for number in range(loudness.LOOKED_AT):
             with contextlib.suppress(ValueError):  # reported when it is struck
-                if (found := self._alone(key)) is not None:
-                    pluck = self._pluck(found.string)
-                    peak = peak_db(found.resonator, pluck, self._whole, self._response, self._release_s)
-                    peaks_db.append(peak + 20 * math.log10(found.gain))
-        return max(0.0, max(peaks_db, default=HIGHEST_PEAK_DB) - HIGHEST_PEAK_DB)
+                key = self.strings.of_key(loudness.looked_at(low, high, number))
+                if key is not None:
+                    sound = self._sound(key, resonator_of(key, self.patch, self._preset))
+                    swings, modes = self.ear.pickup == "velocity", len(sound) // of.SOUND_ROWS
+                    gain, body = self._gain(sound), self._heard_through
+                    highest = max(highest, gain * loudness.peak(sound, modes, swings, *body, highest / gain))
+        return float(loudness.limit(highest))
 
-    def _alone(self, key: int, number: int | None = None) -> LoudKey | None:
-        """With the gain that makes it as loud as the others."""
-        string = self.strings.of_key(key, number)
-        if string is None:
-            return None
-        resonator = resonator_of(string, self.patch, self._preset)
-        heard = self._whole, self._response, self._release_s
-        return LoudKey(string, resonator, gain_of(resonator, self._pluck(string), *heard))
+    @property
+    def _heard_through(self) -> tuple[Array, float]:
+        """The body's curves, and how much of it is heard."""
+        return (_NO_BODY, 0.0) if self.body is None else (self.body, self.patch.body.mix)
 
-    def _pluck(self, string: KeyString) -> Pluck:
-        """Of which loudness and peak are taken."""
-        return on_string(string, self.patch.pluck.pluck(REFERENCE_VELOCITY))
+    def _gain(self, sound: Array) -> float:
+        from engine.kernels import loudness
+
+        modes = len(sound) // of.SOUND_ROWS
+        return float(loudness.gain(sound, modes, len(self.ear.points), *self._heard_through))
+
+    def _sound(self, string: KeyString, resonator: Resonator) -> Array:
+        """What keys are equally loud by, as `engine.kernels.loudness` reads it."""
+        patch = self.patch
+        pluck = on_string(string, patch.pluck.pluck(of.REFERENCE_VELOCITY))
+        amplitudes = resonator.to_modes(pluck.displacement(resonator.points))
+        if release_s := patch.pluck.release_s(of.REFERENCE_VELOCITY):
+            amplitudes = amplitudes * release_factor(resonator.omega, release_s)
+        weights = resonator.shapes @ self._whole.weights(resonator.points, resonator.force_weights) / FULL_SCALE_M
+        if self.ear.pickup == "velocity":
+            weights = weights * resonator.omega[:, None] * (FULL_SCALE_M / FULL_SCALE_M_S)
+        sound = np.zeros((of.SOUND_ROWS, resonator.modes))
+        sound[of.SOUND_OMEGA], sound[of.SOUND_SIGMA] = resonator.omega, resonator.sigma
+        heard = weights * amplitudes[:, None]
+        sound[of.SOUND_LEFT : of.SOUND_LEFT + heard.shape[1]] = heard.T
+        return sound.ravel()
 
 
 def polarisations_of(patch: Patch, preset: PresetInfo) -> Polarisations | None:
@@ -138,7 +163,7 @@ def _with_losses(resonator: Resonator, string: StringParameters, patch: Patch, p
     rates = Losses(**patch.losses.model_dump()).rates(
         string, int(partial[-1]) + 1, patch.knobs.decay, patch.knobs.brightness_decay
     )
-    sigma = np.minimum(resonator.sigma + rates[partial], HIGHEST_SIGMA * resonator.omega)
+    sigma = np.minimum(resonator.sigma + rates[partial], of.HIGHEST_SIGMA * resonator.omega)
     return replace(resonator, sigma=sigma)
 
 

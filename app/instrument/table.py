@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Iterable
 from dataclasses import astuple
 
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKeys, block_of
 from app.instrument.loud_keys import LoudKeys
-from app.instrument.loudness import PART_S, WANTED_DB
 from app.instrument.strings import KNOBS, STRING
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
@@ -42,7 +40,11 @@ VALUES = (
     "noise.release_db",
     "damping.mute",
     *(f"technique.{name}" for name in ("harmonic", "strum_ms", "strokes", "tremolo_hz")),
+    "body.mix",
+    "pickup.points.0",
+    "pickup.points.1",
 )
+WHEELED = VALUES[: of.BODY_MIX]  # what the kernel turns with the modulation wheel
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
 SHAPES = {
     "gaussian": of.GAUSSIAN,
@@ -95,10 +97,9 @@ def table_of(
     grid_points: int,
     sources: Iterable[str],
     programs: tuple[NDArray[np.float64], ...],
-    near: Table | None = None,
     varied: bool = True,
 ) -> Table:
-    """The table of a patch, without its number. `fill_gain` adds gains of keys; until then they are those of `near`.
+    """The table of a patch, without its number.
 
     Args:
         varied: whether plucks vary from stroke to stroke, as the patch says.
@@ -111,8 +112,6 @@ def table_of(
     counts[of.TABLE_SHAPE], counts[of.TABLE_STOPS] = SHAPES[patch.pluck.shape], patch.pluck.stops
     counts[of.TABLE_LET_RING] = patch.damping.let_ring
     counts[of.TABLE_POINTS], counts[of.TABLE_VELOCITY] = len(ear.points), ear.pickup == "velocity"
-    points = [of.BRIDGE] * len(ear.points) if ear.pickup == "bridge" else ear.points
-    memory[of.TABLE_POINT : of.TABLE_POINT + len(points)] = points
     counts[of.TABLE_SOLO], counts[of.TABLE_GRID] = ear.solo, grid_points
     if (moving := loud.polarisations) is not None:
         counts[of.TABLE_PAIRS], memory[of.TABLE_DETUNING] = PAIRS, moving.detuning
@@ -133,18 +132,24 @@ def table_of(
     pluck = patch.pluck
     memory[of.TABLE_RELEASE_S : of.TABLE_RELEASE_S + 2] = pluck.release_ms / 1000, pluck.release_hard_ms / 1000
     memory[of.TABLE_VARIATION] = pluck.variation if varied else 0.0
-    memory[of.TABLE_NOISE_LEVEL] = PART_S * 10 ** ((WANTED_DB + patch.level_db) / 10)
+    memory[of.TABLE_LEVEL] = 10 ** (patch.level_db / 20)
+    memory[of.TABLE_NOISE_LEVEL] = of.PART_S * 10 ** ((of.WANTED_DB + patch.level_db) / 10)
     for place, each in enumerate(CONTACTS[patch.noise.kind]):
         first = of.TABLE_CONTACTS + place * of.CONTACT
         memory[first : first + len(astuple(each))] = astuple(each)
-    goal = wheel_goal(patch) if patch.mod_wheel in VALUES else None
-    counts[of.TABLE_WHEEL] = -1 if goal is None else VALUES.index(patch.mod_wheel)
+    goal = wheel_goal(patch) if patch.mod_wheel in WHEELED else None
+    counts[of.TABLE_WHEEL] = -1 if goal is None else WHEELED.index(patch.mod_wheel)
     memory[of.TABLE_WHEEL_GOAL] = 0.0 if goal is None else goal
     for place, (source, program) in enumerate(zip(sources, programs, strict=True)):
         counts[of.TABLE_KINDS + place] = at.TRUTH if source == "truth" else at.TENSION
         counts[of.TABLE_PROGRAMS + place] = program.ctypes.data
     counts[of.TABLE_SOURCES] = len(programs)
-    memory[of.TABLE_VALUES : of.TABLE_VALUES + of.VALUES] = [_value(patch, name) for name in VALUES]
+    points = [of.BRIDGE] * len(ear.points) if ear.pickup == "bridge" else ear.points
+    values = [*(_value(patch, name) for name in (*WHEELED, "body.mix")), *points]
+    memory[of.TABLE_VALUES : of.TABLE_VALUES + len(values)] = values
+    if loud.body is not None:
+        memory = _with_body(memory, loud.body)
+        counts = memory.view(np.int64)
     if isinstance(loud, DrumKeys):
         return Table(_with_drums(memory, loud), programs)
     if loud.recorded is not None:
@@ -166,14 +171,17 @@ def table_of(
             memory[first : first + of.OPEN_SLOTS] = row
     turn = 2 * (grid_points - 1)
     memory[of.TABLE_SINES : of.TABLE_SINES + turn] = np.sin(2 * np.pi * np.arange(turn) / turn)
-    if near is not None:
-        guesses = slice(of.TABLE_GAINS, of.TABLE_GAINS + of.KEYS * of.GAINS)
-        memory[guesses] = -np.abs(np.nan_to_num(near.memory[guesses]))
     return Table(memory, programs)
 
 
+def _with_body(memory: NDArray[np.float64], curves: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The table with what the body does at each frequency."""
+    memory.view(np.int64)[of.TABLE_BODY] = len(memory)
+    return np.concatenate([memory, curves])
+
+
 def _with_drums(memory: NDArray[np.float64], loud: DrumKeys) -> NDArray[np.float64]:
-    """The table with the drums of all keys, and their gains. A key whose drum is impossible has none."""
+    """The table with the drums of all keys. A key whose drum is impossible has none."""
     blocks: list[NDArray[np.float64]] = []
     first = len(memory) + of.KEYS
     slots = np.zeros(of.KEYS, np.int64)
@@ -181,7 +189,6 @@ def _with_drums(memory: NDArray[np.float64], loud: DrumKeys) -> NDArray[np.float
     for key in range(low, high + 1):
         with contextlib.suppress(ValueError):
             if (found := loud.of_key(key)) is not None:
-                memory[of.TABLE_GAINS + key * of.GAINS] = found.gain
                 blocks.append(block_of(found))
                 slots[key] = first
                 first += len(blocks[-1])
@@ -209,31 +216,6 @@ def _with_attack(memory: NDArray[np.float64], attack: RecordedAttack) -> NDArray
     header.view(np.int64)[of.ATTACK_FRAMES] = len(samples)
     memory.view(np.int64)[of.TABLE_ATTACK] = len(memory)
     return np.concatenate([memory, header, samples])
-
-
-def fill_gain(table: Table, loud: LoudKeys | DrumKeys, key: int, string: int | None = None) -> None:
-    """Computes the gain of a key, where it is not known, in half a millisecond. Any thread.
-
-    Args:
-        string: on which of a set it is played, as in `Strings.of_key`.
-
-    Raises:
-        ValueError: the key has no possible string.
-    """
-    if isinstance(loud, DrumKeys):
-        loud.of_key(key)  # whose gain the table has
-        return
-    slot = of.TABLE_GAINS + key * of.GAINS + (0 if string is None else 1 + string)
-    if table.memory[slot] > 0:
-        return
-    try:
-        found = loud.of_key(key, string)
-        if found is not None:
-            found.resonator.eigenvalues()
-            table.memory[slot] = found.gain
-    except ValueError:
-        table.memory[slot] = math.nan
-        raise
 
 
 def strings_of(patch: Patch) -> int:

@@ -41,8 +41,8 @@ class _Wanted:
 class Keys:
     """Every public method may be called from any thread.
 
-    A key waits for no knob. A turned patch is played at once, with the body's loudness and the peaks of the patch
-    before; its own are computed in the background. Nothing that takes milliseconds is computed under a lock.
+    A key waits for no knob. A turned patch is played at once, as loud as through the body of the patch before; where
+    its own is another, that is computed in the background. Nothing that takes milliseconds is computed under a lock.
 
     Args:
         find: the path of a preset by its name; None where there is none.
@@ -273,18 +273,6 @@ class Keys:
             else:
                 self._bring(player, wanted)
         self._set_present_effects()
-        self._prepare()
-
-    def _prepare(self) -> None:
-        """Computes keys before they are struck, until something else is wanted."""
-        wanted, player = self._wanted, self._player
-        if player is None:
-            return
-        low, high = player.patch.range
-        for key in range(low, high + 1):
-            if wanted is not self._wanted:
-                return
-            player.prepare([key])
 
     def _bring(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
         """Lets keys play what is wanted, unless something else is by now. `nearly`: as of `loud_keys`."""

@@ -6,6 +6,7 @@ impulse    an impulse response as a value: checked, at another rate, as loud as 
 amp        an amplifier, whose cabinet is a body
 body       from the modes of an instrument's body, or from a response that is given
 body_table seventeen bodies: their modes, with sources
+curves     what a body does to the loudness of a key
 room       of a box of six walls
 effects    the amplifier, then body and room as one response; the same for arrays
 partitions that response as the compiled convolver reads it

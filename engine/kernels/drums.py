@@ -12,6 +12,7 @@ import numpy as np
 from numba import carray, njit
 
 from engine.kernels import layout as at
+from engine.kernels import loudness
 from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import pointer
@@ -27,6 +28,67 @@ def block_of(tables: np.ndarray, key: int) -> int:
     return tables[tables[of.TABLE_DRUMS] + key]
 
 
+@njit(inline="always", **COMPILED)
+def _speed(table: np.ndarray, drum: int, share: float) -> float:
+    """Of a mallet at a share of the velocities, in m/s."""
+    soft = table[drum + of.DRUM_SOFTEST_M_S]
+    return soft * (table[drum + of.DRUM_HARDEST_M_S] / soft) ** share
+
+
+@njit(**COMPILED)
+def _blow(
+    table: np.ndarray, tables: np.ndarray, drum: int, struck: np.ndarray, speed: float, out: np.ndarray
+) -> None:
+    """The speeds (modes,) that a blow gives; `struck`: those that 1 N s gives. As `engine.strike.Strike.speeds`."""
+    n, energy = tables[drum + of.DRUM_MODES], 0.0
+    contact_s = table[drum + of.DRUM_CONTACT_S] * max(speed, 1e-3) ** HERTZ
+    for mode in range(n):
+        turns = math.sqrt(table[drum + of.DRUM_HEADER + mode]) * contact_s / (2 * math.pi)
+        pulse = 0.5
+        if turns < 1e-6:
+            pulse = 1.0
+        elif abs(turns - 1) > 1e-6:
+            pulse = math.sin(math.pi * turns) / (math.pi * turns * (1 - turns * turns))
+        out[mode] = struck[mode] * pulse
+        energy += 0.5 * table[drum + of.DRUM_MASS_KG] * out[mode] ** 2
+    impulse = speed / (energy + 0.5 / table[drum + of.DRUM_MALLET_KG])
+    for mode in range(n):
+        out[mode] *= impulse
+
+
+@njit(**COMPILED)
+def _struck(table: np.ndarray, drum: int, modes: int) -> np.ndarray:
+    """The speeds that 1 N s gives at the drum's own place."""
+    return table[drum + of.DRUM_HEADER + 4 * modes : drum + of.DRUM_HEADER + 5 * modes]
+
+
+@njit(**COMPILED)
+def gain_of(player: np.ndarray, table: np.ndarray, tables: np.ndarray, key: int, drum: int) -> float:
+    """The factor that makes a key as loud as others, and lets it peak no higher than the highest of them may."""
+    slot = of.PLAYER_GAINS + key * of.GAINS
+    if player[slot] == 0.0:
+        n, rows, first = tables[drum + of.DRUM_MODES], drum + of.DRUM_HEADER, of.PLAYER_SOUND
+        sound = player[first : first + of.SOUND_ROWS * n]
+        speeds = sound[of.SOUND_X * n : (of.SOUND_X + 1) * n]
+        speed = _speed(table, drum, (of.REFERENCE_VELOCITY - 1) / 126)
+        _blow(table, tables, drum, _struck(table, drum, n), speed, speeds)
+        stereo = tables[of.TABLE_POINTS] == 2
+        for mode in range(n):
+            omega = math.sqrt(table[rows + mode])
+            sound[of.SOUND_OMEGA * n + mode] = omega
+            sound[of.SOUND_SIGMA * n + mode] = table[rows + n + mode]
+            sound[of.SOUND_LEFT * n + mode] = table[rows + 5 * n + mode] * speeds[mode] / omega
+            right = table[rows + 6 * n + mode] * speeds[mode] / omega if stereo else 0.0
+            sound[of.SOUND_RIGHT * n + mode] = right
+        curves = tables[of.TABLE_BODY]
+        body = table[curves : curves + of.BODY_SLOTS]
+        mix = player[of.PLAYER_VALUES + of.BODY_MIX] if curves != 0 else 0.0
+        found = loudness.gain(sound, n, tables[of.TABLE_POINTS], body, mix)
+        found *= loudness.limit(found * loudness.peak(sound, n, True, body, mix, 0.0))
+        player[slot] = found * table[of.TABLE_LEVEL]
+    return player[slot]
+
+
 @njit(**COMPILED)
 def strike(
     player: np.ndarray,
@@ -36,22 +98,19 @@ def strike(
     event: int,
     first_voice: int,
     stride: int,
-) -> bool:
-    """Makes the voices of a note in the player's memory and names them in its event; False: there is no such drum."""
+) -> float:
+    """Makes the voices of a note in the player's memory and names them in its event; their gain, 0: no drum."""
     key, velocity = players[event + of.EVENT_KEY], player[event + of.EVENT_VALUE]
     drum = block_of(tables, key)
-    gain = abs(table[of.TABLE_GAINS + key * of.GAINS])
-    if drum == 0 or not gain >= 0.0 or tables[drum + of.DRUM_MODES] > players[of.PLAYER_MODES]:
-        return False
-    if gain == 0.0:
-        gain = 1.0
+    if drum == 0 or tables[drum + of.DRUM_MODES] > players[of.PLAYER_MODES]:
+        return 0.0
+    gain = gain_of(player, table, tables, key, drum)
     modes, elsewhere = tables[drum + of.DRUM_MODES], players[event + of.EVENT_STRUCK]
-    struck = table[drum + of.DRUM_HEADER + 4 * modes : drum + of.DRUM_HEADER + 5 * modes]
+    struck = _struck(table, drum, modes)
     if elsewhere != 0 and players[event + of.EVENT_STRUCK_MODES] == modes:
         struck = carray(pointer(elsewhere), (1 << 40,), np.float64)[:modes]
-    curve, soft = player[of.PLAYER_VALUES + of.CURVE], table[drum + of.DRUM_SOFTEST_M_S]
-    share = min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve)
-    speed = soft * (table[drum + of.DRUM_HARDEST_M_S] / soft) ** share
+    curve = player[of.PLAYER_VALUES + of.CURVE]
+    speed = _speed(table, drum, min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve))
     for source in range(tables[of.TABLE_SOURCES]):
         slot = first_voice + source * stride
         address = players[of.PLAYER_HERE] + 8 * slot
@@ -61,7 +120,7 @@ def strike(
         voice.view(np.int64)[at.PROGRAM] = tables[of.TABLE_PROGRAMS + source]
         voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
         players[event + of.EVENT_VOICES + source] = address
-    return True
+    return gain
 
 
 @njit(**COMPILED)
@@ -89,21 +148,9 @@ def _make(
     for slot in range(4 * n):
         voice[place + slot] = table[rows + slot]
     weigh(player, table, tables, voice, 0, drum)
-    contact_s = table[drum + of.DRUM_CONTACT_S] * max(speed, 1e-3) ** HERTZ
-    first, widest, loudest, energy = at.state(n), 0.0, 0.0, 0.0
+    first, widest, loudest = at.state(n), 0.0, 0.0
+    _blow(table, tables, drum, struck, speed, voice[first + n : first + 2 * n])
     for mode in range(n):
-        omega = math.sqrt(table[rows + mode])
-        turns = omega * contact_s / (2 * math.pi)
-        pulse = 0.5
-        if turns < 1e-6:
-            pulse = 1.0
-        elif abs(turns - 1) > 1e-6:
-            pulse = math.sin(math.pi * turns) / (math.pi * turns * (1 - turns * turns))
-        voice[first + n + mode] = struck[mode] * pulse
-        energy += 0.5 * table[drum + of.DRUM_MASS_KG] * voice[first + n + mode] ** 2
-    impulse = speed / (energy + 0.5 / table[drum + of.DRUM_MALLET_KG])
-    for mode in range(n):
-        voice[first + n + mode] *= impulse
         moved, omega = voice[first + n + mode], math.sqrt(table[rows + mode])
         widest += abs(moved) / omega
         heard = 0.0
@@ -134,12 +181,10 @@ def hear(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.
     drum = block_of(tables, players[note + of.NOTE_KEY])
     if drum == 0:
         return
-    gain = abs(table[of.TABLE_GAINS + players[note + of.NOTE_KEY] * of.GAINS])
-    if not gain > 0.0:
-        gain = 1.0
+    gain, points = player[note + of.NOTE_GAIN], of.PLAYER_VALUES + of.POINT
     moved = False
     for point in range(2):
-        moved = moved or player[note + of.NOTE_POINT + point] != table[of.TABLE_POINT + point]
+        moved = moved or player[note + of.NOTE_POINT + point] != player[points + point]
     moved = moved and players[note + of.NOTE_POINTS] == tables[of.TABLE_POINTS]
     for source in range(tables[of.TABLE_SOURCES]):
         address = players[note + of.NOTE_VOICES + source]
@@ -155,7 +200,7 @@ def hear(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.
     if not moved:
         return
     for point in range(2):
-        player[note + of.NOTE_POINT + point] = table[of.TABLE_POINT + point]
+        player[note + of.NOTE_POINT + point] = player[points + point]
     for source in range(tables[of.TABLE_SOURCES]):
         address = players[note + of.NOTE_VOICES + source]
         if address != 0:

@@ -34,7 +34,7 @@ import math
 import numpy as np
 from numba import carray, njit
 
-from engine.kernels import contact, drums, recorded, strings
+from engine.kernels import contact, drums, loudness, recorded, strings
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
@@ -42,6 +42,7 @@ from engine.kernels.memory import fence, pointer
 from engine.kernels.modes import TOO_HIGH
 from engine.pluck import (
     FULL_SCALE_M,
+    FULL_SCALE_M_S,
     FULL_SCALE_N,
     LARGEST_AMPLITUDE_MM,
     LEAST_PEAK_M,
@@ -477,6 +478,14 @@ def _round(player: np.ndarray, table: np.ndarray, grid: int, position: float, pe
 
 
 @njit(**COMPILED)
+def _weight(own: np.ndarray, partial: int, place: float) -> float:
+    """What an amplitude of 1 m of a partial is at a listening point, re full scale."""
+    if place == of.BRIDGE:
+        return strings.bridge_force(own, partial) / FULL_SCALE_N
+    return math.sin(math.pi * partial * place) / FULL_SCALE_M
+
+
+@njit(**COMPILED)
 def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: int, note: int) -> None:
     """Sets one of the two sets of weights of a voice for the points of its note; modes too high are not heard."""
     n, solo, pairs = players[note + of.NOTE_MODES], players[note + of.NOTE_SOLO], players[note + of.NOTE_PAIRS]
@@ -488,11 +497,7 @@ def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: in
         omega = math.sqrt(max(strings.omega_squared(own, partial) - sigma * sigma, 0.0))
         for point in range(players[note + of.NOTE_POINTS]):
             first = at.weights(n, which, point, 0) + mode
-            place = player[note + of.NOTE_POINT + point]
-            if place == of.BRIDGE:
-                weight = strings.bridge_force(own, partial) / FULL_SCALE_N
-            else:
-                weight = math.sin(math.pi * partial * place) / FULL_SCALE_M
+            weight = _weight(own, partial, player[note + of.NOTE_POINT + point])
             heard = omega <= highest and (solo == 0 or solo == partial)
             voice[first] = part * weight if heard else 0.0
             voice[first + n] = 0.0
@@ -618,6 +623,132 @@ def _make_voice(
         for mode in range(n):
             largest += abs(player[of.PLAYER_AMPLITUDES + mode] * voice[at.weights(n, 0, 0, 0) + mode])
         voice[at.LIMIT] = max(voice[at.LIMIT], RUNAWAY_FACTOR * largest)
+
+
+# How loud a key is
+
+
+@njit(**COMPILED)
+def _forget_gains(player: np.ndarray) -> None:
+    """Gains of keys are computed again, each with the next note of its key."""
+    player[of.PLAYER_LIMIT] = 0.0
+    for slot in range(of.KEYS * of.GAINS):
+        player[of.PLAYER_GAINS + slot] = 0.0
+
+
+@njit(**COMPILED)
+def _reference_share(player: np.ndarray) -> float:
+    """The share of the velocities at which keys are equally loud."""
+    return ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0 ** -player[of.PLAYER_VALUES + of.CURVE])
+
+
+@njit(**COMPILED)
+def _sound(
+    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, key: int, string: int
+) -> int:
+    """Fills the sound of a key at the reference velocity, see `loudness`; how many modes it has, 0: it is silent.
+
+    The modulation wheel and the mute do not count: what they change is heard as louder or softer.
+    """
+    own, values, first = _moment(player, 2), of.PLAYER_VALUES, of.PLAYER_SOUND
+    pitch_hz = _pitch_hz(table, tables, key, 0.0)
+    if not pitch_hz > 0.0:
+        return 0
+    partials, shortened = string_of(player, players, table, tables, key, string, pitch_hz, False, own)
+    if partials < 1 or strings.overdamped(own, partials):
+        return 0
+    share, soft = _reference_share(player), player[values + of.SOFTEST_MM]
+    amplitude_mm = soft * (player[values + of.HARDEST_MM] / soft) ** share * shortened
+    for mode in range(partials):
+        pulled_m = min(amplitude_mm, LARGEST_AMPLITUDE_MM) / 1000
+        player[of.PLAYER_AMPLITUDES + mode] = pulled_m * player[of.PLAYER_REFERENCE + mode]
+    release_s = table[of.TABLE_RELEASE_S]
+    if release_s > 0.0:
+        release_s *= (table[of.TABLE_RELEASE_S + 1] / release_s) ** share
+    _release_pluck(player, own, partials, release_s)
+    modes, pairs, learned = partials, 0, tables[of.TABLE_RECORDED] != 0
+    if learned:
+        modes = recorded.modes_of(tables, partials)
+        pairs = (modes + 1) // 2
+        recorded.split(table, tables, own, modes, player[of.PLAYER_AMPLITUDES : of.PLAYER_AMPLITUDES + modes])
+    else:
+        pairs = _split(player, table, tables, partials, 0.0)
+        modes += pairs
+    decay, inside = player[values + of.DECAY], player[values + of.BRIGHTNESS_DECAY]
+    rows = player[first : first + 4 * modes]
+    strings.rows(
+        own,
+        modes,
+        pairs,
+        table[of.TABLE_DETUNING],
+        decay * table[of.TABLE_CONDUCTANCE],
+        decay * table[of.TABLE_CONDUCTANCE + 1],
+        decay * table[of.TABLE_LOSSES],
+        inside * table[of.TABLE_LOSSES + 1],
+        inside * table[of.TABLE_LOSSES + 2],
+        rows,
+    )
+    if learned:
+        recorded.correct(table, tables, own, modes, rows)
+    for mode in range(modes):
+        partial, direction = strings.partial_of(mode, pairs), strings.direction_of(mode, pairs)
+        omega = math.sqrt(rows[mode])
+        amplitude = player[of.PLAYER_AMPLITUDES + mode]
+        if pairs > 0 and not learned:
+            amplitude *= table[of.TABLE_HEARD + direction]
+        if tables[of.TABLE_VELOCITY] != 0:
+            amplitude *= omega * (FULL_SCALE_M / FULL_SCALE_M_S)
+        rows[of.SOUND_OMEGA * modes + mode] = omega
+        left, right = player[values + of.POINT], player[values + of.POINT + 1]
+        rows[of.SOUND_LEFT * modes + mode] = amplitude * _weight(own, partial, left)
+        stereo = tables[of.TABLE_POINTS] == 2
+        rows[of.SOUND_RIGHT * modes + mode] = amplitude * _weight(own, partial, right) if stereo else 0.0
+    return modes
+
+
+@njit(**COMPILED)
+def _body(player: np.ndarray, table: np.ndarray, tables: np.ndarray) -> tuple[np.ndarray, float]:
+    """The curves of the body, and how much of it is heard."""
+    slot = tables[of.TABLE_BODY]
+    return table[slot : slot + of.BODY_SLOTS], player[of.PLAYER_VALUES + of.BODY_MIX] if slot != 0 else 0.0
+
+
+@njit(**COMPILED)
+def _look_at_peaks(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray) -> None:
+    """The pluck of which keys are equally loud, and the factor that keeps all keys below the highest peak."""
+    values, share = of.PLAYER_VALUES, _reference_share(player)
+    width = player[values + of.WIDTH]
+    width *= (player[values + of.WIDTH_HARD] / width) ** share
+    partials = min(players[of.PLAYER_MODES] - of.MOST_PAIRS, of.MOST_MODES)
+    _pull(player, table, tables, partials, player[values + of.POSITION], 1.0, width)
+    for mode in range(partials):
+        player[of.PLAYER_REFERENCE + mode] = player[of.PLAYER_AMPLITUDES + mode]
+    (body, mix), highest = _body(player, table, tables), 0.0
+    for number in range(loudness.LOOKED_AT):
+        key = loudness.looked_at(tables[of.TABLE_LOW], tables[of.TABLE_HIGH], number)
+        modes = _sound(player, players, table, tables, key, -1)
+        sound = player[of.PLAYER_SOUND : of.PLAYER_SOUND + of.SOUND_ROWS * modes]
+        gain = loudness.gain(sound, modes, tables[of.TABLE_POINTS], body, mix)
+        swings = tables[of.TABLE_VELOCITY] != 0
+        highest = max(highest, gain * loudness.peak(sound, modes, swings, body, mix, highest / gain))
+    player[of.PLAYER_LIMIT] = loudness.limit(highest)
+
+
+@njit(**COMPILED)
+def _gain(
+    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, key: int, string: int
+) -> float:
+    """The factor that makes a key as loud as others on a string of a set, -1: the one that it chooses."""
+    slot = of.PLAYER_GAINS + key * of.GAINS + 1 + string
+    if player[slot] == 0.0:
+        if player[of.PLAYER_LIMIT] == 0.0:
+            _look_at_peaks(player, players, table, tables)
+        body, mix = _body(player, table, tables)
+        modes = _sound(player, players, table, tables, key, string)
+        sound = player[of.PLAYER_SOUND : of.PLAYER_SOUND + of.SOUND_ROWS * modes]
+        found = loudness.gain(sound, modes, tables[of.TABLE_POINTS], body, mix)
+        player[slot] = found * player[of.PLAYER_LIMIT] * table[of.TABLE_LEVEL]
+    return player[slot]
 
 
 @njit(inline="always", **COMPILED)
@@ -929,15 +1060,13 @@ def _note_on(
     pairs, strength, stroke, touched = 0, 1.0, 0, 0
     if not prepared:
         pitch_hz = _pitch_hz(table, tables, key, player[event + of.EVENT_PITCH_HZ])
-        gain = abs(table[of.TABLE_GAINS + key * of.GAINS + 1 + string])
         shortened = 1.0
-        if pitch_hz > 0.0 and gain >= 0.0:
+        if pitch_hz > 0.0:
             modes, shortened = string_of(player, players, table, tables, key, string, pitch_hz, False, own)
         if modes < 1 or strings.overdamped(own, modes):
             _refuse(player, players, event)
             return
-        if gain == 0.0:
-            gain = 1.0
+        gain = _gain(player, players, table, tables, key, string)
         curve, soft = (
             _value(player, players, table, tables, of.CURVE),
             _value(player, players, table, tables, of.SOFTEST_MM),
@@ -1025,7 +1154,7 @@ def _note_on(
     players[note + of.NOTE_POINTS] = tables[of.TABLE_POINTS]
     players[note + of.NOTE_SOLO] = tables[of.TABLE_SOLO]
     for point in range(2):
-        player[note + of.NOTE_POINT + point] = table[of.TABLE_POINT + point]
+        player[note + of.NOTE_POINT + point] = player[of.PLAYER_VALUES + of.POINT + point]
     for source in range(of.MOST_SOURCES):
         address = players[event + of.EVENT_VOICES + source]
         if not prepared and source < tables[of.TABLE_SOURCES]:
@@ -1584,6 +1713,7 @@ def _take_table(player: np.ndarray, players: np.ndarray, address: int, frame: in
     for which in range(of.VALUES):
         player[of.PLAYER_VALUES + which] = table[of.TABLE_VALUES + which]
     players[of.PLAYER_TABLE] = address
+    _forget_gains(player)
     if before != 0 and _whole(before)[of.TABLE_INSTRUMENT] != tables[of.TABLE_INSTRUMENT]:
         players[of.PLAYER_WHEEL] = 0
         for each in range(of.CHANNELS):
@@ -1656,9 +1786,13 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
             number = _free_note(player, players, mixers)
             first = _slots_of_voice(players, number, 0)
             stride = _slots_of_voice(players, number, 1) - first
-            if not drums.strike(player, players, table, tables, event, first, stride):
+            gain = drums.strike(player, players, table, tables, event, first, stride)
+            if gain == 0.0:
                 _refuse(player, players, event)
                 return
+            _note_on(player, players, table, tables, mixers, event)
+            player[_note(number) + of.NOTE_GAIN] = gain
+            return
         _note_on(player, players, table, tables, mixers, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
         if _waits(players, event, now):
@@ -1672,6 +1806,8 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
         _controller(player, players, table, tables, channel, key, int(value), frame, now)
     elif kind == of.PARAMETER and key < of.VALUES:
         player[of.PLAYER_VALUES + key] = value
+        if key <= of.CURVE or key >= of.BODY_MIX:
+            _forget_gains(player)
         _glide(player, players, table, tables, -1, KNOB_S, frame, now)
 
 
@@ -1718,10 +1854,10 @@ def _hear(player: np.ndarray, players: np.ndarray) -> None:
 @njit(**COMPILED)
 def _listen(player: np.ndarray, players: np.ndarray, note: int) -> None:
     """Lets a note be heard at the instrument's points, unless they are others in number, or of another pick-up."""
-    table, tables = _at(players[of.PLAYER_TABLE]), _whole(players[of.PLAYER_TABLE])
+    tables = _whole(players[of.PLAYER_TABLE])
     moved = players[note + of.NOTE_SOLO] != tables[of.TABLE_SOLO]
     for point in range(2):
-        moved = moved or player[note + of.NOTE_POINT + point] != table[of.TABLE_POINT + point]
+        moved = moved or player[note + of.NOTE_POINT + point] != player[of.PLAYER_VALUES + of.POINT + point]
     if not moved or players[note + of.NOTE_POINTS] != tables[of.TABLE_POINTS]:
         return
     for source in range(of.MOST_SOURCES):
@@ -1732,7 +1868,7 @@ def _listen(player: np.ndarray, players: np.ndarray, note: int) -> None:
                 return
     players[note + of.NOTE_SOLO] = tables[of.TABLE_SOLO]
     for point in range(2):
-        player[note + of.NOTE_POINT + point] = table[of.TABLE_POINT + point]
+        player[note + of.NOTE_POINT + point] = player[of.PLAYER_VALUES + of.POINT + point]
     for source in range(of.MOST_SOURCES):
         address = players[note + of.NOTE_VOICES + source]
         if address != 0:

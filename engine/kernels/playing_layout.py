@@ -30,9 +30,15 @@ HARMONIC = KNOBS + 11  # which partial is the lowest that a touch leaves; 1: the
 STRUM_MS = KNOBS + 12  # from one string of a chord to the next; 0: all at once
 STROKES = KNOBS + 13  # of strums: one of the three below
 TREMOLO_HZ = KNOBS + 14  # strokes of a key that is held; 0: one
-VALUES = KNOBS + 15
+BODY_MIX = KNOBS + 15  # as far as keys are as loud through it
+POINT = KNOBS + 16  # two: listening points
+VALUES = KNOBS + 18
 DOWN, UP, ALTERNATE = range(3)
 REFERENCE_VELOCITY = 100  # at which keys are equally loud, and levels of noise hold
+# The level of such a note over its first part. Six of the classical guitar, strummed, peak at -9 dBFS
+WANTED_DB, PART_S = -29.0, 0.4  # a loudness meter's block
+HIGHEST_PEAK_DB = WANTED_DB + 15.0  # of such a note of any key
+GAIN_RANGE_DB = (WANTED_DB - 6.0, WANTED_DB + 66.0)
 
 # Kinds of events
 NOTE_ON, NOTE_OFF, BEND, CONTROLLER, TUNE, PARAMETER, TABLE, CANCEL, STOP, CHOKE = range(10)
@@ -76,7 +82,8 @@ TABLE_STOPS = 7  # W whether a pluck stops its string, or is added to its motion
 TABLE_LET_RING = 8  # W
 TABLE_BEND_BY = 9  # W
 TABLE_POINTS = 10  # W listening points, 1 or 2
-TABLE_POINT = 11  # R two
+TABLE_LEVEL = 11  # R of the whole instrument, a factor
+TABLE_BODY = 12  # W slot of the body's curves; 0: it has none
 TABLE_VELOCITY = 13  # W whether the pick-up senses velocity
 TABLE_SOLO = 14  # W the mode that alone is heard; 0: all are
 TABLE_WHEEL = 15  # W which of the values the modulation wheel turns; -1: none
@@ -106,8 +113,7 @@ PULSE_S, PULSE_SHARE, BURST_HZ, BURST_Q, ATTACK_S, FALL_S, FOLLOWS = range(7)
 CONTACT = 8
 TABLE_VALUES = TABLE_CONTACTS + 2 * CONTACT  # R
 TABLE_PITCHES = TABLE_VALUES + VALUES  # R of keys in Hz; 0: silent
-TABLE_GAINS = TABLE_PITCHES + KEYS  # R (KEYS, GAINS); below 0: a guess; 0: none is known; not a number: impossible
-TABLE_OPEN = TABLE_GAINS + KEYS * GAINS  # R (strings, OPEN_SLOTS), the highest string first
+TABLE_OPEN = TABLE_PITCHES + KEYS  # R (strings, OPEN_SLOTS), the highest string first
 OPEN_NOTE = 0  # R key of the whole string
 OPEN_HZ = 1  # R its pitch
 OPEN_STRING = 2  # R
@@ -125,6 +131,19 @@ DRUM_MASS_KG = 5  # R of each mode
 DRUM_HEADER = 8
 DRUM_ROWS = 7
 MOST_DRUM_MODES = 1_600
+
+# Slots of a body's curves; then three rows (BODY_POINTS,): of its gain at frequencies, 2^(1/BODY_STEPS) apart
+BODY_CROSS = 0  # R what noise through it has in common with that noise
+BODY_STEP = 1  # R the highest sample that a step of 1 becomes
+BODY_HEADER = 2
+BODY_REAL, BODY_IMAGINARY, BODY_POWER = range(3)  # the mean of the channels; of the squares
+BODY_LOWEST_HZ, BODY_STEPS = 16.0, 96  # steps an octave: the third of a half-width of a resonance of Q 50
+BODY_POINTS = 992
+BODY_SLOTS = BODY_HEADER + 3 * BODY_POINTS
+
+# Rows (modes,) of a sound, see `loudness`
+SOUND_OMEGA, SOUND_SIGMA, SOUND_LEFT, SOUND_RIGHT, SOUND_X, SOUND_Y, SOUND_COSINE, SOUND_SINE = range(8)
+SOUND_ROWS = 8
 
 # Slots of what a recording adds to strings: the fields of `RecordedString`, of which five are of each partial
 RECORDED_HZ = 0  # R pitch of the recorded note
@@ -287,7 +306,11 @@ NOISE_SLOTS = 19
 PLAYER_NOISE_GAIN = PLAYER_SYMPATHY + 7 * MOST_SYMPATHETIC  # R at the end of the quantum before
 PLAYER_NOISES = PLAYER_NOISE_GAIN + 1
 PLAYER_AGAIN = PLAYER_NOISES + MOST_NOISES * NOISE_SLOTS  # W the event of a tremolo's stroke, for a moment
-PLAYER_VOICES = PLAYER_AGAIN + EVENT_SLOTS
+PLAYER_LIMIT = PLAYER_AGAIN + EVENT_SLOTS  # R of all gains, for peaks; 0: not computed yet
+PLAYER_GAINS = PLAYER_LIMIT + 1  # R (KEYS, GAINS) of keys; 0: not computed since a value changed
+PLAYER_REFERENCE = PLAYER_GAINS + KEYS * GAINS  # R (MOST_MODES,) partials of the pluck that is as loud for all keys
+PLAYER_SOUND = PLAYER_REFERENCE + MOST_MODES  # R of a key, for a moment
+PLAYER_VOICES = PLAYER_SOUND + SOUND_ROWS * MOST_DRUM_MODES
 BLOCKS = 4  # of modes that a voice is to have
 
 

@@ -70,6 +70,7 @@ def voices() -> None:
     Mixer(RATE_HZ).set_effects(Effects(room=Room()))
     CompiledPlayer(RATE_HZ, INFO.modes).catch_up(Mixer(RATE_HZ))
     _string()
+    _loudness()
 
 
 def models() -> None:
@@ -102,6 +103,17 @@ def _string() -> None:
     for change in (strings.fretted, strings.bent, strings.slid, strings.damped):
         change(string, 1.5)
     strings.pitch_hz(string)
+
+
+def _loudness() -> None:
+    """How loud a sound of one mode is."""
+    from engine.kernels import loudness, playing_layout
+
+    sound, no_body = np.ones(playing_layout.SOUND_ROWS), np.zeros(0)
+    no_body.setflags(write=False)  # as curves are
+    loudness.gain(sound, 1, 1, no_body, 0.0)
+    loudness.limit(loudness.peak(sound, 1, False, no_body, 0.0, 0.0))
+    loudness.looked_at(0, 1, 0)
 
 
 def _bank(sizes: dict[str, Any]) -> Program:

@@ -15,9 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.export.plugin.parts import AMP, MIXES, STEPS, driven, drum_keys, levels, losses, mixed, parts_of
+from app.export.plugin.parts import AMP, MIXES, driven, drum_keys, losses, mixed, parts_of
 from app.instrument.compiled import InstrumentPlayer
-from app.instrument.table import VALUES, wheel_goal
+from app.instrument.drum_keys import DrumKeys
+from app.instrument.loud_keys import LoudKeys
+from app.instrument.table import VALUES, WHEELED, wheel_goal
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
@@ -40,7 +42,7 @@ MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
 LARGEST_WHOLE = 2**31 - 1
 NOISE_BYTES = 8  # of a frame
 NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
-SOURCE, VOLUME, VALUE, POINT, MACRO, MIX, AMPLIFIER = range(7)  # kinds of the shell's parameters
+SOURCE, VOLUME, VALUE, MACRO, MIX, AMPLIFIER = range(6)  # kinds of the shell's parameters
 SOURCE_ID = "source"
 SOURCES = ("model", "truth", "difference")
 OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "pluck.curve", "damping.release_t60_s")  # that drums follow
@@ -108,8 +110,6 @@ class _Header(ctypes.Structure):
         *(
             (name, ctypes.c_int64)
             for name in (
-                "levels",
-                "level_steps",
                 "losses",
                 "wheel_mix",
                 "modes",
@@ -164,22 +164,17 @@ class Image:
         return len(self.content) + self.noise_frames * NOISE_BYTES
 
 
-def image_of(patch: Patch, preset: Preset, levelled: bool = True) -> Image:
+def image_of(patch: Patch, preset: Preset) -> Image:
     """The image of an instrument.
-
-    Args:
-        levelled: whether keys stay as loud while macros move, for which levels are computed for a second or two.
 
     Raises:
         ValueError: its model learned one string only, its tuning is impossible, or no key sounds.
     """
     drums = isinstance(patch.strings, Drums)
     player = InstrumentPlayer(patch, preset, PREPARED_HZ, {"model": 1.0, "truth": 1.0})
-    player.prepare()
     table = player.table
     assert table is not None
-    gains = table.memory[of.TABLE_GAINS : of.TABLE_GAINS + of.KEYS * of.GAINS]
-    if not (gains > 0).any():
+    if not any(_sounds(player.keys, key) for key in range(of.KEYS)):
         raise ValueError(f"{patch.name}: no key sounds with {preset.path}; choose another pick-up")
     header = _Header(magic=b"LSPLUGIN", version=1, modes=min(of.MOST_MODES, player.grid_points - 2) + of.MOST_PAIRS)
     struck = dict(drum_keys(patch)) if drums else {}
@@ -208,8 +203,6 @@ def image_of(patch: Patch, preset: Preset, levelled: bool = True) -> Image:
     ids = tuple(id for id, _ in parameters)
     macros, left_out = _macros(patch, ids)
     header.macros, header.macro_count = put(b"".join(bytes(each) for each in macros)), len(macros)
-    heights = levels(patch, preset.info) if levelled else np.zeros((len(patch.macros), STEPS, of.KEYS))
-    header.levels, header.level_steps = put(heights.tobytes()) // 8, STEPS
     header.wheel_mix = MIXES.index(patch.mod_wheel) if patch.mod_wheel in MIXES else -1
     header.wheel_goal = wheel_goal(patch) or 0.0
     header.level = 10 ** (patch.level_db / 20)
@@ -242,6 +235,14 @@ def image_of(patch: Patch, preset: Preset, levelled: bool = True) -> Image:
         for id, each in parameters
     )
     return Image(id, patch.name, bytes(whole), tuple(controls), left_out, round(parts.room_t60_s * room.RATE_HZ))
+
+
+def _sounds(keys: LoudKeys | DrumKeys, key: int) -> bool:
+    try:
+        found = keys.of_key(key) if isinstance(keys, DrumKeys) else keys.string_of(key)
+    except ValueError:
+        return False
+    return found is not None
 
 
 def _bytes(text: str, most: int) -> bytes:
@@ -286,20 +287,18 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     )
     yield _record("volume_db", VOLUME, 0, 0.0, OF_CHOICES["volume_db"], "")
     drums = isinstance(patch.strings, Drums)
-    for index, id in enumerate(VALUES):
+    fixed = drums or patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
+    points = () if fixed else VALUES[of.POINT :][: len(patch.pickup.points)]
+    for id in (*WHEELED, *points):
         if id in (OF_DRUMS if drums else OF_PATCHES):
-            yield _record(id, VALUE, index, patch.value(id), OF_PATCHES[id], OF_PATCHES[id].group.capitalize())
+            parameter = OF_PATCHES[id]
+            yield _record(id, VALUE, VALUES.index(id), patch.value(id), parameter, parameter.group.capitalize())
     for id in mixed(patch):
         parameter = OF_PATCHES[id]
         yield _record(id, MIX, MIXES.index(id), patch.value(id), parameter, parameter.group.capitalize())
     for id in driven(patch):
         parameter = OF_PATCHES[id]
         yield _record(id, AMPLIFIER, AMP.index(id), patch.value(id), parameter, "Amplifier", parameter.name)
-    fixed = drums or patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
-    points = () if fixed else patch.pickup.points
-    for index, point in enumerate(points):
-        id = f"pickup.points.{index}"
-        yield _record(id, POINT, index, point, OF_PATCHES[id], OF_PATCHES[id].group.capitalize())
 
 
 def _macros(patch: Patch, ids: tuple[str, ...]) -> tuple[list[_Macro], tuple[str, ...]]:
@@ -325,12 +324,12 @@ def layout_header(version: str) -> str:
         "C_ACTIVE C_STEP C_COSINES C_SINES C_WORK C_LATE S_RATE T_RATE",
         of: "NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CANCEL CHOKE ANY EVENT_FRAME EVENT_KIND "
         "EVENT_CHANNEL EVENT_KEY EVENT_VALUE EVENT_ID EVENT_POSITION EVENT_PITCH_HZ EVENT_TABLE EVENT_SLOTS "
-        "EVENTS REPORTS MOST_NOTES MOST_SOURCES TABLE_MODE TABLE_POINT TABLE_SOURCES TABLE_PROGRAMS MPE KEYS "
+        "EVENTS REPORTS MOST_NOTES MOST_SOURCES TABLE_MODE TABLE_SOURCES TABLE_PROGRAMS MPE KEYS "
         "CHANNELS CHANNEL_SLOTS CHANNEL_RANGE BEND_SEMITONES PLAYER_MOST PLAYER_MODES PLAYER_PUSHED "
         "PLAYER_TAKEN PLAYER_QUEUED PLAYER_REPORTED PLAYER_RATE PLAYER_SOURCE_GAINS PLAYER_VALUES "
         "PLAYER_CHANNELS PLAYER_EVENTS PLAYER_REPORTS PLAYER_VOICES BEGAN REPORT_KIND REPORT_ID "
-        "REPORT_CHANNEL REPORT_KEY REPORT_SLOTS TABLE_GAINS GAINS TABLE_LOW TABLE_HIGH PLAYER_WHEEL "
-        "TABLE_DRUMS TABLE_VALUES DRUM_MODES DRUM_HEADER DECAY BRIGHTNESS_DECAY",
+        "REPORT_CHANNEL REPORT_KEY REPORT_SLOTS PLAYER_WHEEL "
+        "TABLE_DRUMS TABLE_VALUES DRUM_MODES DRUM_HEADER DECAY BRIGHTNESS_DECAY BODY_MIX",
     }
     lines = [f'#define LS_VERSION "{version}"']
     for module, names in wanted.items():

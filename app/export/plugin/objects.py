@@ -25,7 +25,7 @@ PREFIX = "ls_"
 WAIT_S = 0.1
 # What the code may ask of the shell and of the C library; all else would be a reference to Python.
 _LIBRARY = """
-cos sin sincos sincosf exp exp2 log log10 log1p log2 pow ceil floor rint round sqrt fmod tan atan atan2
+cos sin sincos sincosf exp exp2 expm1 log log10 log1p log2 pow ceil floor rint round sqrt fmod tan atan atan2
 memcpy memset memmove bzero __sincos_stret __exp10 numba_attempt_nocopy_reshape
 """
 _ERROR_PATHS = """

@@ -1,32 +1,23 @@
-"""What macros change of a sound beyond its strings: the mix of body and room, and the level of each key."""
+"""What macros change of a sound beyond its strings: the mix of body and room, and the decay of drums."""
 
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKey, DrumKeys
 from app.instrument.effects import effects_of
-from app.instrument.loud_keys import LoudKeys
-from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.effects import BODIES
 from engine.effects.body import HIGHEST_HZ, SUBSONIC, modes_of
-from engine.kernels.playing_layout import KEYS
-from engine.presets import PresetInfo
 from engine.voices import Ear
 
 MIXES = ("body.mix", "room.mix")
 AMP = ("amp.drive_db", "amp.tone_db")
-STEPS = 17  # positions of a macro at which levels are known
-SPARSE = 4  # every so many of them are computed; those between, where levels bend
-NEAR_DB = 0.05  # off a straight line: less is no bend
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,41 +80,9 @@ def parts_of(patch: Patch) -> Parts:
     return replace(found, modes=modes, body_s=wood.seconds * body.size, subsonic_hz=subsonic_hz)
 
 
-def levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float64]:
-    """How levels of keys change as each macro moves alone, in dB: (macros, STEPS, KEYS)."""
-    found, now = np.zeros((len(patch.macros), STEPS, KEYS)), _levels(patch, preset)
-    for number, macro in enumerate(patch.macros):
-        if all(target.field.startswith(("room.", "noise.")) for target in macro.targets):
-            continue  # no level depends on the room or on noise
-
-        def level(step: int, number: int = number) -> NDArray[np.float64]:
-            return _levels(patch.turned(number, step / (STEPS - 1)), preset) - now
-
-        coarse = np.stack([level(step) for step in range(0, STEPS, SPARSE)])
-        bends = np.abs(np.diff(coarse, 2, axis=0)).max(1) / 8  # half-way, as of a parabola
-        for part, (left, right) in enumerate(pairwise(coarse)):
-            first = part * SPARSE
-            bent = max(bends[max(part - 1, 0) : part + 1]) > NEAR_DB
-            for step in range(first, first + SPARSE):
-                share = (step - first) / SPARSE
-                found[number, step] = level(step) if bent and step > first else left + share * (right - left)
-        found[number, -1] = coarse[-1]
-    return found
-
-
-def _levels(patch: Patch, preset: PresetInfo) -> NDArray[np.float64]:
-    """Of all keys, in dB; of silent ones, that of their neighbours."""
-    if isinstance(patch.strings, Drums):
-        known = {key: 20 * math.log10(found.gain) for key, found in drum_keys(patch)}
-    else:
-        known = dict(_known(LoudKeys(patch, _ear(patch), preset), patch))
-    keys = sorted(known) or [0]
-    return np.interp(np.arange(KEYS), keys, [known.get(key, 0.0) for key in keys])
-
-
 def drum_keys(patch: Patch) -> Iterator[tuple[int, DrumKey]]:
     """The drums of an instrument by their keys, as far as they are possible."""
-    drums = DrumKeys(patch, _ear(patch))
+    drums = DrumKeys(patch, Ear(tuple(patch.pickup.points), patch.pickup.kind))
     low, high = patch.range
     for key in range(low, high + 1):
         with contextlib.suppress(ValueError):
@@ -139,15 +98,3 @@ def losses(patch: Patch, key: DrumKey) -> NDArray[np.float64]:
         key.modes.damped(drum.damping_d1_kg_m2_s, drum.damping_d3_kg_s * (1 + 1 / knobs.brightness_decay)),
     )
     return np.stack([each.sigma - key.modes.sigma for each in added])
-
-
-def _ear(patch: Patch) -> Ear:
-    return Ear(tuple(patch.pickup.points), patch.pickup.kind)
-
-
-def _known(loud: LoudKeys, patch: Patch) -> Iterator[tuple[int, float]]:
-    low, high = patch.range
-    for key in range(low, high + 1):
-        with contextlib.suppress(ValueError):  # it has no possible string
-            if (found := loud.of_key(key)) is not None:
-                yield key, 20 * math.log10(found.gain)

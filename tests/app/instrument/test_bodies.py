@@ -17,7 +17,7 @@ from app.instrument.bodies import (
     own_bodies,
     own_impulse,
 )
-from app.instrument.effects import body_problem, body_response, effects_of
+from app.instrument.effects import body_curves, body_problem, effects_of
 from app.instrument.offline import render_note
 from app.patches.patch import Body, Patch
 from engine.effects import BODIES
@@ -120,7 +120,7 @@ def test_one_that_is_gone_is_reported_in_a_line_and_left_out(patch: Patch, prese
     problem = body_problem(wooden)
     assert problem.startswith("test is played without its body: the body late is not here")
     assert problem.isprintable()
-    assert effects_of(wooden) is None and body_response(wooden) is None
+    assert effects_of(wooden) is None and body_curves(wooden) is None
     dry, left_out = (render_note(each, preset, 57, 90, 1.0, 0.05, RATE_HZ) for each in (patch, wooden))
     np.testing.assert_array_equal(left_out, dry)
     assert body_problem(on(patch, name, mix=0.0)) == ""  # it would not be heard

@@ -29,11 +29,11 @@ from app.instrument.events import (
     NoteOn,
     release_all,
 )
+from app.instrument.loud_keys import LoudKeys
 from app.instrument.strings import pitch_hz_of
 from app.patches.patch import Knobs, OpenString, Patch, StringSet
 from engine.kernels.player import WIDEST_SEMITONES
-from engine.kernels.playing_layout import BEGAN, GAINS, TABLE_GAINS
-from engine.kernels.playing_layout import KEYS as KEY_COUNT
+from engine.kernels.playing_layout import BEGAN
 from engine.presets import Preset
 from engine.voices import Mixer
 from engine.voices.player import Report
@@ -264,13 +264,12 @@ def test_with_its_input_at_rest_a_guitar_is_forgotten(strung: Patch, preset: Pre
     assert {72, 76} <= set(hand.sounding)
 
 
-def test_what_a_guitar_may_fret_is_prepared(strung: Patch, preset: Preset) -> None:
-    hand = Hand(strung, preset)
-    hand.player.prepare([64])
-    table = hand.player.table
-    assert table is not None
-    gains = table.memory[TABLE_GAINS : TABLE_GAINS + KEY_COUNT * GAINS].reshape(KEY_COUNT, GAINS)
-    before = gains.copy()
-    assert (before[64][: 1 + len(OPEN)] > 0).all() and not (before[63] > 0).any()
-    hand.play(NoteOn(64, 90, KEYS), *(NoteOn(64, 90, channel) for channel in (B, G, LOW_E, HIGH_E)))
-    np.testing.assert_array_equal(gains, before)
+def test_a_key_is_as_loud_on_every_string_of_a_guitar(strung: Patch, preset: Preset) -> None:
+    hand, channels = Hand(strung, preset), (B, G, LOW_E, HIGH_E)
+    hand.play(NoteOn(64, 90, KEYS), *(NoteOn(64, 90, channel) for channel in channels))
+    keys = hand.player.keys
+    assert isinstance(keys, LoudKeys)
+    found = [keys.of_key(64, channel) for channel in channels]
+    gains = [report.gain for report in hand.reports if report.kind == BEGAN][1:]
+    np.testing.assert_allclose(gains, [each.gain for each in found if each is not None], rtol=1e-9)
+    assert len(set(np.round(gains, 9))) == len(channels)

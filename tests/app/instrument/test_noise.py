@@ -7,11 +7,11 @@ import pytest
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import KEYS, SOUND_OFF, Controller, NoteOff, NoteOn, TimedEvent
-from app.instrument.loudness import PART_S, WANTED_DB
 from app.instrument.offline import render_events
 from app.patches.patch import Damping, Noise, Patch
 from engine.contact import CONTACTS
 from engine.kernels import playing_layout as of
+from engine.kernels.playing_layout import PART_S, WANTED_DB
 from engine.presets import Preset
 from engine.voices import Mixer
 
@@ -116,7 +116,7 @@ def test_many_strokes_at_once_keep_within_the_places_of_noises(patch: Patch, pre
     for key in range(30, 30 + of.MOST_NOISES + 8):
         player.handle(NoteOn(key, 100))
     assert np.isfinite(mixer.render(4_800)).all()
-    noises = player.compiled.memory.view(np.int64)[of.PLAYER_NOISES : of.PLAYER_VOICES : of.NOISE_SLOTS]
+    noises = player.compiled.memory.view(np.int64)[of.PLAYER_NOISES : of.PLAYER_LIMIT : of.NOISE_SLOTS]
     assert np.count_nonzero(noises) <= of.MOST_NOISES
 
 

@@ -23,14 +23,15 @@ from app.instrument.events import (
     PatchTurned,
     TimedEvent,
 )
-from app.instrument.loudness import WANTED_DB, k_weight
 from app.instrument.offline import channels_played, render_events, render_note
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, PluckChoices, Room
 from engine.kernels import playing_layout as of
 from engine.kernels.layout import QUANTUM
+from engine.kernels.loudness import k_weight
 from engine.kernels.player import PLUCK_STOPS_S
+from engine.kernels.playing_layout import WANTED_DB
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters

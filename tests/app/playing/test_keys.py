@@ -13,6 +13,7 @@ import pytest
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
+from app.instrument.effects import body_curves
 from app.instrument.events import (
     KEYS,
     LEGATO,
@@ -29,7 +30,6 @@ from app.instrument.events import (
     PatchTurned,
     TimedEvent,
 )
-from app.instrument.loudness import peak_db
 from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
@@ -116,9 +116,9 @@ def test_a_key_waits_for_no_knob(played: Notes, patch: Patch, wait: Wait, monkey
     def slow(*args: Any) -> float:
         begun.set()
         held.wait(30)
-        return peak_db(*args)
+        return body_curves(*args)
 
-    monkeypatch.setattr("app.instrument.loud_keys.peak_db", slow)
+    monkeypatch.setattr("app.instrument.loud_keys.body_curves", slow)
     turned, begun_notes = patch.with_value("knobs.stiffness", 3.0), list[object]()
     knob = Thread(target=played.set_instrument, args=(turned, EAR))
     key = Thread(target=lambda: begun_notes.append(played.handle(NoteOn(52, 60))))

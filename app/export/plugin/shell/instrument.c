@@ -212,33 +212,6 @@ static slot *pushed(instrument *own, int64_t frame, int64_t kind, int32_t channe
 /* Events count a quantum late, so that each is known before the quantum that holds its frame. */
 static int64_t frame_of(const instrument *own, uint32_t at) { return own->mixer[M_FRAMES].whole + at + QUANTUM; }
 
-/* A macro's share in the level of a key: known at steps, and 0 where the macro stands in the app. */
-static double level_db(const instrument *own, int32_t number, int32_t key) {
-  const image *of = own->of;
-  const double *levels = (const double *)of + of->levels + number * of->level_steps * KEYS + key;
-  double last = (double)(of->level_steps - 1), place = own->positions[number] * last, none = own->standards[number] * last;
-  int64_t step = place < last - 1 ? (int64_t)place : of->level_steps - 2;
-  double left = (double)step, right = left + 1, left_db = levels[step * KEYS], right_db = levels[(step + 1) * KEYS];
-  if (left < none && none < right && place < none) right = none, right_db = 0;
-  else if (left < none && none < right) left = none, left_db = 0;
-  return left_db + (place - left) / (right - left) * (right_db - left_db);
-}
-
-/* Keys stay as loud as in the app while macros move: each macro's share is known, and all are added. */
-static void follow_levels(instrument *own, int32_t moved, double value) {
-  const image *of = own->of;
-  own->positions[moved] = value;
-  const slot *gains = (const slot *)of + of->table + TABLE_GAINS;
-  for (int32_t key = (int32_t)own->table[TABLE_LOW].whole; key <= own->table[TABLE_HIGH].whole && key < KEYS; key++) {
-    double change_db = 0;
-    for (int32_t each = 0; each < of->macro_count; each++)
-      change_db += level_db(own, each, key);
-    double factor = pow(10, change_db / 20);
-    for (int32_t place = key * GAINS; place < (key + 1) * GAINS; place++)
-      own->table[TABLE_GAINS + place].real = gains[place].real * factor;
-  }
-}
-
 /* Drums that are struck from now on decay as a knob says. */
 static void follow_losses(instrument *own, int64_t knob, double value) {
   const image *of = own->of;
@@ -271,8 +244,6 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
   if (of->kind == KIND_VALUE) {
     pushed(own, frame, PARAMETER, 0, of->index, value);
     if (own->of->losses && (of->index == DECAY || of->index == BRIGHTNESS_DECAY)) follow_losses(own, of->index, value);
-  } else if (of->kind == KIND_POINT) {
-    own->table[TABLE_POINT + of->index].real = value;
   } else if (of->kind == KIND_VOLUME) {
     own->mixer[M_WANTED_VOLUME].real = pow(10, value / 20);
   } else if (of->kind == KIND_SOURCE) {
@@ -283,11 +254,10 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
     follow_amp(own);
   } else if (of->kind == KIND_MIX) {
     own->mix[of->index] = value;
+    if (of->index == MIX_BODY) pushed(own, frame, PARAMETER, 0, BODY_MIX, value); /* keys stay as loud */
   } else if (of->kind == KIND_AMP) {
     own->amp[of->index] = value;
     follow_amp(own);
-  } else if (of->kind == KIND_MACRO) {
-    follow_levels(own, of->index, value);
   }
 }
 
@@ -330,7 +300,6 @@ bool instrument_begin(instrument *own, double rate_hz) {
     const parameter *each = &parameters_of(of)[place];
     if (each->kind == KIND_MIX) own->mix[each->index] = own->values[place];
     if (each->kind == KIND_AMP) own->amp[each->index] = own->values[place];
-    if (each->kind == KIND_MACRO) own->positions[each->index] = own->standards[each->index] = each->standard;
   }
   if (!begin_responses(own)) {
     instrument_end(own);

@@ -10,7 +10,7 @@
 
 typedef union { double real; int64_t whole; } slot;
 
-enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_POINT, KIND_MACRO, KIND_MIX, KIND_AMP };
+enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_MACRO, KIND_MIX, KIND_AMP };
 enum { MIX_BODY, MIX_ROOM };
 enum { AMP_DRIVE_DB, AMP_TONE_DB };
 enum { PART_BODY, PART_ROOM, PART_BOTH, MIX_PARTS };
@@ -35,7 +35,6 @@ typedef struct {
   int64_t body, body_modes;                                          /* Hz, 1/s, left, right: each of all modes */
   int64_t impulse, impulse_frames, impulse_channels;                 /* a body that is a response: 32-bit whole numbers */
   double body_s, body_subsonic_hz, impulse_hz, impulse_unit, room_t60_s; /* no time: no room */
-  int64_t levels, level_steps; /* dB: of each macro, step and key */
   int64_t losses;              /* of drums: of each key the slot of two rows, 1/s that knobs of decay add at 1; 0: strings */
   int64_t wheel_mix;           /* which mix the modulation wheel moves, -1: none */
   int64_t modes, most_notes;
@@ -58,7 +57,6 @@ typedef struct {
   double amp[2];      /* drive and tone in dB; no drive: there is no amplifier */
   double values[MOST_PARAMETERS];
   double added[2]; /* knobs of decay and of brightness decay beyond the instrument's own, which drums follow */
-  double positions[MOST_PARAMETERS], standards[MOST_PARAMETERS]; /* of macros: as levels follow them */
   change changes[MOST_CHANGES];
   int32_t waiting;
   int64_t read;       /* reports */

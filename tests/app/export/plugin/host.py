@@ -282,6 +282,16 @@ class Instance:
             found[info.name.decode()] = info
         return found
 
+    @property
+    def ids(self) -> list[int]:
+        """Of its parameters, in the plug-in's order."""
+        params, info = self.extension("clap.params", Params), ParamInfo()
+        found = []
+        for index in range(params.count(self.at)):  # type: ignore[attr-defined]
+            assert params.info(self.at, index, info)  # type: ignore[attr-defined]
+            found.append(info.id)
+        return found
+
     def value(self, id: int) -> float:
         found = c.c_double()
         assert self.extension("clap.params", Params).value(self.at, id, found)  # type: ignore[attr-defined]

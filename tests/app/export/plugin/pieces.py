@@ -31,7 +31,8 @@ NAMES = (
     "learned",  # from a recording
     "member_channels",  # MPE
 )
-MOVED, BARS = "classical_guitar", "thin_bars"  # those whose levels follow their macros
+MOVED, DRUMS = "classical_guitar", ("timpani", "thin_bars")
+TURNED = ("classical_guitar", "electric_bass", "concert_harp", "jazz_guitar", "learned", *DRUMS)  # their parameters
 LEARNED, MEMBERS = "learned", "member_channels"
 LONG = os.environ.get("LEARNED_STRINGS_FUZZ") == "long"  # by `run.py test --fuzz`
 SECONDS = 1.6

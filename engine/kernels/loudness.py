@@ -1,0 +1,166 @@
+"""How loud a key is, and how high it peaks, from its modes as they set out: a few microseconds, without Python.
+
+Measured as loudness meters do: mean square after the K-weighting of ITU-R BS.1770-5, here over the first part of the
+note. The quiet instrument's modes decay each by itself, so that the mean square is a sum over them, each through the
+body's power at its frequency. The peak is looked for in the sum of the modes over one period of the lowest, each
+through the body as in its steady state; a body that is struck by the release itself may peak higher.
+
+A sound is its modes, in rows of `playing_layout`: ω, σ, and amplitudes left and right, re full scale, with room for
+the peak. `swings`: modes set out from rest at speeds, as sines, otherwise from their amplitudes, as cosines.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from engine.kernels import playing_layout as of
+from engine.kernels.compiled import COMPILED
+
+# BS.1770: the shelf and the high-pass as analogue filters of second order
+_SHELF_HZ, _SHELF_DB, _SHELF_Q = 1681.97, 4.0, 0.7072
+_PASS_HZ, _PASS_Q = 38.135, 0.5003
+_FRAMES = (8, 256)  # of the period in which the peak is looked for
+_FRAMES_A_PERIOD = 2.5  # of the highest mode
+_TINY = 1e-30
+LOOKED_AT = 5  # keys of an instrument, whose peaks are known
+
+
+@njit(**COMPILED)
+def looked_at(low: int, high: int, number: int) -> int:
+    """One of the keys whose peaks are known: evenly over the range."""
+    return low + (2 * number * (high - low) + LOOKED_AT - 1) // (2 * (LOOKED_AT - 1))
+
+
+@njit(**COMPILED)
+def k_weight(hz: Any) -> Any:
+    """The square of the gain of K-weighting at a frequency, or at each of an array."""
+    gain, middle, squared = 10 ** (_SHELF_DB / 20), 10 ** (_SHELF_DB / 40), hz * hz
+    shelf, high_pass = _SHELF_HZ**2, _PASS_HZ**2
+    above = (shelf - gain * squared) ** 2 + (middle / _SHELF_Q) ** 2 * shelf * squared
+    below = (shelf - squared) ** 2 + shelf * squared / _SHELF_Q**2
+    return above / below * squared**2 / ((high_pass - squared) ** 2 + high_pass * squared / _PASS_Q**2)
+
+
+@njit(inline="always", **COMPILED)
+def _at(body: np.ndarray, which: int, place: float) -> float:
+    """A row of a body's curves at a place of its grid."""
+    left = int(place)
+    first = of.BODY_HEADER + which * of.BODY_POINTS + left
+    return body[first] + (place - left) * (body[first + 1] - body[first])
+
+
+@njit(inline="always", **COMPILED)
+def _place(omega: float) -> float:
+    """Of a frequency on the grid of a body's curves."""
+    place = of.BODY_STEPS * math.log2(max(omega / (2 * math.pi * of.BODY_LOWEST_HZ), 1.0))
+    return min(place, of.BODY_POINTS - 1.001)
+
+
+@njit(inline="always", **COMPILED)
+def _noise(body: np.ndarray, mix: float) -> float:
+    """The power of noise through strings and body together; the sound is divided by its root."""
+    return (1 - mix) ** 2 + 2 * mix * (1 - mix) * body[of.BODY_CROSS] + mix * mix
+
+
+@njit(inline="always", **COMPILED)
+def _power(body: np.ndarray, mix: float, place: float) -> float:
+    """The square of the body's gain, before that division."""
+    alike = 2 * mix * (1 - mix) * _at(body, of.BODY_REAL, place)
+    return max((1 - mix) ** 2 + alike + mix * mix * _at(body, of.BODY_POWER, place), 0.0)
+
+
+@njit(**COMPILED)
+def gain(sound: np.ndarray, modes: int, points: int, body: np.ndarray, mix: float) -> float:
+    """The factor that brings a sound at the reference velocity to the wanted level; 1 where it is silent.
+
+    Args:
+        points: 1 or 2 amplitudes of each mode that count.
+        body, mix: its curves, as `playing_layout` has them, and how much of it is heard; at 0 they are not read.
+    """
+    total = 0.0
+    noise = _noise(body, mix) if mix > 0.0 else 1.0
+    for mode in range(modes):
+        omega, falls = sound[of.SOUND_OMEGA * modes + mode], 2 * of.PART_S * sound[of.SOUND_SIGMA * modes + mode]
+        left, right = sound[of.SOUND_LEFT * modes + mode], sound[of.SOUND_RIGHT * modes + mode]
+        mean = -math.expm1(-falls) / falls if falls > 1e-6 else 1.0
+        power = _power(body, mix, _place(omega)) / noise if mix > 0.0 else 1.0
+        total += (left * left + right * right) * mean * power * k_weight(omega / (2 * math.pi))
+    total *= 0.5 / points
+    if not total > 0.0:  # at a fixed end: it would be far too loud anywhere else
+        return 1.0
+    return 10 ** (min(max(of.WANTED_DB - 10 * math.log10(total), of.GAIN_RANGE_DB[0]), of.GAIN_RANGE_DB[1]) / 20)
+
+
+@njit(**COMPILED)
+def peak(sound: np.ndarray, modes: int, swings: bool, body: np.ndarray, mix: float, least: float) -> float:
+    """An estimate of the highest sample of a sound, re full scale. One that is below `least` may be a bound of it.
+
+    Args:
+        body, mix: as of `gain`.
+    """
+    x, y = of.SOUND_X * modes, of.SOUND_Y * modes
+    noise, onset = 1.0, 0.0
+    if mix > 0.0:
+        noise = math.sqrt(_noise(body, mix))
+        onset = (1 - mix + mix * body[of.BODY_STEP]) / noise
+    bound = sum_left = sum_right = highest = 0.0
+    for mode in range(modes):
+        real, imaginary = 1.0, 0.0
+        if mix > 0.0:
+            place = _place(sound[of.SOUND_OMEGA * modes + mode])
+            real = 1 - mix + mix * _at(body, of.BODY_REAL, place)
+            imaginary = mix * _at(body, of.BODY_IMAGINARY, place)
+            size = math.sqrt(_power(body, mix, place)) / noise
+            own = math.sqrt(real * real + imaginary * imaginary)
+            real, imaginary = (real / own * size, imaginary / own * size) if own > _TINY else (size, 0.0)
+        left, right = sound[of.SOUND_LEFT * modes + mode], sound[of.SOUND_RIGHT * modes + mode]
+        bound += max(abs(left), abs(right)) * math.sqrt(real * real + imaginary * imaginary)
+        sum_left += left
+        sum_right += right
+        highest = max(highest, sound[of.SOUND_OMEGA * modes + mode])
+        sound[x + mode] = imaginary if swings else real
+        sound[y + mode] = -real if swings else imaginary
+    struck = 0.0 if swings else max(abs(sum_left), abs(sum_right)) * onset
+    if bound <= least or modes == 0:
+        return max(bound, struck)
+    lowest = sound[of.SOUND_OMEGA * modes]
+    frames = int(_FRAMES_A_PERIOD * highest / lowest + 0.75)  # never about to be one more for harmonic partials
+    frames = min(max(frames, _FRAMES[0]), _FRAMES[1])
+    step_s = 2 * math.pi / lowest / frames
+    cosine, sine = of.SOUND_COSINE * modes, of.SOUND_SINE * modes
+    for mode in range(modes):
+        shrinks = math.exp(-sound[of.SOUND_SIGMA * modes + mode] * step_s)
+        turn = sound[of.SOUND_OMEGA * modes + mode] * step_s
+        sound[cosine + mode] = shrinks * math.cos(turn)
+        sound[sine + mode] = shrinks * math.sin(turn)
+    return max(struck, _highest(sound, modes, frames))
+
+
+@njit(**COMPILED)
+def _highest(sound: np.ndarray, modes: int, frames: int) -> float:
+    """The highest of both channels' samples, of modes that turn from step to step."""
+    left, right = sound[of.SOUND_LEFT * modes :][:modes], sound[of.SOUND_RIGHT * modes :][:modes]
+    x, y = sound[of.SOUND_X * modes :][:modes], sound[of.SOUND_Y * modes :][:modes]
+    cosine, sine = sound[of.SOUND_COSINE * modes :][:modes], sound[of.SOUND_SINE * modes :][:modes]
+    found = 0.0
+    for _ in range(frames):
+        sum_left, sum_right = 0.0, 0.0
+        for mode in range(modes):
+            before = x[mode]
+            sum_left += left[mode] * before
+            sum_right += right[mode] * before
+            x[mode] = cosine[mode] * before - sine[mode] * y[mode]
+            y[mode] = sine[mode] * before + cosine[mode] * y[mode]
+        found = max(found, abs(sum_left), abs(sum_right))
+    return found
+
+
+@njit(**COMPILED)
+def limit(highest: float) -> float:
+    """The factor that lowers a peak to the highest one; 1 where it is not above."""
+    most = 10 ** (of.HIGHEST_PEAK_DB / 20)
+    return most / highest if highest > most else 1.0

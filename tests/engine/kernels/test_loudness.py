@@ -1,0 +1,125 @@
+"""Loudness and peak of a sound in closed form against the sound itself, sample by sample."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from engine.effects import Body, Effects
+from engine.effects.curves import RATE_HZ, curves_of
+from engine.effects.impulse import convolved
+from engine.kernels import loudness
+from engine.kernels import playing_layout as of
+
+Array = NDArray[np.float64]
+NO_BODY = np.zeros(0)
+DB = 20 / np.log(10)
+
+
+def sound_of(omega: Array, sigma: Array, *heard: Array) -> Array:
+    rows = np.zeros((of.SOUND_ROWS, len(omega)))
+    rows[of.SOUND_OMEGA], rows[of.SOUND_SIGMA] = omega, sigma
+    rows[of.SOUND_LEFT : of.SOUND_LEFT + len(heard)] = heard
+    return rows.ravel()
+
+
+def drawn(seed: int, modes: int = 30) -> tuple[Array, Array, Array]:
+    """ω, σ and amplitudes of a string, 0.01 of full scale."""
+    draw = np.random.default_rng(seed)
+    partial = np.arange(1, modes + 1)
+    omega = 2 * np.pi * draw.uniform(80, 400) * partial * np.sqrt(1 + 1e-4 * partial**2)
+    return omega, draw.uniform(1, 8) + 1e-3 * omega / 50, 0.01 * draw.standard_normal(modes) / partial
+
+
+def samples(omega: Array, sigma: Array, heard: Array, seconds: float, swings: bool = False) -> Array:
+    t = np.arange(round(seconds * RATE_HZ)) / RATE_HZ
+    found = np.exp(np.multiply.outer(t, 1j * omega - sigma)) @ heard
+    return np.asarray(found.imag if swings else found.real)
+
+
+def measured_db(sound: Array) -> float:
+    """K-weighted, over the first part."""
+    sound = sound[: round(of.PART_S * RATE_HZ)]
+    power = np.abs(np.fft.rfft(sound)) ** 2
+    weights = loudness.k_weight(np.fft.rfftfreq(len(sound), 1 / RATE_HZ))
+    return 10 * float(np.log10(2 * (power * weights).sum() / len(sound) ** 2))
+
+
+def test_k_weighting_is_that_of_the_recommendation() -> None:
+    """Table 1 of ITU-R BS.1770-5 is for 48 kHz: its filters have +4 dB at high frequencies, and 0.69 dB at 997 Hz."""
+    db = 10 * np.log10(loudness.k_weight(np.array([20.0, 997.0, 20_000.0])))
+    assert db[0] < -12
+    assert db[1] == pytest.approx(0.69, abs=0.05)
+    assert db[2] == pytest.approx(4.0, abs=0.1)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_gain_brings_a_sound_to_the_wanted_level(seed: int) -> None:
+    omega, sigma, heard = drawn(seed)
+    gain = loudness.gain(sound_of(omega, sigma, heard), len(omega), 1, NO_BODY, 0.0)
+    assert measured_db(gain * samples(omega, sigma, heard, 0.5)) == pytest.approx(of.WANTED_DB, abs=0.2)
+    both = loudness.gain(sound_of(omega, sigma, heard, heard), len(omega), 2, NO_BODY, 0.0)
+    assert both == pytest.approx(gain)
+    other = loudness.gain(sound_of(omega, sigma, heard, 0 * heard), len(omega), 2, NO_BODY, 0.0)
+    assert DB * np.log(other / gain) == pytest.approx(3.01, abs=0.01)
+
+
+@pytest.mark.parametrize("mix", [0.3, 1.0])
+@pytest.mark.parametrize("name", ["guitar", "harp"])
+def test_it_does_so_through_a_body(name: str, mix: float) -> None:
+    """The level through the body is that of its steady state: an onset takes a body some hundredths of a second."""
+    curves = curves_of(Body(name=name))
+    impulse = Effects(Body(mix, name=name)).impulse(RATE_HZ)
+    off = []
+    for seed in range(8):
+        omega, sigma, heard = drawn(seed)
+        gain = loudness.gain(sound_of(omega, sigma, heard), len(omega), 1, curves, mix)
+        dry = gain * samples(omega, sigma, heard, 0.5)
+        through = convolved(dry[:, None], impulse)[: len(dry)].T
+        off.append(10 * np.log10(np.mean([10 ** (measured_db(side) / 10) for side in through])) - of.WANTED_DB)
+    assert np.abs(off).max() < 1.5
+    assert np.abs(np.mean(off)) < 0.5
+
+
+def test_silence_has_a_gain_of_one_and_a_gain_has_bounds() -> None:
+    omega, sigma, heard = drawn(0)
+    assert loudness.gain(sound_of(omega, sigma, 0 * heard), len(omega), 1, NO_BODY, 0.0) == 1.0
+    for factor, gain_db in ((1e-9, of.GAIN_RANGE_DB[1]), (1e9, of.GAIN_RANGE_DB[0])):
+        found = loudness.gain(sound_of(omega, sigma, factor * heard), len(omega), 1, NO_BODY, 0.0)
+        assert DB * np.log(found) == pytest.approx(gain_db)
+
+
+@pytest.mark.parametrize("swings", [False, True])
+@pytest.mark.parametrize("seed", range(5))
+def test_the_peak_is_nearly_the_highest_sample(seed: int, swings: bool) -> None:
+    """It is looked for in the first period alone."""
+    omega, sigma, heard = drawn(seed)
+    highest = np.abs(samples(omega, sigma, heard, 0.1, swings)).max()
+    found = loudness.peak(sound_of(omega, sigma, heard), len(omega), swings, NO_BODY, 0.0, 0.0)
+    assert -1.5 < DB * np.log(found / highest) < 0.1
+    least = 10 * found
+    bound = loudness.peak(sound_of(omega, sigma, heard), len(omega), swings, NO_BODY, 0.0, least)
+    assert found <= bound <= least
+
+
+def test_the_peak_through_a_body_is_near() -> None:
+    curves = curves_of(Body(name="guitar"))
+    impulse = Effects(Body(0.8)).impulse(RATE_HZ)
+    off = []
+    for seed in range(12):
+        omega, sigma, heard = drawn(seed)
+        dry = samples(omega, sigma, heard, 0.1)
+        highest = np.abs(convolved(dry[:, None], impulse)[: len(dry), 0]).max()
+        found = loudness.peak(sound_of(omega, sigma, heard), len(omega), False, curves, 0.8, 0.0)
+        off.append(DB * np.log(found / highest))
+    print(np.round(off, 1))
+    assert abs(np.mean(off)) < 2
+    assert np.abs(off).max() < 4
+
+
+def test_a_peak_that_is_too_high_is_lowered_to_the_highest() -> None:
+    highest = 10 ** (of.HIGHEST_PEAK_DB / 20)
+    assert loudness.limit(0.9 * highest) == 1.0
+    assert 3 * highest * loudness.limit(3 * highest) == pytest.approx(highest)
+    assert [loudness.looked_at(28, 88, number) for number in range(loudness.LOOKED_AT)] == [28, 43, 58, 73, 88]
