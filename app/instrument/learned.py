@@ -18,14 +18,16 @@ from numpy.typing import NDArray
 from scipy.signal import resample_poly
 
 from app.audio.note_file import NoteFileError, read_note
-from app.instrument import effects
 from app.instrument.bodies import own_bodies
-from app.instrument.loudness import PART_S, k_weight
+from app.instrument.effects import effects_of
 from app.patches.fields import explained
 from app.patches.library import PatchError, file_stem, own_patches, save_patch
 from app.patches.patch import Body, Category, Fretted, Noise, Patch, PhysicalString, Pickup, PluckChoices
 from app.shared.parameters import NOISE_DB
+from engine.effects.curves import RATE_HZ as RESPONSE_HZ
 from engine.folders import usable_files, user_folder
+from engine.kernels.loudness import k_weight
+from engine.kernels.playing_layout import PART_S
 from engine.resonators.recorded import RecordedAttack
 from engine.result_file import WriteError, explain, whole_file
 from training.recording.attack import attack_force
@@ -162,9 +164,11 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
     response = body_response(first.physics, first.strung, len(recorded.cents), BODY_RATE_HZ)
     with whole_file(body) as file:
         soundfile.write(file, 0.9 * response, BODY_RATE_HZ, subtype="PCM_24", format="WAV")
-    heard_through = effects.body_response(patch)
-    assert heard_through is not None
-    force = attack_force(first.note, recorded.note, heard_through.impulse, effects.RESPONSE_HZ)
+    effects = effects_of(patch)
+    assert effects is not None
+    force = attack_force(
+        first.note, recorded.note, replace(effects, room=None).impulse(RESPONSE_HZ)[:, 0], RESPONSE_HZ
+    )
     if force is not None:
         recorded = replace(recorded, attack=RecordedAttack.of(force, first.note.rate_hz))
         noise = Noise(kind="recorded", onset_db=_level_db(force, first))

@@ -25,7 +25,7 @@ from app.window.settings import Settings, load_settings
 from tests.bench.machine import Machine
 from tests.bench.play import analysis, hands, hearing, program
 from tests.bench.play.children import SOUND_AND_SCREEN, need_programs
-from tests.bench.play.control import holes_ms, steady_tone
+from tests.bench.play.control import steady_tone
 from tests.bench.play.recording import Recording, recording
 from tests.bench.play.screen import Screen, private_screen
 from tests.bench.play.sound_server import RATE_HZ, sound_server
@@ -122,12 +122,19 @@ def measure(patches: Sequence[Patch], buffer: Buffer, out: Path | None, report: 
             stays.append(_play(screen, patch))
         report(0.95, "analysis")
         clock, sound = recorded.clock(), recorded.sound()
-        visited = tuple(_judged(each, sound, recorded, control) for each in stays)
+        tone_clock, tone = control.clock(), control.sound()[:, 0]
+        visited = []
+        for stay in stays:
+            begin_s, end_s = stay.keys_s[0] - BEFORE_S, stay.until_s
+            part = sound[clock.frame(begin_s) : clock.frame(end_s)]
+            steady = tone[tone_clock.frame(begin_s) : tone_clock.frame(end_s)]
+            keys = [clock.frame(key_s) - clock.frame(begin_s) for key_s in stay.keys_s]
+            visited.append(_judged(stay, keys, part, steady))
         if out is not None:
             with out.open("wb+") as file:
                 kept = sound[clock.frame(began_s) : clock.frame(stays[-1].until_s)]
                 write_wav(file, kept, RATE_HZ, WavSettings(), {"title": "Tour of instruments"})
-        return Tour(Machine.here(), buffer, stays[-1].until_s - began_s, visited)
+        return Tour(Machine.here(), buffer, stays[-1].until_s - began_s, tuple(visited))
 
 
 def _silence(screen: Screen, recorded: Recording) -> None:
@@ -186,11 +193,11 @@ def _play(screen: Screen, patch: Patch) -> _Stay:
     return _Stay(patch, pressed_s, len(line) // 2, time.monotonic())
 
 
-def _judged(stay: _Stay, sound: NDArray[np.float32], recorded: Recording, control: Recording) -> Visited:
-    clock = recorded.clock()
-    begin = clock.frame(stay.keys_s[0] - BEFORE_S)
-    part = sound[begin : clock.frame(stay.until_s)]
-    keys = [clock.frame(key_s) - begin for key_s in stay.keys_s]
+def _judged(stay: _Stay, keys: Sequence[int], part: NDArray[np.float32], tone: NDArray[np.float32]) -> Visited:
+    """Args:
+    keys: frames at which they were pressed, in the sound of the instrument.
+    part, tone: this sound, and that of the steady tone meanwhile.
+    """
     first = analysis.onset(part[:, 0], keys[0], RATE_HZ)
     usual = 0 if first is None else first - keys[0]
     found = analysis.faults(part, keys, usual, RATE_HZ)
@@ -206,7 +213,7 @@ def _judged(stay: _Stay, sound: NDArray[np.float32], recorded: Recording, contro
         len(found.clicks),
         hearing.loudness(part, middle_s),
         float(20 * np.log10(max(np.abs(part).max(), 1e-9))),
-        len(holes_ms(control, stay.keys_s[0], stay.until_s)),
+        len(analysis.silences(tone, RATE_HZ)),
     )
 
 

@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.learned import keep
-from app.instrument.loudness import PART_S
 from app.instrument.offline import render_note
 from app.patches.library import find_patch
 from app.patches.patch import Patch
 from app.shared.parameters import NOISE_DB
 from engine.folders import FOLDER_VARIABLE
+from engine.kernels.playing_layout import PART_S
 from engine.presets import Preset, load_preset
 from training.recording.learn import Learned, examined, learn
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, RecordingError
