@@ -1,0 +1,88 @@
+"""The attack of a learned instrument: the noise of its strokes, on where it brings the own key nearer to the note.
+
+Nearness is measured over the first 30 ms, of the own key in closed form: its modes' free decay, through its body.
+"""
+
+from __future__ import annotations
+
+import math
+from math import gcd
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import fftconvolve, resample_poly
+
+from app.instrument.effects import RESPONSE_HZ, Response, body_response
+from app.instrument.loud_keys import LoudKeys, on_string
+from app.instrument.loudness import PART_S, k_weight
+from app.patches.patch import Noise, Patch
+from app.shared.parameters import NOISE_DB
+from engine.kernels.playing_layout import REFERENCE_VELOCITY
+from engine.pluck import FULL_SCALE_M
+from engine.presets import PresetInfo
+from engine.resonators.recorded import RecordedAttack, RecordedNote
+from engine.voices import Ear
+from training.recording.attack import attack_force, first_distance_db
+from training.recording.note import Note
+
+Array = NDArray[np.float64]
+
+
+def attack_of(patch: Patch, note: Note, recorded: RecordedNote) -> tuple[RecordedAttack, float] | None:
+    """The attack of a note and its level, as `noise.onset_db` has it; None: there is nothing."""
+    heard_through = body_response(patch)
+    if heard_through is None:
+        return None
+    force = attack_force(note, recorded, heard_through.impulse, RESPONSE_HZ)
+    if force is None:
+        return None
+    part = note.part(0, PART_S)
+    hz = np.fft.rfftfreq(2 * len(part), 1 / note.rate_hz)
+    heard = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(part, 2 * len(part))) ** 2
+    level_db = 10 * math.log10(float(force @ force) / max(float(heard.sum()) / len(part), 1e-30))
+    return RecordedAttack.of(force, note.rate_hz), round(min(max(level_db, NOISE_DB[0]), NOISE_DB[1]), 2)
+
+
+def with_attack(patch: Patch, info: PresetInfo, note: Note, f0_hz: float, level_db: float) -> Patch:
+    """The patch whose strokes have the recorded attack: at its level where that is nearer to the note, else off."""
+    heard_through = body_response(patch)
+    assert heard_through is not None and info.recorded is not None and info.recorded.attack is not None
+    loud = LoudKeys(patch, Ear(tuple(patch.pickup.points), patch.pickup.kind), info)
+    key = round(69 + 12 * math.log2(f0_hz / 440))
+    shared = gcd(note.rate_hz, RESPONSE_HZ)
+    truth = resample_poly(note.part(0, PART_S), RESPONSE_HZ // shared, note.rate_hz // shared)
+    sound = _own_key(loud, key, len(truth), heard_through)
+    attack = info.recorded.attack
+    shared = gcd(attack.rate_hz, RESPONSE_HZ)
+    force = resample_poly(attack.samples, RESPONSE_HZ // shared, attack.rate_hz // shared)[: len(truth)]
+    # at the loudness of a key, of which `level_db` is a share
+    gain = math.sqrt(PART_S * 10 ** (level_db / 10) * _mean_square(sound, RESPONSE_HZ))
+    struck = np.zeros(len(truth))
+    struck[: len(force)] = gain * force
+    nearer = first_distance_db(
+        truth, sound + fftconvolve(struck, heard_through.impulse)[: len(truth)], RESPONSE_HZ
+    ) < first_distance_db(truth, sound, RESPONSE_HZ)
+    noise = Noise(kind="recorded", onset_db=level_db if nearer else NOISE_DB[0])
+    return patch.model_copy(update={"noise": noise})
+
+
+def _own_key(loud: LoudKeys, key: int, frames: int, response: Response) -> Array:
+    """A key at the reference velocity, through the body, (frames,) at RESPONSE_HZ."""
+    found = loud.of_key(key)
+    assert found is not None  # of a range around it
+    resonator = found.resonator
+    pluck = on_string(found.string, loud.patch.pluck.pluck(REFERENCE_VELOCITY))
+    weights = resonator.shapes @ loud.ear.weights(resonator.points, resonator.force_weights)[:, 0] / FULL_SCALE_M
+    amplitudes = weights * resonator.to_modes(pluck.displacement(resonator.points))
+    t = np.arange(frames) / RESPONSE_HZ
+    dry = np.zeros(frames)
+    for amplitude, sigma, omega in zip(amplitudes, resonator.sigma, resonator.omega, strict=True):
+        dry += amplitude * np.exp(-sigma * t) * np.cos(omega * t)
+    return np.asarray(fftconvolve(found.gain * dry, response.impulse)[:frames])
+
+
+def _mean_square(sound: Array, rate_hz: int) -> float:
+    """After K-weighting."""
+    hz = np.fft.rfftfreq(2 * len(sound), 1 / rate_hz)
+    heard = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(sound, 2 * len(sound))) ** 2
+    return float(heard.sum()) / len(sound) / len(sound)
