@@ -4,8 +4,8 @@ A fit knows the curve of pitch, but not where it ends: a glide that is slower th
 string decides. Its tension rises with its energy, so that the glide is a sum of its partials' decays of energy, with
 weights above 0. The constant that such a sum leaves belongs to the frequencies at rest.
 
-How far the curve departs from that law counts as an error of the frequencies: the glide of recordings follows it
-less well than that of the solver.
+The glide of recordings follows that law less well than that of the solver. So the fit's own end and the law's are
+averaged, each with the inverse of its variance; the law's is how far the curve departs from it.
 
 A partial also bends its own pitch, by half as much again as it bends that of all others: of q³ with q = a cos, 3/4 a³
 is at its frequency; of q r² with another one, 1/2 (Nayfeh, Mook 1979, ch. 6). A sound does not give its share of
@@ -29,6 +29,8 @@ Array = NDArray[np.float64]
 
 SECONDS, POINTS = 2.4, 1200
 LAW_PARTIALS = 12  # the lowest, which have nearly all of the tension
+FIT_CENTS = 2.0  # that a fit's own end of the glide is off, an estimate; on synthetic notes it is 1.2
+LEAST_FALL = 0.1  # of a partial's energy: what falls less cannot be told from a constant
 LEAST_WEIGHT = 1e-3
 PLACES = np.linspace(0.05, 0.5, 200)  # of plucks
 OWN = 0.5  # what a partial adds to its own glide, of what it adds to all
@@ -50,9 +52,11 @@ def at_rest(glide: Glide, poles: dict[int, list[Pole]]) -> dict[int, Rest]:
     """
     if not poles or not glide.shares.any():
         return {number: Rest(0.0, 0.0) for number in poles}
-    low = sorted(poles)[:LAW_PARTIALS]
     t = np.linspace(0, SECONDS, POINTS)
     curves = {number: _energy(own, t) for number, own in poles.items()}
+    low = [each for each in sorted(poles)[:LAW_PARTIALS] if curves[each][-1] < LEAST_FALL * curves[each][0]]
+    if not low:
+        return {number: Rest(0.0, 0.0) for number in poles}
     energies = np.stack([curves[number] / curves[number][0] for number in low], 1)
     known = np.sum([curves[number] * own[0].hz ** 2 for number, own in poles.items()], axis=0)
     weight = np.sqrt(known / known.max() + LEAST_WEIGHT)
@@ -61,13 +65,15 @@ def at_rest(glide: Glide, poles: dict[int, list[Pole]]) -> dict[int, Rest]:
     found, _ = optimize.nnls(rows * weight[:, None], curve * weight)
     law = energies @ found[: len(low)]
     misfit = float(np.sqrt(np.mean((curve - rows @ found) ** 2)))
+    trusted = FIT_CENTS**2 / (FIT_CENTS**2 + misfit**2)
+    law_error = misfit * math.sqrt(trusted)
     rests = {}
     for number in poles:
         seen = curves[number] / curves[number].sum()
         share, spread = share_of_tension(number)
         own_cents = OWN * float(seen @ law)
         cents = float(seen @ (curve - law)) - share * own_cents
-        rests[number] = Rest(cents, math.hypot(spread * own_cents, misfit))
+        rests[number] = Rest(trusted * cents, math.hypot(spread * own_cents, law_error))
     return rests
 
 
