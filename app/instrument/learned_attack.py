@@ -14,7 +14,7 @@ from scipy.signal import fftconvolve, resample_poly
 
 from app.instrument.effects import RESPONSE_HZ, Response, body_response
 from app.instrument.loud_keys import LoudKeys, on_string
-from app.instrument.loudness import PART_S, k_weight
+from app.instrument.loudness import PART_S, WANTED_DB, k_weight
 from app.patches.patch import Noise, Patch
 from app.shared.parameters import NOISE_DB
 from engine.kernels.playing_layout import REFERENCE_VELOCITY
@@ -27,9 +27,11 @@ from training.recording.note import Note
 
 Array = NDArray[np.float64]
 
+LEAST_GAIN_DB = 0.2  # of distance, for an attack that is on; the player's glide moves it by half as much
+
 
 def attack_of(patch: Patch, note: Note, recorded: RecordedNote) -> tuple[RecordedAttack, float] | None:
-    """The attack of a note and its level, as `noise.onset_db` has it; None: there is nothing."""
+    """The attack of a note and its energy, in dB re that of the note's first 0.4 s; None: there is nothing."""
     heard_through = body_response(patch)
     if heard_through is None:
         return None
@@ -40,29 +42,32 @@ def attack_of(patch: Patch, note: Note, recorded: RecordedNote) -> tuple[Recorde
     hz = np.fft.rfftfreq(2 * len(part), 1 / note.rate_hz)
     heard = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(part, 2 * len(part))) ** 2
     level_db = 10 * math.log10(float(force @ force) / max(float(heard.sum()) / len(part), 1e-30))
-    return RecordedAttack.of(force, note.rate_hz), round(min(max(level_db, NOISE_DB[0]), NOISE_DB[1]), 2)
+    return RecordedAttack.of(force, note.rate_hz), level_db
 
 
 def with_attack(patch: Patch, info: PresetInfo, note: Note, f0_hz: float, level_db: float) -> Patch:
     """The patch whose strokes have the recorded attack: at its level where that is nearer to the note, else off."""
     heard_through = body_response(patch)
     assert heard_through is not None and info.recorded is not None and info.recorded.attack is not None
-    loud = LoudKeys(patch, Ear(tuple(patch.pickup.points), patch.pickup.kind), info)
     key = round(69 + 12 * math.log2(f0_hz / 440))
+    tuning = patch.tuning.model_copy(update={"a4_hz": f0_hz * 2 ** ((69 - key) / 12)})  # as the note was
+    tuned = patch.model_copy(update={"tuning": tuning})
+    loud = LoudKeys(tuned, Ear(tuple(patch.pickup.points), patch.pickup.kind), info)
     shared = gcd(note.rate_hz, RESPONSE_HZ)
     truth = resample_poly(note.part(0, PART_S), RESPONSE_HZ // shared, note.rate_hz // shared)
     sound = _own_key(loud, key, len(truth), heard_through)
     attack = info.recorded.attack
     shared = gcd(attack.rate_hz, RESPONSE_HZ)
     force = resample_poly(attack.samples, RESPONSE_HZ // shared, attack.rate_hz // shared)[: len(truth)]
-    # at the loudness of a key, of which `level_db` is a share
-    gain = math.sqrt(PART_S * 10 ** (level_db / 10) * _mean_square(sound, RESPONSE_HZ))
+    loudness_db = 10 * math.log10(max(_mean_square(sound, RESPONSE_HZ), 1e-30))
+    onset_db = level_db + loudness_db - WANTED_DB - patch.level_db  # keys are softer where their peaks are high
+    onset_db = round(min(max(onset_db, NOISE_DB[0]), NOISE_DB[1]), 2)
+    gain = math.sqrt(PART_S * 10 ** ((WANTED_DB + patch.level_db + onset_db) / 10))
     struck = np.zeros(len(truth))
     struck[: len(force)] = gain * force
-    nearer = first_distance_db(
-        truth, sound + fftconvolve(struck, heard_through.impulse)[: len(truth)], RESPONSE_HZ
-    ) < first_distance_db(truth, sound, RESPONSE_HZ)
-    noise = Noise(kind="recorded", onset_db=level_db if nearer else NOISE_DB[0])
+    whole = sound + fftconvolve(struck, heard_through.impulse)[: len(truth)]
+    gained_db = first_distance_db(truth, sound, RESPONSE_HZ) - first_distance_db(truth, whole, RESPONSE_HZ)
+    noise = Noise(kind="recorded", onset_db=onset_db if gained_db > LEAST_GAIN_DB else NOISE_DB[0])
     return patch.model_copy(update={"noise": noise})
 
 
