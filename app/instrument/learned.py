@@ -19,18 +19,12 @@ from scipy.signal import resample_poly
 
 from app.audio.note_file import NoteFileError, read_note
 from app.instrument.bodies import own_bodies
-from app.instrument.effects import effects_of
+from app.instrument.learned_attack import attack_of, with_attack
 from app.patches.fields import explained
 from app.patches.library import PatchError, file_stem, own_patches, save_patch
-from app.patches.patch import Body, Category, Fretted, Noise, Patch, PhysicalString, Pickup, PluckChoices
-from app.shared.parameters import NOISE_DB
-from engine.effects.curves import RATE_HZ as RESPONSE_HZ
+from app.patches.patch import Body, Category, Fretted, Patch, PhysicalString, Pickup, PluckChoices
 from engine.folders import usable_files, user_folder
-from engine.kernels.loudness import k_weight
-from engine.kernels.playing_layout import PART_S
-from engine.resonators.recorded import RecordedAttack
 from engine.result_file import WriteError, explain, whole_file
-from training.recording.attack import attack_force
 from training.recording.fit import FREE_POLES
 from training.recording.joint import combined
 from training.recording.learn import Learned, examined, learn
@@ -164,31 +158,15 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
     response = body_response(first.physics, first.strung, len(recorded.cents), BODY_RATE_HZ)
     with whole_file(body) as file:
         soundfile.write(file, 0.9 * response, BODY_RATE_HZ, subtype="PCM_24", format="WAV")
-    effects = effects_of(patch)
-    assert effects is not None
-    force = attack_force(
-        first.note, recorded.note, replace(effects, room=None).impulse(RESPONSE_HZ)[:, 0], RESPONSE_HZ
-    )
-    if force is not None:
-        recorded = replace(recorded, attack=RecordedAttack.of(force, first.note.rate_hz))
-        noise = Noise(kind="recorded", onset_db=_level_db(force, first))
-        patch = patch.model_copy(update={"noise": noise})
-    write_preset(preset, name, first.strung, recorded)
+    attack = attack_of(patch, first.note, recorded.note)
+    if attack is not None:
+        recorded = replace(recorded, attack=attack[0])
+    info = write_preset(preset, name, first.strung, recorded)
+    if attack is not None:
+        patch = with_attack(patch, info, first.note, first.physics.f0_hz, attack[1])
     with whole_file(report) as file:
         file.write(json.dumps([as_data(each) for each in learned], indent=2).encode())
     return Kept(preset, save_patch(patch).path, body, report)
-
-
-def _level_db(force: NDArray[np.float64], learned: Learned) -> float:
-    """The energy of an attack, in dB re that of its note, as `noise.onset_db` has it."""
-    note = learned.note
-    part = note.part(0, PART_S)
-    size = 2 * len(part)
-    hz = np.fft.rfftfreq(size, 1 / note.rate_hz)
-    heard = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(part, size)) ** 2
-    energy = 2 * float(heard.sum()) / size
-    level_db = 10 * math.log10(float(force @ force) / max(energy, 1e-30))
-    return round(min(max(level_db, NOISE_DB[0]), NOISE_DB[1]), 2)
 
 
 def _patch(name: str, stem: str, learned: Learned, partials: int, kind: Kind) -> Patch:

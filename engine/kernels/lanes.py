@@ -21,7 +21,7 @@ from engine.kernels.compiled import COMPILED
 # mypy: disable-error-code="no-untyped-def"
 
 LANES = 4
-# Rows of a block: z = x + iy, those of `kernels.tension.prepare`, and what is heard
+# Rows of a block: z = x + iy, those of `kernels.tension.prepare`, and the output
 X, Y, COSINE, SINE, KICK, SECOND_KICK, STRETCH, SECOND_STRETCH, SEEN, SQUARE = range(10)
 EARS = 10  # two for each: the weight, and the weight times κ p
 MOST_EARS = 4

@@ -193,7 +193,7 @@ S_HIGHEST_PHASE = 2  # R
 S_SILENCE = 3  # R
 S_LOUDNESS = 4  # R nepers: log of full scale's share of a metre
 S_RATE = 5  # R frames a second
-S_UNHEARD = 6  # R of what is heard: a mode that is quieter, and hardly stretches a drum, rests; 0: none does
+S_UNHEARD = 6  # R of the output: a mode that is quieter, and hardly stretches a drum, rests; 0: none does
 S_HEADER = 7
 
 # Slots of a rendered voice's program

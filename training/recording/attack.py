@@ -18,6 +18,7 @@ from training.recording.note import Note
 Array = NDArray[np.float64]
 
 WHOLE_S, FADED_S = 0.05, 0.1  # it is whole until the first, and fades until the second
+FIRST_S, FIRST_FLOOR_DB = 0.03, -60.0
 LEAST_DB = -30.0  # of the body's largest gain: what lies deeper is not amplified any more
 
 
@@ -40,3 +41,12 @@ def attack_force(note: Note, learned: RecordedNote, impulse: Array, impulse_hz: 
     whole = min(len(force), round(WHOLE_S * rate))
     force[whole:] *= np.cos(np.linspace(0, math.pi / 2, len(force) - whole)) ** 2
     return force if np.abs(force).max() > 0 else None
+
+
+def first_distance_db(truth: Array, found: Array, rate_hz: int) -> float:
+    """Log spectral distance of the first 30 ms of two notes of one length, made equally loud, by one Hann window."""
+    found = found * math.sqrt(float(truth @ truth) / max(float(found @ found), 1e-30))
+    size = min(len(truth), round(FIRST_S * rate_hz))
+    theirs, ours = (np.abs(fft.rfft(each[:size] * np.hanning(size))) for each in (truth, found))
+    floor = float(theirs.max()) * 10 ** (FIRST_FLOOR_DB / 20)
+    return float(np.sqrt(np.mean((20 * np.log10(np.maximum(theirs, floor) / np.maximum(ours, floor))) ** 2)))

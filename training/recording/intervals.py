@@ -26,7 +26,7 @@ from training.recording.rest import Rest, at_rest
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-MODEL_ERRORS = {"cents": 0.58, "decay": 0.05, "level_db": 0.35}  # cents, a share, dB
+MODEL_ERRORS = {"cents": 0.6, "decay": 0.05, "level_db": 0.35}  # cents, a share, dB
 NORMAL_95 = 1.96
 NEIGHBOURS = 4  # bins over which a residual counts as correlated
 MOST_LEVERAGE = 0.95  # of one bin

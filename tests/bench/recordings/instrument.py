@@ -22,6 +22,7 @@ from app.shared.parameters import NOISE_DB
 from engine.folders import FOLDER_VARIABLE
 from engine.kernels.playing_layout import PART_S
 from engine.presets import Preset, load_preset
+from training.recording.attack import first_distance_db
 from training.recording.learn import Learned, examined, learn
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, RecordingError
 from training.recording.preset import Source
@@ -32,8 +33,6 @@ Recordings = Mapping[str, tuple[Array, int]]
 Progress = Callable[[float], None]
 
 VELOCITY = 100  # of the recorded note
-ATTACK_S = 0.03
-ATTACK_FLOOR_DB = -60.0
 SEMITONES = (1.5, 4.5)  # between neighbours: a whole tone to a major third
 HIGHEST_PARTIAL = 12  # whose frequency is compared
 MOST_CENTS, MOST_DECAY_OFF, MOST_DISTANCE_DB = 3.0, 0.3, 8.0
@@ -50,35 +49,27 @@ class Instrument:
     def sound(self, f0_hz: float, seconds: float, rate_hz: int, attack: bool = True) -> Array:
         """The key that is nearest to a pitch, tuned to it, (frames,)."""
         key = round(69 + 12 * math.log2(f0_hz / 440))
-        patch = self.patch.with_value("tuning.a4_hz", f0_hz * 2 ** ((69 - key) / 12))
+        tuning = self.patch.tuning.model_copy(update={"a4_hz": f0_hz * 2 ** ((69 - key) / 12)})
+        patch = self.patch.model_copy(update={"tuning": tuning})
         if not attack:
             patch = patch.with_value("noise.onset_db", NOISE_DB[0])
         return render_note(patch, self.preset, key, VELOCITY, seconds, seconds, rate_hz)[:, 0].astype(np.float64)
 
 
 def attacks(recordings: Recordings, progress: Progress) -> dict[str, list[float]]:
-    """Log spectral distance of the first 30 ms of the own key, with and without the recorded attack."""
+    """Log spectral distance of the first 30 ms of the own key, without the recorded attack, and as learned."""
     values: dict[str, list[float]] = {}
     with _instruments(recordings, progress) as instruments:
         for each in instruments.values():
             note = each.learned.note
+            switched = each.patch.noise.onset_db > NOISE_DB[0]
+            values.setdefault("attack switched on by it", []).append(float(switched))
             truth = note.part(0, PART_S)
-            for name, attack in (("without", False), ("with", True)):
+            for name, attack in (("without an attack", False), ("as learned", True)):
                 found = each.sound(each.learned.physics.f0_hz, PART_S, note.rate_hz, attack)[: len(truth)]
-                distance = _first_distance_db(truth, found, note.rate_hz)
-                values.setdefault(f"first 30 ms {name} the attack, distance in dB", []).append(distance)
-    without, with_ = values.values()
-    values["attack below none"] = [float(b < a) for a, b in zip(without, with_, strict=True)]
+                distance = first_distance_db(truth, found, note.rate_hz)
+                values.setdefault(f"first 30 ms {name}, distance in dB", []).append(distance)
     return values
-
-
-def _first_distance_db(truth: Array, found: Array, rate_hz: int) -> float:
-    """Of equally loud notes, through one Hann window."""
-    found = found * math.sqrt(float(truth @ truth) / max(float(found @ found), 1e-30))
-    size = round(ATTACK_S * rate_hz)
-    theirs, ours = (np.abs(np.fft.rfft(each[:size] * np.hanning(size))) for each in (truth, found))
-    floor = float(theirs.max()) * 10 ** (ATTACK_FLOOR_DB / 20)
-    return float(np.sqrt(np.mean((20 * np.log10(np.maximum(theirs, floor) / np.maximum(ours, floor))) ** 2)))
 
 
 def neighbours(recordings: Recordings, progress: Progress) -> dict[str, list[float]]:

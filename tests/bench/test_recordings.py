@@ -1,0 +1,36 @@
+"""The figures of recordings, on synthetic notes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.bench.recordings.evaluate import table
+from tests.bench.recordings.instrument import attacks, neighbours
+from tests.bench.recordings.pitch import pitches, pitches_of
+from tests.bench.recordings.synthetic import synthetic_note
+
+
+def test_pitch_is_found_blind_and_named() -> None:
+    values = pitches(3, lambda share: None)
+    assert sum(map(len, values.values())) == 3
+    made = synthetic_note(1, 1.0, f0_range_hz=(109.9, 110.1))
+    named = {f"bass_{name}_fa": (made.samples, made.rate_hz) for name in ("a2", "b2", "take")}
+    assert pitches_of(named) == {"recordings, f0 within 50 cents": [1.0, 0.0]}
+
+
+def test_a_key_of_neighbouring_pitch_is_compared_with_its_recording() -> None:
+    made = [synthetic_note(5, 2.0, f0_range_hz=(hz, 1.0001 * hz)) for hz in (180.0, 214.0)]  # three semitones
+    found = {f"string_{name}_fa": (each.samples, each.rate_hz) for name, each in zip("ab", made, strict=True)}
+    values = neighbours(found, lambda share: None)
+    assert len(values["neighbour, distance in dB"]) == 2
+    assert all(np.isfinite(each).all() for each in values.values())
+    assert max(values["neighbour, distance in dB"]) < 20
+    measured = attacks({"string_a_fa": found["string_a_fa"]}, lambda share: None)
+    without, learned = (
+        measured[f"first 30 ms {name}, distance in dB"][0] for name in ("without an attack", "as learned")
+    )
+    assert learned <= without + 0.05
+    rows = {row[0]: row[1:] for row in table({"a share": [1.0, 0.0], "a figure": [0.5, 2.0]})}
+    assert rows["a share, share"] == (0.5, None, 2)
+    assert rows["a figure"][0] == pytest.approx(1.25)
