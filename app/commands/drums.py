@@ -125,7 +125,7 @@ def predict(
     points: Points = 33,
     preset: PresetOption = None,
 ) -> None:
-    """Predict the motion of a struck drum with the model of a preset of many strings.
+    """Predict the motion of a struck drum by a model of many strings.
 
     OUT is as that of `drums simulate`.
     """

@@ -12,7 +12,6 @@ from app.patches.patch import Body as ChosenBody
 from app.patches.patch import Patch
 from app.patches.patch import Room as ChosenRoom
 from engine.effects import BODIES, Amp, Body, Effects, Room
-from engine.effects.curves import curves_of
 
 
 def effects_of(patch: Patch) -> Effects | None:
@@ -54,6 +53,8 @@ def channels_of(patch: Patch, wheeled: bool = False) -> int:
 
 def body_curves(patch: Patch) -> NDArray[np.float64] | None:
     """The curves of a patch's body, whose resonances favour some keys, at whatever mix; None: it has no body."""
+    from engine.effects.curves import curves_of  # brings the compiler
+
     body = _body(patch.body.model_copy(update={"mix": 1.0}))[0]
     return None if body is None else curves_of(body)
 

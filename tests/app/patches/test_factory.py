@@ -115,7 +115,7 @@ def test_every_key_in_range_is_a_drum_and_drops_as_drums_do(patch: Patch) -> Non
     for key in {low, (low + high) // 2, high} if patch.strings.keys == "pitch" else range(low, high + 1):
         drum = keys.of_key(key)
         assert drum is not None
-        assert np.isfinite(drum.heard).all() and 0 < drum.gain < 1e4
+        assert np.isfinite(drum.heard).all()
         found.append(drum.drop_cents(127, patch.pluck.curve))
         assert drum.drop_cents(30) < found[-1]
     print(f"{patch.name}: drops by {max(found):.0f} cents at most")
