@@ -198,9 +198,14 @@ class InstrumentPlayer:
             found.append(Controller(events.MOD_WHEEL, wheel, moved_by))
         return found
 
-    def set_gains(self, gains: Mapping[str, float]) -> None:
-        """The factor of each of its sources; notes that ring fade to it."""
+    def set_gains(self, gains: Mapping[str, float], compared: bool = True) -> None:
+        """The factor of each of its sources; notes that ring fade to it.
+
+        Args:
+            compared: whether notes that begin have a voice of each source, to switch while they ring.
+        """
         self.compiled.set_source_gains(gains[source] for source in self._sources)
+        self.compiled.set_spares(not compared)
 
     def _keys(self, patch: Patch, ear: Ear, near: LoudKeys | DrumKeys | None = None) -> LoudKeys | DrumKeys:
         if not isinstance(patch.strings, Drums):

@@ -72,6 +72,7 @@ class Keys:
         self._in: Mixer | None = None  # where the player's events are played
         self._playing: list[InstrumentPlayer] = []  # with those before, whose notes may ring
         self._gains: Mapping[str, float] = AS_THEY_ARE
+        self._compared = True
         self._notes: dict[tuple[InstrumentPlayer, int], KeyNote] = {}
         self._wanted: _Wanted | None = None
         self._completed: _Wanted | None = None  # the latest wish for which all is computed, or tried
@@ -110,12 +111,12 @@ class Keys:
                 return
         self._follow_wish()
 
-    def set_gains(self, gains: Mapping[str, float]) -> None:
-        """The factor of each source; notes that ring fade to it."""
+    def set_gains(self, gains: Mapping[str, float], compared: bool) -> None:
+        """The factor of each source, see `InstrumentPlayer.set_gains`."""
         with self._lock:
-            self._gains = gains
+            self._gains, self._compared = gains, compared
             for player in self._playing:
-                player.set_gains(gains)
+                player.set_gains(gains, compared)
 
     def handle(
         self, event: Event, due: Due | None, struck_s: float, begun: Callable[[KeyNote], None]
@@ -251,7 +252,7 @@ class Keys:
 
     def _give(self, player: InstrumentPlayer, mixer: Mixer) -> None:
         """Lets keys play a player. Under the lock."""
-        player.set_gains(self._gains)
+        player.set_gains(self._gains, self._compared)
         mixer.set_player(player.compiled)
         self._player, self._in = player, mixer
         self._playing.append(player)

@@ -80,6 +80,7 @@ class Notes:
         self._lock = threading.RLock()
         self._notes: list[Note | KeyNote] = []
         self._monitor = Monitor()
+        self._compared = True
         self._ear: Ear | None = None
         self.latest: Note | KeyNote | None = None
         self._chosen: RenderRequest | None = None
@@ -126,10 +127,14 @@ class Notes:
         with self._lock:
             self._chosen = request
 
-    def set_monitor(self, monitor: Monitor) -> None:
-        """Sets the sources of all notes; those that ring are cross-faded."""
+    def set_monitor(self, monitor: Monitor, compared: bool = True) -> None:
+        """Sets the sources of all notes; those that ring are cross-faded.
+
+        Args:
+            compared: whether keys that are struck from now on can be switched to another source while they ring.
+        """
         with self._lock:
-            self._monitor = monitor
+            self._monitor, self._compared = monitor, compared
             notes = self._plucks()
             for note in notes:
                 self._apply_monitor(note)
@@ -337,7 +342,8 @@ class Notes:
 
     def _set_gains_of_keys(self) -> None:
         """Sets which sources of keys are heard; both are of one string, whose levels match as they are."""
-        self.keys.set_gains({source: self._monitor.gain(source, SOURCES, None) for source in SOURCES})
+        gains = {source: self._monitor.gain(source, SOURCES, None) for source in SOURCES}
+        self.keys.set_gains(gains, self._compared)
 
     def _plucks(self) -> list[Note]:
         """The notes whose voices are made here."""

@@ -140,9 +140,11 @@ TIPS = {
     "noise.release_db": "Noise of the damper or finger that ends a note. The lowest is off",
     "pickup.points.0": f"Where the string is heard; {_PLACE_TIP}",
     "pickup.points.1": "Where the right channel hears the string; an instrument in mono has none",
+    "body.size": "Size of the body: a larger one resonates lower",
     "body.mix": "Mix of the body: 0 % the strings alone, 100 % the body alone",
     "amp.drive_db": "Drive of the amplifier before the body, which may be its cabinet; 0 dB: there is none",
     "amp.tone_db": "Tone of the amplifier: above 0 brighter, below darker, about 700 Hz",
+    "room.t60_s": "Time in which the room's reverberation falls by 60 dB",
     "room.mix": "Mix of the room: 0 % without it, 100 % its reverberation alone",
     "level_db": "Level of the instrument; saved with it",
     "position": "Pluck position; 0 and 1 are the ends of the string",
@@ -152,14 +154,22 @@ TIPS = {
     "listen_right": "Listening point of the right channel in stereo; the left is at “listen”",
     "seconds": "Length of a rendered pluck",
     "speed": "Slow motion of the string view, as under a stroboscope; the sound is not slowed",
+    "difference_gain_db": "Gain of the difference between model and truth",
     "volume_db": "Playback volume; exported files are not affected",
 }
 
 
-def _knob(part: str, label: str, limits: tuple[float, float], figure_unit: str, **more: str | float) -> Parameter:
+def _knob(
+    part: str,
+    label: str,
+    limits: tuple[float, float],
+    figure_unit: str,
+    *,
+    name: str = "",
+    wheel_factor: float = 4.0,
+) -> Parameter:
     """A multiplier of the string, which the wheel multiplies by four at its end, unless said otherwise."""
     group = DECAY if part in ("decay", "brightness_decay") else STRING
-    factor = float(more.get("wheel_factor", 4.0))
     return Parameter(
         f"knobs.{part}",
         label,
@@ -168,9 +178,9 @@ def _knob(part: str, label: str, limits: tuple[float, float], figure_unit: str, 
         TIMES,
         group,
         "wheel",
-        str(more.get("name", "")),
+        name,
         None,
-        factor,
+        wheel_factor,
         figure_unit,
     )
 

@@ -45,6 +45,11 @@ class Blows:
         return self._shown.moving
 
     @property
+    def audible(self) -> bool:
+        """Whether the blow that is shown rings."""
+        return self._shown.audible
+
+    @property
     def settled(self) -> bool:
         """Whether motion and signals are complete, so that views need not look for more."""
         asked, take = self._asked, self._shown.take

@@ -136,8 +136,8 @@ class Performance(QObject):
 
     def moment(self, elapsed_s: float) -> Moment:
         """What panels show now; `elapsed_s`: since they were shown the last one."""
-        blow = self._blows.take if self._of_drums else None
-        return Moment(self.take, self.position_s, self.moving, elapsed_s, blow)
+        blow, of = (self._blows.take, self._blows) if self._of_drums else (None, self._shown)
+        return Moment(self.take, self.position_s, self.moving, elapsed_s, blow, of.audible)
 
     # Intents
 
@@ -185,8 +185,9 @@ class Performance(QObject):
     def choices_changed(self, names: frozenset[str]) -> None:
         """Applies changed fields of `Choices` to the notes, and asks for another motion where that has changed."""
         choices, entry = self._session.choices, self.entry
+        if names & {"face", *Monitor.model_fields}:
+            self.notes.set_monitor(choices, compared=choices.face == "lab")
         if names & Monitor.model_fields.keys():
-            self.notes.set_monitor(choices)
             self.hear_dry(False)
         if names & {"instrument", "patch"}:  # ends a comparison
             self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)

@@ -39,3 +39,8 @@ class Playhead(Generic[Shown]):
         """Whether it moves."""
         note, take = self.note, self.take
         return note is not None and take is not None and not note.over and note.seconds < take.seconds
+
+    @property
+    def audible(self) -> bool:
+        """Whether the note of the motion rings, which may be longer than the motion."""
+        return self.note is not None and self.take is not None and not self.note.over

@@ -87,7 +87,7 @@ def _steps(controller: Controller) -> Iterator[None]:
 def _play(controller: Controller) -> Iterator[None]:
     """Switches to Play, waits for the guitar and plays a chord."""
     window = controller.window
-    controller.session.update(face="play", speed=0.004)
+    controller.session.update(face="play", speed=0.004, seconds=4.0)
     controller.patches.choose("classical_guitar")
     window.instrument.show_surface("neck")
     window.resize(1280, 800)
@@ -97,7 +97,9 @@ def _play(controller: Controller) -> Iterator[None]:
         yield
     for key in CHORD:
         window.instrument.pressed.emit(key, 80)
-    for _ in range(3):
+    while not controller.performance.settled:  # its motion is being computed
+        yield
+    for _ in range(4):
         yield
     window.notices.hide()
     window.notices.bell.set_unseen(0)

@@ -158,6 +158,17 @@ def sound(player_address: int, mixer_address: int) -> None:
             players[noise + of.NOISE_LEFT] = 0
 
 
+@njit(inline="always", **COMPILED)
+def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, stops: int) -> None:
+    """Adds a force to a frame of the mix, at a gain between two quanta; it fades out where the noise stops."""
+    share = (frame + 1) / at.QUANTUM
+    level = before + (gain - before) * share
+    if stops > 0:
+        level *= 1 - share / stops
+    mix[frame, 0] += level * force
+    mix[frame, 1] += level * force
+
+
 @njit(**COMPILED)
 def _run(
     player: np.ndarray,
@@ -190,12 +201,7 @@ def _run(
             envelope *= shrinks
         if done < pulse_frames:
             force += pulse * (0.5 - 0.5 * math.cos(2 * math.pi * (done + 0.5) / pulse_frames))
-        share = (frame + 1) / at.QUANTUM
-        level = before + (gain - before) * share
-        if stops > 0:
-            level *= 1 - share / stops
-        mix[frame, 0] += level * force
-        mix[frame, 1] += level * force
+        _add(mix, frame, force, before, gain, stops)
         done += 1
     past[0], past[1], past[2], past[3] = x1, x2, y1, y2
     player[noise + of.NOISE_ENVELOPE] = envelope
@@ -215,7 +221,7 @@ def _play(
     gain: float,
     mix: np.ndarray,
 ) -> None:
-    """As `_run`, of the table's recorded attack: even between its samples."""
+    """Adds the table's recorded attack, by linear interpolation between its samples, as `_run` adds a noise."""
     first = tables[of.TABLE_ATTACK]
     frames, step = tables[first + of.ATTACK_FRAMES], table[first + of.ATTACK_RATE] / player[of.PLAYER_RATE]
     first += of.ATTACK_HEADER
@@ -230,11 +236,6 @@ def _play(
         if number < frames:
             after = table[first + number + 1] if number + 1 < frames else 0.0
             force = amplitude * (table[first + number] + (place - number) * (after - table[first + number]))
-            share = (frame + 1) / at.QUANTUM
-            level = before + (gain - before) * share
-            if stops > 0:
-                level *= 1 - share / stops
-            mix[frame, 0] += level * force
-            mix[frame, 1] += level * force
+            _add(mix, frame, force, before, gain, stops)
         done += 1
     players[noise + of.NOISE_DONE] = done

@@ -1188,7 +1188,8 @@ def _note_on(
             continue
         _whole(address)[at.BEGIN_AT] = frame
         _at(address)[at.STRUCK_S] = player[event + of.EVENT_STRUCK_S]
-        if mixers[at.M_ACTIVE] < at.MOST_VOICES:
+        spared = players[of.PLAYER_SPARES] != 0 and player[of.PLAYER_SOURCE_GAINS + source] == 0.0
+        if mixers[at.M_ACTIVE] < at.MOST_VOICES and not spared:
             mixers[at.M_VOICES + mixers[at.M_ACTIVE]] = address
             mixers[at.M_ACTIVE] += 1
         else:

@@ -269,6 +269,7 @@ PLAYER_SOURCE_GAINS = 16  # R four
 PLAYER_CHORD_BEGUN = 20  # W notes of it that have begun
 PLAYER_CHORD_UP = 21  # W whether it goes from the highest to the lowest
 PLAYER_NEXT_UP = 22  # W whether the next does, where strokes alternate
+PLAYER_SPARES = 23  # W whether notes begin without voices of sources that are not heard
 PLAYER_VALUES = 24  # R
 PLAYER_CHANNELS = PLAYER_VALUES + VALUES
 PLAYER_EVENTS = PLAYER_CHANNELS + CHANNELS * CHANNEL_SLOTS

@@ -46,7 +46,7 @@ def _load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, mem
 def _load_weights(
     weights: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int
 ) -> None:
-    """What one of the ears hears modes with, beside `_load`."""
+    """Copies the weights of one ear into the blocks that `_load` fills."""
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number) + (lanes.EARS + 2 * ear) * lanes.LANES
         memory[slot] = memory[slot + lanes.LANES] = 0.0

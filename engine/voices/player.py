@@ -299,6 +299,10 @@ class CompiledPlayer:
         for source, gain in enumerate(gains):
             self.memory[of.PLAYER_SOURCE_GAINS + source] = gain
 
+    def set_spares(self, spares: bool) -> None:
+        """Whether notes begin without voices of sources that are not heard: they cost nothing, and stay silent."""
+        self._counts[of.PLAYER_SPARES] = spares
+
     def source_gain(self, source: int) -> float:
         """As it was set."""
         return float(self.memory[of.PLAYER_SOURCE_GAINS + source])

@@ -171,8 +171,8 @@ class Neck(Playable):
             painter.setPen(Qt.PenStyle.NoPen)
             painter.setBrush(theme.blended(theme.FAINT, theme.RAISED, 0.6))
             rows = len(self._strings)
-            beside = max(1, rows // 3) / rows  # between two strings
-            for share in (beside, 1 - beside) if fret % 12 == 0 else (0.5,):
+            between = max(1, rows // 3) / rows  # two strings
+            for share in (between, 1 - between) if fret % 12 == 0 else (0.5,):
                 painter.drawEllipse(QPointF((x + before) / 2, share * bottom), 4.5, 4.5)
             painter.setPen(QColor(theme.FAINT))
             number = QRectF(before - 10, bottom + 1, x - before + 20, theme.px(_FOOT) - 2)

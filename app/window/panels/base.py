@@ -42,6 +42,7 @@ class Moment:
         playing: whether the playhead moves.
         elapsed_s: since the last call of `show_moment`, by the clock.
         blow: the motion of a drum, while one is played; `take` is None then.
+        audible: whether the note of the motion rings.
     """
 
     take: Take | None
@@ -49,6 +50,7 @@ class Moment:
     playing: bool
     elapsed_s: float
     blow: BlowTake | None = None
+    audible: bool = False
 
     @property
     def sounding(self) -> Sounding | None:
@@ -58,12 +60,12 @@ class Moment:
     def standing(self, choices: Choices) -> tuple[object, ...]:
         """What a picture of the take depends on: while it is equal and nothing plays, the picture is the same."""
         sounding = self.sounding
-        return sounding, sounding.progress if sounding is not None else (), self.position_s, self.playing, choices
+        return sounding, sounding.progress if sounding is not None else (), self.position_s, self.audible, choices
 
     def in_motion(self, choices: Choices) -> bool:
-        """Whether a picture shows the motion, not the state of rest: in Play as long as the playhead moves."""
-        parked = self.position_s > 0 and choices.face != "play"
-        return choices.motion and (self.playing or parked)
+        """Whether a picture shows the motion, not the state of rest: in Play as long as its note rings."""
+        shown = self.audible or choices.face != "play"
+        return choices.motion and (self.playing or (self.position_s > 0 and shown))
 
 
 class Panel(QWidget):

@@ -23,7 +23,7 @@ from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn
 from app.instrument.loud_keys import LoudKeys, on_string
 from app.instrument.strings import pitch_hz_of
 from app.instrument.table import VALUES
-from app.patches.library import read_patch
+from app.patches.library import find_patch, read_patch
 from app.patches.patch import Losses, Patch, Pickup, Polarisations
 from app.patches.tuning import TuningChoice
 from engine.kernels import layout as at
@@ -434,6 +434,26 @@ def test_wheels_and_pedals_can_be_read(shipped: dict[str, Patch], preset: Preset
     assert stage.player.heard_through == patch
 
 
+@pytest.mark.parametrize("name", ["koto", "timpani"])
+def test_without_a_comparison_a_note_has_a_voice_of_the_audible_source_alone(name: str, preset: Preset) -> None:
+    patch, sounds = find_patch(name).patch, {}
+    event = NoteOn(sum(patch.range) // 2, 100)
+    for compared in (False, True):
+        mixer = Mixer(RATE_HZ, limited=False)
+        player = InstrumentPlayer(patch, preset, RATE_HZ, GAINS)
+        mixer.set_player(player.compiled)
+        player.set_gains({"model": 1.0, "truth": 0.0}, compared)
+        player.handle(event)
+        sounds[compared] = mixer.render(4_800)
+        assert mixer.active == (2 if compared else 1)
+        player.set_gains({"model": 0.0, "truth": 1.0}, compared)
+        mixer.render(9_600)
+        assert bool(np.abs(mixer.render(480)).max() > 1e-4) == compared
+        player.handle(event)  # the next note has the other source
+        assert np.abs(mixer.render(4_800)).max() > 1e-4
+    np.testing.assert_array_equal(sounds[False], sounds[True])
+
+
 def test_another_player_begins_as_the_hands_are(shipped: dict[str, Patch], preset: Preset) -> None:
     stage = Compiled(shipped["koto"], preset)
     stage.player.set_gains({"model": 0.25, "truth": 0.0})
@@ -555,3 +575,36 @@ def test_a_pluck_at_a_place_is_none_of_a_key(shipped: dict[str, Patch], preset: 
 )
 def test_an_event_and_its_record(event: NoteOn | NoteOff | Bend | Controller) -> None:
     assert event_of(record_of(event)) == event
+
+
+def test_values_of_the_player_have_the_indices_of_its_layout() -> None:
+    indices = {
+        "knobs.stiffness": of.STIFFNESS,
+        "knobs.decay": of.DECAY,
+        "knobs.brightness_decay": of.BRIGHTNESS_DECAY,
+        "knobs.modulus": of.MODULUS_FACTOR,
+        "knobs.density": of.DENSITY_FACTOR,
+        "knobs.gauge": of.GAUGE,
+        "knobs.tension": of.TENSION_FACTOR,
+        "knobs.length": of.LENGTH_FACTOR,
+        "pluck.position": of.POSITION,
+        "pluck.width": of.WIDTH,
+        "pluck.width_hard": of.WIDTH_HARD,
+        "pluck.softest_mm": of.SOFTEST_MM,
+        "pluck.hardest_mm": of.HARDEST_MM,
+        "pluck.curve": of.CURVE,
+        "damping.release_t60_s": of.RELEASE_S,
+        "bend_semitones": of.BEND_SEMITONES,
+        "noise.onset_db": of.ONSET_DB,
+        "noise.release_db": of.DAMPER_DB,
+        "damping.mute": of.MUTE,
+        "technique.harmonic": of.HARMONIC,
+        "technique.strum_ms": of.STRUM_MS,
+        "technique.strokes": of.STROKES,
+        "technique.tremolo_hz": of.TREMOLO_HZ,
+        "body.mix": of.BODY_MIX,
+        "pickup.points.0": of.POINT,
+        "pickup.points.1": of.POINT + 1,
+    }
+    assert {id: index for index, id in enumerate(VALUES)} == indices
+    assert len(VALUES) == of.VALUES

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from app.shared.parameters import OF_PATCHES
+from app.shared.parameters import OF_CHOICES, OF_PATCHES, Parameter
 
 
 @pytest.mark.parametrize("id", [id for id, each in OF_PATCHES.items() if each.words])
@@ -20,3 +20,10 @@ def test_each_whole_value_has_its_word(id: str) -> None:
 def test_a_value_beyond_the_words_has_the_nearest() -> None:
     parameter = OF_PATCHES["technique.strokes"]
     assert [parameter.shown(value) for value in (-1.0, 0.6, 9.0)] == ["down", "up", "both"]
+
+
+@pytest.mark.parametrize(
+    "parameter", [*OF_PATCHES.values(), *OF_CHOICES.values()], ids=lambda parameter: parameter.id
+)
+def test_help_explains_each_parameter(parameter: Parameter) -> None:
+    assert parameter.tip

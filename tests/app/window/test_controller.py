@@ -407,14 +407,18 @@ def test_only_what_concerns_the_sound_is_reported_to_the_notes(
 ) -> None:
     wait_for_take(qtbot, controller)
     reported: list[object] = []
-    monkeypatch.setattr(controller.performance.notes, "set_monitor", reported.append)
-    monkeypatch.setattr(controller.performance.notes, "listen", reported.append)
+    notes = controller.performance.notes
+    monkeypatch.setattr(notes, "set_monitor", lambda monitor, compared: reported.append((monitor, compared)))
+    monkeypatch.setattr(notes, "listen", reported.append)
     controller.session.update(left_view="waveform", speed=0.1, position=0.4)
     assert reported == []
     controller.session.update(heard="b")
     heard = controller.session.choices
     controller.session.update(listen=0.2)
-    assert reported == [heard, controller.session.choices.ear]
+    ear = controller.session.choices.ear
+    assert reported == [(heard, True), ear]
+    controller.session.update(face="play")
+    assert reported[2:] == [(controller.session.choices, False)]
 
 
 def test_while_nothing_moves_pictures_are_looked_at_less_often(qtbot: QtBot, controller: Controller) -> None:

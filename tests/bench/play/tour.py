@@ -200,6 +200,8 @@ def _judged(stay: _Stay, keys: Sequence[int], part: NDArray[np.float32], tone: N
     """
     first = analysis.onset(part[:, 0], keys[0], RATE_HZ)
     usual = 0 if first is None else first - keys[0]
+    part = part.copy()
+    part[: keys[0] + usual] = 0  # what rang of the instrument before is no sound of this one
     found = analysis.faults(part, keys, usual, RATE_HZ)
     middle_s = (keys[stay.middle] + usual) / RATE_HZ
     levels = levels_db(part[:, 0], [key + usual for key in keys])
