@@ -12,7 +12,7 @@ from engine.effects.impulse import noise_powers, room_for
 from engine.kernels import playing_layout as of
 
 RATE_HZ = 48_000  # of the response; keys are as loud at other rates
-_FINEST_HZ = 0.75  # of the spectrum
+FINEST_HZ = 0.75  # of the spectrum
 
 
 @lru_cache(maxsize=16)
@@ -22,7 +22,7 @@ def curves_of(body: Body) -> NDArray[np.float64]:
     Each value is the mean of the spectrum half-way to its neighbours. The array is remembered, and not to be written.
     """
     response = body.response(RATE_HZ)
-    size = room_for(max(len(response), round(RATE_HZ / _FINEST_HZ)))
+    size = room_for(max(len(response), round(RATE_HZ / FINEST_HZ)))
     spectrum, hz = np.fft.rfft(response, size, axis=0), np.fft.rfftfreq(size, 1 / RATE_HZ)
     rows = np.stack([spectrum.real.mean(1), spectrum.imag.mean(1), (np.abs(spectrum) ** 2).mean(1)])
     edges_hz = of.BODY_LOWEST_HZ * 2 ** ((np.arange(of.BODY_POINTS + 1) - 0.5) / of.BODY_STEPS)

@@ -14,13 +14,13 @@ from xml.sax.saxutils import escape
 import numpy as np
 
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, check_compiler
-from app.export.plugin.image import MAKER, NOISE_UNIT, Image, layout_header
+from app.export.plugin.image import MAKER, NOISE_FRAMES, NOISE_UNIT, Image, layout_header
 from app.export.plugin.objects import STUBS, object_of, run_waiting
 from app.shared.version import program_version
 from engine.effects.room import room_noise
 from engine.whole_file import whole_file
 
-COMMON = ("instrument.c", "responses.c")
+COMMON = ("instrument.c", "effects.c", "responses.c", "thread.c")
 LIBRARY_ENDINGS = {"linux": ".so", "windows": ".dll", "macos": ".dylib"}
 VST3_ENDINGS = {"linux": ".so", "windows": ".vst3"}
 VST3_FOLDERS = {"linux-x64": "x86_64-linux", "linux-arm64": "aarch64-linux", "windows-x64": "x86_64-win"}
@@ -110,8 +110,7 @@ def _images(images: Sequence[Image], folder: Path) -> str:
         (folder / f"image{number}.bin").write_bytes(image.content)
         lines.append(f"_Alignas(64) static const unsigned char image{number}[] = {{")
         lines += [f'#embed "image{number}.bin"', "};"]
-    frames = max(1, *(image.noise_frames for image in images))
-    noise = np.rint(room_noise(frames) / NOISE_UNIT).astype(np.int32)  # finer than single precision
+    noise = np.rint(room_noise(NOISE_FRAMES) / NOISE_UNIT).astype(np.int32)  # finer than single precision
     (folder / "noise.bin").write_bytes(noise.tobytes())
     lines += [
         f"static const union {{ unsigned char bytes[{noise.nbytes}]; int32_t samples[{noise.size}]; }} noise_bytes ="
@@ -135,6 +134,8 @@ def _link(
     command = [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].linker, "-shared", "-O2", "-std=c23"]
     command += ["-fvisibility=hidden", "-fno-sanitize=all", "-s", "-fPIC", "-o", str(library)]
     command += [*(str(folder / name) for name in sources), str(kernels), "-lm"]
+    if target.startswith("linux"):
+        command.append("-lpthread")
     code, said = run_waiting(command, None, waiting)
     if code:
         raise PluginError(f"linking for {target} failed: {said.strip()[-600:]}")

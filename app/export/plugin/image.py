@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from app.export.plugin.parts import AMP, MIXES, driven, drum_keys, losses, mixed, parts_of
+from app.export.plugin.parts import AMP, EFFECTS, drum_keys, effects_there, losses, parts_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.loud_keys import LoudKeys
@@ -24,7 +24,7 @@ from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
 from engine import bounds
-from engine.effects import body, impulse, room
+from engine.effects import body, curves, impulse, room
 from engine.effects.amp import NOMINAL
 from engine.effects.partitions import FADE_S
 from engine.kernels import layout as at
@@ -41,8 +41,9 @@ MOST_PARAMETERS, MOST_TARGETS = 64, 8  # of the shell
 MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
 LARGEST_WHOLE = 2**31 - 1
 NOISE_BYTES = 8  # of a frame
+NOISE_FRAMES = round(bounds.ROOM_T60_S[1] * room.RATE_HZ)  # of the noise of the longest room
 NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
-SOURCE, VOLUME, VALUE, MACRO, MIX, AMPLIFIER = range(6)  # kinds of the shell's parameters
+SOURCE, VOLUME, VALUE, MACRO, EFFECT, AMPLIFIER = range(6)  # kinds of the shell's parameters
 SOURCE_ID = "source"
 SOURCES = ("model", "truth", "difference")
 OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "pluck.curve", "damping.release_t60_s")  # that drums follow
@@ -105,13 +106,13 @@ class _Header(ctypes.Structure):
         ),
         *(
             (name, ctypes.c_double)
-            for name in ("body_s", "body_subsonic_hz", "impulse_hz", "impulse_unit", "room_t60_s")
+            for name in ("body_s", "body_subsonic_hz", "impulse_hz", "impulse_unit", "body_size")
         ),
         *(
             (name, ctypes.c_int64)
             for name in (
                 "losses",
-                "wheel_mix",
+                "wheel_effect",
                 "modes",
                 "most_notes",
             )
@@ -148,7 +149,6 @@ class Image:
         id: of the plug-in, the same for every version of the instrument.
         parameters: in the shell's order.
         left_out: targets of macros that the plug-in cannot move.
-        noise_frames: of the noise that its room needs.
     """
 
     id: str
@@ -156,12 +156,11 @@ class Image:
     content: bytes
     parameters: tuple[Control, ...]
     left_out: tuple[str, ...]
-    noise_frames: int = 0
 
     @property
     def bytes(self) -> int:
-        """With the noise, which instruments of a bank share."""
-        return len(self.content) + self.noise_frames * NOISE_BYTES
+        """With the noise of rooms, which instruments of a bank share."""
+        return len(self.content) + NOISE_FRAMES * NOISE_BYTES
 
 
 def image_of(patch: Patch, preset: Preset) -> Image:
@@ -203,7 +202,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     ids = tuple(id for id, _ in parameters)
     macros, left_out = _macros(patch, ids)
     header.macros, header.macro_count = put(b"".join(bytes(each) for each in macros)), len(macros)
-    header.wheel_mix = MIXES.index(patch.mod_wheel) if patch.mod_wheel in MIXES else -1
+    header.wheel_effect = EFFECTS.index(patch.mod_wheel) if patch.mod_wheel in EFFECTS else -1
     header.wheel_goal = wheel_goal(patch) or 0.0
     header.level = 10 ** (patch.level_db / 20)
 
@@ -215,14 +214,14 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     parts = parts_of(patch)
     if parts.modes is not None:
         header.body, header.body_modes = put(parts.modes.tobytes()) // 8, parts.modes.shape[1]
-        header.body_s, header.body_subsonic_hz = parts.body_s, parts.subsonic_hz
+        header.body_s, header.body_subsonic_hz = parts.seconds, parts.subsonic_hz
     if parts.impulse is not None:  # where it is loud, finer than single precision
         unit = float(np.abs(parts.impulse).max()) / LARGEST_WHOLE
         header.impulse = put(np.rint(parts.impulse / unit).astype(np.int32).tobytes()) // 4
         header.impulse_frames, header.impulse_channels = parts.impulse.shape
         header.impulse_hz, header.impulse_unit = parts.impulse_hz, unit
-    header.room_t60_s = parts.room_t60_s
-    header.longest_s = parts.seconds + MOST_LOUD_S
+    header.body_size = patch.body.size
+    header.longest_s = MOST_LOUD_S
     id = f"org.learned-strings.{''.join(c if c.isalnum() else '-' for c in patch.name.lower())}"
     header.id, header.name, header.maker = id.encode()[:127], _bytes(patch.name, 63), MAKER.encode()
     header.uid[:] = uuid.uuid5(uuid.NAMESPACE_URL, f"urn:{id}").bytes
@@ -234,7 +233,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
         Control(id, each.name.decode(), each.low, each.high, each.standard, tuple(each.words.decode().split()))
         for id, each in parameters
     )
-    return Image(id, patch.name, bytes(whole), tuple(controls), left_out, round(parts.room_t60_s * room.RATE_HZ))
+    return Image(id, patch.name, bytes(whole), tuple(controls), left_out)
 
 
 def _sounds(keys: LoudKeys | DrumKeys, key: int) -> bool:
@@ -293,10 +292,10 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
         if id in (OF_DRUMS if drums else OF_PATCHES):
             parameter = OF_PATCHES[id]
             yield _record(id, VALUE, VALUES.index(id), patch.value(id), parameter, parameter.group.capitalize())
-    for id in mixed(patch):
+    for id in effects_there(patch):
         parameter = OF_PATCHES[id]
-        yield _record(id, MIX, MIXES.index(id), patch.value(id), parameter, parameter.group.capitalize())
-    for id in driven(patch):
+        yield _record(id, EFFECT, EFFECTS.index(id), patch.value(id), parameter, parameter.group.capitalize())
+    for id in AMP:
         parameter = OF_PATCHES[id]
         yield _record(id, AMPLIFIER, AMP.index(id), patch.value(id), parameter, "Amplifier", parameter.name)
 
@@ -329,7 +328,8 @@ def layout_header(version: str) -> str:
         "PLAYER_TAKEN PLAYER_QUEUED PLAYER_REPORTED PLAYER_RATE PLAYER_SOURCE_GAINS PLAYER_VALUES "
         "PLAYER_CHANNELS PLAYER_EVENTS PLAYER_REPORTS PLAYER_VOICES BEGAN REPORT_KIND REPORT_ID "
         "REPORT_CHANNEL REPORT_KEY REPORT_SLOTS PLAYER_WHEEL "
-        "TABLE_DRUMS TABLE_VALUES DRUM_MODES DRUM_HEADER DECAY BRIGHTNESS_DECAY BODY_MIX",
+        "TABLE_DRUMS TABLE_VALUES DRUM_MODES DRUM_HEADER DECAY BRIGHTNESS_DECAY BODY_MIX "
+        "TABLE_BODY BODY_CROSS BODY_STEP BODY_HEADER BODY_POINTS BODY_LOWEST_HZ BODY_STEPS BODY_SLOTS",
     }
     lines = [f'#define LS_VERSION "{version}"']
     for module, names in wanted.items():
@@ -352,6 +352,10 @@ def layout_header(version: str) -> str:
 _RESPONSES = {
     "LOUDNESS_LOW_HZ": impulse.LOUDNESS_HZ[0],
     "LOUDNESS_HIGH_HZ": impulse.LOUDNESS_HZ[1],
+    "CURVES_HZ": curves.RATE_HZ,
+    "CURVES_FINEST_HZ": curves.FINEST_HZ,
+    "BODY_SIZE_HIGHEST": bounds.BODY_SIZE[1],
+    "ROOM_T60_HIGHEST_S": bounds.ROOM_T60_S[1],
     "FADE_SHARE": impulse.FADE_SHARE,
     "LONGEST_IMPULSE_S": bounds.LONGEST_IMPULSE_S,
     "BODY_HIGHEST_HZ": body.HIGHEST_HZ,

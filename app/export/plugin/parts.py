@@ -1,10 +1,10 @@
-"""What macros change of a sound beyond its strings: the mix of body and room, and the decay of drums."""
+"""What parameters change of a sound beyond its strings: body and room, and the decay of drums."""
 
 from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,72 +12,49 @@ from numpy.typing import NDArray
 from app.instrument.drum_keys import DrumKey, DrumKeys
 from app.instrument.effects import effects_of
 from app.patches.patch import Patch
+from engine.bounds import BODY_SIZE
 from engine.effects import BODIES
 from engine.effects.body import HIGHEST_HZ, SUBSONIC, modes_of
 from engine.voices import Ear
 
-MIXES = ("body.mix", "room.mix")
+EFFECTS = ("body.mix", "room.mix", "body.size", "room.t60_s")  # in the shell's order
 AMP = ("amp.drive_db", "amp.tone_db")
 
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What the shell computes responses of body and room from.
+    """What the shell computes responses of the body from, at a size of 1.
 
     Attributes:
-        modes: of the body, (4, modes): Hz, decay in 1/s, amplitudes left and right; None: it has no modes.
-        body_s: how long they ring.
+        modes: (4, modes): Hz, decay in 1/s, amplitudes left and right; None: it has no modes.
+        seconds: how long they ring.
         subsonic_hz: below it the body radiates next to nothing.
         impulse: a body that is a response, at `impulse_hz` (frames, 1 or 2); None: it is not.
-        room_t60_s: 0: there is no room.
     """
 
     modes: NDArray[np.float64] | None = None
-    body_s: float = 0.0
+    seconds: float = 0.0
     subsonic_hz: float = 0.0
     impulse: NDArray[np.float64] | None = None
     impulse_hz: float = 0.0
-    room_t60_s: float = 0.0
-
-    @property
-    def seconds(self) -> float:
-        """How long body and room ring, at most."""
-        heard_s = 0.0 if self.impulse is None else len(self.impulse) / self.impulse_hz
-        return self.body_s + heard_s + self.room_t60_s
-
-
-def driven(patch: Patch) -> tuple[str, ...]:
-    """The parameters of the amplifier, where it is on or a macro drives it."""
-    return AMP if patch.amp.drive_db > 0 or AMP[0] in _moved(patch) else ()
-
-
-def _moved(patch: Patch) -> set[str]:
-    return {target.field for macro in patch.macros for target in macro.targets}
-
-
-def mixed(patch: Patch) -> tuple[str, ...]:
-    """The mixes that are above 0, or that a macro or the modulation wheel moves."""
-    moved = _moved(patch) | {patch.mod_wheel}
-    there = {"body.mix": bool(patch.body.name), "room.mix": True}
-    return tuple(each for each in MIXES if there[each] and (each in moved or patch.value(each) > 0))
 
 
 def parts_of(patch: Patch) -> Parts:
-    """Of a patch's body and room, as far as either is ever heard."""
-    effects = effects_of(patch.with_values(dict.fromkeys(mixed(patch), 1.0)))
-    if effects is None:
-        return Parts()
-    found = Parts(room_t60_s=0.0 if effects.room is None else effects.room.t60_s)
-    body = effects.body
+    """Of a patch's body, as far as it has one."""
+    effects = effects_of(patch.with_value("body.mix", 1.0))
+    body = None if effects is None else effects.body
     if body is None:
-        return found
+        return Parts()
     if body.impulse is not None:
-        hz = body.impulse.rate_hz / body.size
-        return replace(found, impulse=body.impulse.samples, impulse_hz=hz)
+        return Parts(impulse=body.impulse.samples, impulse_hz=body.impulse.rate_hz)
     wood = BODIES[body.name]
-    modes = np.vstack([part.T for part in modes_of(wood, body.size, HIGHEST_HZ)])
-    subsonic_hz = SUBSONIC * wood.lowest[0].frequency_hz / body.size
-    return replace(found, modes=modes, body_s=wood.seconds * body.size, subsonic_hz=subsonic_hz)
+    modes = np.vstack([part.T for part in modes_of(wood, 1.0, HIGHEST_HZ * BODY_SIZE[1])])
+    return Parts(modes, wood.seconds, SUBSONIC * wood.lowest[0].frequency_hz)
+
+
+def effects_there(patch: Patch) -> tuple[str, ...]:
+    """The parameters of body and room that change an instrument's sound."""
+    return tuple(each for each in EFFECTS if patch.body.name or not each.startswith("body."))
 
 
 def drum_keys(patch: Patch) -> Iterator[tuple[int, DrumKey]]:

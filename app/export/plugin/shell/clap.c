@@ -203,16 +203,15 @@ static bool no_requirement(const clap_plugin *plugin) {
   return false;
 }
 
-static bool any_mode(const clap_plugin *plugin, int32_t mode) {
-  (void)plugin;
-  (void)mode;
+static bool set_mode(const clap_plugin *plugin, int32_t mode) {
+  shell_of(plugin)->own.effects.offline = mode == CLAP_RENDER_OFFLINE;
   return true;
 }
 
 static const clap_state state = {state_save, state_load};
 static const clap_latency latency = {latency_get};
 static const clap_tail tail = {tail_get};
-static const clap_render render = {no_requirement, any_mode};
+static const clap_render render = {no_requirement, set_mode};
 
 /* The plug-in */
 

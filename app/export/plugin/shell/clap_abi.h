@@ -173,6 +173,7 @@ typedef struct {
 } clap_state;
 
 typedef struct { uint32_t (*get)(const clap_plugin *); } clap_latency, clap_tail;
+enum { CLAP_RENDER_REALTIME, CLAP_RENDER_OFFLINE };
 typedef struct {
   bool (*has_hard_realtime_requirement)(const clap_plugin *);
   bool (*set)(const clap_plugin *, int32_t mode);

@@ -6,8 +6,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "effects.h"
 #include "layout.h"
-#include "responses.h"
 
 #if defined(__x86_64__)
 #include <xmmintrin.h>
@@ -17,8 +17,6 @@ _Static_assert(sizeof(image) == IMAGE_BYTES && sizeof(parameter) == PARAMETER_BY
 
 int32_t ls_render(void *result, void **error, int64_t mixer, int64_t frames, int64_t out);
 int32_t ls_begin(void *result, void **error, int64_t player);
-int32_t ls_partition(void *result, void **error, int64_t response, int64_t frames, int64_t channels, int64_t memory,
-                     int64_t convolver);
 
 /* Of Numba's library: other strides for the same contiguous memory, rows last, as all of the kernels' is. */
 int numba_attempt_nocopy_reshape(int64_t dimensions, const int64_t *sizes, const int64_t *strides, int64_t new_dimensions,
@@ -51,144 +49,14 @@ void instrument_reset_values(instrument *own) {
 
 uint32_t instrument_latency(void) { return QUANTUM + AHEAD; }
 
-uint32_t instrument_tail(const instrument *own) { return (uint32_t)(own->of->longest_s * own->rate_hz); }
+uint32_t instrument_tail(const instrument *own) {
+  return (uint32_t)((own->of->longest_s + effects_tail_s(own)) * own->rate_hz);
+}
 
 static slot *copied(const image *of, int64_t first, int64_t count) {
   slot *memory = calloc((size_t)count, sizeof(slot));
   if (memory) memcpy(memory, (const slot *)of + first, (size_t)count * sizeof(slot));
   return memory;
-}
-
-/* Body and room: one response for the convolver, mixed of four: nothing, the body, the room, and both in series. */
-
-static double mix_wanted(const instrument *own, int32_t which) {
-  const slot *gains = own->player + PLAYER_SOURCE_GAINS;
-  if (gains[0].real != 0 && gains[1].real != 0) return 0; /* a difference is heard as it is */
-  double mix = own->mix[which];
-  double wheel = own->of->wheel_mix == which ? (double)own->player[PLAYER_WHEEL].whole / 127 : 0;
-  return mix + wheel * (own->of->wheel_goal - mix);
-}
-
-static bool begin_mix(instrument *own) {
-  double body = mix_wanted(own, MIX_BODY), room = mix_wanted(own, MIX_ROOM), power = 0;
-  own->mixing[MIX_BODY] = body, own->mixing[MIX_ROOM] = room;
-  if (body == 0 && room == 0) { /* nothing is changed */
-    own->mixer[M_EFFECTS].whole = 0;
-    return false;
-  }
-  double weights[] = {(1 - body) * (1 - room), body * (1 - room), (1 - body) * room, body * room};
-  const double *powers = own->powers[(body > 0 ? POWER_BODY : 0) + (room > 0 ? POWER_ROOM : 0)];
-  for (int32_t each = 0; each < 16; each++) power += weights[each / 4] * weights[each % 4] * powers[each];
-  for (int32_t each = 0; each < 1 + MIX_PARTS; each++) own->weights[each] = weights[each] / fmax(sqrt(power), 1e-30);
-  own->mixing_at = I_HEADER;
-  return true;
-}
-
-/* Goes on mixing; what is ready is handed to the convolver, which fades to it. */
-static void mix_on(instrument *own, int64_t most) {
-  slot *mixer = own->mixer, *to = own->mixes[mixer[M_EFFECTS_NOW].whole == number_of(own->mixes[0])];
-  int64_t first = own->mixing_at, end = first + most < own->mix_slots ? first + most : own->mix_slots;
-  for (int64_t place = first; place < end; place++) to[place].real = 0;
-  for (int32_t which = 0; which < MIX_PARTS; which++)
-    for (int64_t place = first; own->parts[which] && place < end; place++)
-      to[place].real += own->weights[1 + which] * own->parts[which][place].real;
-  for (int32_t channel = 0; channel < 2; channel++) { /* a single sample at the beginning: the same at all frequencies */
-    int64_t begin = I_HEADER + channel * 2 * (QUANTUM + 1), until = begin + QUANTUM + 1;
-    for (int64_t place = begin > first ? begin : first; place < until && place < end; place++)
-      to[place].real += own->weights[0] / (2 * QUANTUM);
-  }
-  own->mixing_at = end < own->mix_slots ? end : -1;
-  if (own->mixing_at < 0) mixer[M_EFFECTS].whole = number_of(to);
-}
-
-enum { MIXED_A_QUANTUM = 16384 }; /* slots: some ten microseconds */
-
-static void follow_mix(instrument *own) {
-  if (!own->convolver) return;
-  const slot *mixer = own->mixer;
-  if (own->mixing_at >= 0) {
-    mix_on(own, MIXED_A_QUANTUM);
-    return;
-  }
-  bool settled = !mixer[M_EFFECTS_NEXT].whole && mixer[M_EFFECTS].whole == mixer[M_EFFECTS_NOW].whole;
-  if (settled && (mix_wanted(own, MIX_BODY) != own->mixing[MIX_BODY] || mix_wanted(own, MIX_ROOM) != own->mixing[MIX_ROOM]))
-    begin_mix(own);
-}
-
-/* The parts of the response at a rate, in the convolver's form. */
-static bool begin_parts(instrument *own) {
-  responses found;
-  bool made = responses_begin(&found, own->of, own->rate_hz);
-  int64_t frames = 1;
-  for (int32_t which = 0; which < MIX_PARTS; which++)
-    if (found.of[which].frames > frames) frames = found.of[which].frames;
-  own->frames_of_parts = frames;
-  int64_t early_frames = frames < EARLY * QUANTUM ? frames : EARLY * QUANTUM;
-  int64_t early = (early_frames + QUANTUM - 1) / QUANTUM, late = (frames - early_frames + WINDOW - 1) / WINDOW;
-  own->mix_slots = I_HEADER + 2 * 2 * (early * (QUANTUM + 1) + late * (WINDOW + 1));
-  memcpy(own->powers, found.powers, sizeof own->powers);
-  for (int32_t which = 0; made && which < MIX_PARTS; which++) {
-    const sound *each = &found.of[which];
-    if (!each->frames) continue;
-    double *padded = calloc((size_t)(2 * frames), sizeof(double)); /* all of one length, so that all are laid out alike */
-    own->parts[which] = calloc((size_t)own->mix_slots, sizeof(slot));
-    made = padded && own->parts[which];
-    void *error = NULL, *result = NULL;
-    if (made) {
-      memcpy(padded, each->samples, (size_t)each->frames * sizeof(pair));
-      ls_partition(&result, &error, number_of(padded), frames, 2, number_of(own->parts[which]), number_of(own->convolver));
-    }
-    free(padded);
-  }
-  responses_end(&found);
-  own->parts_hz = made ? own->rate_hz : 0;
-  return made;
-}
-
-static void end_parts(instrument *own) {
-  for (int32_t which = 0; which < MIX_PARTS; which++) {
-    free(own->parts[which]);
-    own->parts[which] = NULL;
-  }
-  own->parts_hz = 0;
-}
-
-static bool begin_responses(instrument *own) {
-  const image *of = own->of;
-  own->mixing_at = -1;
-  if (!of->body_modes && !of->impulse_frames && of->room_t60_s == 0) return true;
-  slot *workshop = calloc(C_LATE, sizeof(slot));
-  if (!workshop) return false;
-  for (int64_t k = 0; k < 2 * WINDOW; k++) {
-    double turn = 2 * 3.14159265358979323846 * (double)k / (2 * WINDOW);
-    workshop[C_COSINES + k].real = cos(turn);
-    workshop[C_SINES + k].real = sin(turn);
-  }
-  own->convolver = workshop;
-  if (own->parts_hz != own->rate_hz) {
-    end_parts(own);
-    if (!begin_parts(own)) return false;
-  }
-  int64_t late = (own->frames_of_parts + WINDOW - 1) / WINDOW; /* at least as many as there are */
-  own->convolver = realloc(workshop, (size_t)(C_LATE + (late + 1) * 4 * (WINDOW + 1)) * sizeof(slot));
-  if (!own->convolver) {
-    free(workshop);
-    return false;
-  }
-  slot *c = own->convolver;
-  memset(c + C_LATE, 0, (size_t)((late + 1) * 4 * (WINDOW + 1)) * sizeof(slot));
-  memset(c + C_WORK, 0, 8 * WINDOW * sizeof(slot));
-  c[C_CAPACITY].whole = late + 1;
-  c[C_FADE_WINDOWS].whole = (int64_t)ceil(CONVOLVER_FADE_S * own->rate_hz / WINDOW);
-  c[C_STEP].whole = -1;
-  for (int32_t each = 0; each < 2; each++) {
-    own->mixes[each] = calloc((size_t)own->mix_slots, sizeof(slot));
-    if (!own->mixes[each]) return false;
-    for (int32_t which = 0; which < MIX_PARTS; which++)
-      if (own->parts[which]) memcpy(own->mixes[each], own->parts[which], I_HEADER * sizeof(slot));
-  }
-  own->mixer[M_CONVOLVER].whole = number_of(c);
-  return true;
 }
 
 static slot *pushed(instrument *own, int64_t frame, int64_t kind, int32_t channel, int32_t key, double value) {
@@ -252,9 +120,9 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
     own->player[PLAYER_SOURCE_GAINS].real = source != SOURCE_TRUTH;
     own->player[PLAYER_SOURCE_GAINS + 1].real = source == SOURCE_MODEL ? 0 : source == SOURCE_TRUTH ? 1 : -1;
     follow_amp(own);
-  } else if (of->kind == KIND_MIX) {
-    own->mix[of->index] = value;
-    if (of->index == MIX_BODY) pushed(own, frame, PARAMETER, 0, BODY_MIX, value); /* keys stay as loud */
+  } else if (of->kind == KIND_EFFECT) {
+    own->effects.values[of->index] = value;
+    if (of->index == EFFECT_BODY_MIX) pushed(own, frame, PARAMETER, 0, BODY_MIX, value); /* keys stay as loud */
   } else if (of->kind == KIND_AMP) {
     own->amp[of->index] = value;
     follow_amp(own);
@@ -298,14 +166,13 @@ bool instrument_begin(instrument *own, double rate_hz) {
   ls_begin(&result, &error, number_of(player));
   for (int32_t place = 0; place < of->parameter_count; place++) {
     const parameter *each = &parameters_of(of)[place];
-    if (each->kind == KIND_MIX) own->mix[each->index] = own->values[place];
+    if (each->kind == KIND_EFFECT) own->effects.values[each->index] = own->values[place];
     if (each->kind == KIND_AMP) own->amp[each->index] = own->values[place];
   }
-  if (!begin_responses(own)) {
+  if (!effects_begin(own)) {
     instrument_end(own);
     return false;
   }
-  if (own->convolver && begin_mix(own)) mix_on(own, own->mix_slots);
   own->waiting = 0;
   own->read = 0;
   own->added[0] = own->added[1] = 0;
@@ -321,8 +188,8 @@ bool instrument_begin(instrument *own, double rate_hz) {
 }
 
 void instrument_end(instrument *own) {
-  slot **all[] = {&own->mixer, &own->player, &own->table, &own->model, &own->truth, &own->convolver, &own->scratch,
-                  &own->mixes[0], &own->mixes[1]};
+  effects_end(own);
+  slot **all[] = {&own->mixer, &own->player, &own->table, &own->model, &own->truth, &own->scratch};
   for (size_t place = 0; place < sizeof(all) / sizeof(*all); place++) {
     free(address(*all[place]));
     *all[place] = NULL;
@@ -331,7 +198,7 @@ void instrument_end(instrument *own) {
 
 void instrument_free(instrument *own) {
   instrument_end(own);
-  end_parts(own);
+  effects_free(own);
 }
 
 /* Events */
@@ -458,7 +325,7 @@ void instrument_render(instrument *own, uint32_t frames, float *left, float *rig
     int64_t rendered = own->mixer[M_LEFT].whole, left_over = frames - done;
     if (!rendered) {
       apply_due(own);
-      follow_mix(own);
+      if (effects_follow(own)) pushed(own, 0, PARAMETER, 0, BODY_MIX, own->effects.values[EFFECT_BODY_MIX]);
       rendered = QUANTUM;
     }
     int64_t count = rendered < left_over ? rendered : left_over;
@@ -489,7 +356,8 @@ void instrument_report_ends(instrument *own, note_ended ended, void *context) {
 bool instrument_silent(const instrument *own) {
   const slot *player = own->player;
   bool events = player[PLAYER_PUSHED].whole != player[PLAYER_TAKEN].whole || player[PLAYER_QUEUED].whole;
-  bool echo = own->convolver && own->convolver[C_ACTIVE].whole;
+  const slot *convolver = own->effects.convolver;
+  bool echo = (convolver && convolver[C_ACTIVE].whole) || effects_wait(own);
   return !events && !echo && !own->waiting && !own->mixer[M_ACTIVE].whole && own->mixer[M_PEAK].real < 1e-9;
 }
 

@@ -5,13 +5,16 @@
 #ifndef LS_INSTRUMENT_H
 #define LS_INSTRUMENT_H
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "layout.h"
+
 typedef union { double real; int64_t whole; } slot;
 
-enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_MACRO, KIND_MIX, KIND_AMP };
-enum { MIX_BODY, MIX_ROOM };
+enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_MACRO, KIND_EFFECT, KIND_AMP };
+enum { EFFECT_BODY_MIX, EFFECT_ROOM_MIX, EFFECT_BODY_SIZE, EFFECT_ROOM_T60_S, EFFECTS };
 enum { AMP_DRIVE_DB, AMP_TONE_DB };
 enum { PART_BODY, PART_ROOM, PART_BOTH, MIX_PARTS };
 enum { POWER_BODY = 1, POWER_ROOM = 2, POWER_CASES = 4 }; /* which of both are heard: a sum of these */
@@ -32,11 +35,12 @@ typedef struct {
   int64_t table, table_slots, model, model_slots, truth, truth_slots; /* in slots from the beginning */
   int64_t parameters, parameter_count, macros, macro_count;           /* in bytes */
   int64_t taps;
-  int64_t body, body_modes;                                          /* Hz, 1/s, left, right: each of all modes */
-  int64_t impulse, impulse_frames, impulse_channels;                 /* a body that is a response: 32-bit whole numbers */
-  double body_s, body_subsonic_hz, impulse_hz, impulse_unit, room_t60_s; /* no time: no room */
+  int64_t body, body_modes;                          /* Hz, 1/s, left, right: each of all modes, at a size of 1 */
+  int64_t impulse, impulse_frames, impulse_channels; /* a body that is a response: 32-bit whole numbers */
+  double body_s, body_subsonic_hz, impulse_hz, impulse_unit; /* at a size of 1 */
+  double body_size;                                  /* of the instrument itself */
   int64_t losses;              /* of drums: of each key the slot of two rows, 1/s that knobs of decay add at 1; 0: strings */
-  int64_t wheel_mix;           /* which mix the modulation wheel moves, -1: none */
+  int64_t wheel_effect;        /* which of EFFECTS the modulation wheel moves, -1: none */
   int64_t modes, most_notes;
   double longest_s, wheel_goal, level;
   char id[128], name[64], description[512], maker[64], features[128];
@@ -45,15 +49,33 @@ typedef struct {
 
 typedef struct { int64_t frame; int32_t parameter; double value; } change;
 
+typedef struct { /* responses of body, room and both at a rate, a size and a time, as the convolver reads them */
+  double hz, size, t60_s;
+  slot *parts[MIX_PARTS];
+  int64_t slots;                  /* of each */
+  double powers[POWER_CASES][16]; /* of `responses` */
+  double curves[BODY_SLOTS];      /* what the body does to the loudness of keys */
+} prepared;
+
+typedef struct {
+  double values[EFFECTS];         /* the latest */
+  slot *convolver, *workshop;     /* of the audio thread, and of the other one */
+  prepared *heard;                /* what is mixed from; it is kept from rate to rate */
+  slot *mixes[2];                 /* what is heard, and the next */
+  int64_t most_frames, mixing_at; /* of a response; the next slot that is mixed, -1: none is */
+  double mixing[2], weights[1 + MIX_PARTS]; /* of the latest mix */
+  void *thread;                   /* it computes a response of `size` and `t60_s` whenever another one is asked for */
+  _Atomic double size, t60_s;
+  atomic_uint asked, answered;
+  _Atomic(prepared *) made, spent; /* to the audio thread, and back */
+  atomic_bool ends, offline;       /* offline: the sound waits for the thread */
+} effects;
+
 typedef struct {
   const image *of;
   double rate_hz;
-  slot *mixer, *player, *table, *model, *truth, *convolver, *scratch;
-  slot *parts[MIX_PARTS], *mixes[2]; /* responses as the convolver reads them: of body, room and both; of their mixes */
-  double parts_hz;                   /* of the parts, which are kept from rate to rate; 0: there are none */
-  double powers[POWER_CASES][16];    /* of `responses` */
-  int64_t frames_of_parts, mix_slots, mixing_at; /* the next slot of the response that is being mixed, -1: none is */
-  double mix[2], mixing[2], weights[1 + MIX_PARTS]; /* of body and room: the latest, and those of that one */
+  slot *mixer, *player, *table, *model, *truth, *scratch;
+  effects effects;
   double amp[2];      /* drive and tone in dB; no drive: there is no amplifier */
   double values[MOST_PARAMETERS];
   double added[2]; /* knobs of decay and of brightness decay beyond the instrument's own, which drums follow */

@@ -245,7 +245,7 @@ static bool in_series(circle *with, const sound *one, const sound *two, sound *b
 
 enum { RUN = 128 }; /* frames between which a mode is computed from the one before */
 
-static bool body_of(circle *with, const image *of, double rate_hz, sound *own) {
+static bool body_of(circle *with, const image *of, double rate_hz, double size, sound *own) {
   if (of->impulse_frames) {
     const int32_t *stored = (const int32_t *)of + of->impulse;
     int64_t frames = of->impulse_frames, channels = of->impulse_channels;
@@ -253,7 +253,7 @@ static bool body_of(circle *with, const image *of, double rate_hz, sound *own) {
     if (!own->samples) return false;
     for (int64_t frame = 0; frame < frames; frame++)
       own->samples[frame] = (pair){of->impulse_unit * stored[frame * channels], of->impulse_unit * stored[frame * channels + channels - 1]};
-    if (!resample(with, own, of->impulse_hz, rate_hz)) return false;
+    if (!resample(with, own, of->impulse_hz / size, rate_hz)) return false;
     int64_t longest = (int64_t)(LONGEST_IMPULSE_S * rate_hz);
     if (own->frames > longest) {
       own->frames = longest;
@@ -263,23 +263,23 @@ static bool body_of(circle *with, const image *of, double rate_hz, sound *own) {
   }
   const double *hz = (const double *)of + of->body, *decay = hz + of->body_modes, *left = decay + of->body_modes, *right = left + of->body_modes;
   double highest_hz = fmin(BODY_HIGHEST_HZ, 0.45 * rate_hz);
-  int64_t runs = (int64_t)ceil(of->body_s * rate_hz / RUN);
+  int64_t runs = (int64_t)ceil(of->body_s * size * rate_hz / RUN);
   *own = (sound){runs * RUN, calloc((size_t)(runs * RUN), sizeof(pair))};
   if (!own->samples) return false;
   for (int64_t mode = 0; mode < of->body_modes; mode++) {
-    if (hz[mode] >= highest_hz) continue;
-    double omega = 2 * PI * hz[mode], fall = exp(-decay[mode] / rate_hz);
+    if (hz[mode] / size >= highest_hz) continue;
+    double omega = 2 * PI * hz[mode] / size, sigma = decay[mode] / size, fall = exp(-sigma / rate_hz);
     pair step = {fall * cos(omega / rate_hz), fall * sin(omega / rate_hz)};
     for (int64_t run = 0; run < runs; run++) {
-      double time_s = (double)run * RUN / rate_hz, level = exp(-decay[mode] * time_s);
+      double time_s = (double)run * RUN / rate_hz, level = exp(-sigma * time_s);
       pair now = {level * cos(omega * time_s), level * sin(omega * time_s)};
       for (pair *each = own->samples + run * RUN, *end = each + RUN; each < end; each++) {
-        each->left += left[mode] * now.right, each->right += right[mode] * now.right;
+        each->left += left[mode] / size * now.right, each->right += right[mode] / size * now.right;
         now = times(now, step);
       }
     }
   }
-  if (!without_subsonic(with, own, of->body_subsonic_hz, rate_hz)) return false;
+  if (!without_subsonic(with, own, of->body_subsonic_hz / size, rate_hz)) return false;
   fade(own);
   return as_loud(with, own, rate_hz);
 }
@@ -395,21 +395,20 @@ static bool room_of(circle *with, double t60_s, double rate_hz, sound *own) {
 
 /* Both */
 
-bool responses_begin(responses *own, const image *of, double rate_hz) {
+bool responses_begin(responses *own, const image *of, double rate_hz, double size, double t60_s) {
   memset(own, 0, sizeof *own);
   circle with = {0, NULL};
-  bool body = of->body_modes || of->impulse_frames, room = of->room_t60_s > 0, made = true;
-  if (body) made = body_of(&with, of, rate_hz, &own->of[PART_BODY]);
-  if (made && room) made = room_of(&with, of->room_t60_s, rate_hz, &own->of[PART_ROOM]);
-  if (made && body && room) made = in_series(&with, &own->of[PART_BODY], &own->of[PART_ROOM], &own->of[PART_BOTH]);
+  bool body = of->body_modes || of->impulse_frames, made = true;
+  if (body) made = body_of(&with, of, rate_hz, size, &own->of[PART_BODY]);
+  if (made) made = room_of(&with, t60_s, rate_hz, &own->of[PART_ROOM]);
+  if (made && body) made = in_series(&with, &own->of[PART_BODY], &own->of[PART_ROOM], &own->of[PART_BOTH]);
   pair one = {1, 1};
   sound nothing = {1, &one};
   const sound *all[] = {&nothing, &own->of[PART_BODY], &own->of[PART_ROOM], &own->of[PART_BOTH]};
   const int32_t longest[] = {0, PART_BODY, PART_ROOM, PART_BOTH}; /* frequencies depend on the length */
   for (int32_t which = 1; made && which < POWER_CASES; which++) {
-    bool there = (which & POWER_BODY ? body : true) && (which & POWER_ROOM ? room : true);
     int64_t frames = own->of[longest[which]].frames;
-    if (!there) continue;
+    if (which & POWER_BODY && !body) continue;
     const sound silent = {0, NULL}, *heard[] = {all[0], which & POWER_BODY ? all[1] : &silent, which & POWER_ROOM ? all[2] : &silent, which == 3 ? all[3] : &silent};
     made = noise_powers(&with, heard, 1 + MIX_PARTS, frames, rate_hz, own->powers[which]);
   }
@@ -422,4 +421,53 @@ void responses_end(responses *own) {
     free(own->of[which].samples);
     own->of[which] = (sound){0, NULL};
   }
+}
+
+/* curves.py */
+
+/* The integral up to a place between multiples of a step, from those up to the multiples. */
+static double area_at(const double *areas, int64_t count, double place) {
+  if (place >= (double)(count - 1)) return areas[count - 1];
+  int64_t before = (int64_t)place;
+  return areas[before] + (place - (double)before) * (areas[before + 1] - areas[before]);
+}
+
+bool responses_curves(const image *of, double body_size, double *curves) {
+  circle with = {0, NULL};
+  sound body = {0, NULL};
+  bool made = body_of(&with, of, CURVES_HZ, body_size, &body);
+  int64_t least = (int64_t)rint(CURVES_HZ / CURVES_FINEST_HZ), size = room_for(body.frames > least ? body.frames : least), count = size / 2 + 1;
+  pair *z = made ? spectrum(&with, body.samples, body.frames, size) : NULL, one = {1, 1};
+  double *areas = calloc((size_t)(3 * count), sizeof(double)), step_hz = (double)CURVES_HZ / (double)size, last[3] = {0}, powers[4];
+  const sound nothing = {1, &one}, *both[] = {&nothing, &body};
+  made = z && areas && noise_powers(&with, both, 2, body.frames, CURVES_HZ, powers);
+  for (int64_t k = 0; made && k < count; k++) {
+    pair a = z[k], b = z[(size - k) % size];
+    pair left = {0.5 * (a.left + b.left), 0.5 * (a.right - b.right)}, right = {0.5 * (a.right + b.right), 0.5 * (b.left - a.left)};
+    double rows[] = {0.5 * (left.left + right.left), 0.5 * (left.right + right.right),
+                     0.5 * (left.left * left.left + left.right * left.right + right.left * right.left + right.right * right.right)};
+    for (int32_t row = 0; row < 3; row++) {
+      if (k) areas[row * count + k] = areas[row * count + k - 1] + 0.5 * (rows[row] + last[row]) * step_hz;
+      last[row] = rows[row];
+    }
+  }
+  if (made) {
+    curves[BODY_CROSS] = powers[1];
+    curves[BODY_STEP] = 0;
+    double sum = 0;
+    for (int64_t frame = 0; frame < body.frames; frame++) curves[BODY_STEP] = fmax(curves[BODY_STEP], fabs(sum += body.samples[frame].left));
+  }
+  for (int32_t point = 0; made && point < BODY_POINTS; point++) {
+    double low_hz = BODY_LOWEST_HZ * exp2((point - 0.5) / BODY_STEPS), high_hz = BODY_LOWEST_HZ * exp2((point + 0.5) / BODY_STEPS);
+    for (int32_t row = 0; row < 3; row++) {
+      const double *of_row = areas + row * count;
+      curves[BODY_HEADER + row * BODY_POINTS + point] =
+          (area_at(of_row, count, high_hz / step_hz) - area_at(of_row, count, low_hz / step_hz)) / (high_hz - low_hz);
+    }
+  }
+  free(z);
+  free(areas);
+  free(body.samples);
+  free(with.turns);
+  return made;
 }

@@ -14,7 +14,10 @@ typedef struct {
 } responses;
 
 /* False where there is no memory. What it gives is freed by the other in any case. */
-bool responses_begin(responses *, const image *, double rate_hz);
+bool responses_begin(responses *, const image *, double rate_hz, double size, double t60_s);
 void responses_end(responses *);
+
+/* What a body of a size does to the loudness of keys (BODY_SLOTS), as engine/effects/curves.py. False: no memory. */
+bool responses_curves(const image *, double size, double *curves);
 
 #endif

@@ -278,6 +278,8 @@ static int32_t setup(void *interface, vst_setup *wanted) {
   if (wanted->sample_size || !(wanted->rate_hz >= 1000 && wanted->rate_hz <= 1e6)) return VST_FALSE;
   own->rate_hz = wanted->rate_hz;
   own->most_frames = wanted->most_frames;
+  const clap_render *render = own->plugin->get_extension(own->plugin, "clap.render");
+  render->set(own->plugin, wanted->mode == VST_OFFLINE ? CLAP_RENDER_OFFLINE : CLAP_RENDER_REALTIME);
   return VST_OK;
 }
 
@@ -289,7 +291,8 @@ static int32_t set_processing(void *interface, uint8_t state) {
 
 static uint32_t tail(void *interface) {
   shell *own = shell_of(interface);
-  return (uint32_t)(own->of->longest_s * own->rate_hz);
+  const clap_tail *of = own->plugin->get_extension(own->plugin, "clap.tail");
+  return own->active ? of->get(own->plugin) : 0;
 }
 
 static const known_note *note_with_id(const shell *own, int32_t note) {

@@ -112,6 +112,7 @@ typedef struct {
 AT(vst_component, get_state, 104);
 
 /* Processor */
+enum { VST_REALTIME, VST_PREFETCH, VST_OFFLINE };
 typedef struct { int32_t mode, sample_size, most_frames; double rate_hz; } vst_setup;
 AT(vst_setup, rate_hz, 16);
 typedef struct { int32_t channels; uint64_t silence; float **data; } vst_buffers;

@@ -17,7 +17,7 @@ void *__libc_calloc(size_t, size_t);
 void *__libc_realloc(void *, size_t);
 void __libc_free(void *);
 
-static int inside;
+static _Thread_local int inside; /* of the audio thread; others may allocate */
 static long allocations;
 
 void *malloc(size_t size) {

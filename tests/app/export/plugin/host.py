@@ -177,6 +177,10 @@ class Frames(c.Structure):
     _fields_ = (("get", c.CFUNCTYPE(c.c_uint32, P)),)
 
 
+class Render(c.Structure):
+    _fields_ = (("required", c.CFUNCTYPE(c.c_bool, P)), ("set", c.CFUNCTYPE(c.c_bool, P, c.c_int32)))
+
+
 @dataclass(frozen=True)
 class Event:
     """An event at a frame of the whole piece; `content` is one of the structures above."""
@@ -317,6 +321,10 @@ class Instance:
     def deactivate(self) -> None:
         self._own.stop_processing(self.at)
         self._own.deactivate(self.at)
+
+    def go_offline(self) -> None:
+        """As hosts do before a bounce."""
+        assert self.extension("clap.render", Render).set(self.at, 1)  # type: ignore[attr-defined]
 
     def reset(self) -> None:
         self._own.reset(self.at)

@@ -269,6 +269,29 @@ def test_body_and_room_follow_macros_and_the_wheel_while_it_plays(bank: Library)
     assert difference_db(sound, rendered(harp, rate_hz)) > -60
 
 
+def test_size_of_body_and_time_of_room_are_followed_while_it_plays(bank: Library, images: list[Image]) -> None:
+    rate_hz, after = 48_000, slice(round(0.9 * 48_000), None)
+    patch = patch_of(MOVED)
+    (image,) = (each for each in images if each.name == patch.name)
+    ids = dict(zip((each.id for each in image.parameters), instance_of(bank, MOVED).ids, strict=True))
+    turned = patch.with_values({"body.size": 1.3, "room.t60_s": 2.2, "room.mix": 0.4})
+    values = {ids[id]: turned.value(id) for id in ("body.size", "room.t60_s", "room.mix")}
+
+    moved = [param(round(0.3 * rate_hz), id, value) for id, value in values.items()]
+    swept = [param(480 * step, ids["body.size"], 0.6 + 0.02 * step) for step in range(100)]
+
+    def bounced(more: list[Event]) -> NDArray[np.float32]:
+        instance = instance_of(bank, MOVED)
+        instance.go_offline()
+        return played(instance, patch, rate_hz, more=tuple(more))
+
+    sound = bounced(moved)
+    wanted = rendered(patch, rate_hz, more=(TimedEvent(0.3, PatchTurned(turned)),))
+    assert difference_db(sound[after], wanted[after]) < EQUAL_DB
+    assert difference_db(sound, rendered(patch, rate_hz)) > -40
+    assert np.array_equal(bounced(swept), bounced(swept))  # the sound waits for the thread
+
+
 def test_registered_parameter_0_sets_the_range_of_bends(bank: Library) -> None:
     patch = patch_of("electric_bass")
     wide = [Controller(101, 0), Controller(100, 0), Controller(6, 12)]
