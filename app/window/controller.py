@@ -49,9 +49,8 @@ from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports
 from app.window.instruments import Instruments
 from app.window.main_window import PLAYED_KEYS, MainWindow
-from app.window.panels import StringPanel
+from app.window.panels import Panel, StringPanel
 from app.window.panels.drum import DrumPanel
-from app.window.panels.rack import fill
 from app.window.patch_desk import TAKEN_FILES, PatchDesk
 from app.window.performance import Performance
 from app.window.preset_desk import PresetDesk
@@ -121,9 +120,10 @@ class Controller(QObject):
         self.presets = PresetDesk(
             self.session, self.library, window.presets, preset_browser(window), settings.favourites
         )
-        self.panels = fill(window, self.session, self.library)
-        self.string = next(panel for panel in self.panels if isinstance(panel, StringPanel))
-        self.drum = next(panel for panel in self.panels if isinstance(panel, DrumPanel))
+        self.string, self.drum = StringPanel(self.session, self.library), DrumPanel(self.session, self.library)
+        window.show_stage(self.string, self.drum)
+        self.string.view.setFocus()
+        self.panels: list[Panel] = [self.string, self.drum]  # and those of the decks from the Lab on
         self.performance = Performance(window, self.session, self.library, self.sound, self.panels)
         window.order_tabs()
         self._connect()
@@ -199,10 +199,7 @@ class Controller(QObject):
     def _connect(self) -> None:
         window, _session = self.window, self.session
         for panel in self.panels:
-            panel.seek_asked.connect(self.performance.seek)
-            panel.pluck_asked.connect(self.pluck)
-            panel.strike_asked.connect(self.strike)
-            panel.reported.connect(window.notices.report)
+            self._connect_panel(panel)
         self.presets.browser.played.connect(lambda name: self.pluck())
         self.presets.reported.connect(window.notices.report)
         window.file_dropped.connect(lambda path: self.take_file(Path(path)))
@@ -212,6 +209,26 @@ class Controller(QObject):
         window.transport.play_asked.connect(self.play_or_stop)
         window.pluck_asked.connect(self.pluck)
         window.face_asked.connect(self.show_face)
+
+    def _connect_panel(self, panel: Panel) -> None:
+        panel.seek_asked.connect(self.performance.seek)
+        panel.pluck_asked.connect(self.pluck)
+        panel.strike_asked.connect(self.strike)
+        panel.reported.connect(self.window.notices.report)
+
+    def _fill_decks(self) -> None:
+        """Makes the views of the Lab when they are first needed: they and their plots take a fifth of a second."""
+        if any(not panel.on_stage for panel in self.panels):
+            return
+        from app.window.panels.rack import decks
+
+        for panel in decks(self.window, self.session, self.library):
+            self.panels.append(panel)
+            self._connect_panel(panel)
+            panel.choices_changed(frozenset(OBSERVED))
+            self.performance.catch_up(panel)
+        self._show_kind()
+        self.window.order_tabs()
 
     def show_face(self, face: Face) -> None:
         """Play returns to the instrument, which a preset of the Lab may have replaced."""
@@ -338,6 +355,7 @@ class Controller(QObject):
 
     def show_help(self) -> None:
         if self._help is None:
+            self._fill_decks()
             views = [(panel.title, panel.help) for panel in self.panels if panel.help]
             keys = [*PLAYED_KEYS, *((entry.key_name, entry.does) for entry in ENTRIES.values() if entry.key)]
             self._help = HelpDialog(keys, views, log_file(), self.window)
@@ -448,6 +466,8 @@ class Controller(QObject):
         if "preset" in names:
             self.presets.choice_changed()
         if "face" in names:
+            if choices.face == "lab":
+                self._fill_decks()
             window.show_face(choices.face)
         window.left.show_key(choices.left_view)
         window.right.show_key(choices.right_view)

@@ -92,10 +92,8 @@ class _Start(QObject):
         try:
             if self.failure is not None:
                 raise self.failure
-            from app.views.plots.plots import dress_plots
             from app.window.controller import Controller
 
-            dress_plots()
             self._controller = Controller(self._window, self._settings, self._path)
             self._collector = collect_between_events()
         except Exception as error:

@@ -139,6 +139,15 @@ class Performance(QObject):
         blow, of = (self._blows.take, self._blows) if self._of_drums else (None, self._shown)
         return Moment(self.take, self.position_s, self.moving, elapsed_s, blow, of.audible)
 
+    def catch_up(self, panel: Panel) -> None:
+        """Shows a panel that was made late the motion that it has missed."""
+        if self._of_drums and self._blows.take is not None:
+            panel.blow_started(self._blows.take)
+        elif self.take is not None:
+            panel.take_started(self.take)
+            if self._shown.errors is not None:
+                panel.take_finished(self.take, self._shown.errors)
+
     # Intents
 
     def pluck(self) -> None:
@@ -317,9 +326,9 @@ class Performance(QObject):
         self._window.show_growth("")
 
     def _take_finished(self, take: Take, errors: ErrorSums) -> None:
-        if take is not self.take or self._shown.finished:
+        if take is not self.take or self._shown.errors is not None:
             return
-        self._shown.finished = True
+        self._shown.errors = errors
         for panel in self._panels:
             panel.take_finished(take, errors)
         if reason := why_ran_away(take):

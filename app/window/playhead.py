@@ -8,6 +8,7 @@ from typing import Generic, TypeVar
 from app.playing.key_note import KeyNote
 from app.playing.note import Note
 from app.rendering import BlowTake, Take
+from engine.metrics import ErrorSums
 
 Shown = TypeVar("Shown", Take, BlowTake)
 
@@ -17,13 +18,13 @@ class Playhead(Generic[Shown]):
     """A motion and the note whose time it follows; without a note it stands at `parked_s`.
 
     Attributes:
-        finished: whether the views have its errors.
+        errors: of the whole motion; None: it is not complete.
     """
 
     take: Shown | None = None
     note: Note | KeyNote | None = None
     parked_s: float = 0.0
-    finished: bool = False
+    errors: ErrorSums | None = None
 
     def position_s(self, latency_s: float) -> float:
         """The time in the motion that is heard now, or where it stands; `latency_s`: of the output."""

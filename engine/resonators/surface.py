@@ -12,8 +12,8 @@ from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
+import scipy  # whose special functions are loaded by the first circle: a quarter of a second
 from numpy.typing import NDArray
-from scipy.special import j1, jn_zeros, jv
 
 from engine.resonators.base import Array
 
@@ -56,7 +56,7 @@ def _zeros(m: int, count: int) -> Array:
 
 @lru_cache(maxsize=1024)
 def _known_zeros(m: int, count: int) -> Array:
-    found: Array = jn_zeros(m, count)
+    found: Array = scipy.special.jn_zeros(m, count)
     return found
 
 
@@ -95,7 +95,7 @@ class Circle:
         r, angle = np.hypot(places[:, 0], places[:, 1]), np.arctan2(places[:, 1], places[:, 0])
         z = self.wavenumber[:, None] * self.radius_m
         distances, place = np.unique(r, return_inverse=True)  # a grid has few: Bessel functions take most of the time
-        radial = (jv(self.m[:, None], z * distances) * self._height[:, None])[:, place]
+        radial = (scipy.special.jv(self.m[:, None], z * distances) * self._height[:, None])[:, place]
         found: Array = np.where(r <= 1, radial * self._turned(angle), 0.0)
         return found
 
@@ -123,7 +123,7 @@ class Circle:
     @cached_property
     def _slope(self) -> Array:
         """J_m'(κa), which is -J_{m+1} at a zero of J_m."""
-        slope: Array = -jv(self.m + 1, self.wavenumber * self.radius_m)
+        slope: Array = -scipy.special.jv(self.m + 1, self.wavenumber * self.radius_m)
         return slope
 
     @property
@@ -141,7 +141,7 @@ class Circle:
         z, s, m = self.wavenumber[:, None] * self.radius_m, wavenumbers * self.radius_m, self.m[:, None]
         slope, apart = self._slope[:, None], z**2 - s**2
         near = np.abs(z - s) < 1e-6 * z
-        found: Array = np.where(near, slope**2 / 2, -z * slope * jv(m, s) / np.where(near, 1.0, apart))
+        found: Array = np.where(near, slope**2 / 2, -z * slope * scipy.special.jv(m, s) / np.where(near, 1.0, apart))
         return found
 
 
@@ -225,5 +225,5 @@ def spread(wavenumber: Array, radius_m: float) -> Array:
     """The mean of a mode over a disc, of its value at the centre: 2 J₁(κR)/κR, as for any solution of -∇²φ = κ²φ."""
     turn = wavenumber * radius_m
     small = turn < 1e-6
-    found: Array = np.where(small, 1.0, 2 * j1(turn) / np.where(small, 1.0, turn))
+    found: Array = np.where(small, 1.0, 2 * scipy.special.j1(turn) / np.where(small, 1.0, turn))
     return found

@@ -18,7 +18,6 @@ from app.audio.devices import AudioDevice
 from app.audio.problems import no_device
 from app.audio.sound import Sound
 from app.shared.heap import collect_anywhere, collect_between_events, return_large_blocks
-from app.views.plots.plots import dress_plots
 from app.views.theme import apply_theme
 from app.window.controller import Controller, ProblemListener
 from app.window.main import load_engine
@@ -89,7 +88,6 @@ def opened(
     return_large_blocks()
     load_engine()
     apply_theme(application, settings.look.theme)
-    dress_plots()
     window = MainWindow()
     window.resize(*size)
     with tempfile.TemporaryDirectory() as folder:
