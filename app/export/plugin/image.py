@@ -57,6 +57,7 @@ class _Parameter(ctypes.Structure):
         ("low", ctypes.c_double),
         ("high", ctypes.c_double),
         ("standard", ctypes.c_double),
+        ("curve", ctypes.c_double),
         ("name", ctypes.c_char * 64),
         ("module", ctypes.c_char * 64),
         ("unit", ctypes.c_char * 16),
@@ -268,6 +269,7 @@ def _record(
         low,
         high,
         value,
+        parameter.curve,
         _bytes(label or parameter.name, 63),
         _bytes(module, 63),
         _bytes(unit, 15),
@@ -282,7 +284,7 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     yield (
         SOURCE_ID,
         _Parameter(
-            _id(SOURCE_ID), SOURCE, 0, len(SOURCES), 0.0, 2.0, 0.0, b"Source", b"", b"", " ".join(SOURCES).encode()
+            _id(SOURCE_ID), SOURCE, 0, len(SOURCES), 0.0, 2.0, 0.0, 1.0, b"Source", b"", b"", " ".join(SOURCES).encode()
         ),
     )
     yield _record("volume_db", VOLUME, 0, 0.0, OF_CHOICES["volume_db"], "")
