@@ -349,7 +349,7 @@ class InstrumentPlayer:
         return self.compiled.ringing()
 
     def slid(self, note: Ringing) -> float:
-        """How many semitones above its key a note's string is stopped now: while it slides, or is bent by its length."""
+        """How many semitones above its key a note's string is stopped now, as while it slides."""
         keys = self._loud
         if note.length_m is None or isinstance(keys, DrumKeys):
             return 0.0

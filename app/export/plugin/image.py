@@ -284,7 +284,18 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     yield (
         SOURCE_ID,
         _Parameter(
-            _id(SOURCE_ID), SOURCE, 0, len(SOURCES), 0.0, 2.0, 0.0, 1.0, b"Source", b"", b"", " ".join(SOURCES).encode()
+            _id(SOURCE_ID),
+            SOURCE,
+            0,
+            len(SOURCES),
+            0.0,
+            2.0,
+            0.0,
+            1.0,
+            b"Source",
+            b"",
+            b"",
+            " ".join(SOURCES).encode(),
         ),
     )
     yield _record("volume_db", VOLUME, 0, 0.0, OF_CHOICES["volume_db"], "")
