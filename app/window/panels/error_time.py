@@ -189,7 +189,7 @@ def percent(error: float) -> str:
 
 
 def _decades(low: float, high: float) -> list[tuple[float, str]]:
-    return [(d, f"{100 * 10.0**d:g} %") for d in range(math.ceil(low), math.floor(high) + 1)]
+    return [(d, f"{100 * 10.0**d:.{max(0, -2 - d)}f} %") for d in range(math.ceil(low), math.floor(high) + 1)]
 
 
 def _between_decades(low: float, high: float) -> list[float]:
