@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
@@ -45,11 +45,15 @@ class ErrorSums:
     """Sums per frame and per trajectory over any number of blocks: a long validation never lies in memory at once.
 
     A prediction that is not a number is an infinite error.
+
+    Args:
+        edges: frames between which trajectories are also summed apart, for `standard_error`.
     """
 
-    def __init__(self, steps: int) -> None:
+    def __init__(self, steps: int, edges: Iterable[int] = ()) -> None:
         self._frames = np.zeros((4, steps))
-        self._trajectories = np.zeros((4, 0))
+        self._edges = sorted({0, steps, *(edge for edge in edges if 0 < edge < steps)})
+        self._spans = np.zeros((4, 0, len(self._edges) - 1))  # of trajectories, between edges
         self._row = 0  # of the last block
 
     def add(self, predicted: Motion, truth: Motion, first: int = 0, row: int | None = None) -> None:
@@ -69,11 +73,12 @@ class ErrorSums:
         sums[::2][np.isnan(sums[::2])] = math.inf
         self._frames[:, first : first + truth.shape[1]] += sums.sum(1)
         if row is None:
-            row = self._row if first else self._trajectories.shape[1]
+            row = self._row if first else self._spans.shape[1]
         self._row, end = row, row + len(truth)
-        if (missing := end - self._trajectories.shape[1]) > 0:
-            self._trajectories = np.concatenate([self._trajectories, np.zeros((4, missing))], axis=1)
-        self._trajectories[:, row:end] += sums.sum(2)
+        if (missing := end - self._spans.shape[1]) > 0:
+            self._spans = np.concatenate([self._spans, np.zeros((4, missing, len(self._edges) - 1))], axis=1)
+        for span, (start, stop) in enumerate(pairwise(self._edges)):
+            self._spans[:, row:end, span] += sums[:, :, max(start - first, 0) : max(stop - first, 0)].sum(2)
 
     def total(self, steps: int | None = None) -> RelativeError:
         """The errors of the first `steps` frames, of all by default.
@@ -99,6 +104,11 @@ class ErrorSums:
         """Relative MSE and MAE of each frame over all trajectories, (steps,) each (the paper's Fig. 4)."""
         return _ratios(self._frames)
 
+    @property
+    def _trajectories(self) -> NDArray[np.float64]:
+        """(4, trajectories) over all frames."""
+        return np.asarray(self._spans.sum(2))
+
     def per_trajectory(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Relative MSE and MAE of each trajectory over all frames, (trajectories,) each."""
         return _ratios(self._trajectories)
@@ -109,18 +119,25 @@ class ErrorSums:
             spreads = [float(own.std()) for own in self.per_trajectory()]
         return RelativeError(*(spread if math.isfinite(spread) else math.inf for spread in spreads))
 
-    def standard_error(self, resamples: int = RESAMPLES) -> RelativeError:
-        """How far `total` would deviate with other trajectories of the same draw: the bootstrap's standard deviation.
+    def standard_error(self, resamples: int = RESAMPLES, first: int = 0, last: int | None = None) -> RelativeError:
+        """The bootstrap's standard deviation of the errors of some frames, by default all, over trajectories.
 
         As many trajectories as there are, drawn with replacement, and the ratios of their sums (Efron, Tibshirani, An
         Introduction to the Bootstrap, 1993, ch. 6). The draws are the same every time. Infinite where a trajectory's
         error is; zero for a single one, which says nothing of others.
+
+        Raises:
+            ValueError: `first` or `last` is not one of the edges.
         """
-        count = self._trajectories.shape[1]
-        if not np.isfinite(self._trajectories).all():
+        last = self._edges[-1] if last is None else last
+        if first not in self._edges or last not in self._edges:
+            raise ValueError(f"frames {first} … {last} are not between two edges of {self._edges}")
+        sums = self._spans[:, :, self._edges.index(first) : self._edges.index(last)].sum(2)
+        count = sums.shape[1]
+        if not np.isfinite(sums).all():
             return RelativeError(math.inf, math.inf)
         drawn = np.random.default_rng(0).multinomial(count, np.full(count, 1 / count), size=resamples)
-        mse, mae = _ratios(self._trajectories @ drawn.T)
+        mse, mae = _ratios(sums @ drawn.T)
         return RelativeError(float(mse.std(ddof=1)), float(mae.std(ddof=1)))
 
     def of(self, rows: Sequence[int]) -> RelativeError:

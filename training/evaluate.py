@@ -122,7 +122,8 @@ def evaluate_past_horizon(
     synthesis = torch.from_numpy(c.resonator.shapes / dataset.scale_m)
     ear = torch.from_numpy(listening_weights(np.array([DEFAULT_LISTEN]), c.grid_points)).float()
     spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
-    string, sound, distances = ErrorSums(steps), ErrorSums(steps), []
+    edges = [edge for span in spans for edge in (span.start, span.stop)]
+    string, sound, distances = ErrorSums(steps, edges), ErrorSums(steps), []
     parts = _parts(c, split, trajectories)
     with _in_evaluation(model):
         for part, rows in enumerate(parts):

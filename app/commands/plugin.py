@@ -38,7 +38,7 @@ def plugin(
 ) -> None:
     """Build a plug-in that plays instruments in a DAW, without Python inside.
 
-    Several instruments make one bank. The first build takes up to a minute, later ones some seconds. It needs the
+    Several instruments make one bank. The first build takes some minutes, later ones seconds. It needs the
     extra learned-strings[plugin].
     """
     from app.export.plugin.build import build_plugin
@@ -83,15 +83,16 @@ def _print_sizes(images: Sequence[Image]) -> None:
 
 
 class _Steps:
-    """Says each step once."""
+    """Says each step once, and each tenth of the build."""
 
     def __init__(self) -> None:
-        self._latest = ""
+        self._latest = ("", 0)
 
-    def __call__(self, step: str) -> None:
-        if step != self._latest:
-            say(step)
-        self._latest = step
+    def __call__(self, step: str, share: float) -> None:
+        reached = (step, int(10 * share))
+        if reached != self._latest:
+            say(f"{step}: {10 * reached[1]} %")
+        self._latest = reached
 
 
 def _size(path: Path) -> int:

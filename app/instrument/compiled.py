@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -346,6 +347,16 @@ class InstrumentPlayer:
     def ringing(self) -> list[Ringing]:
         """The notes that ring, one for each place."""
         return self.compiled.ringing()
+
+    def slid(self, note: Ringing) -> float:
+        """How many semitones above its key a note's string is stopped now, as while it slides."""
+        keys = self._loud
+        if note.length_m is None or isinstance(keys, DrumKeys):
+            return 0.0
+        with contextlib.suppress(ValueError):  # reported when it is struck
+            own = keys.strings.of_key(note.key, note.string if note.string >= 0 else None)
+            return 0.0 if own is None else 12 * math.log2(own.parameters.length_m / note.length_m)
+        return 0.0
 
 
 def is_another(patch: Patch, than: Patch) -> bool:

@@ -47,7 +47,7 @@ class LoudKeys:
         if isinstance(patch.strings, Drums):
             raise ValueError(f"{patch.name} has drums, and no strings; choose an instrument of strings")
         self.patch, self.ear = patch, ear
-        self._whole, self._preset = replace(ear, solo=0), preset
+        self._full_ear, self._preset = replace(ear, solo=0), preset
         self.strings = Strings(patch)
         self.polarisations, self.recorded = polarisations_of(patch, preset), preset.recorded
         self.body: Array | None = body_curves(patch) if near is None else near.body
@@ -115,7 +115,7 @@ class LoudKeys:
         amplitudes = resonator.to_modes(pluck.displacement(resonator.points))
         if release_s := patch.pluck.release_s(of.REFERENCE_VELOCITY):
             amplitudes = amplitudes * release_factor(resonator.omega, release_s)
-        weights = resonator.shapes @ self._whole.weights(resonator.points, resonator.force_weights) / FULL_SCALE_M
+        weights = resonator.shapes @ self._full_ear.weights(resonator.points, resonator.force_weights) / FULL_SCALE_M
         if self.ear.pickup == "velocity":
             weights = weights * resonator.omega[:, None] * (FULL_SCALE_M / FULL_SCALE_M_S)
         sound = np.zeros((of.SOUND_ROWS, resonator.modes))

@@ -31,7 +31,7 @@ from engine.voices.programs import (
     tension_memory,
 )
 
-VALUES = (
+PLAYED_PARAMETERS = (
     *(f"knobs.{name}" for name in KNOBS),
     *(f"pluck.{name}" for name in ("position", "width", "width_hard", "softest_mm", "hardest_mm", "curve")),
     "damping.release_t60_s",
@@ -44,7 +44,7 @@ VALUES = (
     "pickup.points.0",
     "pickup.points.1",
 )
-WHEELED = VALUES[: of.BODY_MIX]  # what the kernel turns with the modulation wheel
+WHEELED = PLAYED_PARAMETERS[: of.BODY_MIX]  # what the kernel turns with the modulation wheel
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
 SHAPES = {
     "gaussian": of.GAUSSIAN,

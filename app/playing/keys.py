@@ -30,6 +30,22 @@ from engine.voices import Ear, Mixer
 SEEN_DB = 70.0  # below full scale: softer strings do not light their keys
 
 
+@dataclass(frozen=True)
+class SoundingNote:
+    """A note that rings.
+
+    Attributes:
+        level: 0 at SEEN_DB below full scale, 1 at full scale.
+        string: on which of a set it is played, from the highest, 0; -1: the key chooses.
+        slid: how many semitones above its key the string is stopped, as by a slide.
+    """
+
+    key: int
+    level: float
+    string: int = -1
+    slid: float = 0.0
+
+
 @dataclass(frozen=True, eq=False)
 class _Wanted:
     """What keys are to play, and where it is heard."""
@@ -194,11 +210,19 @@ class Keys:
     def sounding(self) -> dict[int, float]:
         """Key -> how loud its string rings: 0 at SEEN_DB below full scale, 1 at full scale."""
         found: dict[int, float] = {}
-        player = self._player
-        for each in player.ringing() if player is not None and self._in is self._mixer() else ():
-            share = min(max(1 + each.level_db / SEEN_DB, 0.0), 1.0)
-            found[each.key] = max(found.get(each.key, 0.0), share)
+        for each in self.sounding_notes():
+            found[each.key] = max(found.get(each.key, 0.0), each.level)
         return found
+
+    def sounding_notes(self) -> list[SoundingNote]:
+        """The notes that ring, with their strings."""
+        player = self._player
+        if player is None or self._in is not self._mixer():
+            return []
+        return [
+            SoundingNote(each.key, min(max(1 + each.level_db / SEEN_DB, 0.0), 1.0), each.string, player.slid(each))
+            for each in player.ringing()
+        ]
 
     @property
     def heard_through(self) -> Patch | None:

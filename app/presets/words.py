@@ -9,7 +9,7 @@ _MODELS = {
     "koopman": ("Koopman", "learned partials, each of one frequency and one decay"),
     "koopman_var": ("Koopman, variable", "learned partials whose pitch and decay depend on the amplitude"),
     "koopman_integrated": (
-        "Koopman, integrated phase",
+        "Integrated phase",
         "learned partials whose pitch glides down with the tension as the string decays",
     ),
     "koopman_tension": ("Koopman, shared tension", "one model for every string: all partials glide with one tension"),

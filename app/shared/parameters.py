@@ -23,16 +23,25 @@ NOISE, TECHNIQUE = "NOISE", "TECHNIQUE"
 
 @dataclass(frozen=True)
 class Taper:
-    """How a value moves and reads: `step` of an arrow key or a wheel notch, a ratio above 1 where logarithmic."""
+    """How a value moves and reads.
+
+    Attributes:
+        step: of an arrow key or a wheel notch: of the value; a ratio above 1 where it is logarithmic; a share of the
+            way where it is curved.
+        text: format, with the unit.
+        curve: how many times as fast the value rises at the end of its range as at the start; 1: evenly.
+    """
 
     step: float
-    text: str = "{:.2f}"  # format, with the unit
+    text: str = "{:.2f}"
     logarithmic: bool = False
+    curve: float = 1.0
 
 
 TIMES = Taper(1.03, "× {:.2f}", True)
 MILLIMETRES, SECONDS = Taper(1.1, "{:.2f} mm", True), Taper(1.1, "{:.2f} s", True)
 DECIBELS = Taper(0.5, "{:+.1f} dB")
+MUTED = Taper(0.02, "{:.1%}", curve=40.0)  # by each tenth of the way the T60 of a guitar's string shrinks by a third
 PLACE, WIDTH, PERCENT = Taper(0.01), Taper(1.05, "{:.3f}", True), Taper(0.02, "{:.0%}")
 
 
@@ -72,22 +81,31 @@ class Parameter:
         object.__setattr__(self, "name", self.name or self.label)
         object.__setattr__(self, "tip", TIPS.get(self.id, ""))
 
+    @property
+    def curve(self) -> float:
+        """As of its taper; a logarithmic one is curved by the ratio of its limits."""
+        return self.limits[1] / self.limits[0] if self.taper.logarithmic else self.taper.curve
+
     def share(self, value: float) -> float:
         """0 … 1 along the range."""
-        low, high = self.limits
-        return (
-            math.log(value / low) / math.log(high / low) if self.taper.logarithmic else (value - low) / (high - low)
-        )
+        (low, high), curve = self.limits, self.curve
+        part = (value - low) / (high - low)
+        return part if curve == 1.0 else math.log1p(part * (curve - 1)) / math.log(curve)
 
     def value(self, share: float) -> float:
         """The inverse of `share`, which is limited to 0 … 1."""
-        (low, high), share = self.limits, min(max(share, 0.0), 1.0)
-        return self.clamped(low * (high / low) ** share if self.taper.logarithmic else low + share * (high - low))
+        (low, high), curve, share = self.limits, self.curve, min(max(share, 0.0), 1.0)
+        part = share if curve == 1.0 else (curve**share - 1) / (curve - 1)
+        return self.clamped(low + part * (high - low))
 
     def stepped(self, value: float, steps: float) -> float:
         """`value` moved by so many steps, within the range."""
         step = self.taper.step
-        return self.clamped(value * step**steps if self.taper.logarithmic else value + step * steps)
+        if self.taper.logarithmic:
+            return self.clamped(value * step**steps)
+        if self.taper.curve != 1.0:
+            return self.value(self.share(value) + step * steps)
+        return self.clamped(value + step * steps)
 
     def clamped(self, value: float) -> float:
         return min(max(value, self.limits[0]), self.limits[1])
@@ -219,7 +237,7 @@ OF_PATCHES: Mapping[str, Parameter] = {
         _knob("decay", "decay", MULTIPLIER, "s"),
         _knob("brightness_decay", "HF loss", MULTIPLIER, "s"),
         Parameter("damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, "wheel", wheel_factor=10),
-        Parameter("damping.mute", "mute", (0, 1), 0, PERCENT, DECAY, "wheel", "palm mute", 1.0),
+        Parameter("damping.mute", "mute", (0, 1), 0, MUTED, DECAY, "wheel", "palm mute", 1.0),
         Parameter("pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, "wheel", "pluck position", 0.5),
         Parameter(
             "pluck.width", "soft width", WIDTH_RANGE, 0.12, WIDTH, PLUCK, "wheel", "width (low velocity)", wheel=0.02

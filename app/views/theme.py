@@ -103,6 +103,11 @@ def __getattr__(name: str) -> str:
     return str(getattr(present, name.lower()))
 
 
+def is_dark() -> bool:
+    """Whether the present theme is the dark one, at any size of text."""
+    return present.background == DARK.background
+
+
 def source_kind(source: str) -> str:
     """The key of `SOURCE_COLOURS` for a source: "other" for "preset:NAME"."""
     return source if source in SOURCE_COLOURS else "other"
@@ -139,7 +144,7 @@ def _luminance(colour: QColor) -> float:
 
 
 def _style_sheet() -> str:
-    tick = SIGNS / f"tick_{'dark' if present.background == DARK.background else 'light'}.svg"
+    tick = SIGNS / f"tick_{'dark' if is_dark() else 'light'}.svg"
     values = {**asdict(present), "tick": tick.as_posix()}
     sheet = re.sub(r"font-size: (\d+)px", lambda found: f"font-size: {px(int(found[1]))}px", SHEET.read_text("utf-8"))
     return re.sub(r"@(\w+)", lambda found: str(values[found[1]]), sheet)

@@ -357,7 +357,7 @@ class MainWindow(QMainWindow):
 
     def show_outside(self, text: str) -> None:
         """What of the latest note lies outside the training; "" for nothing."""
-        self.outside_label.say(text)
+        self.outside_label.say(text, text.replace(" is outside the trained ", ", trained "), "outside training")
         self.outside_label.setToolTip(plain_tip(text))
 
     def show_growth(self, text: str) -> None:

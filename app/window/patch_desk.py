@@ -501,7 +501,8 @@ class PatchDesk(QObject):
         self._song.tick()
         if not self._panel.isVisible():
             return
-        self._panel.show_sounding(self._performance.notes.keys.sounding())
+        keys = self._performance.notes.keys
+        self._panel.show_sounding(keys.sounding(), keys.sounding_notes())
         self._panel.bar.show_voices(self._performance.notes.ringing)
         self.recordings.tick(now_s)
 

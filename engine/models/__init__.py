@@ -22,7 +22,7 @@ MODELS: dict[str, tuple[str, type]] = {
     "dmd": ("dmd.DMD", sizes.DMDConfiguration),
     "koopman": ("koopman.Koopman", sizes.KoopmanConfiguration),
     "koopman_var": ("koopman_var.KoopmanVar", sizes.KoopmanVarConfiguration),
-    "koopman_integrated": ("integrated_phase.KoopmanIntegrated", sizes.IntegratedPhaseConfiguration),
+    "koopman_integrated": ("integrated_phase.IntegratedPhase", sizes.IntegratedPhaseConfiguration),
     "koopman_tension": ("koopman_tension.KoopmanTension", sizes.KoopmanTensionConfiguration),
     "fgru": ("fno.FGRU", sizes.FGRUConfiguration),
     "frnn": ("fno.FRNN", sizes.FRNNConfiguration),

@@ -1,4 +1,4 @@
-"""Koopman with integrated phase: eigenvalues that follow the decaying energies, integrated over time.
+"""The integrated phase: Koopman with eigenvalues that follow the decaying energies, integrated over time.
 
 A string's partials fall in pitch while it decays, because its tension falls: each frequency depends on the energies
 of all modes, and a phase is the integral of a frequency. Koopman_var's multiplier sees the present energies only and
@@ -128,7 +128,7 @@ class _Segments(NamedTuple):
     begin: int
 
 
-class KoopmanIntegrated(AnyFrameModel[IntegratedPhaseState]):
+class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
     """See the module."""
 
     initialisations: ClassVar = {

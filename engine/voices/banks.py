@@ -15,7 +15,7 @@ from torch import Tensor, nn
 from engine.kernels import layout as at
 from engine.models.base import StringModel
 from engine.models.dmd import DMD
-from engine.models.integrated_phase import GAIN_LIMIT, SETTLED, KoopmanIntegrated
+from engine.models.integrated_phase import GAIN_LIMIT, SETTLED, IntegratedPhase
 from engine.pluck import FULL_SCALE_M
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
@@ -30,7 +30,7 @@ def bank_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Pro
 
 @bank_program.register
 @torch.no_grad()
-def _integrated_program(model: KoopmanIntegrated, info: PresetInfo, rate_hz: int) -> Program | None:
+def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz: int) -> Program | None:
     """None where there are more latents or layers than the kernel holds."""
     c, n = model.configuration, model.configuration.state_size
     widths = (n, *c.eigenvalue_widths)
@@ -148,7 +148,7 @@ def _bank(
     return Program(at.BANK, memory, modes, rate_hz, info.grid_points, start, read, None, voice_ends_s(info), force)
 
 
-def _origin(model: KoopmanIntegrated | DMD, displacement: Array) -> NDArray[np.complex128]:
+def _origin(model: IntegratedPhase | DMD, displacement: Array) -> NDArray[np.complex128]:
     """The latents (state_size,) of a displacement (grid_points,) in normalised units."""
     with torch.inference_mode():
         state = model.encode(torch.from_numpy(displacement[None]).float())

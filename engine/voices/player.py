@@ -119,6 +119,8 @@ class Ringing:
     Attributes:
         level_db: of its loudest voice, in dB of full scale.
         seconds: how long it has been ringing, as far as the device was given it.
+        string: on which of a set it is played, from the highest, 0; -1: the key chooses.
+        length_m: of its string as it is now, between two keys while it slides; None for prepared voices and drums.
     """
 
     id: int
@@ -126,6 +128,8 @@ class Ringing:
     key: int
     level_db: float
     seconds: float
+    string: int = -1
+    length_m: float | None = None
 
 
 @dataclass(frozen=True)
@@ -342,8 +346,19 @@ class CompiledPlayer:
                 level = max(float(voice[at.LOUDNESS]) for voice in alive) * LOG_DB
                 frames = max(int(voice.view(np.int64)[at.FRAME]) for voice in alive)
                 id, channel, key = (int(note[of.NOTE_ID + place]) for place in (0, 2, 3))
-                found.append(Ringing(id, channel, key, level, frames / self.rate_hz))
+                string, length_m = int(note[of.NOTE_STRING]), self._length_m(note, alive[0])
+                found.append(Ringing(id, channel, key, level, frames / self.rate_hz, string, length_m))
         return found
+
+    def _length_m(self, note: NDArray[np.int64], voice: NDArray[np.float64]) -> float | None:
+        """Of a note's string: where it glides to, times how far the first mode of a voice has still to go."""
+        own = StringParameters(*note.view(np.float64)[of.NOTE_STRING_NOW : of.NOTE_STRING_NOW + of.STRING].tolist())
+        modes = int(voice.view(np.int64)[at.MODES])
+        if note[of.NOTE_PREPARED] or not own.length_m > 0.0 or voice.view(np.int64)[at.KIND] == at.BANK:
+            return None
+        first = (int(voice.ctypes.data) - self.address) // 8 + at.state(modes) + at.OMEGA_SQUARED * modes
+        present = float(self.memory[first])
+        return own.length_m * (own.undamped_frequency(1) / math.sqrt(present) if present > 0.0 else 1.0)
 
     def missing(self, ids: Iterable[int]) -> list[int]:
         """Which of these notes have ended, where reports were missed; empty while events wait, or where none were."""

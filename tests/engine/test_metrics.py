@@ -158,3 +158,16 @@ def test_null_depth() -> None:
     assert RelativeError(1e-3, 0.1).null_depth_db == pytest.approx(-30)
     assert RelativeError(0, 0).null_depth_db == RelativeError(1e-30, 0).null_depth_db == NULL_FLOOR_DB
     assert RelativeError(math.inf, math.inf).null_depth_db == math.inf
+
+
+def test_the_standard_error_of_some_frames_is_that_of_sums_over_them_alone() -> None:
+    draw = np.random.default_rng(3)
+    predicted, truth = draw.normal(size=(2, 12, 30, 4))
+    whole, alone = ErrorSums(30, edges=[20, 10, 90]), ErrorSums(10)
+    for first in (0, 7, 14, 21, 28):  # blocks that cross the edges
+        whole.add(predicted[:, first : first + 7], truth[:, first : first + 7], first)
+    alone.add(predicted[:, 10:20], truth[:, 10:20])
+    found, wanted = whole.standard_error(first=10, last=20), alone.standard_error()
+    assert (found.rel_mse, found.rel_mae) == pytest.approx((wanted.rel_mse, wanted.rel_mae))
+    with pytest.raises(ValueError, match="edges"):
+        whole.standard_error(first=11, last=20)

@@ -15,6 +15,7 @@ from training.cli.console import Shares, number, print_json, print_table, progre
 from training.cli.training import load_data
 
 if TYPE_CHECKING:
+    from engine.metrics import ErrorSums
     from engine.presets import Preset
     from training.configuration import DatasetConfiguration
     from training.data.dataset import Dataset
@@ -190,6 +191,7 @@ class _Measurement:
             "trajectories": len(motion.string.per_trajectory()[0]),
             "rel_mse": whole.rel_mse,
             "rel_mae": whole.rel_mae,
+            **_with_se(motion.string, 0, info.horizon_steps),
             **self._stored(split),
             "null_depth_db": sound.null_depth_db,
             "spectral_convergence": motion.spectra[0].convergence,
@@ -198,8 +200,6 @@ class _Measurement:
         if not self.past_s:  # a trajectory's own error is over all that was measured
             spread = motion.string.spread()
             found |= {"rel_mse_spread": spread.rel_mse, "rel_mae_spread": spread.rel_mae}
-            deviation = motion.string.standard_error()
-            found |= {"rel_mse_se": deviation.rel_mse, "rel_mae_se": deviation.rel_mae}
             if info.tension_modulated:
                 groups = errors_by_rise(motion.string, self.data.configuration, split)
                 found["by_rise"] = [asdict(group) for group in groups]
@@ -213,6 +213,7 @@ class _Measurement:
                 **self._label(window.start_s, window.stop_s),
                 "rel_mse": window.rel_mse,
                 "rel_mae": window.rel_mae,
+                **_with_se(motion.string, *(round(at_s * info.rate_hz) for at_s in (window.start_s, window.stop_s))),
                 "null_depth_db": heard.null_depth_db,
                 "spectral_convergence": spectrum.convergence,
                 "log_spectrum_db": spectrum.log_db,
@@ -269,6 +270,12 @@ class _Measurement:
     def _label(self, start_s: float, stop_s: float) -> dict[str, Any]:
         past = start_s >= self.preset.info.horizon_s
         return {"start_s": start_s, "stop_s": stop_s, "past_horizon": past}
+
+
+def _with_se(sums: ErrorSums, first: int, last: int) -> dict[str, float]:
+    """The standard errors of the errors of some frames, over trajectories."""
+    deviation = sums.standard_error(first=first, last=last)
+    return {"rel_mse_se": deviation.rel_mse, "rel_mae_se": deviation.rel_mae}
 
 
 def _on(preset: Preset, run: str) -> Preset:
@@ -338,8 +345,9 @@ def _print_errors(split: str, errors: dict[str, Any], horizon_s: float) -> None:
     if "by_rise" in errors:
         heads = ("plucks", "tension rises %", "to %", "rel. MSE", "rel. MAE", "of squared error %", "one pluck %")
         print_table(heads, [_by_rise(group) for group in errors["by_rise"]])
-    columns = ("from s", "to s", "rel. MSE", "rel. MAE", "null dB", "convergence", "spectra dB", "")
-    keys = ("start_s", "stop_s", "rel_mse", "rel_mae", "null_depth_db", "spectral_convergence", "log_spectrum_db")
+    columns = ("from s", "to s", "rel. MSE", "± se", "rel. MAE", "± se", "null dB", "convergence", "spectra dB", "")
+    figures = ("rel_mse", "rel_mse_se", "rel_mae", "rel_mae_se", "null_depth_db", "spectral_convergence")
+    keys = ("start_s", "stop_s", *figures, "log_spectrum_db")
     print_table(
         columns,
         [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -34,6 +35,14 @@ def train(
         Path | None, typer.Option(help="The preset to write; default presets/CONFIG.safetensors.")
     ] = None,
     runs: Runs = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(
+            min=0,
+            metavar="N",
+            help="Of weights and batches, in place of the run's own; it is named CONFIG_seedN then.",
+        ),
+    ] = None,
     device: Annotated[Device, typer.Option(help="auto: CUDA if it can be used.")] = "cpu",
     threads: Annotated[int | None, typer.Option(min=1, help="Threads of the CPU; default all cores.")] = None,
     cache: Cache = None,
@@ -48,9 +57,17 @@ def train(
     from training.cell import Cell, load
     from training.run import default_runs, run_row
 
-    configuration = load(config)
-    name = Path(config).stem
-    cell = Cell.parse(config)
+    configuration, name = load(config), Path(config).stem
+    if seed is not None and seed != configuration.recipe.seed:
+        name += f"_seed{seed}"
+        if (cell := Cell.parse(config)) is None:
+            title, recipe = f"{configuration.title}, seed {seed}", replace(configuration.recipe, seed=seed)
+            configuration = replace(configuration, title=title, recipe=recipe)
+        elif cell.seed:
+            raise typer.BadParameter(f"{config} has a seed already; leave one out", param_hint="--seed")
+        else:
+            configuration = load(name)
+    cell = Cell.parse(name)
     file, folder = output or SHIPPED / f"{name}.safetensors", runs or default_runs()
     if threads is not None:
         torch.set_num_threads(threads)

@@ -23,7 +23,7 @@ from scipy.optimize import least_squares
 
 from engine.models.base import StringModel
 from engine.models.fno import FGRU, FRNN
-from engine.models.integrated_phase import KoopmanIntegrated
+from engine.models.integrated_phase import IntegratedPhase
 from engine.models.string_modes import StringModes
 from training.fitting.modes import SLOWEST, Modes
 from training.research.fourier_wiring import store_in_fgru, store_in_frnn
@@ -44,7 +44,7 @@ def start_from_phases(model: StringModel, modes: Modes, seed: int) -> None:
     Raises:
         ValueError: the model cannot hold as many modes.
     """
-    if isinstance(model, KoopmanIntegrated):
+    if isinstance(model, IntegratedPhase):
         model.store_modes(fit_phases(modes, seed))
     elif isinstance(model, FGRU):
         store_in_fgru(model, fit_phases(modes, seed))

@@ -19,7 +19,7 @@ from app.export.plugin.parts import AMP, EFFECTS, drum_keys, effects_there, loss
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.loud_keys import LoudKeys
-from app.instrument.table import VALUES, WHEELED, wheel_goal
+from app.instrument.table import PLAYED_PARAMETERS, WHEELED, wheel_goal
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
@@ -46,7 +46,12 @@ NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
 SOURCE, VOLUME, VALUE, MACRO, EFFECT, AMPLIFIER = range(6)  # kinds of the shell's parameters
 SOURCE_ID = "source"
 SOURCES = ("model", "truth", "difference")
-OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "pluck.curve", "damping.release_t60_s")  # that drums follow
+DRUM_PARAMETERS = (
+    "knobs.decay",
+    "knobs.brightness_decay",
+    "pluck.curve",
+    "damping.release_t60_s",
+)  # that drums follow
 
 
 class _Parameter(ctypes.Structure):
@@ -58,6 +63,7 @@ class _Parameter(ctypes.Structure):
         ("low", ctypes.c_double),
         ("high", ctypes.c_double),
         ("standard", ctypes.c_double),
+        ("curve", ctypes.c_double),
         ("name", ctypes.c_char * 64),
         ("module", ctypes.c_char * 64),
         ("unit", ctypes.c_char * 16),
@@ -267,6 +273,7 @@ def _record(
         low,
         high,
         value,
+        parameter.curve,
         _bytes(label or parameter.name, 63),
         _bytes(module, 63),
         _bytes(unit, 15),
@@ -281,17 +288,30 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     yield (
         SOURCE_ID,
         _Parameter(
-            _id(SOURCE_ID), SOURCE, 0, len(SOURCES), 0.0, 2.0, 0.0, b"Source", b"", b"", " ".join(SOURCES).encode()
+            _id(SOURCE_ID),
+            SOURCE,
+            0,
+            len(SOURCES),
+            0.0,
+            2.0,
+            0.0,
+            1.0,
+            b"Source",
+            b"",
+            b"",
+            " ".join(SOURCES).encode(),
         ),
     )
     yield _record("volume_db", VOLUME, 0, 0.0, OF_CHOICES["volume_db"], "")
     drums = isinstance(patch.strings, Drums)
     fixed = drums or patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
-    points = () if fixed else VALUES[of.POINT :][: len(patch.pickup.points)]
+    points = () if fixed else PLAYED_PARAMETERS[of.POINT :][: len(patch.pickup.points)]
     for id in (*WHEELED, *points):
-        if id in (OF_DRUMS if drums else OF_PATCHES):
+        if id in (DRUM_PARAMETERS if drums else OF_PATCHES):
             parameter = OF_PATCHES[id]
-            yield _record(id, VALUE, VALUES.index(id), patch.value(id), parameter, parameter.group.capitalize())
+            yield _record(
+                id, VALUE, PLAYED_PARAMETERS.index(id), patch.value(id), parameter, parameter.group.capitalize()
+            )
     for id in effects_there(patch):
         parameter = OF_PATCHES[id]
         yield _record(id, EFFECT, EFFECTS.index(id), patch.value(id), parameter, parameter.group.capitalize())

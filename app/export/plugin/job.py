@@ -10,8 +10,6 @@ from app.export.plugin.formats import check_compiler, install_folder, this_targe
 from app.patches.patch import Patch
 from app.shared.worker import Progress
 
-SHARES = {"reading the instrument": 0.05, "compiling the kernels": 0.2, "linking": 0.9}
-
 
 @dataclass(frozen=True)
 class PluginExport:
@@ -40,11 +38,12 @@ class PluginExport:
         from engine.kernels import cache
         from engine.presets import load_preset
 
-        def advanced(step: str) -> None:
-            progress(SHARES[step], step.capitalize())
-
-        advanced("reading the instrument")
+        progress(0.0, "Reading the instrument")
         image = image_of(self.patch, load_preset(self.preset))
+
+        def advanced(step: str, share: float) -> None:
+            progress(share, step.capitalize())
+
         kept = cache.folder() or Path(tempfile.gettempdir())
         path = build_plugin([image], self.form, self.target, self.path, kept, advanced)
         if self.target != this_target():

@@ -23,6 +23,9 @@ from engine.whole_file import whole_file
 
 PREFIX = "ls_"
 WAIT_S = 0.1
+FUNCTIONS = 295  # that are made for the entries, about: dots of `texts`
+STEPS = 4  # of an object file after that
+TEXT_SHARE = 0.85  # of the time, measured
 # What the code may ask of the shell and of the C library; all else would be a reference to Python.
 _LIBRARY = """
 cos sin sincos sincosf exp exp2 expm1 log log10 log1p log2 pow ceil floor rint round sqrt fmod tan atan atan2
@@ -54,11 +57,11 @@ def digest() -> str:
     return found.hexdigest()[:16]
 
 
-def object_of(target: str, folder: Path, waiting: Callable[[], None] = lambda: None) -> Path:
-    """The object file of the kernels for a target, from `folder` or compiled into it (half a minute the first time).
+def object_of(target: str, folder: Path, advanced: Callable[[float], None] = lambda share: None) -> Path:
+    """The object file of the kernels for a target, from `folder` or compiled into it (minutes the first time).
 
     Args:
-        waiting: is called a few times a second meanwhile; may raise, to end it.
+        advanced: is called a few times a second meanwhile with the share that is done; may raise, to end it.
 
     Raises:
         ObjectError: an unknown target, or the code needs what no plug-in has.
@@ -68,32 +71,55 @@ def object_of(target: str, folder: Path, waiting: Callable[[], None] = lambda: N
     path = folder / f"kernels-{digest()}-{target}.o"
     if not path.exists():
         folder.mkdir(parents=True, exist_ok=True)
-        compiled = _compiled(_text(folder, waiting), TARGETS[target])
+        text = _text(folder, lambda share: advanced(TEXT_SHARE * share))
         with whole_file(path) as part:
-            part.write_bytes(compiled)
+            _run(
+                __name__,
+                [str(text), target, str(part)],
+                STEPS,
+                lambda share: advanced(TEXT_SHARE + (1 - TEXT_SHARE) * share),
+            )
     return path
 
 
-def _text(folder: Path, waiting: Callable[[], None]) -> str:
-    """LLVM code of the entries, made by a process of its own, for Numba's settings hold for a whole process."""
+def _text(folder: Path, advanced: Callable[[float], None]) -> Path:
+    """LLVM code of the entries."""
     path = folder / f"kernels-{digest()}.ll"
     if not path.exists():
         with whole_file(path) as part:
-            code, said = run_waiting([sys.executable, "-m", texts.__name__, str(part)], _environment(), waiting)
-            if code:
-                raise ObjectError(f"the kernels cannot be compiled: {said.strip()[-400:]}")
-    return path.read_text(encoding="utf-8")
+            _run(texts.__name__, [str(part)], FUNCTIONS, advanced)
+    return path
+
+
+def _run(module: str, arguments: Sequence[str], steps: int, advanced: Callable[[float], None]) -> None:
+    """Runs a module in a process of its own: Numba's settings hold for a whole process, and it can be ended.
+
+    Args:
+        steps: how many dots it prints.
+
+    Raises:
+        ObjectError: it failed.
+    """
+    code, said = run_waiting(
+        [sys.executable, "-m", module, *arguments], _environment(), lambda dots: advanced(min(dots / steps, 1.0))
+    )
+    if code:
+        raise ObjectError(f"the kernels cannot be compiled: {said.strip()[-400:]}")
 
 
 def run_waiting(
-    command: Sequence[str], environment: Mapping[str, str] | None, waiting: Callable[[], None]
+    command: Sequence[str], environment: Mapping[str, str] | None, waiting: Callable[[int], None]
 ) -> tuple[int, str]:
-    """A command's exit status, and what it reported; it is ended where `waiting` raises."""
-    with tempfile.TemporaryFile() as said:
-        process = subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL, stderr=said)
+    """A command's exit status, and what it reported; it is ended where `waiting` raises.
+
+    Args:
+        waiting: is called a few times a second with the number of bytes that the command has printed.
+    """
+    with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as printed:
+        process = subprocess.Popen(command, env=environment, stdout=printed, stderr=said)
         try:
             while process.poll() is None:
-                waiting()
+                waiting(os.fstat(printed.fileno()).st_size)
                 with contextlib.suppress(subprocess.TimeoutExpired):
                     process.wait(WAIT_S)
         finally:
@@ -119,12 +145,14 @@ def _compiled(text: str, target: Target) -> bytes:
     machine = llvm.Target.from_triple(target.triple).create_target_machine(
         cpu=target.cpu, opt=3, reloc="pic", codemodel="default"
     )
+    _step()
     names = dict(re.findall(r"^; (\w+) (\S+)$", text, flags=re.M)[: len(texts.ENTRIES)])
     for name, entry in names.items():
         text = text.replace(f"@{entry}(", f"@{PREFIX}{name}(")
     text = re.sub(r"^target datalayout = .*$", f'target datalayout = "{machine.target_data}"', text, flags=re.M)
     text = re.sub(r"^target triple = .*$", f'target triple = "{target.triple}"', text, flags=re.M)
     whole = llvm.parse_assembly(_without_counts(text))
+    _step()
     kept = {f"{PREFIX}{name}" for name in names}
     for function in whole.functions:
         if not function.is_declaration and function.name not in kept:
@@ -136,9 +164,15 @@ def _compiled(text: str, target: Target) -> bytes:
     options.loop_vectorization = options.slp_vectorization = True
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(whole, builder)
+    _step()
     _check_names(whole, kept)
     emitted: bytes = machine.emit_object(whole)
+    _step()
     return emitted
+
+
+def _step() -> None:
+    print(".", end="", flush=True)
 
 
 def _without_counts(text: str) -> str:
@@ -158,3 +192,10 @@ def _check_names(module: object, kept: set[str]) -> None:
     unknown = asked - ALLOWED - STUBS - kept
     if unknown:
         raise ObjectError(f"the kernels refer to {', '.join(sorted(unknown))}, which no plug-in has")
+
+
+if __name__ == "__main__":
+    try:
+        Path(sys.argv[3]).write_bytes(_compiled(Path(sys.argv[1]).read_text(encoding="utf-8"), TARGETS[sys.argv[2]]))
+    except ObjectError as error:
+        sys.exit(str(error))

@@ -1,7 +1,7 @@
 """LLVM code of the kernels' entries as text, without any machine code: `python -m app.export.plugin.texts FILE`.
 
 Numba would optimise and emit each function with all that it calls, several times over. Here it stops at its own code,
-which is linked once. Its first lines name the entries.
+which is linked once. Its first lines name the entries. A dot is printed for each function.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ def _stop_early() -> None:
 
     def finalize(library: Any) -> None:
         library._finalized = True
+        print(".", end="", flush=True)
 
     CPUCodeLibrary._optimize_functions = lambda library, module: None
     CPUCodeLibrary.finalize = finalize

@@ -51,7 +51,7 @@ def _lines(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: str)
     yield "<global>"
     # one_shot: letting go damps nothing; the damping is still what ends a string that is plucked again
     yield f"loop_mode={'one_shot' if patch.damping.let_ring else 'no_loop'}"
-    yield f"ampeg_release={min(100.0, release_s(patch)):.4f}"
+    yield f"ampeg_release={release_s(patch):.4f}"  # below 100, the format's longest
     # a string that is plucked again ends the former note: by `off_by` in players of SFZ 1, where a key may end
     # itself, by `note_polyphony` in the others, with `note_selfmask=off` so that a soft note ends a loud one as well
     yield "off_mode=normal"

@@ -19,7 +19,7 @@ class NameButton(QPushButton):
         self.setText(text)
 
     def setText(self, text: str) -> None:
-        self._whole = text
+        self._full_text = text
         self._fit()
 
     def resizeEvent(self, event: QResizeEvent) -> None:
@@ -28,4 +28,4 @@ class NameButton(QPushButton):
 
     def _fit(self) -> None:
         cut, room = Qt.TextElideMode.ElideMiddle, self.width() - PADDING
-        super().setText(self.fontMetrics().elidedText(self._whole, cut, room, Qt.TextFlag.TextShowMnemonic))
+        super().setText(self.fontMetrics().elidedText(self._full_text, cut, room, Qt.TextFlag.TextShowMnemonic))

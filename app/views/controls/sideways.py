@@ -24,13 +24,17 @@ class Sideways(QScrollArea):
         self._fit()
 
     def event(self, event: QEvent) -> bool:
-        if event.type() in (QEvent.Type.LayoutRequest, QEvent.Type.Polish):
+        if event.type() in (QEvent.Type.LayoutRequest, QEvent.Type.Polish, QEvent.Type.Show):
             self._fit()
         return super().event(event)
 
     def _fit(self) -> None:
         part = self.widget()
         if part is not None:
-            too_narrow = part.minimumSizeHint().width() > self.width()
+            if (layout := part.layout()) is not None:
+                layout.activate()  # or it holds the sizes that its rows had before the text grew while it was hidden
+            least = part.minimumSizeHint().width()
+            too_narrow = least > self.width()
+            part.resize(max(least, self.viewport().width()), part.height())
             bar = self.horizontalScrollBar().sizeHint().height() + 2 if too_narrow else 0
             self.setFixedHeight(part.sizeHint().height() + bar)

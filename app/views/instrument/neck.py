@@ -7,7 +7,8 @@ or the highest would be too short to see).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen
@@ -15,7 +16,10 @@ from PySide6.QtWidgets import QWidget
 
 from app.shared.key_names import note_name
 from app.views import theme
-from app.views.instrument.playable import Playable
+from app.views.instrument.playable import LEVEL_STEPS, Playable
+
+if TYPE_CHECKING:
+    from app.playing.keys import SoundingNote
 
 MOST_ROWS, MOST_FRETS = 8, 24
 _NAMES_WIDTH = 40  # open strings, left of the nut
@@ -23,10 +27,12 @@ _FOOT = 15  # numbers of frets, names of octaves
 SHORTEST = 0.14  # of the fan's height
 THICK, THIN = 2.6, 1.0  # lowest and highest string, in pixels
 LARGEST_DOT = 14.0
+PLACES = 8  # of a fret that a sliding string can be distinguished at
 SWING = 0.42  # of a string's row, at full level
 INLAYS = (3, 5, 7, 9, 12, 15, 17, 19, 21, 24)
 TIP = (
     "Click or drag to play: softer at the upper edge of a string's row, harder at the lower.\n"
+    "Drag across strings to strum. "
     "Right button or Shift: the note stays down. With the keyboard: arrows and Enter"
 )
 
@@ -42,14 +48,31 @@ class Neck(Playable):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Strings", TIP, parent)
         self._strings: tuple[tuple[str, int], ...] = ()
+        self._stops: dict[tuple[int, float], int] = {}  # string, fret -> level of 0 … LEVEL_STEPS
         self._set_cursor(60)
+
+    def show_notes(self, notes: Iterable[SoundingNote]) -> None:
+        """Shows strings of a neck where they are stopped, which lies between two frets while they slide."""
+        shown: dict[tuple[int, float], int] = {}
+        for note in notes if self.in_rows else ():
+            string = len(self._strings) - 1 - note.string
+            if not 0 <= note.string < len(self._strings):
+                string = self.string_of(note.key)
+            fret = round(PLACES * (note.key + note.slid - self._strings[string][1])) / PLACES
+            fret = min(max(fret, 0.0), float(self.frets))
+            step = round(min(max(note.level, 0.0), 1.0) * LEVEL_STEPS)
+            if step > 0:
+                shown[string, fret] = max(step, shown.get((string, fret), 0))
+        for string, _ in {at for at in self._stops.keys() | shown.keys() if self._stops.get(at) != shown.get(at)}:
+            self.update(self.cell(string, 0).adjusted(0, -6, self.width(), 6).toAlignedRect())
+        self._stops = shown
 
     def set_strings(self, strings: Sequence[tuple[str, int]]) -> None:
         """Name and open key of each; none or one that is fretted for every key is shown as a fan."""
         ordered = tuple(sorted(strings, key=lambda string: string[1]))
         if ordered != self._strings:
             self.release_all()
-            self._strings = ordered
+            self._strings, self._stops = ordered, {}
             self.rest_changed()
 
     @property
@@ -109,6 +132,23 @@ class Neck(Playable):
         height = (self.height() - theme.px(_FOOT)) / len(self._strings)
         return min(max(len(self._strings) - 1 - int(at.y() / height), 0), len(self._strings) - 1)
 
+    def keys_between(self, before: QPointF, at: QPointF) -> list[int]:
+        """Where it is a neck, with the strings that lie between the two points: the mouse is seen at few places."""
+        met = super().keys_between(before, at)
+        if not self.in_rows:
+            return met
+        first, last = self._row_at(before), self._row_at(at)
+        step = 1 if last > first else -1
+        crossed = []
+        for string in range(first + step, last, step):
+            y = self.cell(string, 0).center().y()
+            x = before.x() + (at.x() - before.x()) * (y - before.y()) / (at.y() - before.y())
+            crossed.append(self.key_at(QPointF(x, y)))
+        return [key for key in crossed if key is not None] + met
+
+    def on_one_string(self, key: int, other: int) -> bool:
+        return not self.in_rows or self.string_of(key) == self.string_of(other)
+
     def share_at(self, key: int, at: QPointF) -> float:
         if not self.in_rows:
             return at.y() / (self.height() - theme.px(_FOOT))
@@ -135,15 +175,14 @@ class Neck(Playable):
                 painter.drawText(place, Qt.AlignmentFlag.AlignCenter, note_name(key))
 
     def paint_marks(self, painter: QPainter, dirty: QRectF) -> None:
-        for key in sorted(self.marked):
+        if self.in_rows:
+            self._paint_stops(painter)
+        for key in () if self.in_rows else sorted(self.marked):
             level = self.level(key)
-            ground = theme.RAISED if self.in_rows else theme.PANEL
-            lit = theme.blended(self.colour.name(), ground, 0.3 + 0.7 * level)
+            lit = theme.blended(self.colour.name(), theme.PANEL, 0.3 + 0.7 * level)
             if not self.key_rect(key).intersects(dirty) or not (level > 0 or self.is_down(key)):
                 continue
-            if self.in_rows:
-                self._paint_stopped(painter, key, lit, level)
-            elif self.sounds(key):
+            if self.sounds(key):
                 end = self._paint_column(painter, key, lit if level > 0 else QColor(theme.FAINT), 1.0)
                 painter.setPen(Qt.PenStyle.NoPen)
                 painter.setBrush(self.colour if level > 0 else QColor(theme.FAINT))
@@ -193,12 +232,31 @@ class Neck(Playable):
         y = row.center().y()
         painter.drawLine(QPointF(theme.px(_NAMES_WIDTH), y), QPointF(self.fret_x(self.frets), y))
 
-    def _paint_stopped(self, painter: QPainter, key: int, lit: QColor, level: float) -> None:
-        """A dot where a key is held, and its string from there on."""
+    def _paint_stops(self, painter: QPainter) -> None:
+        """Keys that are down where they are usually stopped; above them, strings that sound where they are now."""
+        for key in sorted(self.marked):
+            if self.is_down(key) and not self.level(key) > 0:
+                string = self.string_of(key)
+                self._paint_stopped(painter, string, key - self._strings[string][1], 0.0)
+        for (string, fret), step in sorted(self._stops.items()):
+            self._paint_stopped(painter, string, fret, step / LEVEL_STEPS)
+
+    def _stop_x(self, fret: float, size: float) -> float:
+        """Where the dot of a fret is drawn: before the fret, and between two of them in proportion."""
+        whole = int(fret)
+        if fret > whole:
+            left, right = self._stop_x(whole, size), self._stop_x(whole + 1, size)
+            return left + (fret - whole) * (right - left)
+        if whole <= 0:
+            return float(theme.px(_NAMES_WIDTH))
+        return self.fret_x(whole) - min(size, (self.fret_x(whole) - self.fret_x(whole - 1)) / 2)
+
+    def _paint_stopped(self, painter: QPainter, string: int, fret: float, level: float) -> None:
+        """A dot where a string is stopped, and what swings of it."""
         size = min(LARGEST_DOT, (self.height() - theme.px(_FOOT)) / len(self._strings) - 2)
-        cell = self._cell_of(key)
-        x = cell.right() - min(size, cell.width() / 2) if cell.left() > 0 else theme.px(_NAMES_WIDTH)
-        middle = QPointF(x, cell.center().y())
+        fret = min(max(fret, 0), self.frets)
+        lit = theme.blended(self.colour.name(), theme.RAISED, 0.3 + 0.7 * level)
+        middle = QPointF(self._stop_x(fret, size), self.cell(string, 0).center().y())
         if level > 0:
             painter.setPen(QPen(lit, 2))
             painter.drawLine(middle, QPointF(self.fret_x(self.frets), middle.y()))

@@ -6,7 +6,8 @@ higher with them.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import QAction, QActionGroup, QResizeEvent
@@ -30,6 +31,9 @@ from app.views.instrument.neck import Neck
 from app.views.instrument.patch_bar import PatchBar
 from app.views.instrument.piano_keys import PianoKeys
 from app.views.instrument.string_knobs import StringKnobs
+
+if TYPE_CHECKING:
+    from app.playing.keys import SoundingNote
 
 HINTS = {"keys": "Press A … L, or click the keys", "neck": "Press A … L, or click the strings"}
 NO_STRINGS = "Drums have no strings to show: keys strike them"
@@ -100,7 +104,7 @@ class InstrumentPanel(QFrame):
             played.released.connect(self.released)
         self._drums = False
         self.touch = Segments("Key while another is held", _TOUCHES)
-        self.touch.chosen.connect(self.touch_chosen)
+        self.touch.chosen.connect(self._choose_touch)
         self.techniques = Switches("Technique", _TECHNIQUES)
         self.techniques.switched.connect(self.technique_switched)
         self._choice = Segments("Surface", _SURFACES)
@@ -261,12 +265,13 @@ class InstrumentPanel(QFrame):
         """What is printed on the computer's keys, by the MIDI key that each plays."""
         self.keys.show_letters(letters)
 
-    def show_sounding(self, levels: Mapping[int, float]) -> None:
-        """How loud each key sounds, 0 … 1; hides the hint once one does."""
+    def show_sounding(self, levels: Mapping[int, float], notes: Iterable[SoundingNote] = ()) -> None:
+        """How loud each key sounds, 0 … 1, and the notes with their strings; hides the hint once one does."""
         if levels:
             self.hide_hint()
         self.keys.show_sounding(levels)
         self.neck.show_sounding(levels)
+        self.neck.show_notes(notes)
 
     def show_source(self, source: str) -> None:
         """The source that is heard, in whose colour keys are lit."""
@@ -286,6 +291,10 @@ class InstrumentPanel(QFrame):
         """Releases all keys that are down."""
         self.keys.release_all()
         self.neck.release_all()
+
+    def _choose_touch(self, touch: str) -> None:
+        self.keys.legato = self.neck.legato = touch != "pluck"
+        self.touch_chosen.emit(touch)
 
     def _press(self, key: int, velocity: int) -> None:
         self.hide_hint()

@@ -34,7 +34,8 @@ _MOVES = {Qt.Key.Key_Right: 1, Qt.Key.Key_Left: -1, Qt.Key.Key_Up: 12, Qt.Key.Ke
 class Playable(QWidget):
     """Keys that are pressed with the mouse or with Enter, and lit by what sounds.
 
-    Left button: plays while it is down; moved to other keys it plays these (glissando).
+    Left button: plays while it is down; moved to other keys it plays these (glissando). Moved to other strings of a
+    neck it strums: those that it has left ring until the button is up.
     Right button, or Shift: the key stays down until it is clicked so again.
     Arrows and Enter: choose a key and play it.
     """
@@ -53,6 +54,9 @@ class Playable(QWidget):
         self._source = "model"
         self._levels: dict[int, int] = {}  # of 0 … LEVEL_STEPS
         self._down: int | None = None  # by the mouse
+        self._at = QPointF()  # of the mouse, while a key is down
+        self._strummed: list[int] = []  # keys of strings that the mouse has left
+        self.legato = False  # a key that is pressed while another is held takes its note over
         self._typed: int | None = None  # by Enter
         self._held: set[int] = set()
         self._cursor = 60
@@ -71,6 +75,15 @@ class Playable(QWidget):
     @abstractmethod
     def key_at(self, at: QPointF) -> int | None:
         """The key under a point, whether it can sound or not."""
+
+    def keys_between(self, before: QPointF, at: QPointF) -> list[int]:
+        """The keys that the mouse meets on its way, without the first, and with the one where it is."""
+        key = self.key_at(at)
+        return [] if key is None else [key]
+
+    def on_one_string(self, key: int, other: int) -> bool:
+        """Whether the mouse leaves one of these keys where it plays the other."""
+        return True
 
     @abstractmethod
     def key_rect(self, key: int) -> QRectF:
@@ -134,10 +147,7 @@ class Playable(QWidget):
         if self._typed is not None:
             typed, self._typed = self._typed, None
             self._release(typed)
-        if self._down is not None:
-            down, self._down = self._down, None
-            if down not in self._held:
-                self._release(down)
+        self._release_mouse()
         for key in sorted(self._held):
             self._held.discard(key)
             self._release(key)
@@ -152,7 +162,7 @@ class Playable(QWidget):
     def marked(self) -> frozenset[int]:
         """Keys that do not look as at rest."""
         cursor = {self._cursor} if self.shows_cursor else set()
-        down = {key for key in (self._down, self._typed) if key is not None}
+        down = {key for key in (self._down, self._typed, *self._strummed) if key is not None}
         return frozenset(self._levels.keys() | self._held | cursor | down)
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -179,7 +189,7 @@ class Playable(QWidget):
 
     def is_down(self, key: int) -> bool:
         """Whether a key is pressed here, or stays down by itself."""
-        return key in (self._down, self._typed) or key in self._held
+        return key in (self._down, self._typed) or key in self._held or key in self._strummed
 
     @property
     def colour(self) -> QColor:
@@ -208,7 +218,7 @@ class Playable(QWidget):
                 self._held.add(key)
                 self._press(key, self.velocity_at(key, event.position()))
         elif event.button() == Qt.MouseButton.LeftButton:
-            self._down = key
+            self._down, self._at = key, event.position()
             self._press(key, self.velocity_at(key, event.position()))
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
@@ -217,19 +227,44 @@ class Playable(QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._down is None:
             return
-        key = self.key_at(event.position())
-        if key is None or key == self._down or not self.sounds(key):
-            return
+        met = self.keys_between(self._at, event.position())
+        self._at = event.position()
+        for key in met:
+            if key != self._down and self.sounds(key):
+                self._move_to(key, self.velocity_at(key, self._at))
+
+    def _move_to(self, key: int, velocity: int) -> None:
+        """Plays the next key that the mouse has met."""
         before, self._down = self._down, key
-        if before not in self._held:
-            self._release(before)
-        self._press(key, self.velocity_at(key, event.position()))
+        assert before is not None
+        for left in [each for each in self._strummed if self.on_one_string(each, key)]:
+            self._strummed.remove(left)
+            self._release_left(left)
+        if not self.legato and not self.on_one_string(before, key):
+            self._strummed.append(before)
+            self._press(key, velocity)
+        elif self.legato and self.on_one_string(before, key):
+            self._press(key, velocity)
+            self._release_left(before)
+        else:
+            self._release_left(before)
+            self._press(key, velocity)
+
+    def _release_left(self, key: int) -> None:
+        """Releases a key that the mouse has left, unless it stays down by itself."""
+        if key not in self._held:
+            self._release(key)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and self._down is not None:
-            down, self._down = self._down, None
-            if down not in self._held:
-                self._release(down)
+            self._release_mouse()
+
+    def _release_mouse(self) -> None:
+        """Releases what the mouse has pressed."""
+        down, self._down = self._down, None
+        left, self._strummed = [*self._strummed, *([] if down is None else [down])], []
+        for key in left:
+            self._release_left(key)
 
     def event(self, event: QEvent) -> bool:
         """Keeps Enter, which is a shortcut of the window, while the surface has the focus."""

@@ -30,7 +30,7 @@ NO_A4 = (
     "The Scala keyboard mapping of this instrument has a reference pitch of its own, so that A4 would change nothing"
 )
 NO_STRING = "This instrument has drums, and no string that this could change"
-OF_DRUMS = ("knobs.decay", "knobs.brightness_decay", "knobs.modulus", "pluck.curve")
+DRUM_KNOBS = ("knobs.decay", "knobs.brightness_decay", "knobs.modulus", "pluck.curve")
 LETS_RING = "Release off (let ring)"
 
 
@@ -171,7 +171,7 @@ def _why_barred(patch: Patch, field: str) -> str:
     if (
         patch.strings.kind == "drums"
         and field.startswith(("knobs.", "pluck.", "damping.mute", "technique."))
-        and field not in OF_DRUMS
+        and field not in DRUM_KNOBS
     ):
         return NO_STRING
     if field in SHAPED and patch.pluck.shape == "triangular":

@@ -50,7 +50,7 @@ class Legend(QWidget):
     @property
     def text(self) -> str:
         """All of it, uncut."""
-        return "   ".join([*([self._part] if self._part else []), *map(_whole, self._sources)])
+        return "   ".join([*([self._part] if self._part else []), *map(_caption, self._sources)])
 
     def show_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
         """`part`: which part of the sound they are of, written before them; "" for all of it."""
@@ -84,23 +84,23 @@ class Legend(QWidget):
         paint_sources(painter, self._sources, _GAP + self._part_width, HEIGHT / 2, self.width() - _GAP)
 
 
-def _whole(source: ShownSource) -> str:
+def _caption(source: ShownSource) -> str:
     return f"{source.slots}  {source.title}{source.remark}"
 
 
 def _texts(sources: Sequence[ShownSource], metrics: QFontMetrics, room: float) -> list[str]:
     """The text of each: whole; where too wide without “heard”, which the colour shows; then with cut titles."""
     for reported in (sources, [replace(source, heard=False) for source in sources]):
-        if _width(texts := [_whole(source) for source in reported], metrics) <= room:
+        if _width(texts := [_caption(source) for source in reported], metrics) <= room:
             return texts
-    titles = room - _width([_whole(replace(source, title="")) for source in reported], metrics)
+    titles = room - _width([_caption(replace(source, title="")) for source in reported], metrics)
     needed = [metrics.horizontalAdvance(source.title) for source in reported]
     for done, place in enumerate(sorted(range(len(needed)), key=lambda i: needed[i])):  # the longest give the most
         needed[place] = int(min(needed[place], max(0.0, titles / (len(needed) - done))))
         titles -= needed[place]
     elide = Qt.TextElideMode.ElideMiddle
     return [
-        _whole(replace(source, title=metrics.elidedText(source.title, elide, room)))
+        _caption(replace(source, title=metrics.elidedText(source.title, elide, room)))
         for source, room in zip(reported, needed, strict=True)
     ]
 

@@ -180,7 +180,7 @@ class ErrorTimePanel(TimePanel[ErrorCourse | BlowErrors]):
         drawn = [(name, hue) for name, hue in hues.items() if name in self._measured]
         text = "&nbsp;&nbsp;".join(f"<span style='color:{colour}'>— {name.upper()}</span>" for name, colour in drawn)
         stored = [percent(self._stored_errors[name]) for name, _ in drawn if name in self._stored_errors]
-        self.readout.rest(f"{text}&nbsp;&nbsp; ⋯ validation {', '.join(stored)}" if stored else text)
+        self.readout.rest(*([f"{text}&nbsp;&nbsp; ⋯ validation {', '.join(stored)}"] if stored else []), text)
 
 
 def percent(error: float) -> str:
@@ -189,7 +189,7 @@ def percent(error: float) -> str:
 
 
 def _decades(low: float, high: float) -> list[tuple[float, str]]:
-    return [(d, f"{100 * 10.0**d:g} %") for d in range(math.ceil(low), math.floor(high) + 1)]
+    return [(d, f"{100 * 10.0**d:.{max(0, -2 - d)}f} %") for d in range(math.ceil(low), math.floor(high) + 1)]
 
 
 def _between_decades(low: float, high: float) -> list[float]:

@@ -125,7 +125,7 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         half = 0.5 / (len(seen.displacement_m) - 1)  # the grid's points are the middles of their rows
         self._image.setImage(seen.displacement_m * MM, autoLevels=False)
         self._image.setRect(QRectF(seen.start_s, -half, seen.stop_s - seen.start_s, 1 + 2 * half))
-        self.readout.rest(_caption(seen))
+        self.readout.rest(*_captions(seen))
 
     def _words(self, made: Envelopes, time_s: float, place: float) -> Iterable[str]:
         here_m = self._picture.at(time_s, place) if self._picture is not None else None
@@ -178,10 +178,14 @@ def _colour_map(kind: str, signed: bool) -> pg.ColorMap:
     return made if signed else magnitudes_of(made)
 
 
-def _caption(made: Picture) -> str:
+def _captions(made: Picture) -> list[str]:
+    """What a column shows, in words and in fewer."""
     column_ms = 1000 * (made.stop_s - made.start_s) / made.displacement_m.shape[1]
     return {
-        "frames": "every frame",
-        "extremes": f"extremes of {column_ms:.2g} ms",
-        "envelope": f"peaks of {column_ms:.2g} ms, without sign; zoom in for motion",
+        "frames": ["every frame"],
+        "extremes": [f"extremes of {column_ms:.2g} ms", f"{column_ms:.2g} ms"],
+        "envelope": [
+            f"peaks of {column_ms:.2g} ms, without sign; zoom in for motion",
+            f"peaks of {column_ms:.2g} ms",
+        ],
     }[made.detail]

@@ -122,6 +122,7 @@ def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) ->
     assert reported.out.count("past the training horizon") == 3
     found = json.loads(run(*words, "--json").out)["validation"]
     late = [w for w in found["windows"] if w["past_horizon"]]
+    assert all(0 < w["rel_mse_se"] < w["rel_mse"] and 0 < w["rel_mae_se"] < w["rel_mae"] for w in late)
     assert [(w["start_s"], w["stop_s"]) for w in late] == [(0.125, 1.125), (1.125, 2.125), (2.125, 2.625)]
     # the first mode is left, and exp(-0.1 σt) of it: so much is known of the error
     sigma, middle_s = DATA.string.decay_rates(1).item(), 2.375
@@ -134,6 +135,7 @@ def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) ->
     at_horizon = json.loads(run("evaluate", preset, "--json", *cache).out)
     assert "first_second" not in at_horizon["validation"]
     assert found["rel_mse"] == pytest.approx(at_horizon["rel_mse"], rel=1e-4)
+    assert found["rel_mse_se"] == pytest.approx(at_horizon["validation"]["rel_mse_se"], rel=1e-4)
 
 
 def test_partials(run, preset: Path, cache: list[Any]) -> None:

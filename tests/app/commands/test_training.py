@@ -84,6 +84,20 @@ def test_training_writes_a_preset_and_ends_with_its_own_error(run, place: Place)
     assert [row["epoch"] for row in place.log("a")] == ["1", "2", "3"]
 
 
+def test_a_run_of_ones_own_takes_another_seed(run, place: Place) -> None:
+    words = place.train("seeded")
+    assert run(*words).status == run(*words, "--seed", 0).status == 0  # its own: the same run
+    own = load_preset(place.folder / "seeded.safetensors")
+    assert run(*words, "--seed", 5).status == 0
+    other = load_preset(place.folder / "seeded.safetensors")
+    assert sorted(each.name for each in (place.folder / "seeded").iterdir()) == ["tiny", "tiny_seed5"]
+    assert other.info.title == f"{own.info.title}, seed 5"
+    weights = own.model.state_dict(), other.model.state_dict()
+    assert any(not torch.equal(weights[0][name], weights[1][name]) for name in weights[0])
+    twice = run("train", "nylon_linear_gaussian_4k_lru_seed3", "--seed", 5)
+    assert twice.status == 2 and "has a seed already" in twice.err
+
+
 def test_a_killed_run_goes_on_to_the_same_weights(run, place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("training.fitting.fit.CHECKPOINT_EVERY_S", -1)
     assert run(*place.train("whole")).status == 0

@@ -22,7 +22,7 @@ from app.instrument.compiled import InstrumentPlayer, event_of, record_of
 from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.loud_keys import LoudKeys, on_string
 from app.instrument.strings import pitch_hz_of
-from app.instrument.table import VALUES
+from app.instrument.table import PLAYED_PARAMETERS
 from app.patches.library import find_patch, read_patch
 from app.patches.patch import Losses, Patch, Pickup, Polarisations
 from app.patches.tuning import TuningChoice
@@ -538,7 +538,7 @@ def test_a_parameter_changes_as_by_a_turned_patch(shipped: dict[str, Patch], pre
     for stage in (one, other):
         rendered(stage, [(1, NoteOn(60, 90))], 10)
     one.handle(PatchTurned(patch.with_value("knobs.decay", 3.0)), 0)
-    other.player.compiled.give(of.PARAMETER, key=VALUES.index("knobs.decay"), value=3.0)
+    other.player.compiled.give(of.PARAMETER, key=PLAYED_PARAMETERS.index("knobs.decay"), value=3.0)
     sounds = [rendered(stage, (), 200) for stage in (one, other)]
     np.testing.assert_array_equal(*sounds)
 
@@ -606,5 +606,5 @@ def test_values_of_the_player_have_the_indices_of_its_layout() -> None:
         "pickup.points.0": of.POINT,
         "pickup.points.1": of.POINT + 1,
     }
-    assert {id: index for index, id in enumerate(VALUES)} == indices
-    assert len(VALUES) == of.VALUES
+    assert {id: index for index, id in enumerate(PLAYED_PARAMETERS)} == indices
+    assert len(PLAYED_PARAMETERS) == of.VALUES

@@ -1,14 +1,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 
+import numpy as np
 import pytest
 
 from app.instrument.loud_keys import on_string
-from app.instrument.strings import Strings, bent, damped, fretted, pitch_hz_of, slid, turned
+from app.instrument.strings import Strings, bent, damped, decay_rates, fretted, pitch_hz_of, slid, turned
+from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Knobs, OpenString, Patch, StringSet
 from app.patches.tuning import TuningChoice
+from app.shared.parameters import OF_PATCHES
 from engine.resonators.family import inharmonicity
 from engine.resonators.string import StringParameters
 from tests.app.instrument.conftest import physical
@@ -131,3 +134,23 @@ def test_an_impossible_key_is_named(patch: Patch) -> None:
     bad = Patch.model_validate({**dict(patch), "strings": Fretted(string=PhysicalString.model_validate(heavy))})
     with pytest.raises(ValueError, match=r"key 88 of test.*length_m"):
         Strings(bad).of_key(88)
+
+
+def test_each_tenth_of_the_mute_knob_shortens_a_string_alike() -> None:
+    from engine.kernels import strings as kernel
+
+    patch = read_patch(SHIPPED / "steel_string_acoustic.json")
+    string = Strings(patch).of_key(40)
+    assert string is not None
+    own, modes, knob = string.parameters, string.modes, OF_PATCHES["damping.mute"]
+    row = np.array([getattr(own, each.name) for each in fields(own)])
+    squares = np.array([own.undamped_frequency(mode) ** 2 for mode in range(1, modes + 1)])
+    energies, times_s, t60_s = np.arange(1.0, modes + 1) ** -2, np.geomspace(0.01, 20, 2000), []
+    for tenth in range(11):
+        out = np.concatenate([squares, decay_rates(patch, own, modes)])
+        kernel.mute(row, modes, 0, knob.value(tenth / 10), out)
+        left = (energies / out[modes:] * np.exp(-2 * np.outer(times_s, out[modes:]))).sum(1)
+        t60_s.append(3 * times_s[np.argmax(left < 0.01 * (energies / out[modes:]).sum())])
+    ratios = np.array(t60_s[1:]) / t60_s[:-1]
+    assert t60_s[0] > 20 * t60_s[-1]
+    assert 0.6 < ratios.min() < ratios.max() < 0.8

@@ -18,7 +18,9 @@ from app.instrument.events import (
     KEYS,
     LEGATO,
     NOTES_OFF,
+    PORTAMENTO,
     RESET,
+    SLIDE_TIME,
     SOUND_OFF,
     STRUM,
     SUSTAIN,
@@ -211,6 +213,29 @@ def test_a_key_sounds_with_the_next_frame_and_is_damped_when_let_go(played: Note
     played.handle(NoteOff(45))
     sound.mixer.render(48_000)
     assert np.abs(sound.mixer.render(4_800)).max() < 1e-3 * np.abs(heard).max()
+
+
+@pytest.mark.parametrize("heard", ["model", "truth"])
+def test_a_note_that_slides_is_reported_on_its_string_with_where_it_is_stopped(
+    played: Notes, sound: Any, heard: Any
+) -> None:
+    played.set_monitor(hears(heard))
+    for number, value in ((LEGATO, 127), (PORTAMENTO, 127), (SLIDE_TIME, 64)):
+        played.handle(Controller(number, value))
+    played.handle(NoteOn(43, 100))  # the third fret of the lowest string
+    sound.mixer.render(4_800)
+    (struck,) = played.keys.sounding_notes()
+    assert (struck.key, struck.string) == (43, -1) and abs(struck.slid) < 0.05
+    played.handle(NoteOn(52, 100))  # where the next two strings have it too
+    places = []
+    for _ in range(40):
+        sound.mixer.render(480)
+        (note,) = played.keys.sounding_notes()
+        assert (note.key, note.string) == (52, 5)
+        places.append(note.key + note.slid)
+    assert places[0] < 47 and places == sorted(places)
+    assert places[-1] == pytest.approx(52, abs=0.1)
+    assert sum(43.5 < place < 51.5 for place in places) > 3
 
 
 def test_model_truth_and_difference_are_of_one_moment(played: Notes, sound: Any) -> None:

@@ -27,3 +27,13 @@ def test_a_value_beyond_the_words_has_the_nearest() -> None:
 )
 def test_help_explains_each_parameter(parameter: Parameter) -> None:
     assert parameter.tip
+
+
+@pytest.mark.parametrize("parameter", OF_PATCHES.values(), ids=lambda parameter: parameter.id)
+def test_a_knob_goes_through_its_whole_range_and_back(parameter: Parameter) -> None:
+    low, high = parameter.limits
+    values = [parameter.value(share / 10) for share in range(11)]
+    assert (values[0], values[-1]) == (low, pytest.approx(high))
+    assert values == sorted(set(values))
+    assert [parameter.share(value) for value in values] == pytest.approx([share / 10 for share in range(11)])
+    assert parameter.stepped(values[5], -1) < values[5] < parameter.stepped(values[5], 1)

@@ -15,6 +15,7 @@ from app.presets.library import Library
 from app.session.choices import Session
 from app.session.shown import ShownSource
 from app.views import theme
+from app.views.plots.colour_maps import level_map, share_map
 from app.views.plots.plots import recolour
 from app.views.string.view import StringView
 from app.window.panels.error_plane import ErrorPlanePanel
@@ -164,3 +165,16 @@ def test_the_choice_is_put_on(
     qapp.styleHints().setColorScheme(Qt.ColorScheme.Unknown)
     qapp.setStyleSheet(style)
     qapp.setPalette(palette)
+
+
+@pytest.mark.parametrize("size_percent", [100, 150])
+def test_maps_of_colours_are_those_of_the_theme_at_any_size_of_text(qapp: QApplication, size_percent: int) -> None:
+    lightness = {}
+    for choice in ("light", "dark"):
+        theme.apply_theme(qapp, choice, size_percent)
+        for made in (level_map, share_map):
+            colours = made().map([0.0, 1.0], mode="qcolor")
+            lightness[choice, made] = [colour.lightnessF() for colour in colours]
+    theme.apply_theme(qapp, "dark")
+    for (choice, _), (zero, most) in lightness.items():
+        assert (zero < most) == (choice == "dark")

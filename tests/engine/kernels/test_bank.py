@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from engine.kernels import layout as at
 from engine.models.configurations import DMDConfiguration
 from engine.models.dmd import DMD
-from engine.models.integrated_phase import KoopmanIntegrated
+from engine.models.integrated_phase import IntegratedPhase
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
@@ -63,7 +63,7 @@ def test_at_any_rate_it_is_the_model_at_those_times(
     name: str, shipped: Shipped, initial_m: Initial, strike: Strike, rung: Rung
 ) -> None:
     preset, pluck, rate_hz = shipped(name), Pluck(0.71, 5.0), 44_100
-    assert isinstance(preset.model, KoopmanIntegrated)
+    assert isinstance(preset.model, IntegratedPhase)
     found = rung(rate_hz, strike(name, pluck, rate_hz, STEREO), attack=False)
     frames = torch.arange(0, rate_hz, 11)
     with torch.inference_mode():
@@ -138,7 +138,7 @@ def test_what_is_no_bank_has_no_program(shipped: Shipped, model: torch.nn.Module
     preset = shipped(KNOWING)
     assert bank_program(model, preset.info, 48_000) is None  # Koopman_var: its multiplier sees every frame
     c = replace(preset.model.configuration, eigenvalue_widths=(at.MOST_MODES + 1,))
-    assert bank_program(KoopmanIntegrated(c), preset.info, 48_000) is None
+    assert bank_program(IntegratedPhase(c), preset.info, 48_000) is None
 
 
 @pytest.mark.parametrize("rank", [0, at.MOST_MODES + 2])

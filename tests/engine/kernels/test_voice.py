@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.kernels import layout as at
-from engine.models.integrated_phase import KoopmanIntegrated
+from engine.models.integrated_phase import IntegratedPhase
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
 from engine.presets import Preset, PresetInfo
 from engine.resonators.string import StringParameters
@@ -357,7 +357,7 @@ def test_a_runaway_never_reaches_the_mix(
 ) -> None:
     """A number of the model is spoilt: what nobody believes is found out before it is heard."""
     preset = shipped(KNOWING)
-    assert isinstance(preset.model, KoopmanIntegrated)
+    assert isinstance(preset.model, IntegratedPhase)
     program = model_program(preset, RATE_HZ)
     if value == 50.0:  # one latent grows
         program.memory[program.memory.view(np.int64)[at.P_OFFSETS] + 2] = -value / RATE_HZ

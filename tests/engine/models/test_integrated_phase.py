@@ -1,4 +1,4 @@
-"""Koopman with integrated phase against a plain quadrature, the physics, and the laws of the contract."""
+"""The integrated phase against a plain quadrature, the physics, and the laws of the contract."""
 
 import math
 
@@ -12,7 +12,7 @@ from engine.models._averaging import FIXED_POINT_STEPS
 from engine.models._cubics import integrate_parabolas
 from engine.models.base import Physics, count_parameters
 from engine.models.configurations import IntegratedPhaseConfiguration
-from engine.models.integrated_phase import GAIN_LIMIT, KoopmanIntegrated
+from engine.models.integrated_phase import GAIN_LIMIT, IntegratedPhase
 from engine.resonators.sine_transform import synthesis_matrix
 from engine.resonators.string import StringParameters
 from engine.truth import ModalState, SplittingSolver, solve_linear
@@ -27,14 +27,14 @@ KINDS: tuple[dict, ...] = (
 )
 
 
-def string_model(how: str = "averaging", seed: int = 0, **sizes: object) -> KoopmanIntegrated:
-    model = KoopmanIntegrated(IntegratedPhaseConfiguration(**{"state_size": 12, **SMALL, **sizes}))  # type: ignore[arg-type]
+def string_model(how: str = "averaging", seed: int = 0, **sizes: object) -> IntegratedPhase:
+    model = IntegratedPhase(IntegratedPhaseConfiguration(**{"state_size": 12, **SMALL, **sizes}))  # type: ignore[arg-type]
     model.initialise(how, Physics(StringParameters().resonator(10), 4_000, 1e-3), torch.Generator().manual_seed(seed))
     return model.eval()
 
 
 @torch.no_grad()
-def stirred_model(**sizes: object) -> KoopmanIntegrated:
+def stirred_model(**sizes: object) -> IntegratedPhase:
     """One that uses all it has: every last layer and the real part of K are away from zero."""
     model = string_model(**sizes)
     generator = torch.Generator().manual_seed(5)
@@ -186,7 +186,7 @@ def test_averaging_is_nearly_the_tension_modulated_string() -> None:
     truth = solver.solve(ModalState.at_rest(amplitudes), steps) @ torch.from_numpy(synthesis_matrix(101, 10) / 1e-3)
     errors = {}
     for how in ("physics", "averaging"):
-        model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10))
+        model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=10))
         model.initialise(how, Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0))
         difference = model(truth[:, 0].float(), steps) - truth[:, 1:]
         errors[how] = float((difference.square().sum((1, 2)) / truth[:, 1:].square().sum((1, 2))).mean())
@@ -214,7 +214,7 @@ def test_modulation_is_what_a_strong_low_mode_does_to_a_high_one_within_a_period
         amplitudes[0, 0], amplitudes[0, high] = 8e-3 * strength, 1e-5
         truth = SplittingSolver(string.resonator(10), rate_hz).solve(ModalState.at_rest(amplitudes), steps)
         for modulation in errors:
-            model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10)).double()
+            model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=10)).double()
             model.initialise(
                 "averaging", Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0)
             )
@@ -236,7 +236,7 @@ def test_the_action_keeps_the_phase_long_after_the_start() -> None:
     truth, _ = SplittingSolver(string.resonator(10), rate_hz).advance(ModalState.at_rest(amplitudes), 5 * rate_hz)
     errors = {}
     for adiabatic in (False, True):
-        model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10, adiabatic=adiabatic))
+        model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=10, adiabatic=adiabatic))
         model.initialise("averaging", Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0))
         found, _ = model.advance(model.encode(to_grid(amplitudes / 1e-3, 101).float()), 5 * rate_hz)
         late = to_modes(found[:, -rate_hz:], 10) * 1e-3 - truth[:, -rate_hz:]
@@ -245,7 +245,7 @@ def test_the_action_keeps_the_phase_long_after_the_start() -> None:
 
 
 def test_averaging_of_the_linear_string_is_the_linear_string() -> None:
-    model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10))
+    model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=10))
     physics = Physics(StringParameters().resonator(10, tension_modulated=False), 4_000, 1e-3)
     model.initialise("averaging", physics, torch.Generator().manual_seed(0))
     assert not model.K.any()
@@ -276,7 +276,7 @@ def test_no_parameters_let_it_grow() -> None:
         assert (exact <= state.origin.abs() * torch.exp(b - sigma * frames[:, None]) * (1 + 1e-5)).all()
 
 
-@pytest.mark.parametrize("how", KoopmanIntegrated.initialisations)
+@pytest.mark.parametrize("how", IntegratedPhase.initialisations)
 def test_the_seed_decides_all(how: str) -> None:
     first, again, other = (string_model(how, seed).state_dict() for seed in (1, 1, 2))
     assert all(torch.equal(first[name], again[name]) for name in first)
@@ -309,11 +309,11 @@ def test_every_parameter_learns(sizes: dict) -> None:
 
 
 def test_sizes_and_name() -> None:
-    assert 57_000 < count_parameters(KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=10))) < 58_000
-    assert model_class("koopman_integrated") is KoopmanIntegrated
+    assert 57_000 < count_parameters(IntegratedPhase(IntegratedPhaseConfiguration(state_size=10))) < 58_000
+    assert model_class("koopman_integrated") is IntegratedPhase
     assert MODELS["koopman_integrated"][1] is IntegratedPhaseConfiguration
     with torch.device("meta"):
-        assert KoopmanIntegrated(IntegratedPhaseConfiguration()).K.is_meta
+        assert IntegratedPhase(IntegratedPhaseConfiguration()).K.is_meta
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import torch
 from engine.models import build_model
 from engine.models.base import StringModel
 from engine.models.configurations import IntegratedPhaseConfiguration
-from engine.models.integrated_phase import KoopmanIntegrated
+from engine.models.integrated_phase import IntegratedPhase
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.data.dataset import Dataset
@@ -25,8 +25,8 @@ from training.start import BLIND_PURSUIT, COUNT, PHASES, PURSUIT, SYMMETRIES, be
 STEPS = 450
 
 
-def integrated_phase(state_size: int = 5) -> KoopmanIntegrated:
-    model = KoopmanIntegrated(IntegratedPhaseConfiguration(state_size=state_size))
+def integrated_phase(state_size: int = 5) -> IntegratedPhase:
+    model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=state_size))
     model.initialise("random", None, torch.Generator().manual_seed(0))  # type: ignore[arg-type]
     return model
 

@@ -25,6 +25,7 @@ typedef struct {
   uint32_t id;
   int32_t kind, index, steps; /* steps: of whole numbers, each with its word, with spaces between; 0: it is real */
   double low, high, standard;
+  double curve; /* how many times as fast a knob moves it at the end as at the start; 1: evenly */
   char name[64], module[64], unit[16], words[64];
 } parameter;
 

@@ -99,8 +99,17 @@ static int32_t terminate(void *interface) {
 
 /* Parameters: hosts have them between 0 and 1. */
 
-static double to_plain(const parameter *of, double value) { return of->low + value * (of->high - of->low); }
-static double from_plain(const parameter *of, double plain) { return of->high > of->low ? (plain - of->low) / (of->high - of->low) : 0; }
+/* As `Parameter.value` and `Parameter.share` of app/shared/parameters.py. */
+static double to_plain(const parameter *of, double value) {
+  double part = of->curve == 1 ? value : (pow(of->curve, value) - 1) / (of->curve - 1);
+  return fmin(fmax(of->low + part * (of->high - of->low), of->low), of->high);
+}
+
+static double from_plain(const parameter *of, double plain) {
+  if (!(of->high > of->low)) return 0;
+  double part = (plain - of->low) / (of->high - of->low);
+  return of->curve == 1 ? part : log1p(part * (of->curve - 1)) / log(of->curve);
+}
 
 static void show(shell *own) {
   for (int32_t place = 0; place < own->of->parameter_count; place++) {

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 from app.export.sampled.job import export_sampled, plain_stem, sample_folder
 from app.export.sampled.plan import SampledPlan
+from app.export.sampled.sfz import release_s
 from app.patches.patch import Patch
+from app.shared.parameters import OF_PATCHES
 
 Render = Callable[..., NDArray[np.float32]]
 PatchOf = Callable[..., Patch]
@@ -199,3 +201,8 @@ def test_no_name_becomes_a_path_or_an_opcode(name: str, patch: Patch, render: Re
 def test_a_folder_name_has_no_sign_that_sfz_reads() -> None:
     assert plain_stem("a b=c$d<e>//f;g") == "a_b_c_d_e_f_g"
     assert sample_folder(Path("x") / "My song.v2.sfz") == Path("x") / "My_song.v2_samples"
+
+
+def test_the_longest_release_of_an_instrument_is_within_the_formats(patch_of: PatchOf) -> None:
+    longest = OF_PATCHES["damping.release_t60_s"].limits[1]
+    assert release_s(patch_of(damping={"release_t60_s": longest})) < 100

@@ -31,11 +31,11 @@ def dialog(
     qtbot: QtBot, preset_folder: Path, monkeypatch: pytest.MonkeyPatch, gate: threading.Event, tmp_path: Path
 ) -> Iterator[ExportDialog]:
     def build(
-        images: list[str], form: str, target: str, path: Path, cache: Path, advanced: Callable[[str], None]
+        images: list[str], form: str, target: str, path: Path, cache: Path, advanced: Callable[[str, float], None]
     ) -> Path:
         while not gate.wait(0.01):
-            advanced("compiling the kernels")
-        advanced("linking")
+            advanced("compiling the kernels", 0.4)
+        advanced("linking", 0.97)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(f"{images} {form} {target}", encoding="utf-8")
         return path

@@ -8,6 +8,7 @@ import pytest
 from PySide6.QtCore import QPoint, QPointF, Qt
 from pytestqt.qtbot import QtBot
 
+from app.playing.keys import SoundingNote
 from app.views import theme
 from app.views.instrument.neck import Neck, fret_share
 
@@ -63,7 +64,7 @@ def test_the_highest_string_is_above_and_lower_in_a_row_is_harder(qtbot: QtBot, 
 def test_a_note_is_seen_on_the_highest_string_at_or_below_it(neck: Neck) -> None:
     for key, string in ((40, 0), (44, 0), (45, 1), (58, 3), (59, 4), (86, 5), (30, 0)):
         assert neck.string_of(key) == string
-    neck.show_sounding({52: 1.0})  # the second fret of D
+    neck.show_notes([SoundingNote(52, 1.0)])  # the second fret of D
     picture = neck.grab().toImage()
     ratio = picture.devicePixelRatio()
     rect = neck.cell(2, 2)
@@ -101,4 +102,53 @@ def test_whatever_sounds_can_be_painted(neck: Neck, levels: dict[int, float]) ->
     for strings in (GUITAR, ()):
         neck.set_strings(strings)
         neck.show_sounding(levels)
+        neck.show_notes([SoundingNote(key, level, key % 7 - 1, 0.3) for key, level in levels.items()])
         assert not neck.grab().isNull()
+
+
+def lit_x(neck: Neck, string: int) -> float:
+    """Where the dot of a string begins: the share of the width left of it."""
+    picture = neck.grab().toImage()
+    y = round(neck.cell(string, 0).center().y() * picture.devicePixelRatio())
+    lit = [x for x in range(picture.width()) if picture.pixelColor(x, y).name() == theme.MODEL]
+    return lit[0] / picture.width() if lit else float("nan")
+
+
+def test_a_note_that_slides_is_seen_on_its_own_string_between_two_frets(neck: Neck) -> None:
+    neck.show_notes([SoundingNote(52, 1.0, string=5)])  # slid up the lowest string, far above the open D
+    last = lit_x(neck, 0)
+    assert last > 0 and lit_x(neck, 2) != lit_x(neck, 2)
+    on_the_way = []
+    for slid in (-12.0, -8.5, -4.25, -1.5):
+        neck.show_notes([SoundingNote(52, 1.0, string=5, slid=slid)])
+        on_the_way.append(lit_x(neck, 0))
+    assert on_the_way == sorted(on_the_way) and on_the_way[-1] < last
+
+
+def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot: QtBot, neck: Neck) -> None:
+    heard: list[tuple[str, int]] = []
+    neck.pressed.connect(lambda key, _: heard.append(("on", key)))
+    neck.released.connect(lambda key: heard.append(("off", key)))
+    qtbot.mousePress(neck, LEFT, pos=on(neck, 0, 2))
+    qtbot.mouseMove(neck, on(neck, 3, 2))  # a fast mouse is seen at few places
+    qtbot.mouseMove(neck, on(neck, 5, 2))
+    assert heard == [("on", key) for key in (42, 47, 52, 57, 61, 66)]
+    assert all(neck.is_down(key) for _, key in heard)
+    qtbot.mouseRelease(neck, LEFT, pos=on(neck, 5, 2))
+    assert {key for what, key in heard if what == "off"} == {42, 47, 52, 57, 61, 66}
+    assert not any(neck.is_down(key) for _, key in heard)
+
+
+@pytest.mark.parametrize("legato", [False, True])
+def test_a_drag_along_a_string_takes_its_note_over_where_keys_are_legato(
+    qtbot: QtBot, neck: Neck, legato: bool
+) -> None:
+    heard: list[tuple[str, int]] = []
+    neck.legato = legato
+    neck.pressed.connect(lambda key, _: heard.append(("on", key)))
+    neck.released.connect(lambda key: heard.append(("off", key)))
+    qtbot.mousePress(neck, LEFT, pos=on(neck, 0, 1))
+    qtbot.mouseMove(neck, on(neck, 0, 3))
+    qtbot.mouseRelease(neck, LEFT, pos=on(neck, 0, 3))
+    moved = [("on", 43), ("off", 41)]
+    assert heard == [("on", 41), *(moved if legato else moved[::-1]), ("off", 43)]

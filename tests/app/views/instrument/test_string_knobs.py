@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
 from app.patches.patch import Patch, Pickup
 from app.patches.tuning import TuningChoice
+from app.views import theme
+from app.views.controls.sideways import Sideways
 from app.views.instrument.string_knobs import StringKnobs
 
 
@@ -118,3 +121,20 @@ def test_a_keyboard_mapping_leaves_nothing_to_a4_and_the_tip_says_why(knobs: Str
     knobs.show_patch(guitar)
     assert a4.isEnabled()
     assert "reference pitch" not in a4.toolTip()
+
+
+def test_knobs_that_were_hidden_while_text_grew_have_their_room(qtbot: QtBot, qapp: QApplication) -> None:
+    row = Sideways(knobs := StringKnobs())
+    qtbot.addWidget(row)
+    row.resize(700, 200)
+    row.show()
+    row.hide()
+    theme.apply_theme(qapp, "dark", 150)
+    try:
+        row.show()
+        QApplication.processEvents()
+        for knob in knobs.knobs.values():
+            assert knob.width() >= knob.sizeHint().width()
+        assert knobs.shape.geometry().right() < knobs.knobs["pluck.position"].geometry().left()
+    finally:
+        theme.apply_theme(qapp, "dark")
