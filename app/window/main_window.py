@@ -353,7 +353,8 @@ class MainWindow(QMainWindow):
 
     def _show_rate_label(self) -> None:
         fault = bool(self.rate_label.property("fault"))
-        self.rate_label.setVisible(self._alive and (fault or self._shows("test")))
+        known = bool(self.rate_label.text())
+        self.rate_label.setVisible(self._alive and known and (fault or self._shows("test")))
 
     def show_outside(self, text: str) -> None:
         """What of the latest note lies outside the training; "" for nothing."""

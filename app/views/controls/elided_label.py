@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import QPainter, QPaintEvent, QStaticText
+from PySide6.QtGui import QPainter, QPaintEvent, QStaticText, QTextOption
 from PySide6.QtWidgets import QLabel, QStyle, QStyleOption, QWidget
 
 
@@ -65,5 +65,8 @@ class ElidedLabel(QLabel):
     def _formatted(self, words: str) -> QStaticText:
         formatted = QStaticText(words)
         formatted.setTextFormat(Qt.TextFormat.RichText)
+        option = QTextOption()
+        option.setWrapMode(QTextOption.WrapMode.NoWrap)
+        formatted.setTextOption(option)
         formatted.prepare(font=self.font())
         return formatted

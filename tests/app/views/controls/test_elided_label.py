@@ -43,6 +43,9 @@ def test_a_legend_in_colours_has_a_shorter_wording_too(qtbot: QtBot) -> None:
     readout.rest(f"{short} and its validation in many words", short)
     readout.resize(600, 20)
     assert readout.shown != short
+    plain = readout.fontMetrics().horizontalAdvance("RMSE and its validation in many words")
+    readout.resize(plain - 20, 20)
+    assert readout.shown == short  # not the longer one in two lines
     readout.resize(60, 20)
     assert readout.shown == short
     picture = readout.grab().toImage()
