@@ -1,7 +1,7 @@
-"""Initial displacements of a musician's plucks.
+"""Initial displacements of a musician's plucks, and the blow of a hammer.
 
-All of them are at rest (zero velocity). Positions and widths are in units of the string's length,
-displacement in metres.
+Plucks are at rest (zero velocity); a blow is a start with speeds alone. Positions and widths are in units of the
+string's length, displacement in metres.
 """
 
 from __future__ import annotations
@@ -59,6 +59,24 @@ def release_factor(omega: Array, release_s: float) -> Array:
     half = omega * (release_s / (2 * np.pi))
     near = np.abs(half - 1) < 1e-6  # there it is 1/2
     return np.where(near, 0.5, np.sinc(half) / np.where(near, 1.0, 1 - half**2))
+
+
+def blow_factor(omega: Array, shape: Array) -> Array:
+    """From amplitudes a pluck of this shape would give modes, to those of a blow on the same width of string.
+
+    A hammer's force for a time τ, a raised cosine, spread over the string as `shape`. A mode then moves as if kicked
+    in the pulse's middle, at rest until then, with its spectrum at the mode's frequency, which is `release_factor` of
+    τ. Speeds are ω times the amplitudes. The height of the pluck becomes that of the wave which a short blow sends
+    out to both sides: the impulse over twice the string's resistance √(TρA). What waves that return do to a hammer
+    that still touches is left out. (N. H. Fletcher, T. D. Rossing, "The Physics of Musical Instruments", 2.9.)
+
+    Args:
+        omega: of the modes, (modes,), the first partial's first.
+        shape: over its height, (grid_points,).
+    """
+    width = float(shape.sum()) / (len(shape) - 1)  # in lengths of the string
+    factor: Array = 2 / (np.pi * width) * omega[0] / omega
+    return factor
 
 
 def held(displacement: Array) -> Array:

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 Shape = Literal["gaussian", "triangular", "raised_cosine", "rounded"]
 SHAPES: tuple[Shape, ...] = get_args(Shape)
 POSITION_RANGE = (0.02, 0.98)
-WIDTH_RANGE = (0.02, 0.5)
+WIDTH_RANGE = (0.02, 1.0)
 LARGEST_AMPLITUDE_MM = 20.0
 FULL_SCALE_M = 0.010  # the displacement that is 0 dBFS in sound
 FULL_SCALE_M_S = 30.0  # the velocity that is 0 dBFS: a Gaussian of width 0.08 is as loud as its displacement

@@ -22,6 +22,7 @@ from app.instrument.strings import MOST_MODES, KeyString, Strings, decay_rates
 from app.patches.drums import Drums
 from app.patches.fields import HIGHEST_KEY
 from app.patches.patch import VELOCITIES, Patch
+from engine.excitation import blow_factor
 from engine.pluck import LARGEST_AMPLITUDE_MM
 from engine.resonators.sine_transform import analysis_matrix
 from engine.voices import Ear
@@ -46,6 +47,7 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
     amplitudes_mm = np.array([pluck.amplitude_mm for pluck in plucks])
     shapes_m = np.stack([pluck.displacement(GRID_POINTS) for pluck in plucks])
     modal_m = shapes_m @ analysis_matrix(GRID_POINTS, MOST_MODES)
+    blows = [blow_factor(np.ones(1), shape) for shape in shapes_m / (amplitudes_mm[:, None] / 1000)]
     found = np.full((HIGHEST_KEY + 1, len(plucks)), np.nan)
     low, high = patch.range
     for key in range(low, high + 1):
@@ -55,7 +57,11 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
             continue
         if string is not None:
             pulled = np.minimum(string.shortened, LARGEST_AMPLITUDE_MM / amplitudes_mm)
-            found[key] = _of_string(patch, string, modal_m * pulled[:, None])
+            sets_out_m = modal_m[:, : string.modes] * pulled[:, None]
+            if patch.pluck.is_blow:
+                omega = string.parameters.undamped_frequencies(string.modes)
+                sets_out_m = sets_out_m * np.stack(blows) * (omega[0] / omega)
+            found[key] = _of_string(patch, string, sets_out_m)
     found.setflags(write=False)
     return found
 

@@ -12,7 +12,7 @@ from app.instrument.effects import body_curves
 from app.instrument.strings import KeyString, Strings
 from app.patches.drums import Drums
 from app.patches.patch import Patch
-from engine.excitation import release_factor
+from engine.excitation import blow_factor, release_factor
 from engine.kernels import playing_layout as of
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, LARGEST_AMPLITUDE_MM, Pluck
 from engine.presets import PresetInfo
@@ -92,10 +92,15 @@ class LoudKeys:
                 key = self.strings.of_key(loudness.looked_at(low, high, number))
                 if key is not None:
                     sound = self._sound(key, resonator_of(key, self.patch, self._preset))
-                    swings, modes = self.ear.pickup == "velocity", len(sound) // of.SOUND_ROWS
+                    swings, modes = self._swings, len(sound) // of.SOUND_ROWS
                     gain, body = self._gain(sound), self._heard_through
                     highest = max(highest, gain * loudness.peak(sound, modes, swings, *body, highest / gain))
         return float(loudness.limit(highest))
+
+    @property
+    def _swings(self) -> bool:
+        """Whether its modes set out as sines do."""
+        return (self.ear.pickup == "velocity") != self.patch.pluck.is_blow
 
     @property
     def _heard_through(self) -> tuple[Array, float]:
@@ -112,7 +117,10 @@ class LoudKeys:
         """What keys are equally loud by, as `engine.kernels.loudness` reads it."""
         patch = self.patch
         pluck = on_string(string, patch.pluck.pluck(of.REFERENCE_VELOCITY))
-        amplitudes = resonator.to_modes(pluck.displacement(resonator.points))
+        displacement_m = pluck.displacement(resonator.points)
+        amplitudes = resonator.to_modes(displacement_m)
+        if patch.pluck.is_blow:
+            amplitudes = amplitudes * blow_factor(resonator.omega, displacement_m / (pluck.amplitude_mm / 1000))
         if release_s := patch.pluck.release_s(of.REFERENCE_VELOCITY):
             amplitudes = amplitudes * release_factor(resonator.omega, release_s)
         weights = resonator.shapes @ self._full_ear.weights(resonator.points, resonator.force_weights) / FULL_SCALE_M

@@ -110,6 +110,7 @@ def table_of(
     counts[of.TABLE_MODE], counts[of.TABLE_BEND_BY] = MODES[patch.mode], BENDS[patch.bend_by]
     counts[of.TABLE_LOW], counts[of.TABLE_HIGH] = patch.range
     counts[of.TABLE_SHAPE], counts[of.TABLE_STOPS] = SHAPES[patch.pluck.shape], patch.pluck.stops
+    counts[of.TABLE_STRIKES] = patch.pluck.is_blow
     counts[of.TABLE_LET_RING] = patch.damping.let_ring
     counts[of.TABLE_POINTS], counts[of.TABLE_VELOCITY] = len(ear.points), ear.pickup == "velocity"
     counts[of.TABLE_SOLO], counts[of.TABLE_GRID] = ear.solo, grid_points

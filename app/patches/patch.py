@@ -125,6 +125,9 @@ class PluckChoices(Value):
         curve: 0 is even; towards 1 the middle velocities are louder, towards -1 softer.
         stops: whether what plucks a string that rings stops it first, as a finger or a plectrum does. Otherwise the
             pluck is added to the motion, as under a hammer.
+        strikes: whether a hammer strikes the string, as wide as the shape, for the time of `release_ms`, by
+            `engine.excitation.blow_factor`. `softest_mm` and `hardest_mm` are heights of the wave that it sends out.
+            Triangles, rounded or not, are no hammers: they pluck.
         release_ms, release_hard_ms: time in which the softest and the hardest pluck release the string; between
             them a step of velocity is a ratio. Slower is mellower. Both 0: at once.
         variation: spread of place, force, width, angle and release from stroke to stroke. Comparisons of model
@@ -139,6 +142,7 @@ class PluckChoices(Value):
     hardest_mm: float = parameter("pluck.hardest_mm")
     curve: float = parameter("pluck.curve")
     stops: Flag = True
+    strikes: Flag = False
     release_ms: Annotated[float, ranged(0, 20)] = 0.0
     release_hard_ms: Annotated[float, ranged(0, 20)] = 0.0
     variation: Share = 0.0
@@ -164,6 +168,11 @@ class PluckChoices(Value):
             self.shape,
             self.width * (self.width_hard / self.width) ** share,
         )
+
+    @property
+    def is_blow(self) -> bool:
+        """Whether strings set out with speeds."""
+        return self.strikes and self.shape in ("gaussian", "raised_cosine")
 
     def release_s(self, velocity: float) -> float:
         """The time in which a pluck of a velocity releases the string; 0: at once."""

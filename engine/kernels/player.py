@@ -427,14 +427,20 @@ def _pull(
     peak_m: float,
     width: float,
 ) -> float:
-    """The amplitudes of the modes of a pluck, and its highest point in m: its shape on the grid, then sines."""
+    """The amplitudes of the modes of a pluck, and its highest point in m: its shape on the grid, then sines.
+
+    Those of a blow are divided by its width, the shape's area over its height; `_release_pluck` does the rest.
+    """
     grid, shape, highest = tables[of.TABLE_GRID], tables[of.TABLE_SHAPE], 0.0
+    if shape == of.ROUNDED:
+        _round(player, table, grid, modes, position, peak_m, width)
+        return peak_m
     for point in range(grid):
         x = point / (grid - 1)
         distance = (x - position) / width
         if shape == of.TRIANGULAR:
             found = peak_m * min(x / position, (1 - x) / (1 - position))
-        elif point == 0 or point == grid - 1 or shape == of.ROUNDED:
+        elif point == 0 or point == grid - 1:
             found = 0.0
         elif shape == of.GAUSSIAN:
             found = peak_m * math.exp(-distance * distance)
@@ -443,8 +449,6 @@ def _pull(
         player[of.PLAYER_PULLED + point] = found
         highest = max(highest, found)
     turn = 2 * (grid - 1)
-    if shape == of.ROUNDED:
-        highest = _round(player, table, grid, position, peak_m, width)
     for mode in range(modes):
         total, place = 0.0, 0
         for point in range(1, grid - 1):
@@ -453,28 +457,43 @@ def _pull(
                 place -= turn
             total += player[of.PLAYER_PULLED + point] * table[of.TABLE_SINES + place]
         player[of.PLAYER_AMPLITUDES + mode] = total * (2 / (grid - 1))
+    if tables[of.TABLE_STRIKES] != 0:
+        area = 0.0
+        for point in range(grid):
+            area += player[of.PLAYER_PULLED + point] / (peak_m * (grid - 1))
+        for mode in range(modes):
+            player[of.PLAYER_AMPLITUDES + mode] /= area
     return highest
 
 
 @njit(**COMPILED)
-def _round(player: np.ndarray, table: np.ndarray, grid: int, position: float, peak_m: float, width: float) -> float:
-    """Fills the pulled shape, which is 0, with a rounded triangle, and returns its peak: as `excitation.rounded`."""
-    turn = 2 * (grid - 1)
+def _round(
+    player: np.ndarray, table: np.ndarray, grid: int, modes: int, position: float, peak_m: float, width: float
+) -> None:
+    """The amplitudes of the modes of a rounded triangle: as `excitation.rounded`.
+
+    It peaks where the force pulls: elsewhere it is straight.
+    """
+    turn, highest = 2 * (grid - 1), 0.0
+    near = int((position - width / 2) * (grid - 1)) - 1
+    far = int((position + width / 2) * (grid - 1)) + 2
+    low, high = max(near, 1), min(far, grid - 2) + 1
+    player[of.PLAYER_PULLED + low : of.PLAYER_PULLED + high] = 0.0
     for mode in range(1, grid - 1):
         half = mode * width / 2
         spread = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
-        each, place = math.sin(math.pi * mode * position) / (mode * mode) * spread, 0
-        for point in range(1, grid - 1):
+        each, place = math.sin(math.pi * mode * position) / (mode * mode) * spread, mode * low % turn
+        for point in range(low, high):
+            player[of.PLAYER_PULLED + point] += each * table[of.TABLE_SINES + place]
             place += mode
             if place >= turn:
                 place -= turn
-            player[of.PLAYER_PULLED + point] += each * table[of.TABLE_SINES + place]
-    highest = 0.0
-    for point in range(grid):
+        if mode <= modes:
+            player[of.PLAYER_AMPLITUDES + mode - 1] = each
+    for point in range(low, high):
         highest = max(highest, player[of.PLAYER_PULLED + point])
-    for point in range(grid):
-        player[of.PLAYER_PULLED + point] *= peak_m / highest
-    return peak_m
+    for mode in range(modes):
+        player[of.PLAYER_AMPLITUDES + mode] *= peak_m / highest
 
 
 @njit(**COMPILED)
@@ -512,8 +531,11 @@ def _slots_of_voice(players: np.ndarray, note: int, source: int) -> int:
 
 
 @njit(**COMPILED)
-def _release_pluck(player: np.ndarray, own: np.ndarray, partials: int, release_s: float) -> None:
-    """Releases a pluck's partials within a time: as `excitation.release_factor`."""
+def _release_pluck(player: np.ndarray, tables: np.ndarray, own: np.ndarray, partials: int, release_s: float) -> None:
+    """Releases a pluck's partials within a time, or strikes them for so long: as `excitation`."""
+    for mode in range(partials if tables[of.TABLE_STRIKES] != 0 else 0):
+        share = math.sqrt(strings.omega_squared(own, 1) / strings.omega_squared(own, mode + 1))
+        player[of.PLAYER_AMPLITUDES + mode] *= 2 / math.pi * share
     for mode in range(partials if release_s > 0.0 else 0):
         half = math.sqrt(strings.omega_squared(own, mode + 1)) * release_s / (2 * math.pi)
         left = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
@@ -600,7 +622,7 @@ def _make_voice(
     velocity: int,
     highest_m: float,
 ) -> None:
-    """A voice of the modes of a note's own string, which is released at the amplitudes of `_pull`: as `Voice`."""
+    """A voice of the modes of a note's own string, which sets out with the amplitudes of `_pull`: as `Voice`."""
     voice, counts, rate_hz, n = _at(address), _whole(address), player[of.PLAYER_RATE], players[note + of.NOTE_MODES]
     for slot in range(at.state(n) + at.TRUTH_ROWS * n):
         voice[slot] = 0.0
@@ -614,9 +636,12 @@ def _make_voice(
     first = at.state(n)
     for mode in range(n):
         voice[first + mode] = player[of.PLAYER_AMPLITUDES + mode]
-    first += at.OMEGA_SQUARED * n
+    struck, first = first, first + at.OMEGA_SQUARED * n
     own = player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING]
     _fill(player, players, table, tables, note, own, voice[first : first + 4 * n])
+    for mode in range(n if tables[of.TABLE_STRIKES] != 0 else 0):
+        voice[struck + n + mode] = voice[struck + mode] * math.sqrt(voice[first + mode])
+        voice[struck + mode] = 0.0
     _weigh(player, players, voice, 0, note)
     if player[note + of.NOTE_POINT] == of.BRIDGE:
         largest = 0.0
@@ -665,7 +690,7 @@ def _sound(
     release_s = table[of.TABLE_RELEASE_S]
     if release_s > 0.0:
         release_s *= (table[of.TABLE_RELEASE_S + 1] / release_s) ** share
-    _release_pluck(player, own, partials, release_s)
+    _release_pluck(player, tables, own, partials, release_s)
     modes, pairs, learned = partials, 0, tables[of.TABLE_RECORDED] != 0
     if learned:
         modes = recorded.modes_of(tables, partials)
@@ -729,7 +754,7 @@ def _look_at_peaks(player: np.ndarray, players: np.ndarray, table: np.ndarray, t
         modes = _sound(player, players, table, tables, key, -1)
         sound = player[of.PLAYER_SOUND : of.PLAYER_SOUND + of.SOUND_ROWS * modes]
         gain = loudness.gain(sound, modes, tables[of.TABLE_POINTS], body, mix)
-        swings = tables[of.TABLE_VELOCITY] != 0
+        swings = (tables[of.TABLE_VELOCITY] != 0) != (tables[of.TABLE_STRIKES] != 0)
         highest = max(highest, gain * loudness.peak(sound, modes, swings, body, mix, highest / gain))
     player[of.PLAYER_LIMIT] = loudness.limit(highest)
 
@@ -1103,7 +1128,7 @@ def _note_on(
         if touched > 0 and not given > 0.0:
             position = min(position, HARMONIC_REACH / touched)
         highest_m = _pull(player, table, tables, modes, position, amplitude_mm / 1000, width)
-        _release_pluck(player, own, modes, release_s)
+        _release_pluck(player, tables, own, modes, release_s)
         if tables[of.TABLE_RECORDED] != 0:
             modes = recorded.modes_of(tables, modes)
             pairs = (modes + 1) // 2

@@ -107,6 +107,7 @@ TABLE_DRUMS = 43  # W slot of the slots of drums of all keys (KEYS,), 0 where a 
 TABLE_RECORDED = 44  # W slot of what a recording adds to the law of strings; 0: nothing
 TABLE_NOISE_LEVEL = 45  # R energy of a noise of 0 dB, in s of full scale squared
 TABLE_ATTACK = 46  # W slot of a recorded attack, the noise of strokes; 0: they have that of a contact
+TABLE_STRIKES = 47  # W whether a key strikes its string, which sets out with speeds, or plucks it
 TABLE_CONTACTS = 48  # R (2, CONTACT): noise of the stroke and of the release, in the order of `Contact`
 STROKE, RELEASE = 0, 1
 PULSE_S, PULSE_SHARE, BURST_HZ, BURST_Q, ATTACK_S, FALL_S, FOLLOWS = range(7)

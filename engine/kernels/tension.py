@@ -22,6 +22,7 @@ NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller chang
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
 UNFELT = 1e-9  # of S, on average: what a mode adds to it that need not move
 LOOKS_QUANTA = 8  # from one look at which modes of a drum move to the next
+FEWER_QUANTA = 64  # from one look at whether a string's modes that still move need so many nodes to the next
 
 
 @njit(**COMPILED)
@@ -162,6 +163,55 @@ def advance(
 
 
 @njit(**COMPILED)
+def _nodes(voice: np.ndarray, program: np.ndarray, kick: float) -> int:
+    """Of a frame, as many as the modes that move need: as `KoopmanTension.step`.
+
+    Args:
+        kick: Σ η² k (q² + v²/ω²).
+    """
+    counts = voice.view(np.int64)
+    n, last = counts[at.MODES], counts[at.MOVING] - 1
+    squares, sigmas = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.SIGMA)
+    first_rate = damped(squares[0], sigmas[0]) / program[at.S_NODE_PHASE]
+    fastest = max(first_rate, damped(squares[last], sigmas[last]) / program[at.S_HIGHEST_PHASE])
+    fastest = min(max(fastest, math.sqrt(kick) / HARDEST_KICK), MOST_NODES * fastest)
+    return max(1, math.ceil(fastest / program[at.S_RATE]))
+
+
+@njit(**COMPILED)
+def _needs_fewer_nodes(voice: np.ndarray, program: np.ndarray) -> bool:
+    """Whether high modes have fallen silent since its rows were prepared, so that fewer nodes are enough."""
+    counts = voice.view(np.int64)
+    if counts[at.STEPS] == 1 or program[at.S_UNHEARD] > 0:
+        return False
+    counts[at.REFRESH] -= 1
+    if counts[at.REFRESH] > 0:
+        return False
+    counts[at.REFRESH] = FEWER_QUANTA
+    n, kick = counts[at.MODES], 0.0
+    x, y = row(voice, n, 0), row(voice, n, 1)
+    couplings, stretches = row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
+    for m in range(counts[at.MOVING]):
+        kick += stretches[m] * couplings[m] * (x[m] * x[m] + y[m] * y[m])
+    return _nodes(voice, program, kick) < counts[at.STEPS]
+
+
+@njit(**COMPILED)
+def _rest_silent(voice: np.ndarray, silence: float, q: np.ndarray, v: np.ndarray) -> None:
+    """Lays the highest modes to rest that are silent as it sets out."""
+    counts = voice.view(np.int64)
+    squares, moving, total = row(voice, counts[at.MODES], at.OMEGA_SQUARED), counts[at.MOVING], 0.0
+    for m in range(moving):
+        total += q[m] * q[m] + v[m] * v[m] / squares[m]
+    while moving > 1:
+        m = moving - 1
+        if not q[m] * q[m] + v[m] * v[m] / squares[m] < silence * silence * total:
+            break
+        moving -= 1
+    counts[at.MOVING] = moving
+
+
+@njit(**COMPILED)
 def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
     """The rows that follow from the voice's modes, its amplitudes and speeds (modes,): as `KoopmanTension.step`."""
     counts, whole = voice.view(np.int64), program.view(np.int64)
@@ -169,17 +219,14 @@ def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray
     squares, sigmas = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.SIGMA)
     couplings, stretches = row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
     rows = following(voice, n)
-    last = rest_above(voice, rate)
-    highest = program[at.S_HIGHEST_PHASE]
-    fastest = max(
-        damped(squares[0], sigmas[0]) / program[at.S_NODE_PHASE], damped(squares[last], sigmas[last]) / highest
-    )
-    kick = 0.0
-    for m in range(last + 1):
+    rest_above(voice, rate)
+    highest, kick = program[at.S_HIGHEST_PHASE], 0.0
+    for m in range(counts[at.MOVING]):
         omega = damped(squares[m], sigmas[m])
         kick += stretches[m] * couplings[m] * (q[m] * q[m] + (v[m] / omega) ** 2)
-    fastest = min(max(fastest, math.sqrt(kick) / HARDEST_KICK), MOST_NODES * fastest)
-    nodes = max(1, math.ceil(fastest / rate))
+    nodes, drum = _nodes(voice, program, kick), program[at.S_UNHEARD] > 0
+    if counts[at.PREPARED] and not drum:  # a glide leaves as many, so that one to the same modes changes nothing
+        nodes = max(nodes, counts[at.STEPS])
     h, coefficients = 1 / (nodes * rate), whole[at.S_COEFFICIENTS]
     slowest = np.inf
     for m in range(n):
@@ -201,7 +248,9 @@ def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray
         rows[2, m], rows[3, m] = angle * growth, angle * kappa * r
         rows[4, m], rows[5, m] = stretches[m] * growth, stretches[m] * kappa * r
         rows[6, m], rows[7, m] = kappa * p, omega * omega
-    counts[at.STEPS], counts[at.REFRESH] = nodes, 0
+    counts[at.STEPS] = nodes
+    if drum or not counts[at.PREPARED]:
+        counts[at.REFRESH] = 0 if drum else FEWER_QUANTA
     voice[at.DECAY] = math.exp(-2 * slowest / rate)
     order = row(voice, n, at.ORDER).view(np.int64)
     for m in range(n):
@@ -369,12 +418,16 @@ def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
     """What follows from its modes, and the latents, where a voice begins or its modes change."""
     counts = voice.view(np.int64)
     n = counts[at.MODES]
-    if counts[at.PREPARED] and not gliding(voice):
+    fewer = counts[at.PREPARED] and _needs_fewer_nodes(voice, program)
+    if counts[at.PREPARED] and not gliding(voice) and not fewer:
         return
     q, v, squares = row(voice, n, at.PHYSICAL), row(voice, n, at.PHYSICAL + 1), following(voice, n)[7]
     if counts[at.PREPARED]:
         physical(voice, q, v)
-        glide(voice)
+        if fewer:
+            counts[at.STEPS] = 1  # or as many as are needed
+        if gliding(voice):
+            glide(voice)
         raised = 1.0  # by the work that raises the tension
         for m in range(n):
             omega = damped(row(voice, n, at.OMEGA_SQUARED)[m], row(voice, n, at.SIGMA)[m])
@@ -384,6 +437,7 @@ def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
         q[:], v[:] = row(voice, n, 0), row(voice, n, 1)
         if gliding(voice):
             glide(voice)
+        _rest_silent(voice, program[at.S_SILENCE], q, v)
     prepare(voice, program, q, v)
     for m in range(counts[at.MOVING], n):
         q[m] = v[m] = 0.0

@@ -176,6 +176,12 @@ def _past(voice: np.ndarray, before: np.ndarray) -> None:
             voice[own + frame] = before[other + frame] + held
 
 
+@njit(inline="always", **COMPILED)
+def _eased(share: float) -> float:
+    """0 … 1 as 0 … 1, without the corners at which a loud string that fades in milliseconds would click."""
+    return share * share * (3 - 2 * share)
+
+
 @njit(**COMPILED)
 def _look_at_wishes(voice: np.ndarray, now: int) -> None:
     """Continues to the latest modes that are due. Wishes count in their order, and wait for those before them."""
@@ -248,10 +254,10 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
         for frame in range(quantum):
             gain = goal
             if done + frame < length:
-                gain = source + (goal - source) * ((done + frame + 1) / length)
+                gain = source + (goal - source) * _eased((done + frame + 1) / length)
             if first + frame < attack:
                 if counts[at.JOINS]:
-                    gain *= (first + frame + 1) / attack
+                    gain *= _eased((first + frame + 1) / attack)
                 else:
                     gain *= 0.5 - 0.5 * math.cos(math.pi * (first + frame + 0.5) / attack)
             place = frame + late
@@ -262,7 +268,9 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
                 left_over[2 * (place - quantum)] = gain * out[0, frame]
                 left_over[2 * (place - quantum) + 1] = gain * out[points - 1, frame]
         counts[at.GAIN_DONE] = min(done + quantum, length)
-        voice[at.GAIN] = goal if done + quantum >= length else source + (goal - source) * ((done + quantum) / length)
+        voice[at.GAIN] = goal
+        if done + quantum < length:
+            voice[at.GAIN] = source + (goal - source) * _eased((done + quantum) / length)
     if counts[at.GENERATED] > generated:  # else it stands still
         if counts[at.BEGAN_FRAME] < 0:
             counts[at.BEGAN_FRAME] = now + late

@@ -28,6 +28,8 @@ COLUMNS = {
     "hard_over_soft": "hard/soft",
     "two_notes_db": "two notes dB",
     "repeats_db": "repeats dB",
+    "tone": "tone",
+    "against_truth": "against truth",
 }
 
 

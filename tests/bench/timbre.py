@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from app.instrument.events import Event, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events
 from app.instrument.strings import Strings
-from app.patches.patch import Damping, Patch
+from app.patches.patch import Damping, Noise, Patch
+from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.layout import QUANTUM
 from engine.presets import Preset
 
@@ -57,6 +58,8 @@ class Timbre:
         hard_over_soft: ratio of the centroids at velocities 125 and 40.
         two_notes_db: two keys a fifth apart together, minus the sum of each alone, re that sum.
         repeats_db: the second stroke of a key minus the first, re the first.
+        tone: ratio of the centroids at the ends of the macro Tone.
+        against_truth: relative mean square of model minus truth over a second, without noise, body and room.
     """
 
     key: int
@@ -71,6 +74,8 @@ class Timbre:
     hard_over_soft: float
     two_notes_db: float
     repeats_db: float
+    tone: float
+    against_truth: float
 
     def figures(self) -> dict[str, float]:
         """All figures by name, in the order of the table; partials as `partial_2` … `partial_10`."""
@@ -133,6 +138,8 @@ REFERENCES = (
         "two_notes_db", -50, -20, "aim for the harp, whose strings share a board; not measured", ("concert_harp",)
     ),
     Reference("repeats_db", -40, -10, "aim; takes of a player differ by -4 … -12 dB in energy"),
+    Reference("tone", 2, 50, "aim: a knob that does much"),
+    Reference("against_truth", 0, 1e-6, "aim: of what each patch is, in the equation", everywhere=True),
     Reference("two_stage", 1.5, 10, "late over early T60: two polarisations, after Weinreich", ("classical_guitar",)),
 )
 PAIRED = ("classical_guitar", "harpsichord", "koto", "banjo", "concert_harp", "electric_bass")
@@ -181,6 +188,8 @@ def timbre(patch: Patch, preset: Preset, source: str = "model") -> Timbre:
         centroids[1] / centroids[0],
         _two_notes_db(played, patch, key),
         _repeats_db(played, varied, key),
+        _tone(played, patch, key, partials_hz[0]),
+        _against_truth(patch, preset, key),
     )
 
 
@@ -308,6 +317,28 @@ def _repeats_db(played: Callable[..., Array], patch: Patch, key: int) -> float:
     frames, again = round(STROKE_S * RATE_HZ), round(again_s * RATE_HZ)
     first, second = sound[:frames], sound[again : again + frames]
     return _ratio_db(float(np.square(second - first).sum()), float(np.square(first).sum()))
+
+
+def _tone(played: Callable[..., Array], patch: Patch, key: int, first_hz: float) -> float:
+    """NaN for an instrument without that macro."""
+    number = next((number for number, macro in enumerate(patch.macros) if macro.name == "Tone"), None)
+    if number is None:
+        return math.nan
+    dark, bright = (
+        centroid_hz(attack(played(0.4, (0.0, NoteOn(key, VELOCITY)), by=patch.turned(number, end)), first_hz))
+        for end in (0.0, 1.0)
+    )
+    return bright / dark
+
+
+def _against_truth(patch: Patch, preset: Preset, key: int) -> float:
+    note = [TimedEvent(0.0, NoteOn(key, VELOCITY))]
+    quiet = patch.model_copy(update={"noise": Noise()})
+    differs, truth = (
+        np.concatenate([*render_events(quiet, preset, note, RATE_HZ, each, 1.0, limited=False, dry=True)])
+        for each in (DIFFERENCE, "truth")
+    )
+    return float(np.square(differs, dtype=np.float64).sum() / np.square(truth, dtype=np.float64).sum())
 
 
 def _power(windowed: Array) -> tuple[Array, Array]:

@@ -1,4 +1,4 @@
-"""Voices: the cost of one while it rings, its error, and the cost of a pluck.
+"""Voices: the cost of one while it rings, its error, the cost of a pluck, and of 64 notes of an instrument.
 
 Costs are processor time of this thread, less that of an empty mixer, so that other processes have little effect.
 Errors are relative L2 over the first second of the sound.
@@ -15,7 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
+from app.instrument.compiled import InstrumentPlayer
+from app.instrument.events import NoteOn
+from app.instrument.strings import Strings
+from app.patches.library import find_patch
+from app.patches.patch import Noise
 from app.presets.library import STUDIO
+from engine.kernels.playing_layout import MOST_NOTES, MOST_PAIRS
 from engine.pluck import DEFAULT_LISTEN, FULL_SCALE_M, Pluck
 from engine.presets import SHIPPED, Preset, load_preset, preset_files
 from engine.resonators.sine_transform import project
@@ -34,6 +40,8 @@ PLUCK = Pluck()
 MODEL_SHARE, TRUTH_SHARE = 0.25, 0.5  # of a core
 MODEL_VOICES, TRUTH_VOICES, TRUTH_ERROR = 64, 16, 1e-4
 STEP_FRAMES = 480
+INSTRUMENTS = ("concert_harp", "steel_string_acoustic", "harpsichord")  # of two polarisations, heard at the bridge
+VELOCITY = 100
 
 
 @dataclass(frozen=True)
@@ -71,11 +79,38 @@ class StrikeCost:
 
 
 @dataclass(frozen=True)
+class NotesCost:
+    """Keys of an instrument whose strings have two polarisations and are heard at the bridge, all struck at once.
+
+    They are the model's, by the compiled player. Body, room, noise of contact and strings at rest are left out.
+
+    Attributes:
+        modes: of a note, on average.
+        onset, first_second, later: shares of a core of 64 such notes over the first 50 ms with their strokes, the
+            first second, and seconds 1 to 4; mean: over four seconds.
+    """
+
+    instrument: str
+    keys: int
+    modes: float
+    onset: float
+    first_second: float
+    later: float
+    mean: float
+
+    @property
+    def met(self) -> bool:
+        """Whether the mean is within the share of a core."""
+        return self.mean <= MODEL_SHARE
+
+
+@dataclass(frozen=True)
 class VoicesBenchmark:
     machine: Machine
     rate_hz: int
     voices: tuple[VoiceCost, ...]
     strikes: tuple[StrikeCost, ...]
+    notes: tuple[NotesCost, ...]
 
     @property
     def targets(self) -> str:
@@ -96,7 +131,8 @@ def measure(report: Callable[[float, str], None]) -> VoicesBenchmark:
             found, strike = _measure(path)
             voices += found
             strikes.append(strike)
-        return VoicesBenchmark(Machine.here(), RATE_HZ, tuple(voices), tuple(strikes))
+        notes = tuple(_notes(name) for name in INSTRUMENTS)
+        return VoicesBenchmark(Machine.here(), RATE_HZ, tuple(voices), tuple(strikes), notes)
 
 
 def _measure(path: Path) -> tuple[list[VoiceCost], StrikeCost]:
@@ -140,6 +176,10 @@ def _times_s(voice: Voice | None) -> list[float]:
     if voice is not None:
         voice.never_ends()
         mixer.add(voice)
+    return _elapsed_s(mixer)
+
+
+def _elapsed_s(mixer: Mixer) -> list[float]:
     found = []
     for begin_s, end_s in pairwise(EDGES_S):
         began_s = time.thread_time()
@@ -147,6 +187,34 @@ def _times_s(voice: Voice | None) -> list[float]:
             mixer.render(STEP_FRAMES)
         found.append(time.thread_time() - began_s)
     return found
+
+
+def _notes(name: str) -> NotesCost:
+    patch = find_patch(name).patch
+    patch = patch.model_copy(update={"sympathy_s_kg": 0.0, "noise": Noise()})
+    preset = load_preset(next(path for path in preset_files(SHIPPED) if path.stem == patch.preset))
+    low, high = patch.range
+    keys = range(low, min(high + 1, low + MODEL_VOICES))
+    partials = [string.modes for key in keys if (string := Strings(patch).of_key(key)) is not None]
+    runs = []
+    for _ in range(REPEATS + 1):  # the first loads what is compiled
+        mixer = Mixer(RATE_HZ)
+        player = InstrumentPlayer(patch, preset, RATE_HZ, {"model": 1.0}, most_notes=MOST_NOTES, varied=False)
+        mixer.set_player(player.compiled)
+        for key in keys:
+            player.handle(NoteOn(key, VELOCITY))
+        runs.append(_elapsed_s(mixer))
+    onset_s, rest_s, later_s = (statistics.median(times) for times in zip(*runs[1:], strict=True))
+    all_s = MODEL_VOICES / len(keys)
+    return NotesCost(
+        name,
+        len(keys),
+        statistics.mean(count + min(count, MOST_PAIRS) for count in partials),
+        all_s * onset_s / EDGES_S[1],
+        all_s * (onset_s + rest_s) / EDGES_S[2],
+        all_s * later_s / (EDGES_S[3] - EDGES_S[2]),
+        all_s * (onset_s + rest_s + later_s) / EDGES_S[3],
+    )
 
 
 def _error(program: Program, preset: Preset, source: StringSource) -> float:

@@ -23,19 +23,22 @@ from app.instrument.events import (
     PatchTurned,
     TimedEvent,
 )
+from app.instrument.loud_keys import LoudKeys
 from app.instrument.offline import channels_played, render_events, render_note
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, PluckChoices, Room
+from engine.excitation import blow_factor, release_factor
 from engine.kernels import playing_layout as of
 from engine.kernels.layout import QUANTUM
 from engine.kernels.loudness import k_weight
 from engine.kernels.player import PLUCK_STOPS_S
 from engine.kernels.playing_layout import WANTED_DB
+from engine.pluck import FULL_SCALE_M
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters
-from engine.voices import Mixer
+from engine.voices import Ear, Mixer
 from engine.voices.player import Report
 from tests.app.instrument.seen import Seen, seen, sounding, taken_up
 
@@ -187,6 +190,51 @@ def test_a_tremolo_keeps_its_level(patch: Patch, preset: Preset, name: str, key:
         spreads.append(max(levels) - min(levels))
     assert spreads[0] < 2
     assert spreads[1] > 4
+
+
+def struck(patch: Patch, **pluck: object) -> Patch:
+    """Struck by a hammer."""
+    blow = {"shape": "raised_cosine", "width": 0.1, "width_hard": 0.1, "strikes": True, "stops": False, **pluck}
+    return changed(patch, pluck=patch.pluck.model_copy(update=blow))
+
+
+def test_a_hammer_starts_the_string_from_rest_with_speeds(patch: Patch, preset: Preset) -> None:
+    """Against modes in closed form, of a blow so soft that the string is linear."""
+    soft = struck(patch, softest_mm=1e-3, hardest_mm=1e-3, release_ms=2.0, release_hard_ms=2.0)
+    found = LoudKeys(soft, Ear((0.37,)), preset.info).of_key(57)
+    assert found is not None
+    modes, shape = found.resonator, soft.pluck.pluck(64).displacement(preset.info.grid_points)
+    amplitudes = modes.to_modes(shape) * found.string.shortened * blow_factor(modes.omega, shape / 1e-6)
+    amplitudes *= release_factor(modes.omega, 2e-3) * (modes.shapes @ Ear((0.37,)).weights(modes.points))[:, 0]
+    t = np.arange(9_600) / RATE_HZ
+    turns = np.exp(np.outer(t, 1j * np.sqrt(modes.omega**2 - modes.sigma**2) - modes.sigma)).imag
+    expected = found.gain / FULL_SCALE_M * turns @ amplitudes
+    heard = changed(soft, pickup=Pickup(points=(0.37,)))
+    for source in ("model", "truth"):
+        sound = play(heard, preset, 0.2, (0.0, NoteOn(57, 64)), source=source)
+        np.testing.assert_allclose(sound[200:], expected[200:], atol=1e-3 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("kind", ["displacement", "bridge"])
+def test_keys_of_hammers_are_alike_in_model_and_truth_and_as_loud(patch: Patch, preset: Preset, kind: str) -> None:
+    hard = struck(patch, release_ms=2.0, release_hard_ms=0.7)
+    hard = changed(hard, pickup=Pickup(points=(0.3,), kind=kind))
+    strokes = [(0.0, NoteOn(45, 127)), (0.15, NoteOn(45, 100)), (0.3, NoteOn(64, 127))]
+    model, truth = (play(hard, preset, 1.0, *strokes, source=source) for source in ("model", "truth"))
+    assert float(((model - truth) ** 2).sum() / (truth**2).sum()) < 1e-6
+    for key in (45, 64):
+        sound = render_note(hard, preset, key, 100, 2.0, 0.4, RATE_HZ)[:, 0].astype(np.float64)
+        spectrum = np.abs(np.fft.rfft(sound)) ** 2
+        weighted = (spectrum * k_weight(np.fft.rfftfreq(len(sound), 1 / RATE_HZ))).sum()
+        assert 10 * np.log10(2 * weighted / len(sound) ** 2) == pytest.approx(WANTED_DB, abs=1.5)
+
+
+@pytest.mark.parametrize("shape", ["triangular", "rounded"])
+def test_what_pulls_to_a_point_is_no_hammer(patch: Patch, preset: Preset, shape: str) -> None:
+    sounds = [
+        play(struck(patch, shape=shape, strikes=each), preset, 0.1, (0.0, NoteOn(57, 90))) for each in (False, True)
+    ]
+    np.testing.assert_array_equal(*sounds)
 
 
 HIGH_BANDS_HZ = ((2_000, 5_000), (5_000, 10_000), (10_000, 20_000))

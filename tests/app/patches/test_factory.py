@@ -14,6 +14,7 @@ from app.instrument.strings import KeyString, Strings, pitch_hz_of
 from app.patches.library import SHIPPED, file_stem, list_patches
 from app.patches.patch import CATEGORIES, Patch
 from app.patches.tuning import Tuning
+from engine.excitation import blow_factor
 from engine.presets import load_preset
 from engine.presets.finding import SHIPPED as PRESETS
 from engine.resonators.base import Resonator
@@ -92,7 +93,10 @@ def test_no_pluck_raises_the_tension_beyond_training(patch: Patch) -> None:
         for velocity in (1, 64, 96, 127):
             pluck = patch.pluck.pluck(velocity)
             pulled = pluck.moved(amplitude_mm=pluck.amplitude_mm * string.shortened)  # as the player does
-            shape = resonator.to_modes(pulled.displacement(GRID_POINTS))
+            displacement_m = pulled.displacement(GRID_POINTS)
+            shape = resonator.to_modes(displacement_m)
+            if patch.pluck.is_blow:
+                shape = shape * blow_factor(resonator.omega, displacement_m / (pulled.amplitude_mm / 1000))
             rises.append(float(resonator.relative_tension_rise(shape)))
         assert rises == sorted(rises)
         worst = max(worst, rises[-1])

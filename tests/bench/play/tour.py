@@ -19,9 +19,12 @@ from numpy.typing import NDArray
 
 from app.audio.choices import Buffer, SoundChoice
 from app.export.wav import WavSettings, write_wav
+from app.instrument.events import KEYS, NoteOn, TimedEvent
+from app.instrument.offline import render_events
 from app.patches.patch import Patch
 from app.session.choices import Choices
 from app.window.settings import Settings, load_settings
+from engine.presets import SHIPPED, load_preset, preset_files
 from tests.bench.machine import Machine
 from tests.bench.play import analysis, hands, hearing, program
 from tests.bench.play.children import SOUND_AND_SCREEN, need_programs
@@ -37,6 +40,7 @@ STOP = "space"
 SILENCE_S, PATIENCE_S, DECAY_PATIENCE_S = 0.3, 2.0, 10.0
 CHOSEN_PATIENCE_S = 15.0
 BEFORE_S = 0.1  # of sound before the first key
+OWN_S, VELOCITY = 1.0, 100  # of a key alone
 AFTER_S, SILENT_DB = 0.1, -40.0  # of sound after a key; re the loudest key: below it nothing was heard
 
 
@@ -48,6 +52,8 @@ class Visited:
         silent: keys after which the level is 40 dB or more below that after the loudest.
         latency_ms: of the first key.
         holes: silences of a millisecond or more while strings ring; fades, clicks: as of `bench play`.
+        own_clicks: so many does the same search find in keys of the line that are rendered alone, without a stop or
+            another key: waves of low, stiff strings arrive as pulses.
         loudness_db: K-weighted, of the middle key of the line; peak_db: of all. Both re full scale.
         control_holes: of a steady tone that another process plays meanwhile.
     """
@@ -59,6 +65,7 @@ class Visited:
     holes: int
     fades: int
     clicks: int
+    own_clicks: int
     loudness_db: float
     peak_db: float
     control_holes: int
@@ -84,7 +91,7 @@ class _Stay:
 
     patch: Patch
     keys_s: list[float]
-    middle: int  # which of the keys is the line's middle
+    line: list[int]  # MIDI keys
     until_s: float
 
 
@@ -190,7 +197,8 @@ def _play(screen: Screen, patch: Patch) -> _Stay:
     time.sleep(REST_S)
     pressed_s += hands.play_in_turn(screen, [line[len(line) // 2]] * REPEATS, REPEATS_S)
     time.sleep(analysis.SOUNDS_S + 0.1)
-    return _Stay(patch, pressed_s, len(line) // 2, time.monotonic())
+    played = [hands.LOWEST + 12 * hands.octave_of(patch) + hands.KEYS.index(key) for key in line]
+    return _Stay(patch, pressed_s, played, time.monotonic())
 
 
 def _judged(stay: _Stay, keys: Sequence[int], part: NDArray[np.float32], tone: NDArray[np.float32]) -> Visited:
@@ -203,7 +211,7 @@ def _judged(stay: _Stay, keys: Sequence[int], part: NDArray[np.float32], tone: N
     part = part.copy()
     part[: keys[0] + usual] = 0  # what rang of the instrument before is no sound of this one
     found = analysis.faults(part, keys, usual, RATE_HZ)
-    middle_s = (keys[stay.middle] + usual) / RATE_HZ
+    middle_s = (keys[len(stay.line) // 2] + usual) / RATE_HZ
     levels = levels_db(part[:, 0], [key + usual for key in keys])
     return Visited(
         stay.patch.name,
@@ -213,10 +221,19 @@ def _judged(stay: _Stay, keys: Sequence[int], part: NDArray[np.float32], tone: N
         len(found.holes),
         len(found.fades),
         len(found.clicks),
+        sum(own_clicks(stay.patch, key) for key in stay.line),
         hearing.loudness(part, middle_s),
         float(20 * np.log10(max(np.abs(part).max(), 1e-9))),
         len(analysis.silences(tone, RATE_HZ)),
     )
+
+
+def own_clicks(patch: Patch, key: int) -> int:
+    """Those of a key alone, without a device."""
+    preset = load_preset(next(path for path in preset_files(SHIPPED) if path.stem == patch.preset))
+    note, begin = TimedEvent(BEFORE_S, NoteOn(key, VELOCITY, KEYS)), round(BEFORE_S * RATE_HZ)
+    sound = np.concatenate(list(render_events(patch, preset, [note], RATE_HZ, seconds=OWN_S)))
+    return len(analysis.faults(sound, [begin], 0, RATE_HZ).clicks)
 
 
 def levels_db(sound: NDArray[np.float32], begins: Sequence[int]) -> NDArray[np.float64]:

@@ -93,7 +93,13 @@ def test_no_pluck_as_velocity_is_taken_for_a_runaway(
     assert not voice.ran_away
 
 
-def test_a_change_of_gain_is_a_straight_fade() -> None:
+def eased(frames: int) -> NDArray[np.float64]:
+    share = np.arange(1, frames + 1) / frames
+    return np.asarray(share**2 * (3 - 2 * share))
+
+
+def test_a_change_of_gain_is_a_fade_without_corners() -> None:
+    """Where a loud string is stopped within 6 ms, a corner would be a click."""
     mixer, voice = Mixer(RATE_HZ, limited=False), constant()
     mixer.add(voice)
     mixer.render(1000)
@@ -101,9 +107,9 @@ def test_a_change_of_gain_is_a_straight_fade() -> None:
     found = mixer.render(2000)[:, 0]
     first = int(np.argmax(found != 0.5))
     assert first < at.QUANTUM
-    ramp = 0.5 * (1 - 0.75 * np.arange(1, FADE + 1) / FADE)
-    np.testing.assert_allclose(found[first : first + FADE], ramp, atol=1e-7)
+    np.testing.assert_allclose(found[first : first + FADE], 0.5 * (1 - 0.75 * eased(FADE)), atol=1e-7)
     np.testing.assert_array_equal(found[first + FADE :], np.float32(0.125))
+    assert np.abs(np.diff(found.astype(np.float64), 2)).max() < 0.375 * 6 / FADE**2 * 1.05
 
 
 def test_a_gain_that_changes_again_on_its_way_makes_no_step() -> None:
@@ -114,7 +120,7 @@ def test_a_gain_that_changes_again_on_its_way_makes_no_step() -> None:
         parts.append(mixer.render(300)[:, 0])
     parts.append(mixer.render(2000)[:, 0])
     steps = np.abs(np.diff(np.concatenate(parts)))
-    assert steps.max() < 0.5 * 2.0 / FADE * 1.01
+    assert steps.max() < 0.5 * 2.0 * 1.5 / FADE * 1.01
     assert parts[-1][-1] == 1.0
 
 
@@ -173,9 +179,7 @@ def test_a_voice_that_is_silent_ends_in_as_long_at_any_rate(rate_hz: int) -> Non
     mixer.add(voice)
     frames = round(0.02 * rate_hz)
     found = mixer.render(frames + 8 * at.QUANTUM)[:, 0]
-    np.testing.assert_allclose(
-        found[at.QUANTUM : at.QUANTUM + frames] / found[0], 1 - np.arange(1, frames + 1) / frames, atol=2e-3
-    )
+    np.testing.assert_allclose(found[at.QUANTUM : at.QUANTUM + frames] / found[0], 1 - eased(frames), atol=2e-3)
     assert voice.over
 
 
@@ -212,7 +216,7 @@ def test_release_fades_and_ends() -> None:
     voice.release(0.01)
     voice.release(1.0)  # the one under way continues
     found = mixer.render(1280)[:, 0]
-    np.testing.assert_allclose(found[:480], 0.5 * (1 - np.arange(1, 481) / 480), atol=1e-7)
+    np.testing.assert_allclose(found[:480], 0.5 * (1 - eased(480)), atol=1e-7)
     assert not found[480:].any()
     assert voice.over
     assert mixer.voices == []
@@ -304,7 +308,7 @@ def test_it_is_released_at_the_quantum_that_it_is_reported() -> None:
     mixer.add(voice)
     found = mixer.render(1024 + FADE)[:, 0]
     assert (found[:1024] == 0.5).all()
-    np.testing.assert_allclose(found[1024:], 0.5 * (1 - np.arange(1, FADE + 1) / FADE), atol=1e-7)
+    np.testing.assert_allclose(found[1024:], 0.5 * (1 - eased(FADE)), atol=1e-7)
     assert voice.over
 
 

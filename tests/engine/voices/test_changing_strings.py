@@ -246,8 +246,8 @@ def test_a_pluck_that_stops_the_string_is_a_fresh_one_and_the_motion_before_fade
     fresh.add(struck(of))
     heard = mixer.render(6_400)[:, 0]
     left = heard - fresh.render(6_400)[:, 0]
-    fade = np.clip(1 - np.arange(1, 6_401) / 288, 0, 1)
-    expected = fade * sound(of, [], 200)[6_400:]
+    done = np.minimum(np.arange(1, 6_401) / 288, 1)
+    expected = (1 - done**2 * (3 - 2 * done)) * sound(of, [], 200)[6_400:]
     np.testing.assert_allclose(left, expected, atol=1e-6)
     assert first.over
 

@@ -118,9 +118,9 @@ def test_a_voice_ends_though_its_model_hums_on(kind: str, ear: Ear, preset: Pres
     endless = render_voice(replace(program, ends_s=math.inf), source, preset.info, PLUCK, ear, 1.0)
     assert np.abs(endless[-RATE_HZ // 10 :]).max() > 1e-3
     first, faded = -(-round(0.3 * RATE_HZ) // at.QUANTUM) * at.QUANTUM, round(END_FADE_S * RATE_HZ)
-    gain = 1 - (np.arange(len(found)) - first + 1).clip(0, faded)[:, None] / faded
+    done = (np.arange(len(found)) - first + 1).clip(0, faded)[:, None] / faded
     np.testing.assert_array_equal(found[:first], endless[:first])
-    np.testing.assert_allclose(found, gain * endless, atol=1e-7)
+    np.testing.assert_allclose(found, (1 - done**2 * (3 - 2 * done)) * endless, atol=1e-7)
     cut = render_voice(program, source, preset.info, PLUCK, ear, 5.0, until_db=60.0)
     assert first + faded < len(cut) < RATE_HZ
 
