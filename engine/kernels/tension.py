@@ -20,7 +20,7 @@ ENERGY_BOUND = 1.5  # of the energy at the start, as in the model
 HARDEST_KICK, MOST_NODES = 0.3, 3  # as in the model
 NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller change is the last
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
-UNFELT = 3e-6  # of S, on average: a mode that adds less rests, and adds its average
+UNFELT = 5e-6  # of S, on average: a mode that adds less rests, and adds its average
 LOOKS_QUANTA = 8  # from one look at which modes of a drum move to the next
 
 
@@ -33,13 +33,14 @@ def _load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, mem
     """
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number)
-        for each in range(lanes.EARS):
-            memory[slot + each * lanes.LANES] = 0.0
         if number < len(order):
             mode = order[number]
             memory[slot], memory[slot + lanes.LANES] = x[mode], y[mode]
             for each in range(8):
                 memory[slot + (lanes.COSINE + each) * lanes.LANES] = rows[each, mode]
+        else:
+            for each in range(lanes.EARS):
+                memory[slot + each * lanes.LANES] = 0.0
 
 
 @njit(**COMPILED)

@@ -83,7 +83,7 @@ def test_modes_that_rest_are_not_missed(key: int, monkeypatch: pytest.MonkeyPatc
 
 
 def test_the_stretch_of_resting_modes_counts_on_average(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Struck by something small and hard most modes rest; also in a roll the sound stays the same to 100 dB."""
+    """Struck by something small and hard most modes rest; also in a roll the sound stays the same to 90 dB."""
     assert isinstance(TOM.strings, Drums)
     drum = TOM.strings.drums[0].model_copy(update={"mallet": HARD})
     patch = TOM.model_copy(update={"strings": TOM.strings.model_copy(update={"drums": (drum,)})})
@@ -97,7 +97,7 @@ def test_the_stretch_of_resting_modes_counts_on_average(monkeypatch: pytest.Monk
     monkeypatch.setattr(table, "DRUM_UNHEARD", 0.0)
     monkeypatch.setattr(table, "DRUM_STILL", 1e-12)
     moving = sound()
-    assert 0 < np.square(resting - moving).sum() < 1e-10 * np.square(moving).sum()
+    assert 0 < np.square(resting - moving).sum() < 1e-9 * np.square(moving).sum()
 
 
 def test_modes_that_rested_are_heard_where_the_listener_moves(monkeypatch: pytest.MonkeyPatch) -> None:
