@@ -20,6 +20,7 @@ from engine.kernels.modes import TOO_HIGH
 from engine.pluck import RUNAWAY_FACTOR
 
 HERTZ = -0.2  # power of the speed in the time of contact, as in `engine.strike`
+UNHEARD = 1e-7  # of the loudest mode, where the loudness of a key and its peak are computed
 
 
 @njit(inline="always", **COMPILED)
@@ -69,22 +70,36 @@ def gain_of(player: np.ndarray, table: np.ndarray, tables: np.ndarray, key: int,
     if player[slot] == 0.0:
         n, rows, first = tables[drum + of.DRUM_MODES], drum + of.DRUM_HEADER, of.PLAYER_SOUND
         sound = player[first : first + of.SOUND_ROWS * n]
-        speeds = sound[of.SOUND_X * n : (of.SOUND_X + 1) * n]
+        speeds = sound[of.SOUND_X * n : (of.SOUND_X + 1) * n]  # behind the rows below, which have no more modes
+        loud = sound[of.SOUND_Y * n : (of.SOUND_Y + 1) * n]
         speed = _speed(table, drum, (of.REFERENCE_VELOCITY - 1) / 126)
         _blow(table, tables, drum, _struck(table, drum, n), speed, speeds)
-        stereo = tables[of.TABLE_POINTS] == 2
+        stereo, loudest, modes = tables[of.TABLE_POINTS] == 2, 0.0, 0
         for mode in range(n):
-            omega = math.sqrt(table[rows + mode])
-            sound[of.SOUND_OMEGA * n + mode] = omega
-            sound[of.SOUND_SIGMA * n + mode] = table[rows + n + mode]
-            sound[of.SOUND_LEFT * n + mode] = table[rows + 5 * n + mode] * speeds[mode] / omega
-            right = table[rows + 6 * n + mode] * speeds[mode] / omega if stereo else 0.0
-            sound[of.SOUND_RIGHT * n + mode] = right
+            speeds[mode] /= math.sqrt(table[rows + mode])
+            weight = abs(table[rows + 5 * n + mode])
+            if stereo:
+                weight = max(weight, abs(table[rows + 6 * n + mode]))
+            loud[mode] = weight * abs(speeds[mode])
+            loudest = max(loudest, loud[mode])
+        loud[0] = loud[n - 1] = loudest  # so that the peak is looked for in the same frames
+        for mode in range(n):
+            if loud[mode] > UNHEARD * loudest:
+                modes += 1
+        place = 0
+        for mode in range(n):
+            if loud[mode] > UNHEARD * loudest:
+                sound[of.SOUND_OMEGA * modes + place] = math.sqrt(table[rows + mode])
+                sound[of.SOUND_SIGMA * modes + place] = table[rows + n + mode]
+                sound[of.SOUND_LEFT * modes + place] = table[rows + 5 * n + mode] * speeds[mode]
+                right = table[rows + 6 * n + mode] * speeds[mode] if stereo else 0.0
+                sound[of.SOUND_RIGHT * modes + place] = right
+                place += 1
         curves = tables[of.TABLE_BODY]
         body = table[curves : curves + of.BODY_SLOTS]
         mix = player[of.PLAYER_VALUES + of.BODY_MIX] if curves != 0 else 0.0
-        found = loudness.gain(sound, n, tables[of.TABLE_POINTS], body, mix)
-        found *= loudness.limit(found * loudness.peak(sound, n, True, body, mix, 0.0))
+        found = loudness.gain(sound, modes, tables[of.TABLE_POINTS], body, mix)
+        found *= loudness.limit(found * loudness.peak(sound, modes, True, body, mix, 0.0))
         player[slot] = found * table[of.TABLE_LEVEL]
     return player[slot]
 

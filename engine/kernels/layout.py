@@ -89,7 +89,10 @@ PENDING_MODES = 56  # W address of the first modes that it was to have; each nam
 HEARD = 57  # W modes that move and are heard, the first of the row ORDER
 FELT = 58  # W those and the next, which stretch a drum; the others, up to MOVING, rest
 RESTED = 59  # W quanta in which those did not even decay
-HEADER = 60
+REST_STRETCH = 60  # R what they add to S on average, and
+REST_SECOND = 61  # R to R
+REST_DECAY = 62  # R of both in a quantum
+HEADER = 63
 
 
 @njit(inline="always", **COMPILED)

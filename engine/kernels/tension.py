@@ -20,7 +20,7 @@ ENERGY_BOUND = 1.5  # of the energy at the start, as in the model
 HARDEST_KICK, MOST_NODES = 0.3, 3  # as in the model
 NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller change is the last
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
-UNFELT = 1e-9  # of S, on average: what a mode adds to it that need not move
+UNFELT = 5e-6  # of S, on average: a mode that adds less rests, and adds its average
 LOOKS_QUANTA = 8  # from one look at which modes of a drum move to the next
 FEWER_QUANTA = 64  # from one look at whether a string's modes that still move need so many nodes to the next
 
@@ -34,13 +34,14 @@ def _load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, mem
     """
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number)
-        for each in range(lanes.EARS):
-            memory[slot + each * lanes.LANES] = 0.0
         if number < len(order):
             mode = order[number]
             memory[slot], memory[slot + lanes.LANES] = x[mode], y[mode]
             for each in range(8):
                 memory[slot + (lanes.COSINE + each) * lanes.LANES] = rows[each, mode]
+        else:
+            for each in range(lanes.EARS):
+                memory[slot + each * lanes.LANES] = 0.0
 
 
 @njit(**COMPILED)
@@ -72,12 +73,17 @@ def _node(
     far: int,
     ears: int,
     sums: tuple[float, float],
+    rest: tuple[float, float],
     largest_stretch: float,
     heard: np.ndarray,
 ) -> tuple[float, float]:
-    """The kick of the common tension and the turn to the next node, in place: from S and R here to those there."""
-    tension = min(sums[0], largest_stretch)
-    linear, squared = tension * (1 - 2 * sums[1]), tension * tension
+    """The kick of the common tension and the turn to the next node, in place: from S and R here to those there.
+
+    Args:
+        sums, rest: S and R of the blocks here, and what resting modes add; the result is of the blocks.
+    """
+    tension = min(sums[0] + rest[0], largest_stretch)
+    linear, squared = tension * (1 - 2 * (sums[1] + rest[1])), tension * tension
     return lanes.turn(memory, first, near, far, ears, linear, squared, heard)
 
 
@@ -138,7 +144,7 @@ def advance(
         rows: (8, modes): λ's parts, h k A/ω, h k κ r/ω, η² A, η² κ r, κ p and ω².
     """
     batch, steps, modes = out.shape
-    memory, order, nobody = np.empty(lanes.slots(modes)), np.arange(modes), np.empty(0)
+    memory, order, nobody, rest = np.empty(lanes.slots(modes)), np.arange(modes), np.empty(0), (0.0, 0.0)
     first = lanes.aligned(memory)
     for string in range(batch):
         _load(x[string], y[string], rows, order, memory, first)
@@ -146,7 +152,7 @@ def advance(
         sums = lanes.add_up(memory, first, blocks, 0, 0, nobody)
         for step in range(steps):
             for _ in range(nodes):
-                sums = _node(memory, first, blocks, 0, 0, sums, largest_stretches[string], nobody)
+                sums = _node(memory, first, blocks, 0, 0, sums, rest, largest_stretches[string], nobody)
             largest_energies[string] *= decay
             total, held = _hold(memory, first, blocks, largest_energies[string])
             before, moving = moving, _trim(memory, first, moving, silence, total)
@@ -287,8 +293,8 @@ def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray
     counts = voice.view(np.int64)
     _fall(voice)
     n, moving = counts[at.MODES], counts[at.MOVING]
-    x, y, stretches = row(voice, n, 0), row(voice, n, 1), following(voice, n)[4]
-    order = row(voice, n, at.ORDER).view(np.int64)
+    x, y, rows, sigmas = row(voice, n, 0), row(voice, n, 1), following(voice, n), row(voice, n, at.SIGMA)
+    stretches, order = rows[4], row(voice, n, at.ORDER).view(np.int64)
     sizes, heard = scratch[:moving], scratch[moving : 2 * moving]
     total = stretch = 0.0
     for m in range(moving):
@@ -320,10 +326,16 @@ def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray
             order[place] = m
             place += 1
     counts[at.FELT], counts[at.MOVING] = place, moving
+    rest = second = rate = 0.0
     for m in range(moving):
         if heard[m] <= audible and not stretches[m] * sizes[m] > UNFELT * stretch:
             order[place] = m
             place += 1
+            rest += 0.5 * stretches[m] * sizes[m]
+            second += 0.5 * rows[5, m] * sizes[m]
+            rate += stretches[m] * sizes[m] * sigmas[m]
+    voice[at.REST_STRETCH], voice[at.REST_SECOND] = rest, second
+    voice[at.REST_DECAY] = math.exp(-rate / rest * at.QUANTUM / program[at.S_RATE]) if rest > 0 else 0.0
     counts[at.REFRESH] = LOOKS_QUANTA
 
 
@@ -455,10 +467,13 @@ def generate(
     n, nodes, points = counts[at.MODES], counts[at.STEPS], counts[at.POINTS]
     sets, rests = 2 if fading else 1, program[at.S_UNHEARD] > 0
     ears = sets * points if heard else 0
+    rest = (0.0, 0.0)
     if not rests:
         counts[at.HEARD] = counts[at.FELT] = counts[at.MOVING]
     elif fading or counts[at.REFRESH] == 0:
         _look(voice, program, sets, scratch)
+    if rests:
+        rest = (voice[at.REST_STRETCH], voice[at.REST_SECOND])
     x, y, rows = row(voice, n, 0), row(voice, n, 1), following(voice, n)
     order = row(voice, n, at.ORDER).view(np.int64)
     loud, quiet = order[: counts[at.HEARD]], order[counts[at.HEARD] : counts[at.FELT]]
@@ -473,10 +488,10 @@ def generate(
     sums = lanes.add_up(scratch, first, near, far, ears, ear_sums)
     for frame in range(at.QUANTUM):
         for ear in range(ears):
-            out[apart * ear, frame] = ear_sums[2 * ear] - sums[0] * ear_sums[2 * ear + 1]
+            out[apart * ear, frame] = ear_sums[2 * ear] - (sums[0] + rest[0]) * ear_sums[2 * ear + 1]
         for _ in range(nodes - 1):
-            sums = _node(scratch, first, near, far, 0, sums, largest, ear_sums)
-        sums = _node(scratch, first, near, far, ears, sums, largest, ear_sums)
+            sums = _node(scratch, first, near, far, 0, sums, rest, largest, ear_sums)
+        sums = _node(scratch, first, near, far, ears, sums, rest, largest, ear_sums)
         voice[at.LARGEST_ENERGY] *= voice[at.DECAY]
         if frame % 16 == 15:
             total, held = _hold(scratch, first, near + far, voice[at.LARGEST_ENERGY])
@@ -491,6 +506,8 @@ def generate(
     if rests:
         counts[at.REFRESH] -= 1
         counts[at.RESTED] += 1
+        voice[at.REST_STRETCH] *= voice[at.REST_DECAY]
+        voice[at.REST_SECOND] *= voice[at.REST_DECAY]
     else:
         counts[at.MOVING] = moving
     counts[at.GENERATED] += at.QUANTUM

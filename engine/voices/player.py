@@ -23,6 +23,8 @@ from engine.voices.mixer import Mixer
 from engine.voices.voice import Voice
 
 NONE = math.nan
+AT_HAND = 16  # notes whose memory is there from the start
+PAGE_SLOTS = 512  # of 4 kB
 LOG_DB = 20 / math.log(10)
 
 # An event and a report as records: the slots of `playing_layout`, in their order
@@ -190,6 +192,9 @@ class CompiledPlayer:
 
         self.rate_hz = rate_hz
         self.memory = memory = np.zeros(of.player_slots(modes + of.MOST_PAIRS))
+        for number in range(AT_HAND * of.MOST_SOURCES):  # else the audio thread would wait for pages of memory
+            first = of.PLAYER_VOICES + number * of.voice_slots(modes + of.MOST_PAIRS)
+            memory[first : first + of.voice_slots(modes + of.MOST_PAIRS) : PAGE_SLOTS] = 0.0
         self._counts = counts = memory.view(np.int64)
         self._lock = threading.Lock()
         self._ids = itertools.count(1)

@@ -45,6 +45,7 @@ class DrumPanel(Panel):
         self.view.listening_point_reset.connect(self._reset_listening_point)
         self.view.motion_toggled.connect(lambda on: session.update(motion=on))
         self._key: int | None = None
+        self._shown: PlayedDrum | None = None  # whose place it is
         self._place: Place = (0.0, 0.0)
         self._standing: tuple[object, ...] = ()
 
@@ -81,13 +82,14 @@ class DrumPanel(Panel):
 
     def show_key(self, key: int, place: Place | None = None) -> None:
         """The drum of a key is shown, struck at a place; None: at its own where it is another drum."""
-        before, self._key = self._drum, key
+        self._key = key
         drum = self._drum
         if drum is None:
             return
         self.view.set_drum(f"{drum.name}, {note_name(key)}", drum.drum.shape, (drum.drum.length_m, drum.drum.width_m))
-        if place is not None or drum != before:
+        if place is not None or drum != self._shown:
             self._aim(place or drum.place)
+        self._shown = drum
 
     def blow_started(self, take: BlowTake) -> None:
         self._standing = ()

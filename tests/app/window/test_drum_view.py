@@ -164,6 +164,13 @@ def test_enter_strikes_where_the_keyboard_points(qtbot: QtBot, drummed: Controll
     assert place == pytest.approx((x + 0.05, y + 0.05))
 
 
+def test_another_instrument_is_struck_at_its_own_place(drummed: Controller) -> None:
+    strike(drummed.drum, 0.4, -0.3)
+    timpani = read_patch(PATCHES / "timpani.json")
+    drummed.session.update(instrument=timpani)
+    assert drummed.drum.place == timpani.strings.drums[0].place  # type: ignore[union-attr]
+
+
 def test_views_of_a_line_say_so_and_those_of_sound_and_error_go_on(qtbot: QtBot, drummed: Controller) -> None:
     window, session = drummed.window, drummed.session
     session.update(face="lab", left_view="partials", right_view="space_time")
