@@ -83,21 +83,21 @@ def test_modes_that_rest_are_not_missed(key: int, monkeypatch: pytest.MonkeyPatc
 
 
 def test_the_stretch_of_resting_modes_counts_on_average(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Struck by something small and hard most modes rest; also in a roll the sound stays the same to 90 dB."""
+    """Struck by something small and hard most modes rest; without their average the error is -96 dB, not -124."""
     assert isinstance(TOM.strings, Drums)
     drum = TOM.strings.drums[0].model_copy(update={"mallet": HARD})
     patch = TOM.model_copy(update={"strings": TOM.strings.model_copy(update={"drums": (drum,)})})
 
     def sound() -> np.ndarray:
-        roll = [TimedEvent(0.1 * number, NoteOn(47, 127)) for number in range(3)]
-        blocks = render_events(patch, PRESET, roll, RATE_HZ, seconds=0.5, limited=False)
+        blow = [TimedEvent(0.0, NoteOn(47, 127))]
+        blocks = render_events(patch, PRESET, blow, RATE_HZ, seconds=0.5, limited=False)
         return np.concatenate(list(blocks)).astype(np.float64)
 
     resting = sound()
     monkeypatch.setattr(table, "DRUM_UNHEARD", 0.0)
     monkeypatch.setattr(table, "DRUM_STILL", 1e-12)
     moving = sound()
-    assert 0 < np.square(resting - moving).sum() < 1e-9 * np.square(moving).sum()
+    assert 0 < np.square(resting - moving).sum() < 1e-11 * np.square(moving).sum()
 
 
 def test_modes_that_rested_are_heard_where_the_listener_moves(monkeypatch: pytest.MonkeyPatch) -> None:
