@@ -93,7 +93,7 @@ def test_silence_is_explained(run, small_preset: Path, folder: Path) -> None:
         (["--seconds", 601], "--seconds: must lie in 0 … 600 s, not 601"),
         (["--seconds", "nan"], "--seconds: must lie in 0 … 600 s, not nan"),
         (["--seconds", 0], "--seconds: must hold a sample of 4000 Hz, not 0 s"),
-        (["--width", 0.6], "--width: must lie in 0.02 … 0.5, not 0.6"),
+        (["--width", 1.6], "--width: must lie in 0.02 … 1, not 1.6"),
         (["--rate", 999], "--rate: must lie in 1000 … 384000 Hz, not 999"),
         (["--bits", 8], "--bits"),
         (["--source", "all"], "--source"),
