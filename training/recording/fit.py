@@ -18,6 +18,7 @@ from training.recording.intervals import Spread, spreads
 from training.recording.note import FIT_LASTS_S, Note
 from training.recording.numbering import Series
 from training.recording.refine import Fit, Pole
+from training.recording.slow import settle_slow
 from training.recording.sweeps import FIRST_DAMPING, Takes
 
 Array = NDArray[np.float64]
@@ -114,7 +115,13 @@ def fit_takes(
         if checkpoint is not None:
             save(checkpoint, takes, number)
         progress(share)
-    return [_learned(note, series, fit) for (note, series), fit in zip(notes, takes.fits, strict=True)]
+    intervals = [spreads(fit) for fit in takes.fits]
+    if glides:
+        settle_slow(takes.fits)
+    return [
+        _learned(note, series, fit, own)
+        for (note, series), fit, own in zip(notes, takes.fits, intervals, strict=True)
+    ]
 
 
 def _steps(
@@ -177,12 +184,12 @@ def _fit_of(note: Note, series: Series, first: Series, hz: Array, edges: Array, 
     return Fit(samples, rate, edges, hz, glide, tuned=tuned)
 
 
-def _learned(note: Note, series: Series, fit: Fit) -> LearnedNote:
+def _learned(note: Note, series: Series, fit: Fit, intervals: dict[int, Spread]) -> LearnedNote:
     """With its own pitch in its poles."""
     higher = 1 + fit.glide.pitch
     poles = (replace(pole, s=pole.s * higher) if pole.partial else pole for pole in fit.every())
     glide = Glide(fit.glide.shares / higher)
-    return LearnedNote(note.rate_hz, series.f0_hz, series.stiffness, glide, tuple(poles), spreads(fit))
+    return LearnedNote(note.rate_hz, series.f0_hz, series.stiffness, glide, tuple(poles), intervals)
 
 
 def _loudest(takes: Takes, number: int) -> Fit:

@@ -58,8 +58,8 @@ def _spread(
 ) -> Spread:
     where = fit.bands[band]
     poles = [pole for pole in fit.poles[band] if pole.a]
-    covariance = _covariance(np.concatenate(fit.columns(poles, where), 1), residual[where])
-    values, vectors = np.linalg.eigh(covariance)
+    spread = covariance(np.concatenate(fit.columns(poles, where), 1), residual[where])
+    values, vectors = np.linalg.eigh(spread)
     draws = random.standard_normal((DRAWS, len(values))) @ (vectors * np.sqrt(np.maximum(values, 0))).T
     p, chosen = len(poles), [poles.index(pole) for pole in own]
     a = np.array([pole.a for pole in poles]) + draws[:, 0 : 2 * p : 2] + 1j * draws[:, 1 : 2 * p : 2]
@@ -80,7 +80,7 @@ def _spread(
     )
 
 
-def _covariance(columns: Complex, residual: Complex) -> Array:
+def covariance(columns: Complex, residual: Complex) -> Array:
     """Of the poles' numbers (n,), from their columns (bins, n), with what is left where it lies."""
     rows = real_rows(columns)
     scale = np.linalg.norm(rows, axis=0) + 1e-300

@@ -22,6 +22,8 @@ COARSE = (0.0, 4e-5, 3e-4)  # of B, for the choice of f0 that are looked at clos
 MOST_PARTIALS = 80
 PRESENT_DB = 9.0  # above the local floor, for a peak that counts
 FULL_DB = 40.0  # above it a peak counts no more than at it
+HEARD_HZ = 1_500.0  # below it a pluck's first partials are heard
+HEARD = 3  # so many of them
 MISSING = 0.55  # what a predicted partial costs that is not there, of a strong one
 SPECTRUM_S = 0.7
 
@@ -182,14 +184,14 @@ def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, 
     weight = strength * (0.3 + 0.7 * loudness)
     best = np.zeros(MOST_PARTIALS + 1)
     np.maximum.at(best, k_of[inside], (near * weight)[inside])
-    explained = float(best.sum() / max(weight.sum(), 1e-12))
     present = np.flatnonzero(best > 0.02)
     if len(present) == 0:
         return -1.0, 0.0, 1.0, ()
-    # predicted ones that are not there, up to where most of the series' strength lies
+    # predicted ones that are not there, up to where most of the series' strength lies: one peak is no series
     share = np.cumsum(best) / best.sum()
     last = int(np.searchsorted(share, 0.93))
-    count = max(last, 1)
+    count = max(last, min(HEARD, int(HEARD_HZ / f0_hz)), 1)
+    explained = float(best[: count + 1].sum() / max(weight.sum(), 1e-12))
     absent = best[1 : count + 1] <= 0.02
     if len(peaks.hidden_hz):
         # near a partial of the other series nothing would be seen
@@ -207,7 +209,7 @@ def _refined(peaks: Peaks, series: Series) -> Series:
     k = np.maximum(1, np.round(_number(peaks.hz, series.f0_hz, series.stiffness)))
     off = np.abs(distances(peaks.hz, series.f0_hz, series.stiffness))
     used = (off < tolerance(peaks.hz, series.f0_hz, peaks.width_hz)) & (k <= MOST_PARTIALS)
-    if used.sum() < 3:
+    if len(np.unique(k[used])) < 3:
         return series
     k, hz, weight = k[used], peaks.hz[used], peaks.strength[used] + 0.05
     # (f/k)² = f0² + f0² B k²

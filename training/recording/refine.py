@@ -149,6 +149,11 @@ class Fit:
     def every(self) -> list[Pole]:
         return self.gliding() + self.free
 
+    def free_bins(self) -> slice:
+        """Where the poles that do not glide are fitted."""
+        reach = max((pole.hz + 4 * pole.decay + 30 for pole in self.free), default=0.0)
+        return slice(1, min(self.highest, max(2, round(reach / self.step_hz))))
+
     def left(self) -> float:
         """The share of the energy that the poles leave."""
         residual = self.data - self.model()

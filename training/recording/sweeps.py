@@ -123,8 +123,7 @@ class Takes:
         """Steps of all free poles together, against what the string leaves."""
         if not self.fits[0].free:
             return
-        reach = max(pole.hz + 4 * pole.decay + 30 for pole in self.fits[0].free)
-        wheres = [slice(1, min(fit.highest, round(reach / fit.step_hz))) for fit in self.fits]
+        wheres = [fit.free_bins() for fit in self.fits]
         targets = [
             fit.data[where] - fit.model(fit.gliding())[where] for fit, where in zip(self.fits, wheres, strict=True)
         ]

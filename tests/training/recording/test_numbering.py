@@ -47,3 +47,12 @@ def test_a_solved_string_is_numbered(synthetic: SyntheticNote) -> None:
     series, _ = number_note(note_of(synthetic.samples, synthetic.rate_hz))
     assert series is not None
     assert abs(1200 * math.log2(series.f0_hz / synthetic.f0_hz)) < 20
+
+
+def test_a_body_is_no_low_string_below_a_high_note() -> None:
+    sound = stiff_note(2_815.0, 2e-5)
+    t = np.arange(len(sound) - 4_000) / RATE_HZ
+    sound[4_000:] += 0.3 * np.exp(-12 * t) * np.sin(2 * math.pi * 97 * t)
+    series, _ = number_note(note_of(sound, RATE_HZ))
+    assert series is not None
+    assert abs(1200 * math.log2(series.f0_hz / 2_815.0)) < 12

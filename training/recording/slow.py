@@ -1,0 +1,79 @@
+"""Decays that hardly show while they are fitted: what lies beyond the end of the fit must not ring for ever.
+
+Two poles of a band can follow a slow change, of level or of pitch, with one of them that does not decay at all. Its
+decay is then unknown: its standard error is as large as itself. So each slow pole's log σ is averaged with that of a
+pole that falls by 11 dB until the end of the fit, each with the inverse of its variance. A decay that the recording
+shows stays. Amplitudes are fitted again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from training.recording.intervals import covariance
+from training.recording.refine import Fit, Pole
+
+Complex = NDArray[np.complex128]
+
+FALL = 1.25  # in nepers until the end of the fit, an estimate; faster poles are left alone
+SPREAD = 0.5  # standard deviation of log σ, an estimate
+
+
+def settle_slow(fits: Sequence[Fit]) -> None:
+    """Settles the slow poles of takes, which share them."""
+    least = FALL / max(len(fit.samples) / fit.rate_hz for fit in fits)
+    residuals = [fit.data - fit.model() for fit in fits]
+    for number in range(len(fits[0].bands)):
+        wheres = [fit.bands[number] for fit in fits]
+        moved = _settled(fits, [fit.poles[number] for fit in fits], residuals, wheres, least)
+        for fit, poles in zip(fits, moved, strict=True):
+            fit.poles[number] = poles
+    moved = _settled(fits, [fit.free for fit in fits], residuals, [fit.free_bins() for fit in fits], least)
+    for fit, poles in zip(fits, moved, strict=True):
+        fit.free = poles
+
+
+def _settled(
+    fits: Sequence[Fit],
+    before: list[list[Pole]],
+    residuals: Sequence[Complex],
+    wheres: Sequence[slice],
+    least: float,
+) -> list[list[Pole]]:
+    if not any(pole.decay < least for pole in before[0]):
+        return before
+    known = sum(
+        (
+            _precision(fit, poles, rest[where], where)
+            for fit, poles, rest, where in zip(fits, before, residuals, wheres, strict=True)
+        ),
+        np.zeros(len(before[0])),
+    )
+    decays = [_decay(pole.decay, each, least) for pole, each in zip(before[0], known, strict=True)]
+    found = []
+    for fit, poles, rest, where in zip(fits, before, residuals, wheres, strict=True):
+        slower = [replace(pole, s=complex(-decay, pole.s.imag)) for pole, decay in zip(poles, decays, strict=True)]
+        found.append(fit.solve(slower, rest[where] + fit.part(poles, where), where)[1])
+    return found
+
+
+def _decay(decay: float, known: float, least: float) -> float:
+    if decay >= least:
+        return decay
+    prior = 1 / SPREAD**2
+    return math.exp((known * math.log(decay) + prior * math.log(least)) / (known + prior))
+
+
+def _precision(fit: Fit, poles: list[Pole], residual: Complex, where: slice) -> NDArray[np.float64]:
+    """Inverse variance of each pole's log σ, (poles,); 0 of one without amplitude."""
+    loud = [place for place, pole in enumerate(poles) if pole.a]
+    found = np.zeros(len(poles))
+    if loud:
+        columns = np.concatenate(fit.columns([poles[place] for place in loud], where), 1)
+        found[loud] = 1 / (np.diag(covariance(columns, residual))[2 * len(loud) :: 2] + 1e-9)
+    return found
