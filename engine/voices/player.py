@@ -357,10 +357,14 @@ class CompiledPlayer:
 
     def _length_m(self, note: NDArray[np.int64], voice: NDArray[np.float64]) -> float | None:
         """Of a note's string: where it glides to, times how far the first mode of a voice has still to go."""
-        own = StringParameters(*note.view(np.float64)[of.NOTE_STRING_NOW : of.NOTE_STRING_NOW + of.STRING].tolist())
-        modes = int(voice.view(np.int64)[at.MODES])
-        if note[of.NOTE_PREPARED] or not own.length_m > 0.0 or voice.view(np.int64)[at.KIND] == at.BANK:
+        if note[of.NOTE_PREPARED] or voice.view(np.int64)[at.KIND] == at.BANK:
             return None
+        row = note.view(np.float64)[of.NOTE_STRING_NOW : of.NOTE_STRING_NOW + of.STRING].tolist()
+        try:
+            own = StringParameters(*row)
+        except ValueError:  # of a drum, or bent beyond the bounds
+            return None
+        modes = int(voice.view(np.int64)[at.MODES])
         first = (int(voice.ctypes.data) - self.address) // 8 + at.state(modes) + at.OMEGA_SQUARED * modes
         present = float(self.memory[first])
         return own.length_m * (own.undamped_frequency(1) / math.sqrt(present) if present > 0.0 else 1.0)
