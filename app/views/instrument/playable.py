@@ -55,6 +55,7 @@ class Playable(QWidget):
         self._levels: dict[int, int] = {}  # of 0 … LEVEL_STEPS
         self._down: int | None = None  # by the mouse
         self._at = QPointF()  # of the mouse, while a key is down
+        self._clicked = TYPED  # velocity of the click, which a strum keeps
         self._strummed: list[int] = []  # keys of strings that the mouse has left
         self.legato = False  # a key that is pressed while another is held takes its note over
         self._typed: int | None = None  # by Enter
@@ -219,7 +220,8 @@ class Playable(QWidget):
                 self._press(key, self.velocity_at(key, event.position()))
         elif event.button() == Qt.MouseButton.LeftButton:
             self._down, self._at = key, event.position()
-            self._press(key, self.velocity_at(key, event.position()))
+            self._clicked = self.velocity_at(key, event.position())
+            self._press(key, self._clicked)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         self.mousePressEvent(event)  # fast repeats are notes too
@@ -242,7 +244,7 @@ class Playable(QWidget):
             self._release_left(left)
         if not self.legato and not self.on_one_string(before, key):
             self._strummed.append(before)
-            self._press(key, velocity)
+            self._press(key, self._clicked)
         elif self.legato and self.on_one_string(before, key):
             self._press(key, velocity)
             self._release_left(before)

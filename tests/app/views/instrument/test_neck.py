@@ -127,13 +127,16 @@ def test_a_note_that_slides_is_seen_on_its_own_string_between_two_frets(neck: Ne
 
 def test_a_drag_across_strings_strums_each_once_and_lets_all_ring(qtbot: QtBot, neck: Neck) -> None:
     heard: list[tuple[str, int]] = []
+    velocities = set[int]()
     neck.pressed.connect(lambda key, _: heard.append(("on", key)))
+    neck.pressed.connect(lambda _, velocity: velocities.add(velocity))
     neck.released.connect(lambda key: heard.append(("off", key)))
     qtbot.mousePress(neck, LEFT, pos=on(neck, 0, 2))
     qtbot.mouseMove(neck, on(neck, 3, 2))  # a fast mouse is seen at few places
-    qtbot.mouseMove(neck, on(neck, 5, 2))
+    qtbot.mouseMove(neck, on(neck, 5, 2) + QPoint(0, 5))  # lower on its string
     assert heard == [("on", key) for key in (42, 47, 52, 57, 61, 66)]
     assert all(neck.is_down(key) for _, key in heard)
+    assert len(velocities) == 1  # that of the click
     qtbot.mouseRelease(neck, LEFT, pos=on(neck, 5, 2))
     assert {key for what, key in heard if what == "off"} == {42, 47, 52, 57, 61, 66}
     assert not any(neck.is_down(key) for _, key in heard)
