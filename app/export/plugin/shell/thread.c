@@ -8,7 +8,7 @@
 
 #include <stdlib.h>
 
-enum { PAUSE_MS = 4 };
+enum { PAUSE_MS = 10 };
 
 typedef struct thread thread;
 

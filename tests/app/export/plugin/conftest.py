@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -33,5 +34,12 @@ def plugin_file(images: list[Image], objects: Path, tmp_path_factory: pytest.Tem
 
 
 @pytest.fixture(scope="package")
-def bank(plugin_file: Path) -> Library:
+def loaded(plugin_file: Path) -> Library:
     return Library(plugin_file)
+
+
+@pytest.fixture
+def bank(loaded: Library) -> Iterator[Library]:
+    """Its instances are destroyed after the test, each with its thread."""
+    yield loaded
+    loaded.destroy_instances()

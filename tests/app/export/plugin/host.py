@@ -221,6 +221,7 @@ class Library:
     """A plug-in file."""
 
     def __init__(self, path: Path) -> None:
+        self.instances: list[Instance] = []
         self._library = c.CDLL(str(path))
         self.entry = Entry.in_dll(self._library, "clap_entry")
         assert self.entry.init(str(path).encode())
@@ -237,7 +238,12 @@ class Library:
         return found
 
     def create(self, id: str) -> Instance:
-        return Instance(self, id)
+        self.instances.append(Instance(self, id))
+        return self.instances[-1]
+
+    def destroy_instances(self) -> None:
+        while self.instances:
+            self.instances.pop().destroy()
 
 
 class Instance:
@@ -330,7 +336,10 @@ class Instance:
         self._own.reset(self.at)
 
     def destroy(self) -> None:
-        self._own.destroy(self.at)
+        """Once: later calls do nothing."""
+        if self.at:
+            self._own.destroy(self.at)
+        self.at = 0
 
     def save(self) -> bytes:
         kept = bytearray()
