@@ -38,7 +38,7 @@ def plugin(
 ) -> None:
     """Build a plug-in that plays instruments in a DAW, without Python inside.
 
-    Several instruments make one bank. The first build takes some minutes, later ones seconds. It needs the
+    Several instruments make one bank. The first build takes about a minute, later ones seconds. It needs the
     extra learned-strings[plugin].
     """
     from app.export.plugin.build import build_plugin
