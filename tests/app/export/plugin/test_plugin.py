@@ -44,7 +44,7 @@ from tests.app.export.plugin.pieces import (
 pytestmark = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang, the extra [plugin]")
 
 
-LARGEST_BYTES = 3_000_000  # the code has a third of a megabyte more
+LARGEST_BYTES = 3_000_000  # the code has 0.7 MB more
 
 
 def instance_of(bank: Library, name: str, rate_hz: int = 48_000) -> Instance:
