@@ -37,7 +37,7 @@ SYMPATHY_S = 5.0  # for which strings may ring that are not played
 MOST_RINGING = 96  # where more strings ring, the oldest fade out
 
 
-class _Stage:
+class OfflinePlayer:
     """A player and a mixer without a device.
 
     Args:
@@ -120,7 +120,7 @@ def render_events(
     Raises:
         ValueError: a key has no possible string, or there is no such `source`.
     """
-    stage = _Stage(patch, preset, rate_hz, _gains(source, difference_gain_db), limited, varied, dry)
+    stage = OfflinePlayer(patch, preset, rate_hz, _gains(source, difference_gain_db), limited, varied, dry)
     channels = channels_played(patch, timed)
     skipped = AHEAD if limited else 0  # the delay of the limiter
     done, events = 0, sorted(timed, key=lambda each: each.time_s)

@@ -75,6 +75,12 @@ def voices(json: Json = False) -> None:
 
 
 @bench.command()
+def plugin(json: Json = False) -> None:
+    """Voices of a plug-in compared with the app: how many times faster than real time each plays 30 notes."""
+    _measure("plugin", json)
+
+
+@bench.command()
 def drums(json: Json = False) -> None:
     """Cost of a drum's voice by its modes, of a kit of 16 with 8 strings, of pictures, and of choosing drums."""
     _measure("drums", json)

@@ -15,13 +15,13 @@ import numpy as np
 
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, check_compiler
 from app.export.plugin.image import MAKER, NOISE_FRAMES, NOISE_UNIT, Image, layout_header
-from app.export.plugin.objects import STUBS, object_of, run_waiting
+from app.export.plugin.objects import STUBS, objects_of, run_waiting
 from app.shared.version import program_version
 from engine.effects.room import room_noise
 from engine.whole_file import whole_file
 
 COMPILING = 0.97  # of the time of a first build, measured
-COMMON = ("instrument.c", "effects.c", "responses.c", "thread.c")
+COMMON = ("instrument.c", "effects.c", "responses.c", "thread.c", "kernels.c")
 LIBRARY_ENDINGS = {"linux": ".so", "windows": ".dll", "macos": ".dylib"}
 VST3_ENDINGS = {"linux": ".so", "windows": ".vst3"}
 VST3_FOLDERS = {"linux-x64": "x86_64-linux", "linux-arm64": "aarch64-linux", "windows-x64": "x86_64-win"}
@@ -51,7 +51,7 @@ def build_plugin(
     check_compiler()
     own = FORMATS[form]
     path = path if path.suffix == own.ending else path.with_name(path.name + own.ending)
-    kernels = object_of(target, cache, lambda share: advanced("compiling the kernels", COMPILING * share))
+    kernels = objects_of(target, cache, lambda share: advanced("compiling the kernels", COMPILING * share))
     advanced("linking", COMPILING)
     with tempfile.TemporaryDirectory(prefix="learned-strings-plugin-") as name:
         folder = Path(name)
@@ -130,14 +130,19 @@ def _stubs() -> str:
 
 
 def _link(
-    folder: Path, sources: Sequence[str], kernels: Path, target: str, library: Path, waiting: Callable[[], None]
+    folder: Path,
+    sources: Sequence[str],
+    kernels: Sequence[Path],
+    target: str,
+    library: Path,
+    waiting: Callable[[], None],
 ) -> None:
     command = [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].linker, "-shared", "-O2", "-std=c23"]
     command += ["-fvisibility=hidden", "-fno-sanitize=all", "-s", "-fPIC", "-o", str(library)]
-    command += [*(str(folder / name) for name in sources), str(kernels), "-lm"]
+    command += [*(str(folder / name) for name in sources), *map(str, kernels), "-lm"]
     if target.startswith("linux"):
         command.append("-lpthread")
-    code, said = run_waiting(command, None, lambda _: waiting())
+    code, said = run_waiting([command], None, lambda _: waiting())
     if code:
         raise PluginError(f"linking for {target} failed: {said.strip()[-600:]}")
 

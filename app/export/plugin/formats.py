@@ -65,20 +65,22 @@ class Target:
 
     Attributes:
         triple: of LLVM; `linker`: of the linker, where it has another name for it.
-        cpu: the oldest processor that is served.
+        cpus: processors whose kernels are built in; the first is the oldest that is served, and the plug-in takes the
+            last that the computer has all instructions of.
     """
 
     triple: str
-    cpu: str
+    cpus: tuple[str, ...]
     linker: str
 
 
+X64 = "x86-64-v2", "x86-64-v3"
 TARGETS: Mapping[str, Target] = {
-    "linux-x64": Target("x86_64-unknown-linux-gnu", "x86-64-v2", "x86_64-linux-gnu.2.17"),
-    "linux-arm64": Target("aarch64-unknown-linux-gnu", "generic", "aarch64-linux-gnu.2.17"),
-    "windows-x64": Target("x86_64-w64-windows-gnu", "x86-64-v2", "x86_64-windows-gnu"),
-    "macos-x64": Target("x86_64-apple-macosx11.0.0", "x86-64-v2", "x86_64-macos.11.0"),
-    "macos-arm64": Target("arm64-apple-macosx11.0.0", "apple-m1", "aarch64-macos.11.0"),
+    "linux-x64": Target("x86_64-unknown-linux-gnu", X64, "x86_64-linux-gnu.2.17"),
+    "linux-arm64": Target("aarch64-unknown-linux-gnu", ("generic",), "aarch64-linux-gnu.2.17"),
+    "windows-x64": Target("x86_64-w64-windows-gnu", X64, "x86_64-windows-gnu"),
+    "macos-x64": Target("x86_64-apple-macosx11.0.0", X64, "x86_64-macos.11.0"),
+    "macos-arm64": Target("arm64-apple-macosx11.0.0", ("apple-m1",), "aarch64-macos.11.0"),
 }
 
 

@@ -21,7 +21,6 @@ from app.export.plugin import texts
 from app.export.plugin.formats import TARGETS, Target
 from engine.whole_file import whole_file
 
-PREFIX = "ls_"
 WAIT_S = 0.1
 FUNCTIONS = 295  # that are made for the entries, about: dots of `texts`
 STEPS = 4  # of an object file after that
@@ -57,10 +56,13 @@ def digest() -> str:
     return found.hexdigest()[:16]
 
 
-def object_of(target: str, folder: Path, advanced: Callable[[float], None] = lambda share: None) -> Path:
-    """The object file of the kernels for a target, from `folder` or compiled into it (minutes the first time).
+def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = lambda share: None) -> tuple[Path, ...]:
+    """Object files of the kernels for a target, one for each of its processors (minutes the first time).
+
+    Their entries have the prefix "ls0_", "ls1_" and so on.
 
     Args:
+        folder: has them from an earlier call, or gets them.
         advanced: is called a few times a second meanwhile with the share that is done; may raise, to end it.
 
     Raises:
@@ -68,18 +70,22 @@ def object_of(target: str, folder: Path, advanced: Callable[[float], None] = lam
     """
     if target not in TARGETS:
         raise ObjectError(f"target {target!r} is unknown; try {', '.join(TARGETS)}")
-    path = folder / f"kernels-{digest()}-{target}.o"
-    if not path.exists():
+    paths = tuple(folder / f"kernels-{digest()}-{target}-{cpu}.o" for cpu in TARGETS[target].cpus)
+    missing = [(number, path) for number, path in enumerate(paths) if not path.exists()]
+    if missing:
         folder.mkdir(parents=True, exist_ok=True)
         text = _text(folder, lambda share: advanced(TEXT_SHARE * share))
-        with whole_file(path) as part:
+        with contextlib.ExitStack() as parts:
             _run(
                 __name__,
-                [str(text), target, str(part)],
+                [
+                    [str(text), target, str(number), str(parts.enter_context(whole_file(path)))]
+                    for number, path in missing
+                ],
                 STEPS,
                 lambda share: advanced(TEXT_SHARE + (1 - TEXT_SHARE) * share),
             )
-    return path
+    return paths
 
 
 def _text(folder: Path, advanced: Callable[[float], None]) -> Path:
@@ -87,46 +93,56 @@ def _text(folder: Path, advanced: Callable[[float], None]) -> Path:
     path = folder / f"kernels-{digest()}.ll"
     if not path.exists():
         with whole_file(path) as part:
-            _run(texts.__name__, [str(part)], FUNCTIONS, advanced)
+            _run(texts.__name__, [[str(part)]], FUNCTIONS, advanced)
     return path
 
 
-def _run(module: str, arguments: Sequence[str], steps: int, advanced: Callable[[float], None]) -> None:
-    """Runs a module in a process of its own: Numba's settings hold for a whole process, and it can be ended.
+def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Callable[[float], None]) -> None:
+    """Runs a module with each of these arguments, all at once, in processes of their own.
+
+    Numba's settings hold for a whole process, and a process can be ended.
 
     Args:
-        steps: how many dots it prints.
+        steps: how many dots each prints.
 
     Raises:
-        ObjectError: it failed.
+        ObjectError: one failed.
     """
     code, said = run_waiting(
-        [sys.executable, "-m", module, *arguments], _environment(), lambda dots: advanced(min(dots / steps, 1.0))
+        [[sys.executable, "-m", module, *arguments] for arguments in calls],
+        _environment(),
+        lambda dots: advanced(min(dots / (steps * len(calls)), 1.0)),
     )
     if code:
         raise ObjectError(f"the kernels cannot be compiled: {said.strip()[-400:]}")
 
 
 def run_waiting(
-    command: Sequence[str], environment: Mapping[str, str] | None, waiting: Callable[[int], None]
+    commands: Sequence[Sequence[str]], environment: Mapping[str, str] | None, waiting: Callable[[int], None]
 ) -> tuple[int, str]:
-    """A command's exit status, and what it reported; it is ended where `waiting` raises.
+    """The first exit status that is not 0 of commands that run at once, and what they reported.
+
+    They are ended where `waiting` raises, or when one has failed.
 
     Args:
-        waiting: is called a few times a second with the number of bytes that the command has printed.
+        waiting: is called a few times a second with the number of bytes that the commands have printed.
     """
     with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as printed:
-        process = subprocess.Popen(command, env=environment, stdout=printed, stderr=said)
+        running = [subprocess.Popen(each, env=environment, stdout=printed, stderr=said) for each in commands]
         try:
-            while process.poll() is None:
-                waiting(os.fstat(printed.fileno()).st_size)
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    process.wait(WAIT_S)
+            for process in running:
+                while process.poll() is None:
+                    waiting(os.fstat(printed.fileno()).st_size)
+                    with contextlib.suppress(subprocess.TimeoutExpired):
+                        process.wait(WAIT_S)
+                if process.returncode:
+                    break
         finally:
-            process.kill()
-            process.wait()
+            for process in running:
+                process.kill()
+                process.wait()
         said.seek(0)
-        return process.returncode, said.read().decode(errors="replace")
+        return next((each.returncode for each in running if each.returncode), 0), said.read().decode(errors="replace")
 
 
 def _environment() -> dict[str, str]:
@@ -136,24 +152,24 @@ def _environment() -> dict[str, str]:
     return {**kept, **processor, "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1", "PYTHONPATH": root}
 
 
-def _compiled(text: str, target: Target) -> bytes:
-    """The object file: entries by their names with `PREFIX`, all else internal, nothing left of Python."""
+def _compiled(text: str, target: Target, number: int) -> bytes:
+    """The object file for a processor of the target: entries "ls0_render" …, all else internal, nothing of Python."""
     import llvmlite.binding as llvm
 
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()
     machine = llvm.Target.from_triple(target.triple).create_target_machine(
-        cpu=target.cpu, opt=3, reloc="pic", codemodel="default"
+        cpu=target.cpus[number], opt=3, reloc="pic", codemodel="default"
     )
     _step()
     names = dict(re.findall(r"^; (\w+) (\S+)$", text, flags=re.M)[: len(texts.ENTRIES)])
     for name, entry in names.items():
-        text = text.replace(f"@{entry}(", f"@{PREFIX}{name}(")
+        text = text.replace(f"@{entry}(", f"@ls{number}_{name}(")
     text = re.sub(r"^target datalayout = .*$", f'target datalayout = "{machine.target_data}"', text, flags=re.M)
     text = re.sub(r"^target triple = .*$", f'target triple = "{target.triple}"', text, flags=re.M)
     whole = llvm.parse_assembly(_without_counts(text))
     _step()
-    kept = {f"{PREFIX}{name}" for name in names}
+    kept = {f"ls{number}_{name}" for name in names}
     for function in whole.functions:
         if not function.is_declaration and function.name not in kept:
             function.linkage = llvm.Linkage.internal
@@ -195,7 +211,9 @@ def _check_names(module: object, kept: set[str]) -> None:
 
 
 if __name__ == "__main__":
+    code, made_for, which, path = sys.argv[1:]
     try:
-        Path(sys.argv[3]).write_bytes(_compiled(Path(sys.argv[1]).read_text(encoding="utf-8"), TARGETS[sys.argv[2]]))
+        made = _compiled(Path(code).read_text(encoding="utf-8"), TARGETS[made_for], int(which))
+        Path(path).write_bytes(made)
     except ObjectError as error:
         sys.exit(str(error))

@@ -10,9 +10,6 @@
 #include "responses.h"
 #include "thread.h"
 
-int32_t ls_partition(void *result, void **error, int64_t response, int64_t frames, int64_t channels, int64_t memory,
-                     int64_t convolver);
-
 static int64_t number_of(const void *pointer) { return (int64_t)(intptr_t)pointer; }
 
 static double wanted(const instrument *own, int32_t which) {
@@ -66,7 +63,7 @@ static prepared *prepare(const instrument *own, double size, double t60_s) {
     memcpy(padded, each->samples, (size_t)each->frames * sizeof(pair));
     memset(padded + 2 * each->frames, 0, (size_t)(2 * (frames - each->frames)) * sizeof(double));
     void *error = NULL, *result = NULL;
-    ls_partition(&result, &error, number_of(padded), frames, 2, number_of(made->parts[which]), number_of(e->workshop));
+    own->kernels->partition(&result, &error, number_of(padded), frames, 2, number_of(made->parts[which]), number_of(e->workshop));
   }
   free(padded);
   responses_end(&found);

@@ -15,9 +15,6 @@
 
 _Static_assert(sizeof(image) == IMAGE_BYTES && sizeof(parameter) == PARAMETER_BYTES && sizeof(macro) == MACRO_BYTES, "as image.py writes");
 
-int32_t ls_render(void *result, void **error, int64_t mixer, int64_t frames, int64_t out);
-int32_t ls_begin(void *result, void **error, int64_t player);
-
 /* Of Numba's library: other strides for the same contiguous memory, rows last, as all of the kernels' is. */
 int numba_attempt_nocopy_reshape(int64_t dimensions, const int64_t *sizes, const int64_t *strides, int64_t new_dimensions,
                                  const int64_t *new_sizes, int64_t *new_strides, int64_t bytes, int columns_last) {
@@ -133,6 +130,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
   const image *of = own->of;
   instrument_end(own);
   own->rate_hz = rate_hz;
+  own->kernels = kernels_here();
   own->mixer = calloc(MIXER_SLOTS, sizeof(slot));
   own->player = calloc((size_t)(PLAYER_VOICES + MOST_NOTES * MOST_SOURCES * (VOICE_SLOTS_FIXED + of->modes * VOICE_SLOTS_A_MODE)),
                        sizeof(slot));
@@ -163,7 +161,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
   player[PLAYER_MODES].whole = of->modes;
   player[PLAYER_MOST].whole = of->most_notes;
   void *error = NULL, *result = NULL;
-  ls_begin(&result, &error, number_of(player));
+  own->kernels->begin(&result, &error, number_of(player));
   for (int32_t place = 0; place < of->parameter_count; place++) {
     const parameter *each = &parameters_of(of)[place];
     if (each->kind == KIND_EFFECT) own->effects.values[each->index] = own->values[place];
@@ -330,7 +328,7 @@ void instrument_render(instrument *own, uint32_t frames, float *left, float *rig
     }
     int64_t count = rendered < left_over ? rendered : left_over;
     void *error = NULL, *result = NULL;
-    if (ls_render(&result, &error, number_of(own->mixer), count, number_of(block))) memset(block, 0, 2 * QUANTUM * sizeof(float));
+    if (own->kernels->render(&result, &error, number_of(own->mixer), count, number_of(block))) memset(block, 0, 2 * QUANTUM * sizeof(float));
     for (int64_t frame = 0; frame < count; frame++) {
       left[done + frame] = right ? block[2 * frame] : 0.5f * (block[2 * frame] + block[2 * frame + 1]);
       if (right) right[done + frame] = block[2 * frame + 1];

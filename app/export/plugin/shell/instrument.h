@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "kernels.h"
 #include "layout.h"
 
 typedef union { double real; int64_t whole; } slot;
@@ -74,6 +75,7 @@ typedef struct {
 
 typedef struct {
   const image *of;
+  const kernels *kernels;
   double rate_hz;
   slot *mixer, *player, *table, *model, *truth, *scratch;
   effects effects;

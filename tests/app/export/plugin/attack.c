@@ -1,7 +1,6 @@
 /* A host that counts allocations within `process` and `reset`: random events, blocks, rates, states.
 
-   attack PLUGIN ID SECONDS SEED: plays so many seconds of sound, then reports what went wrong in one line.
-   attack PLUGIN ID voices NOTES: how many times faster than real time so many notes are played at 48 kHz. */
+   attack PLUGIN ID SECONDS SEED: plays so many seconds of sound, then reports what went wrong in one line. */
 
 #include <dlfcn.h>
 #include <math.h>
@@ -179,26 +178,6 @@ static int attack(const clap_plugin *plugin, double seconds) {
   return 0;
 }
 
-static int voices(const clap_plugin *plugin, uint32_t notes, uint32_t lowest) {
-  plugin->activate(plugin, 48000, 1, MOST_FRAMES);
-  event_count = 0;
-  for (uint32_t each = 0; each < notes; each++)
-    events[event_count++].note = (clap_event_note){{sizeof(clap_event_note), 0, 0, CLAP_NOTE_ON, 0}, (int32_t)each, 0, 0, (int16_t)(lowest + each), 0.8};
-  process(plugin, 512);
-  event_count = 0;
-  double best_s = 1e9;
-  for (int round = 0; round < 12; round++) {
-    struct timespec begin, end;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &begin);
-    for (int block = 0; block < 4; block++) process(plugin, 512);
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &end);
-    double took_s = (double)(end.tv_sec - begin.tv_sec) + 1e-9 * (double)(end.tv_nsec - begin.tv_nsec);
-    best_s = fmin(best_s, took_s);
-  }
-  printf("{\"notes\": %u, \"faster\": %.2f}\n", notes, 4 * 512 / 48000.0 / best_s);
-  return 0;
-}
-
 int main(int count, char **words) {
   if (count < 5) return 2;
   inside = 1;
@@ -216,7 +195,7 @@ int main(int count, char **words) {
   if (!plugin) return 1;
   plugin->init(plugin);
   state = 88172645463325252u + 977u * strtoull(words[4], NULL, 10);
-  int result = strcmp(words[3], "voices") ? attack(plugin, atof(words[3])) : voices(plugin, (uint32_t)atoi(words[4]), count > 5 ? (uint32_t)atoi(words[5]) : 40);
+  int result = attack(plugin, atof(words[3]));
   plugin->destroy(plugin);
   return result;
 }

@@ -1,0 +1,16 @@
+/* The compiled kernels, for the processor that the plug-in runs on. Each returns 0, or that it failed. */
+
+#ifndef LS_KERNELS_H
+#define LS_KERNELS_H
+
+#include <stdint.h>
+
+typedef struct {
+  int32_t (*render)(void *result, void **error, int64_t mixer, int64_t frames, int64_t out);
+  int32_t (*begin)(void *result, void **error, int64_t player);
+  int32_t (*partition)(void *result, void **error, int64_t response, int64_t frames, int64_t channels, int64_t memory, int64_t convolver);
+} kernels;
+
+const kernels *kernels_here(void);
+
+#endif

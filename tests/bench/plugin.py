@@ -1,0 +1,100 @@
+"""Voices of a plug-in and of the app, in turns: how many times faster than real time each plays the same notes.
+
+Costs are processor time of this thread. Of many rounds the fastest counts, on which other processes have no effect.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from app.export.plugin.build import build_plugin
+from app.export.plugin.formats import this_target
+from app.export.plugin.image import image_of
+from app.instrument.events import NoteOn
+from app.instrument.offline import OfflinePlayer
+from app.instrument.strings import Strings
+from app.patches.library import find_patch
+from app.patches.patch import Patch
+from engine.kernels import cache
+from engine.presets import SHIPPED, Preset, load_preset
+from tests.app.export.plugin.host import Instance, Library, note_on
+from tests.bench.machine import Machine, one_thread
+
+RATE_HZ = 48_000
+INSTRUMENTS = ("electric_bass", "classical_guitar", "concert_harp")
+NOTES, VELOCITY = 30, 102
+BLOCK_FRAMES, BLOCKS, ROUNDS = 512, 4, 12
+PLUGIN = "plugin"
+
+
+@dataclass(frozen=True)
+class PluginCost:
+    """Notes of an instrument, all struck at once, with its body, room and amplifier.
+
+    Attributes:
+        modes: of the lowest note.
+        app_faster, plugin_faster: than real time, at 48 kHz in blocks of 512.
+    """
+
+    instrument: str
+    notes: int
+    modes: int
+    app_faster: float
+    plugin_faster: float
+
+    @property
+    def met(self) -> bool:
+        """Whether the plug-in plays no fewer voices on a core than the app."""
+        return self.plugin_faster >= self.app_faster
+
+
+@dataclass(frozen=True)
+class PluginBenchmark:
+    machine: Machine
+    plugins: tuple[PluginCost, ...]
+
+
+def measure(report: Callable[[float, str], None]) -> PluginBenchmark:
+    """Builds a plug-in of all INSTRUMENTS, and plays each."""
+    patches = [find_patch(name).patch for name in INSTRUMENTS]
+    presets = [load_preset(SHIPPED / f"{patch.preset}.safetensors") for patch in patches]
+    images = [image_of(patch, preset) for patch, preset in zip(patches, presets, strict=True)]
+    with one_thread(), tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / PLUGIN
+        kept = cache.folder() or Path(folder)
+        library = Library(
+            build_plugin(images, "clap", this_target(), path, kept, lambda step, share: report(share, step))
+        )
+        found = tuple(
+            _cost(name, patch, preset, Instance(library, image.id))
+            for name, patch, preset, image in zip(INSTRUMENTS, patches, presets, images, strict=True)
+        )
+        return PluginBenchmark(Machine.here(), found)
+
+
+def _cost(name: str, patch: Patch, preset: Preset, instance: Instance) -> PluginCost:
+    low, high = patch.range
+    keys = range(low, min(low + NOTES, high + 1))
+    player = OfflinePlayer(patch, preset, RATE_HZ, {"model": 1.0}, limited=True, varied=True, dry=False)
+    instance.activate(RATE_HZ)
+    for key in keys:
+        player.handle(NoteOn(key, VELOCITY), 0)
+    player.render(BLOCK_FRAMES)
+    instance.render(BLOCK_FRAMES, [note_on(0, key, VELOCITY) for key in keys])
+    rounds = [(_taken_s(player.render), _taken_s(lambda frames: instance.render(frames, []))) for _ in range(ROUNDS)]
+    instance.destroy()
+    app_s, plugin_s = (min(times) for times in zip(*rounds, strict=True))
+    string, sound_s = Strings(patch).of_key(low), BLOCK_FRAMES * BLOCKS / RATE_HZ
+    modes = string.modes if string is not None else 0
+    return PluginCost(name, len(keys), modes, sound_s / app_s, sound_s / plugin_s)
+
+
+def _taken_s(render: Callable[[int], object]) -> float:
+    began_s = time.thread_time()
+    for _ in range(BLOCKS):
+        render(BLOCK_FRAMES)
+    return time.thread_time() - began_s
