@@ -25,6 +25,8 @@ Kind = Literal["guitar", "bass", "harp", "piano"]
 SMOOTH_OCTAVES = 0.4  # half width of the window in which decays are averaged
 MOST_NODES = 24
 MOST_BESIDE_SMOOTH = 5.0
+MOST_OFF_CENTS = 25.0  # an estimate: a partial further from the series is pulled by the body, and decays with it
+PULLED_WEIGHT = 1e-3
 LEAST_SHARE = 1e-8  # of the strongest partial's energy, for a partial whose decay counts
 
 
@@ -127,7 +129,7 @@ def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
 
 
 def physics_of(learned: LearnedNote) -> Physics:
-    """Fits f0, B and the decay over frequency to a note's partials."""
+    """Fits f0, B and the decay over frequency to a note's partials; those pulled by the body count little for it."""
     partials = partials_of(learned)
     k = np.array([each.number for each in partials], float)
     hz = np.array([each.hz for each in partials])
@@ -151,7 +153,9 @@ def physics_of(learned: LearnedNote) -> Physics:
     else:
         f0, stiffness = hz[0] / k[0] / math.sqrt(1 + learned.stiffness * k[0] ** 2), learned.stiffness
         f0_error, stiffness_error = math.inf, math.inf
-    smooth_hz, smooth = _smooth(hz, np.array([each.decay for each in partials]), weight)
+    cents = 1200 * np.log2(hz / (f0 * k * np.sqrt(1 + stiffness * k**2)))
+    of_string = weight * np.where(np.abs(cents) > MOST_OFF_CENTS, PULLED_WEIGHT, 1.0)
+    smooth_hz, smooth = _smooth(hz, np.array([each.decay for each in partials]), of_string)
     rise = float(learned.glide.shares.sum())
     return Physics(f0, f0_error, stiffness, stiffness_error, partials, smooth_hz, smooth, max(0.0, rise))
 

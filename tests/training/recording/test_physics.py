@@ -1,0 +1,30 @@
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from training.recording.fit import LearnedNote
+from training.recording.glide import Glide
+from training.recording.physics import physics_of
+from training.recording.refine import Pole
+
+F0_HZ, SIGMA = 110.0, 2.0
+
+
+def _note(first_cents: float) -> LearnedNote:
+    """Ten partials of one decay; the first, off by so many cents, decays ten times as fast."""
+    hz = [F0_HZ * number * (2 ** (first_cents / 1200) if number == 1 else 1) for number in range(1, 11)]
+    sigma = [10 * SIGMA, *[SIGMA] * 9]
+    poles = [
+        Pole(complex(-s, 2 * math.pi * f), 0.1 + 0j, k) for k, (f, s) in enumerate(zip(hz, sigma, strict=True), 1)
+    ]
+    return LearnedNote(48_000, F0_HZ, 0.0, Glide.none(), tuple(poles))
+
+
+@pytest.mark.parametrize(("first_cents", "lowest"), [(0.0, 10 * SIGMA), (-62.0, SIGMA)])
+def test_other_keys_do_not_take_the_decay_of_a_partial_that_the_body_pulls(first_cents: float, lowest: float) -> None:
+    found = physics_of(_note(first_cents))
+    assert found.f0_hz == pytest.approx(F0_HZ, rel=1e-3)
+    assert found.smooth_decay[0] == pytest.approx(lowest)
+    assert found.smooth_decay[-1] == pytest.approx(SIGMA)
