@@ -22,6 +22,7 @@ from training.recording.gate import examine
 from training.recording.glide import Glide
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, Note, RecordingError, note_of
 from training.recording.numbering import Series, number_note
+from training.recording.physics import physics_of
 from training.recording.report import aligned, errors_of
 
 Array = NDArray[np.float64]
@@ -31,6 +32,7 @@ HALF_S = 1.25
 COARSE_HZ = 8_000  # takes are compared below 4 kHz
 MOST_PITCH = 0.006  # that another take may be higher or lower, as a share
 MOST_DELAY_S = 0.012
+LEAST_RISE = 6e-4  # of the frequencies, one cent: a smaller glide cannot be separated from none
 GLIDE_STEPS = (3e-4, 4e-3, 4e-3, 3e-3)  # of pitch and shares, at first
 
 
@@ -54,6 +56,7 @@ def evaluate(
         except RecordingError as error:
             row = [name, str(error), *[None] * 7]
         rows.append(row)
+    _glides({name: learned for name, (_, _, learned) in notes.items()}, values)
     if not quick:
         for first, second in itertools.permutations(notes, 2):
             if first[:-1] == second[:-1]:
@@ -125,6 +128,17 @@ def _row(
         if value is not None:
             _append(values, figure, value)
     return [name, kinds, *found.values()], note, series, learned
+
+
+def _glides(notes: Mapping[str, LearnedNote], values: dict[str, list[float]]) -> None:
+    """The power of the energy that the glide follows, of two dynamics that glide; by the string's law it is 1."""
+    found = {name: physics_of(learned) for name, learned in notes.items()}
+    for first, second in itertools.combinations(found, 2):
+        rises = [found[name].rise for name in (first, second)]
+        if first[:-2] == second[:-2] and first[-2] != second[-2] and min(rises) > LEAST_RISE:
+            energies = [sum(each.energy for each in found[name].partials) for name in (first, second)]
+            power = np.log(rises[0] / rises[1]) / np.log(energies[0] / energies[1])
+            _append(values, "glide of two dynamics, power of the energy", float(power))
 
 
 def _dynamics(notes: Mapping[str, tuple[Note, Series]], values: dict[str, list[float]]) -> None:

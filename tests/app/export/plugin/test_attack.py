@@ -32,7 +32,9 @@ def attack(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", (MOVED, "fretless_bass", "concert_harp", "timpani") if LONG else (MOVED, "fretless_bass"))
+@pytest.mark.parametrize(
+    "name", (MOVED, "fretless_bass", "concert_harp", "timpani") if LONG else (MOVED, "fretless_bass")
+)
 def test_nothing_random_does_harm_or_allocates(
     attack: Path, plugin_file: Path, images: list[Image], name: str
 ) -> None:
