@@ -70,6 +70,7 @@ USUAL_HARMONIC, USUAL_STRUM_MS, USUAL_TREMOLO_HZ = 2.0, 12.0, 10.0  # of a foots
 VARIES_PLACE, VARIES_DB, VARIES_WIDTH, VARIES_RELEASE = 0.08, 1.0, 0.12, 0.2  # shares, dB
 VARIES_ANGLE = math.radians(8.0)
 
+PLAIN_DB = 12.0  # by how much fingers are quieter on plain strings than on wound ones: an estimate
 MEMBERS_APART = 1 << 16  # places of the strings of a course
 COURSES_VARY = 0.5  # by how much detuning varies from key to key, at most
 VIBRATO_QUANTA = 8  # of a glide, of which a vibrato is made
@@ -934,8 +935,11 @@ def _damp(
         if players[note + of.NOTE_MEMBER] != 0:
             return
         level_db = _value(player, players, table, tables, of.DAMPER_DB)
-        stroke = players[note + of.NOTE_AGE] if table[of.TABLE_VARIATION] > 0.0 else 0
-        contact.touch(player, players, table, of.RELEASE, level_db, 1.0, stroke, players[note + of.NOTE_KEY], frame)
+        stroke, key = (
+            players[note + of.NOTE_AGE] if table[of.TABLE_VARIATION] > 0.0 else 0,
+            players[note + of.NOTE_KEY],
+        )
+        contact.touch(player, players, table, of.RELEASE, level_db, 1.0, stroke, key, frame, 0.0, 0.0)
         return
     t60_s = _value(player, players, table, tables, of.RELEASE_S)
     for source in range(of.MOST_SOURCES):
@@ -1283,7 +1287,7 @@ def _note_on(
     _retune(player, players, table, tables, number, 0.0, 0, mixers[at.M_FRAMES])
     if not prepared and member == 0:
         level_db = _value(player, players, table, tables, of.ONSET_DB)
-        contact.touch(player, players, table, of.STROKE, level_db, strength, stroke, key, frame)
+        contact.touch(player, players, table, of.STROKE, level_db, strength, stroke, key, frame, 0.0, 0.0)
     _make_room(player, players)
     _report_began(player, players, tables, event, number, player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING])
 
@@ -1347,6 +1351,14 @@ def _move(
     players[note + of.NOTE_STRING], players[note + of.NOTE_KEY] = string, key
     player[note + of.NOTE_PITCH_HZ] = given_hz
     seconds = _moves_in_s(players, mode, players[note + of.NOTE_CHANNEL])
+    if players[note + of.NOTE_MEMBER] == 0:
+        level_db = _value(player, players, table, tables, of.DAMPER_DB)
+        if not strings.is_wound(player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING]):
+            level_db -= PLAIN_DB
+        slid_m = abs(_moment(player, 3)[of.LENGTH] - player[note + of.NOTE_STRING_NOW + of.LENGTH])
+        slides_s = seconds if seconds > HAMMER_S else 0.0
+        stroke = players[note + of.NOTE_AGE] if table[of.TABLE_VARIATION] > 0.0 else 0
+        contact.touch(player, players, table, of.RELEASE, level_db, 1.0, stroke, key, frame, slid_m, slides_s)
     _retune(player, players, table, tables, number, seconds, frame, now)
     return True
 

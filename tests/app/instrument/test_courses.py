@@ -1,4 +1,4 @@
-"""Courses, vibrato, and the aperture and flux of a magnetic pick-up: measured on sound of model and truth."""
+"""Courses, vibrato, slides, and the aperture and flux of a magnetic pick-up: measured on sound of model and truth."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import scipy.signal
 
-from app.instrument.events import LEGATO, MOD_WHEEL, Controller, NoteOff, NoteOn
-from app.patches.patch import Course, Patch, Pickup, Technique
+from app.instrument.events import LEGATO, MOD_WHEEL, PORTAMENTO, SLIDE_TIME, Controller, NoteOff, NoteOn
+from app.patches.patch import Course, Fretted, Noise, Patch, Pickup, Technique
 from engine.kernels import playing_layout as of
+from engine.kernels.player import SLIDE_S
 from engine.presets import Preset
 from tests.app.instrument.seen import seen
 from tests.app.instrument.test_strokes import Played, level
@@ -151,3 +152,27 @@ def test_the_wheel_makes_vibrato(patch: Patch, preset: Preset, bend_by: str, sou
     plain = changed(patch, bend_by=bend_by)
     still, expected = (play(each, preset, 0.5, events[1], source=source) for each in (wheeled, plain))
     np.testing.assert_array_equal(still, expected)
+
+
+def test_a_slide_squeaks_at_the_windings_that_pass(patch: Patch, preset: Preset) -> None:
+    """Noise is what the instrument with noise has more; plain strings have 12 dB less, slow slides a lower band."""
+    string, found = patch.strings.string, []  # type: ignore[union-attr]
+    for heavier, time in ((1.0, 80), (5.0, 80), (5.0, 100)):
+        events = (
+            (0.0, Controller(LEGATO, 127)),
+            (0.0, Controller(PORTAMENTO, 127)),
+            (0.0, Controller(SLIDE_TIME, time)),
+        )
+        events += (0.0, NoteOn(KEY, 60)), (0.3, NoteOn(KEY + 7, 60))
+        changes = {"density_kg_m3": heavier * string.density_kg_m3, "tension_n": heavier * string.tension_n}
+        plain = changed(patch, strings=Fretted(string=string.model_copy(update=changes)))
+        noisy = changed(plain, noise=Noise(kind="finger", release_db=-12))
+        noise = play(noisy, preset, 1.5, *events) - play(plain, preset, 1.5, *events)
+        assert not noise[: round(0.3 * RATE_HZ)].any()
+        power = np.abs(np.fft.rfft(noise)) ** 2
+        half = np.searchsorted(np.cumsum(power), power.sum() / 2) * RATE_HZ / len(noise)
+        found.append((10 * math.log10(power.sum()), half))
+    (quiet_db, _), (loud_db, quick_hz), (_, slow_hz) = found
+    assert loud_db - quiet_db == pytest.approx(12, abs=2)
+    slower = (SLIDE_S[1] / SLIDE_S[0]) ** (20 / 127)
+    assert quick_hz / slow_hz == pytest.approx(slower, rel=0.3)
