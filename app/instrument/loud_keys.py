@@ -64,7 +64,7 @@ class LoudKeys:
         if found is None:
             return None
         resonator = resonator_of(found, self.patch, self._preset)
-        level = float(10 ** (self.patch.level_db / 20))
+        level = float(10 ** (self.patch.level_db / 20)) / self.patch.course.strings
         return LoudKey(found, resonator, self._gain(self._sound(found, resonator)) * self._limit * level)
 
     def string_of(self, key: int, string: int | None = None) -> KeyString | None:
@@ -125,6 +125,8 @@ class LoudKeys:
             amplitudes = amplitudes * release_factor(resonator.omega, release_s)
         weights = resonator.shapes @ self._full_ear.weights(resonator.points, resonator.force_weights) / FULL_SCALE_M
         if self.ear.pickup == "velocity":
+            half = np.sqrt(resonator.stretch) * (patch.pickup.aperture_mm / 2000)
+            weights = weights * np.sinc(half / np.pi)[:, None]
             weights = weights * resonator.omega[:, None] * (FULL_SCALE_M / FULL_SCALE_M_S)
         sound = np.zeros((of.SOUND_ROWS, resonator.modes))
         sound[of.SOUND_OMEGA], sound[of.SOUND_SIGMA] = resonator.omega, resonator.sigma

@@ -18,6 +18,7 @@ from app.shared.parameters import OF_PATCHES
 from engine.contact import CONTACTS
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
+from engine.pluck import FULL_SCALE_M
 from engine.presets import Preset
 from engine.resonators.polarised import PAIRS
 from engine.resonators.recorded import OF_PARTIALS, RecordedAttack, RecordedString
@@ -39,7 +40,12 @@ PLAYED_PARAMETERS = (
     "noise.onset_db",
     "noise.release_db",
     "damping.mute",
-    *(f"technique.{name}" for name in ("harmonic", "strum_ms", "strokes", "tremolo_hz")),
+    *(
+        f"technique.{name}"
+        for name in ("harmonic", "strum_ms", "strokes", "tremolo_hz", "vibrato_cents", "vibrato_hz")
+    ),
+    "pluck.release_ms",
+    "pluck.release_hard_ms",
     "body.mix",
     "pickup.points.0",
     "pickup.points.1",
@@ -130,9 +136,14 @@ def table_of(
     if patch.sympathy_s_kg > 0:
         counts[of.TABLE_SYMPATHY] = of.EVERY_KEY if patch.damping.let_ring else of.OPEN_STRINGS
         memory[of.TABLE_SYMPATHY_S_KG] = patch.sympathy_s_kg
-    pluck = patch.pluck
-    memory[of.TABLE_RELEASE_S : of.TABLE_RELEASE_S + 2] = pluck.release_ms / 1000, pluck.release_hard_ms / 1000
-    memory[of.TABLE_VARIATION] = pluck.variation if varied else 0.0
+    if ear.pickup == "velocity":
+        memory[of.TABLE_APERTURE_M] = patch.pickup.aperture_mm / 1000
+        if patch.pickup.flux_mm > 0:
+            memory[of.TABLE_NEARNESS] = FULL_SCALE_M / (patch.pickup.flux_mm / 1000)
+    course = patch.course
+    counts[of.TABLE_COURSE], counts[of.TABLE_OCTAVES] = course.strings, course.octaves
+    memory[of.TABLE_APART_CENTS], memory[of.TABLE_APART_S] = course.cents, course.apart_ms / 1000
+    memory[of.TABLE_VARIATION] = patch.pluck.variation if varied else 0.0
     memory[of.TABLE_LEVEL] = 10 ** (patch.level_db / 20)
     memory[of.TABLE_NOISE_LEVEL] = of.PART_S * 10 ** ((of.WANTED_DB + patch.level_db) / 10)
     for place, each in enumerate(CONTACTS[patch.noise.kind]):

@@ -129,7 +129,7 @@ class PluckChoices(Value):
             `engine.excitation.blow_factor`. `softest_mm` and `hardest_mm` are heights of the wave that it sends out.
             Triangles, rounded or not, are no hammers: they pluck.
         release_ms, release_hard_ms: time in which the softest and the hardest pluck release the string; between
-            them a step of velocity is a ratio. Slower is mellower. Both 0: at once.
+            them a step of velocity is a ratio. Slower is mellower. Either 0: at once.
         variation: spread of place, force, width, angle and release from stroke to stroke. Comparisons of model
             and truth leave it out.
     """
@@ -143,15 +143,9 @@ class PluckChoices(Value):
     curve: float = parameter("pluck.curve")
     stops: Flag = True
     strikes: Flag = False
-    release_ms: Annotated[float, ranged(0, 20)] = 0.0
-    release_hard_ms: Annotated[float, ranged(0, 20)] = 0.0
+    release_ms: float = parameter("pluck.release_ms")
+    release_hard_ms: float = parameter("pluck.release_hard_ms")
     variation: Share = 0.0
-
-    @model_validator(mode="after")
-    def _both_take_time(self) -> Self:
-        if (self.release_ms > 0) != (self.release_hard_ms > 0):
-            raise ValueError("release_ms and release_hard_ms must both be 0, or both above 0; change one")
-        return self
 
     @model_validator(mode="after")
     def _softest_is_softer(self) -> Self:
@@ -176,7 +170,7 @@ class PluckChoices(Value):
 
     def release_s(self, velocity: float) -> float:
         """The time in which a pluck of a velocity releases the string; 0: at once."""
-        if self.release_ms == 0:
+        if self.release_ms == 0 or self.release_hard_ms == 0:
             return 0.0
         return self.release_ms / 1000 * (self.release_hard_ms / self.release_ms) ** self._share(velocity)
 
@@ -186,10 +180,24 @@ class PluckChoices(Value):
 
 
 class Pickup(Value):
-    """Where the string is heard, one point or left and right, and whether as displacement or its velocity."""
+    """Where the string is heard, one point or left and right, and whether as displacement or its velocity.
+
+    Attributes:
+        aperture_mm: of a magnetic pick-up, the length of string over which it averages.
+        flux_mm: of a magnetic pick-up, the displacement for an e-fold growth of its flux: a curve, by
+            `engine.kernels.voice`. 0: it grows evenly, without distortion.
+    """
 
     points: Annotated[tuple[Share, ...], Field(min_length=1, max_length=2)] = (DEFAULT_LISTEN,)
     kind: PickupKind = "displacement"
+    aperture_mm: Annotated[float, ranged(0, 80)] = 0.0
+    flux_mm: Annotated[float, ranged(0, 100)] = 0.0
+
+    @model_validator(mode="after")
+    def _curves_gently(self) -> Self:
+        if 0 < self.flux_mm < 1:
+            raise ValueError("flux_mm must be 0 or at least 1; raise it")
+        return self
 
 
 def _polarisation(name: str) -> Any:
@@ -212,6 +220,22 @@ class Polarisations(Value):
     second_cents: Annotated[float, _polarisation("second_cents")] = 1.0
     conductance_s_kg: Annotated[float, _polarisation("conductance_s_kg")] = 0.01
     second_conductance_s_kg: Annotated[float, _polarisation("second_conductance_s_kg")] = 0.001
+
+
+class Course(Value):
+    """Strings of a key that sound together, each with its own voice.
+
+    Attributes:
+        strings: how many they are.
+        octaves: of a set of strings, how many of the lowest have an octave string as their second.
+        cents: between strings of a course. It varies from key to key by half at most.
+        apart_ms: from the stroke of one string to that of the next.
+    """
+
+    strings: Annotated[int, Field(ge=1, le=3)] = 1
+    octaves: Annotated[int, Field(ge=0, le=8)] = 0
+    cents: Annotated[float, ranged(0, 50)] = 0.0
+    apart_ms: Annotated[float, ranged(0, 50)] = 0.0
 
 
 class Losses(Value):
@@ -261,12 +285,15 @@ class Technique(Value):
         strum_ms: from one string of a chord to the next. A chord is what begins within 30 ms.
         strokes: of strums: 0 from low to high, 1 from high to low, 2 by turns.
         tremolo_hz: how often a string is plucked while its key is held.
+        vibrato_cents, vibrato_hz: how far the pitch goes up and down, and how often.
     """
 
     harmonic: float = parameter("technique.harmonic")
     strum_ms: float = parameter("technique.strum_ms")
     strokes: float = parameter("technique.strokes")
     tremolo_hz: float = parameter("technique.tremolo_hz")
+    vibrato_cents: float = parameter("technique.vibrato_cents")
+    vibrato_hz: float = parameter("technique.vibrato_hz")
 
 
 class Amp(Value):
@@ -344,6 +371,7 @@ class Patch(Value):
     range: tuple[Key, Key] = (28, 88)
     pluck: PluckChoices = PluckChoices()
     pickup: Pickup = Pickup()
+    course: Course = Course()
     polarisations: Polarisations | None = None
     losses: Losses | None = None
     sympathy_s_kg: Annotated[float, ranged(0, 0.5)] = 0.0
@@ -360,6 +388,15 @@ class Patch(Value):
     room: Room = Room()
     level_db: float = parameter("level_db")
     macros: Annotated[tuple[Macro, ...], Field(max_length=MOST_MACROS)] = ()
+
+    @model_validator(mode="after")
+    def _courses_fit(self) -> Self:
+        if isinstance(self.strings, Drums) and self.course.strings > 1:
+            raise ValueError("course: drums have no strings; leave it out")
+        count = len(self.strings.strings) if isinstance(self.strings, StringSet) else 0
+        if self.course.octaves > count:
+            raise ValueError(f"course.octaves: {self.course.octaves} is above the number of open strings, {count}")
+        return self
 
     @model_validator(mode="after")
     def _parts_fit(self) -> Self:

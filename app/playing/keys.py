@@ -16,7 +16,7 @@ from app.instrument.drum_keys import DrumKeys
 from app.instrument.effects import body_problem, effects_of
 from app.instrument.events import RESET, SWITCHES, Controller, Event, NoteOn, PatchTurned, moves_effects
 from app.patches.drums import Drums
-from app.patches.patch import Patch, Pickup
+from app.patches.patch import Patch
 from app.playing.due import Due
 from app.playing.key_note import AS_THEY_ARE, KeyNote
 from app.playing.recorder import EventRecorder
@@ -366,5 +366,5 @@ def _holds(player: InstrumentPlayer, patch: Patch) -> bool:
 
 def _turned(player: InstrumentPlayer) -> PatchTurned:
     """With the pick-up through which it is heard, which is not its own where a single string is played."""
-    pickup = Pickup(points=player.ear.points, kind=player.ear.pickup)
-    return PatchTurned(player.patch.model_copy(update={"pickup": pickup}))
+    heard = {"points": player.ear.points, "kind": player.ear.pickup}
+    return PatchTurned(player.patch.model_copy(update={"pickup": player.patch.pickup.model_copy(update=heard)}))

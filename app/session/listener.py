@@ -52,7 +52,7 @@ class Listener(BaseModel):
         Raises:
             ValueError: in mono one of its macros would have nothing to move.
         """
-        heard = Pickup(points=self.points, kind=self.pickup)
+        heard = patch.pickup.model_copy(update={"points": self.points, "kind": self.pickup})
         if heard == patch.pickup:
             return patch
         if not self.stereo:

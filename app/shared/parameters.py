@@ -41,6 +41,7 @@ class Taper:
 TIMES = Taper(1.03, "× {:.2f}", True)
 MILLIMETRES, SECONDS = Taper(1.1, "{:.2f} mm", True), Taper(1.1, "{:.2f} s", True)
 DECIBELS = Taper(0.5, "{:+.1f} dB")
+CONTACT = Taper(0.02, "{:.2f} ms", curve=400.0)
 MUTED = Taper(0.02, "{:.1%}", curve=40.0)  # by each tenth of the way the T60 of a guitar's string shrinks by a third
 PLACE, WIDTH, PERCENT = Taper(0.01), Taper(1.05, "{:.3f}", True), Taper(0.02, "{:.0%}")
 
@@ -149,11 +150,16 @@ TIPS = {
     "pluck.softest_mm": "How far the softest key pulls the string",
     "pluck.hardest_mm": "How far the hardest key pulls the string",
     "pluck.curve": "Velocity curve: above 0 middle velocities are louder, below 0 softer",
+    "pluck.release_ms": "Time in which the softest pluck releases the string, or the softest hammer touches it: "
+    "longer is mellower. 0: at once",
+    "pluck.release_hard_ms": "The same of the hardest pluck or hammer",
     "technique.harmonic": "Harmonics: a finger touches the string at 1/n of its length as it is plucked, so that "
     "partial n is the lowest. 1: it does not",
     "technique.strum_ms": "Strum: time from one string of a chord to the next. 0: all at once",
     "technique.strokes": "Strokes of strums: from low to high (down), from high to low (up), or by turns (both)",
     "technique.tremolo_hz": "Tremolo: how often a key that is held plucks its string. 0: once",
+    "technique.vibrato_cents": "Vibrato: how far the pitch goes up and down. 0: none",
+    "technique.vibrato_hz": "How often a vibrato goes up and down in a second",
     "noise.onset_db": "Noise of what plucks or strikes: its energy, compared with a note's. The lowest is off",
     "noise.release_db": "Noise of the damper or finger that ends a note. The lowest is off",
     "pickup.points.0": f"Where the string is heard; {_PLACE_TIP}",
@@ -266,6 +272,10 @@ OF_PATCHES: Mapping[str, Parameter] = {
             wheel_factor=2,
         ),
         Parameter("pluck.curve", "curve", (-1, 1), 0, Taper(0.05, "{:+.2f}"), PLUCK, "wheel", "velocity curve", 1.0),
+        Parameter("pluck.release_ms", "soft contact", (0, 20), 0, CONTACT, PLUCK, "macro", "contact (low velocity)"),
+        Parameter(
+            "pluck.release_hard_ms", "hard contact", (0, 20), 0, CONTACT, PLUCK, "macro", "contact (high velocity)"
+        ),
         Parameter("noise.onset_db", "stroke", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "stroke noise"),
         Parameter("noise.release_db", "release", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "release noise"),
         Parameter(
@@ -286,6 +296,28 @@ OF_PATCHES: Mapping[str, Parameter] = {
         ),
         Parameter(
             "technique.tremolo_hz", "tremolo", (0, 16), 0, Taper(0.5, "{:.1f} Hz"), TECHNIQUE, "wheel", wheel=12
+        ),
+        Parameter(
+            "technique.vibrato_cents",
+            "vibrato",
+            (0, 100),
+            0,
+            Taper(1, "{:.0f} cents"),
+            TECHNIQUE,
+            "wheel",
+            "vibrato depth",
+            wheel=35,
+        ),
+        Parameter(
+            "technique.vibrato_hz",
+            "rate",
+            (0.5, 12),
+            5.5,
+            Taper(1.05, "{:.1f} Hz", True),
+            TECHNIQUE,
+            "wheel",
+            "vibrato rate",
+            wheel=7,
         ),
         Parameter("pickup.points.0", "place", (0, 1), DEFAULT_LISTEN, PLACE, PICKUP, "macro", "listening point"),
         Parameter(

@@ -27,6 +27,9 @@ OFF_DB = -60.0  # from this level down there is no noise
 SHORTENS, BRIGHTENS = -0.2, 0.15  # exponents of strength: of the pulse's length (Hertz), of the band (an estimate)
 LARGEST_CHANGE = 2.0  # of either
 HIGHEST_SHARE = 0.4  # of the rate: the middle of a band
+# Of a slide: J. Pakarinen, H. Penttinen, B. Bank, "Analysis of handling noises on wound strings", J. Acoust. Soc. Am.
+# 122, 2007. Its pitch is that of the windings that pass; wires of 0.4 mm are an estimate
+WINDINGS_M, LOWEST_SLIDE_HZ = 2_500.0, 200.0
 LEFT_DB = -80.0  # of the burst as it ends
 
 
@@ -50,14 +53,17 @@ def touch(
     stroke: int,
     key: int,
     frame: int,
+    slid_m: float,
+    slides_s: float,
 ) -> None:
-    """Begins the noise of a stroke or a release. Where all places are taken, the one that has sounded longest ends.
+    """Begins the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends.
 
     Args:
         level_db: energy re a note's; `OFF_DB` and below: none.
         strength: amplitude of the stroke over that at the reference velocity.
         stroke: with the key, it chooses the noise.
         frame: of the mixer, at which it begins; 0: at once.
+        slid_m, slides_s: way and time of a finger along the string, whose windings pass by: then that is the band.
     """
     if not level_db > OFF_DB:
         return
@@ -75,11 +81,16 @@ def touch(
     shorter = min(max(strength**SHORTENS, 1 / LARGEST_CHANGE), LARGEST_CHANGE)
     brighter = min(max(strength**BRIGHTENS, 1 / LARGEST_CHANGE), LARGEST_CHANGE)
     pulse_frames = max(2.0, table[first + of.PULSE_S] * shorter * rate_hz)
-    turn = 2 * math.pi * min(table[first + of.BURST_HZ] * brighter / rate_hz, HIGHEST_SHARE)
+    band_hz, share = table[first + of.BURST_HZ] * brighter, table[first + of.PULSE_SHARE]
+    attack_s, fall_s = table[first + of.ATTACK_S], table[first + of.FALL_S]
+    if slides_s > 0.0:
+        band_hz, share = max(slid_m * WINDINGS_M / slides_s, LOWEST_SLIDE_HZ), 0.0
+        attack_s, fall_s = 0.5 * slides_s, 0.1 * slides_s
+    turn = 2 * math.pi * min(band_hz / rate_hz, HIGHEST_SHARE)
     alpha = math.sin(turn) / (2 * table[first + of.BURST_Q])
-    shrinks = math.exp(-1 / max(1.0, table[first + of.FALL_S] * rate_hz))
-    attack_frames = max(1.0, table[first + of.ATTACK_S] * rate_hz)
-    share, passed = table[first + of.PULSE_SHARE], alpha / (1 + alpha)  # power of white noise in the band
+    shrinks = math.exp(-1 / max(1.0, fall_s * rate_hz))
+    attack_frames = max(1.0, attack_s * rate_hz)
+    passed = alpha / (1 + alpha)  # power of white noise in the band
     lasts = attack_frames / 3 + 1 / (1 - shrinks * shrinks)
     players[noise + of.NOISE_FRAME] = frame
     players[noise + of.NOISE_DONE] = players[noise + of.NOISE_STOPS] = 0

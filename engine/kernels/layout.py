@@ -92,7 +92,8 @@ RESTED = 59  # W quanta in which those did not even decay
 REST_STRETCH = 60  # R what they add to S on average, and
 REST_SECOND = 61  # R to R
 REST_DECAY = 62  # R of both in a quantum
-HEADER = 63
+NEARNESS = 63  # R full scale over the length in which a pick-up's flux grows e-fold; 0: it grows evenly
+HEADER = 64
 
 
 @njit(inline="always", **COMPILED)

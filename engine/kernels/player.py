@@ -70,6 +70,11 @@ USUAL_HARMONIC, USUAL_STRUM_MS, USUAL_TREMOLO_HZ = 2.0, 12.0, 10.0  # of a foots
 VARIES_PLACE, VARIES_DB, VARIES_WIDTH, VARIES_RELEASE = 0.08, 1.0, 0.12, 0.2  # shares, dB
 VARIES_ANGLE = math.radians(8.0)
 
+PLAIN_DB = 12.0  # by how much fingers are quieter on plain strings than on wound ones: an estimate
+MEMBERS_APART = 1 << 16  # places of the strings of a course
+COURSES_VARY = 0.5  # by how much detuning varies from key to key, at most
+VIBRATO_QUANTA = 8  # of a glide, of which a vibrato is made
+
 # Controllers of MIDI
 MOD_WHEEL, DATA, SUSTAIN, FINE_DATA, SLIDE = 1, 6, 64, 38, 74
 SLIDE_TIME, PORTAMENTO, SOFT, LEGATO = 5, 65, 67, 68
@@ -394,11 +399,14 @@ def _string_now(
         number = players[note + of.NOTE_STRING]
         wheeled = players[of.PLAYER_WHEEL] != 0 and 0 <= tables[of.TABLE_WHEEL] < of.KNOBS
         modes, _ = string_of(player, players, table, tables, key, number, pitch_hz, wheeled, out)
+        if players[note + of.NOTE_OCTAVE] != 0:
+            strings.thin(out, pitch_hz)
         fits = modes > 0 and (wheeled or not strings.overdamped(out, modes))
     else:
         for place in range(of.STRING):
             out[place] = player[note + of.NOTE_OWN + place]
     semitones = _semitones(player, mode, players[note + of.NOTE_CHANNEL]) + player[note + of.NOTE_TUNED]
+    semitones += player[note + of.NOTE_APART] + player[note + of.NOTE_VIBRATO]
     ratio = 2.0 ** (semitones / 12)
     if fits and ratio != 1.0:
         if tables[of.TABLE_BEND_BY] == of.BY_LENGTH:
@@ -497,11 +505,13 @@ def _round(
 
 
 @njit(**COMPILED)
-def _weight(own: np.ndarray, partial: int, place: float) -> float:
-    """What an amplitude of 1 m of a partial is at a listening point, re full scale."""
+def _weight(own: np.ndarray, partial: int, place: float, aperture_m: float) -> float:
+    """What an amplitude of 1 m of a partial is at a listening point, re full scale, averaged over an aperture."""
     if place == of.BRIDGE:
         return strings.bridge_force(own, partial) / FULL_SCALE_N
-    return math.sin(math.pi * partial * place) / FULL_SCALE_M
+    half = math.pi * partial * aperture_m / (2 * own[of.LENGTH])
+    averaged = math.sin(half) / half if half > 1e-6 else 1.0
+    return averaged * math.sin(math.pi * partial * place) / FULL_SCALE_M
 
 
 @njit(**COMPILED)
@@ -516,7 +526,8 @@ def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: in
         omega = math.sqrt(max(strings.omega_squared(own, partial) - sigma * sigma, 0.0))
         for point in range(players[note + of.NOTE_POINTS]):
             first = at.weights(n, which, point, 0) + mode
-            weight = _weight(own, partial, player[note + of.NOTE_POINT + point])
+            aperture_m = player[note + of.NOTE_APERTURE_M]
+            weight = _weight(own, partial, player[note + of.NOTE_POINT + point], aperture_m)
             heard = omega <= highest and (solo == 0 or solo == partial)
             voice[first] = part * weight if heard else 0.0
             voice[first + n] = 0.0
@@ -629,6 +640,7 @@ def _make_voice(
     counts[at.KIND], counts[at.PROGRAM], counts[at.MODES] = kind, program, n
     counts[at.POINTS], counts[at.VELOCITY] = players[note + of.NOTE_POINTS], velocity
     counts[at.BEGAN_FRAME], counts[at.MOVING] = -1, n
+    voice[at.NEARNESS] = table[of.TABLE_NEARNESS]
     counts[at.FADE_FRAMES], counts[at.ATTACK] = round(at.FADE_S * rate_hz), round(at.ATTACK_S * rate_hz)
     counts[at.ENDS_AT], counts[at.ENDS_IN] = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
     voice[at.SILENT], peak = at.SILENT_DB * math.log(10.0) / 20, max(highest_m, LEAST_PEAK_M)
@@ -668,6 +680,14 @@ def _reference_share(player: np.ndarray) -> float:
 
 
 @njit(**COMPILED)
+def _contact_s(softest_ms: float, hardest_ms: float, share: float) -> float:
+    """The time in which a pluck releases the string, or a hammer touches it, of a share of the velocities."""
+    if softest_ms <= 0.0 or hardest_ms <= 0.0:
+        return 0.0
+    return softest_ms / 1000 * (hardest_ms / softest_ms) ** share
+
+
+@njit(**COMPILED)
 def _sound(
     player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, key: int, string: int
 ) -> int:
@@ -687,9 +707,7 @@ def _sound(
     for mode in range(partials):
         pulled_m = min(amplitude_mm, LARGEST_AMPLITUDE_MM) / 1000
         player[of.PLAYER_AMPLITUDES + mode] = pulled_m * player[of.PLAYER_REFERENCE + mode]
-    release_s = table[of.TABLE_RELEASE_S]
-    if release_s > 0.0:
-        release_s *= (table[of.TABLE_RELEASE_S + 1] / release_s) ** share
+    release_s = _contact_s(player[values + of.CONTACT_MS], player[values + of.CONTACT_HARD_MS], share)
     _release_pluck(player, tables, own, partials, release_s)
     modes, pairs, learned = partials, 0, tables[of.TABLE_RECORDED] != 0
     if learned:
@@ -725,9 +743,9 @@ def _sound(
             amplitude *= omega * (FULL_SCALE_M / FULL_SCALE_M_S)
         rows[of.SOUND_OMEGA * modes + mode] = omega
         left, right = player[values + of.POINT], player[values + of.POINT + 1]
-        rows[of.SOUND_LEFT * modes + mode] = amplitude * _weight(own, partial, left)
-        stereo = tables[of.TABLE_POINTS] == 2
-        rows[of.SOUND_RIGHT * modes + mode] = amplitude * _weight(own, partial, right) if stereo else 0.0
+        stereo, aperture_m = tables[of.TABLE_POINTS] == 2, table[of.TABLE_APERTURE_M]
+        rows[of.SOUND_LEFT * modes + mode] = amplitude * _weight(own, partial, left, aperture_m)
+        rows[of.SOUND_RIGHT * modes + mode] = amplitude * _weight(own, partial, right, aperture_m) if stereo else 0.0
     return modes
 
 
@@ -772,6 +790,7 @@ def _gain(
         modes = _sound(player, players, table, tables, key, string)
         sound = player[of.PLAYER_SOUND : of.PLAYER_SOUND + of.SOUND_ROWS * modes]
         found = loudness.gain(sound, modes, tables[of.TABLE_POINTS], body, mix)
+        found /= max(tables[of.TABLE_COURSE], 1)  # of strings that swing together at first
         player[slot] = found * player[of.PLAYER_LIMIT] * table[of.TABLE_LEVEL]
     return player[slot]
 
@@ -913,9 +932,14 @@ def _damp(
     players[note + of.NOTE_DAMPED] = 1
     if players[note + of.NOTE_PREPARED] == 0:
         _retune(player, players, table, tables, number, DAMPER_S, frame, now)
+        if players[note + of.NOTE_MEMBER] != 0:
+            return
         level_db = _value(player, players, table, tables, of.DAMPER_DB)
-        stroke = players[note + of.NOTE_AGE] if table[of.TABLE_VARIATION] > 0.0 else 0
-        contact.touch(player, players, table, of.RELEASE, level_db, 1.0, stroke, players[note + of.NOTE_KEY], frame)
+        stroke, key = (
+            players[note + of.NOTE_AGE] if table[of.TABLE_VARIATION] > 0.0 else 0,
+            players[note + of.NOTE_KEY],
+        )
+        contact.touch(player, players, table, of.RELEASE, level_db, 1.0, stroke, key, frame, 0.0, 0.0)
         return
     t60_s = _value(player, players, table, tables, of.RELEASE_S)
     for source in range(of.MOST_SOURCES):
@@ -975,6 +999,8 @@ def _refuse(player: np.ndarray, players: np.ndarray, event: int) -> None:
 def _forget(player: np.ndarray, players: np.ndarray, note: int, frame: int) -> None:
     """A note has ended: its slots are free."""
     players[note + of.NOTE_STATE] = of.FREE
+    if players[note + of.NOTE_MEMBER] != 0:
+        return
     id, channel, key = players[note + of.NOTE_ID], players[note + of.NOTE_CHANNEL], players[note + of.NOTE_KEY]
     _report(player, players, of.ENDED, id, channel, key, frame, 0.0)
     _reported(players)
@@ -1062,9 +1088,32 @@ def _make_room(player: np.ndarray, players: np.ndarray) -> None:
 
 
 @njit(**COMPILED)
-def _note_on(
+def _strike(
     player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, mixers: np.ndarray, event: int
 ) -> None:
+    """Plays all strings of a key's course, one after the other; the first is the one that is reported."""
+    _note_on(player, players, table, tables, mixers, event, 0)
+    if players[event + of.EVENT_VOICES] != 0:
+        return
+    frame = players[event + of.EVENT_FRAME]
+    for member in range(1, tables[of.TABLE_COURSE]):
+        later = round(member * table[of.TABLE_APART_S] * player[of.PLAYER_RATE])
+        players[event + of.EVENT_FRAME] = max(frame, mixers[at.M_FRAMES]) + later if later > 0 else frame
+        _note_on(player, players, table, tables, mixers, event, member)
+    players[event + of.EVENT_FRAME] = frame
+
+
+@njit(**COMPILED)
+def _note_on(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    mixers: np.ndarray,
+    event: int,
+    member: int,
+) -> None:
+    """Plays a note, of a course one string. A string that is impossible is refused, unless another sounds."""
     channel, key, velocity = (
         players[event + of.EVENT_CHANNEL],
         players[event + of.EVENT_KEY],
@@ -1080,6 +1129,11 @@ def _note_on(
     if _is_string(players, tables, channel):
         place, count = 256 * (channel + 1), tables[of.TABLE_STRINGS]
         string = channel if count > 0 and _chosen(table, count, key) != channel else -1
+    place += MEMBERS_APART * member
+    octave = member > 0 and tables[of.TABLE_OCTAVES] > 0
+    if octave:
+        own_string = string if string >= 0 else _chosen(table, tables[of.TABLE_STRINGS], key)
+        octave = own_string >= tables[of.TABLE_STRINGS] - tables[of.TABLE_OCTAVES]
     own, modes, gain, highest_m = _moment(player, 3), 0, 1.0, 0.0
     position = amplitude_mm = width = 0.0
     pairs, strength, stroke, touched = 0, 1.0, 0, 0
@@ -1088,7 +1142,12 @@ def _note_on(
         shortened = 1.0
         if pitch_hz > 0.0:
             modes, shortened = string_of(player, players, table, tables, key, string, pitch_hz, False, own)
+        if octave and modes > 0:
+            strings.thin(own, pitch_hz)
+            modes = min(modes, strings.modes_below(own, of.HIGHEST_HZ)) if strings.possible(own) else 0
         if modes < 1 or strings.overdamped(own, modes):
+            if member > 0:
+                return
             _refuse(player, players, event)
             return
         gain = _gain(player, players, table, tables, key, string)
@@ -1111,9 +1170,9 @@ def _note_on(
             position = min(max(given, POSITION_RANGE[0]), POSITION_RANGE[1])
         elif mode == of.MPE and slide >= 0:
             position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
-        release_s, turned, varies = table[of.TABLE_RELEASE_S], 0.0, table[of.TABLE_VARIATION]
-        if release_s > 0.0:
-            release_s *= (table[of.TABLE_RELEASE_S + 1] / release_s) ** share
+        turned, varies = 0.0, table[of.TABLE_VARIATION]
+        softest_ms = _value(player, players, table, tables, of.CONTACT_MS)
+        release_s = _contact_s(softest_ms, _value(player, players, table, tables, of.CONTACT_HARD_MS), share)
         if varies > 0.0:
             stroke = players[of.PLAYER_AGE]
             if not given > 0.0:
@@ -1155,6 +1214,12 @@ def _note_on(
     for each in range(3):
         player[note + of.NOTE_LOSSES + each] = table[of.TABLE_LOSSES + each]
     player[note + of.NOTE_DETUNING] = table[of.TABLE_DETUNING]
+    player[note + of.NOTE_APERTURE_M] = table[of.TABLE_APERTURE_M]
+    players[note + of.NOTE_MEMBER] = member
+    players[note + of.NOTE_OCTAVE] = octave
+    if member > 0:  # above and below the first by turns, each key a little otherwise
+        apart = (member + 1) // 2 * (1 if member % 2 == 1 else -1) * (1 + COURSES_VARY * _varied(0, key, member))
+        player[note + of.NOTE_APART] = apart * table[of.TABLE_APART_CENTS] / 100
     for each in range(2):
         polarised = pairs > 0 and tables[of.TABLE_RECORDED] == 0
         player[note + of.NOTE_HEARD + each] = table[of.TABLE_HEARD + each] if polarised else 1.0
@@ -1220,9 +1285,9 @@ def _note_on(
         else:
             _whole(address)[at.STATE] = at.OVER
     _retune(player, players, table, tables, number, 0.0, 0, mixers[at.M_FRAMES])
-    if not prepared:
+    if not prepared and member == 0:
         level_db = _value(player, players, table, tables, of.ONSET_DB)
-        contact.touch(player, players, table, of.STROKE, level_db, strength, stroke, key, frame)
+        contact.touch(player, players, table, of.STROKE, level_db, strength, stroke, key, frame, 0.0, 0.0)
     _make_room(player, players)
     _report_began(player, players, tables, event, number, player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING])
 
@@ -1233,6 +1298,8 @@ def _report_began(
 ) -> None:
     """Reports the note of an event, and the string of its key."""
     note, frame = _note(number), players[event + of.EVENT_FRAME]
+    if players[note + of.NOTE_MEMBER] != 0:
+        return
     id, channel, key = players[note + of.NOTE_ID], players[note + of.NOTE_CHANNEL], players[note + of.NOTE_KEY]
     slot = _report(player, players, of.BEGAN, id, channel, key, frame, player[event + of.EVENT_VALUE])
     players[slot + of.REPORT_STRING] = players[note + of.NOTE_STRING]
@@ -1284,8 +1351,38 @@ def _move(
     players[note + of.NOTE_STRING], players[note + of.NOTE_KEY] = string, key
     player[note + of.NOTE_PITCH_HZ] = given_hz
     seconds = _moves_in_s(players, mode, players[note + of.NOTE_CHANNEL])
+    if players[note + of.NOTE_MEMBER] == 0:
+        level_db = _value(player, players, table, tables, of.DAMPER_DB)
+        if not strings.is_wound(player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING]):
+            level_db -= PLAIN_DB
+        slid_m = abs(_moment(player, 3)[of.LENGTH] - player[note + of.NOTE_STRING_NOW + of.LENGTH])
+        slides_s = seconds if seconds > HAMMER_S else 0.0
+        stroke = players[note + of.NOTE_AGE] if table[of.TABLE_VARIATION] > 0.0 else 0
+        contact.touch(player, players, table, of.RELEASE, level_db, 1.0, stroke, key, frame, slid_m, slides_s)
     _retune(player, players, table, tables, number, seconds, frame, now)
     return True
+
+
+@njit(**COMPILED)
+def _move_others(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    channel: int,
+    before: int,
+    key: int,
+    given_hz: float,
+    frame: int,
+    now: int,
+) -> None:
+    """Lets the other strings of a course follow the first, which has moved."""
+    for number in range(of.MOST_NOTES):
+        note = _note(number)
+        same = players[note + of.NOTE_KEY] == before and players[note + of.NOTE_CHANNEL] == channel
+        same = same and players[note + of.NOTE_MEMBER] != 0 and players[note + of.NOTE_HELD] != 0
+        if same and _sounds(players, note):
+            _move(player, players, table, tables, number, key, given_hz, frame, now)
 
 
 @njit(**COMPILED)
@@ -1303,6 +1400,7 @@ def _hammer_on(
         held = players[note + of.NOTE_HELD] != 0 and players[note + of.NOTE_CHANNEL] == channel
         if (
             held
+            and players[note + of.NOTE_MEMBER] == 0
             and players[note + of.NOTE_PREPARED] == 0
             and players[note + of.NOTE_AGE] > age
             and _sounds(players, note)
@@ -1316,8 +1414,13 @@ def _hammer_on(
         player, players, table, tables, found, key, player[event + of.EVENT_PITCH_HZ], frame, now
     ):
         return False
+    _move_others(player, players, table, tables, channel, before, key, player[event + of.EVENT_PITCH_HZ], frame, now)
     _report(player, players, of.ENDED, id, channel, before, now, 0.0)
     _reported(players)
+    for number in range(of.MOST_NOTES):
+        other = _note(number)
+        if players[other + of.NOTE_MEMBER] != 0 and players[other + of.NOTE_ID] == id:
+            players[other + of.NOTE_ID] = players[event + of.EVENT_ID]
     players[note + of.NOTE_ID] = players[event + of.EVENT_ID]
     _report_began(player, players, tables, event, found, _moment(player, 3))
     return True
@@ -1334,7 +1437,7 @@ def _pull_off(
     now: int,
 ) -> bool:
     """Gives the note of a released key to the highest key that is down and has none; whether there is one."""
-    channel = players[_note(number) + of.NOTE_CHANNEL]
+    channel, before = players[_note(number) + of.NOTE_CHANNEL], players[_note(number) + of.NOTE_KEY]
     if not _switched(players, tables[of.TABLE_MODE], channel, of.CHANNEL_LEGATO):
         return False
     for key in range(of.KEYS - 1, -1, -1):
@@ -1342,8 +1445,10 @@ def _pull_off(
         for each in range(of.MOST_NOTES):
             other = _note(each)
             same = players[other + of.NOTE_KEY] == key and players[other + of.NOTE_CHANNEL] == channel
+            same = same and players[other + of.NOTE_MEMBER] == 0
             free = free and not (same and players[other + of.NOTE_HELD] != 0 and _sounds(players, other))
         if free and _move(player, players, table, tables, number, key, math.nan, frame, now):
+            _move_others(player, players, table, tables, channel, before, key, math.nan, frame, now)
             return True
     return False
 
@@ -1359,11 +1464,13 @@ def _note_off(
     frame: int,
     now: int,
 ) -> None:
-    for number in range(of.MOST_NOTES):
+    for turn in range(2 * of.MOST_NOTES):  # first strings of courses first, which the others follow
+        number = turn % of.MOST_NOTES
         note = _note(number)
         same = players[note + of.NOTE_KEY] == key and players[note + of.NOTE_CHANNEL] == channel
+        same = same and (players[note + of.NOTE_MEMBER] == 0) == (turn < of.MOST_NOTES)
         if same and players[note + of.NOTE_HELD] != 0 and _sounds(players, note):
-            if _pull_off(player, players, table, tables, number, frame, now):
+            if players[note + of.NOTE_MEMBER] == 0 and _pull_off(player, players, table, tables, number, frame, now):
                 continue
             players[note + of.NOTE_HELD] = 0
             players[note + of.NOTE_KEPT] = _pedal(players, tables[of.TABLE_MODE], channel)
@@ -1554,6 +1661,21 @@ def _forget_turns(player: np.ndarray, players: np.ndarray, mode: int, channel: i
 
 
 @njit(**COMPILED)
+def _vibrate(
+    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, number: int, now: int
+) -> None:
+    """Lets a note glide to where its vibrato is some quanta later; all strings of a course alike."""
+    note, depth = _note(number), _value(player, players, table, tables, of.VIBRATO_CENTS) / 100
+    if depth == 0.0 and player[note + of.NOTE_VIBRATO] == 0.0:
+        return
+    ahead = now + VIBRATO_QUANTA * at.QUANTUM - players[note + of.NOTE_BEGAN]
+    hz = _value(player, players, table, tables, of.VIBRATO_HZ)
+    player[note + of.NOTE_VIBRATO] = depth * math.sin(2 * math.pi * hz * max(ahead, 0) / player[of.PLAYER_RATE])
+    seconds = VIBRATO_QUANTA * at.QUANTUM / player[of.PLAYER_RATE]
+    _retune(player, players, table, tables, number, seconds, 0, now)
+
+
+@njit(**COMPILED)
 def _follow_hands(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, now: int) -> None:
     """Lifts fingers from strings that they touch, and plucks again what a tremolo plucks, in the next quantum."""
     address = players[of.PLAYER_TABLE]
@@ -1568,9 +1690,13 @@ def _follow_hands(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, n
             continue
         if players[note + of.NOTE_TOUCHED] != 0 and players[note + of.NOTE_LIFTED] < end:
             _retune(player, players, table, tables, number, LIFT_S, players[note + of.NOTE_LIFTED], now)
+        if (now - players[note + of.NOTE_BEGAN]) // at.QUANTUM % VIBRATO_QUANTA == 0:
+            _vibrate(player, players, table, tables, number, now)
         if players[note + of.NOTE_HELD] == 0 or players[note + of.NOTE_RELEASED] != 0 or not _sounds(players, note):
             continue
         channel, switch = players[note + of.NOTE_CHANNEL], of.CHANNEL_TREMOLO
+        if players[note + of.NOTE_MEMBER] != 0:
+            continue
         hz = _technique(player, players, table, tables, channel, of.TREMOLO_HZ, switch, USUAL_TREMOLO_HZ)
         due = players[note + of.NOTE_BEGAN] + _frames(player, 1 / hz) if hz > 0.0 else end
         if due < end:
@@ -1600,7 +1726,7 @@ def _pluck_again(
     player[event + of.EVENT_PITCH_HZ] = player[note + of.NOTE_PITCH_HZ]
     players[note + of.NOTE_ID], players[note + of.NOTE_BEGAN] = 0, frame
     tuned, before = player[note + of.NOTE_TUNED], players[of.PLAYER_AGE]
-    _note_on(player, players, table, tables, mixers, event)
+    _strike(player, players, table, tables, mixers, event)
     for number in range(of.MOST_NOTES):
         made = _note(number)
         if tuned != 0.0 and players[made + of.NOTE_STATE] == of.RINGS and players[made + of.NOTE_AGE] > before:
@@ -1816,10 +1942,10 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
             if gain == 0.0:
                 _refuse(player, players, event)
                 return
-            _note_on(player, players, table, tables, mixers, event)
+            _note_on(player, players, table, tables, mixers, event, 0)
             player[_note(number) + of.NOTE_GAIN] = gain
             return
-        _note_on(player, players, table, tables, mixers, event)
+        _strike(player, players, table, tables, mixers, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
         if _waits(players, event, now):
             return

@@ -115,6 +115,21 @@ def fretted(string: np.ndarray, wanted_hz: float) -> float:
 
 
 @njit(**EXACT)
+def is_wound(string: np.ndarray) -> bool:
+    """Whether its mass per volume of core is above that of metal, or of gut and nylon."""
+    return string[of.DENSITY] > (8_900.0 if string[of.MODULUS] > 5e10 else 2_000.0)
+
+
+@njit(**EXACT)
+def thin(string: np.ndarray, pitch_hz: float) -> None:
+    """Makes it the octave string of its course: half as thick, as tight, and so long that it has twice the pitch."""
+    for place in (of.AREA, of.D1, of.D3):
+        string[place] *= 0.25
+    string[of.MOMENT] *= 0.0625
+    string[of.LENGTH] = fretted(string, 2 * pitch_hz)
+
+
+@njit(**EXACT)
 def bent(string: np.ndarray, ratio: float) -> float:
     """The tension in N that raises the string's pitch by a ratio; not above 0 where there is none."""
     if ratio == 1.0:

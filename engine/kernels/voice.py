@@ -15,6 +15,7 @@ from engine.kernels.modes import row
 
 MOVE_S = 0.020  # the fade to another listening point
 END_S = 0.020  # the fade of a voice that has become silent
+FLUX_CURVES = 2.0  # e-folds up to which the flux is a curve: its series rises everywhere
 WARMED = 3  # quanta: the one that is heard, and those before and after it
 
 
@@ -59,6 +60,7 @@ def _velocity(
 ) -> None:
     """As `_generate`, differentiated; the voice is generated a quantum ahead for that.
 
+    The flux through a magnetic pick-up grows as (exp(x/δ) - 1) δ with the displacement x, to third order.
     What the filter needs is there when `WARM` has reached `WARMED`: at the pluck at once, else two quanta later.
     """
     counts = voice.view(np.int64)
@@ -74,8 +76,11 @@ def _velocity(
             past = voice[slot : slot + 3 * quantum]
             for frame in range(2 * quantum):
                 past[frame] = past[frame + quantum]
+            near = voice[at.NEARNESS]
             for frame in range(quantum):
-                past[2 * quantum + frame] = out[point, frame]
+                moved = min(max(near * out[point, frame], -FLUX_CURVES), FLUX_CURVES)
+                curved = 1.0 + moved * (0.5 + moved / 6)
+                past[2 * quantum + frame] = out[point, frame] * curved
             if begins and turn == 0 and counts[at.FRAME] == 0:
                 mirrored = 1 if counts[at.JOINS] else quantum  # at rest before the pluck: the mirror of what follows
                 for frame in range(1, mirrored):

@@ -344,7 +344,7 @@ class CompiledPlayer:
         """The notes that have their places and ring. Any thread; the levels are those of the latest quantum."""
         found = []
         for number, note in enumerate(self._notes()):
-            if note[of.NOTE_STATE] != of.RINGS or not note[of.NOTE_HAS_PLACE]:
+            if note[of.NOTE_STATE] != of.RINGS or not note[of.NOTE_HAS_PLACE] or note[of.NOTE_MEMBER]:
                 continue
             alive = _alive(self._voices(number, note))
             if alive:

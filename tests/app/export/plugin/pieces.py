@@ -27,6 +27,7 @@ NAMES = (
     "sitar",  # open strings ring with it
     "cimbalom",
     "timpani",  # drums
+    "twelve_string_guitar",  # courses, of octaves too
     "thin_bars",  # drums that are bars
     "learned",  # from a recording
     "member_channels",  # MPE
