@@ -220,6 +220,7 @@ def compile_kernels() -> None:
     trouble = "the sound engine was not compiled, for the reason above; remedy: delete .venv, then try again"
     run_step([PYTHON, "-m", "engine.kernels.warm"], trouble)
     COMPILED.write_text(kernels(), "utf-8")
+    say("the sound engine is ready")
 
 
 def kernels() -> str:

@@ -27,8 +27,8 @@ def one_line(text: str, most: int = LONGEST_MESSAGE) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A duration in words, such as "8.2 s", "3 min 20 s", "2 h 5 min"."""
-    if seconds < 60:
-        return f"{seconds:.1f} s"
+    """A duration in words, such as "8.2 s", "32 s", "3 min 20 s", "2 h 5 min"."""
+    if seconds < 59.5:
+        return f"{seconds:.1f} s" if seconds < 9.95 else f"{seconds:.0f} s"
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

@@ -53,7 +53,10 @@ def faults(heard: Heard) -> list[str]:
     if heard.split_cents is not None:
         found.append((heard.split_cents / NOTICED_CENTS, f"two pitches, {heard.split_cents:.0f} cents apart"))
     if heard.pitch_cents is not None and abs(heard.pitch_cents) >= NOTICED_CENTS:
-        found.append((abs(heard.pitch_cents) / NOTICED_CENTS, f"pitch {_signed(heard.pitch_cents)} cents"))
+        which = "high" if heard.pitch_cents > 0 else "low"
+        found.append(
+            (abs(heard.pitch_cents) / NOTICED_CENTS, f"pitch {abs(heard.pitch_cents):.0f} cents too {which}")
+        )
     if heard.hum_db is not None and heard.hum_db >= NOTICED_HUM_DB:
         loudness = 10 ** ((heard.hum_db - NOTICED_HUM_DB) / 20)
         found.append((loudness, f"residual hum at {_signed(heard.hum_db)} dB"))

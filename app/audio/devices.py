@@ -6,9 +6,12 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
+import sys
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from types import ModuleType
 from typing import Any, Protocol
 
@@ -171,5 +174,18 @@ def _sounddevice() -> ModuleType:
         raise portaudio_missing(str(error)) from error
     except Exception as error:  # importing the module starts PortAudio, which fails with an exception of its own
         raise not_started(str(error)) from error
+    _silence_alsa()
     module: ModuleType = sounddevice
     return module
+
+
+@cache
+def _silence_alsa() -> None:
+    """Lets ALSA print nothing: the window counts gaps, and errors are raised.
+
+    ALSA calls the handler in the audio thread too, where Python must not run. So it is one of C's functions that
+    has no effect.
+    """
+    if sys.platform == "linux":
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL("libasound.so.2").snd_lib_error_set_handler(ctypes.CDLL(None).abs)

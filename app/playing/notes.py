@@ -314,6 +314,10 @@ class Notes:
         """Times from gestures to the callbacks that gave their first samples to the device, the latest last."""
         return tuple(self._latencies_s)
 
+    def forget_latencies(self) -> None:
+        """For another device or buffer: those measured before do not hold for it."""
+        self._latencies_s.clear()
+
     def poll(self) -> None:
         """Forgets notes that ended, and moves listening points. The window calls it at each frame."""
         self.look()

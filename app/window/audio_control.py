@@ -44,6 +44,7 @@ class AudioControl(QObject):
         self._changes = 0
         self._notice = ""
         self._latencies_s: tuple[float, ...] = ()
+        self._measured_with: object = None  # device and buffer of these
         self._last_known: Gap | None = None  # the user's zero: gaps up to this one are not counted
         self._listed: list[DeviceChoice] | None = None
         self._moments = 0
@@ -82,6 +83,9 @@ class AudioControl(QObject):
                 self._notice = ""
             if status.changes_done == self._changes and status.device is not None:
                 self.device, self.sound = self._wish
+        if self._measured_with not in (None, (status.device, status.latency_s)):
+            notes.forget_latencies()
+        self._measured_with = status.device, status.latency_s
         self._latencies_s = notes.latencies_s
         self._watch_gaps(status)
         if take is not None:

@@ -114,7 +114,7 @@ def test_a_run_that_was_done_is_read_and_another_configuration_is_not_its(tmp_pa
 
     assert run_row(CELL.name, "ours", configuration(), **places, report=trained) == row
     file = tmp_path / "runs" / CELL.name / "row.json"
-    with pytest.raises(ValueError, match="belongs to another configuration"):
+    with pytest.raises(ValueError, match="was trained with other settings"):
         run_row(CELL.name, "ours", configuration(epochs=3), **places)
     file.write_text("{")
     with pytest.raises(ValueError, match=r"row.json: not a row .*delete it to measure the run again"):

@@ -73,7 +73,14 @@ def train(
         torch.set_num_threads(threads)
     try:
         load_data(configuration.data, cache)
+        begun: list[Progress] = []  # empty where the run was finished already
         with progress("train") as report:
+            shown = training_report(report)
+
+            def follow(each: Progress) -> None:
+                begun.append(each)
+                shown(each)
+
             row = run_row(
                 name,
                 cell.recipe if cell else "",
@@ -81,7 +88,7 @@ def train(
                 folder,
                 cache=cache,
                 device=_device(device),
-                report=training_report(report),
+                report=follow,
                 waits=lambda: say(f"{folder / name}: another process trains there; waiting for its end"),
                 preset=file,
             )
@@ -98,7 +105,8 @@ def train(
         print(f"{split:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}")
     if row.start_rel_mse is not None and row.start_rel_mae is not None:
         print(f"untrained   rel. MSE {number(row.start_rel_mse)}, rel. MAE {number(row.start_rel_mae)} (validation)")
-    print(f"trained in  {duration(row.seconds or 0.0)}, best epoch {row.best_epoch}")
+    when = "" if begun else "; finished earlier, nothing was trained now"
+    print(f"trained in  {duration(row.seconds or 0.0)}, best epoch {row.best_epoch}{when}")
     _tell_heard(file)
 
 

@@ -317,7 +317,9 @@ class _Run:
         except (ValueError, OverflowError, RuntimeError) as error:
             raise ValueError(f"{path}: damaged checkpoint ({error}); delete it to start the run again") from error
         if other.digest != self._configuration.digest:
-            raise ValueError(f"{path}: belongs to another configuration; delete it or choose another run folder")
+            raise ValueError(
+                f"{path}: was trained with other settings; delete it to start again, or give another --runs"
+            )
         try:
             self._model.load_state_dict(dict(checkpoint.model))
             if self._average is not None:

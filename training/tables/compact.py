@@ -49,7 +49,7 @@ def given(line: Line) -> str:
         words = "random weights"
     if line.recipe == "paper":
         words += ", paper's recipe"
-    return f"{words} §" if line.hints else words
+    return f"{words}, hinted" if line.hints else words
 
 
 def own_lines(section: Section) -> list[Line]:

@@ -248,3 +248,20 @@ def test_a_missing_portaudio_is_said_with_its_remedy(monkeypatch: pytest.MonkeyP
         output_devices()
     assert caught.value.kind is ProblemKind.PORTAUDIO_MISSING
     assert caught.value.detail == "PortAudio library not found"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="ALSA is Linux's")
+def test_alsa_prints_nothing_into_the_terminal() -> None:
+    """In a process of its own: the handler stays."""
+    script = (
+        "import ctypes, sys; from app.audio.devices import _silence_alsa\n"
+        "if sys.argv[1:]: _silence_alsa()\n"
+        "ctypes.CDLL('libasound.so.2').snd_pcm_open(ctypes.byref(ctypes.c_void_p()), b'no_such_device', 0, 0)"
+    )
+    loud, quiet = (
+        subprocess.run([sys.executable, "-c", script, *words], capture_output=True, text=True, check=False)
+        for words in ([], ["quiet"])
+    )
+    if "ALSA lib" not in loud.stderr:
+        pytest.skip("there is no ALSA")
+    assert (quiet.returncode, quiet.stderr) == (0, "")

@@ -17,9 +17,9 @@ def test_progress_off_a_terminal_is_a_line_now_and_then(
             now[0] = float(second)
             report(second / 60, f"step {second}")
     assert capsys.readouterr().err.splitlines() == [
-        "learned-strings: work: 17%, 50.0 s left step 10",
-        "learned-strings: work: 33%, 40.0 s left step 20",
-        "learned-strings: work: 50%, 30.0 s left step 30",
+        "learned-strings: work: 17%, 50 s left step 10",
+        "learned-strings: work: 33%, 40 s left step 20",
+        "learned-strings: work: 50%, 30 s left step 30",
     ]
 
 
@@ -42,7 +42,8 @@ def test_progress_shows_a_files_name_as_it_is(
 
 
 @pytest.mark.parametrize(
-    ("seconds", "text"), [(8.24, "8.2 s"), (200, "3 min 20 s"), (7500, "2 h 5 min"), (59.99, "60.0 s")]
+    ("seconds", "text"),
+    [(8.24, "8.2 s"), (200, "3 min 20 s"), (7500, "2 h 5 min"), (59.99, "1 min 0 s"), (31.9, "32 s")],
 )
 def test_durations_are_words(seconds: float, text: str) -> None:
     assert console.duration(seconds) == text

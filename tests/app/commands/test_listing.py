@@ -80,7 +80,7 @@ def test_what_was_heard_is_listed_and_a_hostile_table_hides_nothing(run, install
     good = installed / "good.safetensors"
     add_heard(installed, [Heard("good", preset_digest(good), 4.0, 9.0, 5.2, 3.0, 13.0)])
     (preset,) = json.loads(run("presets", "--json").out)
-    assert preset["heard"] == "pitch +13 cents …"
+    assert preset["heard"] == "pitch 13 cents too high …"
     with (installed / NAME).open("a") as table:
         table.write("<script>,1e999,nan\n")
     reported = run("presets", "--json")

@@ -139,7 +139,7 @@ def test_a_run_of_another_configuration_is_refused(run, place: Place) -> None:
         place.folder / "b",
         *place.cache,
     ]
-    assert "belongs to another configuration; delete it" in run(*words).failure
+    assert "was trained with other settings; delete it" in run(*words).failure
 
 
 @pytest.mark.parametrize("bytes_left", [0, 100, 15_000])

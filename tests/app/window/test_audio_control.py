@@ -60,7 +60,7 @@ def control(qtbot: QtBot, output: FakeSound, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def show(control: AudioControl, status: SoundStatus, latencies_s: tuple[float, ...] = ()) -> None:
-    control.show(status, SimpleNamespace(latencies_s=latencies_s), None)  # type: ignore[arg-type]
+    control.show(status, SimpleNamespace(latencies_s=latencies_s, forget_latencies=lambda: None), None)  # type: ignore[arg-type]
 
 
 def test_the_first_opening(control: AudioControl, output: FakeSound) -> None:
@@ -152,3 +152,11 @@ def test_the_latency_that_was_measured_is_reported(control: AudioControl) -> Non
     assert "key to device" not in facts.text()
     show(control, SoundStatus(device=SPEAKERS, latency_s=0.012), latencies_s=(0.5, 0.004, 0.0031))
     assert "48 kHz, buffer 12 ms, key to device 4.0 ms (measured)" in facts.text()
+
+
+def test_latencies_of_another_buffer_are_forgotten(control: AudioControl) -> None:
+    forgotten: list[float] = []
+    notes = SimpleNamespace(latencies_s=(), forget_latencies=lambda: forgotten.append(1))
+    for buffer_s in (0.012, 0.012, 0.05):
+        control.show(SoundStatus(device=SPEAKERS, latency_s=buffer_s), notes, None)  # type: ignore[arg-type]
+    assert len(forgotten) == 1

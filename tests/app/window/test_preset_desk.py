@@ -361,12 +361,12 @@ def test_browser_and_card_say_how_true_a_preset_sounds(
     controller.presets.toggle()
     assert listed(browser) == ["second", "first"]  # what was not measured is last
     rows = [browser._listed.index_of(name) for name in listed(browser)]
-    assert [row.siblingAtColumn(4).data() for row in rows] == ["pitch +13 cents …", "not measured"]
+    assert [row.siblingAtColumn(4).data() for row in rows] == ["pitch 13 cents too high …", "not measured"]
     assert "&lt;i&gt;sma&lt;/i&gt; str" in rows[0].data(Qt.ItemDataRole.ToolTipRole)
     assert "evaluate first --heard --write" in browser.card.text()
     controller.session.update(preset="second")
     card = browser.card.text()
-    assert "past training: pitch +13 cents; grows, +5 dB; spectra 7.4 dB apart over 4 s" in card
+    assert "past training: pitch 13 cents too high; grows, +5 dB; spectra 7.4 dB apart over 4 s" in card
     assert "<b>bold</b>" not in card
     browser.order.setCurrentIndex(browser.order.findText("By name"))
     assert listed(browser) == ["first", "second"]

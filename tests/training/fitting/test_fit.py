@@ -223,7 +223,7 @@ def test_a_model_that_overflows_is_never_the_best(
 
 def test_a_checkpoint_of_another_configuration_is_refused(small_dataset: Dataset, runs: Path) -> None:
     fit(small("koopman_var"), small_dataset, runs)
-    with pytest.raises(ValueError, match="belongs to another configuration; delete it or choose another run folder"):
+    with pytest.raises(ValueError, match="was trained with other settings; delete it to start again"):
         fit(small("koopman_var", epochs=5), small_dataset, runs)
 
 

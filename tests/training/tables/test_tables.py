@@ -171,7 +171,7 @@ def test_compact_lines_name_what_the_start_was_given() -> None:
 
     assert given("averaging", model="koopman_integrated") == "averaged equations"
     assert given(PHASES, model="koopman_integrated", recipe="blind") == "displacement only"
-    assert given(PHASES, model="koopman_integrated", recipe="hinted") == "displacement only §"
+    assert given(PHASES, model="koopman_integrated", recipe="hinted") == "displacement only, hinted"
     assert given("least squares", model="dmd") == "fitted"
     assert given("paper", model="koopman", recipe="paper") == "random weights, paper's recipe"
 

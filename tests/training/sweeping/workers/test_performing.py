@@ -62,7 +62,7 @@ def test_a_checkpoint_of_another_configuration_is_reported(plan, task: Task, opt
     perform(write(task), lambda reported: None)
     other = plan(epochs=5)
     error = perform(write(options.task(other, other.runs[0])), lambda reported: None)["error"]
-    assert "belongs to another configuration; delete it" in error
+    assert "was trained with other settings; delete it" in error
 
 
 def test_a_full_disk_is_reported(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
