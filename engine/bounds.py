@@ -74,6 +74,7 @@ DRUM: Mapping[str, tuple[float, float]] = {
     "uneven": (0.0, 0.05),
     "air_kg_m3": (0.0, 2.0),
     "cavity_m3": (0.0, 10.0),
+    "shell_m": (0.0, 2.0),
 }
 MALLET: Mapping[str, tuple[float, float]] = {
     "mass_kg": (1e-4, 5.0),

@@ -65,13 +65,13 @@ def modes(
     json: Json = False,
 ) -> None:
     """Print frequencies and decays of a drum's modes. Air counts, and the drop of pitch is added."""
-    patch, struck = _drum_of(drum, key)
+    patch, struck = drum_of(drum, key)
     found = struck.modes
     drops = {str(velocity): struck.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)}
     facts = {"modes": len(found), "hardest_m_s": struck.played.hardest_m_s, "drop_cents": drops}
     rows = [
         {"m": m, "n": n, "hz": hz, "t60_s": t60, "air_mass": mass}
-        for m, n, hz, t60, mass in _rows(found, min(count, len(found)))
+        for m, n, hz, t60, mass in mode_rows(found, min(count, len(found)))
     ]
     if json:
         print_json({**facts, "lowest": rows})
@@ -260,7 +260,7 @@ def _blow_of(
 
     from engine.strike import Strike
 
-    patch, struck = _drum_of(drum, key)
+    patch, struck = drum_of(drum, key)
     if preset is not None:
         patch = patch.model_copy(update={"preset": preset})
     own = struck.strike(velocity, patch.pluck.curve)
@@ -273,7 +273,7 @@ def _blow_of(
     return _Blow(patch, struck, Strike(place, own.speed_m_s, own.mallet))
 
 
-def _drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
+def drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
     """The drum of a file, or of a key of an instrument.
 
     Raises:
@@ -346,7 +346,8 @@ def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int) -> N
         arrays.write_array(out, (steps + 1, *inside.shape), pictures(), report)
 
 
-def _rows(found: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:
+def mode_rows(found: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:
+    """m, n, frequency in Hz, T60 in s and the mass with air, relatively, of the lowest modes."""
     import math
 
     from engine.resonators.surface import Circle, Rectangle

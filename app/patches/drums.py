@@ -34,6 +34,7 @@ class PhysicalDrum(Value):
     uneven: Annotated[float, ranged(*bounds.DRUM["uneven"])] = 0.0
     air_kg_m3: Annotated[float, ranged(*bounds.DRUM["air_kg_m3"])] = 0.0
     cavity_m3: Annotated[float, ranged(*bounds.DRUM["cavity_m3"])] = 0.0
+    shell_m: Annotated[float, ranged(*bounds.DRUM["shell_m"])] = 0.0
 
     @property
     def parameters(self) -> DrumParameters:
@@ -49,6 +50,8 @@ class PhysicalDrum(Value):
             raise ValueError("length_m and width_m of a circle are its two diameters; make them alike")
         if self.thickness_m > (self.length_m if self.shape == "bar" else shorter) / 10:
             raise ValueError("thickness_m must be below a tenth of the sides; choose a thinner one")
+        if self.shell_m and (self.cavity_m3 or not self.air_kg_m3):
+            raise ValueError("shell_m is of an open shell in air; set cavity_m3 to 0 and air_kg_m3, or shell_m to 0")
         return self
 
 

@@ -24,7 +24,9 @@ from engine.resonators.base import Array, Resonator
 from engine.resonators.surface import Circle, Numbers, Rectangle, Surface, spread
 
 DrumShape = Literal["circle", "rectangle", "bar"]
-MAY_BE_ZERO = frozenset({"tension_n_m", "damping_d1_kg_m2_s", "damping_d3_kg_s", "uneven", "air_kg_m3", "cavity_m3"})
+MAY_BE_ZERO = frozenset(
+    {"tension_n_m", "damping_d1_kg_m2_s", "damping_d3_kg_s", "uneven", "air_kg_m3", "cavity_m3", "shell_m"}
+)
 MOST_MODES = 1_600
 LARGEST_ELLIPTICITY = 0.1
 
@@ -41,6 +43,7 @@ class DrumParameters:
         uneven: by how much the frequencies of a circle's pairs differ, relatively: heads are never tuned evenly.
         air_kg_m3: density of the air on both sides; 0: none.
         cavity_m3: volume of a closed shell under the head, whose air is a spring for modes that move it; 0: open.
+        shell_m: depth of an open shell under the head, whose air is a mass for modes that move it; 0: a baffle.
 
     Raises:
         ValueError: a parameter is not finite, out of its bounds, or does not go with others.
@@ -59,6 +62,7 @@ class DrumParameters:
     uneven: float = 0.0
     air_kg_m3: float = 0.0
     cavity_m3: float = 0.0
+    shell_m: float = 0.0
 
     def __post_init__(self) -> None:
         if self.shape not in get_args(DrumShape):
@@ -72,6 +76,11 @@ class DrumParameters:
             if not math.isfinite(value) or value < 0 or (value == 0 and field.name not in MAY_BE_ZERO):
                 raise ValueError(f"drum parameter {field.name} must be positive and finite, not {value}")
             bounds.check(f"drum parameter {field.name}", value, bounds.DRUM[field.name])
+        if self.shell_m and (self.cavity_m3 or not self.air_kg_m3):
+            raise ValueError(
+                "drum parameter shell_m is of an open shell in air: set cavity_m3 to 0 and air_kg_m3 to that of air, "
+                "or shell_m to 0"
+            )
         if self.shape == "circle" and abs(self.ellipticity) > LARGEST_ELLIPTICITY:
             raise ValueError(
                 f"drum parameters length_m and width_m of a circle are its two diameters, nearly the same, "
@@ -153,7 +162,7 @@ class DrumModes:
         stiffness = drum.tension_n_m * kappa**2 + drum.bending_nm * kappa**4
         mass, radiated = np.full(len(kappa), mu), np.zeros(len(kappa))
         if drum.air_kg_m3:
-            mass, radiated = air.loaded(surface, stiffness, mu, drum.air_kg_m3)
+            mass, radiated = air.loaded(surface, stiffness, mu, drum.air_kg_m3, drum.shell_m)
         squared = stiffness / mass
         if drum.cavity_m3:
             volumes = surface.transform(np.zeros_like(kappa), 0.0)

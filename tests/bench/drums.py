@@ -1,4 +1,4 @@
-"""Drums: the cost of a voice of many modes, of a kit with strings, of the picture, and of choosing an instrument.
+"""Drums: frequencies and pitch drops beside published ones; costs of voices, kit, picture and choosing an instrument.
 
 Costs are processor time of this thread at 48 kHz, less that of an empty mixer, as shares of a core. The least of some
 repeats counts: other processes only add.
@@ -12,6 +12,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 from typing import TypeVar
 
 import numpy as np
@@ -36,6 +37,22 @@ VELOCITY = 110
 PICTURES = (("concert_toms", 36), ("concert_toms", 47), ("timpani", 50), ("soft_plate", 60), ("thin_bars", 72))
 INSTRUMENTS = ("concert_toms", "tuned_toms", "frame_drum", "conga", "timpani", "soft_plate", "thin_bars")
 T = TypeVar("T")
+# A tom: Rossing, Science of Percussion Instruments (2000), 26, as J. Hsu's code quotes it (percussionSynthesis,
+# tomtoms.m): 142 Hz and ratios; which mode is which is our reading. Its size is not quoted; (1,1) sets the tension.
+# A timpani head: Christian et al., JASA 76 (1984), 1336, from memory.
+MEASURED_HZ: dict[str, dict[tuple[int, int], float]] = {
+    "tom_12": {
+        mode: 142 * ratio
+        for mode, ratio in zip(
+            [(1, 1), (0, 1), (2, 1), (0, 2), (3, 1), (1, 2), (4, 1)],
+            [2.15, 1, 3.17, 3.42, 4.09, 4.80, 4.94],
+            strict=True,
+        )
+    },
+    "timpani_head_26": {(0, 1): 82, (1, 1): 155, (2, 1): 229, (3, 1): 297, (4, 1): 366, (5, 1): 431},
+}
+DRUM_FILES, MODES_COMPARED = Path(__file__).parents[2] / "presets" / "drums", 40
+PUBLISHED_DROP_PERCENT = 10.0  # "around 10 percent" of a kick drum: Reid, Sound on Sound, January 2002; of toms none
 SIZES = (400, 800, 1500)  # modes
 HARD = PhysicalMallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)  # so that all modes move
 STRINGS, STRING_PATCH = (40, 45, 50, 55, 59, 64, 67, 71), "classical_guitar"
@@ -87,9 +104,34 @@ class ChoiceCost:
 
 
 @dataclass(frozen=True)
+class MeasuredMode:
+    """A frequency of a drum in air beside a published measurement."""
+
+    drum: str
+    mode: str
+    measured_hz: float
+    computed_hz: float
+
+    @property
+    def error_percent(self) -> float:
+        return 100 * (self.computed_hz / self.measured_hz - 1)
+
+
+@dataclass(frozen=True)
+class PitchDrop:
+    """Of the hardest blow on a drum of the kit, from its first half-period on."""
+
+    drum: str
+    drop_percent: float
+    published_percent: float
+
+
+@dataclass(frozen=True)
 class DrumsBenchmark:
     machine: Machine
     rate_hz: int
+    modes: tuple[MeasuredMode, ...]
+    drops: tuple[PitchDrop, ...]
     drums: tuple[DrumCost, ...]
     pictures: tuple[PictureCost, ...]
     choices: tuple[ChoiceCost, ...]
@@ -112,7 +154,32 @@ def measure(report: Callable[[float, str], None]) -> DrumsBenchmark:
         report((len(SIZES) + 1) / (len(SIZES) + 2), "pictures")
         pictures = tuple(_picture(*drum) for drum in PICTURES)
         choices = tuple(_choice(name) for name in INSTRUMENTS)
-        return DrumsBenchmark(Machine.here(), RATE_HZ, tuple(found), pictures, choices)
+        return DrumsBenchmark(Machine.here(), RATE_HZ, measured_modes(), _drops(kit), tuple(found), pictures, choices)
+
+
+def measured_modes() -> tuple[MeasuredMode, ...]:
+    """Modes of drums whose frequencies are published."""
+    from app.commands.drums import drum_of, mode_rows
+
+    found = []
+    for name, measured in MEASURED_HZ.items():
+        modes = drum_of(str(DRUM_FILES / f"{name}.toml"), None)[1].modes
+        computed = {(m, n): hz for m, n, hz, *_ in reversed(mode_rows(modes, MODES_COMPARED))}  # of a pair the lower
+        found += [MeasuredMode(name, f"({m},{n})", hz, computed[m, n]) for (m, n), hz in measured.items()]
+    return tuple(found)
+
+
+def _drops(kit: Patch) -> tuple[PitchDrop, ...]:
+    from app.instrument.drum_keys import DrumKeys
+    from engine.voices import Ear
+
+    keys, found = DrumKeys(kit, Ear((0.5,))), []
+    for drum in _drums(kit).drums:
+        key = keys.of_key(drum.note)
+        if key is not None and drum.drum.shape == "circle":
+            cents = key.drop_cents(127, kit.pluck.curve)
+            found.append(PitchDrop(drum.name, 100 * (2 ** (cents / 1200) - 1), PUBLISHED_DROP_PERCENT))
+    return tuple(found)
 
 
 def _choice(name: str) -> ChoiceCost:

@@ -125,7 +125,7 @@ def test_modes_that_rested_are_heard_where_the_listener_moves(monkeypatch: pytes
             power = np.abs(np.fft.rfft(each[begin : begin + 4_800] * window)) ** 2
             found = [power[(hz >= low) & (hz < high)].sum() for low, high in pairwise(bands)]
             levels_db.append(10 * np.log10(found))
-        assert np.abs(np.diff(levels_db, axis=0)).max() < 0.5
+        assert np.abs(np.diff(levels_db, axis=0)).max() < 0.7  # in the highest band, 45 dB below the lowest
 
 
 def test_the_kernel_strikes_as_the_engine_does() -> None:
