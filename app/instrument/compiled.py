@@ -35,14 +35,15 @@ class Record:
     channel: int
     key: int
     value: float
+    string: int | None = None
 
 
 def record_of(event: NoteOn | NoteOff | Bend | Controller) -> Record:
     """The only way from events to records."""
     if isinstance(event, NoteOn):
-        return Record(of.NOTE_ON, event.channel, event.key, event.velocity)
+        return Record(of.NOTE_ON, event.channel, event.key, event.velocity, event.string)
     if isinstance(event, NoteOff):
-        return Record(of.NOTE_OFF, event.channel, event.key, 0.0)
+        return Record(of.NOTE_OFF, event.channel, event.key, 0.0, event.string)
     if isinstance(event, Bend):
         return Record(of.BEND, event.channel, 0, event.value)
     return Record(of.CONTROLLER, event.channel, event.number, event.value)
@@ -51,9 +52,9 @@ def record_of(event: NoteOn | NoteOff | Bend | Controller) -> Record:
 def event_of(record: Record) -> NoteOn | NoteOff | Bend | Controller:
     """The only way back."""
     if record.kind == of.NOTE_ON:
-        return NoteOn(record.key, round(record.value), record.channel)
+        return NoteOn(record.key, round(record.value), record.channel, string=record.string)
     if record.kind == of.NOTE_OFF:
-        return NoteOff(record.key, record.channel)
+        return NoteOff(record.key, record.channel, record.string)
     if record.kind == of.BEND:
         return Bend(record.value, record.channel)
     if record.kind == of.CONTROLLER:
@@ -294,9 +295,8 @@ class InstrumentPlayer:
         elif isinstance(event, Controller):
             self._follow_wheel(event)
         record = record_of(event)
-        return self.compiled.give(
-            record.kind, record.channel, record.key, record.value, frame, struck_s=struck_s, struck=struck
-        )
+        numbers = record.kind, record.channel, record.key, record.value, frame
+        return self.compiled.give(*numbers, struck_s=struck_s, struck=struck, string=record.string)
 
     def _check(self, event: NoteOn) -> None:
         """Raises ValueError: no string on which an event may play its key is possible."""
@@ -304,9 +304,10 @@ class InstrumentPlayer:
         if isinstance(keys, DrumKeys):
             keys.of_key(event.key)
             return
-        if event.channel < strings_of(self.patch):  # the string of its channel, where that plays
+        string = event.channel if event.string is None else event.string
+        if event.string is not None or string < strings_of(self.patch):  # its own, or that of its channel, if any
             with contextlib.suppress(ValueError):
-                keys.string_of(event.key, event.channel)
+                keys.string_of(event.key, string)
                 return
         keys.string_of(event.key)
 

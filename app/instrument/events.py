@@ -37,20 +37,23 @@ class NoteOn:
 
     Attributes:
         place: where a drum is struck, from its centre in half-lengths, x and y; None: at its own place.
+        string: on which string of a set, from the highest, 0; None: the channel or the key chooses.
     """
 
     key: int
     velocity: int
     channel: int = 0
     place: tuple[float, float] | None = None
+    string: int | None = None
 
 
 @dataclass(frozen=True)
 class NoteOff:
-    """A key is released."""
+    """A key is released; with `string`, only on that string."""
 
     key: int
     channel: int = 0
+    string: int | None = None
 
 
 @dataclass(frozen=True)
@@ -118,7 +121,7 @@ def releases_for(events: Iterable[Event]) -> list[Event]:
     down: dict[NoteOff | Controller, None] = {}  # in their order
     for event in events:
         if isinstance(event, NoteOn | NoteOff):
-            off = NoteOff(event.key, event.channel)
+            off = NoteOff(event.key, event.channel, event.string)
             down.pop(off, None)
             if isinstance(event, NoteOn) and event.velocity > 0:
                 down[off] = None

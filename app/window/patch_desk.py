@@ -124,7 +124,7 @@ class PatchDesk(QObject):
     def _connect(self) -> None:
         session, panel, bar, browser = self._session, self._panel, self._panel.bar, self.browser
         panel.pressed.connect(self._press)
-        panel.released.connect(lambda key: self._instruments.play(NoteOff(key, KEYS)))
+        panel.released.connect(lambda key, string: self._instruments.play(NoteOff(key, KEYS, string)))
         bar.previous_asked.connect(lambda: self.desk.step(-1))
         bar.next_asked.connect(lambda: self.desk.step(1))
         bar.browse_asked.connect(self.desk.toggle)
@@ -527,10 +527,10 @@ class PatchDesk(QObject):
             panel.neck.set_strings([(note_name(patch.range[0]), patch.range[0])])
         self.desk.show_chosen()
 
-    def _press(self, key: int, velocity: int) -> None:
+    def _press(self, key: int, velocity: int, string: int | None) -> None:
         """Plays a key on the screen, which is one of the patch, where there is one."""
         self._session.play_patch()
-        self._instruments.play(NoteOn(key, velocity, KEYS))
+        self._instruments.play(NoteOn(key, velocity, KEYS, string=string))
 
     def _choose_touch(self, touch: str) -> None:
         """What a key on the screen or of the computer does while another is held."""

@@ -236,6 +236,17 @@ def _is_string(players: np.ndarray, tables: np.ndarray, channel: int) -> bool:
 
 
 @njit(**COMPILED)
+def _place(players: np.ndarray, tables: np.ndarray, event: int) -> int:
+    """Which string of the instrument the note of an event has; 256 (n + 1): string n of a set, which was given."""
+    channel, string = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_STRING]
+    if _is_string(players, tables, channel):
+        return 256 * (channel + 1)
+    if 0 < string <= min(tables[of.TABLE_STRINGS], of.GUITAR_STRINGS):
+        return 256 * string
+    return (256 * (channel + 1) if tables[of.TABLE_MODE] == of.MPE else 0) + players[event + of.EVENT_KEY] + 1
+
+
+@njit(**COMPILED)
 def _hold(players: np.ndarray, channel: int, key: int, down: bool) -> None:
     """Notes that a key is down, or is not."""
     slot = _channel(channel) + of.CHANNEL_HELD + key // 64
@@ -1125,15 +1136,13 @@ def _note_on(
         players[event + of.EVENT_VOICES] != 0,
     )
     players[_channel(channel) + of.CHANNEL_PLAYS] = 1
-    place, string = (256 * (channel + 1) if mode == of.MPE else 0) + key + 1, -1
-    if _is_string(players, tables, channel):
-        place, count = 256 * (channel + 1), tables[of.TABLE_STRINGS]
-        string = channel if count > 0 and _chosen(table, count, key) != channel else -1
+    place, string, count = _place(players, tables, event), -1, tables[of.TABLE_STRINGS]
+    if place % 256 == 0 and count > 0 and _chosen(table, count, key) != place // 256 - 1:
+        string = place // 256 - 1
     place += MEMBERS_APART * member
     octave = member > 0 and tables[of.TABLE_OCTAVES] > 0
     if octave:
-        own_string = string if string >= 0 else _chosen(table, tables[of.TABLE_STRINGS], key)
-        octave = own_string >= tables[of.TABLE_STRINGS] - tables[of.TABLE_OCTAVES]
+        octave = (string if string >= 0 else _chosen(table, count, key)) >= count - tables[of.TABLE_OCTAVES]
     own, modes, gain, highest_m = _moment(player, 3), 0, 1.0, 0.0
     position = amplitude_mm = width = 0.0
     pairs, strength, stroke, touched = 0, 1.0, 0, 0
@@ -1369,18 +1378,19 @@ def _move_others(
     players: np.ndarray,
     table: np.ndarray,
     tables: np.ndarray,
-    channel: int,
+    first: int,
     before: int,
     key: int,
     given_hz: float,
     frame: int,
     now: int,
 ) -> None:
-    """Lets the other strings of a course follow the first, which has moved."""
+    """Lets the other strings of a course follow the first, a note that has moved."""
+    id, channel = players[first + of.NOTE_ID], players[first + of.NOTE_CHANNEL]
     for number in range(of.MOST_NOTES):
         note = _note(number)
         same = players[note + of.NOTE_KEY] == before and players[note + of.NOTE_CHANNEL] == channel
-        same = same and players[note + of.NOTE_MEMBER] != 0 and players[note + of.NOTE_HELD] != 0
+        same = same and players[note + of.NOTE_MEMBER] != 0 and players[note + of.NOTE_ID] == id
         if same and _sounds(players, note):
             _move(player, players, table, tables, number, key, given_hz, frame, now)
 
@@ -1389,8 +1399,12 @@ def _move_others(
 def _hammer_on(
     player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, event: int, frame: int, now: int
 ) -> bool:
-    """Lets a key have the latest note that is held on its channel, where legato is on; whether it has one."""
+    """Lets a key have the latest note that is held on its channel, where legato is on; whether it has one.
+
+    Where the event gives a string, only a note on that string.
+    """
     channel, key, found, age = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY], -1, 0
+    place = _place(players, tables, event)
     if players[event + of.EVENT_VOICES] != 0 or not _switched(
         players, tables[of.TABLE_MODE], channel, of.CHANNEL_LEGATO
     ):
@@ -1401,6 +1415,7 @@ def _hammer_on(
         if (
             held
             and players[note + of.NOTE_MEMBER] == 0
+            and (place % 256 != 0 or players[note + of.NOTE_PLACE] == place)
             and players[note + of.NOTE_PREPARED] == 0
             and players[note + of.NOTE_AGE] > age
             and _sounds(players, note)
@@ -1414,7 +1429,7 @@ def _hammer_on(
         player, players, table, tables, found, key, player[event + of.EVENT_PITCH_HZ], frame, now
     ):
         return False
-    _move_others(player, players, table, tables, channel, before, key, player[event + of.EVENT_PITCH_HZ], frame, now)
+    _move_others(player, players, table, tables, note, before, key, player[event + of.EVENT_PITCH_HZ], frame, now)
     _report(player, players, of.ENDED, id, channel, before, now, 0.0)
     _reported(players)
     for number in range(of.MOST_NOTES):
@@ -1448,7 +1463,7 @@ def _pull_off(
             same = same and players[other + of.NOTE_MEMBER] == 0
             free = free and not (same and players[other + of.NOTE_HELD] != 0 and _sounds(players, other))
         if free and _move(player, players, table, tables, number, key, math.nan, frame, now):
-            _move_others(player, players, table, tables, channel, before, key, math.nan, frame, now)
+            _move_others(player, players, table, tables, _note(number), before, key, math.nan, frame, now)
             return True
     return False
 
@@ -1459,16 +1474,19 @@ def _note_off(
     players: np.ndarray,
     table: np.ndarray,
     tables: np.ndarray,
-    channel: int,
-    key: int,
+    event: int,
     frame: int,
     now: int,
 ) -> None:
+    channel, key = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
+    place = _place(players, tables, event)
     for turn in range(2 * of.MOST_NOTES):  # first strings of courses first, which the others follow
         number = turn % of.MOST_NOTES
         note = _note(number)
         same = players[note + of.NOTE_KEY] == key and players[note + of.NOTE_CHANNEL] == channel
         same = same and (players[note + of.NOTE_MEMBER] == 0) == (turn < of.MOST_NOTES)
+        given = players[event + of.EVENT_STRING] != 0
+        same = same and (not given or players[note + of.NOTE_PLACE] % MEMBERS_APART == place)
         if same and players[note + of.NOTE_HELD] != 0 and _sounds(players, note):
             if players[note + of.NOTE_MEMBER] == 0 and _pull_off(player, players, table, tables, number, frame, now):
                 continue
@@ -1515,9 +1533,9 @@ def _choke(player: np.ndarray, players: np.ndarray, event: int, frame: int) -> N
 
 @njit(**COMPILED)
 def _height(players: np.ndarray, tables: np.ndarray, event: int) -> int:
-    """Rises from the lowest note of a chord to the highest: by strings where channels are strings, else by keys."""
-    channel = players[event + of.EVENT_CHANNEL]
-    string = of.CHANNELS - channel if _is_string(players, tables, channel) else 0
+    """Rises from the lowest note of a chord to the highest: by strings where these are given, else by keys."""
+    place = _place(players, tables, event)
+    string = of.CHANNELS + 1 - place // 256 if place % 256 == 0 else 0
     return string * of.KEYS + players[event + of.EVENT_KEY]
 
 
@@ -1638,6 +1656,7 @@ def _waits(players: np.ndarray, event: int, now: int) -> bool:
         if players[each + of.EVENT_CHORD] == 0:
             continue
         meant = players[each + of.EVENT_CHANNEL] == channel and players[each + of.EVENT_KEY] == key
+        meant = meant and players[event + of.EVENT_STRING] in (0, players[each + of.EVENT_STRING])
         if by_id:
             meant = players[each + of.EVENT_ID] == id
         if meant and players[of.PLAYER_QUEUED] < of.QUEUED:
@@ -1721,6 +1740,8 @@ def _pluck_again(
     players[event + of.EVENT_CHANNEL] = players[note + of.NOTE_CHANNEL]
     players[event + of.EVENT_KEY] = players[note + of.NOTE_KEY]
     players[event + of.EVENT_ID] = players[note + of.NOTE_ID]
+    if players[note + of.NOTE_PLACE] % 256 == 0:
+        players[event + of.EVENT_STRING] = players[note + of.NOTE_PLACE] // 256
     player[event + of.EVENT_VALUE] = player[note + of.NOTE_VELOCITY]
     player[event + of.EVENT_POSITION] = player[note + of.NOTE_GIVEN]
     player[event + of.EVENT_PITCH_HZ] = player[note + of.NOTE_PITCH_HZ]
@@ -1950,7 +1971,7 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
         if _waits(players, event, now):
             return
         _hold(players, channel, key, False)
-        _note_off(player, players, table, tables, channel, key, frame, now)
+        _note_off(player, players, table, tables, event, frame, now)
     elif kind == of.BEND:
         player[_channel(channel) + of.CHANNEL_BEND] = min(max(value, -1.0), 1.0)
         _glide(player, players, table, tables, channel, BEND_S, frame, now)

@@ -64,7 +64,8 @@ EVENT_STRUCK = 14  # W address of the speeds (modes,) that 1 N s gives a drum at
 EVENT_STRUCK_MODES = 15  # W how many they are
 EVENT_CHORD = 16  # W the chord in which a note waits for its turn; 0: none
 EVENT_CAME = 17  # W the frame at which it would have begun alone
-EVENT_SLOTS = 18
+EVENT_STRING = 18  # W of a note: string n of a set from the highest, as n + 1; 0: the channel or the key chooses
+EVENT_SLOTS = 19
 
 # Slots of an instrument's table
 POLY, GUITAR, MPE = 0, 1, 2

@@ -42,6 +42,7 @@ EVENT = np.dtype(
         ("struck_modes", np.int64),
         ("chord", np.int64),
         ("came", np.int64),
+        ("string", np.int64),
     ]
 )
 REPORT = np.dtype(
@@ -233,6 +234,7 @@ class CompiledPlayer:
         voices: Sequence[Voice] = (),
         note: int = 0,
         struck: NDArray[np.float64] | None = None,
+        string: int | None = None,
     ) -> int:
         """Hands an event over; its number, which reports of a note carry. Any thread, at once; none is lost.
 
@@ -242,6 +244,7 @@ class CompiledPlayer:
             voices: of a note, which were built elsewhere, with their gains; they are in use until they are over.
             note: the number of the note that is tuned, choked or cancelled; 0: all.
             struck: speeds (modes,) that 1 N s gives to a drum where it is struck; None: at its own place.
+            string: of a note: on which of a set it is played, from the highest, 0; None: channel or key choose.
         """
         addresses = [voice.address for voice in voices] + [0] * (of.MOST_SOURCES - len(voices))
         row, modes = (0, 0) if struck is None else (int(struck.ctypes.data), len(struck))
@@ -255,9 +258,8 @@ class CompiledPlayer:
             if voices:
                 self._prepared = [each for each in self._prepared if not each.over]
                 self._prepared.append(_Prepared(tuple(voices)))
-            self._push(
-                (frame, kind, channel, key, value, id, position, pitch_hz, 0, struck_s, addresses, row, modes, 0, 0)
-            )
+            head = (frame, kind, channel, key, value, id, position, pitch_hz, 0, struck_s, addresses, row, modes)
+            self._push((*head, 0, 0, 0 if string is None else string + 1))
         return number
 
     def take(self, table: Table, frame: int = 0) -> None:
@@ -267,7 +269,7 @@ class CompiledPlayer:
             while self._tables[0].serial < int(self._counts[of.PLAYER_SERIAL]):
                 self._tables.popleft()
             self._push(
-                (frame, of.TABLE, 0, 0, 0.0, 0, NONE, NONE, table.address, 0.0, [0] * of.MOST_SOURCES, 0, 0, 0, 0)
+                (frame, of.TABLE, 0, 0, 0.0, 0, NONE, NONE, table.address, 0.0, [0] * of.MOST_SOURCES, 0, 0, 0, 0, 0)
             )
 
     def _push(self, record: tuple[object, ...]) -> None:

@@ -11,12 +11,12 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen
+from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPainterPath, QPen
 from PySide6.QtWidgets import QWidget
 
 from app.shared.key_names import note_name
 from app.views import theme
-from app.views.instrument.playable import LEVEL_STEPS, Playable
+from app.views.instrument.playable import LEVEL_STEPS, Playable, Spot, is_second
 
 if TYPE_CHECKING:
     from app.playing.keys import SoundingNote
@@ -32,8 +32,9 @@ SWING = 0.42  # of a string's row, at full level
 INLAYS = (3, 5, 7, 9, 12, 15, 17, 19, 21, 24)
 TIP = (
     "Click or drag to play: softer at the upper edge of a string's row, harder at the lower.\n"
-    "Drag across strings to strum. "
-    "Right button or Shift: the note stays down. With the keyboard: arrows and Enter"
+    "Drag across strings to strum. Right button or Shift: put a finger on a string, or lift it;\n"
+    "clicks and drags then play the strings as the fingers stop them. Delete lifts all fingers.\n"
+    "With the keyboard: arrows and Enter"
 )
 
 
@@ -43,12 +44,17 @@ def fret_share(fret: float, frets: int) -> float:
 
 
 class Neck(Playable):
-    """A key is played on the highest string at or below it, as patches do."""
+    """A click plays the string that was clicked; keys of others, the highest string at or below them, as patches do.
+
+    Fingers stay where they were put, and make no sound. While there are any, strings sound as these stop them, and
+    those without a finger sound open, wherever they are clicked: so chords can be strummed with one mouse.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Strings", TIP, parent)
         self._strings: tuple[tuple[str, int], ...] = ()
         self._stops: dict[tuple[int, float], int] = {}  # string, fret -> level of 0 … LEVEL_STEPS
+        self._fingers: dict[int, int] = {}  # string -> fret
         self._set_cursor(60)
 
     def show_notes(self, notes: Iterable[SoundingNote]) -> None:
@@ -72,7 +78,7 @@ class Neck(Playable):
         ordered = tuple(sorted(strings, key=lambda string: string[1]))
         if ordered != self._strings:
             self.release_all()
-            self._strings, self._stops = ordered, {}
+            self._strings, self._stops, self._fingers = ordered, {}, {}
             self.rest_changed()
 
     @property
@@ -128,13 +134,26 @@ class Neck(Playable):
         fret = next((n for n in range(self.frets + 1) if at.x() < self.fret_x(n)), None)
         return None if fret is None or at.y() >= self.height() - theme.px(_FOOT) else self._strings[string][1] + fret
 
+    def spot_at(self, at: QPointF) -> Spot | None:
+        key = self.key_at(at)
+        if key is None or not self.in_rows:
+            return super().spot_at(at)
+        string = self._row_at(at)
+        if self._fingers:
+            key = self._strings[string][1] + self._fingers.get(string, 0)
+        return Spot(key, len(self._strings) - 1 - string)
+
+    def _row_of(self, spot: Spot) -> int:
+        """Which string, counted from the lowest, a spot is on."""
+        return self.string_of(spot.key) if spot.string is None else len(self._strings) - 1 - spot.string
+
     def _row_at(self, at: QPointF) -> int:
         height = (self.height() - theme.px(_FOOT)) / len(self._strings)
         return min(max(len(self._strings) - 1 - int(at.y() / height), 0), len(self._strings) - 1)
 
-    def keys_between(self, before: QPointF, at: QPointF) -> list[int]:
+    def spots_between(self, before: QPointF, at: QPointF) -> list[Spot]:
         """Where it is a neck, with the strings that lie between the two points: the mouse is seen at few places."""
-        met = super().keys_between(before, at)
+        met = super().spots_between(before, at)
         if not self.in_rows:
             return met
         first, last = self._row_at(before), self._row_at(at)
@@ -143,17 +162,41 @@ class Neck(Playable):
         for string in range(first + step, last, step):
             y = self.cell(string, 0).center().y()
             x = before.x() + (at.x() - before.x()) * (y - before.y()) / (at.y() - before.y())
-            crossed.append(self.key_at(QPointF(x, y)))
-        return [key for key in crossed if key is not None] + met
-
-    def on_one_string(self, key: int, other: int) -> bool:
-        return not self.in_rows or self.string_of(key) == self.string_of(other)
+            crossed.append(self.spot_at(QPointF(x, y)))
+        return [spot for spot in crossed if spot is not None] + met
 
     def share_at(self, key: int, at: QPointF) -> float:
         if not self.in_rows:
             return at.y() / (self.height() - theme.px(_FOOT))
         rect = self.cell(self._row_at(at), 0)
         return (at.y() - rect.top()) / rect.height()
+
+    # Fingers
+
+    @property
+    def fingers(self) -> dict[int, int]:
+        """The fret of each string, counted from the lowest, that a finger stops."""
+        return dict(self._fingers)
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:
+        key = self.key_at(event.position())
+        if not (self.in_rows and is_second(event)):
+            super().mousePressEvent(event)
+        elif key is not None and self.sounds(key):
+            string = self._row_at(event.position())
+            fret = key - self._strings[string][1]
+            if fret <= 0 or self._fingers.get(string) == fret:
+                self._fingers.pop(string, None)
+            else:
+                self._fingers[string] = fret
+            self.update()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if self._fingers and event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
+            self._fingers = {}
+            self.update()
+        else:
+            super().keyPressEvent(event)
 
     # How it looks
 
@@ -233,11 +276,13 @@ class Neck(Playable):
         painter.drawLine(QPointF(theme.px(_NAMES_WIDTH), y), QPointF(self.fret_x(self.frets), y))
 
     def _paint_stops(self, painter: QPainter) -> None:
-        """Keys that are down where they are usually stopped; above them, strings that sound where they are now."""
-        for key in sorted(self.marked):
-            if self.is_down(key) and not self.level(key) > 0:
-                string = self.string_of(key)
-                self._paint_stopped(painter, string, key - self._strings[string][1], 0.0)
+        """Fingers and what is down; above them, strings that sound, where they are stopped now."""
+        for string in self._fingers:
+            self._paint_finger(painter, string)
+        for spot in self.down:
+            if not self.level(spot.key) > 0:
+                string = self._row_of(spot)
+                self._paint_stopped(painter, string, spot.key - self._strings[string][1], 0.0)
         for (string, fret), step in sorted(self._stops.items()):
             self._paint_stopped(painter, string, fret, step / LEVEL_STEPS)
 
@@ -251,9 +296,25 @@ class Neck(Playable):
             return float(theme.px(_NAMES_WIDTH))
         return self.fret_x(whole) - min(size, (self.fret_x(whole) - self.fret_x(whole - 1)) / 2)
 
+    def repaint_spot(self, spot: Spot) -> None:
+        super().repaint_spot(spot)
+        if self.in_rows:
+            self.update(self.cell(self._row_of(spot), 0).adjusted(0, -6, self.width(), 6).toAlignedRect())
+
+    @property
+    def _dot(self) -> float:
+        """The size of a dot in pixels."""
+        return min(LARGEST_DOT, (self.height() - theme.px(_FOOT)) / len(self._strings) - 2)
+
+    def _paint_finger(self, painter: QPainter, string: int) -> None:
+        middle = QPointF(self._stop_x(self._fingers[string], self._dot), self.cell(string, 0).center().y())
+        painter.setPen(QPen(QColor(theme.TEXT), 1.5))
+        painter.setBrush(QColor(theme.RAISED))
+        painter.drawEllipse(middle, *(2 * [self._dot / 2]))
+
     def _paint_stopped(self, painter: QPainter, string: int, fret: float, level: float) -> None:
         """A dot where a string is stopped, and what swings of it."""
-        size = min(LARGEST_DOT, (self.height() - theme.px(_FOOT)) / len(self._strings) - 2)
+        size = self._dot
         fret = min(max(fret, 0), self.frets)
         lit = theme.blended(self.colour.name(), theme.RAISED, 0.3 + 0.7 * level)
         middle = QPointF(self._stop_x(fret, size), self.cell(string, 0).center().y())

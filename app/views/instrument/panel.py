@@ -85,8 +85,8 @@ _TECHNIQUES = (  # that keys are played with; their amounts have knobs
 class InstrumentPanel(QFrame):
     """Its parts are public: `bar`, `keys`, `neck`, `knobs`."""
 
-    pressed = Signal(int, int)  # key, velocity
-    released = Signal(int)
+    pressed = Signal(int, int, object)  # key, velocity, string as of `Playable`
+    released = Signal(int, object)
     keys_play_asked = Signal(str)  # of KEYS_PLAY
     touch_chosen = Signal(str)  # of _TOUCHES
     technique_switched = Signal(str, bool)  # of _TECHNIQUES, and whether it is on
@@ -296,9 +296,9 @@ class InstrumentPanel(QFrame):
         self.keys.legato = self.neck.legato = touch != "pluck"
         self.touch_chosen.emit(touch)
 
-    def _press(self, key: int, velocity: int) -> None:
+    def _press(self, key: int, velocity: int, string: int | None) -> None:
         self.hide_hint()
-        self.pressed.emit(key, velocity)
+        self.pressed.emit(key, velocity, string)
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
         if watched is self._stack and event.type() in (QEvent.Type.Resize, QEvent.Type.Show):

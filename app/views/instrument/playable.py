@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
@@ -31,6 +32,13 @@ LEVEL_STEPS = 24  # that can be distinguished; finer changes are not painted
 _MOVES = {Qt.Key.Key_Right: 1, Qt.Key.Key_Left: -1, Qt.Key.Key_Up: 12, Qt.Key.Key_Down: -12}
 
 
+class Spot(NamedTuple):
+    """What a finger presses: a key, and on a neck its string, from the highest, 0; None: the key chooses it."""
+
+    key: int
+    string: int | None = None
+
+
 class Playable(QWidget):
     """Keys that are pressed with the mouse or with Enter, and lit by what sounds.
 
@@ -40,8 +48,8 @@ class Playable(QWidget):
     Arrows and Enter: choose a key and play it.
     """
 
-    pressed = Signal(int, int)  # key, velocity
-    released = Signal(int)
+    pressed = Signal(int, int, object)  # key, velocity, string as in `Spot`
+    released = Signal(int, object)  # key, string
 
     def __init__(self, name: str, tip: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -53,13 +61,13 @@ class Playable(QWidget):
         self._low, self._high = 28, 88
         self._source = "model"
         self._levels: dict[int, int] = {}  # of 0 … LEVEL_STEPS
-        self._down: int | None = None  # by the mouse
+        self._down: Spot | None = None  # by the mouse
         self._at = QPointF()  # of the mouse, while a key is down
         self._clicked = TYPED  # velocity of the click, which a strum keeps
-        self._strummed: list[int] = []  # keys of strings that the mouse has left
+        self._strummed: list[Spot] = []  # on strings that the mouse has left
         self.legato = False  # a key that is pressed while another is held takes its note over
         self._typed: int | None = None  # by Enter
-        self._held: set[int] = set()
+        self._held: set[Spot] = set()
         self._cursor = 60
         self._by_keys = False  # the cursor was last reached or moved with the keyboard
         self._rest = QPixmap()
@@ -77,14 +85,15 @@ class Playable(QWidget):
     def key_at(self, at: QPointF) -> int | None:
         """The key under a point, whether it can sound or not."""
 
-    def keys_between(self, before: QPointF, at: QPointF) -> list[int]:
-        """The keys that the mouse meets on its way, without the first, and with the one where it is."""
+    def spot_at(self, at: QPointF) -> Spot | None:
+        """What a click there presses."""
         key = self.key_at(at)
-        return [] if key is None else [key]
+        return None if key is None else Spot(key)
 
-    def on_one_string(self, key: int, other: int) -> bool:
-        """Whether the mouse leaves one of these keys where it plays the other."""
-        return True
+    def spots_between(self, before: QPointF, at: QPointF) -> list[Spot]:
+        """What the mouse meets on its way, without the first, and with where it is."""
+        spot = self.spot_at(at)
+        return [] if spot is None else [spot]
 
     @abstractmethod
     def key_rect(self, key: int) -> QRectF:
@@ -141,17 +150,17 @@ class Playable(QWidget):
     @property
     def held(self) -> frozenset[int]:
         """Keys that stay down by themselves."""
-        return frozenset(self._held)
+        return frozenset(spot.key for spot in self._held)
 
     def release_all(self) -> None:
         """Releases all keys that are down."""
         if self._typed is not None:
             typed, self._typed = self._typed, None
-            self._release(typed)
+            self._release(Spot(typed))
         self._release_mouse()
-        for key in sorted(self._held):
-            self._held.discard(key)
-            self._release(key)
+        for spot in sorted(self._held):
+            self._held.discard(spot)
+            self._release(spot)
 
     def sounds(self, key: int | None) -> bool:
         """Whether a key has a string."""
@@ -163,8 +172,7 @@ class Playable(QWidget):
     def marked(self) -> frozenset[int]:
         """Keys that do not look as at rest."""
         cursor = {self._cursor} if self.shows_cursor else set()
-        down = {key for key in (self._down, self._typed, *self._strummed) if key is not None}
-        return frozenset(self._levels.keys() | self._held | cursor | down)
+        return frozenset(self._levels.keys() | cursor | {spot.key for spot in self.down})
 
     def paintEvent(self, event: QPaintEvent) -> None:
         ratio = self.devicePixelRatioF()
@@ -190,7 +198,14 @@ class Playable(QWidget):
 
     def is_down(self, key: int) -> bool:
         """Whether a key is pressed here, or stays down by itself."""
-        return key in (self._down, self._typed) or key in self._held or key in self._strummed
+        return any(spot.key == key for spot in self.down)
+
+    @property
+    def down(self) -> frozenset[Spot]:
+        """What is pressed here, or stays down by itself."""
+        typed = {Spot(self._typed)} if self._typed is not None else set()
+        mouse = {self._down} if self._down is not None else set()
+        return frozenset(typed | mouse | self._held | set(self._strummed))
 
     @property
     def colour(self) -> QColor:
@@ -203,25 +218,22 @@ class Playable(QWidget):
         return round(SOFTEST + min(max(self.share_at(key, at), 0.0), 1.0) * (HARDEST - SOFTEST))
 
     def mousePressEvent(self, event: QMouseEvent) -> None:
-        key = self.key_at(event.position())
-        if key is None or not self.sounds(key) or self._down is not None:
+        spot = self.spot_at(event.position())
+        if spot is None or not self.sounds(spot.key) or self._down is not None:
             return
         self._by_keys = False
-        self._set_cursor(key)
-        holding = event.button() == Qt.MouseButton.RightButton or (
-            event.button() == Qt.MouseButton.LeftButton and event.modifiers() & Qt.KeyboardModifier.ShiftModifier
-        )
-        if holding:
-            if key in self._held:
-                self._held.discard(key)
-                self._release(key)
+        self._set_cursor(spot.key)
+        velocity = self.velocity_at(spot.key, event.position())
+        if is_second(event):
+            if spot in self._held:
+                self._held.discard(spot)
+                self._release(spot)
             else:
-                self._held.add(key)
-                self._press(key, self.velocity_at(key, event.position()))
+                self._held.add(spot)
+                self._press(spot, velocity)
         elif event.button() == Qt.MouseButton.LeftButton:
-            self._down, self._at = key, event.position()
-            self._clicked = self.velocity_at(key, event.position())
-            self._press(key, self._clicked)
+            self._down, self._at, self._clicked = spot, event.position(), velocity
+            self._press(spot, velocity)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         self.mousePressEvent(event)  # fast repeats are notes too
@@ -229,33 +241,33 @@ class Playable(QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._down is None:
             return
-        met = self.keys_between(self._at, event.position())
+        met = self.spots_between(self._at, event.position())
         self._at = event.position()
-        for key in met:
-            if key != self._down and self.sounds(key):
-                self._move_to(key, self.velocity_at(key, self._at))
+        for spot in met:
+            if spot != self._down and self.sounds(spot.key):
+                self._move_to(spot, self.velocity_at(spot.key, self._at))
 
-    def _move_to(self, key: int, velocity: int) -> None:
-        """Plays the next key that the mouse has met."""
-        before, self._down = self._down, key
+    def _move_to(self, spot: Spot, velocity: int) -> None:
+        """Plays what the mouse has met next."""
+        before, self._down = self._down, spot
         assert before is not None
-        for left in [each for each in self._strummed if self.on_one_string(each, key)]:
+        for left in [each for each in self._strummed if each.string == spot.string]:
             self._strummed.remove(left)
             self._release_left(left)
-        if not self.legato and not self.on_one_string(before, key):
+        if not self.legato and before.string != spot.string:
             self._strummed.append(before)
-            self._press(key, self._clicked)
-        elif self.legato and self.on_one_string(before, key):
-            self._press(key, velocity)
+            self._press(spot, self._clicked)
+        elif self.legato and before.string == spot.string:
+            self._press(spot, velocity)
             self._release_left(before)
         else:
             self._release_left(before)
-            self._press(key, velocity)
+            self._press(spot, velocity)
 
-    def _release_left(self, key: int) -> None:
-        """Releases a key that the mouse has left, unless it stays down by itself."""
-        if key not in self._held:
-            self._release(key)
+    def _release_left(self, spot: Spot) -> None:
+        """Releases what the mouse has left, unless it stays down by itself."""
+        if spot not in self._held:
+            self._release(spot)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if event.button() == Qt.MouseButton.LeftButton and self._down is not None:
@@ -265,8 +277,8 @@ class Playable(QWidget):
         """Releases what the mouse has pressed."""
         down, self._down = self._down, None
         left, self._strummed = [*self._strummed, *([] if down is None else [down])], []
-        for key in left:
-            self._release_left(key)
+        for spot in left:
+            self._release_left(spot)
 
     def event(self, event: QEvent) -> bool:
         """Keeps Enter, which is a shortcut of the window, while the surface has the focus."""
@@ -287,7 +299,7 @@ class Playable(QWidget):
         elif event.key() in ENTER_KEYS:
             if not event.isAutoRepeat() and self._typed is None:
                 self._typed = self._cursor
-                self._press(self._cursor, TYPED)
+                self._press(Spot(self._cursor), TYPED)
         else:
             super().keyPressEvent(event)
 
@@ -295,14 +307,14 @@ class Playable(QWidget):
         if event.key() in ENTER_KEYS and not event.isAutoRepeat():
             if self._typed is not None:
                 typed, self._typed = self._typed, None
-                self._release(typed)
+                self._release(Spot(typed))
         else:
             super().keyReleaseEvent(event)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
         if self._typed is not None:
             typed, self._typed = self._typed, None
-            self._release(typed)
+            self._release(Spot(typed))
         super().focusOutEvent(event)
         self.update()
 
@@ -333,13 +345,23 @@ class Playable(QWidget):
         self._repaint(before)
         self._repaint(key)
 
-    def _press(self, key: int, velocity: int) -> None:
-        self._repaint(key)
-        self.pressed.emit(key, velocity)
+    def _press(self, spot: Spot, velocity: int) -> None:
+        self.repaint_spot(spot)
+        self.pressed.emit(spot.key, velocity, spot.string)
 
-    def _release(self, key: int) -> None:
-        self._repaint(key)
-        self.released.emit(key)
+    def _release(self, spot: Spot) -> None:
+        self.repaint_spot(spot)
+        self.released.emit(spot.key, spot.string)
+
+    def repaint_spot(self, spot: Spot) -> None:
+        """Called when it is pressed or released."""
+        self._repaint(spot.key)
 
     def _repaint(self, key: int) -> None:
         self.update(self.key_rect(key).toAlignedRect().adjusted(-1, -1, 1, 1))
+
+
+def is_second(event: QMouseEvent) -> bool:
+    """Whether it is the right button, or the left one with Shift."""
+    shift = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+    return event.button() == Qt.MouseButton.RightButton or (event.button() == Qt.MouseButton.LeftButton and shift)

@@ -14,6 +14,7 @@ from app.instrument.events import (
     FINE_REGISTERED,
     FINE_VALUE,
     KEYS,
+    LEGATO,
     MOD_WHEEL,
     NOTES_OFF,
     OTHER,
@@ -253,6 +254,33 @@ def test_far_below_a_string_and_beyond_the_set_the_key_chooses(strung: Patch, pr
     assert hand.play(NoteOn(47, 90, B)).area_m2 == pytest.approx(area_m2(strung, 4))
     assert hand.play(NoteOn(65, 90, 6)).area_m2 == pytest.approx(area_m2(strung, HIGH_E))
     assert hand.play(NoteOn(66, 90, 6)).now.place != hand.struck[-2].now.place
+
+
+@pytest.mark.parametrize("mode", ["poly", "guitar", "mpe"])
+def test_a_note_that_gives_its_string_sounds_there_and_two_strings_sound_one_pitch(
+    strung: Patch, preset: Preset, mode: str
+) -> None:
+    strung = changed(strung, mode=mode)
+    hand = Hand(strung, preset)
+    for string, key in ((B, 64), (HIGH_E, 64), (LOW_E, 45)):
+        assert hand.play(NoteOn(key, 90, KEYS, string=string)).area_m2 == pytest.approx(area_m2(strung, string))
+    assert hand.sounding == [64, 64, 45]
+    hand.play(NoteOff(64, KEYS, HIGH_E))
+    assert [note.now.held for note in hand.struck] == [True, False, True]
+    hand.play(NoteOn(66, 90, KEYS, string=B))  # the next fret of a string that rings
+    assert [note.now.has_place for note in hand.struck] == [False, True, True, True]
+    chosen = hand.play(NoteOn(64, 90, KEYS, string=6))  # the set has no such string
+    assert chosen.area_m2 == pytest.approx(area_m2(strung, HIGH_E))
+
+
+def test_a_slide_stays_on_its_string_while_another_is_held(strung: Patch, preset: Preset) -> None:
+    hand = Hand(changed(strung, mode="poly"), preset)
+    hand.play(Controller(LEGATO, 127, KEYS), NoteOn(52, 90, KEYS, string=LOW_E), NoteOn(57, 90, KEYS, string=G))
+    hand.play(NoteOn(64, 90, KEYS, string=LOW_E), NoteOff(52, KEYS, LOW_E))
+    low, other = sounding(hand.player)
+    assert (low.key, other.key) == (64, 57)
+    assert low.now.area_m2 == pytest.approx(area_m2(strung, LOW_E))
+    assert pitch_hz_of(low.now) == pytest.approx(440 * 2 ** ((64 - 69) / 12), rel=1e-6)
 
 
 def test_with_its_input_at_rest_a_guitar_is_forgotten(strung: Patch, preset: Preset) -> None:

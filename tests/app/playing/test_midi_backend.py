@@ -91,10 +91,10 @@ def test_messages_come_through_jack_and_an_input_closes_while_they_stream(tmp_pa
     if "missing" in found:
         pytest.skip(found["missing"])
     assert found["came"] == [
-        "NoteOn(key=60, velocity=100, channel=2, place=None)",
+        "NoteOn(key=60, velocity=100, channel=2, place=None, string=None)",
         "Bend(value=-1.0, channel=0)",
         "Controller(number=64, value=127, channel=0)",
-        "NoteOff(key=60, channel=2)",
+        "NoteOff(key=60, channel=2, string=None)",
     ]
     assert found["closed"] == 20 and found["streamed"]
     assert "Nobody:nothing is not connected" in found["absent"]

@@ -59,14 +59,14 @@ def test_the_browser_lists_all_shipped_drums(played: Controller) -> None:
 def test_pads_sound_light_and_ring(qtbot: QtBot, kit: Controller) -> None:
     assert kit.session.choices.drums is not None
     for key in (38, 45):
-        kit.window.instrument.pressed.emit(key, 110)
-        kit.window.instrument.released.emit(key)
+        kit.window.instrument.pressed.emit(key, 110, None)
+        kit.window.instrument.released.emit(key, None)
     qtbot.waitUntil(lambda: {38, 45} <= kit.performance.notes.keys.sounding().keys())
     qtbot.waitUntil(lambda: heard_db(kit) > -40)
     qtbot.waitUntil(lambda: kit.window.instrument.keys.level(45) > 0.1)
     assert kit.instruments.drum_key == 45
     assert kit.performance.notes.ringing == 2
-    kit.window.instrument.pressed.emit(60, 110)  # no pad
+    kit.window.instrument.pressed.emit(60, 110, None)  # no pad
     assert kit.performance.notes.ringing == 2
     kit.play_or_stop()
     qtbot.waitUntil(lambda: not kit.performance.notes.keys.sounding())
@@ -84,7 +84,7 @@ def test_pads_of_a_midi_input_strike_by_channel_ten(qtbot: QtBot, kit: Controlle
 
 def test_model_and_truth_are_switched_while_a_drum_rings(qtbot: QtBot, kit: Controller) -> None:
     kit.session.update(a="model", b="truth")
-    kit.window.instrument.pressed.emit(36, 127)
+    kit.window.instrument.pressed.emit(36, 127, None)
     player = kit.performance.notes.keys.player
     assert player is not None
     qtbot.waitUntil(lambda: bool(seen(player)))
@@ -107,7 +107,7 @@ def test_views_of_a_string_say_that_drums_are_played(qtbot: QtBot, kit: Controll
             kit._tick()
             kit._show_deck()
     kit.session.update(loop=True, solo=3, pickup="bridge", listen=0.7, volume_db=-3.0)
-    kit.window.instrument.pressed.emit(40, 90)
+    kit.window.instrument.pressed.emit(40, 90, None)
     qtbot.waitUntil(lambda: 40 in kit.performance.notes.keys.sounding())
     kit._tick()
     kit.patches.choose("steel_string_acoustic")
@@ -135,7 +135,7 @@ def test_space_and_a_click_strike_the_drum_that_was_struck_last(qtbot: QtBot, ki
     qtbot.waitUntil(lambda: notes.keys.sounding().keys() == {36})
     kit.play_or_stop()
     qtbot.waitUntil(lambda: not notes.keys.sounding())
-    kit.window.instrument.pressed.emit(43, 90)
+    kit.window.instrument.pressed.emit(43, 90, None)
     kit.strike(0.1, -0.2, 100.0)
     note = kit.instruments.latest
     assert isinstance(note, KeyNote)
@@ -144,7 +144,7 @@ def test_space_and_a_click_strike_the_drum_that_was_struck_last(qtbot: QtBot, ki
 
 
 def test_the_listening_test_compares_model_and_truth_of_a_blow(qtbot: QtBot, kit: Controller) -> None:
-    kit.window.instrument.pressed.emit(38, 127)
+    kit.window.instrument.pressed.emit(38, 127, None)
     kit._tick()
     kit.session.update(velocity=100, stereo=True, seconds=0.5)
     kit.drum._aim((0.2, -0.1))
@@ -162,7 +162,7 @@ def test_the_listening_test_compares_model_and_truth_of_a_blow(qtbot: QtBot, kit
     assert a.shape == b.shape == (round(0.5 * made.rate_hz), 2)
     assert np.abs(a).max() > 0.01
     assert 0 < np.abs(a - b).max() < 1e-3 * np.abs(a).max()
-    kit.window.instrument.pressed.emit(40, 100)  # nothing else plays meanwhile
+    kit.window.instrument.pressed.emit(40, 100, None)  # nothing else plays meanwhile
     assert 40 not in kit.performance.notes.keys.sounding()
     dialog.abandon()
 
@@ -177,11 +177,11 @@ def test_keys_of_the_computer_play_bars_in_pitch(qtbot: QtBot, played: Controlle
 
 def test_strings_and_drums_follow_one_another_without_a_leftover(qtbot: QtBot, kit: Controller) -> None:
     """Each needs a player of its own; what the one before has struck rings on, and stops."""
-    kit.window.instrument.pressed.emit(36, 127)
+    kit.window.instrument.pressed.emit(36, 127, None)
     qtbot.waitUntil(lambda: 36 in kit.performance.notes.keys.sounding())
     kit.patches.choose("steel_string_acoustic")
     ready(qtbot, kit)
-    kit.window.instrument.pressed.emit(52, 100)
+    kit.window.instrument.pressed.emit(52, 100, None)
     qtbot.waitUntil(lambda: kit.performance.notes.keys.sounding().keys() == {52})
     kit.performance.stop()
     qtbot.waitUntil(lambda: kit.sound.mixer.active == 0)
@@ -189,7 +189,7 @@ def test_strings_and_drums_follow_one_another_without_a_leftover(qtbot: QtBot, k
     ready(qtbot, kit)
     key = kit.instruments.drum_key
     assert key is not None
-    kit.window.instrument.pressed.emit(key, 100)
+    kit.window.instrument.pressed.emit(key, 100, None)
     qtbot.waitUntil(lambda: key in kit.performance.notes.keys.sounding())
 
 
@@ -213,8 +213,8 @@ def test_what_is_drummed_is_recorded_and_exported(qtbot: QtBot, kit: Controller,
     kit.exports._choices = ExportChoices(folder=str(tmp_path)), kit.exports.choices[1]
     kit.patches.recordings.record()
     for key in (36, 38, 41):
-        kit.window.instrument.pressed.emit(key, 110)
-        kit.window.instrument.released.emit(key)
+        kit.window.instrument.pressed.emit(key, 110, None)
+        kit.window.instrument.released.emit(key, None)
     kit.patches.recordings.record()
     played = kit.patches.recordings.latest
     assert played is not None
@@ -232,7 +232,7 @@ def test_what_is_drummed_is_recorded_and_exported(qtbot: QtBot, kit: Controller,
 def test_a_blow_is_exported_as_a_note(qtbot: QtBot, kit: Controller, tmp_path: Path) -> None:
     """Of the drum that was struck last, as hard; dropped on the window, it chooses the instrument."""
     kit.exports._choices = ExportChoices(folder=str(tmp_path)), kit.exports.choices[1]
-    kit.window.instrument.pressed.emit(38, 120)
+    kit.window.instrument.pressed.emit(38, 120, None)
     kit.exports.open("note")
     dialog = kit.exports.dialog
     assert dialog is not None

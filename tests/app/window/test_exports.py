@@ -64,7 +64,7 @@ def test_a_note_is_exported_through_the_instrument_that_is_heard(
     guitar = find_patch("Classical guitar").patch
     short.session.update(instrument=guitar)
     qtbot.waitUntil(lambda: short.performance.notes.keys.player is not None)
-    short.window.instrument.pressed.emit(60, 100)
+    short.window.instrument.pressed.emit(60, 100, None)
     qtbot.waitUntil(lambda: short.session.choices.string is not None)
     export(qtbot, short, "Saved")
     (file,) = tmp_path.glob("*.wav")
@@ -89,7 +89,7 @@ def test_a_knob_that_was_turned_is_heard_in_the_file(
     short.library.refresh()
     short.session.update(instrument=find_patch("Classical guitar").patch)
     qtbot.waitUntil(lambda: short.performance.notes.keys.player is not None)
-    short.window.instrument.pressed.emit(60, 100)
+    short.window.instrument.pressed.emit(60, 100, None)
     qtbot.waitUntil(lambda: short.session.choices.string is not None)
     patch = short.session.choices.patch
     assert patch is not None

@@ -18,7 +18,7 @@ def test_midi_selects_a_preset_of_one_string_after_a_key_of_a_patch(
     qtbot: QtBot, played: Controller, known: bool
 ) -> None:
     session, midi = played.session, played.instruments.midi
-    played.window.instrument.pressed.emit(52, 100)
+    played.window.instrument.pressed.emit(52, 100, None)
     if known:
         qtbot.waitUntil(lambda: session.choices.string is not None)
     midi._remember(midi.choices.model_copy(update={"notes": "preset"}))
@@ -53,7 +53,7 @@ def test_a_pluck_after_a_preset_that_midi_has_selected_is_of_that_preset(
 def test_a_note_of_midi_sets_the_place_where_the_string_is_plucked(qtbot: QtBot, played: Controller) -> None:
     """Also while a patch is the instrument: on the string of the key that was struck last."""
     session, reach = played.session, played.instruments.reach
-    played.window.instrument.pressed.emit(52, 100)
+    played.window.instrument.pressed.emit(52, 100, None)
     qtbot.waitUntil(lambda: session.choices.string is not None)
     string = session.choices.string
     midi = played.instruments.midi
@@ -74,7 +74,7 @@ def test_places_are_prepared_where_keys_choose_them_alone(
         lambda subject, plucks: prepared.append([pluck.position for pluck in plucks]),
     )
     for key in (52, 55):
-        played.window.instrument.pressed.emit(key, 100)
+        played.window.instrument.pressed.emit(key, 100, None)
         qtbot.waitUntil(lambda key=key: played.instruments.latest_key == (key, None))  # type: ignore[misc]
     qtbot.waitUntil(lambda: not played.instruments._reported and played.session.choices.string is not None)
     assert prepared == []

@@ -63,7 +63,7 @@ def test_a_note_is_learned_compared_kept_and_played(qtbot: QtBot, played: Contro
     qtbot.waitUntil(lambda: played.patches.entry is not None)
     notes = played.performance.notes
     qtbot.waitUntil(lambda: notes.keys.player is not None, timeout=LEARNED_MS)
-    played.window.instrument.pressed.emit(43, 100)
+    played.window.instrument.pressed.emit(43, 100, None)
     qtbot.waitUntil(lambda: notes.keys.sounding().get(43, 0.0) > 0.3, timeout=LEARNED_MS)
 
 

@@ -60,7 +60,7 @@ def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, playe
 
 
 def test_a_pluck_by_hand_is_as_loud_as_the_key_whose_string_it_is(qtbot: QtBot, played: Controller) -> None:
-    played.window.instrument.pressed.emit(52, 100)
+    played.window.instrument.pressed.emit(52, 100, None)
     qtbot.waitUntil(lambda: played.session.choices.string is not None)
     (struck,) = ringing(played)
     note = played.performance.notes.handle(PluckAt(played.session.choices.pluck))
@@ -111,9 +111,9 @@ def test_places_are_still_there_without_pitches(qtbot: QtBot, played: Controller
 
 
 def test_keys_on_the_screen_play(qtbot: QtBot, played: Controller) -> None:
-    played.window.instrument.pressed.emit(60, 100)
+    played.window.instrument.pressed.emit(60, 100, None)
     qtbot.waitUntil(lambda: keys_that_ring(played) == {60})
-    played.window.instrument.released.emit(60)
+    played.window.instrument.released.emit(60, None)
     qtbot.waitUntil(lambda: [each.damped for each in ringing(played)] == [True])
 
 
@@ -124,7 +124,7 @@ def test_keys_on_the_screen_and_of_the_computer_sound_together_on_a_guitars_patc
     keys = played.performance.notes.keys
     qtbot.waitUntil(lambda: keys.player is not None and keys.player.patch.mode == "guitar")
     for key in (60, 64):  # on one string
-        played.window.instrument.pressed.emit(key, 100)
+        played.window.instrument.pressed.emit(key, 100, None)
     press(qtbot, played, Qt.Key.Key_X)
     press(qtbot, played, Qt.Key.Key_G)
     qtbot.waitUntil(lambda: keys_that_ring(played) == {60, 64, 67})
@@ -295,7 +295,7 @@ def test_what_is_beyond_training_is_reported_and_follows_the_knobs(qtbot: QtBot,
     played.patches.change("knobs.brightness_decay", 0.1)
     played.patches.change("knobs.decay", 0.5)
     assert not label.toolTip()  # nothing was struck
-    played.window.instrument.pressed.emit(80, 100)
+    played.window.instrument.pressed.emit(80, 100, None)
     reported(True)
     played.patches.change("knobs.decay", 1.5)
     reported(True)
@@ -312,7 +312,7 @@ def test_what_is_beyond_training_is_reported_and_follows_the_knobs(qtbot: QtBot,
     assert not label.toolTip()
     played.session.play_patch()
     assert not label.toolTip()
-    played.window.instrument.pressed.emit(80, 100)
+    played.window.instrument.pressed.emit(80, 100, None)
     reported(True)
     played.patches.choose("concert_harp")
     assert not label.toolTip()
@@ -433,7 +433,7 @@ def test_knobs_report_the_string_that_was_struck_last_and_take_figures(qtbot: Qt
     assert patch is not None
     middle = sum(patch.range) // 2
     assert knobs.facts.accessibleDescription().startswith(f"key {note_name(middle)}, ")
-    played.window.instrument.pressed.emit(50, 100)
+    played.window.instrument.pressed.emit(50, 100, None)
     qtbot.waitUntil(lambda: knobs.facts.accessibleDescription().startswith("key D3, pitch 146.8 Hz"))
     long_mm = float(length.accessibleDescription().split()[0])
     knobs.figure_asked.emit("knobs.tension", 200.0)
@@ -460,7 +460,7 @@ def test_the_pluck_of_a_patch_is_given_a_shape(qtbot: QtBot, played: Controller)
         assert (patch.pluck.shape, knobs.shape.currentText()) == (shape, named)
         assert knobs.knobs["pluck.width_hard"].isEnabled()
         assert played.history.undo_words == "pluck shape"
-    played.window.instrument.pressed.emit(60, 100)
+    played.window.instrument.pressed.emit(60, 100, None)
     note = played.instruments.latest
     assert isinstance(note, KeyNote)
     qtbot.waitUntil(lambda: note.request is not None)
@@ -525,7 +525,7 @@ def test_the_pick_ups_knob_moves_where_the_string_is_heard(qtbot: QtBot, played:
     choices = played.session.choices
     assert choices.patch is not None
     assert (choices.patch.pickup.points[0], choices.listen) == (0.11, 0.11)
-    played.window.instrument.pressed.emit(60, 100)
+    played.window.instrument.pressed.emit(60, 100, None)
     note = played.instruments.latest
     assert isinstance(note, KeyNote)
     assert note.ear.points[0] == 0.11

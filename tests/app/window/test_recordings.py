@@ -59,8 +59,8 @@ def save(qtbot: QtBot, played: Controller, path: Path, words: str = "Saved") -> 
 
 
 def play(played: Controller, key: int = 60) -> None:
-    played.window.instrument.pressed.emit(key, 100)
-    played.window.instrument.released.emit(key)
+    played.window.instrument.pressed.emit(key, 100, None)
+    played.window.instrument.released.emit(key, None)
 
 
 def record(played: Controller) -> None:
@@ -166,10 +166,10 @@ def test_it_is_recorded_as_it_is_heard(
     for name, turn in {"before.wav": lambda: None, "after.wav": change}.items():
         turn()
         played.patches.recordings.record()
-        played.window.instrument.pressed.emit(60, 100)  # and held: when it is released would differ
+        played.window.instrument.pressed.emit(60, 100, None)  # and held: when it is released would differ
         qtbot.wait(100)  # the string is damped where the recording ends
         played.patches.recordings.record()
-        played.window.instrument.released.emit(60)
+        played.window.instrument.released.emit(60, None)
         save(qtbot, played, tmp_path / name, f"{name} and")
     before, after = (soundfile.read(tmp_path / name, always_2d=True)[0] for name in ("before.wav", "after.wav"))
     assert before.shape[1] == after.shape[1] == 2

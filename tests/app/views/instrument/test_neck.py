@@ -12,7 +12,8 @@ from app.playing.keys import SoundingNote
 from app.views import theme
 from app.views.instrument.neck import Neck, fret_share
 
-LEFT = Qt.MouseButton.LeftButton
+LEFT, RIGHT = Qt.MouseButton.LeftButton, Qt.MouseButton.RightButton
+SHIFT = Qt.KeyboardModifier.ShiftModifier
 GUITAR = (("E2", 40), ("A2", 45), ("D3", 50), ("G3", 55), ("B3", 59), ("E4", 64))
 
 
@@ -44,7 +45,7 @@ def test_a_click_is_the_note_of_its_string_and_fret(qtbot: QtBot, neck: Neck) ->
     pressed: list[tuple[int, int]] = []
     released: list[int] = []
     neck.pressed.connect(lambda key, velocity: pressed.append((key, velocity)))
-    neck.released.connect(released.append)
+    neck.released.connect(lambda key: released.append(key))
     for string, fret in ((0, 0), (0, 5), (3, 2), (5, 12), (5, 22)):
         qtbot.mouseClick(neck, LEFT, pos=on(neck, string, fret))
         assert pressed[-1][0] == GUITAR[string][1] + fret
@@ -155,3 +156,42 @@ def test_a_drag_along_a_string_takes_its_note_over_where_keys_are_legato(
     qtbot.mouseRelease(neck, LEFT, pos=on(neck, 0, 3))
     moved = [("on", 43), ("off", 41)]
     assert heard == [("on", 41), *(moved if legato else moved[::-1]), ("off", 43)]
+
+
+def test_a_click_gives_its_string_and_two_strings_have_one_pitch(qtbot: QtBot, neck: Neck) -> None:
+    heard: list[tuple[str, int, int]] = []
+    neck.pressed.connect(lambda key, _, string: heard.append(("on", key, string)))
+    neck.released.connect(lambda key, string: heard.append(("off", key, string)))
+    qtbot.mousePress(neck, LEFT, pos=on(neck, 4, 5))
+    qtbot.mouseMove(neck, on(neck, 5, 0))
+    qtbot.mouseRelease(neck, LEFT, pos=on(neck, 5, 0))
+    assert heard == [("on", 64, 1), ("on", 64, 0), ("off", 64, 1), ("off", 64, 0)]
+
+
+@pytest.mark.parametrize(("button", "modifier"), [(RIGHT, Qt.KeyboardModifier.NoModifier), (LEFT, SHIFT)])
+def test_a_chord_is_fingered_silently_then_strummed(
+    qtbot: QtBot, neck: Neck, button: Qt.MouseButton, modifier: Qt.KeyboardModifier
+) -> None:
+    heard: list[int] = []
+    neck.pressed.connect(lambda key, _: heard.append(key))
+    for string, fret in ((1, 3), (2, 2), (3, 5), (4, 1)):  # C, and a wrong finger on G
+        qtbot.mouseClick(neck, button, modifier, on(neck, string, fret))
+    qtbot.mouseClick(neck, button, modifier, on(neck, 3, 5))  # lifted
+    assert heard == [] and neck.fingers == {1: 3, 2: 2, 4: 1}
+    qtbot.mousePress(neck, LEFT, pos=on(neck, 1, 9))  # wherever it is strummed
+    qtbot.mouseMove(neck, on(neck, 5, 10))
+    qtbot.mouseRelease(neck, LEFT, pos=on(neck, 5, 10))
+    assert heard == [48, 52, 55, 60, 64]
+    neck.setFocus()
+    qtbot.keyClick(neck, Qt.Key.Key_Delete)
+    assert neck.fingers == {}
+    qtbot.mouseClick(neck, LEFT, pos=on(neck, 1, 9))
+    assert heard[-1] == 54
+
+
+def test_fingers_are_seen_and_leave_with_their_strings(qtbot: QtBot, neck: Neck) -> None:
+    bare = neck.grab().toImage()
+    qtbot.mouseClick(neck, RIGHT, pos=on(neck, 2, 4))
+    assert neck.grab().toImage() != bare
+    neck.set_strings(GUITAR[:4])
+    assert neck.fingers == {}
