@@ -1142,8 +1142,7 @@ def _note_on(
     place += MEMBERS_APART * member
     octave = member > 0 and tables[of.TABLE_OCTAVES] > 0
     if octave:
-        own_string = string if string >= 0 else _chosen(table, count, key)
-        octave = own_string >= count - tables[of.TABLE_OCTAVES]
+        octave = (string if string >= 0 else _chosen(table, count, key)) >= count - tables[of.TABLE_OCTAVES]
     own, modes, gain, highest_m = _moment(player, 3), 0, 1.0, 0.0
     position = amplitude_mm = width = 0.0
     pairs, strength, stroke, touched = 0, 1.0, 0, 0
@@ -1379,18 +1378,19 @@ def _move_others(
     players: np.ndarray,
     table: np.ndarray,
     tables: np.ndarray,
-    channel: int,
+    first: int,
     before: int,
     key: int,
     given_hz: float,
     frame: int,
     now: int,
 ) -> None:
-    """Lets the other strings of a course follow the first, which has moved."""
+    """Lets the other strings of a course follow the first, a note that has moved."""
+    id, channel = players[first + of.NOTE_ID], players[first + of.NOTE_CHANNEL]
     for number in range(of.MOST_NOTES):
         note = _note(number)
         same = players[note + of.NOTE_KEY] == before and players[note + of.NOTE_CHANNEL] == channel
-        same = same and players[note + of.NOTE_MEMBER] != 0 and players[note + of.NOTE_HELD] != 0
+        same = same and players[note + of.NOTE_MEMBER] != 0 and players[note + of.NOTE_ID] == id
         if same and _sounds(players, note):
             _move(player, players, table, tables, number, key, given_hz, frame, now)
 
@@ -1429,7 +1429,7 @@ def _hammer_on(
         player, players, table, tables, found, key, player[event + of.EVENT_PITCH_HZ], frame, now
     ):
         return False
-    _move_others(player, players, table, tables, channel, before, key, player[event + of.EVENT_PITCH_HZ], frame, now)
+    _move_others(player, players, table, tables, note, before, key, player[event + of.EVENT_PITCH_HZ], frame, now)
     _report(player, players, of.ENDED, id, channel, before, now, 0.0)
     _reported(players)
     for number in range(of.MOST_NOTES):
@@ -1463,7 +1463,7 @@ def _pull_off(
             same = same and players[other + of.NOTE_MEMBER] == 0
             free = free and not (same and players[other + of.NOTE_HELD] != 0 and _sounds(players, other))
         if free and _move(player, players, table, tables, number, key, math.nan, frame, now):
-            _move_others(player, players, table, tables, channel, before, key, math.nan, frame, now)
+            _move_others(player, players, table, tables, _note(number), before, key, math.nan, frame, now)
             return True
     return False
 
@@ -1479,12 +1479,13 @@ def _note_off(
     now: int,
 ) -> None:
     channel, key = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
-    place, given = _place(players, tables, event), players[event + of.EVENT_STRING] != 0
+    place = _place(players, tables, event)
     for turn in range(2 * of.MOST_NOTES):  # first strings of courses first, which the others follow
         number = turn % of.MOST_NOTES
         note = _note(number)
         same = players[note + of.NOTE_KEY] == key and players[note + of.NOTE_CHANNEL] == channel
         same = same and (players[note + of.NOTE_MEMBER] == 0) == (turn < of.MOST_NOTES)
+        given = players[event + of.EVENT_STRING] != 0
         same = same and (not given or players[note + of.NOTE_PLACE] % MEMBERS_APART == place)
         if same and players[note + of.NOTE_HELD] != 0 and _sounds(players, note):
             if players[note + of.NOTE_MEMBER] == 0 and _pull_off(player, players, table, tables, number, frame, now):

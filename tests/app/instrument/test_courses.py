@@ -176,3 +176,14 @@ def test_a_slide_squeaks_at_the_windings_that_pass(patch: Patch, preset: Preset)
     assert loud_db - quiet_db == pytest.approx(12, abs=2)
     slower = (SLIDE_S[1] / SLIDE_S[0]) ** (20 / 127)
     assert quick_hz / slow_hz == pytest.approx(slower, rel=0.3)
+
+
+def test_one_key_on_two_strings_is_two_courses(guitar: Patch, preset: Preset) -> None:
+    """Legato moves the course of the string that is given, and a release ends that alone."""
+    played = Played(changed(guitar, course=Course(strings=2)), preset)
+    key = 59
+    events = [(0, Controller(LEGATO, 127)), *((64 * n, NoteOn(key, 60, string=n)) for n in (1, 2))]
+    played.run([*events, (960, NoteOn(key + 2, 60, string=1))], 1_920)
+    assert sorted(note.key for note in seen(played.player)) == [key, key, key + 2, key + 2]
+    played.run([(0, NoteOff(key, string=2))], 640)
+    assert sorted(note.key for note in seen(played.player) if note.held) == [key + 2, key + 2]
