@@ -243,7 +243,7 @@ OF_PATCHES: Mapping[str, Parameter] = {
         _knob("decay", "decay", MULTIPLIER, "s"),
         _knob("brightness_decay", "HF loss", MULTIPLIER, "s"),
         Parameter("damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, "wheel", wheel_factor=10),
-        Parameter("damping.mute", "mute", (0, 1), 0, MUTED, DECAY, "wheel", "palm mute", 1.0),
+        Parameter("damping.mute", "mute", (0, 1), 0, MUTED, TECHNIQUE, "wheel", "palm mute", 1.0),
         Parameter("pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, "wheel", "pluck position", 0.5),
         Parameter(
             "pluck.width", "soft width", WIDTH_RANGE, 0.12, WIDTH, PLUCK, "wheel", "width (low velocity)", wheel=0.02

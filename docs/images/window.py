@@ -71,6 +71,7 @@ def _steps(controller: Controller) -> Iterator[None]:
     performance.seek(AT_S)
     for _ in range(15):
         yield
+    window.rate_label.hide()  # there is no sound device here
     window.grab().save(str(HERE / "window.png"))
     view, frames = window.findChild(StringView), []
     for number in range(FRAMES):
@@ -96,7 +97,7 @@ def _play(controller: Controller) -> Iterator[None]:
     for _ in range(5):
         yield
     for key in CHORD:
-        window.instrument.pressed.emit(key, 80)
+        window.instrument.pressed.emit(key, 80, None)
     while not controller.performance.settled:  # its motion is being computed
         yield
     for _ in range(4):

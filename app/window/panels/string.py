@@ -6,6 +6,8 @@ from dataclasses import replace
 
 from app.analysis.heard import HeardMotion
 from app.analysis.moment import Envelope, frame_at
+from app.instrument.beyond_training import outside_of_string
+from app.instrument.facts import by_two_numbers
 from app.presets.library import Library
 from app.presets.words import shape_word
 from app.rendering import Take
@@ -141,9 +143,13 @@ class StringPanel(Panel):
         silent = why_silent(choices, self.library)
         if not silent and choices.source_heard == DIFFERENCE and self._take is not None:
             silent = why_difference_silent(choices, self._take)
-        if silent or self._plain:
+        if silent or self._plain or entry is None:
             return silent
-        return "; ".join(outside_training(info_of(choices, entry), choices.pluck)) if entry else ""
+        patch, string = choices.patch, choices.string
+        if patch is None or string is None or not choices.plays_patch:
+            return "; ".join(outside_training(info_of(choices, entry), choices.pluck))
+        heard = by_two_numbers(patch, string.parameters)  # as the head of the Lab reports it
+        return "; ".join(outside_of_string(entry.info, heard, choices.pluck))
 
     # Gestures
 

@@ -20,6 +20,7 @@ from app.playing.key_note import KeyNote
 from app.playing.note import Note
 from app.rendering.subject import string_of
 from app.shared.key_names import note_name
+from app.views.string.view import StringView
 from app.window.controller import Controller
 from app.window.patch_desk import NOTE_REPORTED_AFTER_MS
 from tests.app.instrument.seen import Seen, sounding
@@ -297,6 +298,7 @@ def test_what_is_beyond_training_is_reported_and_follows_the_knobs(qtbot: QtBot,
     assert not label.toolTip()  # nothing was struck
     played.window.instrument.pressed.emit(80, 100, None)
     reported(True)
+    assert played.window.findChild(StringView)._warning in ("", label.toolTip())  # in Play a sign stands for it
     played.patches.change("knobs.decay", 1.5)
     reported(True)
     qtbot.wait(2 * NOTE_REPORTED_AFTER_MS)
@@ -314,6 +316,7 @@ def test_what_is_beyond_training_is_reported_and_follows_the_knobs(qtbot: QtBot,
     assert not label.toolTip()
     played.window.instrument.pressed.emit(80, 100, None)
     reported(True)
+    assert played.window.findChild(StringView)._warning in ("", label.toolTip())  # in Play a sign stands for it
     played.patches.choose("concert_harp")
     assert not label.toolTip()
     qtbot.wait(2 * NOTE_REPORTED_AFTER_MS)
