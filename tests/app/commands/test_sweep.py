@@ -240,9 +240,9 @@ def test_the_time_left_follows_what_is_known() -> None:
     shown.finished(row_of("a", seconds=20.0))
     assert shown.seconds_left() == 4 * 20 / 2
     shown.finished(row_of("b", status="diverged", seconds=None))
-    assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30.0 s left"
+    assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30 s left"
     shown.progressed(progress_of("a", 1, 1))  # that came late
-    assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30.0 s left"
+    assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30 s left"
     assert ended == ["a", "b"]
 
 
@@ -257,7 +257,7 @@ def test_a_terminal_shows_each_run_that_is_under_way(capsys, monkeypatch: pytest
         shown.progressed(progress_of("second", 20, 20))
     reported = capsys.readouterr().err
     assert "first" in reported
-    assert "20.0 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125" in reported
+    assert "20 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125" in reported
 
 
 def test_a_log_reports_of_a_long_run_now_and_then(capsys) -> None:

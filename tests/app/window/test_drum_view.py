@@ -232,7 +232,7 @@ def test_a_kit_shows_the_drum_that_is_struck(qtbot: QtBot, drummed: Controller) 
     drummed.session.update(instrument=kit)
     qtbot.waitUntil(lambda: (player := drummed.performance.notes.keys.player) is not None and player.patch == kit)
     for key in (47, 36):
-        drummed.patches._press(key, 100)
+        drummed.patches._press(key, 100, None)
         name = kit.strings.of_key(key).name  # type: ignore[union-attr]
         qtbot.waitUntil(lambda name=name: name in drummed.drum.view.accessibleDescription())  # type: ignore[misc]
     drummed.drum.view.setFocus()

@@ -256,7 +256,7 @@ class Instance:
         def count(_host: int) -> None:
             self.callbacks += 1
 
-        none = HostStructure._fields_[7][1](lambda host: None)  # type: ignore[misc]
+        none = HostStructure._fields_[7][1](lambda host: None)
         self._host = HostStructure(
             Version(1, 2, 0),
             None,
@@ -266,8 +266,8 @@ class Instance:
             b"1",
             HostStructure._fields_[6][1](lambda host, id: None),
             none,
-            none,  # type: ignore[misc]
-            HostStructure._fields_[9][1](count),  # type: ignore[misc]
+            none,
+            HostStructure._fields_[9][1](count),
         )
         found = library.factory.create(library._factory_at, c.addressof(self._host), id.encode())
         assert found, f"{id} is not in the library"
@@ -286,9 +286,9 @@ class Instance:
         """By name."""
         params = self.extension("clap.params", Params)
         found = {}
-        for index in range(params.count(self.at)):  # type: ignore[attr-defined]
+        for index in range(params.count(self.at)):
             info = ParamInfo()
-            assert params.info(self.at, index, info)  # type: ignore[attr-defined]
+            assert params.info(self.at, index, info)
             found[info.name.decode()] = info
         return found
 
@@ -297,27 +297,27 @@ class Instance:
         """Of its parameters, in the plug-in's order."""
         params, info = self.extension("clap.params", Params), ParamInfo()
         found = []
-        for index in range(params.count(self.at)):  # type: ignore[attr-defined]
-            assert params.info(self.at, index, info)  # type: ignore[attr-defined]
+        for index in range(params.count(self.at)):
+            assert params.info(self.at, index, info)
             found.append(info.id)
         return found
 
     def value(self, id: int) -> float:
         found = c.c_double()
-        assert self.extension("clap.params", Params).value(self.at, id, found)  # type: ignore[attr-defined]
+        assert self.extension("clap.params", Params).value(self.at, id, found)
         return found.value
 
     def text(self, id: int, value: float) -> str:
         """A value in words, which lead back to it."""
         params, found, back = self.extension("clap.params", Params), c.create_string_buffer(64), c.c_double()
-        assert params.to_text(self.at, id, value, found, len(found))  # type: ignore[attr-defined]
-        assert params.from_text(self.at, id, found.value, back)  # type: ignore[attr-defined]
+        assert params.to_text(self.at, id, value, found, len(found))
+        assert params.from_text(self.at, id, found.value, back)
         assert back.value == value
         return found.value.decode()
 
     @property
     def latency(self) -> int:
-        return int(self.extension("clap.latency", Frames).get(self.at))  # type: ignore[attr-defined]
+        return int(self.extension("clap.latency", Frames).get(self.at))
 
     def activate(self, rate_hz: float, most: int = 4096) -> None:
         assert self._own.activate(self.at, rate_hz, 1, most)
@@ -330,7 +330,7 @@ class Instance:
 
     def go_offline(self) -> None:
         """As hosts do before a bounce."""
-        assert self.extension("clap.render", Render).set(self.at, 1)  # type: ignore[attr-defined]
+        assert self.extension("clap.render", Render).set(self.at, 1)
 
     def reset(self) -> None:
         self._own.reset(self.at)
@@ -348,7 +348,7 @@ class Instance:
             kept.extend(c.string_at(data, size))
             return size
 
-        assert self.extension("clap.state", State).save(self.at, Stream(None, WRITE_FN(write)))  # type: ignore[attr-defined]
+        assert self.extension("clap.state", State).save(self.at, Stream(None, WRITE_FN(write)))
         return bytes(kept)
 
     def load(self, content: bytes) -> bool:
@@ -359,14 +359,14 @@ class Instance:
             c.memmove(data, part, len(part))
             return len(part)
 
-        return bool(self.extension("clap.state", State).load(self.at, Stream(None, WRITE_FN(read))))  # type: ignore[attr-defined]
+        return bool(self.extension("clap.state", State).load(self.at, Stream(None, WRITE_FN(read))))
 
     def block(self, frames: int, events: Sequence[Event]) -> NDArray[np.float32]:
         """The next frames, (frames, 2); events are of frames of the whole piece."""
         out = np.zeros((2, frames), np.float32)
         rows = (c.POINTER(c.c_float) * 2)(*(row.ctypes.data_as(c.POINTER(c.c_float)) for row in out))
         for event in events:
-            event.content.header.time = event.frame - self.frame  # type: ignore[attr-defined]
+            event.content.header.time = event.frame - self.frame
         kept = [event.content for event in events]
         incoming = InEvents(
             None, SIZE_FN(lambda _list: len(kept)), GET_FN(lambda _list, index: c.addressof(kept[index]))
