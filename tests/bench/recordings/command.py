@@ -35,8 +35,7 @@ def recordings(
 ) -> None:
     """Print how well a folder's recordings are learned: own note, baselines, unseen half, takes, gate.
 
-    Names show takes: files whose names differ in the last letter alone are takes of one note. The letter before it is
-    the dynamic, such as f, m or p.
+    The ends of names show takes and dynamics (p, m or f): bass_a2_fb is the second take (b) of a forte (f).
     """
     from app.audio.note_file import NoteFileError, read_note
     from tests.bench.recordings.coverage import FIRST_SEED, coverage

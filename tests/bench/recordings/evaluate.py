@@ -9,6 +9,7 @@ dynamic is played by poles that takes of other dynamics share; its amplitudes, p
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -28,6 +29,7 @@ from training.recording.report import aligned, errors_of
 Array = NDArray[np.float64]
 Recordings = Mapping[str, tuple[Array, int]]
 
+DYNAMIC = re.compile(r"_[pmf][a-z]$")  # of a name: piano, mezzo or forte, and a letter for the take
 HALF_S = 1.25
 COARSE_HZ = 8_000  # takes are compared below 4 kHz
 MOST_PITCH = 0.006  # that another take may be higher or lower, as a share
@@ -59,7 +61,7 @@ def evaluate(
     _glides({name: learned for name, (_, _, learned) in notes.items()}, values)
     if not quick:
         for first, second in itertools.permutations(notes, 2):
-            if first[:-1] == second[:-1]:
+            if first[:-1] == second[:-1] and DYNAMIC.search(first) and DYNAMIC.search(second):
                 _takes(notes[first], notes[second], values)
         _dynamics({name: (note, series) for name, (note, series, _) in notes.items()}, values)
     progress(1.0)
@@ -77,7 +79,7 @@ def dynamics(
         series, _ = number_note(note)
         if series is not None and series.present:
             notes[name] = note, series
-    stems = sorted({name[:-2] for name in notes})
+    stems = sorted({name[:-2] for name in notes if DYNAMIC.search(name)})
     for number, stem in enumerate(stems):
         progress(number / len(stems))
         _dynamics({name: each for name, each in notes.items() if name[:-2] == stem}, values)
@@ -132,7 +134,7 @@ def _row(
 
 def _glides(notes: Mapping[str, LearnedNote], values: dict[str, list[float]]) -> None:
     """The power of the energy that the glide follows, of two dynamics that glide; by the string's law it is 1."""
-    found = {name: physics_of(learned) for name, learned in notes.items()}
+    found = {name: physics_of(learned) for name, learned in notes.items() if DYNAMIC.search(name)}
     for first, second in itertools.combinations(found, 2):
         rises = [found[name].rise for name in (first, second)]
         if first[:-2] == second[:-2] and first[-2] != second[-2] and min(rises) > LEAST_RISE:
@@ -142,8 +144,8 @@ def _glides(notes: Mapping[str, LearnedNote], values: dict[str, list[float]]) ->
 
 
 def _dynamics(notes: Mapping[str, tuple[Note, Series]], values: dict[str, list[float]]) -> None:
-    """Each dynamic of a note, the last letter but one of its name, against a joint fit of the others."""
-    for stem in sorted({name[:-2] for name in notes}):
+    """Each dynamic of a note against a joint fit of the others; see DYNAMIC."""
+    for stem in sorted({name[:-2] for name in notes if DYNAMIC.search(name)}):
         names = [name for name in notes if name[:-2] == stem]
         for held in sorted({name[-2] for name in names}):
             others = [name for name in names if name[-2] != held]
