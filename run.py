@@ -262,8 +262,8 @@ def site_packages() -> Path:
 @contextlib.contextmanager
 def locked():
     """Let one set-up run at a time: a second waits, until the first and the pip it started have ended."""
-    if not VENV.is_dir():
-        remove(VENV)  # a file, or a link to nothing
+    if VENV.is_symlink() or not VENV.is_dir():
+        remove(VENV)  # a file, or a link, whose folder is another's
         VENV.mkdir()
     with LOCK.open("a") as handle:
         if WINDOWS:

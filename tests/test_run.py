@@ -144,6 +144,16 @@ def test_a_start_with_nothing_to_do_is_silent_and_starts_no_process(run, monkeyp
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="links need rights there")
+def test_a_set_up_never_empties_a_folder_that_is_linked(run, tmp_path):
+    other = tmp_path / "other"
+    run.VENV.rename(other)
+    run.VENV.symlink_to(other)
+    with run.locked():
+        assert not run.VENV.is_symlink()
+    assert (other / "pyvenv.cfg").is_file()
+
+
 def dangle(run):
     run.PYTHON.unlink()
     run.PYTHON.symlink_to("/nonexistent/python")
