@@ -32,7 +32,8 @@ class Sideways(QScrollArea):
         part = self.widget()
         if part is not None:
             if (layout := part.layout()) is not None:
-                layout.activate()  # or it holds the sizes that its rows had before the text grew while it was hidden
+                layout.invalidate()  # or it holds the sizes that its rows had before the text grew
+                layout.activate()
             least = part.minimumSizeHint().width()
             too_narrow = least > self.width()
             part.resize(max(least, self.viewport().width()), part.height())
