@@ -1,4 +1,4 @@
-"""Drums: frequencies and pitch drops beside published ones; costs of voices, kit, picture and choosing an instrument.
+"""Drums: frequencies and pitch drops compared with published ones; costs of voices, kit, picture and choosing one.
 
 Costs are processor time of this thread at 48 kHz, less that of an empty mixer, as shares of a core. The least of some
 repeats counts: other processes only add.
@@ -105,7 +105,7 @@ class ChoiceCost:
 
 @dataclass(frozen=True)
 class MeasuredMode:
-    """A frequency of a drum in air beside a published measurement."""
+    """A frequency of a drum in air, and a published measurement."""
 
     drum: str
     mode: str

@@ -1,4 +1,4 @@
-"""One table per horizon as Markdown: our error, the paper's, their ratio, and what the start was given."""
+"""One table per horizon as Markdown: our error, the paper's, their ratio, and where training starts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def as_compact(rows: Sequence[Row], recipe: RecipeChoice = "all", metric: str = 
     for horizon in HORIZONS:
         shown = [section for section in found if section.horizon == horizon]
         parts.append(f"### {horizon} frames, relative {METRIC_NAMES[metric]}")
-        head = ["string", "model", "start was given", "seeds", *map(str, COLUMNS)]
+        head = ["string", "model", "training starts from", "seeds", *map(str, COLUMNS)]
         parts.append(markdown_table(head, [line for section in shown for line in _lines(section, metric)]))
     parts.append("### Missing cells\n\n" + _missing(found))
     if out := len(rows) - len(rows_of(found)):

@@ -133,14 +133,22 @@ def _row(
 
 
 def _glides(notes: Mapping[str, LearnedNote], values: dict[str, list[float]]) -> None:
-    """The power of the energy that the glide follows, of two dynamics that glide; by the string's law it is 1."""
+    """How the glides of two dynamics compare: the string's law is that they go with its energy.
+
+    Where both glide, the power of the energy is measured. Where one does not, it is what the law leaves it in cents.
+    """
     found = {name: physics_of(learned) for name, learned in notes.items() if DYNAMIC.search(name)}
-    for first, second in itertools.combinations(found, 2):
-        rises = [found[name].rise for name in (first, second)]
-        if first[:-2] == second[:-2] and first[-2] != second[-2] and min(rises) > LEAST_RISE:
-            energies = [sum(each.energy for each in found[name].partials) for name in (first, second)]
-            power = np.log(rises[0] / rises[1]) / np.log(energies[0] / energies[1])
+    for pair in itertools.combinations(found, 2):
+        if pair[0][:-2] != pair[1][:-2] or pair[0][-2] == pair[1][-2]:
+            continue
+        less, more = sorted((found[name] for name in pair), key=lambda each: each.rise)
+        share = sum(each.energy for each in less.partials) / sum(each.energy for each in more.partials)
+        if less.rise > LEAST_RISE:
+            power = np.log(less.rise / more.rise) / np.log(share)
             _append(values, "glide of two dynamics, power of the energy", float(power))
+        elif more.rise > LEAST_RISE:
+            left_cents = 1200 * np.log2(1 + more.rise * share)
+            _append(values, "no glide in one, what the law leaves it in cents", float(left_cents))
 
 
 def _dynamics(notes: Mapping[str, tuple[Note, Series]], values: dict[str, list[float]]) -> None:
