@@ -16,6 +16,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.shared.key_names import note_name
 from app.views import theme
+from app.views.controls.parts import ENTER_KEYS
 from app.views.instrument.playable import LEVEL_STEPS, Playable, Spot, is_second
 
 if TYPE_CHECKING:
@@ -28,13 +29,19 @@ SHORTEST = 0.14  # of the fan's height
 THICK, THIN = 2.6, 1.0  # lowest and highest string, in pixels
 LARGEST_DOT = 14.0
 PLACES = 8  # of a fret that a sliding string can be distinguished at
+_ARROWS = {  # frets along the string, strings
+    Qt.Key.Key_Right: (1, 0),
+    Qt.Key.Key_Left: (-1, 0),
+    Qt.Key.Key_Up: (0, 1),
+    Qt.Key.Key_Down: (0, -1),
+}
 SWING = 0.42  # of a string's row, at full level
 INLAYS = (3, 5, 7, 9, 12, 15, 17, 19, 21, 24)
 TIP = (
     "Click or drag to play: softer at the upper edge of a string's row, harder at the lower.\n"
     "Drag across strings to strum. Right button or Shift: put a finger on a string, or lift it;\n"
     "clicks and drags then play the strings as the fingers stop them. Delete lifts all fingers.\n"
-    "With the keyboard: arrows and Enter"
+    "With the keyboard: arrows and Enter; Shift+Enter for a finger, Ctrl+Enter for all strings"
 )
 
 
@@ -55,7 +62,7 @@ class Neck(Playable):
         self._strings: tuple[tuple[str, int], ...] = ()
         self._stops: dict[tuple[int, float], int] = {}  # string, fret -> level of 0 … LEVEL_STEPS
         self._fingers: dict[int, int] = {}  # string -> fret
-        self._set_cursor(60)
+        self._set_cursor(Spot(60))
 
     def show_notes(self, notes: Iterable[SoundingNote]) -> None:
         """Shows strings of a neck where they are stopped, which lies between two frets while they slide."""
@@ -79,6 +86,7 @@ class Neck(Playable):
         if ordered != self._strings:
             self.release_all()
             self._strings, self._stops, self._fingers = ordered, {}, {}
+            self._set_cursor(Spot(self.chosen.key))
             self.rest_changed()
 
     @property
@@ -139,6 +147,10 @@ class Neck(Playable):
         if key is None or not self.in_rows:
             return super().spot_at(at)
         string = self._row_at(at)
+        return self._stopped(string, key)
+
+    def _stopped(self, string: int, key: int) -> Spot:
+        """A key on a string, counted from the lowest; if there are fingers, the key where these stop it."""
         if self._fingers:
             key = self._strings[string][1] + self._fingers.get(string, 0)
         return Spot(key, len(self._strings) - 1 - string)
@@ -146,6 +158,25 @@ class Neck(Playable):
     def _row_of(self, spot: Spot) -> int:
         """Which string, counted from the lowest, a spot is on."""
         return self.string_of(spot.key) if spot.string is None else len(self._strings) - 1 - spot.string
+
+    def _fret_of(self, spot: Spot) -> int:
+        return min(max(spot.key - self._strings[self._row_of(spot)][1], 0), self.frets)
+
+    def stepped(self, arrow: Qt.Key) -> Spot:
+        """On a neck: along the string by a fret, or to the same fret of the next string."""
+        if not self.in_rows:
+            return super().stepped(arrow)
+        along, across = _ARROWS[arrow]
+        string = min(max(self._row_of(self.chosen) + across, 0), len(self._strings) - 1)
+        fret = min(max(self._fret_of(self.chosen) + along, 0), self.frets)
+        return Spot(self._strings[string][1] + fret, len(self._strings) - 1 - string)
+
+    def typed(self, all_strings: bool) -> list[Spot]:
+        if not self.in_rows:
+            return super().typed(all_strings)
+        rows = range(len(self._strings)) if all_strings else [self._row_of(self.chosen)]
+        found = [self._stopped(row, self._strings[row][1] + self._fret_of(self.chosen)) for row in rows]
+        return [spot for spot in found if self.sounds(spot.key)]
 
     def _row_at(self, at: QPointF) -> int:
         height = (self.height() - theme.px(_FOOT)) / len(self._strings)
@@ -184,15 +215,22 @@ class Neck(Playable):
             super().mousePressEvent(event)
         elif key is not None and self.sounds(key):
             string = self._row_at(event.position())
-            fret = key - self._strings[string][1]
-            if fret <= 0 or self._fingers.get(string) == fret:
-                self._fingers.pop(string, None)
-            else:
-                self._fingers[string] = fret
-            self.update()
+            self._put_finger(string, key - self._strings[string][1])
+
+    def _put_finger(self, string: int, fret: int) -> None:
+        """Lifts it where it is already, or at the nut."""
+        if fret <= 0 or self._fingers.get(string) == fret:
+            self._fingers.pop(string, None)
+        else:
+            self._fingers[string] = fret
+        self.update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        if self._fingers and event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
+        shift = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
+        if self.in_rows and shift and event.key() in ENTER_KEYS:
+            if not event.isAutoRepeat():
+                self._put_finger(self._row_of(self.chosen), self._fret_of(self.chosen))
+        elif self._fingers and event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
             self._fingers = {}
             self.update()
         else:
@@ -233,8 +271,10 @@ class Neck(Playable):
         if self.shows_cursor:
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.setPen(QPen(QColor(theme.TEXT), 1.5))
-            key = self.cursor_key
-            place = self._cell_of(key) if self.in_rows else self._column(key).adjusted(0, 0, 0, -theme.px(_FOOT))
+            if self.in_rows:
+                place = self.cell(self._row_of(self.chosen), self._fret_of(self.chosen))
+            else:
+                place = self._column(self.chosen.key).adjusted(0, 0, 0, -theme.px(_FOOT))
             painter.drawRoundedRect(place.adjusted(1, 1, -1, -1), 3, 3)
 
     def _paint_board(self, painter: QPainter) -> None:

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from app.shared.key_names import note_name
 from app.views import theme
-from app.views.instrument.playable import Playable
+from app.views.instrument.playable import Playable, Spot
 
 BLACK_HEIGHT = 0.62  # of a white key's
 BLACK_WIDTH = 0.6
@@ -46,7 +46,7 @@ class PianoKeys(Playable):
         super().__init__("On-screen keyboard", TIP, parent)
         self._letters: dict[int, str] = {}
         self._first, self._last = shown_range(self._low, self._high)
-        self._set_cursor(60)
+        self._set_cursor(Spot(60))
 
     def show_letters(self, letters: Mapping[int, str]) -> None:
         """What is printed on the computer's keys, by the MIDI key that each plays."""
@@ -112,7 +112,7 @@ class PianoKeys(Playable):
                 if key in self.held:
                     self._paint_pin(painter, key)
         if self.shows_cursor:
-            key = self.cursor_key
+            key = self.chosen.key
             painter.setPen(QPen(QColor(_ink(self._filling(key))), 1.5))
             painter.setBrush(Qt.BrushStyle.NoBrush)
             painter.drawRoundedRect(self.key_rect(key).adjusted(3, 2, -3, -4), 3, 3)

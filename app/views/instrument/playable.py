@@ -45,7 +45,7 @@ class Playable(QWidget):
     Left button: plays while it is down; moved to other keys it plays these (glissando). Moved to other strings of a
     neck it strums: those that it has left ring until the button is up.
     Right button, or Shift: the key stays down until it is clicked so again.
-    Arrows and Enter: choose a key and play it.
+    Arrows and Enter: choose a key and play it; with Ctrl, what belongs to it.
     """
 
     pressed = Signal(int, int, object)  # key, velocity, string as in `Spot`
@@ -66,9 +66,9 @@ class Playable(QWidget):
         self._clicked = TYPED  # velocity of the click, which a strum keeps
         self._strummed: list[Spot] = []  # on strings that the mouse has left
         self.legato = False  # a key that is pressed while another is held takes its note over
-        self._typed: int | None = None  # by Enter
+        self._typed: list[Spot] = []  # by Enter
         self._held: set[Spot] = set()
-        self._cursor = 60
+        self._cursor = Spot(60)
         self._by_keys = False  # the cursor was last reached or moved with the keyboard
         self._rest = QPixmap()
         theme.changes.theme_changed.connect(self.rest_changed)
@@ -95,6 +95,14 @@ class Playable(QWidget):
         spot = self.spot_at(at)
         return [] if spot is None else [spot]
 
+    def stepped(self, arrow: Qt.Key) -> Spot:
+        """Where an arrow of the keyboard moves the cursor."""
+        return Spot(self._cursor.key + _MOVES[arrow])
+
+    def typed(self, all_strings: bool) -> list[Spot]:
+        """What Enter plays; `all_strings`: with Ctrl."""
+        return [self._cursor]
+
     @abstractmethod
     def key_rect(self, key: int) -> QRectF:
         """The area that changes when a key sounds."""
@@ -118,7 +126,7 @@ class Playable(QWidget):
         if (low, high) != (self._low, self._high):
             self.release_all()
             self._low, self._high = low, high
-            self._set_cursor(self._cursor)
+            self._set_cursor(Spot(self._cursor.key))
             self.lay_out()
             self.rest_changed()
 
@@ -154,9 +162,7 @@ class Playable(QWidget):
 
     def release_all(self) -> None:
         """Releases all keys that are down."""
-        if self._typed is not None:
-            typed, self._typed = self._typed, None
-            self._release(Spot(typed))
+        self._release_typed()
         self._release_mouse()
         for spot in sorted(self._held):
             self._held.discard(spot)
@@ -171,7 +177,7 @@ class Playable(QWidget):
     @property
     def marked(self) -> frozenset[int]:
         """Keys that do not look as at rest."""
-        cursor = {self._cursor} if self.shows_cursor else set()
+        cursor = {self._cursor.key} if self.shows_cursor else set()
         return frozenset(self._levels.keys() | cursor | {spot.key for spot in self.down})
 
     def paintEvent(self, event: QPaintEvent) -> None:
@@ -203,9 +209,8 @@ class Playable(QWidget):
     @property
     def down(self) -> frozenset[Spot]:
         """What is pressed here, or stays down by itself."""
-        typed = {Spot(self._typed)} if self._typed is not None else set()
         mouse = {self._down} if self._down is not None else set()
-        return frozenset(typed | mouse | self._held | set(self._strummed))
+        return frozenset(mouse | self._held | {*self._typed, *self._strummed})
 
     @property
     def colour(self) -> QColor:
@@ -222,7 +227,7 @@ class Playable(QWidget):
         if spot is None or not self.sounds(spot.key) or self._down is not None:
             return
         self._by_keys = False
-        self._set_cursor(spot.key)
+        self._set_cursor(spot)
         velocity = self.velocity_at(spot.key, event.position())
         if is_second(event):
             if spot in self._held:
@@ -292,29 +297,31 @@ class Playable(QWidget):
         return super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        step = _MOVES.get(Qt.Key(event.key()))
-        self._by_keys = self._by_keys or step is not None
-        if step is not None:
-            self._set_cursor(self._cursor + step)
-        elif event.key() in ENTER_KEYS:
-            if not event.isAutoRepeat() and self._typed is None:
-                self._typed = self._cursor
-                self._press(Spot(self._cursor), TYPED)
+        key = Qt.Key(event.key())
+        self._by_keys = self._by_keys or key in _MOVES
+        if key in _MOVES:
+            self._set_cursor(self.stepped(key))
+        elif key in ENTER_KEYS:
+            if not event.isAutoRepeat() and not self._typed:
+                self._typed = self.typed(bool(event.modifiers() & Qt.KeyboardModifier.ControlModifier))
+                for spot in self._typed:
+                    self._press(spot, TYPED)
         else:
             super().keyPressEvent(event)
 
     def keyReleaseEvent(self, event: QKeyEvent) -> None:
         if event.key() in ENTER_KEYS and not event.isAutoRepeat():
-            if self._typed is not None:
-                typed, self._typed = self._typed, None
-                self._release(Spot(typed))
+            self._release_typed()
         else:
             super().keyReleaseEvent(event)
 
+    def _release_typed(self) -> None:
+        typed, self._typed = self._typed, []
+        for spot in typed:
+            self._release(spot)
+
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        if self._typed is not None:
-            typed, self._typed = self._typed, None
-            self._release(Spot(typed))
+        self._release_typed()
         super().focusOutEvent(event)
         self.update()
 
@@ -328,8 +335,8 @@ class Playable(QWidget):
         super().hideEvent(event)
 
     @property
-    def cursor_key(self) -> int:
-        """The key that Enter plays."""
+    def chosen(self) -> Spot:
+        """What Enter plays."""
         return self._cursor
 
     @property
@@ -337,13 +344,12 @@ class Playable(QWidget):
         """Whether the cursor is drawn: after it was reached or moved with the keyboard, not with the mouse."""
         return self._by_keys and self.hasFocus()
 
-    def _set_cursor(self, key: int) -> None:
-        if not self._low <= key <= self._high:
-            key = min(max(key, self._low), self._high)
-        before, self._cursor = self._cursor, key
-        self.setAccessibleDescription(f"{note_name(key)}; arrows choose a key, Enter plays it")
-        self._repaint(before)
-        self._repaint(key)
+    def _set_cursor(self, spot: Spot) -> None:
+        spot = spot._replace(key=min(max(spot.key, self._low), self._high))
+        before, self._cursor = self._cursor, spot
+        self.setAccessibleDescription(f"{note_name(spot.key)}; arrows choose a key, Enter plays it")
+        self.repaint_spot(before)
+        self.repaint_spot(spot)
 
     def _press(self, spot: Spot, velocity: int) -> None:
         self.repaint_spot(spot)
@@ -354,7 +360,7 @@ class Playable(QWidget):
         self.released.emit(spot.key, spot.string)
 
     def repaint_spot(self, spot: Spot) -> None:
-        """Called when it is pressed or released."""
+        """Called when it is pressed, released, or the cursor's."""
         self._repaint(spot.key)
 
     def _repaint(self, key: int) -> None:

@@ -195,3 +195,39 @@ def test_fingers_are_seen_and_leave_with_their_strings(qtbot: QtBot, neck: Neck)
     assert neck.grab().toImage() != bare
     neck.set_strings(GUITAR[:4])
     assert neck.fingers == {}
+
+
+def test_the_keyboard_alone_fingers_a_chord_and_strums_it(qtbot: QtBot, neck: Neck) -> None:
+    heard: list[tuple[str, int, int]] = []
+    neck.pressed.connect(lambda key, _, string: heard.append(("on", key, string)))
+    neck.released.connect(lambda key, string: heard.append(("off", key, string)))
+    up, down, left, right = Qt.Key.Key_Up, Qt.Key.Key_Down, Qt.Key.Key_Left, Qt.Key.Key_Right
+    for arrow in [down] * 9 + [left] * 30 + [right]:
+        qtbot.keyClick(neck, arrow)
+    assert neck.chosen == (41, 5)  # F on the lowest string
+    qtbot.keyClick(neck, Qt.Key.Key_Return, SHIFT)
+    for arrow in (up, right, right):
+        qtbot.keyClick(neck, arrow)
+    qtbot.keyClick(neck, Qt.Key.Key_Return, SHIFT)
+    assert heard == [] and neck.fingers == {0: 1, 1: 3}
+    qtbot.keyClick(neck, Qt.Key.Key_Return)
+    assert heard == [("on", 48, 4), ("off", 48, 4)]
+    heard.clear()
+    qtbot.keyPress(neck, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert heard == [("on", key, 5 - string) for string, key in enumerate((41, 48, 50, 55, 59, 64))]
+    qtbot.keyRelease(neck, Qt.Key.Key_Return, Qt.KeyboardModifier.ControlModifier)
+    assert [what for what, _, _ in heard] == ["on"] * 6 + ["off"] * 6
+    qtbot.keyClick(neck, up)
+    qtbot.keyClick(neck, up)
+    assert neck.chosen == (58, 2), "the same fret of another string"
+
+
+def test_the_cursor_on_the_neck_is_seen_on_its_string(
+    qtbot: QtBot, neck: Neck, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(neck, "hasFocus", lambda: True)  # a window without a desktop is never active
+    seen = []
+    for arrow in (Qt.Key.Key_Down, Qt.Key.Key_Down, Qt.Key.Key_Right, Qt.Key.Key_Left):
+        qtbot.keyClick(neck, arrow)
+        seen.append(neck.grab().toImage())
+    assert seen[0] != seen[1] != seen[2] and seen[3] == seen[1]

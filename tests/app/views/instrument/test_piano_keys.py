@@ -162,13 +162,13 @@ def test_hidden_keys_do_not_go_on_sounding(qtbot: QtBot, keys: PianoKeys, heard:
 def test_arrows_choose_a_key_and_enter_plays_it(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
     for key in (Qt.Key.Key_Right, Qt.Key.Key_Right, Qt.Key.Key_Up):
         qtbot.keyClick(keys, key)
-    assert keys.cursor_key == 74
+    assert keys.chosen.key == 74
     assert "D5" in keys.accessibleDescription()
     qtbot.keyClick(keys, Qt.Key.Key_Return)
     assert heard.notes == [("on", 74), ("off", 74)]
     qtbot.keyClick(keys, Qt.Key.Key_Up)
     qtbot.keyClick(keys, Qt.Key.Key_Up)
-    assert keys.cursor_key == 86, "no further than the strings go"
+    assert keys.chosen.key == 86, "no further than the strings go"
 
 
 def test_the_cursor_is_where_one_clicked_and_seen_by_those_who_use_the_keyboard(
@@ -177,9 +177,9 @@ def test_the_cursor_is_where_one_clicked_and_seen_by_those_who_use_the_keyboard(
     monkeypatch.setattr(keys, "hasFocus", lambda: True)  # a window without a desktop is never active
     qtbot.mouseClick(keys, LEFT, pos=spot(keys, 71))
     at_rest = keys.grab().toImage()
-    assert keys.cursor_key == 71
+    assert keys.chosen.key == 71
     qtbot.keyClick(keys, Qt.Key.Key_Right)
-    assert keys.cursor_key == 72
+    assert keys.chosen.key == 72
     assert keys.grab().toImage() != at_rest
 
 
