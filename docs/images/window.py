@@ -18,6 +18,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtGui import QImage
 from PySide6.QtWidgets import QAbstractButton, QWidget
 
+from app.views.instrument.neck import Neck
 from app.views.string.view import StringView
 from app.window import main as start
 from app.window.controller import Controller
@@ -98,9 +99,10 @@ def _play(controller: Controller) -> Iterator[None]:
         yield
     for key in CHORD:
         window.instrument.pressed.emit(key, 80, None)
-    while not controller.performance.settled:  # its motion is being computed
+    neck = window.findChild(Neck)
+    while not all(neck.level(key) > 0 for key in CHORD):
         yield
-    for _ in range(4):
+    for _ in range(5):  # its motion is being computed
         yield
     window.notices.hide()
     window.notices.bell.set_unseen(0)
