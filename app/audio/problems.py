@@ -89,8 +89,8 @@ def no_device(detail: str = "") -> AudioUnavailable:
 def stalled(device_name: str) -> AudioProblem:
     return AudioProblem(
         ProblemKind.STALLED,
-        f"The sound output “{device_name}” is not responding.",
-        "The app keeps trying; if it does not recover, choose another output in the audio settings.",
+        f"The sound output “{device_name}” stopped. The computer may be too busy.",
+        "The app keeps trying. If it does not recover, choose a larger buffer or another output in Audio.",
     )
 
 
@@ -98,8 +98,8 @@ def vanished(device_name: str, detail: str = "") -> AudioUnavailable:
     return AudioUnavailable(
         AudioProblem(
             ProblemKind.VANISHED,
-            f"The sound output “{device_name}” has been disconnected.",
-            "Connect it again, or choose another one in the audio settings.",
+            f"The sound output “{device_name}” was not found: it is disconnected, or the computer is too busy.",
+            "The app keeps trying. Connect it again, or choose another one in the audio settings.",
             detail,
         )
     )

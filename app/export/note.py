@@ -124,7 +124,8 @@ class NoteExport:
         return next(iter(self.paths.values())).parent
 
     def run(self, progress: Progress) -> str:
-        return "\n".join(_words(self.written(progress)))
+        of_family = self.note.string is not None or self.note.struck is not None
+        return "\n".join(_words(self.written(progress), of_family))
 
     def written(self, progress: Progress) -> list[WavReport]:
         """As `run`, with reports in place of words."""
@@ -152,12 +153,13 @@ class NoteExport:
         return "no file was written."
 
 
-def _words(reports: list[WavReport]) -> list[str]:
+def _words(reports: list[WavReport], of_family: bool) -> list[str]:
+    """`of_family`: whether the model is of many strings, whose error does not grow past its training."""
     lines = []
     for report in reports:
         level = f"peak {report.peak_db:.1f} dBFS, {report.clipped} clipped"
         lines.append(f"Saved {report.path} ({report.seconds:.2f} s, {level}).")
-    if past_s := max(report.past_training_s for report in reports):
+    if (past_s := max(report.past_training_s for report in reports)) and not of_family:
         trained_s = max(report.seconds for report in reports) - past_s
         lines.append(f"The model was trained on the first {trained_s:.2f} s.")
     if not reports[0].decayed:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from PySide6.QtCore import Qt, Signal
+from PySide6.QtCore import QStandardPaths, Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
     QDoubleSpinBox,
@@ -95,7 +95,7 @@ class FilePicker(QWidget):
 
     def __init__(self, folder: str, tip: str, suffix: str = ".wav") -> None:
         super().__init__()
-        self._folder, self.suffix = folder or str(Path.home()), suffix
+        self._folder, self.suffix = folder or music_folder(), suffix
         self._named_by_user = False
         self.edit = QLineEdit()
         self.edit.setAccessibleName("File")
@@ -110,6 +110,13 @@ class FilePicker(QWidget):
     @property
     def folder(self) -> str:
         return str(Path(self.edit.text().strip()).parent)
+
+    def follow(self, folder: str) -> None:
+        """Suggests names in this folder from now on, where another file was saved; keeps a name that was given."""
+        self._folder = folder
+        typed = self.edit.text().strip()
+        if typed:
+            self.edit.setText(str(Path(folder) / Path(typed).name))
 
     @property
     def path(self) -> Path:
@@ -128,7 +135,7 @@ class FilePicker(QWidget):
             self.edit.setText(str(Path(typed).with_suffix(self.suffix)))
 
     def browse(self) -> None:
-        path, _ = QFileDialog.getSaveFileName(self, "Export", self.edit.text(), FILTERS[self.suffix])
+        path, _ = QFileDialog.getSaveFileName(self, "Save as", self.edit.text(), FILTERS[self.suffix])
         if path:
             self.edit.setText(path)
             self.edit.setText(str(self.path))
@@ -137,3 +144,9 @@ class FilePicker(QWidget):
     def _name_edited(self) -> None:
         self._named_by_user = True
         self.changed.emit()
+
+
+def music_folder() -> str:
+    """The user's folder for music, else the home folder."""
+    music = QStandardPaths.writableLocation(QStandardPaths.StandardLocation.MusicLocation)
+    return music if music and Path(music).is_dir() else str(Path.home())

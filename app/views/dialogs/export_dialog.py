@@ -139,6 +139,7 @@ class ExportDialog(QDialog):
         for page in self.pages.values():
             page.setVisible(page is self.page)
         self.wav.setVisible(self.page.writes_wav)
+        self.setWindowTitle(self.page.window_title)
         self._update()
         self.adjustSize()
 
@@ -184,6 +185,9 @@ class ExportDialog(QDialog):
         self._tell(f"{text or 'Rendering'}{left}. {MEANWHILE}")
 
     def _finished(self, words: str) -> None:
+        if self._job is not None and self.page.writes_wav:
+            for page in (self.note, self.performance):
+                page.file.follow(str(self._job.folder))
         self.exported.emit(self._job)
         self._end(words)
         self.show_folder.show()

@@ -118,7 +118,7 @@ class ExportPage(QWidget):
     """What is exported, and how; a further kind is a further subclass.
 
     Attributes:
-        title: of its tab.
+        title, window_title: of its tab, and of the dialog while it is shown.
         missing: why there is nothing to export.
         writes_wav: whether the form for WAV files belongs to it.
         file: where it is written.
@@ -126,6 +126,7 @@ class ExportPage(QWidget):
 
     changed = Signal()
     title = missing = ""
+    window_title = "Export"
     writes_wav = True
     file: FilePicker
 
@@ -248,6 +249,7 @@ class PerformancePage(ExportPage):
     """What was played, to a WAV and a MIDI file of one name."""
 
     title, missing = "Recording", "Nothing was recorded: click Record, play, and click it again."
+    window_title = "Save the recording"
 
     def __init__(self, export: ExportChoices, wav: WavForm) -> None:
         super().__init__()
@@ -280,7 +282,7 @@ class PerformancePage(ExportPage):
 
     def offer(self) -> tuple[str, str]:
         there = [path.name for path in recorded_files(self.job().path) if path.exists()]
-        return "Replace" if there else "Export", f"Replaces {' and '.join(there)}." if there else MIDI_NOTE
+        return "Replace" if there else "Save", f"Replaces {' and '.join(there)}." if there else MIDI_NOTE
 
 
 class SamplerPage(ExportPage):

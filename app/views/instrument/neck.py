@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt, Signal
 from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPainterPath, QPen
 from PySide6.QtWidgets import QWidget
 
@@ -39,8 +39,9 @@ SWING = 0.42  # of a string's row, at full level
 INLAYS = (3, 5, 7, 9, 12, 15, 17, 19, 21, 24)
 TIP = (
     "Click or drag to play: softer at the upper edge of a string's row, harder at the lower.\n"
-    "Drag across strings to strum. Right button or Shift: put a finger on a string, or lift it;\n"
-    "clicks and drags then play the strings as the fingers stop them. Delete lifts all fingers.\n"
+    "Drag across strings to strum; across their names, open strings. They ring while the button is down.\n"
+    "Right button or Shift: put a finger on a string, or lift it; clicks and drags then play the strings\n"
+    "as the fingers stop them. Delete lifts all fingers.\n"
     "With the keyboard: arrows and Enter; Shift+Enter for a finger, Ctrl+Enter for all strings"
 )
 
@@ -56,6 +57,8 @@ class Neck(Playable):
     Fingers stay where they were put, and make no sound. While there are any, strings sound as these stop them, and
     those without a finger sound open, wherever they are clicked: so chords can be strummed with one mouse.
     """
+
+    fingered = Signal(bool)  # whether there are fingers
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("Strings", TIP, parent)
@@ -85,7 +88,8 @@ class Neck(Playable):
         ordered = tuple(sorted(strings, key=lambda string: string[1]))
         if ordered != self._strings:
             self.release_all()
-            self._strings, self._stops, self._fingers = ordered, {}, {}
+            self._strings, self._stops = ordered, {}
+            self.lift()
             self._set_cursor(Spot(self.chosen.key))
             self.rest_changed()
 
@@ -223,6 +227,15 @@ class Neck(Playable):
             self._fingers.pop(string, None)
         else:
             self._fingers[string] = fret
+        self._show_fingers()
+
+    def lift(self) -> None:
+        """Takes all fingers away."""
+        self._fingers = {}
+        self._show_fingers()
+
+    def _show_fingers(self) -> None:
+        self.fingered.emit(bool(self._fingers))
         self.update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -231,8 +244,7 @@ class Neck(Playable):
             if not event.isAutoRepeat():
                 self._put_finger(self._row_of(self.chosen), self._fret_of(self.chosen))
         elif self._fingers and event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
-            self._fingers = {}
-            self.update()
+            self.lift()
         else:
             super().keyPressEvent(event)
 

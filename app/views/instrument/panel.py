@@ -115,6 +115,11 @@ class InstrumentPanel(QFrame):
         self._fold.setCheckable(True)
         self._fold.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self._fold.toggled.connect(self.set_unfolded)
+        self._lift = tool_button("Lift fingers", tip="No finger on the neck: clicks play frets again (Delete)")
+        self._lift.setObjectName("small")
+        self._lift.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self._lift.clicked.connect(self.neck.lift)
+        self.neck.fingered.connect(self._show_lift)
         self._build_plays()
         self._low = False
         self._stack = QStackedWidget()
@@ -137,7 +142,9 @@ class InstrumentPanel(QFrame):
         side.addWidget(self.plays)
         side.addWidget(self.touch)
         side.addWidget(self.techniques)
+        side.addWidget(self._lift)
         side.addStretch(1)
+        self._lift.hide()
         self._grid = QGridLayout(self)
         self._grid.setHorizontalSpacing(8)
         self._grid.setColumnStretch(1, 1)
@@ -181,6 +188,7 @@ class InstrumentPanel(QFrame):
         self._stack.setCurrentWidget(self.keys if shown == "keys" else self.neck)
         self._hint.setText(HINTS[shown])
         self._place_hint()
+        self._show_lift()
 
     def set_drums(self, drums: bool) -> None:
         """For drums, which have no strings to show: their keys are shown, whatever the surface is."""
@@ -291,6 +299,9 @@ class InstrumentPanel(QFrame):
         """Releases all keys that are down."""
         self.keys.release_all()
         self.neck.release_all()
+
+    def _show_lift(self) -> None:
+        self._lift.setVisible(bool(self.neck.fingers) and self._stack.currentWidget() is self.neck)
 
     def _choose_touch(self, touch: str) -> None:
         self.keys.legato = self.neck.legato = touch != "pluck"

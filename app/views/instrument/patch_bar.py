@@ -331,7 +331,7 @@ class PatchBar(QFrame):
 
     def show_octave(self, octave: int, lowest: int, highest: int) -> None:
         """The octave of the lowest of the computer's keys, of those at which a key sounds."""
-        self.octave.setText(f"from C{octave}")
+        self.octave.setText(f"octave C{octave}")
         self._lower.setEnabled(octave > lowest)
         self._higher.setEnabled(octave < highest)
 

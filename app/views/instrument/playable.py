@@ -25,7 +25,7 @@ from app.views import theme
 from app.views.controls.parts import ENTER_KEYS
 
 LOWEST, HEIGHT = 72, 104  # of a surface in a low window, and otherwise, in pixels
-SOFTEST, HARDEST = 16, 127  # velocities of a click at the top and at the bottom of a place
+SOFTEST, HARDEST = 40, 127  # velocities of a click at the top and at the bottom of a place
 TIP_MS = 5_000  # the tooltip covers keys
 TYPED = 96  # velocity of the Enter key
 LEVEL_STEPS = 24  # that can be distinguished; finer changes are not painted

@@ -24,7 +24,7 @@ MERGED = 2.0  # pixels: of two lines that are nearer, one hides the other
 
 @dataclass(frozen=True)
 class ShownPluck:
-    """The pluck as chosen. shape_mm (points,); `label` says its shape and width."""
+    """The pluck as chosen. shape_mm (points,); `label`: its shape and width in words."""
 
     position: float
     amplitude_mm: float
@@ -145,7 +145,7 @@ def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, 
     painter.setBrush(QColor(theme.BACKGROUND))
     painter.setPen(Qt.PenStyle.NoPen)
     painter.drawEllipse(at, 2.2, 2.2)
-    words = f"{pluck.position:.2f}   {pluck.amplitude_mm:.1f} mm"
+    words = f"at {pluck.position:.2f}   {pluck.amplitude_mm:.1f} mm"
     if pluck.label:
         words += f"   {pluck.label}"
     painter.setFont(theme.small_font(12))

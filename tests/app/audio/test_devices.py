@@ -190,7 +190,7 @@ def test_rescanning_finds_what_was_plugged_in(sounddevice: FakeSoundDevice) -> N
 
 
 def test_a_vanished_device_is_named(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
-    with pytest.raises(AudioUnavailable, match="“Headset” has been disconnected") as caught:
+    with pytest.raises(AudioUnavailable, match="“Headset” was not found: it is disconnected") as caught:
         open_device(AudioDevice("Headset", "ALSA", 48_000), 0.05, mixer)
     assert caught.value.kind is ProblemKind.VANISHED
 

@@ -283,7 +283,7 @@ def test_a_stall_is_reported_and_withdrawn(sound: Sound, desk: Desk) -> None:
     opened(sound)
     desk.outputs[0].is_stalled = True
     wait_for(lambda: desk.problems != [])
-    assert "is not responding" in str(sound.status().problem)
+    assert "“Headphones” stopped" in str(sound.status().problem)
     time.sleep(0.2)
     assert [problem.kind for problem in desk.problems] == [ProblemKind.STALLED]
     desk.outputs[0].is_stalled = False

@@ -87,7 +87,7 @@ def test_octave_keys_stop_where_no_key_sounds_and_the_strip_says_so(qtbot: QtBot
             press(qtbot, played, key)
         assert played.session.choices.octave == octave
         assert QToolTip.text() == f"{words} octave: Toy wires has C3 to D♯6"
-    assert played.window.instrument.bar.octave.text() == "from C6"
+    assert played.window.instrument.bar.octave.text() == "octave C6"
     press(qtbot, played, Qt.Key.Key_A)
     qtbot.waitUntil(lambda: keys_that_ring(played) == {84})
     played.window.instrument.bar.octave_asked.emit(1)
@@ -99,7 +99,7 @@ def test_the_octave_moves_into_the_range_of_another_instrument(qtbot: QtBot, pla
     played.patches.choose("slack_bass")
     assert played.session.choices.octave == 0
     assert QToolTip.text() == "Octave moved: Slack bass has C1 to A♯3"
-    assert played.window.instrument.bar.octave.text() == "from C3"
+    assert played.window.instrument.bar.octave.text() == "octave C3"
     played.patches.choose("concert_harp")
     assert played.session.choices.octave == 0, "keys sound there"
 

@@ -109,3 +109,18 @@ def test_what_keys_do_is_chosen(qtbot: QtBot, panel: InstrumentPanel) -> None:
     panel.set_drums(True)
     assert not panel.touch.isEnabled()
     assert not panel.techniques.isEnabled()
+
+
+def test_fingers_are_lifted_by_a_button_that_is_there_only_then(qtbot: QtBot, panel: InstrumentPanel) -> None:
+    panel.neck.set_strings((("A2", 45), ("D3", 50)))
+    panel.set_range(45, 70)
+    panel.show_surface("neck")
+    button = next(each for each in panel.findChildren(QAbstractButton) if each.text() == "Lift fingers")
+    assert button.isHidden()
+    qtbot.mouseClick(panel.neck, Qt.MouseButton.RightButton, pos=panel.neck.cell(0, 3).center().toPoint())
+    assert panel.neck.fingers == {0: 3} and not button.isHidden()
+    panel.show_surface("keys")
+    assert button.isHidden()
+    panel.show_surface("neck")
+    qtbot.mouseClick(button, Qt.MouseButton.LeftButton)
+    assert panel.neck.fingers == {} and button.isHidden()

@@ -99,7 +99,7 @@ def test_what_the_instrument_does_is_reported(qtbot: QtBot, bar: PatchBar) -> No
     bar.show_recording(None)
     assert not bar.record.isChecked()
     bar.show_octave(-1, -2, 3)
-    assert bar.octave.text() == "from C-1"
+    assert bar.octave.text() == "octave C-1"
     bar.show_velocity(17)
     assert bar.velocity.text() == "velocity 17"
     bar.show_note("Choose an instrument")
