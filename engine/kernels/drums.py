@@ -151,7 +151,8 @@ def _make(
 ) -> None:
     """A voice that sets out from the speeds that a blow gives its modes; `struck`: those that 1 N s gives."""
     counts, n, rate_hz = voice.view(np.int64), tables[drum + of.DRUM_MODES], player[of.PLAYER_RATE]
-    for slot in range(at.state(n) + at.TRUTH_ROWS * n):
+    used = at.FOLLOWING if kind == at.TENSION else at.TRUTH_ROWS  # what follows from them is prepared
+    for slot in range(at.state(n) + used * n):
         voice[slot] = 0.0
     counts[at.KIND], counts[at.MODES], counts[at.POINTS] = kind, n, tables[of.TABLE_POINTS]
     counts[at.BEGAN_FRAME], counts[at.MOVING] = -1, n

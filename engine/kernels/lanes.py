@@ -22,10 +22,10 @@ from engine.kernels.compiled import COMPILED
 
 LANES = 4
 # Rows of a block: z = x + iy, those of `kernels.tension.prepare`, and the output
-X, Y, COSINE, SINE, KICK, SECOND_KICK, STRETCH, SECOND_STRETCH, SEEN, SQUARE = range(10)
-EARS = 10  # two for each: the weight, and the weight times κ p
+X, Y, COSINE, SINE, KICK, STRETCH, RATIO, SEEN, SQUARE = range(9)
+EARS = 9  # the weights of each
 MOST_EARS = 4
-ROWS = EARS + 2 * MOST_EARS
+ROWS = EARS + MOST_EARS
 BLOCK = ROWS * LANES
 
 _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
@@ -123,25 +123,27 @@ def _sweep(turns: bool, ears: int):
             code = _Blocks(context, builder, signature.args[0], arguments[0], 2 + 2 * ears)
             first, near, far = arguments[1:4]
             linear, squared = (code.spread(each) for each in arguments[4:6])
+            ones = ir.Constant(_VECTOR, [1.0] * LANES)
             behind = builder.add(first, builder.mul(near, _WHOLE(BLOCK)))
             for begin, blocks, hearing in ((first, near, ears), (behind, far, 0)):
                 with cgutils.for_range(builder, blocks) as loop:
                     code.begin(begin, loop.index)
-                    x = code.row(X)
+                    x, ratio = code.row(X), code.row(RATIO)
                     if turns:
-                        kick = builder.fsub(
-                            builder.fmul(code.row(KICK), linear), builder.fmul(code.row(SECOND_KICK), squared)
-                        )
-                        y = builder.fadd(code.row(Y), builder.fmul(kick, x))
+                        share = builder.fsub(linear, builder.fmul(ratio, squared))
+                        y = builder.fadd(code.row(Y), builder.fmul(builder.fmul(code.row(KICK), share), x))
                         cosine, sine = code.row(COSINE), code.row(SINE)
                         code.set_row(Y, builder.fadd(builder.fmul(sine, x), builder.fmul(cosine, y)))
                         x = builder.fsub(builder.fmul(cosine, x), builder.fmul(sine, y))
                         code.set_row(X, x)
-                    square = builder.fmul(x, x)
-                    code.add(0, code.row(STRETCH), square)
-                    code.add(1, code.row(SECOND_STRETCH), square)
-                    for each in range(2 * hearing):
-                        code.add(2 + each, code.row(EARS + each), x)
+                    stretch = builder.fmul(code.row(STRETCH), builder.fmul(x, x))
+                    code.add(0, stretch, ones)
+                    code.add(1, stretch, ratio)
+                    lifted = builder.fmul(code.row(SEEN), x) if hearing else x
+                    for each in range(hearing):
+                        weight = code.row(EARS + each)
+                        code.add(2 + 2 * each, weight, x)
+                        code.add(3 + 2 * each, weight, lifted)
             stretch, second, *found = code.totals()
             data = context.make_array(signature.args[6])(context, builder, arguments[6]).data
             for slot, total in enumerate(found):

@@ -93,7 +93,9 @@ REST_STRETCH = 60  # R what they add to S on average, and
 REST_SECOND = 61  # R to R
 REST_DECAY = 62  # R of both in a quantum
 NEARNESS = 63  # R full scale over the length in which a pick-up's flux grows e-fold; 0: it grows evenly
-HEADER = 64
+NODES = 64  # W since the rows were prepared, for which modes that rest have not turned, and
+STRETCHED = 65  # R the sum of S over them
+HEADER = 66
 
 
 @njit(inline="always", **COMPILED)
@@ -140,7 +142,7 @@ BANK_ROWS = 21
 OMEGA_SQUARED, SIGMA, COUPLING, STRETCH = 2, 3, 4, 5
 FOLLOWING = 6
 TRUTH_ROWS = FOLLOWING + 16  # the flows of half a palindrome, of four rows each
-PHYSICAL = FOLLOWING + 8  # behind the rows of `kernels.tension.advance`: amplitudes and speeds for a moment
+PHYSICAL = FOLLOWING + 7  # behind the rows of `kernels.tension.advance`: amplitudes and speeds for a moment
 ORDER = PHYSICAL + 2  # whole numbers: modes
 TENSION_ROWS = ORDER + 1
 

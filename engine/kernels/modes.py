@@ -28,9 +28,9 @@ def row(voice: np.ndarray, modes: int, which: int) -> np.ndarray:
 
 @njit(inline="always", **COMPILED)
 def following(voice: np.ndarray, modes: int) -> np.ndarray:
-    """What follows from the modes of latents that share a tension, (8, modes): see `kernels.tension.prepare`."""
+    """What follows from the modes of latents that share a tension, (7, modes): see `kernels.tension.prepare`."""
     slot = at.state(modes) + at.FOLLOWING * modes
-    return voice[slot : slot + 8 * modes].reshape(8, modes)
+    return voice[slot : slot + 7 * modes].reshape(7, modes)
 
 
 @njit(inline="always", **COMPILED)

@@ -30,14 +30,14 @@ def _load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, mem
     """Copies modes, in this order, into blocks of `kernels.lanes`; unused lanes are zero.
 
     Args:
-        rows: (8, modes), see `advance`.
+        rows: (7, modes), see `advance`.
     """
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number)
         if number < len(order):
             mode = order[number]
             memory[slot], memory[slot + lanes.LANES] = x[mode], y[mode]
-            for each in range(8):
+            for each in range(7):
                 memory[slot + (lanes.COSINE + each) * lanes.LANES] = rows[each, mode]
         else:
             for each in range(lanes.EARS):
@@ -45,16 +45,11 @@ def _load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, mem
 
 
 @njit(**COMPILED)
-def _load_weights(
-    weights: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int
-) -> None:
+def _load_weights(weights: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
     """Copies the weights of one ear into the blocks that `_load` fills."""
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
-        slot = first + lanes.place(number) + (lanes.EARS + 2 * ear) * lanes.LANES
-        memory[slot] = memory[slot + lanes.LANES] = 0.0
-        if number < len(order):
-            mode = order[number]
-            memory[slot], memory[slot + lanes.LANES] = weights[mode], weights[mode] * rows[6, mode]
+        slot = first + lanes.place(number) + (lanes.EARS + ear) * lanes.LANES
+        memory[slot] = weights[order[number]] if number < len(order) else 0.0
 
 
 @njit(**COMPILED)
@@ -141,7 +136,7 @@ def advance(
         largest_stretches: of S, (batch,).
         nodes: of a frame.
         silence: the highest modes rest from when their amplitude is below this share of that of all together.
-        rows: (8, modes): λ's parts, h k A/ω, h k κ r/ω, η² A, η² κ r, κ p and ω².
+        rows: (7, modes): λ's parts, h k A/ω, η² A, κ r/A, κ p and ω².
     """
     batch, steps, modes = out.shape
     memory, order, nobody, rest = np.empty(lanes.slots(modes)), np.arange(modes), np.empty(0), (0.0, 0.0)
@@ -251,9 +246,9 @@ def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray
         r, p = min(max(r, -1.0), 1.0), min(max(p, -1.0), 1.0)
         kappa, angle, shrunk = h * h * couplings[m], h * couplings[m] / omega, math.exp(-h * sigma)
         rows[0, m], rows[1, m] = shrunk * math.cos(phase), shrunk * math.sin(phase)
-        rows[2, m], rows[3, m] = angle * growth, angle * kappa * r
-        rows[4, m], rows[5, m] = stretches[m] * growth, stretches[m] * kappa * r
-        rows[6, m], rows[7, m] = kappa * p, omega * omega
+        rows[2, m], rows[3, m] = angle * growth, stretches[m] * growth
+        rows[4, m] = kappa * r / growth if growth > 0.0 else 0.0
+        rows[5, m], rows[6, m] = kappa * p, omega * omega
     counts[at.STEPS] = nodes
     if drum or not counts[at.PREPARED]:
         counts[at.REFRESH] = 0 if drum else FEWER_QUANTA
@@ -261,23 +256,60 @@ def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray
     order = row(voice, n, at.ORDER).view(np.int64)
     for m in range(n):
         order[m] = m
+    counts[at.HEARD] = counts[at.FELT] = counts[at.MOVING]
+    counts[at.NODES], voice[at.STRETCHED] = 0, 0.0
+
+
+@njit(**COMPILED)
+def _turn(voice: np.ndarray, mode: int, sign: float) -> None:
+    """Turns a mode by the angle that it has swung through since the rows were prepared, forward or back.
+
+    Modes that rest are kept without that angle. A kick K S x turns z by K S/2 on average.
+    """
+    counts = voice.view(np.int64)
+    n = counts[at.MODES]
+    if counts[at.NODES] == 0:
+        return
+    x, y, rows = row(voice, n, 0), row(voice, n, 1), following(voice, n)
+    angle = counts[at.NODES] * math.atan2(rows[1, mode], rows[0, mode]) + 0.5 * rows[2, mode] * voice[at.STRETCHED]
+    cosine, sine = math.cos(angle), sign * math.sin(angle)
+    x[mode], y[mode] = cosine * x[mode] - sine * y[mode], sine * x[mode] + cosine * y[mode]
 
 
 @njit(**COMPILED)
 def _fall(voice: np.ndarray) -> None:
-    """Modes that rest because nobody hears or feels them decay to the present; their phase is nobody's."""
+    """Modes that rest because nobody hears or feels them decay to the present."""
     counts = voice.view(np.int64)
     n, frames = counts[at.MODES], counts[at.RESTED] * at.QUANTUM
     if frames == 0:
         return
     x, y, rows = row(voice, n, 0), row(voice, n, 1), following(voice, n)
     order = row(voice, n, at.ORDER).view(np.int64)
+    steps = counts[at.STEPS] * frames // 2  # a quantum is even
     for place in range(counts[at.FELT], counts[at.MOVING]):
         m = order[place]
-        left = (rows[0, m] * rows[0, m] + rows[1, m] * rows[1, m]) ** (0.5 * counts[at.STEPS] * frames)
+        square, left, power = rows[0, m] * rows[0, m] + rows[1, m] * rows[1, m], 1.0, steps
+        while power > 0:  # square ** steps: of whole numbers in fewer steps than of any
+            if power & 1:
+                left *= square
+            square *= square
+            power >>= 1
         x[m] *= left
         y[m] *= left
     counts[at.RESTED] = 0
+
+
+@njit(**COMPILED)
+def _wake(voice: np.ndarray) -> None:
+    """Brings the modes that rest to the present; the next quantum chooses again which rest."""
+    _fall(voice)
+    counts = voice.view(np.int64)
+    order = row(voice, counts[at.MODES], at.ORDER).view(np.int64)
+    if counts[at.FELT] < counts[at.MOVING]:
+        counts[at.REFRESH] = 0
+    for place in range(counts[at.FELT], counts[at.MOVING]):
+        _turn(voice, order[place], 1.0)
+    counts[at.FELT] = counts[at.MOVING]
 
 
 @njit(**COMPILED)
@@ -288,14 +320,16 @@ def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray
 
     Args:
         sets: of weights that hear it.
-        scratch: room for two rows (modes,).
+        scratch: room for three rows (modes,).
     """
     counts = voice.view(np.int64)
     _fall(voice)
     n, moving = counts[at.MODES], counts[at.MOVING]
     x, y, rows, sigmas = row(voice, n, 0), row(voice, n, 1), following(voice, n), row(voice, n, at.SIGMA)
-    stretches, order = rows[4], row(voice, n, at.ORDER).view(np.int64)
-    sizes, heard = scratch[:moving], scratch[moving : 2 * moving]
+    stretches, order = rows[3], row(voice, n, at.ORDER).view(np.int64)
+    sizes, heard, rested = scratch[:moving], scratch[moving : 2 * moving], scratch[2 * moving : 3 * moving]
+    for place in range(moving):
+        rested[order[place]] = 1.0 if place >= counts[at.FELT] else 0.0
     total = stretch = 0.0
     for m in range(moving):
         sizes[m], heard[m] = x[m] * x[m] + y[m] * y[m], 0.0
@@ -326,13 +360,18 @@ def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray
             order[place] = m
             place += 1
     counts[at.FELT], counts[at.MOVING] = place, moving
+    for felt in range(place):
+        if rested[order[felt]] > 0.0:
+            _turn(voice, order[felt], 1.0)
     rest = second = rate = 0.0
     for m in range(moving):
         if heard[m] <= audible and not stretches[m] * sizes[m] > UNFELT * stretch:
             order[place] = m
             place += 1
+            if not rested[m] > 0.0:
+                _turn(voice, m, -1.0)
             rest += 0.5 * stretches[m] * sizes[m]
-            second += 0.5 * rows[5, m] * sizes[m]
+            second += 0.5 * stretches[m] * rows[4, m] * sizes[m]
             rate += stretches[m] * sizes[m] * sigmas[m]
     voice[at.REST_STRETCH], voice[at.REST_SECOND] = rest, second
     voice[at.REST_DECAY] = math.exp(-rate / rest * at.QUANTUM / program[at.S_RATE]) if rest > 0 else 0.0
@@ -344,13 +383,13 @@ def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.nd
     """Half of what `_node` does first, forward or back, in place of y."""
     first = second = 0.0
     for m in range(len(x)):
-        square = x[m] * x[m]
-        first += rows[4, m] * square
-        second += rows[5, m] * square
+        stretch = rows[3, m] * x[m] * x[m]
+        first += stretch
+        second += rows[4, m] * stretch
     first = min(first, largest_stretch)
     linear, squared = first * (1 - 2 * second), first * first
     for m in range(len(x)):
-        y[m] += sign * 0.5 * (rows[2, m] * linear - rows[3, m] * squared) * x[m]
+        y[m] += sign * 0.5 * rows[2, m] * (linear - rows[4, m] * squared) * x[m]
 
 
 @njit(**COMPILED)
@@ -358,7 +397,7 @@ def physical(voice: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
     """Amplitudes in m and speeds in m/s, (modes,), of a voice as it is now: the inverse of `set_out`, to rounding."""
     counts = voice.view(np.int64)
     n = counts[at.MODES]
-    _fall(voice)
+    _wake(voice)
     x, y = row(voice, n, 0), row(voice, n, 1)
     rows = following(voice, n)
     sigmas, stretches = row(voice, n, at.SIGMA), row(voice, n, at.STRETCH)
@@ -369,21 +408,21 @@ def physical(voice: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
     for _ in range(NEWTON_STEPS):
         value, slope = -tension, 1.0
         for m in range(n):
-            lift = 1 + rows[6, m] * tension
+            lift = 1 + rows[5, m] * tension
             square = stretches[m] * (x[m] / lift) ** 2
             value += square
-            slope += 2 * square * rows[6, m] / lift
+            slope += 2 * square * rows[5, m] / lift
         change = value / slope
         tension += change
         if not abs(change) > NEWTON_DONE * abs(tension):
             break
     moved = 0.0
     for m in range(n):
-        q[m] = x[m] / (1 + rows[6, m] * tension)
-        v[m] = -math.sqrt(rows[7, m]) * v[m] - sigmas[m] * q[m]
+        q[m] = x[m] / (1 + rows[5, m] * tension)
+        v[m] = -math.sqrt(rows[6, m]) * v[m] - sigmas[m] * q[m]
         moved += stretches[m] * q[m] * v[m]
     for m in range(n):
-        v[m] = v[m] * (1 + rows[6, m] * tension) + 2 * rows[6, m] * q[m] * moved
+        v[m] = v[m] * (1 + rows[5, m] * tension) + 2 * rows[5, m] * q[m] * moved
 
 
 @njit(**COMPILED)
@@ -402,26 +441,26 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
     sigmas, couplings, stretches = row(voice, n, at.SIGMA), row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
     tension = held = energy = widest = 0.0
     for m in range(n):
-        omega, square = math.sqrt(rows[7, m]), q[m] * q[m]
+        omega, square = math.sqrt(rows[6, m]), q[m] * q[m]
         tension += stretches[m] * square
         held += couplings[m] * square
         y[m] = -(v[m] + sigmas[m] * q[m]) / omega
-        energy += rows[7, m] * (square + y[m] * y[m])
-        widest = max(widest, stretches[m] / rows[7, m])
+        energy += rows[6, m] * (square + y[m] * y[m])
+        widest = max(widest, stretches[m] / rows[6, m])
     largest = ENERGY_BOUND * (energy + 0.5 * tension * held)
     voice[at.LARGEST_ENERGY] = min(voice[at.LARGEST_ENERGY], largest) if bounded else largest
     voice[at.LARGEST_STRETCH] = voice[at.LARGEST_ENERGY] * widest
     moved, share = 0.0, 1.0
     for m in range(n):
-        part = stretches[m] * q[m] / (1 + rows[6, m] * tension)
+        part = stretches[m] * q[m] / (1 + rows[5, m] * tension)
         moved += part * v[m]
-        share += 2 * part * rows[6, m] * q[m]
+        share += 2 * part * rows[5, m] * q[m]
     moved /= share
     for m in range(n):
-        lift = 1 + rows[6, m] * tension
-        lifted = (v[m] - 2 * rows[6, m] * q[m] * moved) / lift
+        lift = 1 + rows[5, m] * tension
+        lifted = (v[m] - 2 * rows[5, m] * q[m] * moved) / lift
         x[m] = q[m] * lift
-        y[m] -= (lifted - v[m]) / math.sqrt(rows[7, m])
+        y[m] -= (lifted - v[m]) / math.sqrt(rows[6, m])
     _half_kick(rows, x, voice[at.LARGEST_STRETCH], y, -1.0)
 
 
@@ -433,7 +472,7 @@ def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
     fewer = counts[at.PREPARED] and _needs_fewer_nodes(voice, program)
     if counts[at.PREPARED] and not gliding(voice) and not fewer:
         return
-    q, v, squares = row(voice, n, at.PHYSICAL), row(voice, n, at.PHYSICAL + 1), following(voice, n)[7]
+    q, v, squares = row(voice, n, at.PHYSICAL), row(voice, n, at.PHYSICAL + 1), following(voice, n)[6]
     if counts[at.PREPARED]:
         physical(voice, q, v)
         if fewer:
@@ -483,14 +522,17 @@ def generate(
     _load(x, y, rows, quiet, scratch, behind)
     for ear in range(ears):
         place = at.weights(n, ear // points, ear % points, 0)
-        _load_weights(voice[place : place + n], rows, loud, scratch, first, ear)
+        _load_weights(voice[place : place + n], loud, scratch, first, ear)
     moving, total, apart, largest = len(loud), 0.0, 2 if points == 1 else 1, voice[at.LARGEST_STRETCH]
+    stretched = at.QUANTUM * nodes * rest[0]
     sums = lanes.add_up(scratch, first, near, far, ears, ear_sums)
     for frame in range(at.QUANTUM):
         for ear in range(ears):
             out[apart * ear, frame] = ear_sums[2 * ear] - (sums[0] + rest[0]) * ear_sums[2 * ear + 1]
+        stretched += sums[0]
         for _ in range(nodes - 1):
             sums = _node(scratch, first, near, far, 0, sums, rest, largest, ear_sums)
+            stretched += sums[0]
         sums = _node(scratch, first, near, far, ears, sums, rest, largest, ear_sums)
         voice[at.LARGEST_ENERGY] *= voice[at.DECAY]
         if frame % 16 == 15:
@@ -506,6 +548,8 @@ def generate(
     if rests:
         counts[at.REFRESH] -= 1
         counts[at.RESTED] += 1
+        counts[at.NODES] += at.QUANTUM * nodes
+        voice[at.STRETCHED] += stretched
         voice[at.REST_STRETCH] *= voice[at.REST_DECAY]
         voice[at.REST_SECOND] *= voice[at.REST_DECAY]
     else:

@@ -59,6 +59,7 @@ ENERGY_BOUND = 1.5  # of the energy at the start: more is not believed
 SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
 FRAMES_AT_ONCE = 4096
 HARDEST_KICK = 0.3  # of the root of Σ η²κ (q² + v²/ω²) as a string sets out: beyond it nodes come closer
+TINY = 1e-300
 MOST_NODES = 3  # times as many as a soft pluck has
 
 
@@ -99,15 +100,14 @@ class Step(NamedTuple):
     cosine: Tensor  # Re λ
     sine: Tensor  # Im λ
     kick: Tensor  # h k A/ω
-    second_kick: Tensor  # h k κ r/ω
     stretch: Tensor  # η² A
-    second_stretch: Tensor  # η² κ r
+    ratio: Tensor  # κ r/A; 0 where A is
     seen: Tensor  # κ p
     squares: Tensor  # ω²
 
     @property
     def rows(self) -> Tensor:
-        """For `engine.kernels.tension`, (8, modes)."""
+        """For `engine.kernels.tension`, (7, modes)."""
         return torch.stack(self[2:])
 
 
@@ -270,9 +270,8 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
             shrunk * phase.cos(),
             shrunk * phase.sin(),
             angle * growth,
-            angle * kappa * r,
             self._stretch * growth,
-            self._stretch * kappa * r,
+            torch.where(growth > 0, kappa * r / growth.clamp(min=TINY), 0.0),
             kappa * p,
             omega.square(),
         )
@@ -299,8 +298,8 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         moved = moved / (1 + 2 * (step.seen * self._stretch * q.square() / (1 + share)).sum(-1, keepdim=True))
         lifted = (swing - 2 * step.seen * q * moved / omega) / (1 + share)
         first = torch.minimum((step.stretch * x.square()).sum(-1, keepdim=True), state.largest_stretch[:, None])
-        second = (step.second_stretch * x.square()).sum(-1, keepdim=True)
-        kick = step.kick * first * (1 - 2 * second) - step.second_kick * first.square()
+        second = (step.stretch * step.ratio * x.square()).sum(-1, keepdim=True)
+        kick = step.kick * (first * (1 - 2 * second) - step.ratio * first.square())
         return replace(state, x=x, y=state.y + (swing - lifted) - 0.5 * kick * x, begun=True)
 
     def _compiled(self, state: KoopmanTensionState, step: Step, steps: int) -> tuple[Tensor, KoopmanTensionState]:
@@ -321,8 +320,8 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         for _ in range(steps):
             for _ in range(step.nodes):
                 first = (x.square() @ step.stretch).minimum(state.largest_stretch)[:, None]
-                second = (x.square() @ step.second_stretch)[:, None]
-                y = y + (step.kick * first * (1 - 2 * second) - step.second_kick * first.square()) * x
+                second = (x.square() @ (step.stretch * step.ratio))[:, None]
+                y = y + step.kick * (first * (1 - 2 * second) - step.ratio * first.square()) * x
                 x, y = step.cosine * x - step.sine * y, step.sine * x + step.cosine * y
             largest = largest * step.decay
             energy = (x.square() + y.square()) @ step.squares

@@ -52,7 +52,10 @@ MEASURED_HZ: dict[str, dict[tuple[int, int], float]] = {
     "timpani_head_26": {(0, 1): 82, (1, 1): 155, (2, 1): 229, (3, 1): 297, (4, 1): 366, (5, 1): 431},
 }
 DRUM_FILES, MODES_COMPARED = Path(__file__).parents[2] / "presets" / "drums", 40
-PUBLISHED_DROP_PERCENT = 10.0  # "around 10 percent" of a kick drum: Reid, Sound on Sound, January 2002; of toms none
+# Drops of hard blows in percent. Toms: "almost 8 %" of one of 14 inches (Gärder, Chalmers thesis 2005:23, C.4.3), 160
+# cents of one of 32 cm (Bork, PTB 1983, by Fletcher and Rossing, 18.4), both as CWBudde/algo-drum quotes them
+# (docs/paper/references.bib). A kick drum: "around 10 percent" (Reid, Sound on Sound, January 2002).
+PUBLISHED_DROPS = {"Tom": (8.0, 9.7), "Floor tom": (8.0, 9.7), "Bass drum": (9.0, 11.0)}
 SIZES = (400, 800, 1500)  # modes
 HARD = PhysicalMallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)  # so that all modes move
 STRINGS, STRING_PATCH = (40, 45, 50, 55, 59, 64, 67, 71), "classical_guitar"
@@ -119,11 +122,12 @@ class MeasuredMode:
 
 @dataclass(frozen=True)
 class PitchDrop:
-    """Of the hardest blow on a drum of the kit, from its first half-period on."""
+    """Of the hardest blow on a drum of the kit, from its first half-period on; beside the range of hard blows."""
 
     drum: str
     drop_percent: float
-    published_percent: float
+    lowest_percent: float
+    highest_percent: float
 
 
 @dataclass(frozen=True)
@@ -176,9 +180,10 @@ def _drops(kit: Patch) -> tuple[PitchDrop, ...]:
     keys, found = DrumKeys(kit, Ear((0.5,))), []
     for drum in _drums(kit).drums:
         key = keys.of_key(drum.note)
-        if key is not None and drum.drum.shape == "circle":
+        published = next((drops for name, drops in PUBLISHED_DROPS.items() if drum.name.startswith(name)), None)
+        if key is not None and published is not None:
             cents = key.drop_cents(127, kit.pluck.curve)
-            found.append(PitchDrop(drum.name, 100 * (2 ** (cents / 1200) - 1), PUBLISHED_DROP_PERCENT))
+            found.append(PitchDrop(drum.name, 100 * (2 ** (cents / 1200) - 1), *published))
     return tuple(found)
 
 

@@ -11,6 +11,7 @@ from engine.pluck import SHAPES, Shape
 
 AT_BRIDGE = "The bridge hears the whole string: choose Point or Magnetic to listen at a place"
 NO_WIDTH = "A triangle has no width: choose another shape to turn it"
+SHAPE_TIP = "The shape of the pluck"
 _NAMES: dict[Shape, str] = {
     "gaussian": "Gaussian",
     "triangular": "Triangle",
@@ -25,7 +26,7 @@ _ARROW, _PICKUP_ARROW = 17, 9  # pixels
 def shape_box() -> QComboBox:
     """A narrow combo box of the names in words; its rows are SHAPES, and so is its data."""
     box = combo_box("Pluck shape", [(_NAMES[shape], shape) for shape in SHAPES])
-    box.setToolTip("The shape of the pluck")
+    box.setToolTip(SHAPE_TIP)
     return _tight(box, _WIDTH, _ARROW)
 
 

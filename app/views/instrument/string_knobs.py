@@ -14,7 +14,7 @@ from app.views import theme
 from app.views.controls.knob import LOW_HEIGHT, NARROW_WIDTH, Knob
 from app.views.controls.parts import faint, filled, vertical_rule
 from app.views.controls.plain import Label, plain_tip
-from app.views.controls.shape_box import NO_WIDTH, shape_box
+from app.views.controls.shape_box import NO_WIDTH, SHAPE_TIP, shape_box
 from engine.pluck import SHAPES
 
 HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
@@ -155,6 +155,9 @@ class StringKnobs(QWidget):
                 knob.default = _value(saved, field)
         with QSignalBlocker(self.shape):
             self.shape.setCurrentIndex(SHAPES.index(patch.pluck.shape))
+        barred = _why_barred(patch, "pluck.shape")
+        self.shape.setEnabled(not barred)
+        self.shape.setToolTip(barred or SHAPE_TIP)
 
     def show_facts(self, facts: Mapping[str, str]) -> None:
         """The resulting string: names and values with their units ("pitch": "329.6 Hz"), in order."""

@@ -100,14 +100,15 @@ def test_the_stretch_of_resting_modes_counts_on_average(monkeypatch: pytest.Monk
     assert 0 < np.square(resting - moving).sum() < 1e-11 * np.square(moving).sum()
 
 
-def test_modes_that_rested_are_heard_where_the_listener_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("key", [36, 41, 47])
+def test_modes_that_rested_are_heard_where_the_listener_moves(key: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """From above, where the head's rings alone are heard, to the side: as loud as if all modes had moved."""
 
     def sound() -> np.ndarray:
         player = InstrumentPlayer(KIT, PRESET, RATE_HZ, {"model": 1.0}, ear=Ear((0.5,)))
         mixer = Mixer(RATE_HZ, limited=False)
         mixer.set_player(player.compiled)
-        player.handle(NoteOn(47, 110))
+        player.handle(NoteOn(key, 110))
         before = mixer.render(4_800)[:, 0]
         player.take(player.tabled(player.loud_keys(KIT, Ear((0.05,)))))
         return np.concatenate([before, mixer.render(9_600)[:, 0]]).astype(np.float64)
@@ -125,7 +126,7 @@ def test_modes_that_rested_are_heard_where_the_listener_moves(monkeypatch: pytes
             power = np.abs(np.fft.rfft(each[begin : begin + 4_800] * window)) ** 2
             found = [power[(hz >= low) & (hz < high)].sum() for low, high in pairwise(bands)]
             levels_db.append(10 * np.log10(found))
-        assert np.abs(np.diff(levels_db, axis=0)).max() < 0.7  # in the highest band, 45 dB below the lowest
+        assert np.abs(np.diff(levels_db, axis=0)).max() < 0.2  # modes that rest keep their phase
 
 
 def test_the_kernel_strikes_as_the_engine_does() -> None:
@@ -183,14 +184,14 @@ def test_every_pad_has_a_drum_and_others_are_refused() -> None:
 
 
 def test_the_pitch_drop_follows_velocity() -> None:
-    """At the hardest within up to about 10 %, which Fletcher and Rossing (1998), 18.3, have: from memory."""
+    """At the hardest between published ones of toms: almost 8 %, or 133 cents, and 160 cents (`docs/drums.md`)."""
     keys = DrumKeys(TOM, Ear((0.5,)))
     found = keys.of_key(47)
     assert found is not None
     drops = [found.drop_cents(velocity) for velocity in (20, 64, 100, 127)]
     assert drops == sorted(drops)
     assert drops[0] < 2
-    assert 50 < drops[-1] < 170
+    assert 133 < drops[-1] < 160
     hard, soft = (lowest_hz(rendered(TOM, 47, v, seconds=0.1).mean(1), 60, 200) for v in (127, 10))
     assert 20 < 1200 * np.log2(hard / soft) < 170
     glides = glides_cents(TOM)

@@ -7,6 +7,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
+from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Patch, Pickup
 from app.patches.tuning import TuningChoice
 from app.views import theme
@@ -138,3 +139,9 @@ def test_knobs_that_were_hidden_while_text_grew_have_their_room(qtbot: QtBot, qa
         assert knobs.shape.geometry().right() < knobs.knobs["pluck.position"].geometry().left()
     finally:
         theme.apply_theme(qapp, "dark")
+
+
+def test_drums_have_no_pluck_to_shape(knobs: StringKnobs, guitar: Patch) -> None:
+    for patch, has in ((read_patch(SHIPPED / "timpani.json"), False), (guitar, True)):
+        knobs.show_patch(patch)
+        assert knobs.shape.isEnabled() == has
