@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from app.instrument.effects import body_curves
-from app.instrument.strings import KeyString, Strings
+from app.instrument.strings import KeyString, Strings, has_octave
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.excitation import blow_factor, release_factor
@@ -65,7 +65,8 @@ class LoudKeys:
             return None
         resonator = resonator_of(found, self.patch, self._preset)
         level = float(10 ** (self.patch.level_db / 20)) / self.patch.course.strings
-        return LoudKey(found, resonator, self._gain(self._sound(found, resonator)) * self._limit * level)
+        sound = self._sound(found, resonator, string)
+        return LoudKey(found, resonator, self._gain(sound) * self._limit * level)
 
     def string_of(self, key: int, string: int | None = None) -> KeyString | None:
         """As `of_key`, the string alone, which takes no time."""
@@ -113,8 +114,12 @@ class LoudKeys:
         modes = len(sound) // of.SOUND_ROWS
         return float(loudness.gain(sound, modes, len(self.ear.points), *self._heard_through))
 
-    def _sound(self, string: KeyString, resonator: Resonator) -> Array:
-        """What keys are equally loud by, as `engine.kernels.loudness` reads it."""
+    def _sound(self, string: KeyString, resonator: Resonator, number: int | None = None) -> Array:
+        """What keys are equally loud by, as `engine.kernels.loudness` reads it.
+
+        Args:
+            number: on which string of a set the key is played, as in `of_key`.
+        """
         patch = self.patch
         pluck = on_string(string, patch.pluck.pluck(of.REFERENCE_VELOCITY))
         displacement_m = pluck.displacement(resonator.points)
@@ -129,10 +134,20 @@ class LoudKeys:
             weights = weights * np.sinc(half / np.pi)[:, None]
             weights = weights * resonator.omega[:, None] * (FULL_SCALE_M / FULL_SCALE_M_S)
         sound = np.zeros((of.SOUND_ROWS, resonator.modes))
-        sound[of.SOUND_OMEGA], sound[of.SOUND_SIGMA] = resonator.omega, resonator.sigma
+        sound[of.SOUND_OMEGA], sound[of.SOUND_SIGMA] = resonator.omega, self._first_decay(string, resonator, number)
         heard = weights * amplitudes[:, None]
         sound[of.SOUND_LEFT : of.SOUND_LEFT + heard.shape[1]] = heard.T
         return sound.ravel()
+
+    def _first_decay(self, string: KeyString, resonator: Resonator, number: int | None) -> Array:
+        """σ of the modes (modes,) while strings on one bridge are in phase, as they are at first."""
+        patch, course, moving = self.patch, self.patch.course, self.polarisations
+        if moving is None or course.strings == 1 or course.bridge == 0 or has_octave(patch, string.key, number):
+            return resonator.sigma
+        both = np.array([moving.conductance_s_kg, moving.second_conductance_s_kg])
+        pull = patch.knobs.decay * string.parameters.tension_n / string.parameters.length_m
+        shared = (course.strings - 1) * course.bridge * pull * both[layout(string.modes)[1]]
+        return np.minimum(resonator.sigma + shared, of.HIGHEST_SIGMA * resonator.omega)
 
 
 def polarisations_of(patch: Patch, preset: PresetInfo) -> Polarisations | None:

@@ -109,6 +109,18 @@ def chosen_string(strings: StringSet, key: int) -> int:
     return next((number for number, string in enumerate(ordered) if string.note <= key), len(ordered) - 1)
 
 
+def has_octave(patch: Patch, key: int, number: int | None) -> bool:
+    """Whether the course of a key has an octave string.
+
+    Args:
+        number: on which string of a set it is played, from the highest, 0; None: on the one that it chooses.
+    """
+    if patch.course.octaves == 0 or not isinstance(patch.strings, StringSet):
+        return False
+    chosen = chosen_string(patch.strings, key) if number is None else number
+    return chosen >= len(patch.strings.strings) - patch.course.octaves
+
+
 def fretting(strings: StringSet, key: int) -> list[int]:
     """The strings of a set on which a key can be fretted, counted from the highest, 0."""
     ordered = enumerate(strings.strings[::-1])

@@ -143,6 +143,7 @@ def table_of(
     course = patch.course
     counts[of.TABLE_COURSE], counts[of.TABLE_OCTAVES] = course.strings, course.octaves
     memory[of.TABLE_APART_CENTS], memory[of.TABLE_APART_S] = course.cents, course.apart_ms / 1000
+    memory[of.TABLE_BRIDGE] = course.bridge
     memory[of.TABLE_VARIATION] = patch.pluck.variation if varied else 0.0
     memory[of.TABLE_LEVEL] = 10 ** (patch.level_db / 20)
     memory[of.TABLE_NOISE_LEVEL] = of.PART_S * 10 ** ((of.WANTED_DB + patch.level_db) / 10)

@@ -230,12 +230,14 @@ class Course(Value):
         octaves: of a set of strings, how many of the lowest have an octave string as their second.
         cents: between strings of a course. It varies from key to key by half at most.
         apart_ms: from the stroke of one string to that of the next.
+        bridge: share of the loss at the bridge, by `polarisations`, that unisons have in common, 0 … 1.
     """
 
     strings: Annotated[int, Field(ge=1, le=3)] = 1
     octaves: Annotated[int, Field(ge=0, le=8)] = 0
     cents: Annotated[float, ranged(0, 50)] = 0.0
     apart_ms: Annotated[float, ranged(0, 50)] = 0.0
+    bridge: Annotated[float, ranged(0, 1)] = 0.0
 
 
 class Losses(Value):

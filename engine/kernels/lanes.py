@@ -75,8 +75,8 @@ class _Blocks:
         one = self.builder.insert_element(nothing, value, _LANE(0))
         return self.builder.shuffle_vector(one, nothing, ir.Constant(ir.VectorType(_LANE, LANES), [0] * LANES))
 
-    def begin(self, first, block) -> None:
-        self._place = self.builder.add(first, self.builder.mul(block, _WHOLE(BLOCK)))
+    def begin(self, first, block, slots: int = BLOCK) -> None:
+        self._place = self.builder.add(first, self.builder.mul(block, _WHOLE(slots)))
 
     def row(self, which: int):
         return self.builder.load(self._row(which), align=8 * LANES)
@@ -206,3 +206,36 @@ def energies(typing_context: Any, memory: Any, first: Any, blocks: Any):
         return context.make_tuple(builder, signature.return_type, code.totals())
 
     return types.UniTuple(types.float64, 2)(memory, first, blocks), generate
+
+
+PARTS, PART_BLOCKS = 3, 12  # rows of parts in a bridge: of y and x in its motion, and of that in y; of so many blocks
+
+
+def _meet(strings: int):
+    """The bridge that strings share takes from each what its modes have in it, block by block.
+
+    Returns a function of the first slots of their modes and of their parts (PARTS, PART_BLOCKS, LANES).
+    """
+
+    @intrinsic
+    def meet(typing_context, memory, blocks, one, other, third, of_one, of_other, of_third):
+        def generate(context, builder, signature, arguments):
+            codes = [_Blocks(context, builder, signature.args[0], arguments[0], 0) for _ in range(2 * strings)]
+            found = list(zip(codes[:strings], arguments[2:], codes[strings:], arguments[5:], strict=False))
+            with cgutils.for_range(builder, arguments[1]) as loop:
+                moved = ir.Constant(_VECTOR, [0.0] * LANES)
+                for code, modes, part, parts in found:
+                    code.begin(modes, loop.index)
+                    part.begin(parts, loop.index, LANES)
+                    moved = builder.fadd(moved, builder.fmul(part.row(0), code.row(Y)))
+                    moved = builder.fadd(moved, builder.fmul(part.row(PART_BLOCKS), code.row(X)))
+                for code, _, part, _ in found:
+                    code.set_row(Y, builder.fsub(code.row(Y), builder.fmul(part.row(2 * PART_BLOCKS), moved)))
+            return context.get_dummy_value()
+
+        return types.void(memory, blocks, one, other, third, of_one, of_other, of_third), generate
+
+    return meet
+
+
+meet_1, meet_2, meet_3 = (_meet(strings) for strings in (1, 2, 3))

@@ -95,7 +95,10 @@ REST_DECAY = 62  # R of both in a quantum
 NEARNESS = 63  # R full scale over the length in which a pick-up's flux grows e-fold; 0: it grows evenly
 NODES = 64  # W since the rows were prepared, for which modes that rest have not turned, and
 STRETCHED = 65  # R the sum of S over them
-HEADER = 66
+COURSE = 66  # W number of the strings with which it stands on one bridge; 0: none
+COURSE_DONE = 67  # W the mixer's frame, and 1, of the quantum that is already added
+BRIDGED = 68  # W its lowest modes, up to the last that has a part in the row BRIDGE
+HEADER = 69
 
 
 @njit(inline="always", **COMPILED)
@@ -138,15 +141,17 @@ CHANGE = 19  # of the level by the amplitude's share of the action, at the segme
 BANK_ROWS = 21
 
 # Rows of the state of a voice with modes (the truth, or latents that share a tension): two that move, amplitude and
-# speed or x and y; four of its resonator as it is now; and what follows from them
+# speed or x and y; five of its resonator as it is now; and what follows from them
 OMEGA_SQUARED, SIGMA, COUPLING, STRETCH = 2, 3, 4, 5
-FOLLOWING = 6
+BRIDGE = 6  # 1/s: what it loses to a bridge on which other strings of its course stand, beside SIGMA
+FOLLOWING = 7
+RESONATOR_ROWS = FOLLOWING - OMEGA_SQUARED
 TRUTH_ROWS = FOLLOWING + 16  # the flows of half a palindrome, of four rows each
 PHYSICAL = FOLLOWING + 7  # behind the rows of `kernels.tension.advance`: amplitudes and speeds for a moment
 ORDER = PHYSICAL + 2  # whole numbers: modes
 TENSION_ROWS = ORDER + 1
 
-# Slots of the modes that a voice is to have, then the four rows above
+# Slots of the modes that a voice is to have, then the five rows above
 B_QUANTA = 0  # W of the way there
 B_NEXT = 1  # W address of the modes that were wished for next; 0: none yet
 B_AT = 2  # W the mixer's frame from which they count
@@ -249,9 +254,11 @@ M_PLAYER_BEFORE = 31  # W address of the player before, whose notes ring on; 0: 
 M_VOICES = 32  # W addresses
 M_RING = M_VOICES + MOST_VOICES  # W addresses
 M_GAP_LIST = M_RING + RING  # R
-M_MIX = M_GAP_LIST + GAPS * GAP_FIELDS  # R (QUANTUM, 2)
-M_OUT = M_MIX + 2 * QUANTUM  # R (4, QUANTUM): two sets of weights at two points
-M_TAPS = M_OUT + 4 * QUANTUM  # R the differentiator's, (2 REACH + 1)
+MOST_COURSE = 3  # strings of a key
+M_COURSE = M_GAP_LIST + GAPS * GAP_FIELDS  # W addresses of strings on one bridge, and of those generated now, or 0
+M_MIX = M_COURSE + 2 * MOST_COURSE  # R (QUANTUM, 2)
+M_OUT = M_MIX + 2 * QUANTUM  # R (MOST_COURSE, 4, QUANTUM): two sets of weights at two points
+M_TAPS = M_OUT + 4 * QUANTUM * MOST_COURSE  # R the differentiator's, (2 REACH + 1)
 REACH = 32  # frames of the differentiator to either side
 M_WAITING = M_TAPS + 2 * REACH + 2  # R (AHEAD + QUANTUM, 2): what the limiter has not given yet, and the mix
 M_PEAKS = M_WAITING + 2 * (AHEAD + QUANTUM)  # R (AHEAD + QUANTUM,): the levels of these

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import carray, cfunc, njit, types
 
-from engine.kernels import contact
+from engine.kernels import contact, courses
 from engine.kernels import layout as at
 from engine.kernels.amplifier import amplify
 from engine.kernels.compiled import COMPILED
@@ -75,7 +75,10 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     for place in range(counts[at.M_ACTIVE]):
         address = counts[at.M_VOICES + place]
         voice = carray(pointer(address), (1 << 40,), np.float64)
-        state = add(voice, mixer, given_s)
+        if voice.view(np.int64)[at.COURSE] != 0:
+            state = courses.add(mixer, place, given_s)
+        else:
+            state = add(voice, mixer, given_s)
         fence()
         voice.view(np.int64)[at.STATE] = state  # one that is over may be freed from here on
         if state == at.SOUNDING or state == at.WAITING:

@@ -1,8 +1,8 @@
 """A voice's modes, which may change while it rings: another tension, length or damping.
 
 What they shall be is a block of memory that somebody else wrote; its address is the command. The kernel goes there in
-equal steps, one a quantum, of ω², σ, k and η² (`engine.resonators.base`). Amplitude and speed of each mode stay as
-they are: it is their equation that changes.
+equal steps, one a quantum, of ω², σ, k, η² (`engine.resonators.base`) and of what a bridge takes (`kernels.courses`).
+Amplitude and speed of each mode stay as they are: it is their equation that changes.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ def glide(voice: np.ndarray) -> None:
         counts[at.GLIDE] = max(1, carray(pointer(wanted), (at.B_HEADER,), np.int64)[at.B_QUANTA])
         counts[at.CURRENT_MODES] = wanted
     n, left = counts[at.MODES], counts[at.GLIDE]
-    block = carray(pointer(counts[at.CURRENT_MODES]), (at.B_HEADER + 4 * n,), np.float64)
+    block = carray(pointer(counts[at.CURRENT_MODES]), (at.B_HEADER + at.RESONATOR_ROWS * n,), np.float64)
     present = at.state(n) + at.OMEGA_SQUARED * n
-    for place in range(4 * n):
+    for place in range(at.RESONATOR_ROWS * n):
         voice[present + place] += (block[at.B_HEADER + place] - voice[present + place]) / left
     counts[at.GLIDE] = left - 1
 

@@ -391,6 +391,13 @@ def string_of(
     return modes, out[of.LENGTH] / whole[of.LENGTH]
 
 
+@njit(inline="always", **COMPILED)
+def _has_octave(table: np.ndarray, tables: np.ndarray, key: int, number: int) -> bool:
+    """Whether the course of a key has octave strings, on a string of a set; -1: on the one that the key chooses."""
+    count, octaves = tables[of.TABLE_STRINGS], tables[of.TABLE_OCTAVES]
+    return octaves > 0 and (number if number >= 0 else _chosen(table, count, key)) >= count - octaves
+
+
 @njit(**COMPILED)
 def _pitch_hz(table: np.ndarray, tables: np.ndarray, key: int, given_hz: float) -> float:
     """Of a note; 0: its key is silent."""
@@ -548,7 +555,8 @@ def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: in
 def _slots_of_voice(players: np.ndarray, note: int, source: int) -> int:
     """First slot of the player's own voice for a note, by its number, and a source."""
     modes = players[of.PLAYER_MODES]
-    each = at.HEADER + 8 * modes + 4 + 8 * at.QUANTUM + at.TRUTH_ROWS * modes + of.BLOCKS * (at.B_HEADER + 4 * modes)
+    each = at.HEADER + 8 * modes + 4 + 8 * at.QUANTUM + at.TRUTH_ROWS * modes
+    each += of.BLOCKS * (at.B_HEADER + at.RESONATOR_ROWS * modes)
     return of.PLAYER_VOICES + (note * of.MOST_SOURCES + source) * each
 
 
@@ -606,7 +614,7 @@ def _fill(
     string: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """ω², σ, k and η² of a note's modes, of its string as it is now, with the instrument's bridge."""
+    """ω², σ, k, η² and the bridge's part of a note's modes, of its string as it is now."""
     losses = _value(player, players, table, tables, of.DECAY)
     inside = _value(player, players, table, tables, of.BRIGHTNESS_DECAY)
     strings.rows(
@@ -629,6 +637,14 @@ def _fill(
         strings.touch(string, modes, pairs, players[note + of.NOTE_TOUCHED], out)
     if tables[of.TABLE_RECORDED] != 0:
         recorded.correct(table, tables, string, players[note + of.NOTE_MODES], out)
+    strings.stand(
+        string,
+        players[note + of.NOTE_MODES],
+        min(players[note + of.NOTE_PAIRS], of.MOST_PAIRS),
+        player[note + of.NOTE_BRIDGE] * losses * player[note + of.NOTE_CONDUCTANCE],
+        player[note + of.NOTE_BRIDGE] * losses * player[note + of.NOTE_CONDUCTANCE + 1],
+        out,
+    )
 
 
 @njit(**COMPILED)
@@ -661,7 +677,9 @@ def _make_voice(
         voice[first + mode] = player[of.PLAYER_AMPLITUDES + mode]
     struck, first = first, first + at.OMEGA_SQUARED * n
     own = player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING]
-    _fill(player, players, table, tables, note, own, voice[first : first + 4 * n])
+    _fill(player, players, table, tables, note, own, voice[first : first + at.RESONATOR_ROWS * n])
+    if player[note + of.NOTE_BRIDGE] > 0.0:
+        counts[at.BRIDGED] = 2 * min(players[note + of.NOTE_PAIRS], of.MOST_PAIRS)
     for mode in range(n if tables[of.TABLE_STRIKES] != 0 else 0):
         voice[struck + n + mode] = voice[struck + mode] * math.sqrt(voice[first + mode])
         voice[struck + mode] = 0.0
@@ -729,14 +747,17 @@ def _sound(
         pairs = _split(player, table, tables, partials, 0.0)
         modes += pairs
     decay, inside = player[values + of.DECAY], player[values + of.BRIGHTNESS_DECAY]
+    together = decay
+    if tables[of.TABLE_COURSE] > 1 and not _has_octave(table, tables, key, string):  # at first they are in phase
+        together *= 1 + (tables[of.TABLE_COURSE] - 1) * table[of.TABLE_BRIDGE]
     rows = player[first : first + 4 * modes]
     strings.rows(
         own,
         modes,
         pairs,
         table[of.TABLE_DETUNING],
-        decay * table[of.TABLE_CONDUCTANCE],
-        decay * table[of.TABLE_CONDUCTANCE + 1],
+        together * table[of.TABLE_CONDUCTANCE],
+        together * table[of.TABLE_CONDUCTANCE + 1],
         decay * table[of.TABLE_LOSSES],
         inside * table[of.TABLE_LOSSES + 1],
         inside * table[of.TABLE_LOSSES + 2],
@@ -862,9 +883,10 @@ def _wish(
         wished = _whole(wished)[at.B_NEXT]
     base, found = players[of.PLAYER_HERE], 0
     if tail == 0 or (_whole(tail)[at.B_AT] <= due) != (frame <= due):
-        blocks = _slots_of_voice(players, number, source + 1) - of.BLOCKS * (at.B_HEADER + 4 * modes)
+        size = at.B_HEADER + at.RESONATOR_ROWS * modes
+        blocks = _slots_of_voice(players, number, source + 1) - of.BLOCKS * size
         for place in range(of.BLOCKS):
-            block = base + 8 * (blocks + place * (at.B_HEADER + 4 * modes))
+            block = base + 8 * (blocks + place * size)
             used, wished = block in (latest, taken), first
             while wished != 0 and not used:
                 used = wished == block
@@ -911,17 +933,17 @@ def _retune(
         changed = True
     if not changed:
         return
-    n, filled = players[note + of.NOTE_MODES], 0
+    size, filled = at.RESONATOR_ROWS * players[note + of.NOTE_MODES], 0
     for source in range(of.MOST_SOURCES):
         address = players[note + of.NOTE_VOICES + source]
         if address == 0 or _voice_over(address):
             continue
         slot = _wish(player, players, number, source, address, seconds, frame, now)
         if filled == 0:
-            _fill(player, players, table, tables, note, string, player[slot : slot + 4 * n])
+            _fill(player, players, table, tables, note, string, player[slot : slot + size])
             filled = slot
         else:
-            for place in range(4 * n):
+            for place in range(size):
                 player[slot + place] = player[filled + place]
 
 
@@ -961,7 +983,7 @@ def _damp(
         if kind in (at.TRUTH, at.TENSION) and n <= players[of.PLAYER_MODES]:
             slot = _wish(player, players, number, source, address, DAMPER_S, frame, now)
             first = at.state(n) + at.OMEGA_SQUARED * n
-            for place in range(4 * n):
+            for place in range(at.RESONATOR_ROWS * n):
                 player[slot + place] = voice[first + place]
                 if n <= place < 2 * n:  # σ
                     player[slot + place] += math.log(1000.0) / t60_s
@@ -1109,6 +1131,8 @@ def _strike(
     frame = players[event + of.EVENT_FRAME]
     for member in range(1, tables[of.TABLE_COURSE]):
         later = round(member * table[of.TABLE_APART_S] * player[of.PLAYER_RATE])
+        if table[of.TABLE_BRIDGE] > 0.0:  # in step
+            later = round(later / at.QUANTUM) * at.QUANTUM
         players[event + of.EVENT_FRAME] = max(frame, mixers[at.M_FRAMES]) + later if later > 0 else frame
         _note_on(player, players, table, tables, mixers, event, member)
     players[event + of.EVENT_FRAME] = frame
@@ -1140,9 +1164,8 @@ def _note_on(
     if place % 256 == 0 and count > 0 and _chosen(table, count, key) != place // 256 - 1:
         string = place // 256 - 1
     place += MEMBERS_APART * member
-    octave = member > 0 and tables[of.TABLE_OCTAVES] > 0
-    if octave:
-        octave = (string if string >= 0 else _chosen(table, count, key)) >= count - tables[of.TABLE_OCTAVES]
+    octaves = _has_octave(table, tables, key, string)
+    octave = member > 0 and octaves
     own, modes, gain, highest_m = _moment(player, 3), 0, 1.0, 0.0
     position = amplitude_mm = width = 0.0
     pairs, strength, stroke, touched = 0, 1.0, 0, 0
@@ -1226,6 +1249,8 @@ def _note_on(
     player[note + of.NOTE_APERTURE_M] = table[of.TABLE_APERTURE_M]
     players[note + of.NOTE_MEMBER] = member
     players[note + of.NOTE_OCTAVE] = octave
+    if not prepared and not octaves and tables[of.TABLE_COURSE] > 1 and table[of.TABLE_CONDUCTANCE] > 0.0:
+        player[note + of.NOTE_BRIDGE] = table[of.TABLE_BRIDGE] if pairs > 0 else 0.0
     if member > 0:  # above and below the first by turns, each key a little otherwise
         apart = (member + 1) // 2 * (1 if member % 2 == 1 else -1) * (1 + COURSES_VARY * _varied(0, key, member))
         player[note + of.NOTE_APART] = apart * table[of.TABLE_APART_CENTS] / 100
@@ -1272,6 +1297,9 @@ def _note_on(
                 highest_m,
             )
             voice, begun = _at(address), gain * player[of.PLAYER_SOURCE_GAINS + source]
+            if player[note + of.NOTE_BRIDGE] > 0.0:
+                first = players[of.PLAYER_AGE] - member
+                _whole(address)[at.COURSE] = of.MOST_SOURCES * first + source
             voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
         players[note + of.NOTE_VOICES + source] = address
     for each in range(of.MOST_NOTES):

@@ -117,7 +117,8 @@ TABLE_COURSE = 50  # W strings of a key that sound together
 TABLE_OCTAVES = 51  # W of a set, the lowest strings, whose courses have an octave string
 TABLE_APART_CENTS = 52  # R between strings of a course
 TABLE_APART_S = 53  # R from the stroke of one to that of the next
-TABLE_CONTACTS = 54  # R (2, CONTACT): noise of the stroke and of the release, in the order of `Contact`
+TABLE_BRIDGE = 54  # R share of the bridge's losses that strings of a course have in common, 0 … 1
+TABLE_CONTACTS = 55  # R (2, CONTACT): noise of the stroke and of the release, in the order of `Contact`
 STROKE, RELEASE = 0, 1
 PULSE_S, PULSE_SHARE, BURST_HZ, BURST_Q, ATTACK_S, FALL_S, FOLLOWS = range(7)
 CONTACT = 8
@@ -236,7 +237,8 @@ NOTE_MEMBER = 45  # W which string of a course it is, from 0, whose reports are 
 NOTE_APART = 46  # R semitones above that one
 NOTE_OCTAVE = 47  # W whether it is an octave string
 NOTE_VIBRATO = 48  # R semitones
-NOTE_OWN = 49  # R its string as its key had it when it was struck
+NOTE_BRIDGE = 49  # R share of its losses at the bridge that others of its course have a part in
+NOTE_OWN = 50  # R its string as its key had it when it was struck
 NOTE_STRING_NOW = NOTE_OWN + STRING  # R with bends, slides, dampers and knobs
 NOTE_SLOTS = NOTE_STRING_NOW + STRING
 MOST_NOTES = 128
@@ -331,7 +333,7 @@ BLOCKS = 4  # of modes that a voice is to have
 
 
 def block_slots(modes: int) -> int:
-    return at.B_HEADER + 4 * modes
+    return at.B_HEADER + at.RESONATOR_ROWS * modes
 
 
 def voice_slots(modes: int) -> int:

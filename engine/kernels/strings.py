@@ -198,6 +198,23 @@ def touch(string: np.ndarray, modes: int, pairs: int, node: int, out: np.ndarray
         out[modes + mode] = max(before, min(before + largest * moves, most))
 
 
+@njit(**EXACT)
+def stand(
+    string: np.ndarray, modes: int, pairs: int, conductance: float, second_conductance: float, out: np.ndarray
+) -> None:
+    """Takes what pairs lose to a bridge that others share from σ, and writes it, in `out` as of `rows`, behind η².
+
+    Args:
+        conductance, second_conductance: of what is shared, in both directions; 0: nothing is.
+    """
+    pull = string[of.TENSION] / string[of.LENGTH]
+    for mode in range(modes):
+        lost = pull * (second_conductance if direction_of(mode, pairs) == 1 else conductance)
+        shared = min(lost, out[modes + mode]) if mode < 2 * pairs else 0.0
+        out[modes + mode] -= shared
+        out[4 * modes + mode] = shared
+
+
 @njit(inline="always", **EXACT)
 def partial_of(mode: int, pairs: int) -> int:
     """The partial, from 1, of a mode, from 0: pairs come first, the two polarisations side by side."""

@@ -26,7 +26,7 @@ FEWER_QUANTA = 64  # from one look at whether a string's modes that still move n
 
 
 @njit(**COMPILED)
-def _load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
+def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
     """Copies modes, in this order, into blocks of `kernels.lanes`; unused lanes are zero.
 
     Args:
@@ -45,15 +45,15 @@ def _load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, mem
 
 
 @njit(**COMPILED)
-def _load_weights(weights: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
-    """Copies the weights of one ear into the blocks that `_load` fills."""
+def load_weights(weights: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
+    """Copies the weights of one ear into the blocks that `load` fills."""
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number) + (lanes.EARS + ear) * lanes.LANES
         memory[slot] = weights[order[number]] if number < len(order) else 0.0
 
 
 @njit(**COMPILED)
-def _save(x: np.ndarray, y: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
+def save(x: np.ndarray, y: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
     """Copies modes back from their blocks."""
     for number in range(len(order)):
         slot = first + lanes.place(number)
@@ -61,7 +61,7 @@ def _save(x: np.ndarray, y: np.ndarray, order: np.ndarray, memory: np.ndarray, f
 
 
 @njit(inline="always", **COMPILED)
-def _node(
+def node(
     memory: np.ndarray,
     first: int,
     near: int,
@@ -83,7 +83,7 @@ def _node(
 
 
 @njit(**COMPILED)
-def _hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> tuple[float, bool]:
+def hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> tuple[float, bool]:
     """Holds Σ ω² |z|² of blocks below the largest; returns Σ |z|², and whether anything has changed."""
     total, energy = lanes.energies(memory, first, blocks)
     held = not energy <= largest_energy  # also where it is not a number
@@ -103,7 +103,7 @@ def _hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) ->
 
 
 @njit(**COMPILED)
-def _trim(memory: np.ndarray, first: int, moving: int, silence: float, total: float) -> int:
+def trim(memory: np.ndarray, first: int, moving: int, silence: float, total: float) -> int:
     """Lays the highest modes to rest that are silent; those left."""
     while moving > 1:
         x = first + lanes.place(moving - 1)
@@ -142,15 +142,15 @@ def advance(
     memory, order, nobody, rest = np.empty(lanes.slots(modes)), np.arange(modes), np.empty(0), (0.0, 0.0)
     first = lanes.aligned(memory)
     for string in range(batch):
-        _load(x[string], y[string], rows, order, memory, first)
+        load(x[string], y[string], rows, order, memory, first)
         moving, blocks = modes, lanes.blocks_of(modes)
         sums = lanes.add_up(memory, first, blocks, 0, 0, nobody)
         for step in range(steps):
             for _ in range(nodes):
-                sums = _node(memory, first, blocks, 0, 0, sums, rest, largest_stretches[string], nobody)
+                sums = node(memory, first, blocks, 0, 0, sums, rest, largest_stretches[string], nobody)
             largest_energies[string] *= decay
-            total, held = _hold(memory, first, blocks, largest_energies[string])
-            before, moving = moving, _trim(memory, first, moving, silence, total)
+            total, held = hold(memory, first, blocks, largest_energies[string])
+            before, moving = moving, trim(memory, first, moving, silence, total)
             if held or moving < before or total < NOTHING:
                 blocks = lanes.blocks_of(moving)
                 sums = lanes.add_up(memory, first, blocks, 0, 0, nobody)
@@ -160,7 +160,7 @@ def advance(
                 frame[n] = memory[slot] * (1 - memory[slot + lanes.SEEN * lanes.LANES] * sums[0])
             for n in range(moving, modes):
                 frame[n] = 0.0
-        _save(x[string], y[string], order, memory, first)
+        save(x[string], y[string], order, memory, first)
 
 
 @njit(**COMPILED)
@@ -380,7 +380,7 @@ def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray
 
 @njit(**COMPILED)
 def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.ndarray, sign: float) -> None:
-    """Half of what `_node` does first, forward or back, in place of y."""
+    """Half of what `node` does first, forward or back, in place of y."""
     first = second = 0.0
     for m in range(len(x)):
         stretch = rows[3, m] * x[m] * x[m]
@@ -465,7 +465,7 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
 
 
 @njit(**COMPILED)
-def _bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
+def bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
     """What follows from its modes, and the latents, where a voice begins or its modes change."""
     counts = voice.view(np.int64)
     n = counts[at.MODES]
@@ -501,7 +501,7 @@ def generate(
     voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
-    _bring_up_to_date(voice, program)
+    bring_up_to_date(voice, program)
     counts = voice.view(np.int64)
     n, nodes, points = counts[at.MODES], counts[at.STEPS], counts[at.POINTS]
     sets, rests = 2 if fading else 1, program[at.S_UNHEARD] > 0
@@ -518,11 +518,11 @@ def generate(
     loud, quiet = order[: counts[at.HEARD]], order[counts[at.HEARD] : counts[at.FELT]]
     first, near, far = lanes.aligned(scratch), lanes.blocks_of(len(loud)), lanes.blocks_of(len(quiet))
     ear_sums, behind = scratch[first + lanes.slots(n) :][: 2 * lanes.MOST_EARS], first + near * lanes.BLOCK
-    _load(x, y, rows, loud, scratch, first)
-    _load(x, y, rows, quiet, scratch, behind)
+    load(x, y, rows, loud, scratch, first)
+    load(x, y, rows, quiet, scratch, behind)
     for ear in range(ears):
         place = at.weights(n, ear // points, ear % points, 0)
-        _load_weights(voice[place : place + n], loud, scratch, first, ear)
+        load_weights(voice[place : place + n], loud, scratch, first, ear)
     moving, total, apart, largest = len(loud), 0.0, 2 if points == 1 else 1, voice[at.LARGEST_STRETCH]
     stretched = at.QUANTUM * nodes * rest[0]
     sums = lanes.add_up(scratch, first, near, far, ears, ear_sums)
@@ -531,20 +531,20 @@ def generate(
             out[apart * ear, frame] = ear_sums[2 * ear] - (sums[0] + rest[0]) * ear_sums[2 * ear + 1]
         stretched += sums[0]
         for _ in range(nodes - 1):
-            sums = _node(scratch, first, near, far, 0, sums, rest, largest, ear_sums)
+            sums = node(scratch, first, near, far, 0, sums, rest, largest, ear_sums)
             stretched += sums[0]
-        sums = _node(scratch, first, near, far, ears, sums, rest, largest, ear_sums)
+        sums = node(scratch, first, near, far, ears, sums, rest, largest, ear_sums)
         voice[at.LARGEST_ENERGY] *= voice[at.DECAY]
         if frame % 16 == 15:
-            total, held = _hold(scratch, first, near + far, voice[at.LARGEST_ENERGY])
+            total, held = hold(scratch, first, near + far, voice[at.LARGEST_ENERGY])
             before = moving
             if not rests:
-                moving = _trim(scratch, first, moving, program[at.S_SILENCE], total)
+                moving = trim(scratch, first, moving, program[at.S_SILENCE], total)
                 near = lanes.blocks_of(moving)
             if held or moving < before or total < NOTHING:
                 sums = lanes.add_up(scratch, first, near, far, ears, ear_sums)
-    _save(x, y, loud, scratch, first)
-    _save(x, y, quiet, scratch, behind)
+    save(x, y, loud, scratch, first)
+    save(x, y, quiet, scratch, behind)
     if rests:
         counts[at.REFRESH] -= 1
         counts[at.RESTED] += 1

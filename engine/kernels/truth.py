@@ -51,13 +51,9 @@ def _prepare(voice: np.ndarray, program: np.ndarray, sub_steps: int) -> None:
 
 
 @njit(**COMPILED)
-def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray) -> None:
-    """The next quantum, (4, QUANTUM); frame 0 is the string at its release.
-
-    The highest modes are left out from when they are below the program's silence: sub-steps follow those left.
-    """
+def set_up(voice: np.ndarray, program: np.ndarray) -> int:
+    """Brings what follows from its modes up to date for a quantum; its sub-steps, 0 where it is linear."""
     counts = voice.view(np.int64)
-    n, points = counts[at.MODES], counts[at.POINTS]
     changed = gliding(voice)
     if changed:
         glide(voice)
@@ -65,6 +61,25 @@ def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, 
     sub_steps = _sub_steps(voice, program)
     if changed or not counts[at.PREPARED] or sub_steps != counts[at.STEPS]:
         _prepare(voice, program, sub_steps)
+    return sub_steps
+
+
+@njit(**COMPILED)
+def advance(
+    voice: np.ndarray,
+    program: np.ndarray,
+    sub_steps: int,
+    frame: int,
+    fading: bool,
+    heard: bool,
+    out: np.ndarray,
+) -> None:
+    """One frame of a quantum, after it is heard.
+
+    The highest modes are left out from when they are below the program's silence: sub-steps follow those left.
+    """
+    counts = voice.view(np.int64)
+    n, points = counts[at.MODES], counts[at.POINTS]
     q, v = row(voice, n, 0), row(voice, n, 1)
     squares, couplings, stretches = (
         row(voice, n, at.OMEGA_SQUARED),
@@ -73,44 +88,49 @@ def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, 
     )
     silence = program[at.T_SILENCE]
     moving = counts[at.MOVING]
-    sets = 2 if fading else 1
     step_s = 1 / (max(sub_steps, 1) * program[at.T_RATE])
-    total = 0.0
-    for frame in range(at.QUANTUM):
-        if heard:
-            for which in range(sets):
-                for point in range(points):
-                    slot = at.weights(n, which, point, 0)
-                    w = voice[slot : slot + n]
-                    found = 0.0
-                    for m in range(moving):
-                        found += w[m] * q[m]
-                    out[2 * which + point, frame] = found
-        if frame % 16 == 0:
-            total = 0.0
-            for m in range(moving):
-                total += q[m] * q[m] + v[m] * v[m] / squares[m]
-            while moving > 1:
-                m = moving - 1
-                if not q[m] * q[m] + v[m] * v[m] / squares[m] < silence * silence * total:
-                    break
-                q[m] = v[m] = 0.0
-                moving = m
-        for _ in range(max(sub_steps, 1)):
-            stretch = 0.0
-            for stage in range(at.STAGES if sub_steps else 1):
-                kick = program[at.T_KICKS + stage - 1] * step_s * stretch if stage > 0 else 0.0
-                flow = at.state(n) + (at.FOLLOWING + 4 * min(stage, at.STAGES - 1 - stage)) * n
-                qq, qv = voice[flow : flow + n], voice[flow + n : flow + 2 * n]
-                vq, vv = voice[flow + 2 * n : flow + 3 * n], voice[flow + 3 * n : flow + 4 * n]
-                stretch = 0.0
+    if heard:
+        for which in range(2 if fading else 1):
+            for point in range(points):
+                slot = at.weights(n, which, point, 0)
+                w = voice[slot : slot + n]
+                found = 0.0
                 for m in range(moving):
-                    amplitude = q[m]
-                    speed = v[m] - kick * couplings[m] * amplitude
-                    turned = qq[m] * amplitude + qv[m] * speed
-                    q[m] = turned
-                    v[m] = vq[m] * amplitude + vv[m] * speed
-                    stretch += stretches[m] * turned * turned
-    counts[at.MOVING] = moving
-    counts[at.GENERATED] += at.QUANTUM
-    voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.T_LOUDNESS]
+                    found += w[m] * q[m]
+                out[2 * which + point, frame] = found
+    if frame % 16 == 0:
+        total = 0.0
+        for m in range(moving):
+            total += q[m] * q[m] + v[m] * v[m] / squares[m]
+        while moving > 1:
+            m = moving - 1
+            if not q[m] * q[m] + v[m] * v[m] / squares[m] < silence * silence * total:
+                break
+            q[m] = v[m] = 0.0
+            moving = m
+        counts[at.MOVING] = moving
+        voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.T_LOUDNESS]
+    for _ in range(max(sub_steps, 1)):
+        stretch = 0.0
+        for stage in range(at.STAGES if sub_steps else 1):
+            kick = program[at.T_KICKS + stage - 1] * step_s * stretch if stage > 0 else 0.0
+            flow = at.state(n) + (at.FOLLOWING + 4 * min(stage, at.STAGES - 1 - stage)) * n
+            qq, qv = voice[flow : flow + n], voice[flow + n : flow + 2 * n]
+            vq, vv = voice[flow + 2 * n : flow + 3 * n], voice[flow + 3 * n : flow + 4 * n]
+            stretch = 0.0
+            for m in range(moving):
+                amplitude = q[m]
+                speed = v[m] - kick * couplings[m] * amplitude
+                turned = qq[m] * amplitude + qv[m] * speed
+                q[m] = turned
+                v[m] = vq[m] * amplitude + vv[m] * speed
+                stretch += stretches[m] * turned * turned
+
+
+@njit(**COMPILED)
+def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray) -> None:
+    """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
+    sub_steps = set_up(voice, program)
+    for frame in range(at.QUANTUM):
+        advance(voice, program, sub_steps, frame, fading, heard, out)
+    voice.view(np.int64)[at.GENERATED] += at.QUANTUM

@@ -28,7 +28,6 @@ def _generate(voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, s
     if kind == at.RENDERED:
         rendered.generate(voice, program, out)
         return
-    n = counts[at.MODES]
     fading = counts[at.NEXT_WEIGHTS] == 1
     fence()
     if kind == at.BANK:
@@ -38,54 +37,82 @@ def _generate(voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, s
     else:
         truth.generate(voice, program, fading, heard, out)
     if fading:
-        done, frames = counts[at.WEIGHTS_FADED], round(MOVE_S * rate_hz)
-        for point in range(counts[at.POINTS]):
-            for frame in range(at.QUANTUM):
-                share = min((done + frame + 1) / frames, 1.0)
-                out[point, frame] += share * (out[2 + point, frame] - out[point, frame])
-        counts[at.WEIGHTS_FADED] = done + at.QUANTUM
-        if counts[at.WEIGHTS_FADED] >= frames or not heard:
-            for slot in range(4 * n):
-                voice[at.HEADER + slot] = voice[at.HEADER + 4 * n + slot]
-            for point in range(2):
-                voice[at.bias(n, 0, point)] = voice[at.bias(n, 1, point)]
-            counts[at.WEIGHTS_FADED] = 0
-            fence()
-            counts[at.NEXT_WEIGHTS] = 0
+        move_points(voice, heard, rate_hz, out)
+
+
+@njit(**COMPILED)
+def move_points(voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray) -> None:
+    """Fades what a quantum is at its points to what it is at others."""
+    counts = voice.view(np.int64)
+    n, done, frames = counts[at.MODES], counts[at.WEIGHTS_FADED], round(MOVE_S * rate_hz)
+    for point in range(counts[at.POINTS]):
+        for frame in range(at.QUANTUM):
+            share = min((done + frame + 1) / frames, 1.0)
+            out[point, frame] += share * (out[2 + point, frame] - out[point, frame])
+    counts[at.WEIGHTS_FADED] = done + at.QUANTUM
+    if counts[at.WEIGHTS_FADED] >= frames or not heard:
+        for slot in range(4 * n):
+            voice[at.HEADER + slot] = voice[at.HEADER + 4 * n + slot]
+        for point in range(2):
+            voice[at.bias(n, 0, point)] = voice[at.bias(n, 1, point)]
+        counts[at.WEIGHTS_FADED] = 0
+        fence()
+        counts[at.NEXT_WEIGHTS] = 0
 
 
 @njit(**COMPILED)
 def _velocity(
     voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray
 ) -> None:
-    """As `_generate`, differentiated; the voice is generated a quantum ahead for that.
+    """As `_generate`, differentiated; the voice is generated a quantum ahead for that."""
+    begins = is_first(voice)
+    for turn in range(2 if begins else 1):
+        _generate(voice, heard, rate_hz, out, scratch)
+        remember(voice, heard, begins and turn == 0, out)
+    differentiate(voice, out, taps)
 
-    The flux through a magnetic pick-up grows as (exp(x/δ) - 1) δ with the displacement x, to third order.
+
+@njit(inline="always", **COMPILED)
+def is_first(voice: np.ndarray) -> bool:
+    """Whether a voice is not yet ahead of what was heard of it."""
+    counts = voice.view(np.int64)
+    return counts[at.GENERATED] == counts[at.FRAME]
+
+
+@njit(**COMPILED)
+def remember(voice: np.ndarray, heard: bool, first: bool, out: np.ndarray) -> None:
+    """Keeps the quantum that was generated, and the flux that it is to a magnetic pick-up.
+
+    That grows as (exp(x/δ) - 1) δ with the displacement x, to third order.
     What the filter needs is there when `WARM` has reached `WARMED`: at the pluck at once, else two quanta later.
     """
     counts = voice.view(np.int64)
     n, quantum = counts[at.MODES], at.QUANTUM
-    begins = counts[at.GENERATED] == counts[at.FRAME]
-    if begins:
+    if first:
         counts[at.WARM] = 0
-    for turn in range(2 if begins else 1):
-        _generate(voice, heard, rate_hz, out, scratch)
-        counts[at.WARM] = min(counts[at.WARM] + 1, WARMED) if heard else 0
-        for point in range(counts[at.POINTS]):
-            slot = at.history(n, point)
-            past = voice[slot : slot + 3 * quantum]
-            for frame in range(2 * quantum):
-                past[frame] = past[frame + quantum]
-            near = voice[at.NEARNESS]
-            for frame in range(quantum):
-                moved = min(max(near * out[point, frame], -FLUX_CURVES), FLUX_CURVES)
-                curved = 1.0 + moved * (0.5 + moved / 6)
-                past[2 * quantum + frame] = out[point, frame] * curved
-            if begins and turn == 0 and counts[at.FRAME] == 0:
-                mirrored = 1 if counts[at.JOINS] else quantum  # at rest before the pluck: the mirror of what follows
-                for frame in range(1, mirrored):
-                    past[2 * quantum - frame] = past[2 * quantum + frame]
-                counts[at.WARM] = WARMED - 1
+    counts[at.WARM] = min(counts[at.WARM] + 1, WARMED) if heard else 0
+    for point in range(counts[at.POINTS]):
+        slot = at.history(n, point)
+        past = voice[slot : slot + 3 * quantum]
+        for frame in range(2 * quantum):
+            past[frame] = past[frame + quantum]
+        near = voice[at.NEARNESS]
+        for frame in range(quantum):
+            moved = min(max(near * out[point, frame], -FLUX_CURVES), FLUX_CURVES)
+            curved = 1.0 + moved * (0.5 + moved / 6)
+            past[2 * quantum + frame] = out[point, frame] * curved
+        if first and counts[at.FRAME] == 0:
+            mirrored = 1 if counts[at.JOINS] else quantum  # at rest before the pluck: the mirror of what follows
+            for frame in range(1, mirrored):
+                past[2 * quantum - frame] = past[2 * quantum + frame]
+            counts[at.WARM] = WARMED - 1
+
+
+@njit(**COMPILED)
+def differentiate(voice: np.ndarray, out: np.ndarray, taps: np.ndarray) -> None:
+    """The velocity of the quantum before the latest, (2, QUANTUM) of `out`."""
+    counts = voice.view(np.int64)
+    n, quantum = counts[at.MODES], at.QUANTUM
     for point in range(counts[at.POINTS]):
         slot = at.history(n, point)
         past = voice[slot : slot + 3 * quantum]
@@ -205,12 +232,34 @@ def _look_at_wishes(voice: np.ndarray, now: int) -> None:
 @njit(**COMPILED)
 def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     """Adds the next quantum of a voice to the mix, (QUANTUM, 2). Returns its state, which it leaves to the caller."""
-    counts, mix_counts = voice.view(np.int64), mixer.view(np.int64)
-    quantum = at.QUANTUM
-    out = mixer[at.M_OUT : at.M_OUT + 4 * quantum].reshape(4, quantum)
-    scratch = mixer[at.M_SCRATCH : at.M_AMPLIFIER]
+    counts = voice.view(np.int64)
+    state = begin(voice, mixer)
+    if state != at.SOUNDING:
+        return state
+    out = mixer[at.M_OUT : at.M_OUT + 4 * at.QUANTUM].reshape(4, at.QUANTUM)
+    scratch, rate_hz, heard = mixer[at.M_SCRATCH : at.M_AMPLIFIER], mixer[at.M_RATE], is_heard(voice)
+    was_dry, generated = counts[at.DRY], counts[at.GENERATED]
+    if counts[at.VELOCITY]:
+        taps = mixer[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1]
+        _velocity(voice, heard, rate_hz, out, scratch, taps)
+    else:
+        _generate(voice, heard, rate_hz, out, scratch)
+    if counts[at.DRY] and not was_dry:
+        note_gap(mixer, mixer.view(np.int64)[at.M_FRAMES], 0.0, at.CAUSE_STARVED)
+    return end(voice, mixer, now_s, out, counts[at.GENERATED] > generated)
+
+
+@njit(inline="always", **COMPILED)
+def is_heard(voice: np.ndarray) -> bool:
+    return voice[at.GAIN] != 0 or voice[at.GAIN_TO] != 0
+
+
+@njit(**COMPILED)
+def begin(voice: np.ndarray, mixer: np.ndarray) -> int:
+    """What comes before a voice's next quantum is generated; its state, where none is: it waits, or is over."""
+    counts, quantum = voice.view(np.int64), at.QUANTUM
     mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
-    now, rate_hz = mix_counts[at.M_FRAMES], mixer[at.M_RATE]
+    now = mixer.view(np.int64)[at.M_FRAMES]
     if counts[at.STATE] == at.WAITING:
         if counts[at.BEGIN_AT] >= now + quantum:
             return at.OVER if counts[at.RELEASE] > 0 else at.WAITING
@@ -232,16 +281,21 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
         counts[at.GAIN_DONE] = 0
         if release > 0:
             counts[at.FADE_FRAMES] = release
-    heard = voice[at.GAIN] != 0 or voice[at.GAIN_TO] != 0
-    was_dry, generated = counts[at.DRY], counts[at.GENERATED]
-    if counts[at.VELOCITY]:
-        taps = mixer[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1]
-        _velocity(voice, heard, rate_hz, out, scratch, taps)
-    else:
-        _generate(voice, heard, rate_hz, out, scratch)
-    points = counts[at.POINTS]
-    if counts[at.DRY] and not was_dry:
-        note_gap(mixer, mix_counts[at.M_FRAMES], 0.0, at.CAUSE_STARVED)
+    return at.SOUNDING
+
+
+@njit(**COMPILED)
+def end(voice: np.ndarray, mixer: np.ndarray, now_s: float, out: np.ndarray, moved: bool) -> int:
+    """Adds a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state.
+
+    Args:
+        moved: whether it was generated, else it stands still.
+    """
+    counts, mix_counts, quantum = voice.view(np.int64), mixer.view(np.int64), at.QUANTUM
+    mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
+    now, rate_hz, points = mix_counts[at.M_FRAMES], mixer[at.M_RATE], counts[at.POINTS]
+    late, release, heard = counts[at.LATE], counts[at.RELEASE], is_heard(voice)
+    left_over = voice[at.left_over(counts[at.MODES]) : at.state(counts[at.MODES])]
     if heard and (not counts[at.VELOCITY] or counts[at.WARM] == WARMED):
         limit = voice[at.LIMIT]
         for point in range(points):
@@ -276,7 +330,7 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
         voice[at.GAIN] = goal
         if done + quantum < length:
             voice[at.GAIN] = source + (goal - source) * _eased((done + quantum) / length)
-    if counts[at.GENERATED] > generated:  # else it stands still
+    if moved:
         if counts[at.BEGAN_FRAME] < 0:
             counts[at.BEGAN_FRAME] = now + late
             voice[at.BEGAN_S] = now_s

@@ -301,8 +301,9 @@ class Voice:
 
 
 def _rows(resonator: Resonator) -> NDArray[np.float64]:
-    """ω², σ, k and η², one after the other."""
-    return np.concatenate([resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch])
+    """ω², σ, k, η² and no part in a bridge of others, one after the other."""
+    nothing = np.zeros(resonator.modes)
+    return np.concatenate([resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch, nothing])
 
 
 def _state(modes: int) -> int:

@@ -1,0 +1,230 @@
+"""Strings of a course on one bridge: modes in the memory of a player against the coupled equations, and sound."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.linalg
+from numpy.typing import NDArray
+
+from app.instrument.compiled import InstrumentPlayer
+from app.instrument.events import Bend, NoteOff, NoteOn
+from app.patches.library import SHIPPED, read_patch
+from app.patches.patch import Course, Fretted, Patch, Pickup, PluckChoices, Polarisations, Technique
+from engine.kernels import layout as at
+from engine.kernels import playing_layout as of
+from engine.kernels.tension import physical as physical_of
+from engine.presets import Preset
+from engine.voices import Mixer
+from tests.app.instrument.conftest import STEEL, physical
+from tests.app.instrument.seen import Seen, seen
+from tests.app.instrument.test_techniques import KEY, RATE_HZ, play
+
+SOURCES = pytest.mark.parametrize("source", ["model", "truth"])
+STRINGS = pytest.mark.parametrize("strings", [2, 3])
+MOVING = Polarisations(angle_deg=30, second_cents=2, conductance_s_kg=0.02, second_conductance_s_kg=0.004)
+QUANTUM_S = at.QUANTUM / RATE_HZ
+
+
+def changed(patch: Patch, **parts: object) -> Patch:
+    return Patch.model_validate({**dict(patch), **parts})
+
+
+def coupled(patch: Patch, strings: int = 2, bridge: float = 1.0, **course: float) -> Patch:
+    return changed(patch, polarisations=MOVING, course=Course(strings=strings, bridge=bridge, **course))
+
+
+def linear(patch: Patch, **string: float) -> Patch:
+    return changed(patch, strings=Fretted(string=physical(replace(STEEL, youngs_modulus_pa=0.0, **string))))
+
+
+class Watched:
+    """A player of one note, whose modes are read after each quantum."""
+
+    def __init__(self, patch: Patch, preset: Preset, source: str, velocity: int = 60) -> None:
+        self.mixer = Mixer(RATE_HZ, limited=False)
+        self.player = InstrumentPlayer(patch, preset, RATE_HZ, {source: 1.0}, varied=False)
+        self.mixer.set_player(self.player.compiled)
+        self.player.handle(NoteOn(KEY, velocity), 0)
+
+    @property
+    def notes(self) -> list[Seen]:
+        return seen(self.player)
+
+    def voices(self) -> list[NDArray[np.float64]]:
+        """Memory of the strings of the course, the first first."""
+        memory = self.player.compiled.memory
+        whole, found = memory.view(np.int64), []
+        stride = of.voice_slots(int(whole[of.PLAYER_MODES]))
+        for number in range(of.MOST_NOTES):
+            note = of.PLAYER_NOTES + number * of.NOTE_SLOTS
+            if whole[note + of.NOTE_STATE] == of.RINGS:
+                first = of.PLAYER_VOICES + number * of.MOST_SOURCES * stride
+                found.append((int(whole[note + of.NOTE_AGE]), memory[first : first + stride]))
+        return [voice for _, voice in sorted(found, key=lambda each: each[0])]
+
+    def states(self, quanta: int) -> NDArray[np.float64]:
+        """Amplitudes and speeds, (quanta, 2, strings, modes)."""
+        found = []
+        for _ in range(quanta):
+            self.mixer.render(at.QUANTUM)
+            found.append(np.array([state(voice) for voice in self.voices()]).transpose(1, 0, 2))
+        return np.array(found)
+
+
+def state(voice: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Amplitudes and speeds of a voice, (2, modes)."""
+    counts = voice.view(np.int64)
+    n = int(counts[at.MODES])
+    if counts[at.KIND] == at.TRUTH:
+        return voice[at.state(n) : at.state(n) + 2 * n].reshape(2, n).copy()
+    found = np.zeros((2, n))
+    physical_of(voice, found[0], found[1])
+    return found
+
+
+def energy(states: NDArray[np.float64], notes: list[Seen]) -> NDArray[np.float64]:
+    """Of the course over its modal mass, (quanta,): of motion and strings, and of the rise of their tensions."""
+    total = np.zeros(len(states))
+    for string, note in enumerate(notes):
+        q, v = states[:, 0, string], states[:, 1, string]
+        partial, second = layout(q.shape[1])
+        squares = note.now.undamped_frequencies(int(partial[-1]) + 1)[partial] ** 2
+        squares = np.where(second == 1, squares * 2 ** (2 * MOVING.second_cents / 1200), squares)
+        eta = note.now.wavenumbers(int(partial[-1]) + 1)[partial]
+        stiffness = note.now.youngs_modulus_pa * note.now.area_m2 / (4 * note.now.mass_per_length_kg_m)
+        total += 0.5 * (v**2 + squares * q**2).sum(axis=1) + stiffness / 4 * (eta**2 * q**2).sum(axis=1) ** 2
+    return total
+
+
+def layout(modes: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    mode = np.arange(modes)
+    paired = mode < 2 * of.MOST_PAIRS
+    return np.where(paired, mode // 2, mode - of.MOST_PAIRS), np.where(paired, mode % 2, 0)
+
+
+@SOURCES
+@STRINGS
+def test_modes_of_a_course_are_those_of_the_coupled_equations(
+    patch: Patch, preset: Preset, strings: int, source: str
+) -> None:
+    """Of each partial and direction 2n eigenvalues, of q̈ + 2 (Σ + s sᵀ) q̇ + Ω² q = 0, fitted to the motion."""
+    watched = Watched(coupled(linear(patch), strings, cents=3), preset, source)
+    states = watched.states(700)[20:]
+    notes = watched.notes
+    assert len(notes) == strings
+    worst = worst_decay = 0.0
+    for mode in (0, 1, 2, 3, 6, 15, 30, 46):
+        partial, second = mode // 2, mode % 2
+        omega = np.array([note.now.undamped_frequencies(partial + 1)[partial] for note in notes])
+        omega *= 2 ** (MOVING.second_cents / 1200) if second else 1.0
+        own = np.array([note.now.decay_rates(partial + 1)[partial] for note in notes])
+        conductance = MOVING.second_conductance_s_kg if second else MOVING.conductance_s_kg
+        lost = np.sqrt([conductance * note.now.tension_n / note.now.length_m for note in notes])
+        zero, one = np.zeros((strings, strings)), np.eye(strings)
+        wanted = np.linalg.eigvals(
+            np.block([[zero, one], [-np.diag(omega**2), -2 * (np.diag(own) + np.outer(lost, lost))]])
+        )
+        motion = np.concatenate([states[:, 0, :, mode] * omega, states[:, 1, :, mode]], axis=1)
+        turned = scipy.linalg.lstsq(motion[:-1], motion[1:])[0].T
+        found = np.log(np.linalg.eigvals(turned).astype(complex)) / QUANTUM_S
+        for each in wanted:
+            near = found + 2j * np.pi / QUANTUM_S * np.round((each - found).imag * QUANTUM_S / math.tau)
+            nearest = near[np.abs(near - each).argmin()]
+            worst = max(worst, abs(nearest - each) / abs(each))
+            worst_decay = max(worst_decay, abs(nearest.real - each.real))
+    assert worst < 1e-6
+    assert worst_decay < 1e-3  # 1/s
+
+
+@SOURCES
+@STRINGS
+def test_energy_of_a_course_never_rises(patch: Patch, preset: Preset, strings: int, source: str) -> None:
+    """With no other loss than that to the bridge it falls to a part that the bridge does not see."""
+    lossless = {"damping_d1_kg_m_s": 0.0, "damping_d3_kg_m_s": 0.0}
+    watched = Watched(coupled(linear(patch, **lossless), strings, cents=3, apart_ms=4), preset, source)
+    found = energy(watched.states(1_500)[strings * 4 :], watched.notes)
+    assert np.diff(found).max() < 1e-9 * found[0]
+    assert found[-1] < 0.5 * found[0]
+
+
+@STRINGS
+def test_energy_of_a_loud_course_never_rises(patch: Patch, preset: Preset, strings: int) -> None:
+    watched = Watched(coupled(patch, strings, cents=3), preset, "truth", velocity=127)
+    found = energy(watched.states(750), watched.notes)
+    assert np.diff(found).max() < 1e-6 * found[0]
+
+
+@SOURCES
+def test_where_nothing_is_shared_nothing_changes(patch: Patch, preset: Preset, source: str) -> None:
+    events = (0.0, NoteOn(KEY, 90)), (0.3, NoteOn(KEY, 60)), (0.5, NoteOff(KEY))
+    for before in (
+        changed(patch, polarisations=MOVING, course=Course(strings=1)),  # alone
+        changed(patch, course=Course(strings=2, cents=2)),  # without a bridge
+    ):
+        after = changed(before, course=before.course.model_copy(update={"bridge": 1.0}))
+        one, both = (play(each, preset, 0.8, *events, source=source) for each in (before, after))
+        np.testing.assert_array_equal(both, one)
+
+
+@SOURCES
+def test_a_string_whose_others_have_not_begun_rings_as_alone(patch: Patch, preset: Preset, source: str) -> None:
+    one, both = (
+        play(coupled(patch, 2, bridge, apart_ms=50), preset, 0.045, (0.0, NoteOn(KEY, 90)), source=source)
+        for bridge in (0.0, 1.0)
+    )
+    one *= (one @ both) / (one @ one)  # they are not equally loud, for they do not decay alike later
+    assert np.abs(both - one).max() < 1e-4 * np.abs(one).max()
+
+
+def t60_s(sound: NDArray[np.float64], begin_s: float, end_s: float) -> float:
+    """From the slope of the level in windows of 50 ms."""
+    times = np.arange(begin_s, end_s, 0.05)
+    windows = [sound[round(each * RATE_HZ) :][: RATE_HZ // 20] for each in times]
+    return -60 / float(np.polyfit(times, [10 * math.log10((each**2).mean()) for each in windows], 1)[0])
+
+
+@SOURCES
+def test_unisons_decay_in_two_stages(patch: Patch, preset: Preset, source: str) -> None:
+    one_direction = changed(patch, polarisations=Polarisations(angle_deg=0, conductance_s_kg=0.03))
+    shared, apart = (
+        play(
+            changed(one_direction, course=Course(strings=2, cents=1.0, bridge=bridge)),
+            preset,
+            4.0,
+            (0.0, NoteOn(KEY, 40)),
+            source=source,
+        )
+        for bridge in (1.0, 0.0)
+    )
+    early, late = t60_s(shared, 0.1, 0.5), t60_s(shared, 2, 4)
+    assert late > 2 * early
+    assert early < 0.7 * t60_s(apart, 0.1, 0.5)
+
+
+@pytest.mark.parametrize("name", ["mandolin", "santur_in_shur"])
+def test_model_and_truth_agree_on_a_course(preset: Preset, name: str) -> None:
+    shipped = read_patch(SHIPPED / f"{name}.json")
+    assert shipped.course.bridge > 0
+    model, truth = (play(shipped, preset, 1.0, (0.0, NoteOn(62, 100)), source=each) for each in ("model", "truth"))
+    assert ((model - truth) ** 2).sum() < 1e-6 * (truth**2).sum()
+
+
+@pytest.mark.parametrize("stops", [True, False])
+@pytest.mark.parametrize("kind", ["bridge", "velocity"])
+def test_a_course_stays_in_step(patch: Patch, preset: Preset, kind: str, stops: bool) -> None:
+    """Plucked again while it rings, by a tremolo, bent, strummed, in blocks of any size: model and truth agree."""
+    moving = changed(
+        coupled(patch, 3, cents=2, apart_ms=3),
+        pickup=Pickup(points=(0.2,), kind=kind),
+        technique=Technique(strum_ms=7, tremolo_hz=9),
+        pluck=PluckChoices(softest_mm=0.05, hardest_mm=1.0, stops=stops),
+    )
+    events = [(0.001, NoteOn(KEY, 60)), (0.002, NoteOn(KEY + 7, 60)), (0.2, Bend(0.5)), (0.31, NoteOn(KEY, 50))]
+    events += [(0.45, Bend(0.0)), (0.5, NoteOff(KEY)), (0.52, NoteOff(KEY + 7)), (0.6, NoteOn(KEY + 2, 40))]
+    model, truth = (play(moving, preset, 0.8, *events, source=each) for each in ("model", "truth"))
+    assert np.isfinite(model).all()
+    assert ((model - truth) ** 2).sum() < 1e-5 * (truth**2).sum()
