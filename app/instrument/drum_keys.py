@@ -48,10 +48,7 @@ class DrumKey:
 
         A place beyond the rim is taken as the nearest one within.
         """
-        x, y = place
-        away = math.hypot(x, y) if self.played.drum.shape == "circle" else max(abs(x), abs(y))
-        if away > NEAREST_RIM:
-            place = x * NEAREST_RIM / away, y * NEAREST_RIM / away
+        place = on_the_drum(self.played, place)
         return np.ascontiguousarray(self.modes.struck(place, self.played.mallet.mallet.radius_m))
 
     def strike(self, velocity: float, curve: float = 0.0) -> Strike:
@@ -78,6 +75,13 @@ class DrumKey:
         return 600 * math.log2(1 + self.rise(velocity, curve))
 
 
+def on_the_drum(played: PlayedDrum, place: tuple[float, float]) -> tuple[float, float]:
+    """The nearest place within the rim."""
+    x, y = place
+    away = math.hypot(x, y) if played.drum.shape == "circle" else max(abs(x), abs(y))
+    return (x * NEAREST_RIM / away, y * NEAREST_RIM / away) if away > NEAREST_RIM else place
+
+
 class DrumKeys:
     """Of one patch of drums, heard at `ear`; see `LoudKeys`. Modes of a drum are remembered."""
 
@@ -97,7 +101,8 @@ class DrumKeys:
             self._known[key] = self._of_key(key)
         return self._known[key]
 
-    def _of_key(self, key: int) -> DrumKey | None:
+    def tuned_to(self, key: int) -> tuple[PlayedDrum, float] | None:
+        """The drum that a key plays, with its mallet's speeds there, and by what ratio it is tuned; None: silent."""
         low, high = self.patch.range
         played = self.drums.of_key(key)
         if played is None or not low <= key <= high or not self._tuning.mapped(key):
@@ -106,7 +111,13 @@ class DrumKeys:
         # a slack head is struck more softly, so that its tension rises no more
         softer = min(1.0, ratio if played.drum.tension_n_m == 0 else ratio**2)
         speeds = {name: getattr(played, name) * softer for name in ("softest_m_s", "hardest_m_s")}
-        played = played.model_copy(update=speeds)
+        return played.model_copy(update=speeds), ratio
+
+    def _of_key(self, key: int) -> DrumKey | None:
+        found = self.tuned_to(key)
+        if found is None:
+            return None
+        played, ratio = found
         try:
             modes = self._modes(played, ratio)
         except ValueError as error:

@@ -55,12 +55,12 @@ def loaded(
         below = np.maximum(surface.wavenumber**2 - k**2, (0.1 * surface.wavenumber) ** 2)
         air = density_kg_m3 / np.sqrt(below)
         if len(low) and turn >= ROUNDS - EXACT_ROUNDS:
-            air[low] = density_kg_m3 * _reactance(distinct, k[each], size_m)[place]
+            air[low] = density_kg_m3 * reactance(distinct, k[each], size_m)[place]
         mass = mass_kg_m2 + SIDES * air
     if len(low):
         omega = np.sqrt(stiffness[each] / mass[each])
-        resistance = density_kg_m3 * omega * _resistance(distinct, omega / SPEED_M_S)
-        sigma[low] = (SIDES * resistance / (2 * mass[each]))[place]
+        pressure = density_kg_m3 * omega * resistance(distinct, omega / SPEED_M_S)
+        sigma[low] = (SIDES * pressure / (2 * mass[each]))[place]
     if shell_m:
         moved = np.flatnonzero(surface.transform(np.zeros_like(stiffness), 0.0) ** 2 > LEAST_VOLUME)
         volume = surface.picked(moved).transform(np.zeros(len(moved)), 0.0)
@@ -70,8 +70,8 @@ def loaded(
             more = _column(k, size_m, shell_m)
             with_column = np.maximum(still + load * more.imag / k, mass_kg_m2 / 2)
             mass[moved] = (mass[moved] + with_column) / 2
-        resistance = sigma[moved] * 2 * still + load * SPEED_M_S * more.real
-        sigma[moved] = np.maximum(resistance, 0.0) / (2 * mass[moved])
+        pressure = sigma[moved] * 2 * still + load * SPEED_M_S * more.real
+        sigma[moved] = np.maximum(pressure, 0.0) / (2 * mass[moved])
     return mass, sigma
 
 
@@ -84,7 +84,7 @@ def _column(k: Array, size_m: float, shell_m: float) -> NDArray[np.complex128]:
     return found
 
 
-def _reactance(surface: Surface, k: Array, size_m: float) -> Array:
+def reactance(surface: Surface, k: Array, size_m: float) -> Array:
     """∫ D(s)/√(s² - k²) ds over s > k, with s² = k² + u²: ∫ D(s)/s du."""
     highest = 8 * EXACT / size_m
     u = (np.arange(POINTS) + 0.5) * (highest / POINTS)
@@ -93,7 +93,7 @@ def _reactance(surface: Surface, k: Array, size_m: float) -> Array:
     return found
 
 
-def _resistance(surface: Surface, k: Array) -> Array:
+def resistance(surface: Surface, k: Array) -> Array:
     """∫ D(s)/√(k² - s²) ds over s < k, with s = k sin α."""
     alpha = (np.arange(64) + 0.5) * (math.pi / 128)
     found: Array = surface.density(k[:, None] * np.sin(alpha)).sum(1) * (math.pi / 128)

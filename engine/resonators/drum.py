@@ -123,19 +123,23 @@ class DrumParameters:
             return Rectangle.below(self.length_m, self.width_m, wavenumber)
         return Circle.below((self.length_m + self.width_m) / 4, wavenumber)
 
-    def modes(self, highest_hz: float, most: int = MOST_MODES) -> DrumModes:
-        """Its lowest modes below a frequency, so many at most.
-
-        Raises:
-            ValueError: there is none, or far too many; the message names the remedy.
-        """
+    def highest_wavenumber(self, highest_hz: float, most: int = MOST_MODES) -> float:
+        """Up to which modes are looked at for the lowest below a frequency, so many at most."""
         load = self.mass_kg_m2 * (2 * math.pi * highest_hz) ** 2
         square = 2 * load / (self.tension_n_m + math.sqrt(self.tension_n_m**2 + 4 * self.bending_nm * load))
         highest = 1.2 * math.sqrt(square) if self.air_kg_m3 else math.sqrt(square)
         density = self.length_m * self.width_m / (4 * math.pi) * (math.pi / 4 if self.shape == "circle" else 1)
         if density * highest**2 > bounds.MOST_SURFACE_MODES:  # Weyl's law
             highest = math.sqrt(2.5 * (most + 50) / density)
-        surface = self.surface(highest * (1 + 1e-9))
+        return highest
+
+    def modes(self, highest_hz: float, most: int = MOST_MODES) -> DrumModes:
+        """Its lowest modes below a frequency, so many at most.
+
+        Raises:
+            ValueError: there is none, or far too many; the message names the remedy.
+        """
+        surface = self.surface(self.highest_wavenumber(highest_hz, most) * (1 + 1e-9))
         if len(surface.wavenumber) == 0:
             raise ValueError(f"a drum has no mode below {highest_hz:g} Hz; tune it lower, or ask for higher modes")
         return DrumModes.of(self, surface, highest_hz, most)

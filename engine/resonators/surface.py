@@ -141,7 +141,8 @@ class Circle:
         z, s, m = self.wavenumber[:, None] * self.radius_m, wavenumbers * self.radius_m, self.m[:, None]
         slope, apart = self._slope[:, None], z**2 - s**2
         near = np.abs(z - s) < 1e-6 * z
-        found: Array = np.where(near, slope**2 / 2, -z * slope * scipy.special.jv(m, s) / np.where(near, 1.0, apart))
+        at_zero = slope**2 / 2 * (2 - s / z)  # to second order
+        found: Array = np.where(near, at_zero, -z * slope * scipy.special.jv(m, s) / np.where(near, 1.0, apart))
         return found
 
 
@@ -213,11 +214,9 @@ class Rectangle:
 
 def _of_sine(m: Numbers, turn: Array) -> Array:
     """|∫₀¹ sin(mπx) e^{i turn x} dx|, with the sign that the middle gives."""
-    side = m * math.pi
-    near = np.abs(side - np.abs(turn)) < 1e-6 * side
-    wave = np.where(m % 2 == 1, np.cos(turn / 2), np.sin(turn / 2))
-    apart = np.where(near, 1.0, side**2 - turn**2)
-    found: Array = np.where(near, 0.5, 2 * side * wave / apart)
+    side, away = m * math.pi, np.abs(turn)
+    sign = np.where(m % 2 == 1, 1.0, np.sign(turn)) * np.where((m - 1) % 4 < 2, 1.0, -1.0)
+    found: Array = sign * side / (side + away) * np.sinc((away - side) / (2 * math.pi))
     return found
 
 

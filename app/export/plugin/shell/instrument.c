@@ -6,6 +6,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "drums.h"
 #include "effects.h"
 #include "layout.h"
 
@@ -50,8 +51,8 @@ uint32_t instrument_tail(const instrument *own) {
   return (uint32_t)((own->of->longest_s + effects_tail_s(own)) * own->rate_hz);
 }
 
-static slot *copied(const image *of, int64_t first, int64_t count) {
-  slot *memory = calloc((size_t)count, sizeof(slot));
+static slot *copied(const image *of, int64_t first, int64_t count, int64_t more) {
+  slot *memory = calloc((size_t)(count + more), sizeof(slot));
   if (memory) memcpy(memory, (const slot *)of + first, (size_t)count * sizeof(slot));
   return memory;
 }
@@ -77,21 +78,6 @@ static slot *pushed(instrument *own, int64_t frame, int64_t kind, int32_t channe
 /* Events count a quantum late, so that each is known before the quantum that holds its frame. */
 static int64_t frame_of(const instrument *own, uint32_t at) { return own->mixer[M_FRAMES].whole + at + QUANTUM; }
 
-/* Drums that are struck from now on decay as a knob says. */
-static void follow_losses(instrument *own, int64_t knob, double value) {
-  const image *of = own->of;
-  double by = value - ((const slot *)of)[of->table + TABLE_VALUES + knob].real; /* of the instrument's own */
-  own->added[knob == BRIGHTNESS_DECAY] = by;
-  const slot *before = (const slot *)of + of->table, *slots = (const slot *)of + of->losses;
-  const slot *drums = own->table + own->table[TABLE_DRUMS].whole;
-  for (int32_t key = 0; key < KEYS; key++) {
-    int64_t drum = drums[key].whole, modes = drum ? own->table[drum + DRUM_MODES].whole : 0;
-    const double *rows = (const double *)of + slots[key].whole;
-    for (int64_t mode = 0, first = drum + DRUM_HEADER + modes; mode < modes; mode++)
-      own->table[first + mode].real = before[first + mode].real + own->added[0] * rows[mode] + own->added[1] * rows[modes + mode];
-  }
-}
-
 /* As `engine.effects.Amp.factors`. */
 static void follow_amp(instrument *own) {
   slot *amp = own->mixer + M_AMPLIFIER;
@@ -108,7 +94,7 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
   const parameter *of = &parameters_of(own->of)[place];
   if (of->kind == KIND_VALUE) {
     pushed(own, frame, PARAMETER, 0, of->index, value);
-    if (own->of->losses && (of->index == DECAY || of->index == BRIGHTNESS_DECAY)) follow_losses(own, of->index, value);
+    if (own->drums) drums_follow(own, of->index, value);
   } else if (of->kind == KIND_VOLUME) {
     own->mixer[M_WANTED_VOLUME].real = pow(10, value / 20);
   } else if (of->kind == KIND_SOURCE) {
@@ -135,9 +121,9 @@ bool instrument_begin(instrument *own, double rate_hz) {
   own->player = calloc((size_t)(PLAYER_VOICES + MOST_NOTES * MOST_SOURCES * (VOICE_SLOTS_FIXED + of->modes * VOICE_SLOTS_A_MODE)),
                        sizeof(slot));
   own->scratch = calloc(QUANTUM, sizeof(slot));
-  own->table = copied(of, of->table, of->table_slots);
-  own->model = copied(of, of->model, of->model_slots);
-  own->truth = copied(of, of->truth, of->truth_slots);
+  own->table = copied(of, of->table, of->table_slots, drums_slots(of));
+  own->model = copied(of, of->model, of->model_slots, 0);
+  own->truth = copied(of, of->truth, of->truth_slots, 0);
   if (!own->mixer || !own->player || !own->scratch || !own->table || !own->model || !own->truth) {
     instrument_end(own);
     return false;
@@ -167,13 +153,12 @@ bool instrument_begin(instrument *own, double rate_hz) {
     if (each->kind == KIND_EFFECT) own->effects.values[each->index] = own->values[place];
     if (each->kind == KIND_AMP) own->amp[each->index] = own->values[place];
   }
-  if (!effects_begin(own)) {
+  if (!drums_begin(own) || !effects_begin(own)) {
     instrument_end(own);
     return false;
   }
   own->waiting = 0;
   own->read = 0;
-  own->added[0] = own->added[1] = 0;
   slot *event = pushed(own, 0, TABLE, 0, 0, 0);
   event[EVENT_TABLE].whole = number_of(own->table);
   for (int32_t place = 0; place < of->parameter_count; place++) {
@@ -187,6 +172,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
 
 void instrument_end(instrument *own) {
   effects_end(own);
+  drums_end(own);
   slot **all[] = {&own->mixer, &own->player, &own->table, &own->model, &own->truth, &own->scratch};
   for (size_t place = 0; place < sizeof(all) / sizeof(*all); place++) {
     free(address(*all[place]));
@@ -323,6 +309,7 @@ void instrument_render(instrument *own, uint32_t frames, float *left, float *rig
     int64_t rendered = own->mixer[M_LEFT].whole, left_over = frames - done;
     if (!rendered) {
       apply_due(own);
+      drums_prepare(own);
       if (effects_follow(own)) pushed(own, 0, PARAMETER, 0, BODY_MIX, own->effects.values[EFFECT_BODY_MIX]);
       rendered = QUANTUM;
     }

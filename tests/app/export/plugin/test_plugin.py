@@ -19,13 +19,15 @@ from app.export.plugin.formats import TARGETS, this_target
 from app.export.plugin.image import Image, image_of
 from app.export.plugin.objects import objects_of
 from app.instrument.events import HARMONICS, STRUM, TREMOLO, Controller, NoteOn, PatchTurned, TimedEvent
+from app.instrument.offline import render_events
 from app.instrument.strings import Strings
+from app.patches.drums import Drums
 from app.patches.patch import Patch, Technique
 from app.shared.parameters import OF_PATCHES
 from tests.app.export.plugin import host
 from tests.app.export.plugin.host import Event, Instance, Library, choke, midi, note_off, note_on, param, tune
+from tests.app.export.plugin.pieces import DRUMS as DRUM_NAMES
 from tests.app.export.plugin.pieces import (
-    DRUMS,
     EQUAL_DB,
     LEARNED,
     LONG,
@@ -168,6 +170,15 @@ def test_techniques_are_as_in_the_app(bank: Library) -> None:
     )
 
 
+def ids_of(bank: Library, images: list[Image], name: str) -> dict[str, int]:
+    """Of a host's parameters, by those of the table."""
+    (image,) = (each for each in images if each.name == patch_of(name).name)
+    instance = bank.create(image.id)
+    found = dict(zip((each.id for each in image.parameters), instance.ids, strict=True))
+    instance.destroy()
+    return found
+
+
 def with_values(bank: Library, name: str, values: dict[int, float]) -> Instance:
     """Its parameters, by their identifiers, are moved before anything is played."""
     instance = instance_of(bank, name)
@@ -208,7 +219,7 @@ def drawn(patch: Patch, image: Image, draw: np.random.Generator, count: int) -> 
 
 
 @pytest.mark.parametrize("count", (1, 1, 1, 1, 4, 9) * (5 if LONG else 1))
-@pytest.mark.parametrize("name", [name for name in TURNED if name not in DRUMS])
+@pytest.mark.parametrize("name", [name for name in TURNED if name not in DRUM_NAMES])
 def test_with_any_parameters_anywhere_it_sounds_as_the_app_renders(
     bank: Library, images: list[Image], name: str, count: int, request: pytest.FixtureRequest
 ) -> None:
@@ -241,13 +252,72 @@ def test_keys_struck_after_a_macro_has_moved_are_as_loud_as_in_the_app(bank: Lib
     assert difference_db(sound, rendered(patch, rate_hz)) > -40
 
 
-def test_decay_of_drums_follows_a_macro(bank: Library) -> None:
-    patch = patch_of("thin_bars")
-    decay = [macro.targets[0].field for macro in patch.macros].index("knobs.decay")
-    id = instance_of(bank, "thin_bars").parameters[patch.macros[decay].name].id
-    sound = played(with_values(bank, "thin_bars", {id: 0.0}), patch, 48_000)
-    assert difference_db(sound, rendered(patch, 48_000)) > -40
-    assert difference_db(sound, rendered(patch.turned(decay, 0.0), 48_000)) < EQUAL_DB
+STEEL, RUBBER = {"knobs.modulus": 3.0}, {"knobs.modulus": 0.3}
+PLACES = {"pickup.points.0": 0.1, "pickup.points.1": 0.93}
+ENDS = {"knobs.modulus": 20.0, "knobs.decay": 0.5, "knobs.brightness_decay": 3.0, "pickup.points.0": 0.5}
+
+
+@pytest.mark.parametrize("values", (STEEL, RUBBER, PLACES, ENDS))
+@pytest.mark.parametrize("name", DRUM_NAMES)
+def test_drums_follow_their_parameters(
+    bank: Library, images: list[Image], name: str, values: dict[str, float]
+) -> None:
+    patch, ids = patch_of(name), ids_of(bank, images, name)
+    moved = patch.with_values(values)
+    sound = played(with_values(bank, name, {ids[id]: value for id, value in values.items()}), patch, 48_000)
+    assert difference_db(sound, rendered(moved, 48_000)) < EQUAL_DB
+    assert difference_db(rendered(moved, 48_000), rendered(patch, 48_000)) > -40
+
+
+@pytest.mark.parametrize("name", DRUM_NAMES)
+def test_drums_follow_while_they_play(bank: Library, images: list[Image], name: str) -> None:
+    """Blows follow modulus and decay; drums that ring are heard at other places."""
+    patch, rate_hz, ids = patch_of(name), 48_000, ids_of(bank, images, name)
+    turned, more, events = patch, list[TimedEvent](), list[Event]()
+    for time_s, values in ((0.05, STEEL), (0.2, PLACES), (0.4, {"knobs.decay": 0.6, **RUBBER})):
+        turned = turned.with_values(values)
+        more.append(TimedEvent(time_s, PatchTurned(turned)))
+        events += [param(round(time_s * rate_hz), ids[id], value) for id, value in values.items()]
+    sound = played(instance_of(bank, name), patch, rate_hz, more=tuple(events))
+    assert difference_db(sound, rendered(patch, rate_hz, more=tuple(more))) < EQUAL_DB
+    assert difference_db(sound, rendered(patch, rate_hz)) > -40
+
+
+@pytest.mark.parametrize("factor", (0.05, 1.0, 20.0))
+def test_other_drums_are_computed_as_in_the_app(objects: Path, tmp_path: Path, factor: float) -> None:
+    """A shell, a kettle, a rectangle in air, of many modes, and a modulus that is impossible."""
+    timpani = patch_of("timpani")
+    assert isinstance(timpani.strings, Drums)
+    one = timpani.strings.drums[0]
+    changed: list[dict[str, object]] = [
+        {"shell_m": 0.4, "cavity_m3": 0.0},
+        {"length_m": 0.33, "width_m": 0.31, "cavity_m3": 0.02, "uneven": 0.01},
+        {"shape": "rectangle", "length_m": 0.3541, "width_m": 0.0612, "cavity_m3": 0.0, "shell_m": 0.2},
+        {"youngs_modulus_pa": 9e11},
+    ]
+    drums = [
+        one.model_copy(update={"note": 50 + place, "drum": type(one.drum)(**{**one.drum.model_dump(), **each})})
+        for place, each in enumerate(changed)
+    ]
+    strings = timpani.strings.model_copy(update={"drums": tuple(drums), "keys": "pads"})
+    patch = timpani.model_copy(update={"name": "Others", "strings": strings, "range": (50, 53)})
+    path = build_plugin([image_of(patch, preset_of("timpani"))], "clap", this_target(), tmp_path / "others", objects)
+    library = Library(path)
+    instance = library.create(next(iter(library.plugins)))
+    id = instance.parameters["modulus"].id
+    struck = [(0.02 * place, NoteOn(50 + place, 90)) for place in range(4)]
+    instance.activate(48_000)
+    instance.block(64, [param(0, id, factor)])
+    instance.deactivate()
+    instance.activate(48_000)
+    frames, moved = 24_000, patch.with_value("knobs.modulus", factor)
+    events = [to_host(event, round(time_s * 48_000)) for time_s, event in struck]
+    sound = instance.render(frames + instance.latency, events)[instance.latency :]
+    library.destroy_instances()
+    possible = struck[:3] if factor > 1 else struck  # beyond the bounds of a modulus a key is silent
+    timed = [TimedEvent(time_s, event) for time_s, event in possible]
+    wanted = np.concatenate(list(render_events(moved, preset_of("timpani"), timed, 48_000, "model", 0.5)))
+    assert difference_db(sound, wanted) < EQUAL_DB
 
 
 def test_body_and_room_follow_macros_and_the_wheel_while_it_plays(bank: Library) -> None:
