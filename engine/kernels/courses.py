@@ -93,7 +93,7 @@ def add(mixer: np.ndarray, place: int, now_s: float) -> int:
         if strings < MOST and _joins(course, late, other, now) and voice.begin(_at(other), mixer) == at.SOUNDING:
             counts[at.M_COURSE + strings] = other
             strings += 1
-    for turn in range(2):  # those first that are to be ahead of what is heard, and are not yet
+    for turn in range(2):  # those first that are behind the others, as a pick-up of velocity is as it begins
         generated = 0
         for string in range(MOST):
             address = counts[at.M_COURSE + string] if string < strings else 0
@@ -118,7 +118,7 @@ def add(mixer: np.ndarray, place: int, now_s: float) -> int:
 
 @njit(**COMPILED)
 def _generate(mixer: np.ndarray, first: bool) -> None:
-    """The next quantum of strings whose addresses are in the second half of `M_COURSE`, (4, QUANTUM) of `_out` each.
+    """The next quantum of strings whose addresses are in the second half of `M_COURSE`.
 
     Args:
         first: whether those that sense velocity are behind the others.

@@ -1298,8 +1298,8 @@ def _note_on(
             )
             voice, begun = _at(address), gain * player[of.PLAYER_SOURCE_GAINS + source]
             if player[note + of.NOTE_BRIDGE] > 0.0:
-                first = players[of.PLAYER_AGE] - member
-                _whole(address)[at.COURSE] = of.MOST_SOURCES * first + source
+                first = players[of.PLAYER_AGE] - member  # of this player, for another may ring as well
+                _whole(address)[at.COURSE] = players[of.PLAYER_HERE] + of.MOST_SOURCES * first + source
             voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
         players[note + of.NOTE_VOICES + source] = address
     for each in range(of.MOST_NOTES):

@@ -228,3 +228,21 @@ def test_a_course_stays_in_step(patch: Patch, preset: Preset, kind: str, stops: 
     model, truth = (play(moving, preset, 0.8, *events, source=each) for each in ("model", "truth"))
     assert np.isfinite(model).all()
     assert ((model - truth) ** 2).sum() < 1e-5 * (truth**2).sum()
+
+
+@SOURCES
+def test_courses_of_two_players_are_two(patch: Patch, preset: Preset, source: str) -> None:
+    """Notes of the player before ring on beside those of the next, whose strokes have the same numbers."""
+
+    def rendered(begins: tuple[bool, bool]) -> NDArray[np.float64]:
+        mixer, found = Mixer(RATE_HZ, limited=False), []
+        for plays in begins:
+            player = InstrumentPlayer(coupled(patch, cents=2), preset, RATE_HZ, {source: 1.0}, varied=False)
+            mixer.set_player(player.compiled)
+            if plays:
+                player.handle(NoteOn(KEY, 60), 0)
+            found.append(mixer.render(4_800)[:, 0].astype(np.float64))
+        return np.concatenate(found)
+
+    both, one, other = (rendered(begins) for begins in ((True, True), (True, False), (False, True)))
+    np.testing.assert_allclose(both, one + other, atol=1e-6 * np.abs(both).max())
