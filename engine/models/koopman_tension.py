@@ -59,8 +59,8 @@ ENERGY_BOUND = 1.5  # of the energy at the start: more is not believed
 SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
 FRAMES_AT_ONCE = 4096
 HARDEST_KICK = 0.3  # of the root of Σ η²κ (q² + v²/ω²) as a string sets out: beyond it nodes come closer
-TINY = 1e-300
 MOST_NODES = 3  # times as many as a soft pluck has
+LEAST_GROWTH = 1e-9  # of A in a quotient: gradients stay finite
 
 
 @dataclass(frozen=True)
@@ -271,7 +271,7 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
             shrunk * phase.sin(),
             angle * growth,
             self._stretch * growth,
-            torch.where(growth > 0, kappa * r / growth.clamp(min=TINY), 0.0),
+            torch.where(growth > 0, kappa * r / growth.clamp(min=LEAST_GROWTH), 0.0),
             kappa * p,
             omega.square(),
         )
