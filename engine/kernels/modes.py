@@ -64,6 +64,20 @@ def damped(omega_squared: float, sigma: float) -> float:
 
 
 @njit(**COMPILED)
+def run_up(voice: np.ndarray, seconds: float) -> None:
+    """Lets amplitudes and speeds of a voice that has not begun move on for so long, alone and at rest's tension."""
+    n = voice.view(np.int64)[at.MODES]
+    q, v, squares = row(voice, n, 0), row(voice, n, 1), row(voice, n, at.OMEGA_SQUARED)
+    for m in range(n):
+        sigma = row(voice, n, at.SIGMA)[m] + row(voice, n, at.BRIDGE)[m]
+        omega = damped(squares[m], sigma)
+        decay, cosine, sine = math.exp(-sigma * seconds), math.cos(omega * seconds), math.sin(omega * seconds) / omega
+        amplitude, speed = q[m], v[m]
+        q[m] = decay * ((cosine + sigma * sine) * amplitude + sine * speed)
+        v[m] = decay * ((cosine - sigma * sine) * speed - (sigma * sigma + omega * omega) * sine * amplitude)
+
+
+@njit(**COMPILED)
 def rest_above(voice: np.ndarray, rate: float) -> int:
     """Lays modes to rest that lie too high for the rate; the highest of the others."""
     counts = voice.view(np.int64)

@@ -39,7 +39,7 @@ from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
-from engine.kernels.modes import TOO_HIGH
+from engine.kernels.modes import TOO_HIGH, run_up
 from engine.pluck import (
     FULL_SCALE_M,
     FULL_SCALE_M_S,
@@ -683,6 +683,9 @@ def _make_voice(
     for mode in range(n if tables[of.TABLE_STRIKES] != 0 else 0):
         voice[struck + n + mode] = voice[struck + mode] * math.sqrt(voice[first + mode])
         voice[struck + mode] = 0.0
+    behind = _behind(player, table, players[note + of.NOTE_MEMBER])
+    if behind > 0:
+        run_up(voice, behind / rate_hz)
     _weigh(player, players, voice, 0, note)
     if player[note + of.NOTE_POINT] == of.BRIDGE:
         largest = 0.0
@@ -1120,6 +1123,13 @@ def _make_room(player: np.ndarray, players: np.ndarray) -> None:
         _release_note(player, players, oldest, STOLEN_S, 0)
 
 
+@njit(inline="always", **COMPILED)
+def _behind(player: np.ndarray, table: np.ndarray, member: int) -> int:
+    """Frames from the stroke of a string of a course to its beginning, in step with the first; 0: at once."""
+    later = round(member * table[of.TABLE_APART_S] * player[of.PLAYER_RATE])
+    return -later % at.QUANTUM if table[of.TABLE_BRIDGE] > 0.0 else 0
+
+
 @njit(**COMPILED)
 def _strike(
     player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, mixers: np.ndarray, event: int
@@ -1131,8 +1141,7 @@ def _strike(
     frame = players[event + of.EVENT_FRAME]
     for member in range(1, tables[of.TABLE_COURSE]):
         later = round(member * table[of.TABLE_APART_S] * player[of.PLAYER_RATE])
-        if table[of.TABLE_BRIDGE] > 0.0:  # in step
-            later = round(later / at.QUANTUM) * at.QUANTUM
+        later += _behind(player, table, member)
         players[event + of.EVENT_FRAME] = max(frame, mixers[at.M_FRAMES]) + later if later > 0 else frame
         _note_on(player, players, table, tables, mixers, event, member)
     players[event + of.EVENT_FRAME] = frame

@@ -180,6 +180,22 @@ def test_a_string_whose_others_have_not_begun_rings_as_alone(patch: Patch, prese
     assert np.abs(both - one).max() < 1e-4 * np.abs(one).max()
 
 
+@SOURCES
+def test_strings_in_step_have_the_phases_of_their_strokes(patch: Patch, preset: Preset, source: str) -> None:
+    loose = Polarisations(conductance_s_kg=1e-6, second_conductance_s_kg=0.0)
+    step, apart = (
+        play(
+            changed(patch, polarisations=loose, course=Course(strings=3, apart_ms=3.1, bridge=bridge)),
+            preset,
+            0.3,
+            (0.0, NoteOn(KEY, 20)),
+            source=source,
+        )[960:]
+        for bridge in (1.0, 0.0)
+    )
+    assert np.abs(step - apart).max() < 2e-3 * np.abs(apart).max()
+
+
 def t60_s(sound: NDArray[np.float64], begin_s: float, end_s: float) -> float:
     """From the slope of the level in windows of 50 ms."""
     times = np.arange(begin_s, end_s, 0.05)
