@@ -115,14 +115,15 @@ def drum_parts(own: DrumKeys) -> DrumParts:
         each if played.drum.shape == "circle" else 0.0 for each, played in zip(reach, drums, strict=True)
     )
     circle, parts, known = Circle.below(1.0, MORE * round_reach), list[DrumPart](), dict[Surface, Array]()
-    for played, each in zip(drums, reach, strict=True):
-        drum, surface = played.drum.parameters, circle
-        if drum.shape != "circle":
-            surface = drum.surface(MORE * each / _size_m(drum.surface(each)))
+    for played, needed in zip(drums, reach, strict=True):
+        drum = played.drum.parameters
+        wanted = MORE * needed / _size_m(drum.surface(needed))
+        surface = circle if drum.shape == "circle" else drum.surface(wanted)
+        assert isinstance(surface, Circle | Rectangle)
         if surface not in known and drum.air_kg_m3:
             known[surface] = _air(surface, air_reach)
         second = surface.sine if isinstance(surface, Circle) else surface.n
-        rows = np.stack([surface.wavenumber * _size_m(surface), surface.m, second])
+        rows = np.stack([surface.wavenumber * _size_m(surface), surface.m, second]).astype(np.float64)
         parts.append(DrumPart(played, rows, air_reach, known.get(surface, np.zeros((2, 0, 0)))))
     return DrumParts(tuple(parts), keys, min(of.MOST_DRUM_MODES, round(MORE * most) + 1))
 

@@ -21,6 +21,9 @@ struct drums {
   bool any_stale;
   int64_t capacity, most; /* modes of a key, and of the longest list of a surface */
   double *struck, *slopes; /* (drums, most): shapes at the places of blows, and of circles J_m' at the edge */
+  double *bessels; /* J_m, m from -TERMS to `orders`, of all multiples of STEP up to `furthest` */
+  int64_t orders;
+  double furthest;
   double *work, *radiated; /* (3, most): ω, mass and radiated losses; (KEYS, capacity) */
   int32_t *order, *modes; /* (most,), and (KEYS, capacity): places in the list of the surface */
 };
@@ -53,6 +56,29 @@ static bessel_values bessel(int64_t m, double x) {
   return (bessel_values){wanted / sum, first, second / sum, 2 / PI * (1 - first) + 4 / PI * struve / sum};
 }
 
+#define STEP 0.1
+enum { TERMS = 4 };
+
+static int64_t columns(const struct drums *with) { return with->orders + 2 * TERMS + 1; }
+
+static void fill(struct drums *with) {
+  for (int64_t step = 0; step <= (int64_t)(with->furthest / STEP) + 1; step++)
+    for (int64_t m = -TERMS; m <= with->orders + TERMS; m++) {
+      double found = bessel(m < 0 ? -m : m, (double)step * STEP).wanted;
+      with->bessels[step * columns(with) + m + TERMS] = m < 0 && m % 2 ? -found : found;
+    }
+}
+
+/* J_m by Taylor's series, whose derivatives are of other orders: to 3e-9. */
+static double bessel_near(const struct drums *with, int64_t m, double x) {
+  if (x > with->furthest || m > with->orders) return bessel(m, x).wanted;
+  int64_t step = (int64_t)(x / STEP + 0.5);
+  const double *j = with->bessels + step * columns(with) + m + TERMS;
+  double d = (x - (double)step * STEP) / 2, two = d * d / 2, three = two * d / 3, four = three * d / 4;
+  return j[0] + d * (j[-1] - j[1]) + two * (j[-2] - 2 * j[0] + j[2]) + three * (j[-3] - 3 * j[-1] + 3 * j[1] - j[3]) +
+         four * (j[-4] - 4 * j[-2] + 6 * j[0] - 4 * j[2] + j[4]);
+}
+
 /* Surfaces */
 
 static double held_across(const drum *own) { return own->shape == BAR ? 1 : 1 - own->poisson * own->poisson; }
@@ -73,12 +99,12 @@ static double of_sine(double m, double turn) {
 }
 
 /* Surface.transform along the first axis: at wavenumber `along`, which may be negative. */
-static double transformed(const image *of, const drum *own, const double *slopes, int64_t mode, double along) {
+static double transformed(const image *of, const struct drums *with, const drum *own, const double *slopes, int64_t mode, double along) {
   double m = list(of, own, 1)[mode], n = list(of, own, 2)[mode];
   if (own->shape != CIRCLE) return 2 * of_sine(m, along * own->length_m) * (n == 0 ? sqrt(0.5) : of_sine(n, 0));
   if (n != 0) return 0; /* of a sine */
   double z = list(of, own, 0)[mode], s = fabs(along) * radius_of(own), slope = slopes[mode];
-  double hankel = fabs(z - s) < 1e-6 * z ? slope * slope / 2 * (2 - s / z) : -z * slope * bessel((int64_t)m, s).wanted / (z * z - s * s);
+  double hankel = fabs(z - s) < 1e-6 * z ? slope * slope / 2 * (2 - s / z) : -z * slope * bessel_near(with, (int64_t)m, s) / (z * z - s * s);
   double height = (m == 0 ? 1 : sqrt(2)) / fabs(slope), turned = along < 0 && fmod(m, 2) == 1 ? -1 : 1;
   return 2 * height * hankel * turned;
 }
@@ -148,7 +174,7 @@ static int64_t solve(const image *of, struct drums *with, const drum *own, const
       double at = sqrt(stiffness / mass), ka = at / AIR_M_S * size_m;
       if (exact) sigma = AIR_SIDES * air * at * size_m * ka * air_of(of, own, 1, low, ka) / (2 * mass);
     }
-    double volume = own->shell_m || own->cavity_m3 ? transformed(of, own, slopes, mode, 0) : 0;
+    double volume = own->shell_m || own->cavity_m3 ? transformed(of, with, own, slopes, mode, 0) : 0;
     if (own->shell_m && volume * volume > LEAST_VOLUME) {
       double still = mass, moved = air * volume * volume, real = 0, imaginary = 0;
       for (int turn = 0; turn < COLUMN_ROUNDS; turn++) {
@@ -233,7 +259,7 @@ static void write_modes(instrument *own, int64_t key, slot *block) {
   for (int64_t place = 0; place < modes; place++) {
     int64_t mode = with->order[place];
     double kappa = wavenumber(of, &tuned, mode), mass = with->work[with->most + mode], turn = kappa * tuned.radius_m;
-    double stretch = kappa * kappa * mu / mass, spread = turn < 1e-6 ? 1 : 2 * bessel(1, turn).wanted / turn;
+    double stretch = kappa * kappa * mu / mass, spread = turn < 1e-6 ? 1 : 2 * bessel_near(with, 1, turn) / turn;
     slot *row = block + DRUM_HEADER + place;
     row[0].real = pow(with->work[mode], 2);
     row[2 * modes].real = coupling * stretch, row[3 * modes].real = stretch;
@@ -272,7 +298,7 @@ static void write_places(instrument *own, int64_t key, slot *block) {
     double scale = sqrt(row[3 * modes].real) / wavenumber(of, &now, mode), k = sqrt(row[0].real) / AIR_M_S;
     double strength = AIR_KG_M3 * row[0].real / (2 * PI) * area * scale / FULL_SCALE_PA;
     for (int64_t point = 0; point < points; point++)
-      row[(5 + point) * modes].real = strength * transformed(of, &now, slopes, mode, k * (2 * own->drums->points[point] - 1));
+      row[(5 + point) * modes].real = strength * transformed(of, own->drums, &now, slopes, mode, k * (2 * own->drums->points[point] - 1));
   }
 }
 
@@ -315,7 +341,9 @@ void drums_prepare(instrument *own) {
   for (int64_t note = 0; note < MOST_NOTES; note++) {
     const slot *ringing = player + PLAYER_NOTES + note * NOTE_SLOTS;
     int64_t key = ringing[NOTE_KEY].whole;
-    if (ringing[NOTE_STATE].whole == RINGS && own->drums->stale[key] & PLACES_MOVED) write_key(own, key);
+    const slot *voice = (const slot *)(intptr_t)ringing[NOTE_VOICES].whole;
+    bool listens = ringing[NOTE_STATE].whole == RINGS && voice && !voice[NEXT_WEIGHTS].whole; /* else it fades to other places yet */
+    if (listens && own->drums->stale[key] & PLACES_MOVED) write_key(own, key);
   }
 }
 
@@ -325,15 +353,21 @@ bool drums_begin(instrument *own) {
   struct drums *with = own->drums = calloc(1, sizeof *with);
   if (!with) return false;
   const drum *all = drums_of(of);
-  for (int64_t each = 0; each < of->drum_count; each++) with->most = all[each].count > with->most ? all[each].count : with->most;
+  for (int64_t each = 0; each < of->drum_count; each++) {
+    with->most = all[each].count > with->most ? all[each].count : with->most;
+    with->furthest = fmax(with->furthest, all[each].air_reach / 2);
+  }
+  with->orders = (int64_t)(with->furthest + 12 * cbrt(with->furthest)) + 20; /* beyond them it is nothing */
   with->capacity = of->modes;
   with->struck = calloc((size_t)(of->drum_count * with->most), sizeof(double));
   with->slopes = calloc((size_t)(of->drum_count * with->most), sizeof(double));
+  with->bessels = calloc((size_t)(columns(with) * ((int64_t)(with->furthest / STEP) + 2)), sizeof(double));
   with->work = calloc((size_t)(3 * with->most), sizeof(double));
   with->radiated = calloc((size_t)(KEYS * with->capacity), sizeof(double));
   with->order = calloc((size_t)with->most, sizeof(int32_t));
   with->modes = calloc((size_t)(KEYS * with->capacity), sizeof(int32_t));
-  if (!with->struck || !with->slopes || !with->work || !with->radiated || !with->order || !with->modes) return false;
+  if (!with->struck || !with->slopes || !with->bessels || !with->work || !with->radiated || !with->order || !with->modes) return false;
+  fill(with);
   for (int64_t each = 0; each < of->drum_count; each++) {
     double *slopes = with->slopes + each * with->most, *struck = with->struck + each * with->most;
     for (int64_t mode = 0; mode < all[each].count; mode++) {
@@ -354,6 +388,6 @@ void drums_end(instrument *own) {
   struct drums *with = own->drums;
   own->drums = NULL;
   if (!with) return;
-  free(with->struck), free(with->slopes), free(with->work), free(with->radiated), free(with->order), free(with->modes);
+  free(with->struck), free(with->slopes), free(with->bessels), free(with->work), free(with->radiated), free(with->order), free(with->modes);
   free(with);
 }

@@ -46,7 +46,7 @@ from tests.app.export.plugin.pieces import (
 pytestmark = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang, the extra [plugin]")
 
 
-LARGEST_BYTES = 3_000_000  # the code has 0.7 MB more
+LARGEST_BYTES = 2_000_000  # the code has 0.7 MB more
 
 
 def instance_of(bank: Library, name: str, rate_hz: int = 48_000) -> Instance:
@@ -452,8 +452,8 @@ def test_an_instrument_that_cannot_sound_is_refused() -> None:
         image_of(sitar, preset_of(LEARNED))
 
 
-def test_instruments_with_the_most_modes_and_the_longest_room_are_small() -> None:
-    for name in ("frame_drum", "slow_water"):
+def test_instruments_with_the_most_drums_or_modes_and_the_longest_room_are_small() -> None:
+    for name in ("concert_toms", "frame_drum", "slow_water"):
         assert image_of(patch_of(name), preset_of(name)).bytes < LARGEST_BYTES
 
 
