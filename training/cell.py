@@ -112,7 +112,7 @@ class Cell:
         """The cell of a name; None where it is no cell's.
 
         Raises:
-            SchemaError: it has a cell's form, but names no cell, for example an unknown model.
+            SchemaError: it has a cell's form, but names no cell, for example an unknown model, or states a default.
         """
         # the longest model first: koopman_var is not koopman by the recipe var
         models = "|".join(sorted(MODELS, key=len, reverse=True))
@@ -120,7 +120,7 @@ class Cell:
         if found is None:
             return None
         try:
-            return cls(
+            cell = cls(
                 found["model"],
                 found["kind"] == "nonlinear",
                 "gaussian" if found["initial"] == "gaussian" else "noise",
@@ -131,6 +131,9 @@ class Cell:
             )
         except ValueError as error:
             raise SchemaError(f"{name}: {error}") from error
+        if cell.name != name:
+            raise SchemaError(f"{name}: a cell's name leaves defaults out; this one is {cell.name}")
+        return cell
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from typing import Literal
 
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
@@ -50,6 +50,8 @@ PLACE, WIDTH, PERCENT = Taper(0.01), Taper(1.05, "{:.3f}", True), Taper(0.02, "{
 class Parameter:
     """A number that a player can change.
 
+    The unit is in the format of `taper`.
+
     Attributes:
         id: its path, in a patch ("knobs.tension") or in the session's choices ("volume_db"); files hold it.
         label: on a knob.
@@ -61,6 +63,9 @@ class Parameter:
         figure_unit: unit of the physical figure that its knob shows, see `app.instrument.facts`; None: none.
         whole: whether it is an integer.
         words: for the integers from its lowest on; empty: they are shown as numbers.
+
+    Raises:
+        ValueError: the default, or the wheel's end, is outside the limits.
     """
 
     id: str
@@ -71,6 +76,7 @@ class Parameter:
     group: str = ""
     modulation: Modulation = "none"
     name: str = ""
+    _: KW_ONLY
     wheel: float | None = None
     wheel_factor: float = 1.0
     figure_unit: str | None = None
@@ -79,6 +85,9 @@ class Parameter:
     tip: str = field(init=False, default="")
 
     def __post_init__(self) -> None:
+        for what, value in (("default", self.default), ("wheel", self.wheel)):
+            if value is not None and value != self.clamped(value):
+                raise ValueError(f"{self.id}: {what} {value:g} is not within {self.limits[0]:g} … {self.limits[1]:g}")
         object.__setattr__(self, "name", self.name or self.label)
         object.__setattr__(self, "tip", TIPS.get(self.id, ""))
 
@@ -143,7 +152,7 @@ TIPS = {
     "near 3 kHz",
     "damping.release_t60_s": "Time in which a released key falls by 60 dB",
     "damping.mute": "Palm mute: a hand on the strings at the bridge, so that high partials stop soon. "
-    "MIDI's soft pedal (controller 67) adds to it",
+    "The larger of knob and MIDI's soft pedal (controller 67) counts",
     "pluck.position": f"Where it is plucked: nearer an end is brighter; {_PLACE_TIP}",
     "pluck.width": "Width of the softest pluck, in lengths of the string: wide is mellow",
     "pluck.width_hard": "Width of the hardest pluck, in lengths of the string: narrow is bright",
@@ -203,9 +212,8 @@ def _knob(
         group,
         "wheel",
         name,
-        None,
-        wheel_factor,
-        figure_unit,
+        wheel_factor=wheel_factor,
+        figure_unit=figure_unit,
     )
 
 
@@ -243,8 +251,10 @@ OF_PATCHES: Mapping[str, Parameter] = {
         _knob("decay", "decay", MULTIPLIER, "s"),
         _knob("brightness_decay", "HF loss", MULTIPLIER, "s"),
         Parameter("damping.release_t60_s", "release", (0.01, 60), 0.3, SECONDS, DECAY, "wheel", wheel_factor=10),
-        Parameter("damping.mute", "mute", (0, 1), 0, MUTED, TECHNIQUE, "wheel", "palm mute", 1.0),
-        Parameter("pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, "wheel", "pluck position", 0.5),
+        Parameter("damping.mute", "mute", (0, 1), 0, MUTED, TECHNIQUE, "wheel", "palm mute", wheel=1.0),
+        Parameter(
+            "pluck.position", "position", POSITION_RANGE, 0.2, PLACE, PLUCK, "wheel", "pluck position", wheel=0.5
+        ),
         Parameter(
             "pluck.width", "soft width", WIDTH_RANGE, 0.12, WIDTH, PLUCK, "wheel", "width (low velocity)", wheel=0.02
         ),
@@ -271,7 +281,9 @@ OF_PATCHES: Mapping[str, Parameter] = {
             "hardest amplitude",
             wheel_factor=2,
         ),
-        Parameter("pluck.curve", "curve", (-1, 1), 0, Taper(0.05, "{:+.2f}"), PLUCK, "wheel", "velocity curve", 1.0),
+        Parameter(
+            "pluck.curve", "curve", (-1, 1), 0, Taper(0.05, "{:+.2f}"), PLUCK, "wheel", "velocity curve", wheel=1.0
+        ),
         Parameter("pluck.release_ms", "soft contact", (0, 20), 0, CONTACT, PLUCK, "macro", "contact (low velocity)"),
         Parameter(
             "pluck.release_hard_ms", "hard contact", (0, 20), 0, CONTACT, PLUCK, "macro", "contact (high velocity)"
@@ -327,7 +339,7 @@ OF_PATCHES: Mapping[str, Parameter] = {
         Parameter(
             "amp.tone_db", "amp tone", AMP_TONE_DB, 0, Taper(0.5, "{:+.1f} dB"), BODY, "macro", "amplifier tone"
         ),
-        Parameter("body.mix", "mix", (0, 1), 0.5, PERCENT, BODY, "wheel", "body mix", 1.0),
+        Parameter("body.mix", "mix", (0, 1), 0.5, PERCENT, BODY, "wheel", "body mix", wheel=1.0),
         Parameter("body.size", "size", BODY_SIZE, 1.0, TIMES, BODY, "wheel", "body size", wheel_factor=2),
         Parameter("room.mix", "room", (0, 1), 0, PERCENT, BODY, "wheel", wheel=1.0),
         Parameter(

@@ -15,10 +15,12 @@ from training.cli.console import Failure, number, progress, say
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from training.cell import Cell
     from training.cli.console import Report
     from training.configuration import DatasetConfiguration
     from training.data.dataset import Dataset
     from training.fitting.fit import Progress
+    from training.results import Row
 
 Configuration = Annotated[
     str,
@@ -103,21 +105,39 @@ def train(
         ("test", row.test_rel_mse, row.test_rel_mae),
     ):
         print(f"{split:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}")
+    if cell is not None:
+        _print_known(cell, row)
     if row.start_rel_mse is not None and row.start_rel_mae is not None:
         print(f"untrained   rel. MSE {number(row.start_rel_mse)}, rel. MAE {number(row.start_rel_mae)} (validation)")
     when = "" if begun else "; finished earlier, nothing was trained now"
-    print(f"trained in  {duration(row.seconds or 0.0)}, best epoch {row.best_epoch}{when}")
+    epoch = "" if row.epochs == 1 else f", best epoch {row.best_epoch}"  # a closed form has one
+    print(f"trained in  {duration(row.seconds or 0.0)}{epoch}{when}")
     _tell_heard(file)
+
+
+def _print_known(cell: Cell, row: Row) -> None:
+    """What the paper, and the project's results, have of the same run on validation."""
+    from training.results import RESULTS, read_results
+    from training.tables.paper import Column, paper_errors
+
+    place = (cell.string_kind, cell.horizon, cell.model, Column(cell.initial, cell.rate_hz))
+    if (paper := paper_errors().get(place)) is not None and paper.rel_mse and paper.rel_mae:
+        print(
+            f"paper       rel. MSE {number(paper.rel_mse.mean)}, rel. MAE {number(paper.rel_mae.mean)} (validation)"
+        )
+    for known in read_results(RESULTS) if RESULTS.is_file() else []:
+        if known.digest == row.digest and known.status == "done":
+            print(f"project     rel. MSE {number(known.rel_mse)}, rel. MAE {number(known.rel_mae)} (validation)")
 
 
 def _tell_heard(file: Path) -> None:
     """Compares the sound of the preset with the truth, and adds the result to the table beside it."""
     from training.cli.heard import measure
-    from training.heard_words import heard_word
+    from training.heard_words import heard_sentence
 
     try:
         with progress("listen") as report:
-            print(f"heard       {heard_word(measure(file, True, report))}")
+            print(f"heard       {heard_sentence(measure(file, True, report), file.stem)}")
     except ValueError as error:  # the model cannot start from a displaced string at rest alone
         say(f"not listened to: {error}")
 
