@@ -298,11 +298,34 @@ static void apply_due(instrument *own) {
   memmove(own->changes, own->changes + done, (size_t)own->waiting * sizeof(change));
 }
 
-void instrument_render(instrument *own, uint32_t frames, float *left, float *right) {
+/* Makes denormal numbers zero in this thread; returns the mode before. */
+static uint64_t begin_flushing(void) {
 #if defined(__x86_64__)
   unsigned int before = _mm_getcsr();
-  _mm_setcsr(before | 0x8040); /* denormal numbers are zero */
+  _mm_setcsr(before | 0x8040);
+  return before;
+#elif defined(__aarch64__)
+  uint64_t before;
+  __asm__ volatile("mrs %0, fpcr" : "=r"(before));
+  __asm__ volatile("msr fpcr, %0" ::"r"(before | (1 << 24)));
+  return before;
+#else
+  return 0;
 #endif
+}
+
+static void end_flushing(uint64_t before) {
+#if defined(__x86_64__)
+  _mm_setcsr((unsigned int)before);
+#elif defined(__aarch64__)
+  __asm__ volatile("msr fpcr, %0" ::"r"(before));
+#else
+  (void)before;
+#endif
+}
+
+void instrument_render(instrument *own, uint32_t frames, float *left, float *right) {
+  uint64_t before = begin_flushing();
   own->mixer[M_PEAK].real = 0; /* of what is rendered now */
   float *block = (float *)own->scratch;
   for (uint32_t done = 0; done < frames;) {
@@ -322,9 +345,7 @@ void instrument_render(instrument *own, uint32_t frames, float *left, float *rig
     }
     done += (uint32_t)count;
   }
-#if defined(__x86_64__)
-  _mm_setcsr(before);
-#endif
+  end_flushing(before);
 }
 
 void instrument_report_ends(instrument *own, note_ended ended, void *context) {
