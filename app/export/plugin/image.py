@@ -178,6 +178,7 @@ class _Header(ctypes.Structure):
         ("description", ctypes.c_char * 512),
         ("maker", ctypes.c_char * 64),
         ("features", ctypes.c_char * 128),
+        ("category", ctypes.c_char * 16),
         ("uid", ctypes.c_uint8 * 16),
     )
 
@@ -275,6 +276,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     header.uid[:] = uuid.uuid5(uuid.NAMESPACE_URL, f"urn:{id}").bytes
     header.description = _bytes(patch.description, 511)
     header.features = f"instrument {'drum' if drums else 'synthesizer'} stereo".encode()
+    header.category = patch.category.encode()
     header.bytes = len(whole)
     whole[: ctypes.sizeof(_Header)] = bytes(header)
     controls = (

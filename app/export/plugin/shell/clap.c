@@ -18,11 +18,15 @@ typedef struct {
   const clap_host *host;
   instrument own;
   bool active;
-  atomic_bool loaded; /* a state that the next block takes up */
+  atomic_bool loaded; /* a state or preset that the next block takes up */
   float *spare; /* where the host gives one channel, or none */
 } shell;
 
 static shell *shell_of(const clap_plugin *plugin) { return plugin->data; }
+
+static const void *host_extension(const clap_host *host, const char *id) {
+  return host && host->get_extension ? host->get_extension(host, id) : NULL;
+}
 
 /* Ports */
 
@@ -168,7 +172,7 @@ static void param_flush(const clap_plugin *plugin, const clap_in_events *in, con
 
 static const clap_params params = {param_count, param_info, param_value, param_to_text, param_from_text, param_flush};
 
-/* State, latency, tail */
+/* State, preset, latency, tail */
 
 static bool state_save(const clap_plugin *plugin, const clap_ostream *stream) {
   uint8_t bytes[8 + 12 * MOST_PARAMETERS];
@@ -208,7 +212,29 @@ static bool set_mode(const clap_plugin *plugin, int32_t mode) {
   return true;
 }
 
+static void on_main_thread(const clap_plugin *plugin) {
+  const clap_host *host = shell_of(plugin)->host;
+  const clap_host_params *found = host_extension(host, "clap.params");
+  if (found && found->rescan) found->rescan(host, CLAP_RESCAN_VALUES);
+}
+
+/* The one preset of a plug-in is its instrument as it was saved; its key is the plug-in's identifier. */
+static bool preset_load(const clap_plugin *plugin, uint32_t kind, const char *location, const char *key) {
+  shell *own = shell_of(plugin);
+  const clap_host_preset_load *found = host_extension(own->host, "clap.preset-load/2");
+  if (kind != CLAP_PRESET_IN_PLUGIN || !key || strcmp(key, own->own.of->id)) {
+    if (found && found->on_error) found->on_error(own->host, kind, location, key, 0, "the preset belongs to another instrument");
+    return false;
+  }
+  instrument_reset_values(&own->own);
+  own->loaded = true;
+  on_main_thread(plugin);
+  if (found && found->loaded) found->loaded(own->host, kind, location, key);
+  return true;
+}
+
 static const clap_state state = {state_save, state_load};
+static const clap_preset_load presets = {preset_load};
 static const clap_latency latency = {latency_get};
 static const clap_tail tail = {tail_get};
 static const clap_render render = {no_requirement, set_mode};
@@ -301,17 +327,11 @@ static const void *shell_extension(const clap_plugin *plugin, const char *id) {
   static const struct { const char *id; const void *extension; } all[] = {
       {"clap.audio-ports", &audio_ports}, {"clap.note-ports", &note_ports}, {"clap.params", &params}, {"clap.state", &state},
       {"clap.latency", &latency},         {"clap.tail", &tail},             {"clap.render", &render},
+      {"clap.preset-load/2", &presets},
   };
   for (size_t place = 0; place < sizeof all / sizeof *all; place++)
     if (!strcmp(id, all[place].id)) return all[place].extension;
   return NULL;
-}
-
-static void on_main_thread(const clap_plugin *plugin) {
-  const clap_host *host = shell_of(plugin)->host;
-  typedef struct { void (*rescan)(const clap_host *, uint32_t); } host_params;
-  const host_params *found = host && host->get_extension ? host->get_extension(host, "clap.params") : NULL;
-  if (found && found->rescan) found->rescan(host, 1); /* values */
 }
 
 /* The factory */
@@ -320,9 +340,12 @@ enum { MOST_IMAGES = 128, MOST_FEATURES = 8 };
 static clap_descriptor descriptors[MOST_IMAGES];
 static char feature_words[MOST_IMAGES][128];
 static const char *features[MOST_IMAGES][MOST_FEATURES + 1];
+static char provider_id[160];
+static const clap_preset_descriptor provider_descriptor = {CLAP_VERSION_USED, provider_id, "Instruments", "Learned Strings"};
 
 static bool entry_init(const char *path) {
   (void)path;
+  snprintf(provider_id, sizeof provider_id, "%s.presets", image_count == 1 ? images[0]->id : "org.learned-strings.bank");
   for (int32_t each = 0; each < image_count; each++) {
     const image *of = images[each];
     memcpy(feature_words[each], of->features, sizeof of->features);
@@ -365,6 +388,60 @@ static const clap_plugin *factory_create(const clap_factory *factory, const clap
 
 static const clap_factory factory = {factory_count, factory_descriptor, factory_create};
 
-static const void *get_factory(const char *id) { return strcmp(id, "clap.plugin-factory") ? NULL : &factory; }
+/* Discovery of presets: one of each instrument, for the host's browser */
+
+static bool provider_init(const clap_preset_provider *provider) {
+  const clap_preset_indexer *to = provider->data;
+  const clap_preset_location inside = {CLAP_PRESET_IS_FACTORY, provider_descriptor.name, CLAP_PRESET_IN_PLUGIN, NULL};
+  return to->declare_location && to->declare_location(to, &inside);
+}
+
+static void provider_destroy(const clap_preset_provider *provider) { free((void *)provider); }
+
+static bool provider_metadata(const clap_preset_provider *provider, uint32_t kind, const char *location, const clap_preset_receiver *to) {
+  (void)provider, (void)location;
+  if (!to || !to->begin_preset || kind != CLAP_PRESET_IN_PLUGIN) return false;
+  for (int32_t each = 0; each < image_count; each++) {
+    const image *of = images[each];
+    if (!to->begin_preset(to, of->name, of->id)) return true; /* the host has enough */
+    if (to->add_plugin_id) to->add_plugin_id(to, &(clap_universal_id){"clap", of->id});
+    if (to->set_flags) to->set_flags(to, CLAP_PRESET_IS_FACTORY);
+    if (to->add_creator) to->add_creator(to, of->maker);
+    if (to->set_description) to->set_description(to, of->description);
+    for (const char **feature = features[each]; to->add_feature && *feature; feature++) to->add_feature(to, *feature);
+    if (to->add_feature) to->add_feature(to, of->category);
+  }
+  return true;
+}
+
+static const void *provider_extension(const clap_preset_provider *provider, const char *id) {
+  (void)provider, (void)id;
+  return NULL;
+}
+
+static uint32_t provider_count(const clap_preset_factory *factory) {
+  (void)factory;
+  return 1;
+}
+
+static const clap_preset_descriptor *provider_at(const clap_preset_factory *factory, uint32_t index) {
+  (void)factory;
+  return index ? NULL : &provider_descriptor;
+}
+
+static const clap_preset_provider *provider_create(const clap_preset_factory *factory, const clap_preset_indexer *indexer, const char *id) {
+  (void)factory;
+  clap_preset_provider *own = indexer && id && !strcmp(id, provider_id) ? malloc(sizeof *own) : NULL;
+  if (own)
+    *own = (clap_preset_provider){&provider_descriptor, (void *)indexer, provider_init, provider_destroy, provider_metadata, provider_extension};
+  return own;
+}
+
+static const clap_preset_factory preset_factory = {provider_count, provider_at, provider_create};
+
+static const void *get_factory(const char *id) {
+  if (!strcmp(id, "clap.plugin-factory")) return &factory;
+  return strcmp(id, "clap.preset-discovery-factory/2") ? NULL : &preset_factory;
+}
 
 LS_EXPORT const clap_entry_t clap_entry = {CLAP_VERSION_USED, entry_init, entry_deinit, get_factory};

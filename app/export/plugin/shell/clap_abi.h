@@ -117,6 +117,75 @@ typedef struct clap_factory {
   const clap_plugin *(*create)(const struct clap_factory *, const clap_host *, const char *id);
 } clap_factory;
 
+/* Discovery of presets */
+enum { CLAP_PRESET_IN_FILE, CLAP_PRESET_IN_PLUGIN };
+enum { CLAP_PRESET_IS_FACTORY = 1 };
+typedef struct { const char *abi, *id; } clap_universal_id;
+_Static_assert(sizeof(clap_universal_id) == 16, "clap_universal_id");
+typedef struct clap_preset_receiver {
+  void *data;
+  void (*on_error)(const struct clap_preset_receiver *, int32_t os_error, const char *message);
+  bool (*begin_preset)(const struct clap_preset_receiver *, const char *name, const char *load_key);
+  void (*add_plugin_id)(const struct clap_preset_receiver *, const clap_universal_id *);
+  void (*set_soundpack_id)(const struct clap_preset_receiver *, const char *);
+  void (*set_flags)(const struct clap_preset_receiver *, uint32_t);
+  void (*add_creator)(const struct clap_preset_receiver *, const char *);
+  void (*set_description)(const struct clap_preset_receiver *, const char *);
+  void (*set_timestamps)(const struct clap_preset_receiver *, uint64_t created, uint64_t modified);
+  void (*add_feature)(const struct clap_preset_receiver *, const char *);
+  void (*add_extra_info)(const struct clap_preset_receiver *, const char *key, const char *value);
+} clap_preset_receiver;
+AT(clap_preset_receiver, on_error, 8);
+AT(clap_preset_receiver, begin_preset, 16);
+AT(clap_preset_receiver, add_plugin_id, 24);
+AT(clap_preset_receiver, set_flags, 40);
+AT(clap_preset_receiver, add_creator, 48);
+AT(clap_preset_receiver, set_description, 56);
+AT(clap_preset_receiver, add_feature, 72);
+_Static_assert(sizeof(clap_preset_receiver) == 88, "clap_preset_receiver");
+typedef struct { uint32_t flags; const char *name; uint32_t kind; const char *location; } clap_preset_location;
+AT(clap_preset_location, name, 8);
+AT(clap_preset_location, kind, 16);
+AT(clap_preset_location, location, 24);
+_Static_assert(sizeof(clap_preset_location) == 32, "clap_preset_location");
+typedef struct { clap_version version; const char *id, *name, *vendor; } clap_preset_descriptor;
+AT(clap_preset_descriptor, id, 16);
+AT(clap_preset_descriptor, vendor, 32);
+_Static_assert(sizeof(clap_preset_descriptor) == 40, "clap_preset_descriptor");
+typedef struct clap_preset_provider {
+  const clap_preset_descriptor *descriptor;
+  void *data;
+  bool (*init)(const struct clap_preset_provider *);
+  void (*destroy)(const struct clap_preset_provider *);
+  bool (*get_metadata)(const struct clap_preset_provider *, uint32_t kind, const char *location, const clap_preset_receiver *);
+  const void *(*get_extension)(const struct clap_preset_provider *, const char *id);
+} clap_preset_provider;
+AT(clap_preset_provider, init, 16);
+AT(clap_preset_provider, destroy, 24);
+AT(clap_preset_provider, get_metadata, 32);
+AT(clap_preset_provider, get_extension, 40);
+_Static_assert(sizeof(clap_preset_provider) == 48, "clap_preset_provider");
+typedef struct clap_preset_indexer {
+  clap_version version;
+  const char *name, *vendor, *url, *host_version;
+  void *data;
+  bool (*declare_filetype)(const struct clap_preset_indexer *, const void *);
+  bool (*declare_location)(const struct clap_preset_indexer *, const clap_preset_location *);
+  bool (*declare_soundpack)(const struct clap_preset_indexer *, const void *);
+  const void *(*get_extension)(const struct clap_preset_indexer *, const char *id);
+} clap_preset_indexer;
+AT(clap_preset_indexer, data, 48);
+AT(clap_preset_indexer, declare_location, 64);
+AT(clap_preset_indexer, get_extension, 80);
+_Static_assert(sizeof(clap_preset_indexer) == 88, "clap_preset_indexer");
+typedef struct clap_preset_factory {
+  uint32_t (*count)(const struct clap_preset_factory *);
+  const clap_preset_descriptor *(*descriptor)(const struct clap_preset_factory *, uint32_t);
+  const clap_preset_provider *(*create)(const struct clap_preset_factory *, const clap_preset_indexer *, const char *id);
+} clap_preset_factory;
+AT(clap_preset_factory, descriptor, 8);
+AT(clap_preset_factory, create, 16);
+
 /* Extensions */
 typedef struct {
   uint32_t id;
@@ -178,5 +247,17 @@ typedef struct {
   bool (*has_hard_realtime_requirement)(const clap_plugin *);
   bool (*set)(const clap_plugin *, int32_t mode);
 } clap_render;
+
+typedef struct { bool (*from_location)(const clap_plugin *, uint32_t kind, const char *location, const char *load_key); } clap_preset_load;
+
+/* Extensions of hosts */
+enum { CLAP_RESCAN_VALUES = 1 };
+typedef struct { void (*rescan)(const clap_host *, uint32_t flags); } clap_host_params; /* two more are not called */
+typedef struct {
+  void (*on_error)(const clap_host *, uint32_t kind, const char *location, const char *load_key, int32_t os_error, const char *message);
+  void (*loaded)(const clap_host *, uint32_t kind, const char *location, const char *load_key);
+} clap_host_preset_load;
+AT(clap_host_preset_load, loaded, 8);
+_Static_assert(sizeof(clap_host_preset_load) == 16, "clap_host_preset_load");
 
 #endif

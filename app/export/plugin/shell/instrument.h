@@ -54,7 +54,7 @@ typedef struct {
   int64_t wheel_effect;        /* which of EFFECTS the modulation wheel moves, -1: none */
   int64_t modes, most_notes;
   double longest_s, wheel_goal, level, highest_hz;
-  char id[128], name[64], description[512], maker[64], features[128];
+  char id[128], name[64], description[512], maker[64], features[128], category[16];
   uint8_t uid[16]; /* of VST3 */
 } image;
 

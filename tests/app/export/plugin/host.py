@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import ctypes as c
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -181,6 +182,169 @@ class Render(c.Structure):
     _fields_ = (("required", c.CFUNCTYPE(c.c_bool, P)), ("set", c.CFUNCTYPE(c.c_bool, P, c.c_int32)))
 
 
+IN_FILE, IN_PLUGIN = 0, 1  # kinds of places of presets
+S = c.c_char_p
+
+
+class PresetLoad(c.Structure):
+    _fields_ = (("from_location", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, S, S)),)
+
+
+class HostParams(c.Structure):
+    _fields_ = (
+        ("rescan", c.CFUNCTYPE(None, P, c.c_uint32)),
+        ("clear", c.CFUNCTYPE(None, P, c.c_uint32, c.c_uint32)),
+        ("request_flush", c.CFUNCTYPE(None, P)),
+    )
+
+
+class HostPresetLoad(c.Structure):
+    _fields_ = (
+        ("on_error", c.CFUNCTYPE(None, P, c.c_uint32, S, S, c.c_int32, S)),
+        ("loaded", c.CFUNCTYPE(None, P, c.c_uint32, S, S)),
+    )
+
+
+class UniversalId(c.Structure):
+    _fields_ = (("abi", S), ("id", S))
+
+
+TEXT_FN, TWO_TEXTS_FN = c.CFUNCTYPE(None, P, S), c.CFUNCTYPE(None, P, S, S)
+
+
+class Receiver(c.Structure):
+    _fields_ = (
+        ("data", P),
+        ("on_error", c.CFUNCTYPE(None, P, c.c_int32, S)),
+        ("begin_preset", c.CFUNCTYPE(c.c_bool, P, S, S)),
+        ("add_plugin_id", c.CFUNCTYPE(None, P, c.POINTER(UniversalId))),
+        ("set_soundpack_id", TEXT_FN),
+        ("set_flags", c.CFUNCTYPE(None, P, c.c_uint32)),
+        ("add_creator", TEXT_FN),
+        ("set_description", TEXT_FN),
+        ("set_timestamps", c.CFUNCTYPE(None, P, c.c_uint64, c.c_uint64)),
+        ("add_feature", TEXT_FN),
+        ("add_extra_info", TWO_TEXTS_FN),
+    )
+
+
+class Location(c.Structure):
+    _fields_ = (("flags", c.c_uint32), ("name", S), ("kind", c.c_uint32), ("location", S))
+
+
+class ProviderDescriptor(c.Structure):
+    _fields_ = (("version", Version), ("id", S), ("name", S), ("vendor", S))
+
+
+class Provider(c.Structure):
+    _fields_ = (
+        ("descriptor", c.POINTER(ProviderDescriptor)),
+        ("data", P),
+        ("init", c.CFUNCTYPE(c.c_bool, P)),
+        ("destroy", c.CFUNCTYPE(None, P)),
+        ("get_metadata", c.CFUNCTYPE(c.c_bool, P, c.c_uint32, S, c.POINTER(Receiver))),
+        ("get_extension", c.CFUNCTYPE(P, P, S)),
+    )
+
+
+class Indexer(c.Structure):
+    _fields_ = (
+        ("version", Version),
+        *((name, S) for name in ("name", "vendor", "url", "host_version")),
+        ("data", P),
+        ("declare_filetype", c.CFUNCTYPE(c.c_bool, P, P)),
+        ("declare_location", c.CFUNCTYPE(c.c_bool, P, c.POINTER(Location))),
+        ("declare_soundpack", c.CFUNCTYPE(c.c_bool, P, P)),
+        ("get_extension", c.CFUNCTYPE(P, P, S)),
+    )
+
+
+class PresetFactory(c.Structure):
+    _fields_ = (
+        ("count", c.CFUNCTYPE(c.c_uint32, P)),
+        ("descriptor", c.CFUNCTYPE(c.POINTER(ProviderDescriptor), P, c.c_uint32)),
+        ("create", c.CFUNCTYPE(c.POINTER(Provider), P, P, S)),
+    )
+
+
+@dataclass
+class Preset:
+    """As a host's browser has it; `plugins` are pairs of interface and identifier."""
+
+    name: str
+    key: str
+    plugins: list[tuple[str, str]] = field(default_factory=list)
+    flags: int = 0
+    creators: list[str] = field(default_factory=list)
+    description: str = ""
+    features: list[str] = field(default_factory=list)
+
+
+class Browser:
+    """A host's list of the presets of a plug-in file."""
+
+    def __init__(self, library: Library) -> None:
+        self.locations: list[tuple[int, str, int, str | None]] = []
+        self._indexer = Indexer(Version(1, 2, 0), b"tests")
+        self._indexer.declare_location = Indexer._fields_[7][1](self._declare)
+        self.factory = c.cast(library.entry.get_factory(b"clap.preset-discovery-factory/2"), c.POINTER(PresetFactory))
+        assert self.factory
+        own = self.factory.contents
+        self.ids = [own.descriptor(self._at, each).contents.id.decode() for each in range(own.count(self._at))]
+
+    @property
+    def _at(self) -> int:
+        return c.addressof(self.factory.contents)
+
+    def _declare(self, _indexer: int, location: c._Pointer[Location]) -> bool:
+        at = location.contents
+        self.locations.append((at.flags, at.name.decode(), at.kind, at.location and at.location.decode()))
+        return True
+
+    def create(self, id: str | None, indexer: bool = True) -> c._Pointer[Provider]:
+        """A provider: null where there is none."""
+        at = c.addressof(self._indexer) if indexer else None
+        found: c._Pointer[Provider] = self.factory.contents.create(self._at, at, None if id is None else id.encode())
+        return found
+
+    def read(self, kind: int = IN_PLUGIN, most: int = 1_000, bare: bool = False) -> tuple[bool, list[Preset]]:
+        """Whether the provider succeeded, and presets, up to one more than `most`; bare: only what is required."""
+        found: list[Preset] = []
+
+        def begin(_receiver: int, name: bytes, key: bytes) -> bool:
+            found.append(Preset(name.decode(), key.decode()))
+            return len(found) <= most
+
+        kinds: dict[str, Any] = dict(Receiver._fields_)
+        receiver = Receiver()
+        receiver.begin_preset = kinds["begin_preset"](begin)
+        if not bare:
+
+            def add_plugin(_receiver: int, at: c._Pointer[UniversalId]) -> None:
+                found[-1].plugins.append((at.contents.abi.decode(), at.contents.id.decode()))
+
+            def set_flags(_receiver: int, flags: int) -> None:
+                found[-1].flags = flags
+
+            def describe(_receiver: int, text: bytes) -> None:
+                found[-1].description = text.decode()
+
+            receiver.add_plugin_id = kinds["add_plugin_id"](add_plugin)
+            receiver.set_flags = kinds["set_flags"](set_flags)
+            receiver.set_description = TEXT_FN(describe)
+            receiver.add_creator = TEXT_FN(lambda _, text: found[-1].creators.append(text.decode()))
+            receiver.add_feature = TEXT_FN(lambda _, text: found[-1].features.append(text.decode()))
+        provider = self.create(self.ids[0])
+        assert provider
+        at, own = c.addressof(provider.contents), provider.contents
+        assert own.init(at)
+        assert not own.get_extension(at, b"unknown")
+        done = own.get_metadata(at, kind, None, receiver)
+        assert not own.get_metadata(at, kind, None, None)
+        own.destroy(at)
+        return bool(done), found
+
+
 @dataclass(frozen=True)
 class Event:
     """An event at a frame of the whole piece; `content` is one of the structures above."""
@@ -251,10 +415,30 @@ class Instance:
 
     def __init__(self, library: Library, id: str) -> None:
         self.callbacks = 0
+        self.rescans: list[int] = []
+        self.loaded: list[tuple[int, bytes | None, bytes | None]] = []
+        self.errors: list[str] = []
         self.ended: list[int] = []
 
         def count(_host: int) -> None:
             self.callbacks += 1
+
+        rescan, clear, flush = (kind for _, kind in HostParams._fields_)
+        on_error, on_load = (kind for _, kind in HostPresetLoad._fields_)
+        self._offers: dict[bytes, c.Structure] = {
+            b"clap.params": HostParams(
+                rescan(lambda host, flags: self.rescans.append(flags)),
+                clear(lambda host, id, flags: None),
+                flush(lambda host: None),
+            ),
+            b"clap.preset-load/2": HostPresetLoad(
+                on_error(lambda host, kind, location, key, code, text: self.errors.append(text.decode())),
+                on_load(lambda host, kind, location, key: self.loaded.append((kind, location, key))),
+            ),
+        }
+
+        def offered(_host: int, id: bytes) -> int | None:
+            return c.addressof(self._offers[id]) if id in self._offers else None
 
         none = HostStructure._fields_[7][1](lambda host: None)
         self._host = HostStructure(
@@ -264,7 +448,7 @@ class Instance:
             b"",
             b"",
             b"1",
-            HostStructure._fields_[6][1](lambda host, id: None),
+            HostStructure._fields_[6][1](offered),
             none,
             none,
             HostStructure._fields_[9][1](count),
@@ -360,6 +544,14 @@ class Instance:
             return len(part)
 
         return bool(self.extension("clap.state", State).load(self.at, Stream(None, WRITE_FN(read))))
+
+    def withdraw_extensions(self) -> None:
+        """As a host that offers none."""
+        self._offers.clear()
+
+    def load_preset(self, key: str | None, kind: int = IN_PLUGIN) -> bool:
+        load = self.extension("clap.preset-load/2", PresetLoad)
+        return bool(load.from_location(self.at, kind, None, None if key is None else key.encode()))
 
     def block(self, frames: int, events: Sequence[Event]) -> NDArray[np.float32]:
         """The next frames, (frames, 2); events are of frames of the whole piece."""

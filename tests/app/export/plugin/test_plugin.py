@@ -25,7 +25,21 @@ from app.patches.drums import Drums
 from app.patches.patch import Patch, Technique
 from app.shared.parameters import OF_PATCHES
 from tests.app.export.plugin import host
-from tests.app.export.plugin.host import Event, Instance, Library, choke, midi, note_off, note_on, param, tune
+from tests.app.export.plugin.host import (
+    IN_FILE,
+    IN_PLUGIN,
+    Browser,
+    Event,
+    Instance,
+    Library,
+    Preset,
+    choke,
+    midi,
+    note_off,
+    note_on,
+    param,
+    tune,
+)
 from tests.app.export.plugin.pieces import DRUMS as DRUM_NAMES
 from tests.app.export.plugin.pieces import (
     EQUAL_DB,
@@ -143,6 +157,84 @@ def test_a_macro_moves_its_targets_and_the_state_keeps_them(bank: Library) -> No
     assert not other.load(b"\x07" + state[1:])
     assert not other.load(state[:5])
     assert other.save() == state
+
+
+def test_the_browser_of_presets_lists_each_instrument(bank: Library) -> None:
+    browser = Browser(bank)
+    done, found = browser.read()
+    assert done
+    assert browser.locations == [(1, "Instruments", IN_PLUGIN, None)]  # of the factory
+    assert {preset.key: preset.name for preset in found} == bank.plugins
+    assert len(found) == len(NAMES)
+    for preset, name in zip(found, NAMES, strict=True):
+        patch = patch_of(name)
+        kind = "drum" if name in DRUM_NAMES else "synthesizer"
+        features = ["instrument", kind, "stereo", patch.category]
+        owner, text = [("clap", preset.key)], patch.description.encode()[:511].decode(errors="ignore")
+        assert preset == Preset(patch.name, preset.key, owner, 1, ["Learned Strings"], text, features)
+    assert len(browser.read(most=2)[1]) == 3  # where the host has enough, the plug-in stops
+    assert browser.read(bare=True) == (True, [Preset(preset.name, preset.key) for preset in found])
+    assert browser.read(kind=IN_FILE) == (False, [])
+
+
+def test_a_browser_of_presets_that_asks_for_what_is_not_there_gets_nothing(bank: Library) -> None:
+    browser = Browser(bank)
+    assert browser.ids == ["org.learned-strings.bank.presets"]
+    assert not browser.create("unknown")
+    assert not browser.create(None)
+    assert not browser.create(browser.ids[0], indexer=False)
+    assert not browser.factory.contents.descriptor(None, 1)
+    assert not bank.entry.get_factory(b"unknown")
+
+
+@pytest.mark.parametrize("name", (MOVED, "timpani"))
+def test_a_preset_brings_back_the_instrument_as_it_was(bank: Library, name: str) -> None:
+    patch, fresh = patch_of(name), instance_of(bank, name)
+    state, sound = fresh.save(), played(fresh, patch, 48_000)
+    (key,) = (preset.key for preset in Browser(bank).read()[1] if preset.name == patch.name)
+    all_at_the_top = [param(0, each.id, each.high) for each in fresh.parameters.values()]
+    for playing in (False, True):
+        instance = instance_of(bank, name)
+        instance.render(24_000, all_at_the_top)
+        assert instance.save() != state
+        if not playing:
+            instance.deactivate()
+        assert instance.load_preset(key)
+        assert instance.save() == state
+        assert instance.rescans == [1]  # of values
+        assert instance.loaded == [(IN_PLUGIN, None, key.encode())]
+        if playing:  # knobs glide, the room follows
+            instance.render(96_000, [])
+            assert difference_db(played(instance, patch, 48_000), sound) < -80
+        else:
+            instance.activate(48_000)
+            assert np.array_equal(played(instance, patch, 48_000), sound)
+
+
+def test_the_preset_of_another_instrument_is_refused(bank: Library) -> None:
+    instance, other = instance_of(bank, MOVED), instance_of(bank, "timpani")
+    own, foreign = (
+        next(id for id, shown in bank.plugins.items() if shown == patch_of(name).name) for name in (MOVED, "timpani")
+    )
+    control = instance.parameters[patch_of(MOVED).macros[0].name]
+    instance.block(512, [param(0, control.id, 1.0)])
+    state = instance.save()
+    for key, kind in ((foreign, IN_PLUGIN), (None, IN_PLUGIN), ("", IN_PLUGIN), (own, IN_FILE)):
+        assert not instance.load_preset(key, kind)
+    assert instance.errors == ["the preset belongs to another instrument"] * 4
+    assert (instance.save(), instance.rescans, instance.loaded) == (state, [], [])
+    other.withdraw_extensions()
+    assert not other.load_preset(own)
+    assert other.load_preset(foreign)
+
+
+def test_a_plug_in_of_one_instrument_has_one_preset(images: list[Image], objects: Path, tmp_path: Path) -> None:
+    library = Library(build_plugin(images[:1], "clap", this_target(), tmp_path / "one", objects))
+    browser = Browser(library)
+    assert browser.ids == [f"{images[0].id}.presets"]
+    assert [(preset.name, preset.key) for preset in browser.read()[1]] == [(images[0].name, images[0].id)]
+    assert library.create(images[0].id).load_preset(images[0].id)
+    library.destroy_instances()
 
 
 def test_techniques_are_as_in_the_app(bank: Library) -> None:
