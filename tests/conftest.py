@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -17,6 +18,8 @@ from engine.presets import PresetInfo, TrainedRange, save_preset
 from engine.resonators.string import StringParameters
 from engine.schema import write
 from engine.voices.derivative import REACH_FRAMES, differentiator_taps
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # windows need no screen, however pytest is started
 
 Derivative = Callable[[NDArray[np.floating], int], NDArray[np.float64]]
 

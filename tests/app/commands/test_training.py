@@ -16,7 +16,7 @@ from training.cell import load
 from training.data.dataset import load_dataset
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import read_heard
-from training.heard_words import heard_word
+from training.heard_words import heard_sentence
 
 CONFIGURATION = """
 title = "Tiny"
@@ -79,7 +79,7 @@ def test_training_writes_a_preset_and_ends_with_its_own_error(run, place: Place)
     heard, problems = read_heard(place.folder)
     assert problems == []
     assert lines[3].startswith("untrained   rel. MSE ")
-    assert lines[5] == f"heard       {heard_word(heard[preset_digest(path)])}"
+    assert lines[5] == f"heard       {heard_sentence(heard[preset_digest(path)], path.stem)}"
     assert info.trained_range.position == (0.3, 0.7)
     assert [row["epoch"] for row in place.log("a")] == ["1", "2", "3"]
 
