@@ -24,12 +24,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray, njit
+from numba import njit
 
 from engine.kernels import lanes, tension, truth, voice
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import fence, pointer
+from engine.kernels.memory import fence, reals, wholes
 from engine.kernels.modes import following, row
 from engine.kernels.playing_layout import MOST_PAIRS
 
@@ -45,16 +45,6 @@ RECORD = HEARD + 2 * lanes.MOST_EARS
 
 
 @njit(inline="always", **COMPILED)
-def _at(address: int) -> np.ndarray:
-    return carray(pointer(address), (1 << 40,), np.float64)
-
-
-@njit(inline="always", **COMPILED)
-def _whole(address: int) -> np.ndarray:
-    return carray(pointer(address), (1 << 40,), np.int64)
-
-
-@njit(inline="always", **COMPILED)
 def _out(mixer: np.ndarray, which: int) -> np.ndarray:
     """Where a string of the course is heard, (4, QUANTUM)."""
     first = at.M_OUT + which * 4 * at.QUANTUM
@@ -64,7 +54,7 @@ def _out(mixer: np.ndarray, which: int) -> np.ndarray:
 @njit(**COMPILED)
 def _joins(course: int, late: int, address: int, now: int) -> bool:
     """Whether a voice is a string of a course that has begun in the mixer's next quantum, in step with it."""
-    counts = _whole(address)
+    counts = wholes(address)
     if counts[at.COURSE] != course or counts[at.COURSE_DONE] == now + 1:
         return False
     if counts[at.STATE] == at.WAITING:
@@ -80,17 +70,17 @@ def add(mixer: np.ndarray, place: int, now_s: float) -> int:
     Others of the course have theirs from here on, and only give it at their own places.
     """
     counts, own = mixer.view(np.int64), mixer.view(np.int64)[at.M_VOICES + place]
-    now, course = counts[at.M_FRAMES], _whole(own)[at.COURSE]
-    if _whole(own)[at.COURSE_DONE] == now + 1:
-        return _whole(own)[at.STATE]
-    state = voice.begin(_at(own), mixer)
+    now, course = counts[at.M_FRAMES], wholes(own)[at.COURSE]
+    if wholes(own)[at.COURSE_DONE] == now + 1:
+        return wholes(own)[at.STATE]
+    state = voice.begin(reals(own), mixer)
     if state != at.SOUNDING:
         return state
-    late, strings = _whole(own)[at.LATE], 1
+    late, strings = wholes(own)[at.LATE], 1
     counts[at.M_COURSE] = own
     for each in range(place + 1, counts[at.M_ACTIVE]):
         other = counts[at.M_VOICES + each]
-        if strings < MOST and _joins(course, late, other, now) and voice.begin(_at(other), mixer) == at.SOUNDING:
+        if strings < MOST and _joins(course, late, other, now) and voice.begin(reals(other), mixer) == at.SOUNDING:
             counts[at.M_COURSE + strings] = other
             strings += 1
     for turn in range(2):  # those first that are behind the others, as a pick-up of velocity is as it begins
@@ -98,7 +88,7 @@ def add(mixer: np.ndarray, place: int, now_s: float) -> int:
         for string in range(MOST):
             address = counts[at.M_COURSE + string] if string < strings else 0
             if turn == 0 and address != 0:
-                behind = _whole(address)[at.VELOCITY] != 0 and voice.is_first(_at(address))
+                behind = wholes(address)[at.VELOCITY] != 0 and voice.is_first(reals(address))
                 address = address if behind else 0
             counts[at.M_COURSE + MOST + string] = address
             generated += address != 0
@@ -106,14 +96,14 @@ def add(mixer: np.ndarray, place: int, now_s: float) -> int:
             _generate(mixer, turn == 0)
     for string in range(strings):
         address, out = counts[at.M_COURSE + string], _out(mixer, string)
-        each = _at(address)
-        if _whole(address)[at.VELOCITY]:
+        each = reals(address)
+        if wholes(address)[at.VELOCITY]:
             voice.differentiate(each, out, mixer[at.M_TAPS : at.M_TAPS + 2 * at.REACH + 1])
         state = voice.end(each, mixer, now_s, out, True)
-        _whole(address)[at.COURSE_DONE] = now + 1
+        wholes(address)[at.COURSE_DONE] = now + 1
         fence()
-        _whole(address)[at.STATE] = state
-    return _whole(own)[at.STATE]
+        wholes(address)[at.STATE] = state
+    return wholes(own)[at.STATE]
 
 
 @njit(**COMPILED)
@@ -132,10 +122,10 @@ def _generate(mixer: np.ndarray, first: bool) -> None:
         address = counts[at.M_COURSE + MOST + string]
         if address == 0:
             continue
-        solved = _whole(address)[at.KIND] == at.TRUTH
+        solved = wholes(address)[at.KIND] == at.TRUTH
         places[strings], places[MOST + strings] = place, counts[at.M_COURSE + MOST + string]
-        place = _set_up(_at(address), scratch, place, solved)
-        shared = max(shared, min(_whole(address)[at.BRIDGED], _whole(address)[at.MOVING]))
+        place = _set_up(reals(address), scratch, place, solved)
+        shared = max(shared, min(wholes(address)[at.BRIDGED], wholes(address)[at.MOVING]))
         strings += 1
     _take_parts(places, strings, shared, 1 / mixer[at.M_RATE], scratch, sums)
     if solved:
@@ -144,13 +134,13 @@ def _generate(mixer: np.ndarray, first: bool) -> None:
         _ring(mixer, places, strings, shared, scratch)
     for string in range(strings):
         address, out = places[MOST + string], _out(mixer, _number(counts, places[MOST + string]))
-        each, heard = _at(address), voice.is_heard(_at(address))
+        each, heard = reals(address), voice.is_heard(reals(address))
         if not solved:
             _put_back(each, scratch, places[string])
-        _whole(address)[at.GENERATED] += at.QUANTUM
-        if _whole(address)[at.NEXT_WEIGHTS] == 1:
+        wholes(address)[at.GENERATED] += at.QUANTUM
+        if wholes(address)[at.NEXT_WEIGHTS] == 1:
             voice.move_points(each, heard, mixer[at.M_RATE], out)
-        if _whole(address)[at.VELOCITY]:
+        if wholes(address)[at.VELOCITY]:
             voice.remember(each, heard, first, out)
 
 
@@ -172,7 +162,7 @@ def _ring(mixer: np.ndarray, places: np.ndarray, strings: int, shared: int, scra
     for frame in range(at.QUANTUM):
         for string in range(strings):
             address = places[MOST + string]
-            _advance(_at(address), scratch, places[string], frame, _out(mixer, _number(counts, address)))
+            _advance(reals(address), scratch, places[string], frame, _out(mixer, _number(counts, address)))
         if strings == 1:
             lanes.meet_1(scratch, blocks, modes[0], modes[1], modes[2], parts[0], parts[1], parts[2])
         elif strings == 2:
@@ -190,9 +180,9 @@ def _ring_solved(
     for frame in range(at.QUANTUM):
         for string in range(strings):
             address = places[MOST + string]
-            each, whole, out = _at(address), _whole(address), _out(mixer, _number(counts, address))
+            each, whole, out = reals(address), wholes(address), _out(mixer, _number(counts, address))
             sub_steps, fading = scratch.view(np.int64)[places[string] + SUB_STEPS], whole[at.NEXT_WEIGHTS] == 1
-            truth.advance(each, _at(whole[at.PROGRAM]), sub_steps, frame, fading, voice.is_heard(each), out)
+            truth.advance(each, reals(whole[at.PROGRAM]), sub_steps, frame, fading, voice.is_heard(each), out)
         sums[:shared] = 0.0
         for string in range(strings):
             speeds, parts = _speeds(places[MOST + string], shared), scratch[places[string] + RECORD :]
@@ -207,15 +197,15 @@ def _ring_solved(
 @njit(inline="always", **COMPILED)
 def _speeds(address: int, shared: int) -> np.ndarray:
     """Speeds of a solved string's first modes."""
-    n = _whole(address)[at.MODES]
-    return row(_at(address), n, 1)[: min(n, shared)]
+    n = wholes(address)[at.MODES]
+    return row(reals(address), n, 1)[: min(n, shared)]
 
 
 @njit(**COMPILED)
 def _set_up(string: np.ndarray, scratch: np.ndarray, place: int, solved: bool) -> int:
     """Prepares a string for a quantum, with its record from a slot of the scratch on; the first slot behind it."""
     counts, whole = string.view(np.int64), scratch.view(np.int64)
-    program, n = _at(counts[at.PROGRAM]), counts[at.MODES]
+    program, n = reals(counts[at.PROGRAM]), counts[at.MODES]
     if solved:
         whole[place + SUB_STEPS] = truth.set_up(string, program)
         return place + RECORD + PARTS
@@ -253,12 +243,12 @@ def _take_parts(
     """
     sums[:shared] = 0.0
     for string in range(strings):
-        each, whole = _at(places[MOST + string]), _whole(places[MOST + string])
+        each, whole = reals(places[MOST + string]), wholes(places[MOST + string])
         lost = row(each, whole[at.MODES], at.BRIDGE)
         for mode in range(min(shared, whole[at.BRIDGED], whole[at.MOVING])):
             sums[mode] += lost[mode]
     for string in range(strings):
-        each, whole, first = _at(places[MOST + string]), _whole(places[MOST + string]), places[string] + RECORD
+        each, whole, first = reals(places[MOST + string]), wholes(places[MOST + string]), places[string] + RECORD
         n, own = whole[at.MODES], min(shared, whole[at.BRIDGED], whole[at.MOVING])
         parts = scratch[first : first + PARTS].reshape(lanes.PARTS, SHARED)
         parts[:] = 0.0
@@ -306,5 +296,5 @@ def _put_back(string: np.ndarray, scratch: np.ndarray, place: int) -> None:
     order = row(string, n, at.ORDER).view(np.int64)[: counts[at.HEARD]]
     tension.save(row(string, n, 0), row(string, n, 1), order, scratch, whole[place + FIRST])
     counts[at.MOVING] = whole[place + MOVING]
-    program = _at(counts[at.PROGRAM])
+    program = reals(counts[at.PROGRAM])
     string[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.S_LOUDNESS]

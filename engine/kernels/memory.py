@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import carray, njit, types
 from numba.extending import intrinsic
 
 from engine.kernels.compiled import COMPILED
@@ -33,6 +33,18 @@ def fence(typing_context: Any):
         return context.get_dummy_value()
 
     return types.void(), generate
+
+
+@njit(inline="always", **COMPILED)
+def reals(address: int) -> np.ndarray:
+    """The memory at an address (int64) as real numbers, of no stated length."""
+    return carray(pointer(address), (1 << 40,), np.float64)
+
+
+@njit(inline="always", **COMPILED)
+def wholes(address: int) -> np.ndarray:
+    """The same as whole numbers."""
+    return carray(pointer(address), (1 << 40,), np.int64)
 
 
 @njit(**COMPILED)

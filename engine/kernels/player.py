@@ -32,13 +32,13 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray, njit
+from numba import njit
 
 from engine.kernels import contact, drums, loudness, recorded, strings
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import fence, pointer
+from engine.kernels.memory import fence, reals, wholes
 from engine.kernels.modes import TOO_HIGH, run_up
 from engine.pluck import (
     FULL_SCALE_M,
@@ -86,16 +86,6 @@ NO_PARAMETER, BEND_RANGE = 127, 0
 
 
 @njit(inline="always", **COMPILED)
-def _at(address: int) -> np.ndarray:
-    return carray(pointer(address), (1 << 40,), np.float64)
-
-
-@njit(inline="always", **COMPILED)
-def _whole(address: int) -> np.ndarray:
-    return carray(pointer(address), (1 << 40,), np.int64)
-
-
-@njit(inline="always", **COMPILED)
 def _note(number: int) -> int:
     """First slot of a note."""
     return of.PLAYER_NOTES + number * of.NOTE_SLOTS
@@ -125,7 +115,7 @@ def _quanta(player: np.ndarray, seconds: float) -> int:
 
 @njit(**COMPILED)
 def _voice_over(address: int) -> bool:
-    state = _whole(address)[at.STATE]
+    state = wholes(address)[at.STATE]
     return state == at.OVER or state == at.RUNAWAY
 
 
@@ -661,7 +651,7 @@ def _make_voice(
     highest_m: float,
 ) -> None:
     """A voice of the modes of a note's own string, which sets out with the amplitudes of `_pull`: as `Voice`."""
-    voice, counts, rate_hz, n = _at(address), _whole(address), player[of.PLAYER_RATE], players[note + of.NOTE_MODES]
+    voice, counts, rate_hz, n = reals(address), wholes(address), player[of.PLAYER_RATE], players[note + of.NOTE_MODES]
     for slot in range(at.state(n) + at.TRUTH_ROWS * n):
         voice[slot] = 0.0
     counts[at.KIND], counts[at.PROGRAM], counts[at.MODES] = kind, program, n
@@ -833,7 +823,7 @@ def _gain(
 @njit(inline="always", **COMPILED)
 def _release(address: int, frames: int) -> None:
     """Lets a voice fade out; a release under way continues."""
-    counts = _whole(address)
+    counts = wholes(address)
     if counts[at.RELEASE] == 0:
         counts[at.RELEASE] = frames
 
@@ -845,7 +835,7 @@ def _release_note(player: np.ndarray, players: np.ndarray, note: int, seconds: f
     for source in range(of.MOST_SOURCES):
         address = players[note + of.NOTE_VOICES + source]
         if address != 0 and frame > 0:
-            _whole(address)[at.RELEASE_AT] = frame
+            wholes(address)[at.RELEASE_AT] = frame
         elif address != 0:
             _release(address, _frames(player, seconds))
 
@@ -853,12 +843,12 @@ def _release_note(player: np.ndarray, players: np.ndarray, note: int, seconds: f
 @njit(**COMPILED)
 def _due(address: int, now: int) -> int:
     """The latest frame for which modes count with a voice's next quantum."""
-    counts = _whole(address)
+    counts = wholes(address)
     due, before = now + counts[at.LATE], counts[at.PREVIOUS_VOICE]
     if counts[at.STATE] == at.WAITING:
         due = max(due, counts[at.BEGIN_AT])
-        if before != 0 and counts[at.STOPS_IN] == 0 and _whole(before)[at.STATE] == at.SOUNDING:
-            due = now + _whole(before)[at.LATE]
+        if before != 0 and counts[at.STOPS_IN] == 0 and wholes(before)[at.STATE] == at.SOUNDING:
+            due = now + wholes(before)[at.LATE]
     return due
 
 
@@ -877,15 +867,15 @@ def _wish(
 
     At most two are still to be reached: those that are due in this quantum, and those for the next.
     """
-    counts, modes = _whole(address), players[of.PLAYER_MODES]
+    counts, modes = wholes(address), players[of.PLAYER_MODES]
     latest, taken, due = counts[at.RESONATOR], counts[at.CURRENT_MODES], _due(address, now)
-    first = counts[at.PENDING_MODES] if latest == 0 else _whole(latest)[at.B_NEXT]
+    first = counts[at.PENDING_MODES] if latest == 0 else wholes(latest)[at.B_NEXT]
     tail, wished = 0, first
     while wished != 0:
         tail = wished
-        wished = _whole(wished)[at.B_NEXT]
+        wished = wholes(wished)[at.B_NEXT]
     base, found = players[of.PLAYER_HERE], 0
-    if tail == 0 or (_whole(tail)[at.B_AT] <= due) != (frame <= due):
+    if tail == 0 or (wholes(tail)[at.B_AT] <= due) != (frame <= due):
         size = at.B_HEADER + at.RESONATOR_ROWS * modes
         blocks = _slots_of_voice(players, number, source + 1) - of.BLOCKS * size
         for place in range(of.BLOCKS):
@@ -893,17 +883,17 @@ def _wish(
             used, wished = block in (latest, taken), first
             while wished != 0 and not used:
                 used = wished == block
-                wished = _whole(wished)[at.B_NEXT]
+                wished = wholes(wished)[at.B_NEXT]
             if not used:
                 found = block
     if found == 0:
         found = tail  # the latest counts
-    wishes = _whole(found)
+    wishes = wholes(found)
     wishes[at.B_QUANTA], wishes[at.B_NEXT], wishes[at.B_AT] = _quanta(player, seconds), 0, frame
     if found != tail and tail != 0:
-        _whole(tail)[at.B_NEXT] = found
+        wholes(tail)[at.B_NEXT] = found
     elif found != tail and latest != 0:
-        _whole(latest)[at.B_NEXT] = found
+        wholes(latest)[at.B_NEXT] = found
     elif found != tail:
         counts[at.PENDING_MODES] = found
     return (found - base) // 8 + at.B_HEADER
@@ -982,7 +972,7 @@ def _damp(
         address = players[note + of.NOTE_VOICES + source]
         if address == 0 or _voice_over(address):
             continue
-        voice, kind, n = _at(address), _whole(address)[at.KIND], _whole(address)[at.MODES]
+        voice, kind, n = reals(address), wholes(address)[at.KIND], wholes(address)[at.MODES]
         if kind in (at.TRUTH, at.TENSION) and n <= players[of.PLAYER_MODES]:
             slot = _wish(player, players, number, source, address, DAMPER_S, frame, now)
             first = at.state(n) + at.OMEGA_SQUARED * n
@@ -1024,7 +1014,7 @@ def _refuse(player: np.ndarray, players: np.ndarray, event: int) -> None:
     for source in range(of.MOST_SOURCES):
         address = players[event + of.EVENT_VOICES + source]
         if address != 0:
-            _whole(address)[at.STATE] = at.OVER
+            wholes(address)[at.STATE] = at.OVER
     id, channel, key = players[event + of.EVENT_ID], players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
     frame, velocity = players[event + of.EVENT_FRAME], player[event + of.EVENT_VALUE]
     _report(player, players, of.REFUSED, id, channel, key, frame, velocity)
@@ -1056,7 +1046,7 @@ def _free_note(player: np.ndarray, players: np.ndarray, mixers: np.ndarray) -> i
         begun = False
         for source in range(of.MOST_SOURCES):
             address = players[note + of.NOTE_VOICES + source]
-            begun = begun or (address != 0 and _whole(address)[at.STATE] != at.WAITING)
+            begun = begun or (address != 0 and wholes(address)[at.STATE] != at.WAITING)
         rank = 2
         if players[note + of.NOTE_RELEASED] != 0 or players[note + of.NOTE_HAS_PLACE] == 0:
             rank = 1 if begun else 0
@@ -1081,11 +1071,11 @@ def _take_out(mixers: np.ndarray, address: int) -> None:
         if each != address:
             mixers[at.M_VOICES + kept] = each
             kept += 1
-            if _whole(each)[at.PREVIOUS_VOICE] == address:
-                _whole(each)[at.PREVIOUS_VOICE] = 0
+            if wholes(each)[at.PREVIOUS_VOICE] == address:
+                wholes(each)[at.PREVIOUS_VOICE] = 0
     mixers[at.M_ACTIVE] = kept
     fence()
-    _whole(address)[at.STATE] = at.OVER
+    wholes(address)[at.STATE] = at.OVER
 
 
 @njit(**COMPILED)
@@ -1099,8 +1089,8 @@ def _follow(player: np.ndarray, players: np.ndarray, tables: np.ndarray, note: i
         if address == 0:
             _release(other, stops)
             continue
-        counts = _whole(address)
-        moves = counts[at.KIND] in (at.TRUTH, at.TENSION) and _whole(other)[at.KIND] == counts[at.KIND]
+        counts = wholes(address)
+        moves = counts[at.KIND] in (at.TRUTH, at.TENSION) and wholes(other)[at.KIND] == counts[at.KIND]
         counts[at.PREVIOUS_VOICE] = other
         counts[at.STOPS_IN] = stops if tables[of.TABLE_STOPS] != 0 or not moves else 0
 
@@ -1305,10 +1295,10 @@ def _note_on(
                 tables[of.TABLE_VELOCITY],
                 highest_m,
             )
-            voice, begun = _at(address), gain * player[of.PLAYER_SOURCE_GAINS + source]
+            voice, begun = reals(address), gain * player[of.PLAYER_SOURCE_GAINS + source]
             if player[note + of.NOTE_BRIDGE] > 0.0:
                 first = players[of.PLAYER_AGE] - member  # of this player, for another may ring as well
-                _whole(address)[at.COURSE] = players[of.PLAYER_HERE] + of.MOST_SOURCES * first + source
+                wholes(address)[at.COURSE] = players[of.PLAYER_HERE] + of.MOST_SOURCES * first + source
             voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
         players[note + of.NOTE_VOICES + source] = address
     for each in range(of.MOST_NOTES):
@@ -1322,14 +1312,14 @@ def _note_on(
         address = players[note + of.NOTE_VOICES + source]
         if address == 0:
             continue
-        _whole(address)[at.BEGIN_AT] = frame
-        _at(address)[at.STRUCK_S] = player[event + of.EVENT_STRUCK_S]
+        wholes(address)[at.BEGIN_AT] = frame
+        reals(address)[at.STRUCK_S] = player[event + of.EVENT_STRUCK_S]
         spared = players[of.PLAYER_SPARES] != 0 and player[of.PLAYER_SOURCE_GAINS + source] == 0.0
         if mixers[at.M_ACTIVE] < at.MOST_VOICES and not spared:
             mixers[at.M_VOICES + mixers[at.M_ACTIVE]] = address
             mixers[at.M_ACTIVE] += 1
         else:
-            _whole(address)[at.STATE] = at.OVER
+            wholes(address)[at.STATE] = at.OVER
     _retune(player, players, table, tables, number, 0.0, 0, mixers[at.M_FRAMES])
     if not prepared and member == 0:
         level_db = _value(player, players, table, tables, of.ONSET_DB)
@@ -1625,7 +1615,7 @@ def _arrange(player: np.ndarray, players: np.ndarray, now: int, first: int, coun
     address, event = players[of.PLAYER_TABLE], first + place % count * of.EVENT_SLOTS
     if address == 0 or players[event + of.EVENT_CHORD] != 0:
         return
-    table, tables, frame = _at(address), _whole(address), max(players[event + of.EVENT_FRAME], now)
+    table, tables, frame = reals(address), wholes(address), max(players[event + of.EVENT_FRAME], now)
     if _strums_in(player, players, table, tables, event) == 0 or _continues(player, players, frame):
         return
     up, best = _goes_up(player, players, table, tables), event
@@ -1737,7 +1727,7 @@ def _follow_hands(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, n
     address = players[of.PLAYER_TABLE]
     if address == 0:
         return
-    table, tables, end = _at(address), _whole(address), now + at.QUANTUM
+    table, tables, end = reals(address), wholes(address), now + at.QUANTUM
     if tables[of.TABLE_DRUMS] != 0:
         return
     for number in range(of.MOST_NOTES):
@@ -1919,12 +1909,12 @@ def _take_table(player: np.ndarray, players: np.ndarray, address: int, frame: in
 
     Another instrument begins with its wheels at rest, for what they turned may be something else now; pedals stay.
     """
-    table, tables, before = _at(address), _whole(address), players[of.PLAYER_TABLE]
+    table, tables, before = reals(address), wholes(address), players[of.PLAYER_TABLE]
     for which in range(of.VALUES):
         player[of.PLAYER_VALUES + which] = table[of.TABLE_VALUES + which]
     players[of.PLAYER_TABLE] = address
     _forget_gains(player)
-    if before != 0 and _whole(before)[of.TABLE_INSTRUMENT] != tables[of.TABLE_INSTRUMENT]:
+    if before != 0 and wholes(before)[of.TABLE_INSTRUMENT] != tables[of.TABLE_INSTRUMENT]:
         players[of.PLAYER_WHEEL] = 0
         for each in range(of.CHANNELS):
             own = _channel(each)
@@ -1979,13 +1969,13 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
         _choke(player, players, event, frame)
         return
     if kind == of.TUNE and address != 0:
-        _tune(player, players, _at(address), _whole(address), event, frame, now)
+        _tune(player, players, reals(address), wholes(address), event, frame, now)
         return
     if not (0 <= channel < of.CHANNELS and 0 <= key < of.KEYS and address != 0):
         if kind == of.NOTE_ON:
             _refuse(player, players, event)
         return
-    table, tables = _at(address), _whole(address)
+    table, tables = reals(address), wholes(address)
     if kind == of.NOTE_ON and value > 0.0:
         if _strum(player, players, table, tables, event, now):
             return
@@ -2055,16 +2045,16 @@ def _hear(player: np.ndarray, players: np.ndarray) -> None:
                 address = players[note + of.NOTE_VOICES + source]
                 if address != 0:
                     wanted = player[note + of.NOTE_GAIN] * player[of.PLAYER_SOURCE_GAINS + source]
-                    _at(address)[at.WANTED_GAIN] = wanted
+                    reals(address)[at.WANTED_GAIN] = wanted
             _listen(player, players, note)
-        elif players[note + of.NOTE_STATE] == of.RINGS and _whole(players[of.PLAYER_TABLE])[of.TABLE_DRUMS] != 0:
-            drums.hear(player, players, _at(players[of.PLAYER_TABLE]), _whole(players[of.PLAYER_TABLE]), note)
+        elif players[note + of.NOTE_STATE] == of.RINGS and wholes(players[of.PLAYER_TABLE])[of.TABLE_DRUMS] != 0:
+            drums.hear(player, players, reals(players[of.PLAYER_TABLE]), wholes(players[of.PLAYER_TABLE]), note)
 
 
 @njit(**COMPILED)
 def _listen(player: np.ndarray, players: np.ndarray, note: int) -> None:
     """Lets a note be heard at the instrument's points, unless they are others in number, or of another pick-up."""
-    tables = _whole(players[of.PLAYER_TABLE])
+    tables = wholes(players[of.PLAYER_TABLE])
     moved = players[note + of.NOTE_SOLO] != tables[of.TABLE_SOLO]
     for point in range(2):
         moved = moved or player[note + of.NOTE_POINT + point] != player[of.PLAYER_VALUES + of.POINT + point]
@@ -2073,7 +2063,7 @@ def _listen(player: np.ndarray, players: np.ndarray, note: int) -> None:
     for source in range(of.MOST_SOURCES):
         address = players[note + of.NOTE_VOICES + source]
         if address != 0:
-            counts = _whole(address)
+            counts = wholes(address)
             if counts[at.NEXT_WEIGHTS] != 0 or counts[at.VELOCITY] != tables[of.TABLE_VELOCITY]:
                 return
     players[note + of.NOTE_SOLO] = tables[of.TABLE_SOLO]
@@ -2082,9 +2072,9 @@ def _listen(player: np.ndarray, players: np.ndarray, note: int) -> None:
     for source in range(of.MOST_SOURCES):
         address = players[note + of.NOTE_VOICES + source]
         if address != 0:
-            _weigh(player, players, _at(address), 1, note)
-            _whole(address)[at.WEIGHTS_FADED] = 0
-            _whole(address)[at.NEXT_WEIGHTS] = 1
+            _weigh(player, players, reals(address), 1, note)
+            wholes(address)[at.WEIGHTS_FADED] = 0
+            wholes(address)[at.NEXT_WEIGHTS] = 1
 
 
 @njit(**COMPILED)
@@ -2100,7 +2090,7 @@ def _superseded(players: np.ndarray, event: int, following: int) -> bool:
 @njit(**COMPILED)
 def play(player_address: int, mixer_address: int) -> None:
     """Plays all events that are due in the mixer's next quantum, before it is rendered."""
-    player, players, mixers = _at(player_address), _whole(player_address), _whole(mixer_address)
+    player, players, mixers = reals(player_address), wholes(player_address), wholes(mixer_address)
     now, pushed = mixers[at.M_FRAMES], players[of.PLAYER_PUSHED]
     fence()
     _tend(player, players, now)
@@ -2143,7 +2133,7 @@ def play(player_address: int, mixer_address: int) -> None:
 @njit(**COMPILED)
 def begin(player_address: int) -> None:
     """Puts all wheels and pedals of a new player at rest."""
-    player, players = _at(player_address), _whole(player_address)
+    player, players = reals(player_address), wholes(player_address)
     players[of.PLAYER_HERE] = player_address
     for each in range(of.CHANNELS):
         _rest(player, players, each, 0, 0)

@@ -122,7 +122,7 @@ class MeasuredMode:
 
 @dataclass(frozen=True)
 class PitchDrop:
-    """Of the hardest blow on a drum of the kit, from its first half-period on; beside the range of hard blows."""
+    """Of the hardest blow on a drum of the kit, from its first half-period on, and the published range."""
 
     drum: str
     drop_percent: float

@@ -150,8 +150,7 @@ class Neck(Playable):
         key = self.key_at(at)
         if key is None or not self.in_rows:
             return super().spot_at(at)
-        string = self._row_at(at)
-        return self._stopped(string, key)
+        return self._stopped(self._row_at(at), key)
 
     def _stopped(self, string: int, key: int) -> Spot:
         """A key on a string, counted from the lowest; if there are fingers, the key where these stop it."""

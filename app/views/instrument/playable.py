@@ -45,7 +45,7 @@ class Playable(QWidget):
     Left button: plays while it is down; moved to other keys it plays these (glissando). Moved to other strings of a
     neck it strums: those that it has left ring until the button is up.
     Right button, or Shift: the key stays down until it is clicked so again.
-    Arrows and Enter: choose a key and play it; with Ctrl, what belongs to it.
+    Arrows and Enter: choose a key and play it; with Ctrl, all strings of a neck.
     """
 
     pressed = Signal(int, int, object)  # key, velocity, string as in `Spot`
