@@ -381,7 +381,7 @@ class Patch(Value):
     damping: Damping = Damping()
     technique: Technique = Technique()
     mode: Mode = "poly"
-    bend_semitones: Annotated[float, ranged(0, 48)] = 2.0
+    bend_semitones: float = parameter("bend_semitones")
     bend_by: Literal["tension", "length"] = "tension"
     mod_wheel: str = "none"
     tuning: TuningChoice = TuningChoice()
