@@ -218,7 +218,7 @@ def configuration_of(
         if case.matches(cell):
             settings |= case.set
             sizes |= case.model_configuration
-    protocol = DatasetConfiguration(cell.initial, cell.rate_hz, MODES[cell.rate_hz], cell.tension_modulated)
+    protocol = _protocol(cell.initial, cell.rate_hz, cell.tension_modulated)
     plain = {**write(protocol), **(data or {})}
     dataset = read(DatasetConfiguration, plain, "data")
     fitted = read(Recipe, {**settings, "seed": cell.seed, **(recipe or {})}, str(path))
@@ -234,6 +234,15 @@ def configuration_of(
         )
     except ValueError as error:
         raise SchemaError(f"{cell.name}: {error}") from error
+
+
+def follows_protocol(data: DatasetConfiguration) -> bool:
+    """Whether a data set is one of the paper's."""
+    return data.rate_hz in MODES and data == _protocol(data.initial, data.rate_hz, data.tension_modulated)
+
+
+def _protocol(initial: Literal["gaussian", "noise", "pluck"], rate_hz: int, modulated: bool) -> DatasetConfiguration:
+    return DatasetConfiguration(initial, rate_hz, MODES[rate_hz], modulated)
 
 
 def _description(cell: Cell) -> str:

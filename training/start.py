@@ -1,4 +1,4 @@
-"""How a run's model starts: by name, what that start is given of the string, in words, and what makes it.
+"""How a run's model starts. A start has a name, the knowledge of the string that it uses, in words, and its function.
 
 Nothing here imports torch before a start is looked up: names of runs are read without it.
 """
@@ -32,7 +32,7 @@ class Start(NamedTuple):
     """A start.
 
     Attributes:
-        given: of the string's motion, in words; "": nothing but the displacement.
+        given: the knowledge of the string's motion that it uses, in words; "": the displacement alone.
         make: the untrained model of a run and its data set, and what its encoder shall learn first, if anything.
         models: that have it.
     """
@@ -50,13 +50,13 @@ def starts_of(model: str) -> dict[str, Start]:
 
 
 def given_to(model: str, start: str) -> str:
-    """What a start of a model is given of the string's motion; "" for nothing, or a start that is not known."""
+    """The knowledge that a start of a model uses, in words; "" for none, or for an unknown start."""
     found = starts_of(model).get(start)
     return found.given if found else ""
 
 
 def hints_of(configuration: TrainingConfiguration) -> str:
-    """What a run that found its start in the displacement was given beside it, in words; empty for other runs."""
+    """The hints of a run whose start was found in the displacement, in words; empty for other runs."""
     if configuration.start not in (BLIND_PURSUIT, PHASES):
         return ""
     counted = configuration.model == "koopman_integrated" and "state_size" in configuration.model_configuration
@@ -65,7 +65,7 @@ def hints_of(configuration: TrainingConfiguration) -> str:
 
 
 def knowledge_of(configuration: TrainingConfiguration) -> str:
-    """What a run's start is given of the string, in words; empty: nothing but the displacement."""
+    """The knowledge of the string that a run's start uses, in words; empty: the displacement alone."""
     return given_to(configuration.model, configuration.start) or hints_of(configuration)
 
 

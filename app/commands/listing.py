@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from training.cli.arguments import Json
 from training.cli.console import print_json, print_table, say
 
 if TYPE_CHECKING:
-    from collections.abc import Container
+    from collections.abc import Container, Iterator
     from pathlib import Path
 
+    from app.patches.patch import Patch
     from training.heard_file import Heard
 
 
@@ -52,10 +55,22 @@ def models(json: Json = False) -> None:
     _show(found, json)
 
 
-def instruments(json: Json = False) -> None:
-    """List the instruments, factory and your own. Files that cannot be used are reported on standard error."""
-    from app.patches.library import list_patches
+def instruments(
+    instrument: Annotated[
+        str | None,
+        typer.Argument(metavar="[INSTRUMENT]", help="List this one's parameters instead: a name or a file."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """List the instruments, factory and your own, or the parameters of one.
 
+    Files that cannot be used are reported on standard error. Plug-ins and files name parameters by the same id.
+    """
+    from app.patches.library import find_patch, list_patches
+
+    if instrument is not None:
+        _show(list(_parameters(find_patch(instrument).patch)), json)
+        return
     entries, problems = list_patches()
     for problem in problems:
         say(problem)
@@ -65,6 +80,17 @@ def instruments(json: Json = False) -> None:
         facts = {"name": entry.name, "title": patch.name, "category": patch.category, "own": entry.own}
         found.append({**facts, "description": patch.description, "file": str(entry.path)})
     _show(found, json, but=("own", "file"))
+
+
+def _parameters(patch: Patch) -> Iterator[dict[str, Any]]:
+    """What the table says of the parameters that an instrument has, and its own values."""
+    from app.shared.parameters import OF_PATCHES
+
+    for id, parameter in OF_PATCHES.items():
+        if patch.has(id):
+            low, high = parameter.limits
+            own = {"value": patch.value(id), "lowest": low, "highest": high, "default": parameter.default}
+            yield {"id": id, "name": parameter.name, "unit": parameter.unit, **own}
 
 
 def _show(found: list[dict[str, Any]], json: bool, but: Container[str] = ()) -> None:

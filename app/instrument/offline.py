@@ -31,7 +31,7 @@ from engine.voices import Ear, Mixer
 SOURCES = ("model", "truth")
 BLOCK_FRAMES = 4_096
 LONGEST_TAIL_S = 60.0
-SILENT_DB = -90.0  # re full scale: after the last event it ends where the peak of a block is lower
+SILENT_DB = -80.0  # re full scale: it ends with the last block whose peak is above; 20 dB SPL where that is 100
 STOLEN_S = 0.03
 SYMPATHY_S = 5.0  # for which strings may ring that are not played
 MOST_RINGING = 96  # where more strings ring, the oldest fade out
@@ -111,7 +111,7 @@ def render_events(
 
     Args:
         source: "model", "truth", or "difference": model minus truth with its gain, without body and room.
-        seconds: its length; None: until all has died away, a minute after the last event at most.
+        seconds: its length; None: until all has fallen below SILENT_DB, a minute after the last event at most.
         limited: through the limiter, as it is heard; without it, samples may pass full scale.
         advanced: is called with the seconds rendered so far; may raise, to end it.
         varied: whether plucks vary from stroke to stroke, as the patch says; in a difference they never do.
@@ -147,13 +147,17 @@ def render_events(
     last = done + round(LONGEST_TAIL_S * rate_hz)
     quiet = 10 ** (SILENT_DB / 20)
     quiet_s = 0.0  # until all effects have died away as well
+    waiting: list[NDArray[np.float32]] = []  # silence, which ends the file unless a sound follows
     while done < last and quiet_s <= stage.tail_s:
         before = done
-        loudest = 0.0
-        for block in blocks_until(min(last, done + BLOCK_FRAMES)):
-            yield block
-            loudest = max(loudest, float(np.abs(block).max(initial=0.0)))
+        made = list(blocks_until(min(last, done + BLOCK_FRAMES)))
+        loudest = max((float(np.abs(block).max(initial=0.0)) for block in made), default=0.0)
+        waiting += made
+        if loudest >= quiet:
+            yield from waiting
+            waiting = []
         quiet_s = quiet_s + (done - before) / rate_hz if stage.silent or loudest < quiet else 0.0
+    yield from waiting[:1]
 
 
 def channels_played(patch: Patch, timed: Iterable[TimedEvent]) -> int:

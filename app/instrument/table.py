@@ -60,7 +60,7 @@ SHAPES = {
 }
 BENDS = {"tension": of.BY_TENSION, "length": of.BY_LENGTH}
 SOURCES = ("model", "truth")
-GOALS = 8  # values that are tried for a wheel all the way up
+HALVINGS = 8  # of the way to the wheel's end, until the value there is within its bounds
 
 
 def wheel_goal(patch: Patch) -> float | None:
@@ -70,7 +70,7 @@ def wheel_goal(patch: Patch) -> float | None:
         return None
     value, parameter = patch.value(name), OF_PATCHES[name]
     goal = value * parameter.wheel_factor if parameter.wheel is None else parameter.wheel
-    for _ in range(GOALS):
+    for _ in range(HALVINGS):
         try:
             patch.with_value(name, goal)
         except ValueError:  # beyond its bounds: half as far
@@ -158,7 +158,7 @@ def table_of(
         counts[of.TABLE_PROGRAMS + place] = program.ctypes.data
     counts[of.TABLE_SOURCES] = len(programs)
     points = [of.BRIDGE] * len(ear.points) if ear.pickup == "bridge" else ear.points
-    values = [*(_value(patch, name) for name in (*WHEELED, "body.mix")), *points]
+    values = [*(patch.value(name) for name in (*WHEELED, "body.mix")), *points]
     memory[of.TABLE_VALUES : of.TABLE_VALUES + len(values)] = values
     if loud.body is not None:
         memory = _with_body(memory, loud.body)
@@ -235,10 +235,6 @@ def strings_of(patch: Patch) -> int:
     """How many strings of a set channels of a guitar may choose."""
     chosen = patch.mode == "guitar" and isinstance(patch.strings, StringSet)
     return min(of.GUITAR_STRINGS, len(patch.strings.strings)) if chosen else 0  # type: ignore[union-attr]
-
-
-def _value(patch: Patch, name: str) -> float:
-    return patch.bend_semitones if name == "bend_semitones" else patch.value(name)
 
 
 def _row(string: object) -> list[float]:

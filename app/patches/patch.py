@@ -381,7 +381,7 @@ class Patch(Value):
     damping: Damping = Damping()
     technique: Technique = Technique()
     mode: Mode = "poly"
-    bend_semitones: Annotated[float, ranged(0, 48)] = 2.0
+    bend_semitones: float = parameter("bend_semitones")
     bend_by: Literal["tension", "length"] = "tension"
     mod_wheel: str = "none"
     tuning: TuningChoice = TuningChoice()
@@ -423,9 +423,16 @@ class Patch(Value):
                         raise ValueError(f"{where}: {error}") from error
         return self
 
+    def has(self, field: str) -> bool:
+        """Whether it has a parameter by this id; instruments in mono lack the second point."""
+        return field in OF_PATCHES and (field != "pickup.points.1" or len(self.pickup.points) > 1)
+
     def value(self, field: str) -> float:
-        """The value of one of ASSIGNABLE. Raises ValueError: an unknown field, or a pick-up point that is missing."""
-        self._check_assignable("field", field)
+        """The value of a parameter. Raises ValueError: there is none by this id, or the instrument lacks it."""
+        if not self.has(field):
+            raise ValueError(
+                f"field: {bounds.brief(field)} is no parameter of this instrument; try {', '.join(OF_PATCHES)}"
+            )
         found: Any = self
         for part in field.split("."):
             found = found[int(part)] if isinstance(found, tuple) else getattr(found, part)
@@ -465,7 +472,7 @@ class Patch(Value):
         return self.model_copy(update={"macros": macros}).with_values(targets)
 
     def _check_assignable(self, where: str, field: str) -> None:
-        if field not in ASSIGNABLE or (field == "pickup.points.1" and len(self.pickup.points) < 2):
+        if field not in ASSIGNABLE or not self.has(field):
             raise ValueError(
                 f"{where}: {bounds.brief(field)} is no field that can be turned; try {', '.join(ASSIGNABLE)}"
             )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -28,6 +29,7 @@ from engine.resonators.string import StringParameters
 from engine.voices import Ear, Mixer
 
 SEEN_DB = 70.0  # below full scale: softer strings do not light their keys
+STANDS_S = 0.5  # the output stands if it takes no frame for so long, which is longer than any of its buffers
 
 
 @dataclass(frozen=True)
@@ -97,6 +99,7 @@ class Keys:
         self._effects: Effects | None = None  # as set
         self._dry = False
         self._switches: dict[tuple[int, int], Controller] = {}  # the latest of each channel, which players take over
+        self._frames, self._moved_s = -1, 0.0  # of the mixer when it was last seen to move, and when that was
         self._reported_body = ""  # the fault of the body that was reported last
 
     @property
@@ -215,14 +218,20 @@ class Keys:
         return found
 
     def sounding_notes(self) -> list[SoundingNote]:
-        """The notes that ring, with their strings."""
-        player = self._player
-        if player is None or self._in is not self._mixer():
+        """The notes that ring, with their strings; none while the output stands."""
+        player, mixer = self._player, self._mixer()
+        if player is None or self._in is not mixer or self._stands(mixer):
             return []
         return [
             SoundingNote(each.key, min(max(1 + each.level_db / SEEN_DB, 0.0), 1.0), each.string, player.slid(each))
             for each in player.ringing()
         ]
+
+    def _stands(self, mixer: Mixer) -> bool:
+        now_s, frames = time.monotonic(), mixer.frames
+        if frames != self._frames:
+            self._frames, self._moved_s = frames, now_s
+        return now_s - self._moved_s > STANDS_S
 
     @property
     def heard_through(self) -> Patch | None:

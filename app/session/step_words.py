@@ -31,7 +31,6 @@ PATCH = {  # other fields of a patch than parameters, by their path; the rest ar
     "pickup.points": "listening point",
     "pickup.kind": "pick-up",
     "mode": "playing mode",
-    "bend_semitones": "bend range",
     "bend_by": "bend mode",
     "mod_wheel": "modulation wheel",
     "tuning.keymap": "keyboard mapping",

@@ -179,6 +179,7 @@ TIPS = {
     "amp.tone_db": "Tone of the amplifier: above 0 brighter, below darker, about 700 Hz",
     "room.t60_s": "Time in which the room's reverberation falls by 60 dB",
     "room.mix": "Mix of the room: 0 % without it, 100 % its reverberation alone",
+    "bend_semitones": "How far the pitch wheel bends when it is turned all the way",
     "level_db": "Level of the instrument; saved with it",
     "position": "Pluck position; 0 and 1 are the ends of the string",
     "amplitude_mm": "Peak displacement of the pluck",
@@ -345,6 +346,7 @@ OF_PATCHES: Mapping[str, Parameter] = {
         Parameter(
             "room.t60_s", "time", ROOM_T60_S, 1.2, SECONDS, BODY, "wheel", "reverberation time", wheel_factor=3
         ),
+        Parameter("bend_semitones", "bend range", (0, 48), 2, Taper(1, "{:g} semitones")),
         Parameter("level_db", "level", (-60, 24), 0, DECIBELS, BODY, "macro"),
     )
 }

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable
+from difflib import get_close_matches
 from pathlib import Path
 
 from engine.plain_text import one_line
 from engine.presets.file import PresetError
 
 SHIPPED = Path(__file__).parents[2] / "presets"
+SUFFIX = ".safetensors"
 
 
 def preset_files(*folders: Path) -> list[Path]:
@@ -20,7 +22,7 @@ def preset_files(*folders: Path) -> list[Path]:
     found = []
     for folder in folders or (SHIPPED,):
         with contextlib.suppress(OSError):
-            found += [path for path in folder.iterdir() if path.suffix == ".safetensors"]
+            found += [path for path in folder.iterdir() if path.suffix == SUFFIX]
     return sorted(found, key=lambda path: path.stem)
 
 
@@ -39,7 +41,7 @@ def find_preset(name_or_path: str, files: Iterable[Path] | None = None) -> Path:
     """The file of a preset given by its name among `files` (by default the shipped ones), or by path.
 
     Raises:
-        PresetError: there is none; the message lists the names.
+        PresetError: there is none; the message has names like it.
     """
     by_name = {path.stem: path for path in (preset_files() if files is None else files)}
     if name_or_path in by_name:
@@ -47,5 +49,8 @@ def find_preset(name_or_path: str, files: Iterable[Path] | None = None) -> Path:
     path = Path(name_or_path)
     if path.exists():
         return path
-    known = ", ".join(by_name) or "none is installed"
-    raise PresetError(f"no preset {name_or_path!r}; give a file or one of: {known}")
+    if path.suffix == SUFFIX or len(path.parts) > 1:
+        raise PresetError(f"{one_line(name_or_path)}: no such file; check the path")
+    close = get_close_matches(name_or_path, by_name)
+    known = f"did you mean {' or '.join(close)}?" if close else "`learned-strings presets` lists all."
+    raise PresetError(f"no preset {name_or_path!r}; {known} Give one of your own by its file, as runs/my_run{SUFFIX}")

@@ -12,7 +12,7 @@ from engine.pluck import DEFAULT_LISTEN
 from training.cli import arguments
 from training.cli.arguments import Cache, Json, check_range, open_preset_of_string
 from training.cli.console import Shares, number, print_json, print_table, progress, say
-from training.cli.training import load_data
+from training.cli.training import Known, known_errors, load_data, print_known
 
 if TYPE_CHECKING:
     from engine.metrics import ErrorSums
@@ -114,6 +114,7 @@ def evaluate(
         splits, configuration = ("all",), replace(configuration, count=fresh)
     _check_trajectories(trajectories, configuration, splits)
     from training.evaluate import held_out
+    from training.row_errors import configuration_of
 
     if fresh is None:
         data = replace(load_data(configuration, cache), scale_m=info.scale_m)
@@ -128,6 +129,9 @@ def evaluate(
         measured = {HELD_OUT if name == "all" else name: measurement.of(name) for name in splits}
     for words in info.family.warnings(info.string) if info.family is not None and on is None else ():
         say(f"warning: {words}")
+    known: Known = {}
+    if info.family is None and "validation" in measured:
+        known = known_errors(configuration_of(info, str(loaded.path)))
     if json:
         first = next(iter(measured.values()))
         facts = {
@@ -139,10 +143,11 @@ def evaluate(
             "past_s": past,
             "listen": DEFAULT_LISTEN,
         }
-        print_json({**facts, "rel_mse": first["rel_mse"], "rel_mae": first["rel_mae"], **measured})
+        others = {whose: {"rel_mse": mse, "rel_mae": mae} for whose, (mse, mae) in known.items()}
+        print_json({**facts, "rel_mse": first["rel_mse"], "rel_mae": first["rel_mae"], **others, **measured})
         return
     for name, errors in measured.items():
-        _print_errors(name, errors, info.horizon_s)
+        _print_errors(name, errors, info.horizon_s, known if name == "validation" else {})
         for found in errors.get("partials", [])[: 2 if past else 1]:  # the whole horizon, and all past it
             _print_partials(name, found)
 
@@ -325,10 +330,11 @@ def _check_trajectories(wanted: int | None, data: DatasetConfiguration, splits: 
             check_range("--trajectories", wanted, 1, rows.stop - rows.start)
 
 
-def _print_errors(split: str, errors: dict[str, Any], horizon_s: float) -> None:
+def _print_errors(split: str, errors: dict[str, Any], horizon_s: float, known: Known) -> None:
     print(f"{split.replace('_', ' ')}: rel. MSE {number(errors['rel_mse'])}, rel. MAE {number(errors['rel_mae'])}")
     if "stored_rel_mse" in errors:
         print(f"stored in the preset: {number(errors['stored_rel_mse'])}, {number(errors['stored_rel_mae'])}")
+    print_known(known)
     for key, text in REPORTED.items():
         if f"rel_mse_{key}" in errors:
             print(f"{text}: {number(errors[f'rel_mse_{key}'])}, {number(errors[f'rel_mae_{key}'])}")

@@ -33,19 +33,20 @@ def train(
         Path | None, typer.Argument(metavar="CONFIG", help="A .toml file; default that of studio_any_string.")
     ] = None,
     output: Annotated[
-        Path | None, typer.Option(help="The preset to write; default presets/CONFIG.safetensors.")
+        Path | None, typer.Option(help="The preset to write; default CONFIG.safetensors in the folder of runs.")
     ] = None,
 ) -> None:
     """Learn from the motions of many strings, and write the preset."""
     import torch
 
-    from engine.presets import SHIPPED
     from training.family.preset import CONFIGURATION, read_configuration, train_preset
+    from training.run import default_runs
 
     torch.set_num_threads(1)
     path = config or CONFIGURATION
     configuration = read_configuration(path)
-    file = output or SHIPPED / f"{path.stem}.safetensors"
+    file = output or default_runs() / f"{path.stem}.safetensors"
+    file.parent.mkdir(parents=True, exist_ok=True)
     with progress("family train") as report:
         info = train_preset(
             configuration,

@@ -15,12 +15,10 @@ from training.cli.console import Failure, number, progress, say
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from training.cell import Cell
     from training.cli.console import Report
-    from training.configuration import DatasetConfiguration
+    from training.configuration import DatasetConfiguration, TrainingConfiguration
     from training.data.dataset import Dataset
     from training.fitting.fit import Progress
-    from training.results import Row
 
 Configuration = Annotated[
     str,
@@ -34,7 +32,7 @@ Configuration = Annotated[
 def train(
     config: Configuration,
     output: Annotated[
-        Path | None, typer.Option(help="The preset to write; default presets/CONFIG.safetensors.")
+        Path | None, typer.Option(help="The preset to write; default CONFIG.safetensors in the run's folder.")
     ] = None,
     runs: Runs = None,
     seed: Annotated[
@@ -55,7 +53,6 @@ def train(
     """
     import torch
 
-    from engine.presets import SHIPPED
     from training.cell import Cell, load
     from training.run import default_runs, run_row
 
@@ -70,7 +67,8 @@ def train(
         else:
             configuration = load(name)
     cell = Cell.parse(name)
-    file, folder = output or SHIPPED / f"{name}.safetensors", runs or default_runs()
+    folder = runs or default_runs()
+    file = output or folder / name / f"{name}.safetensors"
     if threads is not None:
         torch.set_num_threads(threads)
     try:
@@ -105,8 +103,7 @@ def train(
         ("test", row.test_rel_mse, row.test_rel_mae),
     ):
         print(f"{split:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}")
-    if cell is not None:
-        _print_known(cell, row)
+    print_known(known_errors(configuration))
     if row.start_rel_mse is not None and row.start_rel_mae is not None:
         print(f"untrained   rel. MSE {number(row.start_rel_mse)}, rel. MAE {number(row.start_rel_mae)} (validation)")
     when = "" if begun else "; finished earlier, nothing was trained now"
@@ -115,19 +112,30 @@ def train(
     _tell_heard(file)
 
 
-def _print_known(cell: Cell, row: Row) -> None:
-    """What the paper, and the project's results, have of the same run on validation."""
+Known = dict[str, tuple[float | None, float | None]]
+
+
+def known_errors(run: TrainingConfiguration) -> Known:
+    """Relative MSE and MAE on validation: the "paper"'s of the same cell, the "project"'s results of the same run."""
+    from training.cell import follows_protocol
     from training.results import RESULTS, read_results
     from training.tables.paper import Column, paper_errors
 
-    place = (cell.string_kind, cell.horizon, cell.model, Column(cell.initial, cell.rate_hz))
-    if (paper := paper_errors().get(place)) is not None and paper.rel_mse and paper.rel_mae:
-        print(
-            f"paper       rel. MSE {number(paper.rel_mse.mean)}, rel. MAE {number(paper.rel_mae.mean)} (validation)"
-        )
-    for known in read_results(RESULTS) if RESULTS.is_file() else []:
-        if known.digest == row.digest and known.status == "done":
-            print(f"project     rel. MSE {number(known.rel_mse)}, rel. MAE {number(known.rel_mae)} (validation)")
+    found: Known = {}
+    kind = "nonlinear" if run.data.tension_modulated else "linear"
+    place = (kind, run.steps, run.model, Column(run.data.initial, run.data.rate_hz))
+    paper = paper_errors().get(place) if follows_protocol(run.data) else None
+    if paper is not None and paper.rel_mse and paper.rel_mae:
+        found["paper"] = paper.rel_mse.mean, paper.rel_mae.mean
+    for known in read_results(RESULTS):
+        if known.digest == run.digest and known.status == "done":
+            found["project"] = known.rel_mse, known.rel_mae
+    return found
+
+
+def print_known(known: Known) -> None:
+    for whose, (mse, mae) in known.items():
+        print(f"{whose:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)} (validation)")
 
 
 def _tell_heard(file: Path) -> None:

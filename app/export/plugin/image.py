@@ -29,7 +29,7 @@ from app.instrument.drum_keys import (
 from app.instrument.loud_keys import LoudKeys
 from app.instrument.table import PLAYED_PARAMETERS, WHEELED, wheel_goal
 from app.patches.drums import Drums
-from app.patches.patch import Patch
+from app.patches.patch import ASSIGNABLE, Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
 from engine import bounds
 from engine.effects import body, curves, impulse, room
@@ -373,7 +373,7 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     fixed = not drums and patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
     points = () if fixed else PLAYED_PARAMETERS[of.POINT :][: len(patch.pickup.points)]
     for id in (*WHEELED, *points):
-        if id in (DRUM_PARAMETERS if drums else OF_PATCHES):
+        if id in (DRUM_PARAMETERS if drums else ASSIGNABLE):
             parameter = OF_PATCHES[id]
             yield _record(
                 id, VALUE, PLAYED_PARAMETERS.index(id), patch.value(id), parameter, parameter.group.capitalize()

@@ -41,6 +41,7 @@ TOP = 52  # pixels: of its place without notices
 REST_MS = 160  # after the last step in the list, what is loaded is played
 DELETE, REALLY = "Delete", "Delete it for good?"
 _COMMAND = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier | Qt.KeyboardModifier.MetaModifier
+_PLACES = {QEvent.Type.Resize, QEvent.Type.Move, QEvent.Type.Show, QEvent.Type.Hide}  # what it keeps clear of
 _ALT_GR = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier  # on Windows
 
 
@@ -293,9 +294,12 @@ class Browser(QFrame):
 
     @property
     def top(self) -> int:
-        """Its upper edge in the window: that of notices, which it covers."""
+        """Its upper edge in the window: under the notice, if one is shown."""
         notices = self.window().findChild(NoticeBar)
-        return TOP if notices is None else notices.y()
+        if notices is None:
+            return TOP
+        notices.installEventFilter(self)
+        return notices.y() if notices.isHidden() else notices.geometry().bottom() + 4
 
     @property
     def words(self) -> tuple[str, ...]:
@@ -410,8 +414,8 @@ class Browser(QFrame):
         return {KEYS.Key_Up: -1, KEYS.Key_Down: 1, KEYS.Key_PageUp: -page, KEYS.Key_PageDown: page}[key]
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:
-        if watched is self.parent():
-            if event.type() == QEvent.Type.Resize and self.isVisible():
+        if watched is self.parent() or isinstance(watched, NoticeBar):
+            if event.type() in _PLACES and self.isVisible():
                 self.place()
             return False
         if not isinstance(event, QKeyEvent) or event.type() == QEvent.Type.KeyRelease:

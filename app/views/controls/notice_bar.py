@@ -136,4 +136,4 @@ class Bell(QToolButton):
         state = f"{unseen} unread" if unseen else "none unread"
         self.setText(f"⚑ {min(unseen, 99)}" if unseen else "⚑")
         self.setAccessibleName(f"Notices, {state}")
-        self.setToolTip(f"Notices since the start: {state} (F8)")
+        self.setToolTip(f"Notices: errors and messages since the start, {state} (F8)")

@@ -267,7 +267,7 @@ class PerformancePage(ExportPage):
             notes = number_of(sum(isinstance(each.event, NoteOn) for each in played.events), "note")
             heard = source_words(played.source, played.difference_gain_db)
             self.what.setText(
-                f"{played.patch.name}: {notes} in {played.events[-1].time_s:.1f} s, then ringing out; {heard}"
+                f"{played.patch.name}: {notes} in {played.events[-1].time_s:.1f} s, then until silent; {heard}"
             )
             self.file.suggest(f"{played.patch.name}.wav")
 

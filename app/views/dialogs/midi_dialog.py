@@ -15,6 +15,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.shared.parameters import OF_PATCHES
 from app.views.controls.parts import combo_box, faint, label, push_button, scrolled
 from app.views.controls.plain import Label
 
@@ -67,7 +68,7 @@ class MidiDialog(QDialog):
         self._bends_by = combo_box("Pitch bend changes", BENDS_BY)
         for box, field, tip in (
             (self._channels, "mode", "Whether the MIDI channel of a note says on which string it is played"),
-            (self._bends, "bend_semitones", "How far the pitch wheel bends when it is turned all the way"),
+            (self._bends, "bend_semitones", OF_PATCHES["bend_semitones"].tip),
             (self._bends_by, "bend_by", BEND_TIP),
             (self._wheel, "mod_wheel", "What the modulation wheel changes while you play"),
         ):

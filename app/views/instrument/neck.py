@@ -174,6 +174,13 @@ class Neck(Playable):
         fret = min(max(self._fret_of(self.chosen) + along, 0), self.frets)
         return Spot(self._strings[string][1] + fret, len(self._strings) - 1 - string)
 
+    def place_words(self, spot: Spot) -> str:
+        """With the string and the fret where it is a neck."""
+        if not self.in_rows:
+            return super().place_words(spot)
+        string, fret = self._strings[self._row_of(spot)][0], self._fret_of(spot)
+        return f"{note_name(spot.key)}, string {string}, {f'fret {fret}' if fret else 'open'}"
+
     def typed(self, all_strings: bool) -> list[Spot]:
         if not self.in_rows:
             return super().typed(all_strings)

@@ -10,11 +10,13 @@ from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
 from PySide6.QtGui import (
     QColor,
     QFocusEvent,
+    QFontMetricsF,
     QHideEvent,
     QKeyEvent,
     QMouseEvent,
     QPainter,
     QPaintEvent,
+    QPen,
     QPixmap,
     QResizeEvent,
 )
@@ -28,6 +30,7 @@ LOWEST, HEIGHT = 72, 104  # of a surface in a low window, and otherwise, in pixe
 SOFTEST, HARDEST = 40, 127  # velocities of a click at the top and at the bottom of a place
 TIP_MS = 5_000  # the tooltip covers keys
 TYPED = 96  # velocity of the Enter key
+FIGURE_BESIDE = 14  # pixels from the mouse to the figure of its velocity
 LEVEL_STEPS = 24  # that can be distinguished; finer changes are not painted
 _MOVES = {Qt.Key.Key_Right: 1, Qt.Key.Key_Left: -1, Qt.Key.Key_Up: 12, Qt.Key.Key_Down: -12}
 
@@ -63,13 +66,15 @@ class Playable(QWidget):
         self._levels: dict[int, int] = {}  # of 0 … LEVEL_STEPS
         self._down: Spot | None = None  # by the mouse
         self._at = QPointF()  # of the mouse, while a key is down
-        self._clicked = TYPED  # velocity of the click, which a strum keeps
+        self._clicked = self._played = TYPED  # velocity of the click, which a strum keeps, and of the latest key
         self._strummed: list[Spot] = []  # on strings that the mouse has left
         self.legato = False  # a key that is pressed while another is held takes its note over
         self._typed: list[Spot] = []  # by Enter
         self._held: set[Spot] = set()
         self._cursor = Spot(60)
         self._by_keys = False  # the cursor was last reached or moved with the keyboard
+        self._figure, self._figure_at = "", QRectF()  # the velocity at the mouse
+        self.setMouseTracking(True)
         self._rest = QPixmap()
         theme.changes.theme_changed.connect(self.rest_changed)
 
@@ -98,6 +103,10 @@ class Playable(QWidget):
     def stepped(self, arrow: Qt.Key) -> Spot:
         """Where an arrow of the keyboard moves the cursor."""
         return Spot(self._cursor.key + _MOVES[arrow])
+
+    def place_words(self, spot: Spot) -> str:
+        """What is there, in words."""
+        return note_name(spot.key)
 
     def typed(self, all_strings: bool) -> list[Spot]:
         """What Enter plays; `all_strings`: with Ctrl."""
@@ -193,6 +202,13 @@ class Playable(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         painter.drawPixmap(QPointF(), self._rest)
         self.paint_marks(painter, QRectF(event.rect()))
+        if self._figure:
+            painter.setPen(QPen(QColor(theme.LINE), 1))
+            painter.setBrush(QColor(theme.PANEL))
+            painter.drawRoundedRect(self._figure_at.adjusted(1, 1, -1, -1), 3, 3)
+            painter.setPen(QColor(theme.TEXT))
+            painter.setFont(theme.small_font(10))
+            painter.drawText(self._figure_at, Qt.AlignmentFlag.AlignCenter, self._figure)
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
@@ -222,6 +238,23 @@ class Playable(QWidget):
         """The velocity of a click there: greater further down."""
         return round(SOFTEST + min(max(self.share_at(key, at), 0.0), 1.0) * (HARDEST - SOFTEST))
 
+    @property
+    def figure(self) -> str:
+        """The velocity of a click at the mouse, or of the one that sounds; "" where no key is."""
+        return self._figure
+
+    def _show_velocity(self, at: QPointF, velocity: int | None) -> None:
+        """Beside the mouse, where it covers neither the mouse nor what is clicked."""
+        before, self._figure = self._figure_at, "" if velocity is None else f"velocity {velocity}"
+        metrics = QFontMetricsF(theme.small_font(10))
+        width, height = metrics.horizontalAdvance("velocity 127") + 12, metrics.height() + 4
+        beside = at.x() + FIGURE_BESIDE
+        left = beside if beside + width <= self.width() else at.x() - FIGURE_BESIDE - width
+        top = min(max(at.y() - height / 2, 0.0), self.height() - height)
+        self._figure_at = QRectF(left, top, width, height) if self._figure else QRectF()
+        for place in (before, self._figure_at):
+            self.update(place.toAlignedRect())
+
     def mousePressEvent(self, event: QMouseEvent) -> None:
         spot = self.spot_at(event.position())
         if spot is None or not self.sounds(spot.key) or self._down is not None:
@@ -239,18 +272,23 @@ class Playable(QWidget):
         elif event.button() == Qt.MouseButton.LeftButton:
             self._down, self._at, self._clicked = spot, event.position(), velocity
             self._press(spot, velocity)
+        self._show_velocity(event.position(), velocity)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
         self.mousePressEvent(event)  # fast repeats are notes too
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         if self._down is None:
+            key = self.key_at(event.position())
+            velocity = self.velocity_at(key, event.position()) if key is not None and self.sounds(key) else None
+            self._show_velocity(event.position(), velocity)
             return
         met = self.spots_between(self._at, event.position())
         self._at = event.position()
         for spot in met:
             if spot != self._down and self.sounds(spot.key):
                 self._move_to(spot, self.velocity_at(spot.key, self._at))
+        self._show_velocity(self._at, self._played)
 
     def _move_to(self, spot: Spot, velocity: int) -> None:
         """Plays what the mouse has met next."""
@@ -347,11 +385,19 @@ class Playable(QWidget):
     def _set_cursor(self, spot: Spot) -> None:
         spot = spot._replace(key=min(max(spot.key, self._low), self._high))
         before, self._cursor = self._cursor, spot
-        self.setAccessibleDescription(f"{note_name(spot.key)}; arrows choose a key, Enter plays it")
+        self.setAccessibleDescription(
+            f"{self.place_words(spot)}; arrows choose a key, Enter plays it at velocity {TYPED}. "
+            "Clicks are softer at the top of a key, harder at its bottom"
+        )
         self.repaint_spot(before)
         self.repaint_spot(spot)
 
+    def leaveEvent(self, event: QEvent) -> None:
+        self._show_velocity(QPointF(), None)
+        super().leaveEvent(event)
+
     def _press(self, spot: Spot, velocity: int) -> None:
+        self._played = velocity
         self.repaint_spot(spot)
         self.pressed.emit(spot.key, velocity, spot.string)
 

@@ -148,11 +148,11 @@ class StringKnobs(QWidget):
     def show_patch(self, patch: Patch, saved: Patch | None = None) -> None:
         """`saved`: the values that a double-click resets to."""
         for field, knob in self.knobs.items():
-            value = _value(patch, field)
+            value = patch.value(field)
             knob.set_barred(_why_barred(patch, field))
             knob.set_value(value)
             if saved is not None:
-                knob.default = _value(saved, field)
+                knob.default = saved.value(field)
         with QSignalBlocker(self.shape):
             self.shape.setCurrentIndex(SHAPES.index(patch.pluck.shape))
         barred = _why_barred(patch, "pluck.shape")
@@ -184,9 +184,3 @@ def _why_barred(patch: Patch, field: str) -> str:
     if field == "tuning.a4_hz" and patch.tuning.keymap.strip():
         return NO_A4
     return ""
-
-
-def _value(patch: Patch, field: str) -> float:
-    if field.startswith("tuning."):
-        return float(getattr(patch.tuning, field.removeprefix("tuning.")))
-    return patch.value(field)

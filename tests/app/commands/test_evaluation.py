@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,9 +14,10 @@ import torch
 
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.presets import load_preset, preset_digest, save_preset
+from engine.presets import find_preset, load_preset, preset_digest, save_preset
 from engine.schema import write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
+from training.data.dataset import Dataset, load_dataset
 from training.heard_file import read_heard
 from training.heard_words import heard_word
 
@@ -49,6 +51,23 @@ def preset(small_preset: Path, tmp_path: Path) -> Path:
     path = tmp_path / "tiny.safetensors"
     save_preset(path, info, model)
     return path
+
+
+def test_the_papers_figures_stand_beside_the_measured(
+    run, tmp_path: Path, cache: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def few(data: DatasetConfiguration, folder: Path | None) -> Dataset:
+        return load_dataset(replace(data, count=20, steps=400), folder)
+
+    monkeypatch.setattr("training.cli.evaluation.load_data", few)
+    file = tmp_path / "mine.safetensors"  # its name need not be the cell's
+    shutil.copy(find_preset("nylon_nonlinear_noise_4k_s5_400"), file)
+    out = run("evaluate", file, "--split", "both", *cache).out
+    assert out.count("paper       rel. MSE 0.0057, rel. MAE 0.0672 (validation)") == 1
+    assert out.count("project     rel. MSE 0.000306, rel. MAE") == 1
+    reported = json.loads(run("evaluate", file, "--json", *cache).out)
+    assert reported["paper"] == {"rel_mse": 0.0057, "rel_mae": 0.0672}
+    assert "paper" not in run("evaluate", file, "--split", "test", *cache).out
 
 
 def test_the_horizon_and_what_is_stored(run, preset: Path, cache: list[Any]) -> None:

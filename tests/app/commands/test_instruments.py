@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from app.patches.library import SHIPPED
+from app.patches.library import SHIPPED, find_patch
+from app.shared.parameters import OF_PATCHES
 
 
 def test_factory_instruments_are_listed(run) -> None:
@@ -19,6 +20,25 @@ def test_factory_instruments_are_listed(run) -> None:
     for each in listed:
         assert set(each) == {"name", "title", "category", "own", "description", "file"} and not each["own"]
         assert each["name"] in table and each["title"] in table
+
+
+def test_an_instruments_parameters_are_listed_with_its_values(run) -> None:
+    own = find_patch("classical_guitar").patch
+    listed = {each["id"]: each for each in json.loads(run("instruments", "classical_guitar", "--json").out)}
+    assert set(listed) == {id for id in OF_PATCHES if own.has(id)}
+    for id, each in listed.items():
+        parameter = OF_PATCHES[id]
+        assert each == {
+            "id": id,
+            "name": parameter.name,
+            "unit": parameter.unit,
+            "value": own.value(id),
+            "lowest": parameter.limits[0],
+            "highest": parameter.limits[1],
+            "default": parameter.default,
+        }
+    assert "damping.release_t60_s" in run("instruments", "classical_guitar").out
+    assert "did you mean classical_guitar" in run("instruments", "clasical_guitar").failure
 
 
 def test_a_broken_instrument_is_reported_and_hides_no_other(

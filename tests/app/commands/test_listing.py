@@ -51,7 +51,12 @@ def test_a_broken_preset_is_reported_and_hides_no_other(run, installed: Path) ->
 def test_a_preset_is_found_by_its_name(run, installed: Path) -> None:
     words = ("--position", 0.5, "--amplitude-mm", 2, "--seconds", 0.01)
     assert run("compare", "good", *words).status == 0
-    assert "give a file or one of: broken, good" in run("compare", "other", *words).failure
+    assert (
+        "no preset 'goood'; did you mean good? Give one of your own by its file"
+        in run("compare", "goood", *words).failure
+    )
+    assert "`learned-strings presets` lists all" in run("compare", "other", *words).failure
+    assert "missing.safetensors: no such file" in run("compare", "runs/missing.safetensors", *words).failure
 
 
 def test_models_counts_the_real_modules_at_the_papers_sizes(run) -> None:

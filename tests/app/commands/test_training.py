@@ -10,9 +10,10 @@ from typing import Any
 import pytest
 import torch
 
-from engine.presets import load_preset, preset_digest
+from engine.presets import SHIPPED, load_preset, preset_digest
 from tests.app.commands.conftest import FullDisk
 from training.cell import load
+from training.cli.training import known_errors
 from training.data.dataset import load_dataset
 from training.fitting.checkpoint import Checkpoint
 from training.heard_file import read_heard
@@ -82,6 +83,20 @@ def test_training_writes_a_preset_and_ends_with_its_own_error(run, place: Place)
     assert lines[5] == f"heard       {heard_sentence(heard[preset_digest(path)], path.stem)}"
     assert info.trained_range.position == (0.3, 0.7)
     assert [row["epoch"] for row in place.log("a")] == ["1", "2", "3"]
+
+
+def test_a_shipped_preset_is_not_replaced(run, place: Place) -> None:
+    runs = place.folder / "runs"
+    found = run("train", place.configuration, "--runs", runs, *place.cache)
+    assert found.out.splitlines()[0] == str(runs / "tiny" / "tiny.safetensors")
+    assert not (SHIPPED / "tiny.safetensors").exists()
+
+
+def test_known_errors_are_the_papers_and_the_projects() -> None:
+    koopman = known_errors(load("nylon_nonlinear_noise_4k_koopman_400"))
+    assert koopman["paper"] == (0.0036, 0.0353) and koopman["project"][0] < 0.0045
+    assert set(known_errors(load("nylon_nonlinear_noise_4k_koopman_integrated_400_blind"))) == {"project"}
+    assert known_errors(load("studio_nylon_b3")) == {}  # data of its own
 
 
 def test_a_run_of_ones_own_takes_another_seed(run, place: Place) -> None:

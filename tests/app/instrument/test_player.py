@@ -24,7 +24,7 @@ from app.instrument.events import (
     TimedEvent,
 )
 from app.instrument.loud_keys import LoudKeys
-from app.instrument.offline import channels_played, render_events, render_note
+from app.instrument.offline import BLOCK_FRAMES, SILENT_DB, channels_played, render_events, render_note
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, PluckChoices, Room
@@ -334,6 +334,14 @@ def test_the_model_is_the_truth_under_the_same_hands(patch: Patch, preset: Prese
     patch = patch if stops else hammered(patch)
     model, truth = (play(patch, preset, 2.0, *BUSY, source=source) for source in ("model", "truth"))
     assert float(((model - truth) ** 2).sum() / (truth**2).sum()) < 1e-5
+
+
+def test_a_file_ends_when_nothing_is_heard(patch: Patch, preset: Preset) -> None:
+    lively = changed(patch, room=Room(mix=0.4, t60_s=1.0), sympathy_s_kg=0.01)
+    events = [TimedEvent(0.0, NoteOn(60, 100)), TimedEvent(0.2, NoteOff(60))]
+    sound = np.concatenate(list(render_events(lively, preset, events, 48_000)))
+    heard = np.flatnonzero(np.abs(sound).max(axis=1) >= 10 ** (SILENT_DB / 20))[-1]
+    assert heard > 0.2 * 48_000 and len(sound) - heard <= 2 * BLOCK_FRAMES
 
 
 def test_events_give_the_same_samples_for_ever(patch: Patch, preset: Preset) -> None:

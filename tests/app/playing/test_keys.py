@@ -342,6 +342,16 @@ def test_a_soloed_mode_is_as_loud_as_in_the_note(played: Notes, sound: Any, wait
     assert played.keys.gain_of(made.parameters) == pytest.approx(whole)
 
 
+def test_keys_go_out_while_the_output_stands(played: Notes, sound: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    played.handle(NoteOn(45, 127))
+    sound.mixer.render(4_800)
+    assert played.keys.sounding()
+    monkeypatch.setattr("app.playing.keys.STANDS_S", 0.0)
+    assert played.keys.sounding() == {}  # no frame since
+    sound.mixer.render(4_800)
+    assert played.keys.sounding()
+
+
 @pytest.mark.parametrize(("rate_hz", "channels"), [(48_000, 1), (44_100, 2)])
 def test_keys_of_a_device_that_is_gone_go_out_and_leave_no_motion(
     played: Notes, sound: Any, rate_hz: int, channels: int

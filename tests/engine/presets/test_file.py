@@ -178,7 +178,7 @@ def test_a_model_that_is_not_finite_is_not_saved(tmp_path: Path, preset_file: Pa
 
 def test_find_by_path_and_by_unknown_name(preset_file: Path) -> None:
     assert find_preset(str(preset_file)) == preset_file
-    with pytest.raises(PresetError, match="no preset 'nonsense'; give a file or one of"):
+    with pytest.raises(PresetError, match="no preset 'nonsense'; `learned-strings presets` lists all"):
         find_preset("nonsense")
 
 

@@ -98,6 +98,32 @@ def test_beyond_the_range_nothing_is_played(qtbot: QtBot, neck: Neck) -> None:
     assert pressed == []
 
 
+def test_the_velocity_of_a_click_is_shown(qtbot: QtBot, neck: Neck) -> None:
+    heard: list[int] = []
+    neck.pressed.connect(lambda _, velocity: heard.append(velocity))
+    assert neck.figure == ""
+    for share in (0.2, 0.8):
+        before = neck.grab().toImage()
+        qtbot.mouseMove(neck, on(neck, 2, 4, share))
+        hovered = neck.figure
+        assert neck.grab().toImage() != before
+        qtbot.mousePress(neck, LEFT, pos=on(neck, 2, 4, share))
+        assert neck.figure == hovered == f"velocity {heard[-1]}"
+        qtbot.mouseMove(neck, on(neck, 3, 4, 0.5))  # a strum keeps it
+        assert neck.figure == hovered
+        qtbot.mouseRelease(neck, LEFT, pos=on(neck, 3, 4, 0.5))
+    qtbot.mouseMove(neck, QPoint(500, 108))  # the numbers beneath
+    assert neck.figure == ""
+
+
+def test_the_string_at_the_cursor_is_named(qtbot: QtBot, neck: Neck) -> None:
+    qtbot.mouseClick(neck, LEFT, pos=on(neck, 1, 3))
+    assert neck.accessibleDescription().startswith("C3, string A2, fret 3; ")
+    qtbot.keyClick(neck, Qt.Key.Key_Up)
+    assert neck.accessibleDescription().startswith("F3, string D3, fret 3; ")
+    assert "velocity 96" in neck.accessibleDescription()
+
+
 @pytest.mark.parametrize("levels", [{}, {20: 1.0, 127: 0.5}, {40: 0.2, 64: 2.0}])
 def test_whatever_sounds_can_be_painted(neck: Neck, levels: dict[int, float]) -> None:
     for strings in (GUITAR, ()):

@@ -6,13 +6,14 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from PySide6.QtCore import QRect, Qt
+from PySide6.QtCore import QPoint, QRect, Qt
 from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.patches.library import SHIPPED, PatchEntry
 from app.patches.patch import Patch
 from app.views.controls.browser import REALLY, Browser
+from app.views.controls.notice_bar import NoticeBar
 from app.views.instrument.patch_card import patch_browser, patch_row
 
 LEFT = Qt.MouseButton.LeftButton
@@ -230,6 +231,17 @@ def test_what_is_shown_does_not_load(browser: Browser, guitar: Patch) -> None:
     browser.show_rows([patch_row(entry(guitar, name)) for name in ("nylon", "new")], (), "new", "/own")
     assert chosen == []
     assert current(browser) == "new"
+
+
+def test_a_notice_is_not_hidden_behind_it(browser: Browser) -> None:
+    notices = NoticeBar(browser.parentWidget())
+    notices.place(QPoint(14, 50), 1200)
+    browser.place()
+    alone = browser.y()
+    notices.report("No sound.")
+    assert browser.y() > notices.geometry().bottom()
+    notices.hide()
+    assert browser.y() == alone == notices.y()
 
 
 def test_it_is_named_after_what_it_lists(browser: Browser) -> None:
