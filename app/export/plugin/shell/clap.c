@@ -109,7 +109,10 @@ static bool param_to_text(const clap_plugin *plugin, uint32_t id, double value, 
     int length, step = (int)fmin(fmax(value - own->low + 0.5, 0), own->steps - 1);
     const char *word = word_of(own, step, &length);
     snprintf(text, room, "%.*s", length, word);
-  } else snprintf(text, room, "%.4g%s%s", value, own->unit[0] ? " " : "", own->unit);
+  } else {
+    double least = 1e-5 * (own->high - own->low);  // single precision of a host's own range, which is no value
+    snprintf(text, room, "%.4g%s%s", fabs(value) < least ? 0.0 : value, own->unit[0] ? " " : "", own->unit);
+  }
   return true;
 }
 
