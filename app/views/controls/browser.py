@@ -256,6 +256,8 @@ class Browser(QFrame):
     def show_over(self) -> None:
         """Opens with the focus in the search field."""
         self._before = QApplication.focusWidget()
+        for notices in self.window().findChildren(NoticeBar):
+            notices.installEventFilter(self)  # again is the same as once
         self.opened.emit()
         self.select()
         self.place()
@@ -298,7 +300,6 @@ class Browser(QFrame):
         notices = self.window().findChild(NoticeBar)
         if notices is None:
             return TOP
-        notices.installEventFilter(self)
         return notices.y() if notices.isHidden() else notices.geometry().bottom() + 4
 
     @property

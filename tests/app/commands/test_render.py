@@ -181,7 +181,7 @@ def test_a_damaged_preset_is_reported(
 
 def test_a_missing_truncated_or_oversized_preset_is_reported(run, small_preset, folder: Path, tmp_path: Path) -> None:
     out, path = folder / "a.wav", tmp_path / "bad.safetensors"
-    assert "no preset" in run(*render(path, out)).failure
+    assert f"{path}: no such file" in run(*render(path, out)).failure
     path.write_bytes(small_preset.read_bytes()[:-50])
     assert f"{path}: not a whole safetensors file" in run(*render(path, out)).failure
     os.truncate(path, LARGEST_PRESET_BYTES + 1)
