@@ -24,6 +24,7 @@ batch_size = 8
 steps_per_batch = 8
 first_horizon = 20
 validate_every = 4
+latent_polish = 0
 {more}
 
 [[block]]
