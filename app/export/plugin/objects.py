@@ -175,7 +175,9 @@ def _compiled(text: str, target: Target, number: int) -> bytes:
     whole = llvm.parse_assembly(_without_counts(text))
     _step()
     for function in whole.functions:
-        if not function.is_declaration and not function.name.startswith(entries):
+        if function.name.startswith(entries):
+            function.visibility = llvm.Visibility.hidden
+        elif not function.is_declaration:
             function.linkage = llvm.Linkage.internal
     for variable in whole.global_variables:
         if not variable.is_declaration:
