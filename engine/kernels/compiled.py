@@ -28,7 +28,7 @@ _usual = Dispatcher.get_call_template
 
 
 def _template(dispatcher: Any, arguments: Any, named: Any) -> Any:
-    """Numba would compile a function anew for each number that a call of it states."""
+    """Numba would compile a function again for each number that a call of it states."""
     return _usual(dispatcher, tuple(map(unliteral, arguments)), named)
 
 

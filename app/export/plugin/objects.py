@@ -22,9 +22,9 @@ from app.export.plugin.formats import TARGETS, Target
 from engine.whole_file import whole_file
 
 WAIT_S = 0.1
-FUNCTIONS = 200  # of a part, about: dots of `texts`
+FUNCTIONS = 150  # of a part, about: dots of `texts`
 STEPS = 4  # of an object file after that
-TEXT_SHARE = 0.85  # of the time, measured
+TEXT_SHARE = 0.6  # of the time, measured
 # What the code may ask of the shell and of the C library; all else would be a reference to Python.
 _LIBRARY = """
 cos sin sincos sincosf exp exp2 expm1 log log10 log1p log2 pow ceil floor rint round sqrt fmod tan atan atan2
