@@ -171,7 +171,7 @@ def strike(voice: np.ndarray, program: np.ndarray, scratch: np.ndarray) -> None:
         _integrate_from(voice, program, 0, scratch)
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _width(node: int) -> int:
     """Nodes from this one to the next that is used: what is left to change does so ever more slowly."""
     return 1 if node < 16 else 2 if node < 64 else 4 if node < 256 else 8

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 from numba import config, njit
+from numba.core.dispatcher import Dispatcher
+from numba.core.types.misc import unliteral
 
 from engine.kernels import cache
 
@@ -20,6 +22,18 @@ COMPILED: dict[str, Any] = {
     "fastmath": {"reassoc", "contract", "nsz", "arcp"},
     "error_model": "numpy",
 }
+
+
+_usual = Dispatcher.get_call_template
+
+
+def _template(dispatcher: Any, arguments: Any, named: Any) -> Any:
+    """Numba would compile a function again for each number that a call of it states."""
+    return _usual(dispatcher, tuple(map(unliteral, arguments)), named)
+
+
+Dispatcher.get_call_template = _template  # type: ignore[method-assign, assignment]
+
 # A number in the source would be a double and take the whole expression with it.
 ZERO, HALF, ONE, _TWO, _LARGE = (np.float32(x) for x in (0, 0.5, 1, 2, 9))
 _P0, _P1, _P2 = (np.float32(x) for x in (135135, 17325, 378))

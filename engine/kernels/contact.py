@@ -169,7 +169,7 @@ def sound(player_address: int, mixer_address: int) -> None:
             players[noise + of.NOISE_LEFT] = 0
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, stops: int) -> None:
     """Adds a force to a frame of the mix, at a gain between two quanta; it fades out where the noise stops."""
     share = (frame + 1) / at.QUANTUM

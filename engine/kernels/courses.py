@@ -144,7 +144,7 @@ def _generate(mixer: np.ndarray, first: bool) -> None:
             voice.remember(each, heard, first, out)
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _number(counts: np.ndarray, address: int) -> int:
     """Which string of the course a voice is."""
     number = 0

@@ -23,13 +23,13 @@ HERTZ = -0.2  # power of the speed in the time of contact, as in `engine.strike`
 UNHEARD = 1e-7  # of the loudest mode, where the loudness of a key and its peak are computed
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def block_of(tables: np.ndarray, key: int) -> int:
     """First slot of the drum of a key in a table of drums; 0: the key has none."""
     return tables[tables[of.TABLE_DRUMS] + key]
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _speed(table: np.ndarray, drum: int, share: float) -> float:
     """Of a mallet at a share of the velocities, in m/s."""
     soft = table[drum + of.DRUM_SOFTEST_M_S]

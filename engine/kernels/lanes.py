@@ -32,18 +32,18 @@ _VECTOR = ir.VectorType(ir.DoubleType(), LANES)
 _WHOLE, _LANE = ir.IntType(64), ir.IntType(32)
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def place(number: int) -> int:
     """Slot of the first row of the mode with this number, from the first block on; rows are LANES apart."""
     return number // LANES * BLOCK + number % LANES
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def blocks_of(modes: int) -> int:
     return (modes + LANES - 1) // LANES
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def slots(modes: int) -> int:
     """Room for the blocks of so many modes in two groups, wherever the memory begins."""
     return (blocks_of(modes) + 2) * BLOCK

@@ -101,30 +101,30 @@ BRIDGED = 68  # W its lowest modes, up to the last that has a part in the row BR
 HEADER = 69
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def weights(modes: int, which: int, point: int, part: int) -> int:
     """First slot of the weights (modes,) of a set, a point, and of the real (0) or imaginary (1) parts."""
     return HEADER + ((which * 2 + point) * 2 + part) * modes
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def bias(modes: int, which: int, point: int) -> int:
     return HEADER + 8 * modes + which * 2 + point
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def history(modes: int, point: int) -> int:
     """First slot of the last three quanta of displacement at a point, the latest last."""
     return HEADER + 8 * modes + 4 + point * 3 * QUANTUM
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def left_over(modes: int) -> int:
     """First slot of what reaches into the mixer's next quantum, (QUANTUM, 2), of a voice that is late."""
     return HEADER + 8 * modes + 4 + 6 * QUANTUM
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def state(modes: int) -> int:
     """First slot of what a kind keeps for itself."""
     return HEADER + 8 * modes + 4 + 8 * QUANTUM

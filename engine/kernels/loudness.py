@@ -45,7 +45,7 @@ def k_weight(hz: Any) -> Any:
     return above / below * squared**2 / ((high_pass - squared) ** 2 + high_pass * squared / _PASS_Q**2)
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _at(body: np.ndarray, which: int, place: float) -> float:
     """A row of a body's curves at a place of its grid."""
     left = int(place)
@@ -53,20 +53,20 @@ def _at(body: np.ndarray, which: int, place: float) -> float:
     return body[first] + (place - left) * (body[first + 1] - body[first])
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _place(omega: float) -> float:
     """Of a frequency on the grid of a body's curves."""
     place = of.BODY_STEPS * math.log2(max(omega / (2 * math.pi * of.BODY_LOWEST_HZ), 1.0))
     return min(place, of.BODY_POINTS - 1.001)
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _noise(body: np.ndarray, mix: float) -> float:
     """The power of noise through strings and body together; the sound is divided by its root."""
     return (1 - mix) ** 2 + 2 * mix * (1 - mix) * body[of.BODY_CROSS] + mix * mix
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _power(body: np.ndarray, mix: float, place: float) -> float:
     """The square of the body's gain, before that division."""
     alike = 2 * mix * (1 - mix) * _at(body, of.BODY_REAL, place)

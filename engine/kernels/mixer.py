@@ -11,10 +11,11 @@ import math
 import numpy as np
 from numba import carray, cfunc, njit, types
 
-from engine.kernels import contact, courses
+from engine.kernels import courses
 from engine.kernels import layout as at
 from engine.kernels.amplifier import amplify
 from engine.kernels.compiled import COMPILED
+from engine.kernels.contact import sound
 from engine.kernels.convolver import convolve
 from engine.kernels.limiter import limit
 from engine.kernels.memory import fence, pointer
@@ -52,7 +53,7 @@ def render(mixer: np.ndarray, frames: int, out: np.ndarray, now_s: float) -> Non
         done += count
 
 
-@njit(**COMPILED)
+@njit(inline="always", **COMPILED)
 def _quantum(mixer: np.ndarray, now_s: float) -> None:
     counts = mixer.view(np.int64)
     mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM] = 0.0
@@ -87,10 +88,10 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
     fence()
     counts[at.M_ACTIVE] = kept
     if before != 0:
-        contact.sound(before, counts[at.M_ADDRESS])
+        sound(before, counts[at.M_ADDRESS])
         sympathise(before, counts[at.M_ADDRESS])
     if player != 0:
-        contact.sound(player, counts[at.M_ADDRESS])
+        sound(player, counts[at.M_ADDRESS])
         sympathise(player, counts[at.M_ADDRESS])
     amplify(mixer)
     convolve(mixer)

@@ -14,26 +14,24 @@ from numba import carray, njit
 
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import fence, pointer
+from engine.kernels.memory import fence, part, pointer, table
 
 TOO_HIGH = 3.0  # rad a frame: a mode that is raised beyond is laid to rest, for it would sound as another
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def row(voice: np.ndarray, modes: int, which: int) -> np.ndarray:
     """One row (modes,) of a voice's state."""
-    slot = at.state(modes) + which * modes
-    return voice[slot : slot + modes]
+    return part(voice, at.state(modes) + which * modes, modes)
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def following(voice: np.ndarray, modes: int) -> np.ndarray:
     """What follows from the modes of latents that share a tension, (7, modes): see `kernels.tension.prepare`."""
-    slot = at.state(modes) + at.FOLLOWING * modes
-    return voice[slot : slot + 7 * modes].reshape(7, modes)
+    return table(voice, at.state(modes) + at.FOLLOWING * modes, 7, modes)
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def gliding(voice: np.ndarray) -> bool:
     """Whether its modes are still to change."""
     counts = voice.view(np.int64)
@@ -57,7 +55,7 @@ def glide(voice: np.ndarray) -> None:
     counts[at.GLIDE] = left - 1
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def damped(omega_squared: float, sigma: float) -> float:
     """√(ω² - σ²); a mode that would no longer swing swings slowly."""
     return math.sqrt(max(omega_squared - sigma * sigma, 0.01 * omega_squared))

@@ -85,30 +85,30 @@ SWITCHES = (of.CHANNEL_LEGATO, of.CHANNEL_SLIDES, of.CHANNEL_HARMONICS, of.CHANN
 NO_PARAMETER, BEND_RANGE = 127, 0
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _note(number: int) -> int:
     """First slot of a note."""
     return of.PLAYER_NOTES + number * of.NOTE_SLOTS
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _channel(number: int) -> int:
     """First slot of a channel."""
     return of.PLAYER_CHANNELS + number * of.CHANNEL_SLOTS
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _moment(player: np.ndarray, number: int) -> np.ndarray:
     """Room for a string, for a moment."""
     return player[of.PLAYER_STRINGS + number * of.STRING : of.PLAYER_STRINGS + (number + 1) * of.STRING]
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _frames(player: np.ndarray, seconds: float) -> int:
     return max(1, round(seconds * player[of.PLAYER_RATE]))
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _quanta(player: np.ndarray, seconds: float) -> int:
     return max(1, round(seconds * player[of.PLAYER_RATE] / at.QUANTUM))
 
@@ -381,7 +381,7 @@ def string_of(
     return modes, out[of.LENGTH] / whole[of.LENGTH]
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _has_octave(table: np.ndarray, tables: np.ndarray, key: int, number: int) -> bool:
     """Whether the course of a key has octave strings, on a string of a set; -1: on the one that the key chooses."""
     count, octaves = tables[of.TABLE_STRINGS], tables[of.TABLE_OCTAVES]
@@ -820,7 +820,7 @@ def _gain(
     return player[slot]
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _release(address: int, frames: int) -> None:
     """Lets a voice fade out; a release under way continues."""
     counts = wholes(address)
@@ -1002,7 +1002,7 @@ def _report(
     return slot
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _reported(players: np.ndarray) -> None:
     fence()
     players[of.PLAYER_REPORTED] += 1
@@ -1113,7 +1113,7 @@ def _make_room(player: np.ndarray, players: np.ndarray) -> None:
         _release_note(player, players, oldest, STOLEN_S, 0)
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _behind(player: np.ndarray, table: np.ndarray, member: int) -> int:
     """Frames from the stroke of a string of a course to its beginning, in step with the first; 0: at once."""
     later = round(member * table[of.TABLE_APART_S] * player[of.PLAYER_RATE])
@@ -1721,7 +1721,7 @@ def _vibrate(
     _retune(player, players, table, tables, number, seconds, 0, now)
 
 
-@njit(**COMPILED)
+@njit(inline="always", **COMPILED)
 def _follow_hands(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, now: int) -> None:
     """Lifts fingers from strings that they touch, and plucks again what a tremolo plucks, in the next quantum."""
     address = players[of.PLAYER_TABLE]
@@ -1749,7 +1749,7 @@ def _follow_hands(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, n
             _pluck_again(player, players, table, tables, mixers, note, max(due, now))
 
 
-@njit(**COMPILED)
+@njit(inline="always", **COMPILED)
 def _pluck_again(
     player: np.ndarray,
     players: np.ndarray,

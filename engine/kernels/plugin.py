@@ -8,8 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numba import carray, njit, types
 
+from engine.kernels import contact, mixer, player, sympathy
 from engine.kernels import layout as at
-from engine.kernels import mixer, player
 from engine.kernels.compiled import COMPILED
 from engine.kernels.fourier import transform
 from engine.kernels.memory import pointer
@@ -17,6 +17,7 @@ from engine.kernels.memory import pointer
 ADDRESS = COUNT = types.int64
 RENDER = types.void(ADDRESS, COUNT, ADDRESS)
 BEGIN = types.void(ADDRESS)
+PLAY = SOUND = SYMPATHISE = types.void(ADDRESS, ADDRESS)
 PARTITION = types.void(ADDRESS, COUNT, COUNT, ADDRESS, ADDRESS)
 
 
@@ -31,6 +32,24 @@ def render(mixer_at: int, frames: int, out_at: int) -> None:
 def begin(player_at: int) -> None:
     """Puts the wheels and pedals of a new player at rest."""
     player.begin(player_at)
+
+
+@njit(**COMPILED)
+def play(player_at: int, mixer_at: int) -> None:
+    """What a player has to do before the mixer's next quantum."""
+    player.play(player_at, mixer_at)
+
+
+@njit(**COMPILED)
+def sound(player_at: int, mixer_at: int) -> None:
+    """Adds what touches strings and drums to the quantum."""
+    contact.sound(player_at, mixer_at)
+
+
+@njit(**COMPILED)
+def sympathise(player_at: int, mixer_at: int) -> None:
+    """Adds what rings along to the quantum."""
+    sympathy.sympathise(player_at, mixer_at)
 
 
 @njit(**COMPILED)

@@ -215,13 +215,13 @@ def stand(
         out[4 * modes + mode] = shared
 
 
-@njit(inline="always", **EXACT)
+@njit(**EXACT)
 def partial_of(mode: int, pairs: int) -> int:
     """The partial, from 1, of a mode, from 0: pairs come first, the two polarisations side by side."""
     return (mode // 2 if mode < 2 * pairs else mode - pairs) + 1
 
 
-@njit(inline="always", **EXACT)
+@njit(**EXACT)
 def direction_of(mode: int, pairs: int) -> int:
     """0: the first polarisation; 1: the second."""
     return mode % 2 if mode < 2 * pairs else 0

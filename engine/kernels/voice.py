@@ -72,7 +72,7 @@ def _velocity(
     differentiate(voice, out, taps)
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def is_first(voice: np.ndarray) -> bool:
     """Whether a voice is not yet ahead of what was heard of it."""
     counts = voice.view(np.int64)
@@ -146,7 +146,7 @@ def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
     counts[at.PREVIOUS_VOICE] = earlier
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _never_begin(voice: np.ndarray) -> None:
     """A voice that waits ends without a sound."""
     voice[at.GAIN] = voice[at.GAIN_TO] = voice[at.WANTED_GAIN] = 0.0
@@ -208,7 +208,7 @@ def _past(voice: np.ndarray, before: np.ndarray) -> None:
             voice[own + frame] = before[other + frame] + held
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def _eased(share: float) -> float:
     """0 … 1 as 0 … 1, without the corners at which a loud string that fades in milliseconds would click."""
     return share * share * (3 - 2 * share)
@@ -249,7 +249,7 @@ def add(voice: np.ndarray, mixer: np.ndarray, now_s: float) -> int:
     return end(voice, mixer, now_s, out, counts[at.GENERATED] > generated)
 
 
-@njit(inline="always", **COMPILED)
+@njit(**COMPILED)
 def is_heard(voice: np.ndarray) -> bool:
     return voice[at.GAIN] != 0 or voice[at.GAIN_TO] != 0
 

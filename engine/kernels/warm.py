@@ -1,10 +1,16 @@
 """Everything compiled is compiled, or loaded, by using it once: `python -m engine.kernels.warm`.
 
-It takes the better part of a minute where nothing has been compiled yet, and about a second where all is kept.
+It takes minutes where nothing has been compiled yet, and about a second where all is kept. Two processes compile what
+does not depend on one another.
 """
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import astuple
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,23 +60,52 @@ def warm() -> None:
     if cache.is_whole():
         _sound(_struck(model_program(PRESET, RATE_HZ), EARS[0]))
     else:
+        with _beside("playing"):
+            models()
+            unheard()
         voices()
-        models()
         cache.set_whole()
 
 
-def voices() -> None:
-    """A few quanta of every kind of voice; what a device calls is compiled as it is imported."""
-    for program in (*map(_bank, BANKS), model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
-        for ear in EARS:
-            voice = _struck(program, ear)
-            voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
-            _sound(voice)
-    _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
-    Mixer(RATE_HZ).set_effects(Effects(room=Room()))
-    CompiledPlayer(RATE_HZ, INFO.modes).catch_up(Mixer(RATE_HZ))
+def _beside(work: str) -> AbstractContextManager[object]:
+    """Another process does a function of this module meanwhile; what it leaves undone, this one does later."""
+    if cache.folder() is None or os.cpu_count() == 1:
+        return nullcontext()
+    code = f"import sys; sys.path[:] = {sys.path!r}; from engine.kernels import warm; warm.{work}()"
+    return subprocess.Popen([sys.executable, "-c", code])
+
+
+def playing() -> None:
+    """What makes voices of events, for strings and drums."""
+    from engine.kernels import contact, player, sympathy
+
+    for each in (player.play, contact.sound, sympathy.sympathise):
+        each.compile("void(int64, int64)")
+    CompiledPlayer(RATE_HZ, INFO.modes)
     _string()
     _loudness()
+
+
+def unheard() -> None:
+    """A quantum of every kind of voice that is computed."""
+    for voice in _each():
+        voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
+
+
+def voices() -> None:
+    """All sound: a few quanta of every kind of voice; what a device calls is compiled as it is imported."""
+    unheard()
+    for voice in _each():
+        _sound(voice)
+    _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
+    Mixer(RATE_HZ).set_effects(Effects(room=Room()))
+    playing()
+
+
+def _each() -> Iterator[Voice]:
+    for program in (*map(_bank, BANKS), model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
+        for ear in EARS:
+            yield _struck(program, ear)
 
 
 def models() -> None:

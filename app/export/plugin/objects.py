@@ -22,9 +22,9 @@ from app.export.plugin.formats import TARGETS, Target
 from engine.whole_file import whole_file
 
 WAIT_S = 0.1
-FUNCTIONS = 295  # that are made for the entries, about: dots of `texts`
+FUNCTIONS = 150  # of a part, about: dots of `texts`
 STEPS = 4  # of an object file after that
-TEXT_SHARE = 0.85  # of the time, measured
+TEXT_SHARE = 0.6  # of the time, measured
 # What the code may ask of the shell and of the C library; all else would be a reference to Python.
 _LIBRARY = """
 cos sin sincos sincosf exp exp2 expm1 log log10 log1p log2 pow ceil floor rint round sqrt fmod tan atan atan2
@@ -57,7 +57,7 @@ def digest() -> str:
 
 
 def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = lambda share: None) -> tuple[Path, ...]:
-    """Object files of the kernels for a target, one for each of its processors (minutes the first time).
+    """Object files of the kernels for a target, for each of its processors (most of a minute the first time).
 
     Their entries have the prefix "ls0_", "ls1_" and so on.
 
@@ -70,31 +70,37 @@ def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = la
     """
     if target not in TARGETS:
         raise ObjectError(f"target {target!r} is unknown; try {', '.join(TARGETS)}")
-    paths = tuple(folder / f"kernels-{digest()}-{target}-{cpu}.o" for cpu in TARGETS[target].cpus)
-    missing = [(number, path) for number, path in enumerate(paths) if not path.exists()]
+    made = {
+        folder / f"kernels-{digest()}-{target}-{cpu}-{part}.o": (part, number)
+        for number, cpu in enumerate(TARGETS[target].cpus)
+        for part in texts.PARTS
+    }
+    missing = [(*wanted, path) for path, wanted in made.items() if not path.exists()]
     if missing:
         folder.mkdir(parents=True, exist_ok=True)
-        text = _text(folder, lambda share: advanced(TEXT_SHARE * share))
+        found = _texts(folder, lambda share: advanced(TEXT_SHARE * share))
         with contextlib.ExitStack() as parts:
             _run(
                 __name__,
                 [
-                    [str(text), target, str(number), str(parts.enter_context(whole_file(path)))]
-                    for number, path in missing
+                    [str(found[part]), target, str(number), str(parts.enter_context(whole_file(path)))]
+                    for part, number, path in missing
                 ],
                 STEPS,
                 lambda share: advanced(TEXT_SHARE + (1 - TEXT_SHARE) * share),
             )
-    return paths
+    return tuple(made)
 
 
-def _text(folder: Path, advanced: Callable[[float], None]) -> Path:
-    """LLVM code of the entries."""
-    path = folder / f"kernels-{digest()}.ll"
-    if not path.exists():
-        with whole_file(path) as part:
-            _run(texts.__name__, [[str(part)]], FUNCTIONS, advanced)
-    return path
+def _texts(folder: Path, advanced: Callable[[float], None]) -> dict[str, Path]:
+    """LLVM code of each part."""
+    found = {part: folder / f"kernels-{digest()}-{part}.ll" for part in texts.PARTS}
+    missing = [(part, path) for part, path in found.items() if not path.exists()]
+    if missing:
+        with contextlib.ExitStack() as parts:
+            calls = [[part, str(parts.enter_context(whole_file(path)))] for part, path in missing]
+            _run(texts.__name__, calls, FUNCTIONS, advanced)
+    return found
 
 
 def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Callable[[float], None]) -> None:
@@ -162,16 +168,16 @@ def _compiled(text: str, target: Target, number: int) -> bytes:
         cpu=target.cpus[number], opt=3, reloc="pic", codemodel="default"
     )
     _step()
-    names = dict(re.findall(r"^; (\w+) (\S+)$", text, flags=re.M)[: len(texts.ENTRIES)])
-    for name, entry in names.items():
-        text = text.replace(f"@{entry}(", f"@ls{number}_{name}(")
+    entries = f"ls{number}_"
+    text = text.replace(f"@{texts.PREFIX}", f"@{entries}")
     text = re.sub(r"^target datalayout = .*$", f'target datalayout = "{machine.target_data}"', text, flags=re.M)
     text = re.sub(r"^target triple = .*$", f'target triple = "{target.triple}"', text, flags=re.M)
     whole = llvm.parse_assembly(_without_counts(text))
     _step()
-    kept = {f"ls{number}_{name}" for name in names}
     for function in whole.functions:
-        if not function.is_declaration and function.name not in kept:
+        if function.name.startswith(entries):
+            function.visibility = llvm.Visibility.hidden
+        elif not function.is_declaration:
             function.linkage = llvm.Linkage.internal
     for variable in whole.global_variables:
         if not variable.is_declaration:
@@ -181,7 +187,7 @@ def _compiled(text: str, target: Target, number: int) -> bytes:
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(whole, builder)
     _step()
-    _check_names(whole, kept)
+    _check_names(whole, {entries + name for names in texts.PARTS.values() for name in names})
     emitted: bytes = machine.emit_object(whole)
     _step()
     return emitted
@@ -201,11 +207,11 @@ def _without_counts(text: str) -> str:
     )
 
 
-def _check_names(module: object, kept: set[str]) -> None:
+def _check_names(module: object, entries: set[str]) -> None:
     """Raises ObjectError where the code refers to anything that the shell or the C library does not give."""
     functions = module.functions  # type: ignore[attr-defined]
     asked = {each.name for each in functions if each.is_declaration and not each.name.startswith("llvm.")}
-    unknown = asked - ALLOWED - STUBS - kept
+    unknown = asked - ALLOWED - STUBS - entries
     if unknown:
         raise ObjectError(f"the kernels refer to {', '.join(sorted(unknown))}, which no plug-in has")
 

@@ -1,7 +1,7 @@
-"""LLVM code of the kernels' entries as text, without any machine code: `python -m app.export.plugin.texts FILE`.
+"""LLVM code of the kernels' entries as text, without any machine code: `python -m app.export.plugin.texts PART FILE`.
 
 Numba would optimise and emit each function with all that it calls, several times over. Here it stops at its own code,
-which is linked once. Its first lines name the entries. A dot is printed for each function.
+which is linked once. The parts are written by processes of their own, at once. A dot is printed for each function.
 """
 
 from __future__ import annotations
@@ -12,19 +12,23 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-ENTRIES = ("render", "begin", "partition")
+PREFIX = "ls_"  # of the entries' names
+# Entries of each; those that mixers call stand in its namespace under the same names
+PARTS = {"mixing": ("render", "partition"), "playing": ("play", "sound", "sympathise", "begin")}
 SELDOM = 50_000, 20, 50  # of objects and passes: a fifth of the time went to collections that freed next to nothing
 NOWHERE = 1  # an address that is never called
 
 
 def _stop_early() -> None:
     """Leaves Numba's code as it is lowered: not optimised, not linked, not made into machine code."""
+    import numba
     from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen
 
     def finalize(library: Any) -> None:
         library._finalized = True
         print(".", end="", flush=True)
 
+    numba.cfunc = lambda *_signature, **_options: lambda function: function  # what devices call is not asked for
     CPUCodeLibrary._optimize_functions = lambda library, module: None
     CPUCodeLibrary.finalize = finalize
     JITCodeLibrary.get_pointer_to_function = lambda library, name: NOWHERE
@@ -40,8 +44,31 @@ def _libraries(library: Any, seen: set[int]) -> Iterator[Any]:
             yield from _libraries(each, seen)
 
 
-def texts() -> str:
-    """LLVM code of all entries together, as Numba has it for the processor of its settings."""
+def _elsewhere(name: str) -> Any:
+    """An entry of another part, of two addresses."""
+    from llvmlite import ir
+    from numba import types
+    from numba.core import cgutils
+    from numba.extending import intrinsic
+
+    place, whole = ir.IntType(8).as_pointer(), ir.IntType(64)
+
+    @intrinsic
+    def entry(typing_context, one, other):  # type: ignore[no-untyped-def]
+        def generate(context, builder, _signature, arguments):  # type: ignore[no-untyped-def]
+            kind = ir.FunctionType(ir.IntType(32), [place.as_pointer(), place.as_pointer(), whole, whole])
+            function = cgutils.get_or_insert_function(builder.module, kind, PREFIX + name)
+            nothing = [cgutils.alloca_once(builder, place) for _ in range(2)]
+            builder.call(function, [*nothing, *arguments])
+            return context.get_dummy_value()
+
+        return types.void(types.int64, types.int64), generate
+
+    return entry
+
+
+def text(part: str) -> str:
+    """LLVM code of all entries of a part together, as Numba has it for the processor of its settings."""
     _stop_early()
     import llvmlite.binding as llvm
     from numba import njit
@@ -50,14 +77,18 @@ def texts() -> str:
 
     compiled.COMPILED["cache"] = False
     compiled.COMPILED["no_cpython_wrapper"] = compiled.COMPILED["no_cfunc_wrapper"] = True
-    from engine.kernels import plugin
+    from engine.kernels import bank, mixer, plugin, rendered
 
+    for kind in (bank, rendered):  # of voices, which the compiled player does not make
+        kind.generate = njit(lambda *_: None)  # type: ignore[attr-defined]
+    for name in (each for entries in PARTS.values() for each in entries if hasattr(mixer, each)):
+        if name not in PARTS[part]:
+            setattr(mixer, name, _elsewhere(name))
     own = llvm.Linkage.internal, llvm.Linkage.private
-    whole, heads, seen, defined = llvm.parse_assembly(""), [], set[int](), set[str]()
-    for name in ENTRIES:
+    whole, seen, defined = llvm.parse_assembly(""), set[int](), set[str]()
+    for name in PARTS[part]:
         entry = njit(getattr(plugin, name.upper()), **compiled.COMPILED)(getattr(plugin, name).py_func)
         overload = entry.overloads[entry.signatures[0]]
-        heads.append(f"; {name} {overload.fndesc.llvm_func_name}\n")
         for library in _libraries(overload.library, seen):
             module = library._final_module
             for function in module.functions:
@@ -65,9 +96,10 @@ def texts() -> str:
                     function.linkage = "linkonce_odr" if function.name in defined else "external"
                     defined.add(function.name)
             whole.link_in(module)
-    return "".join(heads) + str(whole)
+        whole.get_function(overload.fndesc.llvm_func_name).name = PREFIX + name
+    return str(whole)
 
 
 if __name__ == "__main__":
     gc.set_threshold(*SELDOM)
-    Path(sys.argv[1]).write_text(texts(), encoding="utf-8")
+    Path(sys.argv[2]).write_text(text(sys.argv[1]), encoding="utf-8")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from contextlib import nullcontext
 from pathlib import Path
 
 import pytest
@@ -92,10 +93,11 @@ def test_without_any_folder_at_all_it_is_compiled_and_not_kept() -> None:
 def test_all_is_compiled_once(whole: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     done: list[str] = []
     monkeypatch.setattr(cache, "is_whole", lambda: whole)
-    for place, name in ((warm, "voices"), (warm, "models"), (cache, "set_whole")):
+    monkeypatch.setattr(warm, "_beside", lambda work: nullcontext(done.append(work)))
+    for place, name in ((warm, "models"), (warm, "unheard"), (warm, "voices"), (cache, "set_whole")):
         monkeypatch.setattr(place, name, lambda name=name: done.append(name))
     warm.warm()
-    assert done == ([] if whole else ["voices", "models", "set_whole"])
+    assert done == ([] if whole else ["playing", "models", "unheard", "voices", "set_whole"])
 
 
 def test_every_kind_of_voice_and_compiled_model_runs() -> None:
