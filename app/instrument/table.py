@@ -46,6 +46,7 @@ PLAYED_PARAMETERS = (
     ),
     "pluck.release_ms",
     "pluck.release_hard_ms",
+    "javari.gap_um",
     "body.mix",
     "pickup.points.0",
     "pickup.points.1",
@@ -170,6 +171,8 @@ def table_of(
         if patch.noise.kind == "recorded" and loud.recorded.attack is not None:
             memory = _with_attack(memory, loud.recorded.attack)
         counts = memory.view(np.int64)
+    elif (edge := patch.javari).distance_mm > 0:
+        memory[of.TABLE_JAVARI : of.TABLE_JAVARI + 3] = edge.distance_mm / 1000, edge.stiffness_n_m, edge.loss_s_m
     for key in range(of.KEYS):
         memory[of.TABLE_PITCHES + key] = loud.strings.pitch_hz(key) or 0.0
     strings = patch.strings

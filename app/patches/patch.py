@@ -240,6 +240,21 @@ class Course(Value):
     bridge: Annotated[float, ranged(0, 1)] = 0.0
 
 
+class Javari(Value):
+    """The edge of a wide bridge, which the string meets from above, by `engine.kernels.javari`; first polarisation.
+
+    Attributes:
+        distance_mm: of the edge from the string's end; 0: there is none.
+        gap_um: from the string at rest to the edge.
+        stiffness_n_m, loss_s_m: of the edge.
+    """
+
+    distance_mm: Annotated[float, ranged(0, 50)] = 0.0
+    gap_um: float = parameter("javari.gap_um")
+    stiffness_n_m: Annotated[float, ranged(1e3, 1e6)] = 3e4
+    loss_s_m: Annotated[float, ranged(0, 10)] = 0.2
+
+
 class Losses(Value):
     """Decay by mode, by `engine.resonators.losses`, in addition to d₁ and d₃ of the strings, which may be 0 then.
 
@@ -374,6 +389,7 @@ class Patch(Value):
     pluck: PluckChoices = PluckChoices()
     pickup: Pickup = Pickup()
     course: Course = Course()
+    javari: Javari = Javari()
     polarisations: Polarisations | None = None
     losses: Losses | None = None
     sympathy_s_kg: Annotated[float, ranged(0, 0.5)] = 0.0
@@ -390,6 +406,16 @@ class Patch(Value):
     room: Room = Room()
     level_db: float = parameter("level_db")
     macros: Annotated[tuple[Macro, ...], Field(max_length=MOST_MACROS)] = ()
+
+    @model_validator(mode="after")
+    def _javari_fits(self) -> Self:
+        if self.javari.distance_mm > 0 and isinstance(self.strings, Drums):
+            raise ValueError("javari.distance_mm: drums have no strings; leave it out")
+        if self.javari.distance_mm > 0 and self.course.bridge > 0:
+            raise ValueError(
+                "javari.distance_mm: strings with course.bridge above 0 have no edge; set one of both to 0"
+            )
+        return self
 
     @model_validator(mode="after")
     def _courses_fit(self) -> Self:

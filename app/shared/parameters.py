@@ -169,6 +169,8 @@ TIPS = {
     "technique.tremolo_hz": "Tremolo: how often a key that is held plucks its string. 0: once",
     "technique.vibrato_cents": "Vibrato: how far the pitch goes up and down. 0: none",
     "technique.vibrato_hz": "How often a vibrato goes up and down in a second",
+    "javari.gap_um": "Javari: from the string at rest to the edge of its bridge, which makes it buzz. "
+    "Nearer buzzes more and sooner",
     "noise.onset_db": "Noise of what plucks or strikes: its energy, compared with a note's. The lowest is off",
     "noise.release_db": "Noise of the damper or finger that ends a note. The lowest is off",
     "pickup.points.0": f"Where the string is heard; {_PLACE_TIP}",
@@ -289,6 +291,7 @@ OF_PATCHES: Mapping[str, Parameter] = {
         Parameter(
             "pluck.release_hard_ms", "hard contact", (0, 20), 0, CONTACT, PLUCK, "macro", "contact (high velocity)"
         ),
+        Parameter("javari.gap_um", "javari", (0, 200), 5, Taper(0.02, "{:.1f} µm", curve=100.0), "", "macro"),
         Parameter("noise.onset_db", "stroke", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "stroke noise"),
         Parameter("noise.release_db", "release", NOISE_DB, NOISE_DB[0], DECIBELS, NOISE, "macro", "release noise"),
         Parameter(

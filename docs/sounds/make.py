@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import mido
@@ -16,6 +17,7 @@ PLUCK = ("--position", "0.3", "--amplitude-mm", "8", "--seconds", "3", "--bits",
 INSTRUMENTS = ("classical_guitar", "steel_string_acoustic", "concert_harp", "harpsichord", "koto", "glass_threads")
 NOTES = (52, 59, 64, 68, 71, 76, 71, 68, 64, 59, 52)  # an arpeggio of E major up and down
 NOTE_TICKS = 150  # of 480 a beat, at 120 beats a minute
+DRONE, DRONE_TICKS = (43, 48, 48, 36) * 2, 800  # fifth, octave, octave and ground of a tanpura
 
 
 def main() -> None:
@@ -28,6 +30,9 @@ def main() -> None:
         for name in INSTRUMENTS:
             run("play", melody, "--instrument", name, "--out", wav, "--seconds", "7", "--normalise")
             convert(wav, HERE / f"{name}.opus")
+        write_melody(melody, DRONE, DRONE_TICKS)
+        run("play", melody, "--instrument", "tanpura_drone", "--out", wav, "--seconds", "10", "--normalise")
+        convert(wav, HERE / "tanpura_drone.opus")
 
 
 def run(*words: str | Path) -> None:
@@ -41,13 +46,13 @@ def convert(wav: Path, path: Path) -> None:
     wav.unlink()
 
 
-def write_melody(path: Path) -> None:
+def write_melody(path: Path, notes: Sequence[int] = NOTES, ticks: int = NOTE_TICKS) -> None:
     """Held notes, so that the instruments ring."""
     track = mido.MidiTrack()
-    for number, note in enumerate(NOTES):
+    for number, note in enumerate(notes):
         velocity = 60 + 10 * (number % 5)
-        track.append(mido.Message("note_on", note=note, velocity=velocity, time=NOTE_TICKS if number else 0))
-    track += [mido.Message("note_off", note=note, time=1400 if not i else 0) for i, note in enumerate(set(NOTES))]
+        track.append(mido.Message("note_on", note=note, velocity=velocity, time=ticks if number else 0))
+    track += [mido.Message("note_off", note=note, time=1400 if not i else 0) for i, note in enumerate(set(notes))]
     file = mido.MidiFile(ticks_per_beat=480)
     file.tracks.append(track)
     file.save(path)

@@ -208,6 +208,50 @@ def energies(typing_context: Any, memory: Any, first: Any, blocks: Any):
     return types.UniTuple(types.float64, 2)(memory, first, blocks), generate
 
 
+@intrinsic
+def felt(typing_context, memory, blocks, modes, parts):
+    """Two sums over blocks: of x, and of x κ p, times the first row of their parts, see `press`."""
+
+    def generate(context, builder, signature, arguments):
+        code, part = (_Blocks(context, builder, signature.args[0], arguments[0], 2) for _ in range(2))
+        with cgutils.for_range(builder, arguments[1]) as loop:
+            code.begin(arguments[2], loop.index)
+            part.begin(arguments[3], loop.index, PRESSED * LANES)
+            moved = builder.fmul(part.row(0), code.row(X))
+            code.add(0, moved, ir.Constant(_VECTOR, [1.0] * LANES))
+            code.add(1, moved, code.row(SEEN))
+        return context.make_tuple(builder, signature.return_type, code.totals())
+
+    return types.UniTuple(types.float64, 2)(memory, blocks, modes, parts), generate
+
+
+PRESSED = 3  # rows of parts in a contact: displacement there, and what x and y change by with a force of 1 N
+
+
+@intrinsic
+def press(typing_context, memory, blocks, modes, parts, force):
+    """Changes x and y of blocks by a force at a contact, and returns their sums, as `turn` does.
+
+    `parts`: first slot of (blocks, PRESSED, LANES).
+    """
+
+    def generate(context, builder, signature, arguments):
+        code, part = (_Blocks(context, builder, signature.args[0], arguments[0], 2) for _ in range(2))
+        force = code.spread(arguments[4])
+        with cgutils.for_range(builder, arguments[1]) as loop:
+            code.begin(arguments[2], loop.index)
+            part.begin(arguments[3], loop.index, PRESSED * LANES)
+            x, y = (builder.fadd(code.row(each), builder.fmul(part.row(1 + each), force)) for each in (X, Y))
+            code.set_row(X, x)
+            code.set_row(Y, y)
+            stretch = builder.fmul(code.row(STRETCH), builder.fmul(x, x))
+            code.add(0, stretch, ir.Constant(_VECTOR, [1.0] * LANES))
+            code.add(1, stretch, code.row(RATIO))
+        return context.make_tuple(builder, signature.return_type, code.totals())
+
+    return types.UniTuple(types.float64, 2)(memory, blocks, modes, parts, force), generate
+
+
 PARTS, PART_BLOCKS = 3, 12  # rows of parts in a bridge: of y and x in its motion, and of that in y; of so many blocks
 
 

@@ -98,7 +98,15 @@ STRETCHED = 65  # R the sum of S over them
 COURSE = 66  # W number of the strings with which it stands on one bridge; 0: none
 COURSE_DONE = 67  # W the mixer's frame, and 1, of the quantum that is already added
 BRIDGED = 68  # W its lowest modes, up to the last that has a part in the row BRIDGE
-HEADER = 69
+JAVARI_STEPS = 69  # W of a frame, in which it may meet the edge of its bridge; 0: there is no edge
+JAVARI_GAP = 70  # R m: from the string at rest to the edge
+JAVARI_STIFFNESS = 71  # R N/m: of the edge
+JAVARI_LOSS = 72  # R s/m
+JAVARI_MASS = 73  # R kg: of a mode
+JAVARI_GIVE = 74  # R m/N: how far it gives way to a force within a step; 0: the rows are not prepared
+JAVARI_HEARD = 75  # R full scale over N: of that force
+JAVARI_FORCE = 76  # R N: in the frame before
+HEADER = 77
 
 
 @njit(**COMPILED)
@@ -146,7 +154,9 @@ OMEGA_SQUARED, SIGMA, COUPLING, STRETCH = 2, 3, 4, 5
 BRIDGE = 6  # 1/s: what it loses to a bridge on which other strings of its course stand, beside SIGMA
 FOLLOWING = 7
 RESONATOR_ROWS = FOLLOWING - OMEGA_SQUARED
-TRUTH_ROWS = FOLLOWING + 16  # the flows of half a palindrome, of four rows each
+JAVARI = FOLLOWING + 16  # of a string with an edge: displacement there of an amplitude of 1, and what both change by
+GIVEN, GIVEN_SPEED = JAVARI + 1, JAVARI + 2  # with a force of 1 N there within a step
+TRUTH_ROWS = FOLLOWING + 19  # before these, the flows of half a palindrome, of four rows each
 PHYSICAL = FOLLOWING + 7  # behind the rows of `kernels.tension.advance`: amplitudes and speeds for a moment
 ORDER = PHYSICAL + 2  # whole numbers: modes
 TENSION_ROWS = ORDER + 1

@@ -34,7 +34,7 @@ import math
 import numpy as np
 from numba import njit
 
-from engine.kernels import contact, drums, loudness, recorded, strings
+from engine.kernels import contact, drums, javari, loudness, recorded, strings
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
@@ -539,6 +539,8 @@ def _weigh(player: np.ndarray, players: np.ndarray, voice: np.ndarray, which: in
             heard = omega <= highest and (solo == 0 or solo == partial)
             voice[first] = part * weight if heard else 0.0
             voice[first + n] = 0.0
+    at_bridge = player[note + of.NOTE_POINT] == of.BRIDGE and solo == 0
+    voice[at.JAVARI_HEARD] = player[note + of.NOTE_HEARD] / FULL_SCALE_N if at_bridge else 0.0
 
 
 @njit(**COMPILED)
@@ -673,6 +675,9 @@ def _make_voice(
     for mode in range(n if tables[of.TABLE_STRIKES] != 0 else 0):
         voice[struck + n + mode] = voice[struck + mode] * math.sqrt(voice[first + mode])
         voice[struck + mode] = 0.0
+    if table[of.TABLE_JAVARI] > 0.0:
+        edge = table[of.TABLE_JAVARI : of.TABLE_JAVARI + 3]
+        javari.fit(voice, own, players[note + of.NOTE_PAIRS], edge, rate_hz)
     behind = _behind(player, table, players[note + of.NOTE_MEMBER])
     if behind > 0:
         run_up(voice, behind / rate_hz)
@@ -2046,6 +2051,10 @@ def _hear(player: np.ndarray, players: np.ndarray) -> None:
                 if address != 0:
                     wanted = player[note + of.NOTE_GAIN] * player[of.PLAYER_SOURCE_GAINS + source]
                     reals(address)[at.WANTED_GAIN] = wanted
+                    if wholes(address)[at.JAVARI_STEPS] != 0:
+                        table, tables = reals(players[of.PLAYER_TABLE]), wholes(players[of.PLAYER_TABLE])
+                        gap_um = _value(player, players, table, tables, of.JAVARI_UM)
+                        reals(address)[at.JAVARI_GAP] = gap_um * 1e-6
             _listen(player, players, note)
         elif players[note + of.NOTE_STATE] == of.RINGS and wholes(players[of.PLAYER_TABLE])[of.TABLE_DRUMS] != 0:
             drums.hear(player, players, reals(players[of.PLAYER_TABLE]), wholes(players[of.PLAYER_TABLE]), note)

@@ -176,7 +176,8 @@ def _nodes(voice: np.ndarray, program: np.ndarray, kick: float) -> int:
     first_rate = damped(squares[0], sigmas[0]) / program[at.S_NODE_PHASE]
     fastest = max(first_rate, damped(squares[last], sigmas[last]) / program[at.S_HIGHEST_PHASE])
     fastest = min(max(fastest, math.sqrt(kick) / HARDEST_KICK), MOST_NODES * fastest)
-    return max(1, math.ceil(fastest / program[at.S_RATE]))
+    nodes, steps = max(1, math.ceil(fastest / program[at.S_RATE])), max(1, counts[at.JAVARI_STEPS])
+    return (nodes + steps - 1) // steps * steps
 
 
 @njit(**COMPILED)
@@ -257,7 +258,7 @@ def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray
     for m in range(n):
         order[m] = m
     counts[at.HEARD] = counts[at.FELT] = counts[at.MOVING]
-    counts[at.NODES], voice[at.STRETCHED] = 0, 0.0
+    counts[at.NODES], voice[at.STRETCHED], voice[at.JAVARI_GIVE] = 0, 0.0, 0.0
 
 
 @njit(**COMPILED)
@@ -488,7 +489,8 @@ def bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
         q[:], v[:] = row(voice, n, 0), row(voice, n, 1)
         if gliding(voice):
             glide(voice)
-        _rest_silent(voice, program[at.S_SILENCE], q, v)
+        if counts[at.JAVARI_STEPS] == 0:  # whose contact wakes them
+            _rest_silent(voice, program[at.S_SILENCE], q, v)
     prepare(voice, program, q, v)
     for m in range(counts[at.MOVING], n):
         q[m] = v[m] = 0.0

@@ -21,10 +21,12 @@ def _sub_steps(voice: np.ndarray, program: np.ndarray) -> int:
     counts = voice.view(np.int64)
     n = counts[at.MODES]
     squares, couplings = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.COUPLING)
+    steps = counts[at.JAVARI_STEPS]
     if couplings[n - 1] == 0.0:
-        return 0
+        return steps
     highest = math.sqrt(squares[counts[at.MOVING] - 1])
-    return max(1, math.ceil(program[at.T_SUBSTEPS] * highest / (2 * math.pi * program[at.T_RATE])))
+    found = max(1, math.ceil(program[at.T_SUBSTEPS] * highest / (2 * math.pi * program[at.T_RATE])))
+    return found if steps == 0 else (found + steps - 1) // steps * steps
 
 
 @njit(**COMPILED)
@@ -47,7 +49,7 @@ def _prepare(voice: np.ndarray, program: np.ndarray, sub_steps: int) -> None:
             )
             qq[m], qv[m] = decay * (cosine + sigma * sine), decay * sine
             vq[m], vv[m] = -decay * (sigma * sigma + omega * omega) * sine, decay * (cosine - sigma * sine)
-    counts[at.STEPS], counts[at.PREPARED] = sub_steps, 1
+    counts[at.STEPS], counts[at.PREPARED], voice[at.JAVARI_GIVE] = sub_steps, 1, 0.0
 
 
 @njit(**COMPILED)
@@ -74,21 +76,23 @@ def advance(
     heard: bool,
     out: np.ndarray,
 ) -> None:
-    """One frame of a quantum, after it is heard.
+    """One frame of a quantum, after it is heard."""
+    hear(voice, program, frame, fading, heard, out)
+    ring(voice, program, sub_steps, max(sub_steps, 1))
 
-    The highest modes are left out from when they are below the program's silence: sub-steps follow those left.
+
+@njit(**COMPILED)
+def hear(voice: np.ndarray, program: np.ndarray, frame: int, fading: bool, heard: bool, out: np.ndarray) -> None:
+    """The output of a frame.
+
+    The highest modes are left out from when they are below the program's silence: sub-steps follow those left. Where
+    a contact may wake them they are not.
     """
     counts = voice.view(np.int64)
     n, points = counts[at.MODES], counts[at.POINTS]
-    q, v = row(voice, n, 0), row(voice, n, 1)
-    squares, couplings, stretches = (
-        row(voice, n, at.OMEGA_SQUARED),
-        row(voice, n, at.COUPLING),
-        row(voice, n, at.STRETCH),
-    )
-    silence = program[at.T_SILENCE]
+    q, v, squares = row(voice, n, 0), row(voice, n, 1), row(voice, n, at.OMEGA_SQUARED)
+    silence = program[at.T_SILENCE] if counts[at.JAVARI_STEPS] == 0 else 0.0
     moving = counts[at.MOVING]
-    step_s = 1 / (max(sub_steps, 1) * program[at.T_RATE])
     if heard:
         for which in range(2 if fading else 1):
             for point in range(points):
@@ -110,7 +114,17 @@ def advance(
             moving = m
         counts[at.MOVING] = moving
         voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.T_LOUDNESS]
-    for _ in range(max(sub_steps, 1)):
+
+
+@njit(**COMPILED)
+def ring(voice: np.ndarray, program: np.ndarray, sub_steps: int, count: int) -> None:
+    """So many of a frame's sub-steps; of what is linear, 0, it is the frame."""
+    counts = voice.view(np.int64)
+    n, moving = counts[at.MODES], counts[at.MOVING]
+    q, v = row(voice, n, 0), row(voice, n, 1)
+    couplings, stretches = row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
+    step_s = 1 / (max(sub_steps, 1) * program[at.T_RATE])
+    for _ in range(count):
         stretch = 0.0
         for stage in range(at.STAGES if sub_steps else 1):
             kick = program[at.T_KICKS + stage - 1] * step_s * stretch if stage > 0 else 0.0

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import carray, njit
 
-from engine.kernels import bank, rendered, tension, truth
+from engine.kernels import bank, javari, rendered, tension, truth
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
@@ -32,6 +32,8 @@ def _generate(voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, s
     fence()
     if kind == at.BANK:
         bank.generate(voice, program, fading, heard, out, scratch)
+    elif counts[at.JAVARI_STEPS] > 0:
+        javari.generate(voice, program, fading, heard, out, scratch)
     elif kind == at.TENSION:
         tension.generate(voice, program, fading, heard, out, scratch)
     else:

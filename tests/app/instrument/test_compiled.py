@@ -608,6 +608,7 @@ def test_values_of_the_player_have_the_indices_of_its_layout() -> None:
         "technique.vibrato_hz": of.VIBRATO_HZ,
         "pluck.release_ms": of.CONTACT_MS,
         "pluck.release_hard_ms": of.CONTACT_HARD_MS,
+        "javari.gap_um": of.JAVARI_UM,
         "body.mix": of.BODY_MIX,
         "pickup.points.0": of.POINT,
         "pickup.points.1": of.POINT + 1,

@@ -44,11 +44,11 @@ def linear(patch: Patch, **string: float) -> Patch:
 class Watched:
     """A player of one note, whose modes are read after each quantum."""
 
-    def __init__(self, patch: Patch, preset: Preset, source: str, velocity: int = 60) -> None:
+    def __init__(self, patch: Patch, preset: Preset, source: str, velocity: int = 60, key: int = KEY) -> None:
         self.mixer = Mixer(RATE_HZ, limited=False)
         self.player = InstrumentPlayer(patch, preset, RATE_HZ, {source: 1.0}, varied=False)
         self.mixer.set_player(self.player.compiled)
-        self.player.handle(NoteOn(KEY, velocity), 0)
+        self.player.handle(NoteOn(key, velocity), 0)
 
     @property
     def notes(self) -> list[Seen]:

@@ -1,0 +1,231 @@
+"""The javari of tanpura and sitar: a string that meets the edge of its bridge, near its end, and buzzes.
+
+The bridge is wide: on a tanpura the string lies on a cotton thread, its end, and some millimetres further on the
+bridge's edge is hardly below it. That edge pushes from one side, an elastic support with a loss (K. H. Hunt and
+F. R. E. Crossley, J. Appl. Mech. 42, 1975), on all modes that move there, of the direction normal to the board:
+
+    q̈_n = … + φ_n F/m,    F = K d (1 + β ḋ) where d = -y - gap > 0, else 0,    y = Σ φ_n q_n,
+
+φ_n = sin(nπ a/ℓ), m = ρAℓ/2. Such a two-point bridge was found to give the tanpura's sound (C. Valette, C. Cuesta,
+"Mécanique de la corde vibrante", 1993; C. Issanchou et al., "A modal-based approach to the nonlinear vibration of
+strings against a unilateral obstacle", JSV 393, 2017; M. van Walstijn, J. Bridges, S. Mehes, "A real-time synthesis
+oriented tanpura model", DAFx-16). A curved bridge, as the sitar's, is one such edge too, which is an approximation.
+
+A frame has steps, h, and within one F is constant: the linear string's answer to that is exact, and its only unknown
+is d at the step's end. With d₀ and d₁ at both ends and V(d) = ½K max(d, 0)², F is the discrete gradient
+
+    F = (V(d₁) - V(d₀))/(d₁ - d₀) · (1 + β (d₁ - d₀)/h),    d₁ = d_free - G F,    G = Σ φ_n² (1 - c_n)/(m ω_n²),
+
+c_n being what is left of an amplitude after h. That is a quadratic equation in each case, and it has one solution,
+for F does not fall with d₁. The second factor is left out in the step in which the string arrives.
+
+Nothing rings up. A constant force does the work F (y₁ - y₀) = -F (d₁ - d₀) on the string, which loses its own in
+addition. So the energy of string and edge together changes by -F (d₁ - d₀) + V(d₁) - V(d₀) =
+-(V(d₁) - V(d₀)) (d₁ - d₀) β/h: never up, for V rises with d, and exactly so for any h. The tension's kicks stand
+between these steps as they do without. A gap that is turned while string and edge touch does work as the hand does.
+
+Model and truth have the same steps, so that they differ by the tension alone. Steps are as many as keep the contact's
+phase, √(K Σ φ_n²/m) h, below `PHASE`, and K is no larger than `MOST_STEPS` resolve. Against many more steps a second
+of sound of the factory's instruments is then wrong by 4e-4 … 2e-3 of its energy, in phases of high modes.
+
+The edge is where it was on the string as it was struck: bends and knobs change the modes' frequencies alone.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from engine.kernels import lanes, strings, tension, truth
+from engine.kernels import layout as at
+from engine.kernels import playing_layout as of
+from engine.kernels.compiled import COMPILED
+from engine.kernels.modes import damped, following, row
+
+PHASE, MOST_STEPS = 0.15, 6
+
+
+@njit(**COMPILED)
+def fit(voice: np.ndarray, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz: float) -> None:
+    """Gives a voice that has not begun an edge of its bridge.
+
+    Args:
+        string, pairs: as of `strings.rows`.
+        edge: its distance from the end in m, stiffness in N/m and loss in s/m.
+    """
+    counts = voice.view(np.int64)
+    n, total = counts[at.MODES], 0.0
+    shapes = row(voice, n, at.JAVARI)
+    for mode in range(n):
+        along = strings.direction_of(mode, pairs) == 1
+        turn = math.pi * strings.partial_of(mode, pairs) * edge[0] / string[of.LENGTH]
+        shapes[mode] = 0.0 if along else math.sin(turn)
+        total += shapes[mode] * shapes[mode]
+    mass, resolved = 0.5 * strings.mass(string) * string[of.LENGTH], PHASE * rate_hz
+    steps = math.ceil(math.sqrt(edge[1] * total / mass) / resolved)
+    counts[at.JAVARI_STEPS] = min(max(steps, 1), MOST_STEPS)
+    voice[at.JAVARI_STIFFNESS] = min(edge[1], (resolved * counts[at.JAVARI_STEPS]) ** 2 * mass / total)
+    voice[at.JAVARI_LOSS], voice[at.JAVARI_MASS] = edge[2], mass
+
+
+@njit(**COMPILED)
+def force(before: float, free: float, give: float, stiffness: float, loss: float) -> float:
+    """The force of the edge within a step, in N.
+
+    Args:
+        before, free: d at its begin, and as it would be at its end without a force.
+        give: G.
+        loss: β/h.
+    """
+    half, moved = 0.5 * stiffness * give, free - before
+    lost = half * loss
+    if before > 0.0:
+        if moved < before * (half - 1 - lost * before):  # it leaves
+            b = moved + lost * before * before
+            return (moved + 0.5 * (math.sqrt(b * b + 4 * half * before * before) - b)) / give
+        b, c = 1 + half + 2 * lost * before, 2 * half * before - moved
+        return (moved + 2 * c / (b + math.sqrt(max(b * b - 4 * lost * c, 0.0)))) / give
+    if free <= 0.0:
+        return 0.0
+    a, b = 1 + half, moved - 2 * half * before
+    return (moved - (b + math.sqrt(max(b * b - 4 * a * half * before * before, 0.0))) / (2 * a)) / give
+
+
+@njit(**COMPILED)
+def generate(
+    voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
+) -> None:
+    """The next quantum, (4, QUANTUM); frame 0 is the string at its release. As `tension` and `truth` have it."""
+    counts = voice.view(np.int64)
+    if counts[at.KIND] == at.TRUTH:
+        _ring_solved(voice, program, fading, heard, out)
+    else:
+        _ring(voice, program, fading, heard, out, scratch)
+    n = counts[at.MODES]
+    first, second = row(voice, n, 0), row(voice, n, 1)
+    for mode in range(n):  # or they would become denormal
+        if first[mode] * first[mode] < tension.NOTHING:
+            first[mode] = 0.0
+        if second[mode] * second[mode] < tension.NOTHING:
+            second[mode] = 0.0
+    counts[at.GENERATED] += at.QUANTUM
+
+
+@njit(**COMPILED)
+def _prepare(voice: np.ndarray, step_s: float) -> None:
+    """What a force of 1 N within a step changes, of a string whose modes are new."""
+    n, give = voice.view(np.int64)[at.MODES], 0.0
+    shapes, given, speeds = row(voice, n, at.JAVARI), row(voice, n, at.GIVEN), row(voice, n, at.GIVEN_SPEED)
+    for mode in range(n):
+        sigma = row(voice, n, at.SIGMA)[mode]
+        omega = damped(row(voice, n, at.OMEGA_SQUARED)[mode], sigma)
+        decay, sine = math.exp(-sigma * step_s), math.sin(omega * step_s) / omega
+        left, part = decay * (math.cos(omega * step_s) + sigma * sine), shapes[mode] / voice[at.JAVARI_MASS]
+        given[mode] = part * (1 - left) / (omega * omega + sigma * sigma)
+        speeds[mode] = part * decay * sine
+        give += shapes[mode] * given[mode]
+    voice[at.JAVARI_GIVE] = give
+
+
+@njit(**COMPILED)
+def _ring(
+    voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
+) -> None:
+    """A quantum of latents that share a tension."""
+    tension.bring_up_to_date(voice, program)
+    counts = voice.view(np.int64)
+    n, points, moving, steps = counts[at.MODES], counts[at.POINTS], counts[at.MOVING], counts[at.JAVARI_STEPS]
+    step_s, nodes = 1 / (program[at.S_RATE] * steps), counts[at.STEPS] // steps
+    if voice[at.JAVARI_GIVE] == 0.0:
+        _prepare(voice, step_s)
+    counts[at.HEARD] = counts[at.FELT] = moving
+    x, y, rows = row(voice, n, 0), row(voice, n, 1), following(voice, n)
+    order = row(voice, n, at.ORDER).view(np.int64)[:moving]
+    first, near = lanes.aligned(scratch), lanes.blocks_of(moving)
+    tension.load(x, y, rows, order, scratch, first)
+    parts = first + lanes.slots(n)
+    ear_sums = scratch[parts + lanes.PRESSED * lanes.LANES * near :][: 2 * lanes.MOST_EARS]
+    for number in range(lanes.LANES * near):
+        slot = parts + number // lanes.LANES * lanes.PRESSED * lanes.LANES + number % lanes.LANES
+        for each in range(lanes.PRESSED):
+            scratch[slot + each * lanes.LANES] = 0.0
+        if number < moving:
+            given, speed = row(voice, n, at.GIVEN)[number], row(voice, n, at.GIVEN_SPEED)[number]
+            scratch[slot], scratch[slot + lanes.LANES] = row(voice, n, at.JAVARI)[number], given
+            speed += row(voice, n, at.SIGMA)[number] * given
+            scratch[slot + 2 * lanes.LANES] = -speed / math.sqrt(rows[6, number])  # v = -(ω y + σ x)
+    ears = (2 if fading else 1) * points if heard else 0
+    for ear in range(ears):
+        place = at.weights(n, ear // points, ear % points, 0)
+        tension.load_weights(voice[place : place + n], order, scratch, first, ear)
+    largest, apart, nothing, total = voice[at.LARGEST_STRETCH], 2 if points == 1 else 1, (0.0, 0.0), 0.0
+    gap, give, pushed = voice[at.JAVARI_GAP], voice[at.JAVARI_GIVE], voice[at.JAVARI_FORCE]
+    sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
+    moved = lanes.felt(scratch, near, first, parts)
+    before = sums[0] * moved[1] - moved[0] - gap
+    for frame in range(at.QUANTUM):
+        for ear in range(ears):
+            out[apart * ear, frame] = ear_sums[2 * ear] - sums[0] * ear_sums[2 * ear + 1]
+            out[apart * ear, frame] -= voice[at.JAVARI_HEARD] * pushed
+        pushed = 0.0
+        for step in range(steps):
+            hearing = ears if step == steps - 1 else 0
+            for _ in range(nodes - 1):
+                sums = tension.node(scratch, first, near, 0, 0, sums, nothing, largest, ear_sums)
+            sums = tension.node(scratch, first, near, 0, hearing, sums, nothing, largest, ear_sums)
+            moved = lanes.felt(scratch, near, first, parts)
+            free = sums[0] * moved[1] - moved[0] - gap
+            if before > 0.0 or free > 0.0:
+                push = force(before, free, give, voice[at.JAVARI_STIFFNESS], voice[at.JAVARI_LOSS] / step_s)
+                sums = lanes.press(scratch, near, first, parts, push)
+                if hearing > 0:
+                    sums = lanes.add_up(scratch, first, near, 0, hearing, ear_sums)
+                free -= give * push
+                pushed += push / steps
+            before = free
+        voice[at.LARGEST_ENERGY] *= voice[at.DECAY]
+        if frame % 16 == 15:
+            total, held = tension.hold(scratch, first, near, voice[at.LARGEST_ENERGY])
+            if held:
+                sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
+    tension.save(x, y, order, scratch, first)
+    voice[at.JAVARI_FORCE] = pushed
+    voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.S_LOUDNESS]
+
+
+@njit(**COMPILED)
+def _ring_solved(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray) -> None:
+    """A quantum of a string that is solved."""
+    sub_steps, counts = truth.set_up(voice, program), voice.view(np.int64)
+    n, points, steps = counts[at.MODES], counts[at.POINTS], counts[at.JAVARI_STEPS]
+    step_s = 1 / (program[at.T_RATE] * steps)
+    if voice[at.JAVARI_GIVE] == 0.0:
+        _prepare(voice, step_s)
+    gap, give, moving = voice[at.JAVARI_GAP], voice[at.JAVARI_GIVE], counts[at.MOVING]
+    q, v, shapes = row(voice, n, 0), row(voice, n, 1), row(voice, n, at.JAVARI)
+    given, speeds = row(voice, n, at.GIVEN), row(voice, n, at.GIVEN_SPEED)
+    before, pushed = -gap, voice[at.JAVARI_FORCE]
+    for mode in range(moving):
+        before -= shapes[mode] * q[mode]
+    for frame in range(at.QUANTUM):
+        truth.hear(voice, program, frame, fading, heard, out)
+        for which in range((2 if fading else 1) if heard else 0):
+            for point in range(points):
+                out[2 * which + point, frame] -= voice[at.JAVARI_HEARD] * pushed
+        pushed = 0.0
+        for _ in range(steps):
+            truth.ring(voice, program, sub_steps, sub_steps // steps)
+            free = -gap
+            for mode in range(moving):
+                free -= shapes[mode] * q[mode]
+            if before > 0.0 or free > 0.0:
+                push = force(before, free, give, voice[at.JAVARI_STIFFNESS], voice[at.JAVARI_LOSS] / step_s)
+                for mode in range(moving):
+                    q[mode] += given[mode] * push
+                    v[mode] += speeds[mode] * push
+                free -= give * push
+                pushed += push / steps
+            before = free
+    voice[at.JAVARI_FORCE] = pushed

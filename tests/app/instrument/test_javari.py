@@ -1,0 +1,179 @@
+"""Strings that meet the edge of their bridge: against the equation, their energy, model against truth, and sound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.integrate
+from numpy.typing import NDArray
+
+from app.instrument.events import Bend, Event, NoteOff, NoteOn, PatchTurned
+from app.patches.library import SHIPPED, read_patch
+from app.patches.patch import Course, Javari, Patch, Pickup, Polarisations
+from engine.kernels import layout as at
+from engine.presets import Preset
+from tests.app.instrument.test_techniques import KEY, RATE_HZ, play
+from tests.app.instrument.test_unisons import Watched, changed, linear
+
+SOURCE_NAMES = ("model", "truth")
+SOURCES = pytest.mark.parametrize("source", SOURCE_NAMES)
+EDGE = Javari(distance_mm=10, gap_um=3, stiffness_n_m=2e4, loss_s_m=0.5)
+MOVING = Polarisations(angle_deg=30, second_cents=2, conductance_s_kg=0.002, second_conductance_s_kg=0.0004)
+
+
+def buzzing(patch: Patch, **edge: float) -> Patch:
+    return changed(patch, javari=EDGE.model_copy(update=edge))
+
+
+class Equation:
+    """That of a voice, from its memory."""
+
+    def __init__(self, voice: NDArray[np.float64]) -> None:
+        n = int(voice.view(np.int64)[at.MODES])
+        rows = voice[at.state(n) : at.state(n) + at.TRUTH_ROWS * n].reshape(-1, n)
+        self.q, self.squares, self.sigma = rows[0].copy(), rows[at.OMEGA_SQUARED].copy(), rows[at.SIGMA].copy()
+        self.coupling, self.stretch = rows[at.COUPLING].copy(), rows[at.STRETCH].copy()
+        self.shapes, self.mass = rows[at.JAVARI].copy(), voice[at.JAVARI_MASS]
+        self.gap, self.stiffness, self.loss = (
+            voice[slot] for slot in (at.JAVARI_GAP, at.JAVARI_STIFFNESS, at.JAVARI_LOSS)
+        )
+
+    def energy(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
+        """In J, of states (quanta, 2, 1, modes): of motion, strings, the rise of their tension, and the edge."""
+        q, v = states[:, 0, 0], states[:, 1, 0]
+        deep = np.maximum(-(q @ self.shapes) - self.gap, 0)
+        risen = 0.25 * (q**2 @ self.stretch) * (q**2 @ self.coupling)
+        return self.mass * (0.5 * (v**2 + self.squares * q**2).sum(-1) + risen) + 0.5 * self.stiffness * deep**2
+
+    def rates(self, _time_s: float, state: NDArray[np.float64]) -> NDArray[np.float64]:
+        q, v = np.split(state, 2)
+        deep = -(self.shapes @ q) - self.gap
+        push = self.stiffness * deep * (1 - self.loss * (self.shapes @ v)) if deep > 0 else 0.0
+        raised = (self.stretch @ q**2) * self.coupling * q
+        return np.concatenate([v, self.shapes * (push / self.mass) - 2 * self.sigma * v - self.squares * q - raised])
+
+
+def watched(
+    patch: Patch, preset: Preset, source: str, velocity: int = 90, key: int = KEY
+) -> tuple[Watched, Equation]:
+    """A note before its first quantum is rendered, whose equation has the modes of its first."""
+    note = Watched(patch, preset, source, velocity, key)
+    note.player.compiled.catch_up(note.mixer)
+    return note, Equation(note.voices()[0])
+
+
+@pytest.mark.parametrize("loss", [0.0, 0.5])
+@SOURCES
+def test_energy_of_string_and_edge_never_rises(patch: Patch, preset: Preset, source: str, loss: float) -> None:
+    """Without losses of the string: where the edge has none either, it stays."""
+    lossless = linear(patch, damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)
+    note, equation = watched(buzzing(lossless, loss_s_m=loss), preset, source)
+    found = equation.energy(note.states(1_500))
+    assert np.diff(found).max() < 1e-9 * found[0]
+    assert (found[-1] < 0.999 * found[0]) if loss else (found[-1] == pytest.approx(found[0], rel=1e-7))
+
+
+@SOURCES
+def test_energy_of_a_loud_string_and_edge_never_rises(patch: Patch, preset: Preset, source: str) -> None:
+    note, equation = watched(buzzing(patch), preset, source, velocity=127)
+    found = equation.energy(note.states(750))
+    assert np.diff(found).max() < 1e-5 * found[0]
+    assert found[-1] < 0.9 * found[0]
+
+
+def test_truth_is_the_solution_of_its_equation(patch: Patch, preset: Preset) -> None:
+    """DOP853, on a short string, for 40 ms in which it meets the edge some fifty times."""
+    note, equation = watched(buzzing(patch, stiffness_n_m=1e4), preset, "truth", key=88)
+    assert equation.stiffness == 1e4
+    quanta = 30
+    times_s = np.arange(1, quanta + 1) * at.QUANTUM / RATE_HZ
+    first = np.concatenate([equation.q, np.zeros_like(equation.q)])
+    solved = scipy.integrate.solve_ivp(
+        equation.rates, (0, times_s[-1] + 1e-9), first, "DOP853", times_s, rtol=1e-9, atol=1e-14, max_step=2e-6
+    )
+    wanted = solved.y.T.reshape(quanta, 2, -1)[:, 0]
+    found = note.states(quanta)[:, 0, 0]
+    assert (wanted @ equation.shapes).min() < -2e-6 - equation.gap  # they meet
+    assert ((found - wanted) ** 2).sum() < 2e-4 * (wanted**2).sum()
+
+
+@pytest.mark.parametrize(
+    ("name", "keys"), [("tanpura_drone", (36, 43, 48, 60)), ("sitar", (43, 48, 60, 72))], ids=lambda each: str(each)
+)
+def test_model_and_truth_agree_where_it_buzzes(preset: Preset, name: str, keys: tuple[int, ...]) -> None:
+    shipped = read_patch(SHIPPED / f"{name}.json")
+    assert shipped.javari.distance_mm > 0
+    for key in keys:
+        model, truth = (play(shipped, preset, 1.0, (0.0, NoteOn(key, 100)), source=each) for each in SOURCE_NAMES)
+        assert ((model - truth) ** 2).sum() < 1e-6 * (truth**2).sum()
+
+
+@SOURCES
+def test_high_partials_come_later(preset: Preset, source: str) -> None:
+    """On a tanpura the share of what lies above 2 kHz rises in the first second; without the edge it falls."""
+    shipped = read_patch(SHIPPED / "tanpura_drone.json")
+
+    def share_db(patch: Patch, at_s: float) -> float:
+        sound = play(patch, preset, at_s + 0.2, (0.0, NoteOn(36, 100)), source=source)[round(at_s * RATE_HZ) :]
+        power = np.abs(np.fft.rfft(sound * np.hanning(len(sound)))) ** 2
+        return float(10 * np.log10(power[round(2_000 * len(sound) / RATE_HZ) :].sum() / power.sum()))
+
+    plain = changed(shipped, javari=Javari())
+    assert share_db(shipped, 1.2) > share_db(shipped, 0.01) + 3
+    assert share_db(plain, 1.2) < share_db(plain, 0.01) - 3
+
+
+@SOURCES
+def test_where_there_is_no_edge_nothing_changes(patch: Patch, preset: Preset, source: str) -> None:
+    events = (0.0, NoteOn(KEY, 90)), (0.3, NoteOn(KEY, 60)), (0.5, NoteOff(KEY))
+    plain, without = (
+        play(each, preset, 0.8, *events, source=source) for each in (patch, buzzing(patch, distance_mm=0))
+    )
+    np.testing.assert_array_equal(without, plain)
+    far = play(buzzing(patch, gap_um=200), preset, 0.3, (0.0, NoteOn(KEY, 20)), source=source)
+    same = play(patch, preset, 0.3, (0.0, NoteOn(KEY, 20)), source=source)
+    assert ((far - same) ** 2).sum() < 1e-9 * (same**2).sum()
+
+
+@SOURCES
+def test_the_push_of_the_edge_is_heard_in_the_force_on_the_bridge(patch: Patch, preset: Preset, source: str) -> None:
+    """On average the end pulls as much as the edge pushes, apart from the overshoot of a finite series (Gibbs)."""
+    note, _ = watched(changed(buzzing(patch, gap_um=0), pickup=Pickup(kind="bridge")), preset, source)
+    heard, pushes = [], []
+    for _ in range(600):
+        heard.append(note.mixer.render(at.QUANTUM)[:, 0].mean())
+        pushes.append(note.voices()[0][at.JAVARI_FORCE])
+    pushed = note.notes[0].gain * note.voices()[0][at.JAVARI_HEARD] * np.mean(pushes)
+    assert pushed > 0
+    assert abs(np.mean(heard)) < 0.2 * pushed
+    point, _ = watched(buzzing(patch), preset, source)
+    assert point.voices()[0][at.JAVARI_HEARD] == 0
+
+
+@pytest.mark.parametrize("stops", [True, False])
+@pytest.mark.parametrize("kind", ["bridge", "velocity"])
+def test_it_plays_as_other_strings(patch: Patch, preset: Preset, kind: str, stops: bool) -> None:
+    """Plucked while it rings, bent, retuned by a knob, its gap turned: model and truth agree."""
+    moving = changed(
+        buzzing(patch),
+        polarisations=MOVING,
+        pickup=Pickup(points=(0.2, 0.8), kind=kind),
+        pluck=patch.pluck.model_copy(update={"stops": stops}),
+    )
+    turned = [changed(moving, javari=EDGE.model_copy(update={"gap_um": gap})) for gap in (60, 0)]
+    events: list[tuple[float, Event]] = [
+        (0.001, NoteOn(KEY, 60)),
+        (0.01, NoteOn(KEY + 24, 70)),
+        (0.2, Bend(0.5)),
+        (0.31, NoteOn(KEY, 50)),
+    ]
+    events += [(0.4, PatchTurned(turned[0])), (0.45, Bend(0.0)), (0.5, PatchTurned(turned[1])), (0.6, NoteOff(KEY))]
+    model, truth = (play(moving, preset, 0.8, *events, source=each) for each in SOURCE_NAMES)
+    assert np.isfinite(model).all()
+    assert ((model - truth) ** 2).sum() < 1e-5 * (truth**2).sum()
+
+
+@pytest.mark.parametrize("course", [Course(strings=2, bridge=1.0), Course(bridge=0.5)])
+def test_strings_that_share_a_bridge_have_no_edge(patch: Patch, course: Course) -> None:
+    with pytest.raises(ValueError, match="javari"):
+        changed(buzzing(patch), course=course)
