@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import this_target
 from app.export.plugin.image import image_of
@@ -85,7 +87,8 @@ def _cost(name: str, patch: Patch, preset: Preset, instance: Instance) -> Plugin
         player.handle(NoteOn(key, VELOCITY), 0)
     player.render(BLOCK_FRAMES)
     instance.render(BLOCK_FRAMES, [note_on(0, key, VELOCITY) for key in keys])
-    rounds = [(_taken_s(player.render), _taken_s(lambda frames: instance.render(frames, []))) for _ in range(ROUNDS)]
+    next_block = instance.repeated(np.zeros((2, BLOCK_FRAMES), np.float32))
+    rounds = [(_taken_s(lambda: player.render(BLOCK_FRAMES)), _taken_s(next_block)) for _ in range(ROUNDS)]
     instance.destroy()
     app_s, plugin_s = (min(times) for times in zip(*rounds, strict=True))
     string, sound_s = Strings(patch).of_key(low), BLOCK_FRAMES * BLOCKS / RATE_HZ
@@ -93,8 +96,8 @@ def _cost(name: str, patch: Patch, preset: Preset, instance: Instance) -> Plugin
     return PluginCost(name, len(keys), modes, sound_s / app_s, sound_s / plugin_s)
 
 
-def _taken_s(render: Callable[[int], object]) -> float:
+def _taken_s(render: Callable[[], object]) -> float:
     began_s = time.thread_time()
     for _ in range(BLOCKS):
-        render(BLOCK_FRAMES)
+        render()
     return time.thread_time() - began_s

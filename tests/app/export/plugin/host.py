@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ctypes as c
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -556,6 +556,12 @@ class Instance:
     def block(self, frames: int, events: Sequence[Event]) -> NDArray[np.float32]:
         """The next frames, (frames, 2); events are of frames of the whole piece."""
         out = np.zeros((2, frames), np.float32)
+        self.repeated(out, events)()
+        return out.T.copy()
+
+    def repeated(self, out: NDArray[np.float32], events: Sequence[Event] = ()) -> Callable[[], None]:
+        """A call that gives the next frames to `out`, (2, frames), and makes nothing that could take time."""
+        frames = out.shape[1]
         rows = (c.POINTER(c.c_float) * 2)(*(row.ctypes.data_as(c.POINTER(c.c_float)) for row in out))
         for event in events:
             event.content.header.time = event.frame - self.frame
@@ -575,10 +581,13 @@ class Instance:
         process = Process(
             self.frame, frames, None, None, c.pointer(audio), 0, 1, c.pointer(incoming), c.pointer(outgoing)
         )
-        self.status = self._own.process(self.at, process)
-        assert self.status != 0
-        self.frame += frames
-        return out.T.copy()
+
+        def call() -> None:
+            self.status = self._own.process(self.at, process)
+            assert self.status != 0
+            self.frame += frames
+
+        return call
 
     def render(self, frames: int, events: Sequence[Event], block: int = 512) -> NDArray[np.float32]:
         """A piece, (frames, 2), in blocks; frames of events count from its beginning, which is now."""
