@@ -246,9 +246,11 @@ class Browser(QFrame):
         self.star.setText("★  Favourite" if name in self._rows.favourites else "☆  Favourite")
 
     def place(self) -> None:
-        """Sets the geometry within the parent; called when opened and when the parent is resized."""
+        """Sets the geometry within the parent, under its notice; called when opened and when either changes."""
         parent = self.parentWidget()
         if parent is not None:
+            for notices in self.window().findChildren(NoticeBar):
+                notices.installEventFilter(self)  # again is the same as once
             most, high, below = self._size
             width, height = min(most, parent.width() - 28), min(high, parent.height() - self.top - below)
             self.setGeometry(14, self.top, width, max(300, height))
@@ -256,8 +258,6 @@ class Browser(QFrame):
     def show_over(self) -> None:
         """Opens with the focus in the search field."""
         self._before = QApplication.focusWidget()
-        for notices in self.window().findChildren(NoticeBar):
-            notices.installEventFilter(self)  # again is the same as once
         self.opened.emit()
         self.select()
         self.place()

@@ -248,7 +248,8 @@ def test_techniques_are_as_in_the_app(bank: Library) -> None:
     state = instance.save()
     assert [instance.text(ids["strokes of strums"], value) for value in range(3)] == ["down", "up", "both"]
     assert [instance.text(ids["harmonic"], value) for value in (1, 5)] == ["1", "5"]
-    assert instance.text(instance.parameters["volume"].id, -1.4e-6) == "0 dB"  # what a host in single precision makes of 0
+    volume = instance.parameters["volume"].id
+    assert instance.text(volume, -1.4e-6) == "0 dB"  # what a host in single precision makes of 0
     other = instance_of(bank, "classical_guitar")
     assert other.load(state)
     other.deactivate()
