@@ -29,7 +29,7 @@ from tests.bench.machine import Machine, one_thread
 RATE_HZ = 48_000
 INSTRUMENTS = ("electric_bass", "classical_guitar", "concert_harp")
 NOTES, VELOCITY = 30, 102
-BLOCK_FRAMES, BLOCKS, ROUNDS = 512, 4, 12
+BLOCK_FRAMES, BLOCKS, ROUNDS = 512, 4, 40
 PLUGIN = "plugin"
 
 

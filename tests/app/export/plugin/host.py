@@ -582,9 +582,11 @@ class Instance:
             self.frame, frames, None, None, c.pointer(audio), 0, 1, c.pointer(incoming), c.pointer(outgoing)
         )
 
+        memory = out, rows, audio, incoming, outgoing  # which the call keeps alive
+
         def call() -> None:
             self.status = self._own.process(self.at, process)
-            assert self.status != 0
+            assert self.status != 0 and memory
             self.frame += frames
 
         return call
