@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent, Qt, QTimer
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QWidget
 
@@ -26,13 +26,21 @@ class Sideways(QScrollArea):
     def event(self, event: QEvent) -> bool:
         if event.type() in (QEvent.Type.LayoutRequest, QEvent.Type.Polish, QEvent.Type.Show):
             self._fit()
+        elif event.type() in (QEvent.Type.StyleChange, QEvent.Type.FontChange):
+            QTimer.singleShot(0, self, self._renew)  # once its controls have the other text
         return super().event(event)
+
+    def _renew(self) -> None:
+        """Forgets the sizes that rows had with another text. It asks for a layout, so `_fit` must not do it."""
+        part = self.widget()
+        if part is not None and (layout := part.layout()) is not None:
+            layout.invalidate()
+        self._fit()
 
     def _fit(self) -> None:
         part = self.widget()
         if part is not None:
             if (layout := part.layout()) is not None:
-                layout.invalidate()  # or it holds the sizes that its rows had before the text grew
                 layout.activate()
             least = part.minimumSizeHint().width()
             too_narrow = least > self.width()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QEvent, Qt
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
@@ -139,6 +139,26 @@ def test_knobs_that_were_hidden_while_text_grew_have_their_room(qtbot: QtBot, qa
         assert knobs.shape.geometry().right() < knobs.knobs["pluck.position"].geometry().left()
     finally:
         theme.apply_theme(qapp, "dark")
+
+
+class Counted(Sideways):
+    """Counts how often it is asked to lay out."""
+
+    requests = 0
+
+    def event(self, event: QEvent) -> bool:
+        self.requests += event.type() == QEvent.Type.LayoutRequest
+        return super().event(event)
+
+
+def test_a_row_at_rest_is_not_laid_out_again(qtbot: QtBot) -> None:
+    row = Counted(StringKnobs())
+    qtbot.addWidget(row)
+    row.show()
+    qtbot.wait(100)
+    row.requests = 0
+    qtbot.wait(100)
+    assert row.requests < 5
 
 
 def test_drums_have_no_pluck_to_shape(knobs: StringKnobs, guitar: Patch) -> None:
