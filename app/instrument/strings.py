@@ -18,7 +18,6 @@ from engine.kernels.playing_layout import HIGHEST_HZ, MOST_MODES, MOST_SLACKENED
 from engine.resonators.losses import Losses
 from engine.resonators.string import StringParameters
 
-HIGHEST_FRET = 24
 STRING = tuple(field.name for field in fields(StringParameters))
 KNOBS = tuple(Knobs.model_fields)  # in the order of the kernels
 
@@ -119,12 +118,6 @@ def has_octave(patch: Patch, key: int, number: int | None) -> bool:
         return False
     chosen = chosen_string(patch.strings, key) if number is None else number
     return chosen >= len(patch.strings.strings) - patch.course.octaves
-
-
-def fretting(strings: StringSet, key: int) -> list[int]:
-    """The strings of a set on which a key can be fretted, counted from the highest, 0."""
-    ordered = enumerate(strings.strings[::-1])
-    return [number for number, string in ordered if string.note <= key <= string.note + HIGHEST_FRET]
 
 
 def turned(string: StringParameters, knobs: Knobs) -> StringParameters:
