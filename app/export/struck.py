@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from typing import Annotated
 
 import numpy as np
@@ -19,6 +19,7 @@ from app.patches.fields import Name
 from app.patches.library import list_patches
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
+from engine.pluck import Pluck
 from engine.presets import Preset
 
 QUIET_FOR_S = 1.0  # longer than strings beat
@@ -31,7 +32,7 @@ class StruckKey(BaseModel):
     Attributes:
         instrument_sha256: of its content and of the file of its body.
         channel: of MIDI, which chooses the string of a guitar; `KEYS`: none.
-        place: where a drum is struck, from its centre in half-lengths; None: at its own place.
+        place, pluck: of a drum and of a string, as in `NoteOn`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -42,6 +43,8 @@ class StruckKey(BaseModel):
     velocity: int = Field(ge=1, le=127)
     channel: int = Field(KEYS, ge=0, le=KEYS)
     place: tuple[Side, Side] | None = None
+    string: int | None = Field(None, ge=0, le=127)
+    pluck: Pluck | None = None
 
     @classmethod
     def of(cls, struck: Struck) -> StruckKey:
@@ -49,10 +52,7 @@ class StruckKey(BaseModel):
         return cls(
             instrument=patch.name,
             instrument_sha256=_digest(patch),
-            key=event.key,
-            velocity=event.velocity,
-            channel=event.channel,
-            place=event.place,
+            **asdict(event),
         )
 
     def found(self) -> tuple[Struck, bool]:
@@ -63,7 +63,7 @@ class StruckKey(BaseModel):
         """
         for entry in list_patches()[0]:
             if entry.patch.name == self.instrument:
-                event = NoteOn(self.key, self.velocity, self.channel, self.place)
+                event = NoteOn(**{field.name: getattr(self, field.name) for field in fields(NoteOn)})
                 return Struck(entry.patch, event), _digest(entry.patch) == self.instrument_sha256
         raise ValueError(f"the instrument {self.instrument} is not here; get its file and add it")
 
@@ -87,7 +87,8 @@ class Struck:
     @property
     def words(self) -> str:
         """For people."""
-        return f"{self.patch.name}, {note_name(self.event.key)} at velocity {self.event.velocity}"
+        stroke = f"at velocity {self.event.velocity}" if self.event.pluck is None else "plucked by hand"
+        return f"{self.patch.name}, {note_name(self.event.key)} {stroke}"
 
     def sound(
         self,

@@ -7,6 +7,7 @@ import math
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,41 +26,6 @@ from engine.voices import CompiledPlayer, Ear
 from engine.voices.player import Report, Ringing, Table
 
 STOP_S = 0.03
-
-
-@dataclass(frozen=True)
-class Record:
-    """An event as the compiled player takes it: see `playing_layout`."""
-
-    kind: int
-    channel: int
-    key: int
-    value: float
-    string: int | None = None
-
-
-def record_of(event: NoteOn | NoteOff | Bend | Controller) -> Record:
-    """The only way from events to records."""
-    if isinstance(event, NoteOn):
-        return Record(of.NOTE_ON, event.channel, event.key, event.velocity, event.string)
-    if isinstance(event, NoteOff):
-        return Record(of.NOTE_OFF, event.channel, event.key, 0.0, event.string)
-    if isinstance(event, Bend):
-        return Record(of.BEND, event.channel, 0, event.value)
-    return Record(of.CONTROLLER, event.channel, event.number, event.value)
-
-
-def event_of(record: Record) -> NoteOn | NoteOff | Bend | Controller:
-    """The only way back."""
-    if record.kind == of.NOTE_ON:
-        return NoteOn(record.key, round(record.value), record.channel, string=record.string)
-    if record.kind == of.NOTE_OFF:
-        return NoteOff(record.key, record.channel, record.string)
-    if record.kind == of.BEND:
-        return Bend(record.value, record.channel)
-    if record.kind == of.CONTROLLER:
-        return Controller(record.key, round(record.value), record.channel)
-    raise ValueError(f"a record of kind {record.kind} is no event of a player; give one of `record_of`")
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,11 +258,24 @@ class InstrumentPlayer:
         if isinstance(event, NoteOn) and event.velocity > 0:
             self._check(event)
             struck = self._struck(event)
-        elif isinstance(event, Controller):
+        give = partial(self.compiled.give, channel=event.channel, frame=frame)
+        if isinstance(event, NoteOn):
+            return give(
+                of.NOTE_ON,
+                key=event.key,
+                value=event.velocity,
+                by_hand=event.pluck,
+                struck_s=struck_s,
+                struck=struck,
+                string=event.string,
+            )
+        elif isinstance(event, NoteOff):
+            return give(of.NOTE_OFF, key=event.key, string=event.string)
+        elif isinstance(event, Bend):
+            return give(of.BEND, value=event.value)
+        else:
             self._follow_wheel(event)
-        record = record_of(event)
-        numbers = record.kind, record.channel, record.key, record.value, frame
-        return self.compiled.give(*numbers, struck_s=struck_s, struck=struck, string=record.string)
+            return give(of.CONTROLLER, key=event.number, value=event.value)
 
     def _check(self, event: NoteOn) -> None:
         """Raises ValueError: no string on which an event may play its key is possible."""

@@ -37,6 +37,8 @@ class NoteOn:
 
     Attributes:
         place: where a drum is struck, from its centre in half-lengths, x and y; None: at its own place.
+        pluck: by hand, of which place, amplitude and width count; None: as the instrument and the velocity have it.
+            The string rings until the key is released, and no key is down.
         string: on which string of a set, from the highest, 0; None: the channel or the key chooses.
     """
 
@@ -45,6 +47,7 @@ class NoteOn:
     channel: int = 0
     place: tuple[float, float] | None = None
     string: int | None = None
+    pluck: Pluck | None = None
 
 
 @dataclass(frozen=True)
@@ -82,7 +85,7 @@ class PatchTurned:
 
 @dataclass(frozen=True)
 class PluckAt:
-    """The string that is shown is plucked at a place: by hand, or by a key that is a place."""
+    """The string that is shown is plucked by itself, without its instrument: what single strings play."""
 
     pluck: Pluck
 

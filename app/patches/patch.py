@@ -163,6 +163,14 @@ class PluckChoices(Value):
             self.width * (self.width_hard / self.width) ** share,
         )
 
+    def velocity_of(self, amplitude_mm: float) -> int:
+        """The velocity, 1 … 127, whose pluck is nearest in amplitude."""
+        if amplitude_mm <= self.softest_mm or self.hardest_mm == self.softest_mm:
+            return VELOCITIES[0]
+        share = min(math.log(amplitude_mm / self.softest_mm) / math.log(self.hardest_mm / self.softest_mm), 1.0)
+        low, high = VELOCITIES
+        return round(low + share ** (4**self.curve) * (high - low))
+
     @property
     def is_blow(self) -> bool:
         """Whether strings set out with speeds."""

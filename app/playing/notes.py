@@ -8,6 +8,7 @@ compiled player as numbers. A pluck of a single string has voices that are made 
 from __future__ import annotations
 
 import threading
+import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -207,12 +208,18 @@ class Notes:
             self._guarded(begin, note)()
         return note
 
-    def turn(self, note: Note | KeyNote, seconds: float) -> Note | None:
+    def turn(self, note: Note | KeyNote, seconds: float) -> Note | KeyNote | None:
         """Hands the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early."""
         mixer, frame = self._sound.mixer, note.frame_at(seconds)
-        if self._chosen is None or frame > (mixer.seconds + LOOP_AHEAD_S) * mixer.rate_hz:
+        chosen, early = self._chosen, frame - mixer.frames
+        if chosen is None or early > LOOP_AHEAD_S * mixer.rate_hz:
             return None
         note.release_at(frame)
+        struck = note.request if isinstance(note, KeyNote) else None
+        same = struck is not None and (struck.preset, struck.pluck.shape) == (chosen.preset, chosen.pluck.shape)
+        if isinstance(note, KeyNote) and same and set(self._voices_of(chosen)) <= set(SOURCES):
+            due = Due(mixer, frame, time.monotonic() + early / mixer.rate_hz)
+            return self.keys.handle(replace(note.event, pluck=chosen.pluck), due, 0.0, self._adopt)
         return self.ring(begin_frame=frame)
 
     def cancel(self) -> None:

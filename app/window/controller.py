@@ -302,7 +302,7 @@ class Controller(QObject):
         if self._abx is not None:
             return
         if self.session.choices.drums is None:
-            self.performance.pluck()
+            self.instruments.pluck()
         else:
             self.instruments.strike(*self.drum.place, self.session.choices.velocity)
 

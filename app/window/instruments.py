@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -11,6 +12,8 @@ from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from app.export.struck import Struck
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
+from app.instrument.strings import Strings
+from app.patches.drums import Drums
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch, PhysicalString
 from app.playing.due import Due
@@ -22,6 +25,7 @@ from app.presets.library import Library
 from app.rendering import RenderRequest
 from app.rendering.subject import string_of
 from app.session.choices import Session
+from app.session.slots import other_preset
 from app.views.controls.playing_keys import PlayingKeys
 from app.window.main_window import MainWindow
 from app.window.midi_control import MidiControl
@@ -128,11 +132,43 @@ class Instruments(QObject):
             return latest
         return min(max(drums.drums[0].note, low), high)
 
+    def shown_key(self, patch: Patch) -> tuple[int, int | None]:
+        """Whose string is shown: the key that was struck last, on its string, or the middle of the patch's range."""
+        (low, high), latest = patch.range, self.latest_key
+        return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
+
+    @property
+    def _by_hand(self) -> NoteOn | None:
+        """The chosen pluck as a note of the key whose string is shown.
+
+        None: a single string is played, or the instrument has no such pluck, or another preset is compared.
+        """
+        choices = self._session.choices
+        patch, pluck = choices.instrument, choices.pluck
+        if not isinstance(patch, Patch) or isinstance(patch.strings, Drums) or pluck.amplitude_mm == 0:
+            return None
+        if pluck.shape != patch.pluck.shape or any(other_preset(each) for each in choices.voices):
+            return None
+        key, number = self.shown_key(patch)
+        string = Strings(patch).of_key(key, number)
+        if string is None:
+            return None
+        velocity = patch.pluck.velocity_of(pluck.amplitude_mm / string.shortened)
+        return NoteOn(key, velocity, KEYS, string=number, pluck=pluck)
+
+    def pluck(self) -> None:
+        """Plucks the string that is shown as it is chosen, where it can with all of its instrument."""
+        with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
+            if (event := self._by_hand) is not None:
+                self.play(event)
+                return
+        self.play(PluckAt(self._session.choices.pluck))
+
     @property
     def struck(self) -> Struck | None:
         """The key of the instrument that an export plays: the latest note, of drums else the one shown.
 
-        None: a single string is played, or the latest note was plucked by hand.
+        None: a string was plucked by itself.
         """
         patch, latest = self._session.choices.instrument, self.latest
         if not isinstance(patch, Patch):

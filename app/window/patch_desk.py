@@ -215,7 +215,7 @@ class PatchDesk(QObject):
         if patch is None:
             return
         try:
-            self.change(field, knob_for(patch, self._shown_key(patch), field, figure))
+            self.change(field, knob_for(patch, self._instruments.shown_key(patch), field, figure))
         except ValueError as error:
             self.reported.emit(one_line(str(error)))
 
@@ -468,11 +468,6 @@ class PatchDesk(QObject):
             string = by_two_numbers(patch, string)
         return outside_of_string(entry.info, string, choices.pluck)
 
-    def _shown_key(self, patch: Patch) -> tuple[int, int | None]:
-        """Whose string is shown: the key that was struck last, on its string, or the middle of the patch's range."""
-        (low, high), latest = patch.range, self._instruments.latest_key
-        return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
-
     def _show_string(self, patch: Patch) -> KeyString | None:
         """Shows that string in figures, or why there is none; None where it is silent or impossible."""
         found: KeyString | None = None
@@ -485,7 +480,7 @@ class PatchDesk(QObject):
             knobs.show_figures({})
             return None
         try:
-            found = Strings(patch).of_key(*self._shown_key(patch))
+            found = Strings(patch).of_key(*self._instruments.shown_key(patch))
         except ValueError as error:
             facts = {"string": str(error)}
         knobs.show_facts(facts if found is None else facts_of(found))

@@ -17,7 +17,7 @@ from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
 from app.export.sound import Through
-from app.instrument.events import NoteOn, PluckAt
+from app.instrument.events import NoteOn
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
@@ -57,7 +57,7 @@ class Performance(QObject):
         self._panels = panels
         self._asked: RenderRequest | None = None
         self._shown: Playhead[Take] = Playhead()
-        self._next_turn: Note | None = None  # of the loop, which waits in the mixer for its frame
+        self._next_turn: Note | KeyNote | None = None  # of the loop, which waits in the mixer for its frame
         self._waiting_words = self._error_words = ""
         mail = self._mail = RenderSignals()
         mail.started.connect(self._take_started)
@@ -149,11 +149,6 @@ class Performance(QObject):
                 panel.take_finished(self.take, self._shown.errors)
 
     # Intents
-
-    def pluck(self) -> None:
-        """Plucks the string as chosen, and shows it."""
-        self.notes.handle(PluckAt(self._session.choices.pluck))
-        self.follow()
 
     def follow(self) -> None:
         """Shows the latest note while it rings, if its motion is rendered; otherwise `_take_started` does."""

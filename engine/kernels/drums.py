@@ -114,7 +114,7 @@ def strike(
     first_voice: int,
     stride: int,
 ) -> float:
-    """Makes the voices of a note in the player's memory and names them in its event; their gain, 0: no drum."""
+    """Makes the voices of a note in the player's memory, a stride apart; their gain, 0: no drum."""
     key, velocity = players[event + of.EVENT_KEY], player[event + of.EVENT_VALUE]
     drum = block_of(tables, key)
     if drum == 0 or tables[drum + of.DRUM_MODES] > players[of.PLAYER_MODES]:
@@ -134,7 +134,6 @@ def strike(
         _make(player, table, tables, voice, drum, struck, speed, tables[of.TABLE_KINDS + source])
         voice.view(np.int64)[at.PROGRAM] = tables[of.TABLE_PROGRAMS + source]
         voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
-        players[event + of.EVENT_VOICES + source] = address
     return gain
 
 

@@ -389,11 +389,11 @@ def _has_octave(table: np.ndarray, tables: np.ndarray, key: int, number: int) ->
 
 
 @njit(**COMPILED)
-def _pitch_hz(table: np.ndarray, tables: np.ndarray, key: int, given_hz: float) -> float:
+def _pitch_hz(table: np.ndarray, tables: np.ndarray, key: int) -> float:
     """Of a note; 0: its key is silent."""
     if not tables[of.TABLE_LOW] <= key <= tables[of.TABLE_HIGH]:
         return 0.0
-    return given_hz if given_hz > 0.0 else table[of.TABLE_PITCHES + key]
+    return table[of.TABLE_PITCHES + key]
 
 
 @njit(**COMPILED)
@@ -402,7 +402,7 @@ def _string_now(
 ) -> None:
     """The string of a note with the present knobs, wheels and damper; where there is none, it stays as it is."""
     key, mode = players[note + of.NOTE_KEY], tables[of.TABLE_MODE]
-    pitch_hz, fits = _pitch_hz(table, tables, key, player[note + of.NOTE_PITCH_HZ]), True
+    pitch_hz, fits = _pitch_hz(table, tables, key), True
     if pitch_hz > 0.0:
         number = players[note + of.NOTE_STRING]
         wheeled = players[of.PLAYER_WHEEL] != 0 and 0 <= tables[of.TABLE_WHEEL] < of.KNOBS
@@ -723,7 +723,7 @@ def _sound(
     The modulation wheel and the mute do not count: what they change is heard as louder or softer.
     """
     own, values, first = _moment(player, 2), of.PLAYER_VALUES, of.PLAYER_SOUND
-    pitch_hz = _pitch_hz(table, tables, key, 0.0)
+    pitch_hz = _pitch_hz(table, tables, key)
     if not pitch_hz > 0.0:
         return 0
     partials, shortened = string_of(player, players, table, tables, key, string, pitch_hz, False, own)
@@ -917,7 +917,7 @@ def _retune(
 ) -> None:
     """Lets a note glide to its string as knobs, wheels and damper have changed it, where they have."""
     note, string, changed = _note(number), _moment(player, 2), False
-    if players[note + of.NOTE_PREPARED] != 0:
+    if players[note + of.NOTE_DRUM] != 0:
         return
     _string_now(player, players, table, tables, note, string)
     for place in range(of.STRING):
@@ -955,13 +955,13 @@ def _damp(
     frame: int,
     now: int,
 ) -> None:
-    """Puts the damper on a string that nothing holds. A prepared voice without modes fades."""
+    """Puts the damper on a string or a drum that nothing holds."""
     note = _note(number)
     held = players[note + of.NOTE_HELD] + players[note + of.NOTE_KEPT] + players[note + of.NOTE_DAMPED]
     if held != 0 or tables[of.TABLE_LET_RING] != 0:
         return
     players[note + of.NOTE_DAMPED] = 1
-    if players[note + of.NOTE_PREPARED] == 0:
+    if players[note + of.NOTE_DRUM] == 0:
         _retune(player, players, table, tables, number, DAMPER_S, frame, now)
         if players[note + of.NOTE_MEMBER] != 0:
             return
@@ -977,16 +977,13 @@ def _damp(
         address = players[note + of.NOTE_VOICES + source]
         if address == 0 or _voice_over(address):
             continue
-        voice, kind, n = reals(address), wholes(address)[at.KIND], wholes(address)[at.MODES]
-        if kind in (at.TRUTH, at.TENSION) and n <= players[of.PLAYER_MODES]:
-            slot = _wish(player, players, number, source, address, DAMPER_S, frame, now)
-            first = at.state(n) + at.OMEGA_SQUARED * n
-            for place in range(at.RESONATOR_ROWS * n):
-                player[slot + place] = voice[first + place]
-                if n <= place < 2 * n:  # σ
-                    player[slot + place] += math.log(1000.0) / t60_s
-        else:
-            _release(address, _frames(player, t60_s))
+        voice, n = reals(address), wholes(address)[at.MODES]
+        slot = _wish(player, players, number, source, address, DAMPER_S, frame, now)
+        first = at.state(n) + at.OMEGA_SQUARED * n
+        for place in range(at.RESONATOR_ROWS * n):
+            player[slot + place] = voice[first + place]
+            if n <= place < 2 * n:  # σ
+                player[slot + place] += math.log(1000.0) / t60_s
 
 
 # Notes
@@ -1015,11 +1012,7 @@ def _reported(players: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def _refuse(player: np.ndarray, players: np.ndarray, event: int) -> None:
-    """Reports a note that no string can play, or that was cancelled; voices that were prepared for it are over."""
-    for source in range(of.MOST_SOURCES):
-        address = players[event + of.EVENT_VOICES + source]
-        if address != 0:
-            wholes(address)[at.STATE] = at.OVER
+    """Reports a note that no string can play, or that was cancelled."""
     id, channel, key = players[event + of.EVENT_ID], players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
     frame, velocity = players[event + of.EVENT_FRAME], player[event + of.EVENT_VALUE]
     _report(player, players, of.REFUSED, id, channel, key, frame, velocity)
@@ -1094,10 +1087,8 @@ def _follow(player: np.ndarray, players: np.ndarray, tables: np.ndarray, note: i
         if address == 0:
             _release(other, stops)
             continue
-        counts = wholes(address)
-        moves = counts[at.KIND] in (at.TRUTH, at.TENSION) and wholes(other)[at.KIND] == counts[at.KIND]
-        counts[at.PREVIOUS_VOICE] = other
-        counts[at.STOPS_IN] = stops if tables[of.TABLE_STOPS] != 0 or not moves else 0
+        wholes(address)[at.PREVIOUS_VOICE] = other
+        wholes(address)[at.STOPS_IN] = stops if tables[of.TABLE_STOPS] != 0 else 0
 
 
 @njit(**COMPILED)
@@ -1131,8 +1122,6 @@ def _strike(
 ) -> None:
     """Plays all strings of a key's course, one after the other; the first is the one that is reported."""
     _note_on(player, players, table, tables, mixers, event, 0)
-    if players[event + of.EVENT_VOICES] != 0:
-        return
     frame = players[event + of.EVENT_FRAME]
     for member in range(1, tables[of.TABLE_COURSE]):
         later = round(member * table[of.TABLE_APART_S] * player[of.PLAYER_RATE])
@@ -1158,11 +1147,8 @@ def _note_on(
         players[event + of.EVENT_KEY],
         player[event + of.EVENT_VALUE],
     )
-    frame, mode, prepared = (
-        players[event + of.EVENT_FRAME],
-        tables[of.TABLE_MODE],
-        players[event + of.EVENT_VOICES] != 0,
-    )
+    frame, mode, drum = players[event + of.EVENT_FRAME], tables[of.TABLE_MODE], tables[of.TABLE_DRUMS] != 0
+    by_hand = player[event + of.EVENT_POSITION] > 0.0
     players[_channel(channel) + of.CHANNEL_PLAYS] = 1
     place, string, count = _place(players, tables, event), -1, tables[of.TABLE_STRINGS]
     if place % 256 == 0 and count > 0 and _chosen(table, count, key) != place // 256 - 1:
@@ -1173,8 +1159,8 @@ def _note_on(
     own, modes, gain, highest_m = _moment(player, 3), 0, 1.0, 0.0
     position = amplitude_mm = width = 0.0
     pairs, strength, stroke, touched = 0, 1.0, 0, 0
-    if not prepared:
-        pitch_hz = _pitch_hz(table, tables, key, player[event + of.EVENT_PITCH_HZ])
+    if not drum:
+        pitch_hz = _pitch_hz(table, tables, key)
         shortened = 1.0
         if pitch_hz > 0.0:
             modes, shortened = string_of(player, players, table, tables, key, string, pitch_hz, False, own)
@@ -1194,6 +1180,10 @@ def _note_on(
         share = min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve)
         harder = _value(player, players, table, tables, of.HARDEST_MM) / soft
         amplitude_mm = min(soft * harder**share * shortened, LARGEST_AMPLITUDE_MM)
+        if by_hand:
+            amplitude_mm = min(player[event + of.EVENT_AMPLITUDE_MM], LARGEST_AMPLITUDE_MM)
+            if harder != 1.0:
+                share = min(max(math.log(amplitude_mm / soft / shortened) / math.log(harder), 0.0), 1.0)
         strength = harder ** (share - ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0**-curve))
         width = _value(player, players, table, tables, of.WIDTH)
         width *= (_value(player, players, table, tables, of.WIDTH_HARD) / width) ** share
@@ -1201,9 +1191,9 @@ def _note_on(
             _value(player, players, table, tables, of.POSITION),
             players[_channel(channel) + of.CHANNEL_SLIDE],
         )
-        given = player[event + of.EVENT_POSITION]
-        if given > 0.0:
-            position = min(max(given, POSITION_RANGE[0]), POSITION_RANGE[1])
+        if by_hand:
+            position = min(max(player[event + of.EVENT_POSITION], POSITION_RANGE[0]), POSITION_RANGE[1])
+            width = player[event + of.EVENT_WIDTH]
         elif mode == of.MPE and slide >= 0:
             position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
         turned, varies = 0.0, table[of.TABLE_VARIATION]
@@ -1211,16 +1201,16 @@ def _note_on(
         release_s = _contact_s(softest_ms, _value(player, players, table, tables, of.CONTACT_HARD_MS), share)
         if varies > 0.0:
             stroke = players[of.PLAYER_AGE]
-            if not given > 0.0:
+            if not by_hand:
                 position *= 1 + varies * VARIES_PLACE * _varied(stroke, key, 0)
                 position = min(max(position, POSITION_RANGE[0]), POSITION_RANGE[1])
-            amplitude_mm *= 10.0 ** (varies * VARIES_DB / 20 * _varied(stroke, key, 1))
-            amplitude_mm = min(amplitude_mm, LARGEST_AMPLITUDE_MM)
-            width *= 1 + varies * VARIES_WIDTH * _varied(stroke, key, 2)
+                amplitude_mm *= 10.0 ** (varies * VARIES_DB / 20 * _varied(stroke, key, 1))
+                amplitude_mm = min(amplitude_mm, LARGEST_AMPLITUDE_MM)
+                width *= 1 + varies * VARIES_WIDTH * _varied(stroke, key, 2)
             release_s *= 1 + varies * VARIES_RELEASE * _varied(stroke, key, 3)
             turned = varies * VARIES_ANGLE * _varied(stroke, key, 4)
         touched = _node(player, players, table, tables, channel, modes)
-        if touched > 0 and not given > 0.0:
+        if touched > 0 and not by_hand:
             position = min(position, HARMONIC_REACH / touched)
         highest_m = _pull(player, table, tables, modes, position, amplitude_mm / 1000, width)
         _release_pluck(player, tables, own, modes, release_s)
@@ -1244,7 +1234,8 @@ def _note_on(
     players[note + of.NOTE_PLACE] = place
     players[note + of.NOTE_STRING] = string
     players[note + of.NOTE_HELD] = 1
-    players[note + of.NOTE_PREPARED] = prepared
+    players[note + of.NOTE_DRUM] = drum
+    players[note + of.NOTE_BY_HAND] = by_hand
     players[note + of.NOTE_MODES] = modes
     players[note + of.NOTE_PAIRS] = pairs
     for each in range(3):
@@ -1253,7 +1244,7 @@ def _note_on(
     player[note + of.NOTE_APERTURE_M] = table[of.TABLE_APERTURE_M]
     players[note + of.NOTE_MEMBER] = member
     players[note + of.NOTE_OCTAVE] = octave
-    if not prepared and not octaves and tables[of.TABLE_COURSE] > 1 and table[of.TABLE_CONDUCTANCE] > 0.0:
+    if not drum and not octaves and tables[of.TABLE_COURSE] > 1 and table[of.TABLE_CONDUCTANCE] > 0.0:
         player[note + of.NOTE_BRIDGE] = table[of.TABLE_BRIDGE] if pairs > 0 else 0.0
     if member > 0:  # above and below the first by turns, each key a little otherwise
         apart = (member + 1) // 2 * (1 if member % 2 == 1 else -1) * (1 + COURSES_VARY * _varied(0, key, member))
@@ -1265,7 +1256,6 @@ def _note_on(
     players[note + of.NOTE_FRAME] = frame
     players[note + of.NOTE_BEGAN] = max(frame, mixers[at.M_FRAMES])
     player[note + of.NOTE_VELOCITY] = velocity
-    player[note + of.NOTE_GIVEN] = player[event + of.EVENT_POSITION]
     if touched > 0:
         players[note + of.NOTE_TOUCHED] = touched
         lasts = _frames(player, TOUCH_PERIODS / strings.pitch_hz(own))
@@ -1275,7 +1265,6 @@ def _note_on(
     player[note + of.NOTE_PLUCK + 1] = amplitude_mm
     player[note + of.NOTE_PLUCK + 2] = width
     player[note + of.NOTE_GAIN] = gain
-    player[note + of.NOTE_PITCH_HZ] = player[event + of.EVENT_PITCH_HZ]
     for each in range(of.STRING):
         player[note + of.NOTE_OWN + each] = own[each]
         player[note + of.NOTE_STRING_NOW + each] = own[each]
@@ -1283,10 +1272,9 @@ def _note_on(
     players[note + of.NOTE_SOLO] = tables[of.TABLE_SOLO]
     for point in range(2):
         player[note + of.NOTE_POINT + point] = player[of.PLAYER_VALUES + of.POINT + point]
-    for source in range(of.MOST_SOURCES):
-        address = players[event + of.EVENT_VOICES + source]
-        if not prepared and source < tables[of.TABLE_SOURCES]:
-            address = players[of.PLAYER_HERE] + 8 * _slots_of_voice(players, number, source)
+    for source in range(tables[of.TABLE_SOURCES]):
+        address = players[of.PLAYER_HERE] + 8 * _slots_of_voice(players, number, source)
+        if not drum:
             kind, program = tables[of.TABLE_KINDS + source], tables[of.TABLE_PROGRAMS + source]
             _make_voice(
                 player,
@@ -1326,7 +1314,7 @@ def _note_on(
         else:
             wholes(address)[at.STATE] = at.OVER
     _retune(player, players, table, tables, number, 0.0, 0, mixers[at.M_FRAMES])
-    if not prepared and member == 0:
+    if not drum and member == 0:
         level_db = _value(player, players, table, tables, of.ONSET_DB)
         contact.touch(player, players, table, of.STROKE, level_db, strength, stroke, key, frame, 0.0, 0.0)
     _make_room(player, players)
@@ -1364,13 +1352,12 @@ def _move(
     tables: np.ndarray,
     number: int,
     key: int,
-    given_hz: float,
     frame: int,
     now: int,
 ) -> bool:
     """Shortens or lengthens the string of a note for another key; False where it cannot play that key."""
     note, count, mode = _note(number), tables[of.TABLE_STRINGS], tables[of.TABLE_MODE]
-    pitch_hz, string = _pitch_hz(table, tables, key, given_hz), players[note + of.NOTE_STRING]
+    pitch_hz, string = _pitch_hz(table, tables, key), players[note + of.NOTE_STRING]
     if count > 0 and string < 0:
         string = _chosen(table, count, players[note + of.NOTE_KEY])
     if pitch_hz <= 0.0 or (count > 0 and key < table[of.TABLE_OPEN + string * of.OPEN_SLOTS + of.OPEN_NOTE]):
@@ -1390,7 +1377,6 @@ def _move(
                 players[other + of.NOTE_HAS_PLACE] = 0
                 _release_note(player, players, other, PLUCK_STOPS_S, frame)
     players[note + of.NOTE_STRING], players[note + of.NOTE_KEY] = string, key
-    player[note + of.NOTE_PITCH_HZ] = given_hz
     seconds = _moves_in_s(players, mode, players[note + of.NOTE_CHANNEL])
     if players[note + of.NOTE_MEMBER] == 0:
         level_db = _value(player, players, table, tables, of.DAMPER_DB)
@@ -1413,7 +1399,6 @@ def _move_others(
     first: int,
     before: int,
     key: int,
-    given_hz: float,
     frame: int,
     now: int,
 ) -> None:
@@ -1424,7 +1409,7 @@ def _move_others(
         same = players[note + of.NOTE_KEY] == before and players[note + of.NOTE_CHANNEL] == channel
         same = same and players[note + of.NOTE_MEMBER] != 0 and players[note + of.NOTE_ID] == id
         if same and _sounds(players, note):
-            _move(player, players, table, tables, number, key, given_hz, frame, now)
+            _move(player, players, table, tables, number, key, frame, now)
 
 
 @njit(**COMPILED)
@@ -1437,9 +1422,7 @@ def _hammer_on(
     """
     channel, key, found, age = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY], -1, 0
     place = _place(players, tables, event)
-    if players[event + of.EVENT_VOICES] != 0 or not _switched(
-        players, tables[of.TABLE_MODE], channel, of.CHANNEL_LEGATO
-    ):
+    if not _switched(players, tables[of.TABLE_MODE], channel, of.CHANNEL_LEGATO):
         return False
     for number in range(of.MOST_NOTES):
         note = _note(number)
@@ -1448,7 +1431,6 @@ def _hammer_on(
             held
             and players[note + of.NOTE_MEMBER] == 0
             and (place % 256 != 0 or players[note + of.NOTE_PLACE] == place)
-            and players[note + of.NOTE_PREPARED] == 0
             and players[note + of.NOTE_AGE] > age
             and _sounds(players, note)
         ):
@@ -1457,11 +1439,9 @@ def _hammer_on(
         return False
     note = _note(found)
     id, before = players[note + of.NOTE_ID], players[note + of.NOTE_KEY]
-    if key == before or not _move(
-        player, players, table, tables, found, key, player[event + of.EVENT_PITCH_HZ], frame, now
-    ):
+    if key == before or not _move(player, players, table, tables, found, key, frame, now):
         return False
-    _move_others(player, players, table, tables, note, before, key, player[event + of.EVENT_PITCH_HZ], frame, now)
+    _move_others(player, players, table, tables, note, before, key, frame, now)
     _report(player, players, of.ENDED, id, channel, before, now, 0.0)
     _reported(players)
     for number in range(of.MOST_NOTES):
@@ -1494,8 +1474,8 @@ def _pull_off(
             same = players[other + of.NOTE_KEY] == key and players[other + of.NOTE_CHANNEL] == channel
             same = same and players[other + of.NOTE_MEMBER] == 0
             free = free and not (same and players[other + of.NOTE_HELD] != 0 and _sounds(players, other))
-        if free and _move(player, players, table, tables, number, key, math.nan, frame, now):
-            _move_others(player, players, table, tables, _note(number), before, key, math.nan, frame, now)
+        if free and _move(player, players, table, tables, number, key, frame, now):
+            _move_others(player, players, table, tables, _note(number), before, key, frame, now)
             return True
     return False
 
@@ -1576,9 +1556,8 @@ def _strums_in(player: np.ndarray, players: np.ndarray, table: np.ndarray, table
     """Frames from string to string of a chord that the note of an event is in; 0: notes begin as they come."""
     note_on = players[event + of.EVENT_KIND] == of.NOTE_ON and player[event + of.EVENT_VALUE] > 0.0
     channel = players[event + of.EVENT_CHANNEL]
-    if not note_on or not 0 <= channel < of.CHANNELS or players[event + of.EVENT_VOICES] != 0:
-        return 0
-    if tables[of.TABLE_DRUMS] != 0:
+    by_hand = player[event + of.EVENT_POSITION] > 0.0
+    if not note_on or by_hand or not 0 <= channel < of.CHANNELS or tables[of.TABLE_DRUMS] != 0:
         return 0
     switch = of.CHANNEL_STRUMS
     milliseconds = _technique(player, players, table, tables, channel, of.STRUM_MS, switch, USUAL_STRUM_MS)
@@ -1737,7 +1716,7 @@ def _follow_hands(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, n
         return
     for number in range(of.MOST_NOTES):
         note = _note(number)
-        if players[note + of.NOTE_STATE] != of.RINGS or players[note + of.NOTE_PREPARED] != 0:
+        if players[note + of.NOTE_STATE] != of.RINGS:
             continue
         if players[note + of.NOTE_TOUCHED] != 0 and players[note + of.NOTE_LIFTED] < end:
             _retune(player, players, table, tables, number, LIFT_S, players[note + of.NOTE_LIFTED], now)
@@ -1746,7 +1725,7 @@ def _follow_hands(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, n
         if players[note + of.NOTE_HELD] == 0 or players[note + of.NOTE_RELEASED] != 0 or not _sounds(players, note):
             continue
         channel, switch = players[note + of.NOTE_CHANNEL], of.CHANNEL_TREMOLO
-        if players[note + of.NOTE_MEMBER] != 0:
+        if players[note + of.NOTE_MEMBER] != 0 or players[note + of.NOTE_BY_HAND] != 0:
             continue
         hz = _technique(player, players, table, tables, channel, of.TREMOLO_HZ, switch, USUAL_TREMOLO_HZ)
         due = players[note + of.NOTE_BEGAN] + _frames(player, 1 / hz) if hz > 0.0 else end
@@ -1775,8 +1754,6 @@ def _pluck_again(
     if players[note + of.NOTE_PLACE] % 256 == 0:
         players[event + of.EVENT_STRING] = players[note + of.NOTE_PLACE] // 256
     player[event + of.EVENT_VALUE] = player[note + of.NOTE_VELOCITY]
-    player[event + of.EVENT_POSITION] = player[note + of.NOTE_GIVEN]
-    player[event + of.EVENT_PITCH_HZ] = player[note + of.NOTE_PITCH_HZ]
     players[note + of.NOTE_ID], players[note + of.NOTE_BEGAN] = 0, frame
     tuned, before = player[note + of.NOTE_TUNED], players[of.PLAYER_AGE]
     _strike(player, players, table, tables, mixers, event)
@@ -1984,10 +1961,13 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
     if kind == of.NOTE_ON and value > 0.0:
         if _strum(player, players, table, tables, event, now):
             return
+        if player[event + of.EVENT_POSITION] > 0.0:  # by hand: no key is down
+            _strike(player, players, table, tables, mixers, event)
+            return
         _hold(players, channel, key, True)
         if tables[of.TABLE_DRUMS] == 0 and _hammer_on(player, players, table, tables, event, frame, now):
             return
-        if tables[of.TABLE_DRUMS] != 0 and players[event + of.EVENT_VOICES] == 0:
+        if tables[of.TABLE_DRUMS] != 0:
             number = _free_note(player, players, mixers)
             first = _slots_of_voice(players, number, 0)
             stride = _slots_of_voice(players, number, 1) - first
@@ -2045,7 +2025,7 @@ def _hear(player: np.ndarray, players: np.ndarray) -> None:
     """Lets notes follow the gains of sources and the listening points."""
     for number in range(of.MOST_NOTES):
         note = _note(number)
-        if players[note + of.NOTE_STATE] == of.RINGS and players[note + of.NOTE_PREPARED] == 0:
+        if players[note + of.NOTE_STATE] == of.RINGS and players[note + of.NOTE_DRUM] == 0:
             for source in range(of.MOST_SOURCES):
                 address = players[note + of.NOTE_VOICES + source]
                 if address != 0:
@@ -2056,7 +2036,7 @@ def _hear(player: np.ndarray, players: np.ndarray) -> None:
                         gap_um = _value(player, players, table, tables, of.JAVARI_UM)
                         reals(address)[at.JAVARI_GAP] = gap_um * 1e-6
             _listen(player, players, note)
-        elif players[note + of.NOTE_STATE] == of.RINGS and wholes(players[of.PLAYER_TABLE])[of.TABLE_DRUMS] != 0:
+        elif players[note + of.NOTE_STATE] == of.RINGS:
             drums.hear(player, players, reals(players[of.PLAYER_TABLE]), wholes(players[of.PLAYER_TABLE]), note)
 
 

@@ -9,8 +9,8 @@ import itertools
 import math
 import threading
 from collections import deque
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.memory import publish
+from engine.pluck import Pluck
 from engine.resonators.string import StringParameters
 from engine.voices.mixer import Mixer
-from engine.voices.voice import Voice
 
-NONE = math.nan
 AT_HAND = 16  # notes whose memory is there from the start
 PAGE_SLOTS = 512  # of 4 kB
 LOG_DB = 20 / math.log(10)
@@ -34,10 +33,10 @@ EVENT = np.dtype(
         ("value", np.float64),
         ("id", np.int64),
         ("position", np.float64),
-        ("pitch_hz", np.float64),
+        ("amplitude_mm", np.float64),
         ("table", np.int64),
         ("struck_s", np.float64),
-        ("voices", np.int64, of.MOST_SOURCES),
+        ("width", np.float64),
         ("struck", np.int64),
         ("struck_modes", np.int64),
         ("chord", np.int64),
@@ -94,7 +93,7 @@ class Report:
         string: on which of a set it is played, from the highest, 0; -1: the key chooses.
         table: serial of its instrument's table.
         position, amplitude_mm, width: of the pluck.
-        parameters: of its string as its key had it; None for prepared voices.
+        parameters: of its string as its key had it; None for drums.
         note: which of the player's notes it is.
     """
 
@@ -123,7 +122,7 @@ class Ringing:
         level_db: of its loudest voice, in dB of full scale.
         seconds: how long it has been ringing, as far as the device was given it.
         string: on which of a set it is played, from the highest, 0; -1: the key chooses.
-        length_m: of its string as it is now, between two keys while it slides; None for prepared voices and drums.
+        length_m: of its string as it is now, between two keys while it slides; None for drums.
     """
 
     id: int
@@ -166,17 +165,6 @@ class Channel:
     strums: bool
 
 
-@dataclass(eq=False)
-class _Prepared:
-    """Voices of a note that were built elsewhere, whose memory is in use."""
-
-    voices: tuple[Voice, ...] = field(default_factory=tuple)
-
-    @property
-    def over(self) -> bool:
-        return all(voice.over for voice in self.voices)
-
-
 class CompiledPlayer:
     """Plays the instrument of its latest table in the mixer that it is given to.
 
@@ -201,7 +189,6 @@ class CompiledPlayer:
         self._ids = itertools.count(1)
         self._backlog: deque[tuple[object, ...]] = deque()  # for which the ring has no room
         self._tables: deque[Table] = deque()  # which the kernel may be reading, or will
-        self._prepared: list[_Prepared] = []
         self._struck: dict[int, NDArray[np.float64]] = {}  # by event, until it is reported
         self._read = 0
         self.missed = False
@@ -228,10 +215,8 @@ class CompiledPlayer:
         key: int = 0,
         value: float = 0.0,
         frame: int = 0,
-        position: float = NONE,
-        pitch_hz: float = NONE,
+        by_hand: Pluck | None = None,
         struck_s: float = 0.0,
-        voices: Sequence[Voice] = (),
         note: int = 0,
         struck: NDArray[np.float64] | None = None,
         string: int | None = None,
@@ -241,12 +226,12 @@ class CompiledPlayer:
         Args:
             kind: one of `playing_layout`, as all that follows.
             frame: of the mixer, at which it counts; 0: at once.
-            voices: of a note, which were built elsewhere, with their gains; they are in use until they are over.
+            by_hand: place, amplitude and width of the pluck of a note, in the instrument's shape; None: as the
+                instrument and the velocity have them.
             note: the number of the note that is tuned, choked or cancelled; 0: all.
             struck: speeds (modes,) that 1 N s gives to a drum where it is struck; None: at its own place.
             string: of a note: on which of a set it is played, from the highest, 0; None: channel or key choose.
         """
-        addresses = [voice.address for voice in voices] + [0] * (of.MOST_SOURCES - len(voices))
         row, modes = (0, 0) if struck is None else (int(struck.ctypes.data), len(struck))
         with self._lock:
             number = next(self._ids)
@@ -255,10 +240,8 @@ class CompiledPlayer:
                 self._struck[number] = struck
                 while len(self._struck) > of.EVENTS + of.QUEUED:
                     del self._struck[next(iter(self._struck))]
-            if voices:
-                self._prepared = [each for each in self._prepared if not each.over]
-                self._prepared.append(_Prepared(tuple(voices)))
-            head = (frame, kind, channel, key, value, id, position, pitch_hz, 0, struck_s, addresses, row, modes)
+            at, mm, width = (0, 0, 0) if by_hand is None else (by_hand.position, by_hand.amplitude_mm, by_hand.width)
+            head = (frame, kind, channel, key, value, id, at, mm, 0, struck_s, width, row, modes)
             self._push((*head, 0, 0, 0 if string is None else string + 1))
         return number
 
@@ -268,9 +251,7 @@ class CompiledPlayer:
             self._tables.append(table)
             while self._tables[0].serial < int(self._counts[of.PLAYER_SERIAL]):
                 self._tables.popleft()
-            self._push(
-                (frame, of.TABLE, 0, 0, 0.0, 0, NONE, NONE, table.address, 0.0, [0] * of.MOST_SOURCES, 0, 0, 0, 0, 0)
-            )
+            self._push((frame, of.TABLE, 0, 0, 0.0, 0, 0.0, 0.0, table.address, *(0,) * (of.EVENT_SLOTS - 9)))
 
     def _push(self, record: tuple[object, ...]) -> None:
         self._backlog.append(record)
@@ -324,7 +305,6 @@ class CompiledPlayer:
         """Those since this was asked for the last time; of very many only the latest. One thread asks."""
         with self._lock:
             self._flush()
-            self._prepared = [each for each in self._prepared if not each.over]
         total, found = int(self._counts[of.PLAYER_REPORTED]), []
         self.missed |= total > self._read + of.REPORTS
         for number in range(max(self._read, total - of.REPORTS), total):
@@ -359,7 +339,7 @@ class CompiledPlayer:
 
     def _length_m(self, note: NDArray[np.int64], voice: NDArray[np.float64]) -> float | None:
         """Of a note's string: where it glides to, times how far the first mode of a voice has still to go."""
-        if note[of.NOTE_PREPARED] or voice.view(np.int64)[at.KIND] == at.BANK:
+        if note[of.NOTE_DRUM]:
             return None
         row = note.view(np.float64)[of.NOTE_STRING_NOW : of.NOTE_STRING_NOW + of.STRING].tolist()
         try:
@@ -422,15 +402,9 @@ class CompiledPlayer:
         for source in range(of.MOST_SOURCES if note[of.NOTE_STATE] == of.RINGS else 0):
             address = int(note[of.NOTE_VOICES + source])
             own = of.PLAYER_VOICES + (number * of.MOST_SOURCES + source) * stride
-            if address == self.address + 8 * own:
+            if address:
                 found.append(self.memory[own : own + at.HEADER])
-            elif address:
-                found += [each for each in self._memories() if int(each.ctypes.data) == address]
         return found
-
-    def _memories(self) -> list[NDArray[np.float64]]:
-        """Of prepared voices."""
-        return [voice.memory for each in list(self._prepared) for voice in each.voices]
 
     @property
     def wheel(self) -> tuple[int, int]:

@@ -20,10 +20,9 @@ import pytest
 from numpy.typing import NDArray
 
 from app.instrument import events
-from app.instrument.compiled import InstrumentPlayer, event_of, record_of
+from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.loud_keys import LoudKeys, on_string
-from app.instrument.strings import pitch_hz_of
 from app.instrument.table import PLAYED_PARAMETERS
 from app.patches.library import find_patch, read_patch
 from app.patches.patch import Losses, Patch, Pickup, Polarisations
@@ -33,8 +32,8 @@ from engine.kernels import playing_layout as of
 from engine.kernels.layout import QUANTUM
 from engine.pluck import Pluck
 from engine.presets import Preset
-from engine.voices import Mixer, Voice, plain_program
-from engine.voices.programs import solver_program, tension_program
+from engine.voices import Mixer
+from tests.app.instrument.seen import sounding
 from tests.engine.resonators.test_recorded import recorded
 
 RATE_HZ = 48_000
@@ -205,16 +204,14 @@ def test_cancel_leaves_what_has_begun(shipped: dict[str, Patch], preset: Preset)
     assert off("cancel", np.concatenate([first, rendered(stage, (), 150)])) < CLOSE
 
 
-def test_a_cancelled_note_is_reported_and_its_voices_are_over(shipped: dict[str, Patch], preset: Preset) -> None:
+def test_a_cancelled_note_is_reported(shipped: dict[str, Patch], preset: Preset) -> None:
     stage = Compiled(shipped["koto"], preset)
     number = stage.player.handle(NoteOn(60, 90), 5000)
-    voice = samples(np.ones((1000, 1), np.float32))
-    prepared = stage.player.compiled.give(of.NOTE_ON, 0, 60, 90, 5001, voices=[voice])
     rendered(stage, (), 2)
     stage.player.cancel()
     rendered(stage, (), 1)
-    assert [(each.kind, each.id) for each in stage.player.reports()] == [(of.REFUSED, number), (of.REFUSED, prepared)]
-    assert voice.over and not stage.mixer.active
+    assert [(each.kind, each.id) for each in stage.player.reports()] == [(of.REFUSED, number)]
+    assert not stage.mixer.active
 
 
 def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(shipped: dict[str, Patch], preset: Preset) -> None:
@@ -304,81 +301,56 @@ def test_the_oldest_make_room(shipped: dict[str, Patch], preset: Preset) -> None
     assert compared("oldest", patch, preset, played, 200, most=5) < CLOSE
 
 
-# Voices that were built elsewhere
+# Plucks by hand
 
 
-def samples(sound: NDArray[np.float32]) -> Voice:
-    voice = Voice.of_samples(plain_program(RATE_HZ), sound)
-    voice.begin_at_once()
-    return voice
-
-
-def tone(frames: int) -> NDArray[np.float32]:
-    return (0.1 * np.sin(np.arange(frames) / 30))[:, None].astype(np.float32)
-
-
-def test_prepared_voices_sound_at_their_frame_and_end(shipped: dict[str, Patch], preset: Preset) -> None:
-    stage = Compiled(shipped["koto"], preset)
-    number = stage.player.compiled.give(of.NOTE_ON, 0, 60, 90, 100, voices=[samples(tone(6000))])
-    sound = rendered(stage, (), 200)[:, 0]
-    assert not sound[:100].any()
-    np.testing.assert_allclose(sound[100:5900], tone(5800)[:, 0], atol=1e-6)
-    kinds = [(each.kind, each.id, each.frame) for each in stage.player.reports()]
-    assert kinds[0] == (of.BEGAN, number, 100) and [kind for kind, *_ in kinds] == [of.BEGAN, of.ENDED]
-
-
-def test_a_prepared_voice_without_modes_fades_when_its_key_is_released(
+def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(
     shipped: dict[str, Patch], preset: Preset
 ) -> None:
-    patch = shipped["jazz_guitar"]  # releases in 0.25 s
-    stage = Compiled(patch, preset)
-    stage.player.compiled.give(of.NOTE_ON, 0, 60, 90, 0, voices=[samples(tone(90_000))])
-    sound = rendered(stage, [(6400, NoteOff(60))], 400)[:, 0]
-    middle = 6400 + 6000
-    assert np.abs(sound[:6400]).max() == pytest.approx(0.1, rel=0.01)
-    assert np.abs(sound[middle - 200 : middle + 200]).max() == pytest.approx(0.05, rel=0.1)
-    assert not sound[6400 + 12_064 :].any()
+    for name, key in (("classical_guitar", 52), ("fretless_bass", 40), ("cimbalom", 60)):
+        patch = shipped[name]
+        one, other = Compiled(patch, preset), Compiled(patch, preset)
+        keys = one.player.keys
+        assert isinstance(keys, LoudKeys)
+        found = keys.string_of(key)
+        assert found is not None
+        pluck = on_string(found, patch.pluck.pluck(90))
+        sound = rendered(one, [(0, NoteOn(key, 90))], 100)
+        assert difference(sound, rendered(other, [(0, NoteOn(key, 1, pluck=pluck))], 100)) < 1e-9
 
 
-def test_a_prepared_voice_is_stopped_by_what_has_its_place_next(shipped: dict[str, Patch], preset: Preset) -> None:
-    for patch in (shipped["koto"], shipped["cimbalom"]):  # a voice without modes cannot be added to
-        stage = Compiled(patch, preset)
-        for frame in (0, 6400):
-            stage.player.compiled.give(of.NOTE_ON, 0, 60, 90, frame, voices=[samples(tone(20_000))])
-        sound = rendered(stage, (), 150)[:, 0]
-        np.testing.assert_allclose(sound[6400 + 300 : 9000], tone(2600)[300:, 0], atol=1e-6)
+def test_a_pluck_by_hand_is_exact_where_strokes_vary(shipped: dict[str, Patch], preset: Preset) -> None:
+    patch = changed(shipped["koto"], pluck=shipped["koto"].pluck.model_copy(update={"variation": 1.0}))
+    stage, pluck = Compiled(patch, preset), Pluck(0.31, 2.5, patch.pluck.shape, 0.03)
+    for number in range(3):
+        stage.handle(NoteOn(60, 90, pluck=pluck), 640 * number)
+    rendered(stage, (), 30)
+    reports = [each for each in stage.player.reports() if each.kind == of.BEGAN]
+    assert {(each.position, each.amplitude_mm, each.width) for each in reports} == {(0.31, 2.5, 0.03)}
 
 
-def test_prepared_voices_with_modes_are_damped_like_the_players_own(
+def test_a_string_plucked_by_hand_rings_until_its_key_is_released_and_no_tremolo_plucks_it(
+    shipped: dict[str, Patch], preset: Preset
+) -> None:
+    patch = changed(shipped["classical_guitar"], technique={"tremolo_hz": 16.0})
+    stage, pluck = Compiled(patch, preset), Pluck(0.3, 1.0, patch.pluck.shape, 0.03)
+    rendered(stage, [(64, NoteOn(52, 90, pluck=pluck))], 300)
+    assert [each.kind for each in stage.player.reports()] == [of.BEGAN]
+    assert [(each.key, each.damped) for each in sounding(stage.player)] == [(52, False)]
+    rendered(stage, [(0, NoteOff(52))], 2)
+    assert [each.damped for each in sounding(stage.player)] == [True]
+
+
+def test_with_legato_a_key_moves_a_string_plucked_by_hand_which_no_key_holds(
     shipped: dict[str, Patch], preset: Preset
 ) -> None:
     patch = shipped["classical_guitar"]
-    at_once = {"release_ms": 0.0, "release_hard_ms": 0.0}
-    patch = changed(patch, pluck=patch.pluck.model_copy(update=at_once), polarisations=None)
-    own, prepared = Compiled(patch, preset), Compiled(patch, preset)
-    keys = own.player.keys
-    assert isinstance(keys, LoudKeys)
-    found = keys.of_key(52)
-    assert found is not None
-    pulled = on_string(found.string, patch.pluck.pluck(90)).displacement(preset.info.grid_points)
-    voices = []
-    for source, gain in GAINS.items():
-        program = solver_program(found.resonator, RATE_HZ)
-        if source == "model":
-            program = tension_program(preset.weights, preset.configuration, found.resonator, RATE_HZ)
-        voices.append(Voice(program, pulled, own.player.ear))
-        voices[-1].start_with_gain(gain * found.gain)
-    prepared.player.compiled.give(of.NOTE_ON, 0, 52, 90, 0, voices=voices)
-    own.handle(NoteOn(52, 90), 0)
-    one, other = (rendered(stage, [(6400, NoteOff(52))], 300) for stage in (own, prepared))
-    assert difference(one, other) < 1e-7  # σ is raised, not d₁ / 2ρA
-
-
-def test_prepared_notes_make_room_with_the_others(shipped: dict[str, Patch], preset: Preset) -> None:
-    stage = Compiled(shipped["koto"], preset, most=2)
-    stage.player.compiled.give(of.NOTE_ON, 0, 50, 90, 0, voices=[samples(tone(90_000))])
-    rendered(stage, [(64, NoteOn(60, 90)), (128, NoteOn(62, 90))], 100)
-    assert [each.key for each in stage.player.ringing()] == [60, 62]
+    stage, pluck = Compiled(patch, preset), Pluck(0.3, 1.0, patch.pluck.shape, 0.03)
+    legato = Controller(events.LEGATO, 127)
+    rendered(stage, [(0, legato), (64, NoteOn(52, 90, pluck=pluck)), (6400, NoteOn(53, 90))], 200)
+    assert [(each.key, each.damped) for each in sounding(stage.player)] == [(53, False)]
+    rendered(stage, [(0, NoteOff(53))], 2)
+    assert [(each.key, each.damped) for each in sounding(stage.player)] == [(53, True)]
 
 
 # What comes back
@@ -525,15 +497,6 @@ def test_tables_are_freed_when_the_kernel_has_left_them(shipped: dict[str, Patch
     assert len(stage.player.compiled._tables) <= 2
 
 
-def test_a_note_may_have_its_own_pitch_and_place(shipped: dict[str, Patch], preset: Preset) -> None:
-    stage = Compiled(shipped["koto"], preset)
-    stage.player.compiled.give(of.NOTE_ON, 0, 60, 90, position=0.4, pitch_hz=271.0)
-    rendered(stage, (), 2)
-    (report,) = stage.player.reports()
-    assert report.parameters is not None
-    assert pitch_hz_of(report.parameters) == pytest.approx(271.0, rel=1e-9) and report.position == 0.4
-
-
 def test_a_parameter_changes_as_by_a_turned_patch(shipped: dict[str, Patch], preset: Preset) -> None:
     patch = shipped["koto"]
     one, other = Compiled(patch, preset), Compiled(patch, preset)
@@ -570,13 +533,6 @@ def test_a_pluck_at_a_place_is_none_of_a_key(shipped: dict[str, Patch], preset: 
     assert stage.player.handle(PluckAt(Pluck())) == 0
     rendered(stage, (), 1)
     assert stage.player.reports() == [] and not stage.mixer.active
-
-
-@pytest.mark.parametrize(
-    "event", [NoteOn(60, 5, 3), NoteOff(60, KEYS), Bend(-0.25, 2), Controller(events.SLIDE, 17, 1)]
-)
-def test_an_event_and_its_record(event: NoteOn | NoteOff | Bend | Controller) -> None:
-    assert event_of(record_of(event)) == event
 
 
 def test_values_of_the_player_have_the_indices_of_its_layout() -> None:

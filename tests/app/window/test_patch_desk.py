@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QInputDialog, QToolTip
 from pytestqt.qtbot import QtBot
 
-from app.instrument.events import NoteOff, NoteOn, PluckAt, TimedEvent
+from app.instrument.events import KEYS, NoteOff, NoteOn, PluckAt, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
@@ -23,6 +23,7 @@ from app.shared.key_names import note_name
 from app.views.string.view import StringView
 from app.window.controller import Controller
 from app.window.patch_desk import NOTE_REPORTED_AFTER_MS
+from engine.pluck import SHAPES
 from tests.app.instrument.seen import Seen, sounding
 
 
@@ -68,6 +69,58 @@ def test_a_pluck_by_hand_is_as_loud_as_the_key_whose_string_it_is(qtbot: QtBot, 
     assert isinstance(note, Note)
     assert string_of(note.request.preset) == struck.own
     assert note.gain == pytest.approx(struck.gain) != 1
+
+
+def test_a_pluck_by_hand_is_a_note_of_the_instrument(qtbot: QtBot, played: Controller) -> None:
+    played.window.instrument.pressed.emit(52, 100, None)
+    qtbot.waitUntil(lambda: played.session.choices.string is not None)
+    played.window.instrument.released.emit(52, None)
+    shown = played.session.choices.string
+    played.session.update(position=0.31, amplitude_mm=1.2)
+    played.performance.notes.keys.begin_recording()
+    played.pluck()
+    note = played.instruments.latest
+    assert isinstance(note, KeyNote)
+    qtbot.waitUntil(lambda: note.request is not None)
+    assert played.session.choices.string == shown
+    assert (note.request.pluck.position, note.request.pluck.amplitude_mm) == (0.31, 1.2)  # type: ignore[union-attr]
+    qtbot.waitUntil(lambda: played.performance.ready and played.performance.moving)
+    assert (played.session.choices.position, played.session.choices.amplitude_mm) == (0.31, 1.2)
+    (struck,) = ringing(played)
+    assert (struck.key, struck.damped) == (52, False)
+    recorded = [each.event for each in played.performance.notes.keys.recorder.end()]
+    assert NoteOn(52, note.event.velocity, KEYS, pluck=played.session.choices.pluck) in recorded
+    sent = played.instruments.struck
+    assert sent is not None and sent.event.pluck == played.session.choices.pluck
+
+
+def test_a_pluck_by_hand_that_the_instrument_does_not_have_is_of_the_string_alone(
+    qtbot: QtBot, played: Controller
+) -> None:
+    played.window.instrument.pressed.emit(52, 100, None)
+    qtbot.waitUntil(lambda: played.session.choices.string is not None)
+    own = played.session.choices.shape
+    for changes in ({"shape": next(each for each in SHAPES if each != own)}, {"b": "preset:nylon_linear_gaussian_16k_koopman"}):
+        played.session.update(**{"shape": own, "b": "truth", **changes})
+        played.pluck()
+        assert isinstance(played.performance.notes.latest, Note)
+
+
+def test_each_turn_of_a_loop_is_a_note_of_the_instrument(qtbot: QtBot, played: Controller) -> None:
+    played.session.update(seconds=0.5, loop=True)
+    played.window.instrument.pressed.emit(52, 100, None)
+    begun: list[object] = []
+
+    def turned() -> bool:
+        latest = played.performance.notes.latest
+        if latest not in begun:
+            begun.append(latest)
+        return len(begun) > 3
+
+    qtbot.waitUntil(turned)
+    played.session.update(loop=False)
+    assert all(isinstance(each, KeyNote) and each.event.key == 52 for each in begun)
+    assert len({each.request.pluck for each in begun[1:3]}) == 1  # type: ignore[attr-defined]
 
 
 def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:

@@ -73,9 +73,14 @@ def ringing(performance: Performance) -> list[Note]:
     return [note for note in performance.notes._notes if not note.over and not note.released]
 
 
+def pluck_chosen(performance: Performance) -> None:
+    performance.notes.handle(PluckAt(performance._session.choices.pluck))
+    performance.follow()
+
+
 def pluck(qtbot: QtBot, performance: Performance) -> Note:
     """One that sounds."""
-    performance.pluck()
+    pluck_chosen(performance)
     note = ringing(performance)[-1]
     qtbot.waitUntil(lambda: note.seconds > 0)
     return note
@@ -112,7 +117,7 @@ def test_stop_keeps_the_playhead_whatever_else_is_chosen(
         window.session.update(**changes)
         assert performance.position_s == stopped_s
     assert not performance.moving
-    performance.pluck()
+    pluck_chosen(performance)
     assert performance.playing
     assert performance.position_s < stopped_s
 
@@ -339,7 +344,7 @@ def test_how_long_a_model_is_waited_for_is_reported_and_then_its_error(
     window.session.update(preset="rendered", seconds=0.8)
     label = window.window.error_label
     qtbot.waitUntil(lambda: performance.ready and performance.settled and "Error of this pluck" in label.text())
-    performance.pluck()
+    pluck_chosen(performance)
     qtbot.waitUntil(lambda: label.text().startswith("Koopman, variable: buffering, starts in 0."))
     (note,) = ringing(performance)
     assert performance.position_s == 0 or not note.pending

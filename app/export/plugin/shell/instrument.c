@@ -70,7 +70,6 @@ static slot *pushed(instrument *own, int64_t frame, int64_t kind, int32_t channe
   event[EVENT_CHANNEL].whole = channel;
   event[EVENT_KEY].whole = key;
   event[EVENT_VALUE].real = value;
-  event[EVENT_POSITION].real = event[EVENT_PITCH_HZ].real = NAN;
   player[PLAYER_PUSHED].whole++;
   return event;
 }
