@@ -59,8 +59,6 @@ class Voice:
         memory[place : place + len(first)], memory[place + n : place + n + len(second)] = first, second
         self._samples: NDArray[np.float32] | None = None
         self._source_rate_hz = source_rate_hz
-        self._blocks: list[NDArray[np.float64]] = []  # of modes, which the kernel may be reading
-        self._before: Voice | None = None
         if program.resonator is not None:
             counts[at.MOVING] = n
             memory[place + at.OMEGA_SQUARED * n : place + at.FOLLOWING * n] = _rows(program.resonator)
@@ -142,10 +140,7 @@ class Voice:
         self.memory[at.GAIN_FROM] = self.memory[at.GAIN_TO] = gain
 
     def begin_at(self, frame: int) -> None:
-        """Before it is handed over: it begins at this frame of the mixer, or with the next quantum if that is past.
-
-        One that is added to the motion of another begins with a quantum of that one, less than a quantum off.
-        """
+        """Before it is handed over: it begins at this frame of the mixer, or at once if that is past."""
         self._counts[at.BEGIN_AT] = frame
 
     def release_at(self, frame: int) -> None:
@@ -189,64 +184,6 @@ class Voice:
         publish(self._counts, at.NEXT_WEIGHTS, 1)
         self.ear = ear
         return True
-
-    def retune(self, resonator: Resonator, seconds: float = 0.005, frame: int = 0) -> None:
-        """Other modes while it rings, as a tension, a length or a damping that changes: it gets there evenly.
-
-        Amplitude and speed of each mode continue. Any one thread; the latest wish counts.
-
-        Args:
-            frame: of the mixer, from which they count, within a quantum; they wait for those wished for before.
-
-        Raises:
-            ValueError: the voice has no modes of its own, or not so many.
-        """
-        if self.program.resonator is None or resonator.modes != self.program.modes:
-            raise ValueError(f"a voice with {self.program.modes} modes cannot take {resonator.modes} others")
-        block = np.concatenate([np.zeros(at.B_HEADER), _rows(resonator)])
-        own = block.view(np.int64)
-        own[at.B_QUANTA], own[at.B_AT] = max(1, round(seconds * self.program.rate_hz / at.QUANTUM)), frame
-        taken = int(self._counts[at.CURRENT_MODES])
-        for place, each in enumerate(self._blocks):
-            if int(each.ctypes.data) == taken:
-                del self._blocks[:place]
-                break
-        if self._blocks:
-            publish(self._blocks[-1].view(np.int64), at.B_NEXT, block.ctypes.data)
-        else:
-            publish(self._counts, at.PENDING_MODES, block.ctypes.data)
-        self._blocks.append(block)
-
-    def continues(self, before: Voice) -> None:
-        """Before it is handed over: it is the same string, plucked again while `before` rings on.
-
-        Its displacement is added to the motion as it begins, and it fades in as `before` fades out.
-
-        Raises:
-            ValueError: a voice has no modes of its own.
-        """
-        if self.program.resonator is None or before.program.resonator is None:
-            raise ValueError("a voice without modes of its own has no string that is plucked again")
-        self._follow(before)
-
-    def stops(self, before: Voice, seconds: float) -> None:
-        """Before it is handed over: it is the same string, stopped by what plucks it again.
-
-        It begins as a pluck of a string at rest, and `before` fades out in so many seconds from then on. One that
-        has not begun by then never sounds.
-        """
-        self._follow(before)
-        self._counts[at.STOPS_IN] = max(1, round(seconds * self.program.rate_hz))
-
-    def _follow(self, before: Voice) -> None:
-        """Keeps the voice before in memory until this one, which is the same string, has begun."""
-        before._forget_before()
-        self._before = before
-        self._counts[at.PREVIOUS_VOICE] = before.address
-
-    def _forget_before(self) -> None:
-        if self._counts[at.PREVIOUS_VOICE] == 0:
-            self._before = None
 
     def append(self, samples: NDArray[np.floating]) -> None:
         """More of what a rendered voice reads, (frames, points) of full scale at its own rate."""

@@ -100,7 +100,8 @@ def test_a_pluck_by_hand_that_the_instrument_does_not_have_is_of_the_string_alon
     played.window.instrument.pressed.emit(52, 100, None)
     qtbot.waitUntil(lambda: played.session.choices.string is not None)
     own = played.session.choices.shape
-    for changes in ({"shape": next(each for each in SHAPES if each != own)}, {"b": "preset:nylon_linear_gaussian_16k_koopman"}):
+    another = next(each for each in SHAPES if each != own)
+    for changes in ({"shape": another}, {"b": "preset:nylon_linear_gaussian_16k_koopman"}):
         played.session.update(**{"shape": own, "b": "truth", **changes})
         played.pluck()
         assert isinstance(played.performance.notes.latest, Note)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -70,21 +69,11 @@ def test_samples_and_voices_are_published_when_they_are_there(published: Publish
     assert counts[at.M_PUSHED] == 0
 
 
-@pytest.mark.parametrize(
-    ("tell", "slot"),
-    [
-        (lambda voice: voice.listen(Ear((0.2,))), at.NEXT_WEIGHTS),
-        (lambda voice: voice.retune(StringParameters().resonator(4)), at.PENDING_MODES),
-    ],
-    ids=["listening points", "modes"],
-)
-def test_what_a_voice_is_reported_is_published(
-    tell: Callable[[Voice], object], slot: int, published: Published
-) -> None:
+def test_listening_points_are_published(published: Published) -> None:
     voice = string_voice()
-    tell(voice)
-    assert [each for each, _ in published] == [slot]
-    assert voice.memory.view(np.int64)[slot] == 0
+    voice.listen(Ear((0.2,)))
+    assert [each for each, _ in published] == [at.NEXT_WEIGHTS]
+    assert voice.memory.view(np.int64)[at.NEXT_WEIGHTS] == 0
 
 
 def test_a_response_is_published_after_the_convolver(published: Published) -> None:

@@ -18,6 +18,7 @@ from engine.sources import ModelSource, TruthSource
 from engine.truth import ModalState, SplittingSolver
 from engine.voices import Ear, Mixer, Voice, model_program
 from engine.voices.programs import truth_program
+from tests.engine.voices.changing import ChangingVoice
 
 STEREO = Ear((0.37, 0.8))
 Rung = Callable[..., NDArray[np.float64]]
@@ -120,7 +121,7 @@ def test_a_string_retuned_to_its_own_modes_does_not_change(shipped: Callable[[st
     heard, latents = [], []
     for retuned in (False, True):
         mixer = Mixer(48_000, limited=False)
-        voice = Voice(program, info.resonator.to_grid(q), STEREO, begin=(q, v))
+        voice = ChangingVoice(program, info.resonator.to_grid(q), STEREO, (q, v))
         mixer.add(voice)
         for _ in range(100):
             if retuned:

@@ -19,8 +19,9 @@ from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
-from engine.voices import Ear, Mixer, Program, Voice, plain_program
+from engine.voices import Ear, Mixer, Program, Voice
 from engine.voices.programs import solver_program, tension_program
+from tests.engine.voices.changing import ChangingVoice
 
 RATE_HZ = 48_000
 STRING = StringParameters(tension_n=80.0, second_moment_m4=1.4e-14)
@@ -57,10 +58,8 @@ def series_program(resonator: Resonator, rate_hz: int) -> Program:
     return tension_program(curves, model.configuration, resonator, rate_hz)
 
 
-def struck(of: Program, pluck: Pluck = PLUCK, ear: Ear = EAR) -> Voice:
-    voice = Voice(of, pluck.displacement(of.grid_points), ear)
-    voice.never_ends()
-    return voice
+def struck(of: Program, pluck: Pluck = PLUCK, ear: Ear = EAR) -> ChangingVoice:
+    return ChangingVoice(of, pluck.displacement(of.grid_points), ear)
 
 
 def sound(of: Program, changes: Changes, quanta: int = 300, ear: Ear = EAR) -> NDArray[np.float64]:
@@ -230,7 +229,7 @@ def test_two_plucks_before_the_string_sounds_are_one_of_both(kind: str) -> None:
     assert not second.over
 
 
-def stopping(before: Voice, of: Program, seconds: float = 0.006) -> Voice:
+def stopping(before: ChangingVoice, of: Program, seconds: float = 0.006) -> ChangingVoice:
     voice = struck(of)
     voice.stops(before, seconds)
     return voice
@@ -353,13 +352,3 @@ def test_modes_of_a_voice_that_begins_within_a_quantum_are_no_earlier_than_their
     mixer.add(voice)
     expected = sound(program("model"), [(50, bent(2), 0.0)])[: 200 * quantum]
     np.testing.assert_allclose(mixer.render(200 * quantum + late)[late:, 0], expected, atol=1e-6)
-
-
-def test_what_cannot_change_says_so() -> None:
-    with pytest.raises(ValueError, match="40 modes cannot take 20"):
-        struck(program("truth")).retune(modes_of(STRING, 20))
-    samples = Voice.of_samples(plain_program(RATE_HZ), np.zeros((10, 1), np.float32))
-    with pytest.raises(ValueError, match="cannot take"):
-        samples.retune(modes_of(STRING))
-    with pytest.raises(ValueError, match="without modes"):
-        samples.continues(struck(program("truth")))

@@ -1,0 +1,74 @@
+"""A voice whose string Python changes as it rings, as the compiled player changes those of its notes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from engine.kernels import layout as at
+from engine.kernels.memory import publish
+from engine.resonators.base import Resonator
+from engine.voices import Ear, Program, Voice
+from engine.voices.voice import _rows
+
+Array = NDArray[np.float64]
+
+
+class ChangingVoice(Voice):
+    """A pluck of a program that never ends; `begin` as in `Voice`."""
+
+    def __init__(
+        self, program: Program, displacement_m: Array, ear: Ear, begin: tuple[Array, Array] | None = None
+    ) -> None:
+        super().__init__(program, displacement_m, ear, begin=begin)
+        self.never_ends()
+        self._blocks: list[Array] = []  # of modes, which the kernel may be reading
+        self._before: ChangingVoice | None = None
+
+    def retune(self, resonator: Resonator, seconds: float = 0.005, frame: int = 0) -> None:
+        """Other modes while it rings, as a tension, a length or a damping that changes: it gets there evenly.
+
+        Amplitude and speed of each mode continue. Any one thread; the latest wish counts.
+
+        Args:
+            frame: of the mixer, from which they count, within a quantum; they wait for those wished for before.
+        """
+        block = np.concatenate([np.zeros(at.B_HEADER), _rows(resonator)])
+        own = block.view(np.int64)
+        own[at.B_QUANTA], own[at.B_AT] = max(1, round(seconds * self.program.rate_hz / at.QUANTUM)), frame
+        taken = int(self._counts[at.CURRENT_MODES])
+        for place, each in enumerate(self._blocks):
+            if int(each.ctypes.data) == taken:
+                del self._blocks[:place]
+                break
+        if self._blocks:
+            publish(self._blocks[-1].view(np.int64), at.B_NEXT, block.ctypes.data)
+        else:
+            publish(self._counts, at.PENDING_MODES, block.ctypes.data)
+        self._blocks.append(block)
+
+    def continues(self, before: ChangingVoice) -> None:
+        """Before it is handed over: it is the same string, plucked again while `before` rings on.
+
+        Its displacement is added to the motion as it begins, and it fades in as `before` fades out.
+        """
+        self._follow(before)
+
+    def stops(self, before: ChangingVoice, seconds: float) -> None:
+        """Before it is handed over: it is the same string, stopped by what plucks it again.
+
+        It begins as a pluck of a string at rest, and `before` fades out in so many seconds from then on. One that
+        has not begun by then never sounds.
+        """
+        self._follow(before)
+        self._counts[at.STOPS_IN] = max(1, round(seconds * self.program.rate_hz))
+
+    def _follow(self, before: ChangingVoice) -> None:
+        """Keeps the voice before in memory until this one, which is the same string, has begun."""
+        before._forget_before()
+        self._before = before
+        self._counts[at.PREVIOUS_VOICE] = before.address
+
+    def _forget_before(self) -> None:
+        if self._counts[at.PREVIOUS_VOICE] == 0:
+            self._before = None
