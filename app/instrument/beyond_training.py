@@ -6,7 +6,7 @@ import contextlib
 
 from app.instrument.events import NoteOn
 from app.instrument.facts import by_two_numbers
-from app.instrument.loud_keys import on_string
+from app.instrument.string_keys import on_string
 from app.instrument.strings import Strings
 from app.patches.patch import Patch
 from engine.pluck import Pluck

@@ -15,13 +15,12 @@ from numpy.typing import NDArray
 from app.instrument import events
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
-from app.instrument.loud_keys import LoudKeys
+from app.instrument.string_keys import StringKeys
 from app.instrument.table import programs_of, strings_of, table_of, wheeled
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.kernels import playing_layout as of
 from engine.presets import Preset
-from engine.resonators.string import StringParameters
 from engine.voices import CompiledPlayer, Ear
 from engine.voices.player import Report, Ringing, Table
 
@@ -32,7 +31,7 @@ STOP_S = 0.03
 class Tabled:
     """Keys with the table that the kernels read of them: what `InstrumentPlayer.take` plays."""
 
-    keys: LoudKeys | DrumKeys
+    keys: StringKeys | DrumKeys
     table: Table
 
 
@@ -64,7 +63,7 @@ class InstrumentPlayer:
         ear: Ear | None = None,
         most_notes: int = 40,
         varied: bool = True,
-        keys: LoudKeys | DrumKeys | None = None,
+        keys: StringKeys | DrumKeys | None = None,
     ) -> None:
         if not preset.info.of_many_strings:
             raise ValueError(
@@ -81,14 +80,13 @@ class InstrumentPlayer:
         modes = of.MOST_DRUM_MODES if self._of_drums else min(of.MOST_MODES, self.grid_points - 2)
         self.compiled = CompiledPlayer(rate_hz, modes, most_notes)
         self.set_gains(gains)
-        heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        self._loud = self._keys(patch, heard) if keys is None else keys
-        self.take(self.tabled(self._loud))
+        self._keys = self.keys_of(patch, ear) if keys is None else keys
+        self.take(self.tabled(self._keys))
 
     def again(self, rate_hz: int) -> InstrumentPlayer:
         """The same for another mixer, with wheels and pedals as they stand. Its keys are taken over."""
         gains = {source: self.compiled.source_gain(place) for place, source in enumerate(self._sources)}
-        patch, ear, most, keys = self.patch, self.ear, self.most_notes, self._loud
+        patch, ear, most, keys = self.patch, self.ear, self.most_notes, self._keys
         made = InstrumentPlayer(patch, self._preset, rate_hz, gains, ear, most, self._varied, keys)
         for event in self.at_hand:
             made.handle(event)
@@ -98,11 +96,11 @@ class InstrumentPlayer:
 
     @property
     def patch(self) -> Patch:
-        return self._loud.patch
+        return self._keys.patch
 
     @property
-    def keys(self) -> LoudKeys | DrumKeys:
-        return self._loud
+    def keys(self) -> StringKeys | DrumKeys:
+        return self._keys
 
     @property
     def preset(self) -> Preset:
@@ -116,7 +114,7 @@ class InstrumentPlayer:
     @property
     def ear(self) -> Ear:
         """Where strings are heard that are struck now."""
-        return self._loud.ear
+        return self._keys.ear
 
     @property
     def rate_hz(self) -> int:
@@ -175,28 +173,26 @@ class InstrumentPlayer:
         self.compiled.set_source_gains(gains[source] for source in self._sources)
         self.compiled.set_spares(not compared)
 
-    def _keys(self, patch: Patch, ear: Ear, near: LoudKeys | DrumKeys | None = None) -> LoudKeys | DrumKeys:
-        if not isinstance(patch.strings, Drums):
-            if self._of_drums:
-                raise ValueError(f"{patch.name} has strings, and this player plays drums")
-            return LoudKeys(patch, ear, self._preset.info, near if isinstance(near, LoudKeys) else None)
-        if not self._of_drums:
-            raise ValueError(f"{patch.name} has drums, of which this player of strings cannot hold the modes")
-        return DrumKeys(patch, ear, near if isinstance(near, DrumKeys) else None)
-
-    def loud_keys(self, patch: Patch, ear: Ear | None = None, nearly: bool = False) -> LoudKeys | DrumKeys:
+    def keys_of(self, patch: Patch, ear: Ear | None = None, nearly: bool = False) -> StringKeys | DrumKeys:
         """What `tabled` needs of a patch. Another body takes milliseconds, in which keys are played.
 
         Args:
             nearly: whether keys may be as loud as through the body of the present patch, which takes no time.
 
         Raises:
-            ValueError: the tuning is impossible, or the patch has drums for a player of strings.
+            ValueError: the tuning is impossible, or the patch has drums for a player of strings, or the reverse.
         """
         heard = ear or Ear(tuple(patch.pickup.points), patch.pickup.kind)
-        return self._keys(patch, heard, self._loud if nearly else None)
+        near = self._keys if nearly else None
+        if not isinstance(patch.strings, Drums):
+            if self._of_drums:
+                raise ValueError(f"{patch.name} has strings, and this player plays drums")
+            return StringKeys(patch, heard, self._preset.info, near if isinstance(near, StringKeys) else None)
+        if not self._of_drums:
+            raise ValueError(f"{patch.name} has drums, of which this player of strings cannot hold the modes")
+        return DrumKeys(patch, heard, near if isinstance(near, DrumKeys) else None)
 
-    def tabled(self, keys: LoudKeys | DrumKeys) -> Tabled:
+    def tabled(self, keys: StringKeys | DrumKeys) -> Tabled:
         """The table of keys, which takes milliseconds, of drums more."""
         return Tabled(keys, table_of(keys, self.grid_points, self._sources, self._programs, self._varied))
 
@@ -206,37 +202,22 @@ class InstrumentPlayer:
         Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
         """
         with self._lock:
-            if self.table is None or is_another(made.keys.patch, self._loud.patch):
+            if self.table is None or is_another(made.keys.patch, self._keys.patch):
                 self._instrument += 1
                 self._wheel = 0, 0
             self._serial += 1
             counts = made.table.memory.view(np.int64)
             counts[of.TABLE_SERIAL], counts[of.TABLE_INSTRUMENT] = self._serial, self._instrument
-            self._loud, self.table = made.keys, made.table
+            self._keys, self.table = made.keys, made.table
             self.compiled.take(self.table, frame)
-
-    def gain_of(self, key: int, string: int | None, parameters: StringParameters, known: float) -> float:
-        """The factor that a string would be struck with now; `known` where its key has another string now.
-
-        Raises:
-            ValueError: the key has no possible string.
-        """
-        keys = self._loud
-        if isinstance(keys, DrumKeys):
-            return known
-        own = keys.string_of(key, string)
-        if own is None or own.parameters != parameters:
-            return known
-        found = keys.of_key(key, string)
-        return known if found is None else found.gain
 
     # Events
 
     def silent(self, key: int) -> bool:
         """Whether a key has nothing that sounds. Raises ValueError: it has an impossible string."""
-        if isinstance(self._loud, DrumKeys):
-            return self._loud.of_key(key) is None
-        return self._loud.strings.pitch_hz(key) is None
+        if isinstance(self._keys, DrumKeys):
+            return self._keys.of_key(key) is None
+        return self._keys.strings.pitch_hz(key) is None
 
     def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
         """Hands an event over; its number, which the reports of a note carry. 0 for a pluck at a place: no key's.
@@ -250,7 +231,7 @@ class InstrumentPlayer:
             ValueError: a key has no possible string.
         """
         if isinstance(event, PatchTurned):
-            self.take(self.tabled(self.loud_keys(event.patch)), frame)
+            self.take(self.tabled(self.keys_of(event.patch)), frame)
             return 0
         if isinstance(event, PluckAt):
             return 0
@@ -279,7 +260,7 @@ class InstrumentPlayer:
 
     def _check(self, event: NoteOn) -> None:
         """Raises ValueError: no string on which an event may play its key is possible."""
-        keys = self._loud
+        keys = self._keys
         if isinstance(keys, DrumKeys):
             keys.of_key(event.key)
             return
@@ -292,9 +273,9 @@ class InstrumentPlayer:
 
     def _struck(self, event: NoteOn) -> NDArray[np.float64] | None:
         """What a blow at a place of its own gives a drum's modes; None: its own place."""
-        if event.place is None or not isinstance(self._loud, DrumKeys):
+        if event.place is None or not isinstance(self._keys, DrumKeys):
             return None
-        found = self._loud.of_key(event.key)
+        found = self._keys.of_key(event.key)
         return None if found is None else found.struck(event.place)
 
     def _follow_wheel(self, event: Controller) -> None:
@@ -330,7 +311,7 @@ class InstrumentPlayer:
 
     def slid(self, note: Ringing) -> float:
         """How many semitones above its key a note's string is stopped now, as while it slides."""
-        keys = self._loud
+        keys = self._keys
         if note.length_m is None or isinstance(keys, DrumKeys):
             return 0.0
         with contextlib.suppress(ValueError):  # reported when it is struck

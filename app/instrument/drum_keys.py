@@ -1,6 +1,6 @@
 """The keys of a patch of drums before anybody plays them: modes, and what a blow and an ear make of them.
 
-What `LoudKeys` is for strings; the compiled player computes gains.
+What `StringKeys` is for strings; the compiled player computes gains.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ def on_the_drum(played: PlayedDrum, place: tuple[float, float]) -> tuple[float, 
 
 
 class DrumKeys:
-    """Of one patch of drums, heard at `ear`; see `LoudKeys`. Modes of a drum are remembered."""
+    """Of one patch of drums, heard at `ear`; see `StringKeys`. Modes of a drum are remembered."""
 
     polarisations = None
 

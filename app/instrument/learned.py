@@ -24,6 +24,7 @@ from app.patches.fields import explained
 from app.patches.library import PatchError, file_stem, own_patches, save_patch
 from app.patches.patch import Body, Category, Fretted, Patch, PhysicalString, Pickup, PluckChoices
 from engine.folders import usable_files, user_folder
+from engine.presets import load_preset
 from engine.result_file import WriteError, explain, whole_file
 from training.recording.fit import FREE_POLES
 from training.recording.joint import combined
@@ -161,9 +162,9 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
     attack = attack_of(patch, first.note, recorded.note)
     if attack is not None:
         recorded = replace(recorded, attack=attack[0])
-    info = write_preset(preset, name, first.strung, recorded)
+    write_preset(preset, name, first.strung, recorded)
     if attack is not None:
-        patch = with_attack(patch, info, first.note, first.physics.f0_hz, attack[1])
+        patch = with_attack(patch, load_preset(preset), first.note, first.physics.f0_hz, attack[1])
     with whole_file(report) as file:
         file.write(json.dumps([as_data(each) for each in learned], indent=2).encode())
     return Kept(preset, save_patch(patch).path, body, report)

@@ -1,6 +1,6 @@
 """The attack of a learned instrument: the noise of its strokes, on where it brings the own key nearer to the note.
 
-Nearness is measured over the first 30 ms, of the own key in closed form: its modes' free decay, through its body.
+Nearness is measured over the first 30 ms of the own key, as the instrument plays it, through its body.
 """
 
 from __future__ import annotations
@@ -14,22 +14,21 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve, resample_poly
 
 from app.instrument.effects import effects_of
-from app.instrument.loud_keys import LoudKeys, on_string
+from app.instrument.events import NoteOn, TimedEvent
+from app.instrument.offline import render_events
 from app.patches.patch import Noise, Patch
 from app.shared.parameters import NOISE_DB
 from engine.effects.curves import RATE_HZ as RESPONSE_HZ
 from engine.kernels.loudness import k_weight
 from engine.kernels.playing_layout import PART_S, REFERENCE_VELOCITY, WANTED_DB
-from engine.pluck import FULL_SCALE_M
-from engine.presets import PresetInfo
+from engine.presets import Preset
 from engine.resonators.recorded import RecordedAttack, RecordedNote
-from engine.voices import Ear
 from training.recording.attack import attack_force, first_distance_db
 from training.recording.note import Note
 
 Array = NDArray[np.float64]
 
-LEAST_GAIN_DB = 0.2  # of distance, for an attack that is on; the player's glide moves it by half as much
+LEAST_GAIN_DB = 0.2  # of distance, for an attack that is on
 
 
 def attack_of(patch: Patch, note: Note, recorded: RecordedNote) -> tuple[RecordedAttack, float] | None:
@@ -47,27 +46,33 @@ def attack_of(patch: Patch, note: Note, recorded: RecordedNote) -> tuple[Recorde
     return RecordedAttack.of(force, note.rate_hz), level_db
 
 
-def with_attack(patch: Patch, info: PresetInfo, note: Note, f0_hz: float, level_db: float) -> Patch:
+def with_attack(patch: Patch, preset: Preset, note: Note, f0_hz: float, level_db: float) -> Patch:
     """The patch whose strokes have the recorded attack: at its level where that is nearer to the note, else off."""
     body = _body_impulse(patch)
-    assert body is not None and info.recorded is not None and info.recorded.attack is not None
+    recorded = preset.info.recorded
+    assert body is not None and recorded is not None and recorded.attack is not None
     key = round(69 + 12 * math.log2(f0_hz / 440))
     tuning = patch.tuning.model_copy(update={"a4_hz": f0_hz * 2 ** ((69 - key) / 12)})  # as the note was
     tuned = patch.model_copy(update={"tuning": tuning})
-    loud = LoudKeys(tuned, Ear(tuple(patch.pickup.points), patch.pickup.kind), info)
     shared = gcd(note.rate_hz, RESPONSE_HZ)
     truth = resample_poly(note.part(0, PART_S), RESPONSE_HZ // shared, note.rate_hz // shared)
-    sound = _own_key(loud, key, len(truth), body)
-    attack = info.recorded.attack
+    struck, seconds = [TimedEvent(0.0, NoteOn(key, REFERENCE_VELOCITY))], len(truth) / RESPONSE_HZ
+    dry = np.concatenate(
+        list(
+            render_events(tuned, preset, struck, RESPONSE_HZ, seconds=seconds, limited=False, varied=False, dry=True)
+        )
+    )
+    sound = fftconvolve(dry[:, 0].astype(np.float64), body)[: len(truth)]
+    attack = recorded.attack
     shared = gcd(attack.rate_hz, RESPONSE_HZ)
     force = resample_poly(attack.samples, RESPONSE_HZ // shared, attack.rate_hz // shared)[: len(truth)]
     loudness_db = 10 * math.log10(max(_mean_square(sound, RESPONSE_HZ), 1e-30))
     onset_db = level_db + loudness_db - WANTED_DB - patch.level_db  # keys are softer where their peaks are high
     onset_db = round(min(max(onset_db, NOISE_DB[0]), NOISE_DB[1]), 2)
     gain = math.sqrt(PART_S * 10 ** ((WANTED_DB + patch.level_db + onset_db) / 10))
-    struck = np.zeros(len(truth))
-    struck[: len(force)] = gain * force
-    whole = sound + fftconvolve(struck, body)[: len(truth)]
+    stroke = np.zeros(len(truth))
+    stroke[: len(force)] = gain * force
+    whole = sound + fftconvolve(stroke, body)[: len(truth)]
     gained_db = first_distance_db(truth, sound, RESPONSE_HZ) - first_distance_db(truth, whole, RESPONSE_HZ)
     noise = Noise(kind="recorded", onset_db=onset_db if gained_db > LEAST_GAIN_DB else NOISE_DB[0])
     return patch.model_copy(update={"noise": noise})
@@ -77,21 +82,6 @@ def _body_impulse(patch: Patch) -> Array | None:
     """Of the body alone, (frames,) at RESPONSE_HZ; None: it has none."""
     effects = effects_of(patch)
     return None if effects is None else replace(effects, room=None).impulse(RESPONSE_HZ)[:, 0]
-
-
-def _own_key(loud: LoudKeys, key: int, frames: int, body: Array) -> Array:
-    """A key at the reference velocity, through the body, (frames,) at RESPONSE_HZ."""
-    found = loud.of_key(key)
-    assert found is not None  # of a range around it
-    resonator = found.resonator
-    pluck = on_string(found.string, loud.patch.pluck.pluck(REFERENCE_VELOCITY))
-    weights = resonator.shapes @ loud.ear.weights(resonator.points, resonator.force_weights)[:, 0] / FULL_SCALE_M
-    amplitudes = weights * resonator.to_modes(pluck.displacement(resonator.points))
-    t = np.arange(frames) / RESPONSE_HZ
-    dry = np.zeros(frames)
-    for amplitude, sigma, omega in zip(amplitudes, resonator.sigma, resonator.omega, strict=True):
-        dry += amplitude * np.exp(-sigma * t) * np.cos(omega * t)
-    return np.asarray(fftconvolve(found.gain * dry, body)[:frames])
 
 
 def _mean_square(sound: Array, rate_hz: int) -> float:

@@ -21,7 +21,7 @@ from app.instrument.events import (
     TimedEvent,
     moves_effects,
 )
-from app.instrument.loud_keys import LoudKeys
+from app.instrument.string_keys import StringKeys
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.layout import AHEAD, QUANTUM
@@ -221,7 +221,7 @@ def render_blow(
         ValueError: the key has no drum.
     """
     found: dict[str, NDArray[np.float32]] = {}
-    keys: LoudKeys | DrumKeys | None = None
+    keys: StringKeys | DrumKeys | None = None
     for source in SOURCES:
         player = InstrumentPlayer(patch, preset, rate_hz, {source: 1.0}, ear, varied=False, keys=keys)
         keys, mixer = player.keys, Mixer(rate_hz, limited=False)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKeys, block_of
-from app.instrument.loud_keys import LoudKeys
+from app.instrument.string_keys import StringKeys
 from app.instrument.strings import KNOBS, STRING
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
@@ -100,7 +100,7 @@ def programs_of(preset: Preset, rate_hz: int, sources: Iterable[str], drums: boo
 
 
 def table_of(
-    loud: LoudKeys | DrumKeys,
+    loud: StringKeys | DrumKeys,
     grid_points: int,
     sources: Iterable[str],
     programs: tuple[NDArray[np.float64], ...],

@@ -243,12 +243,8 @@ class Keys:
 
     def gain_of(self, string: StringParameters | None) -> float:
         """The factor of the string that a key played last, so that a pluck by hand is as loud; 1 for any other."""
-        note, player = self._latest, self._player
-        if note is None or string is None or note.parameters != string:
-            return 1.0
-        with contextlib.suppress(ValueError):  # reported when it is struck
-            return note.gain if player is None else player.gain_of(note.event.key, note.string, string, note.gain)
-        return note.gain
+        note = self._latest
+        return 1.0 if note is None or string is None or note.parameters != string else note.gain
 
     def begin_recording(self) -> None:
         """Records events from now on, wheels and pedals as they stand; an earlier recording is discarded."""
@@ -309,9 +305,9 @@ class Keys:
         self._set_present_effects()
 
     def _bring(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
-        """Lets keys play what is wanted, unless something else is by now. `nearly`: as of `loud_keys`."""
+        """Lets keys play what is wanted, unless something else is by now. `nearly`: as of `keys_of`."""
         try:
-            keys = player.loud_keys(wanted.patch, wanted.ear, nearly)
+            keys = player.keys_of(wanted.patch, wanted.ear, nearly)
             if isinstance(keys, DrumKeys) and not self._all_computed(keys):
                 return
             made = player.tabled(keys)

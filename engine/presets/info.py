@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
@@ -121,20 +121,6 @@ class PresetInfo:
         if self.recorded is not None:
             return self.recorded.resonator(string, modes, tension_modulated=modulated, grid_points=points)
         return string.resonator(modes, tension_modulated=modulated, grid_points=points)
-
-    def retuned(self, resonator: Resonator, string: StringParameters) -> Resonator:
-        """A resonator of `resonator_of` with the frequencies, decays and coupling of another string; same shapes."""
-        if self.recorded is not None:
-            other = self.resonator_of(string, resonator.modes)
-            return replace(other, shapes=resonator.shapes, analysis=resonator.analysis)
-        modes = resonator.modes
-        return replace(
-            resonator,
-            omega=string.undamped_frequencies(modes),
-            sigma=string.decay_rates(modes),
-            coupling=string.tension_coupling(modes) if resonator.tension_modulated else resonator.coupling,
-            stretch=string.wavenumbers(modes) ** 2,
-        )
 
     def modes_of(self, partials: int) -> int:
         """How many modes it plays so many partials with: of a recorded string two for each, if its grid allows."""

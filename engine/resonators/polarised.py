@@ -14,7 +14,7 @@ envelopes in stringed instruments", JASA 150, 2021). Slightly different frequenc
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,20 +100,6 @@ class Polarisations:
             analysis=law.analysis[:, partial] * pulled,
             mirror=law.mirror[partial],
             end_force=law.end_force[partial] * heard,
-        )
-
-    def retuned(self, resonator: Resonator, string: StringParameters, losses: float = 1.0) -> Resonator:
-        """A resonator of `resonator` with the frequencies, decays and coupling of another string; same shapes."""
-        partials = partials_of(resonator.modes)
-        partial, _ = layout(partials)
-        omega, sigma = self._rates(string, partials, losses)
-        coupling = string.tension_coupling(partials)[partial]
-        return replace(
-            resonator,
-            omega=omega,
-            sigma=sigma,
-            coupling=coupling if resonator.tension_modulated else resonator.coupling,
-            stretch=string.wavenumbers(partials)[partial] ** 2,
         )
 
     def _rates(self, string: StringParameters, partials: int, losses: float) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ from app.instrument.drum_keys import (
     DrumKeys,
     on_the_drum,
 )
-from app.instrument.loud_keys import LoudKeys
+from app.instrument.string_keys import StringKeys
 from app.instrument.table import PLAYED_PARAMETERS, WHEELED, wheel_goal
 from app.patches.drums import Drums
 from app.patches.patch import ASSIGNABLE, Patch
@@ -308,7 +308,7 @@ def _put_drums(own: DrumKeys, header: _Header, put: Callable[[bytes], int]) -> N
     header.modes, header.highest_hz = made.most_modes, own.drums.highest_hz
 
 
-def _sounds(keys: LoudKeys | DrumKeys, key: int) -> bool:
+def _sounds(keys: StringKeys | DrumKeys, key: int) -> bool:
     try:
         found = keys.of_key(key) if isinstance(keys, DrumKeys) else keys.string_of(key)
     except ValueError:

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from app.instrument import events
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
-from app.instrument.loud_keys import LoudKeys, on_string
+from app.instrument.string_keys import StringKeys, on_string
 from app.instrument.table import PLAYED_PARAMETERS
 from app.patches.library import find_patch, read_patch
 from app.patches.patch import Losses, Patch, Pickup, Polarisations
@@ -33,6 +33,7 @@ from engine.kernels.layout import QUANTUM
 from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.voices import Mixer
+from tests.app.instrument.loud import LoudKeys
 from tests.app.instrument.seen import sounding
 from tests.engine.resonators.test_recorded import recorded
 
@@ -311,7 +312,7 @@ def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(
         patch = shipped[name]
         one, other = Compiled(patch, preset), Compiled(patch, preset)
         keys = one.player.keys
-        assert isinstance(keys, LoudKeys)
+        assert isinstance(keys, StringKeys)
         found = keys.string_of(key)
         assert found is not None
         pluck = on_string(found, patch.pluck.pluck(90))
@@ -360,8 +361,7 @@ def test_reports_say_what_was_plucked(shipped: dict[str, Patch], preset: Preset)
     patch = changed(shipped["fretless_bass"], mod_wheel="none")
     stage, played = Compiled(patch, preset), drawn(patch, shipped["koto"], 9, 0.2)
     struck = [(frame, each) for frame, each in played if isinstance(each, NoteOn)]
-    keys = stage.player.keys
-    assert isinstance(keys, LoudKeys)
+    keys = LoudKeys(patch, stage.player.ear, preset.info)
     for frame, event in struck:
         stage.handle(event, frame)
     rendered(stage, (), 200)

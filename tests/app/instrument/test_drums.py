@@ -110,7 +110,7 @@ def test_modes_that_rested_are_heard_where_the_listener_moves(key: int, monkeypa
         mixer.set_player(player.compiled)
         player.handle(NoteOn(key, 110))
         before = mixer.render(4_800)[:, 0]
-        player.take(player.tabled(player.loud_keys(KIT, Ear((0.05,)))))
+        player.take(player.tabled(player.keys_of(KIT, Ear((0.05,)))))
         return np.concatenate([before, mixer.render(9_600)[:, 0]]).astype(np.float64)
 
     resting = sound()
@@ -262,4 +262,4 @@ def test_a_player_of_strings_takes_no_drums() -> None:
     guitar = read_patch(PATCHES / "classical_guitar.json")
     player = InstrumentPlayer(guitar, PRESET, RATE_HZ, {"model": 1.0})
     with pytest.raises(ValueError, match="has drums"):
-        player.loud_keys(KIT)
+        player.keys_of(KIT)

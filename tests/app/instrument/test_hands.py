@@ -30,7 +30,6 @@ from app.instrument.events import (
     NoteOn,
     release_all,
 )
-from app.instrument.loud_keys import LoudKeys
 from app.instrument.strings import pitch_hz_of
 from app.patches.patch import Knobs, OpenString, Patch, StringSet
 from engine.kernels.player import WIDEST_SEMITONES
@@ -39,6 +38,7 @@ from engine.presets import Preset
 from engine.voices import Mixer
 from engine.voices.player import Report
 from tests.app.instrument.conftest import STEEL, physical
+from tests.app.instrument.loud import LoudKeys
 from tests.app.instrument.seen import Seen, seen, sounding, taken_up
 
 RATE_HZ = 48_000
@@ -96,7 +96,7 @@ class Hand:
 
     def take(self, patch: Patch) -> None:
         """Another patch, or the same with a knob turned."""
-        self.player.take(self.player.tabled(self.player.loud_keys(patch)))
+        self.player.take(self.player.tabled(self.player.keys_of(patch)))
 
     @property
     def sounding(self) -> list[int]:
@@ -295,8 +295,7 @@ def test_with_its_input_at_rest_a_guitar_is_forgotten(strung: Patch, preset: Pre
 def test_a_key_is_as_loud_on_every_string_of_a_guitar(strung: Patch, preset: Preset) -> None:
     hand, channels = Hand(strung, preset), (B, G, LOW_E, HIGH_E)
     hand.play(NoteOn(64, 90, KEYS), *(NoteOn(64, 90, channel) for channel in channels))
-    keys = hand.player.keys
-    assert isinstance(keys, LoudKeys)
+    keys = LoudKeys(strung, hand.player.ear, preset.info)
     found = [keys.of_key(64, channel) for channel in channels]
     gains = [report.gain for report in hand.reports if report.kind == BEGAN][1:]
     np.testing.assert_allclose(gains, [each.gain for each in found if each is not None], rtol=1e-9)

@@ -7,7 +7,6 @@ import pytest
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import NoteOn, TimedEvent
-from app.instrument.loud_keys import LoudKeys
 from app.instrument.offline import render_events, render_note
 from app.patches.library import SHIPPED, find_patch, list_patches
 from app.patches.patch import Patch
@@ -16,6 +15,7 @@ from engine.kernels.loudness import k_weight
 from engine.kernels.playing_layout import HIGHEST_PEAK_DB, PART_S, REFERENCE_VELOCITY, WANTED_DB
 from engine.presets import Preset
 from engine.voices import Mixer
+from tests.app.instrument.loud import LoudKeys
 from tests.bench.tune import chord_of
 
 RATE_HZ = 48_000
@@ -70,8 +70,7 @@ def test_keys_of_a_patch_have_the_gains_that_the_player_computes(name: str, pres
         for key in (low, (low + high) // 2, high):
             player.handle(NoteOn(key, 30))
         player.compiled.catch_up(mixer)
-        keys = player.keys
-        assert isinstance(keys, LoudKeys)
+        keys = LoudKeys(each, player.ear, preset.info)
         for report in player.reports():
             found = keys.of_key(report.key)
             assert found is not None

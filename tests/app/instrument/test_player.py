@@ -23,7 +23,6 @@ from app.instrument.events import (
     PatchTurned,
     TimedEvent,
 )
-from app.instrument.loud_keys import LoudKeys
 from app.instrument.offline import BLOCK_FRAMES, SILENT_DB, channels_played, render_events, render_note
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
@@ -40,6 +39,7 @@ from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters
 from engine.voices import Ear, Mixer
 from engine.voices.player import Report
+from tests.app.instrument.loud import LoudKeys
 from tests.app.instrument.seen import Seen, seen, sounding, taken_up
 
 RATE_HZ = 48_000
@@ -78,7 +78,7 @@ class Stage:
 
     def take(self, patch: Patch) -> None:
         """Another patch, or the same with a knob turned."""
-        self.player.take(self.player.tabled(self.player.loud_keys(patch)))
+        self.player.take(self.player.tabled(self.player.keys_of(patch)))
 
     def render(self, frames: int) -> NDArray[np.float64]:
         """(frames,), left."""

@@ -6,7 +6,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from app.instrument.loud_keys import on_string
+from app.instrument.string_keys import on_string
 from app.instrument.strings import Strings, bent, damped, decay_rates, fretted, pitch_hz_of, slid, turned
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Knobs, OpenString, Patch, StringSet

@@ -120,7 +120,7 @@ def test_a_key_waits_for_no_knob(played: Notes, patch: Patch, wait: Wait, monkey
         held.wait(30)
         return body_curves(*args)
 
-    monkeypatch.setattr("app.instrument.loud_keys.body_curves", slow)
+    monkeypatch.setattr("app.instrument.string_keys.body_curves", slow)
     turned, begun_notes = patch.with_value("knobs.stiffness", 3.0), list[object]()
     knob = Thread(target=played.set_instrument, args=(turned, EAR))
     key = Thread(target=lambda: begun_notes.append(played.handle(NoteOn(52, 60))))

@@ -1,4 +1,4 @@
-"""The keys of a patch before anybody plays them: each one's string, its modes, and the gain that makes it as loud."""
+"""The gains of keys by Python, as `engine.kernels.playing.gains` computes them for the player."""
 
 from __future__ import annotations
 
@@ -8,22 +8,20 @@ from functools import cached_property
 
 import numpy as np
 
-from app.instrument.effects import body_curves
-from app.instrument.strings import KeyString, Strings, has_octave
-from app.patches.drums import Drums
+from app.instrument.string_keys import StringKeys, on_string, polarisations_of
+from app.instrument.strings import KeyString, has_octave
 from app.patches.patch import Patch
 from engine.excitation import blow_factor, release_factor
 from engine.kernels import playing_layout as of
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, LARGEST_AMPLITUDE_MM, Pluck
+from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import PresetInfo
 from engine.resonators.base import Array, Resonator
 from engine.resonators.losses import Losses
-from engine.resonators.polarised import Polarisations, layout, partials_of
+from engine.resonators.polarised import layout, partials_of
 from engine.resonators.string import StringParameters
 from engine.voices import Ear
 
 _NO_BODY = np.zeros(0)
-_NO_BODY.setflags(write=False)  # as curves are
 
 
 @dataclass(frozen=True)
@@ -33,33 +31,15 @@ class LoudKey:
     gain: float
 
 
-class LoudKeys:
-    """Of one patch, heard at `ear`, played by a preset. A soloed mode is as loud as it is in the whole note.
+class LoudKeys(StringKeys):
+    """A soloed mode is as loud as it is in the whole note."""
 
-    The compiled player computes the gains of keys by itself, with the same `engine.kernels.loudness`.
-
-    Args:
-        near: keys of nearly the same patch, of which the body's curves are taken instead, in no time.
-    """
-
-    def __init__(self, patch: Patch, ear: Ear, preset: PresetInfo, near: LoudKeys | None = None) -> None:
-        """Raises ValueError: the tuning is impossible, or the patch has drums."""
-        if isinstance(patch.strings, Drums):
-            raise ValueError(f"{patch.name} has drums, and no strings; choose an instrument of strings")
-        self.patch, self.ear = patch, ear
+    def __init__(self, patch: Patch, ear: Ear, preset: PresetInfo) -> None:
+        super().__init__(patch, ear, preset)
         self._full_ear, self._preset = replace(ear, solo=0), preset
-        self.strings = Strings(patch)
-        self.polarisations, self.recorded = polarisations_of(patch, preset), preset.recorded
-        self.body: Array | None = body_curves(patch) if near is None else near.body
 
     def of_key(self, key: int, string: int | None = None) -> LoudKey | None:
-        """None for a key that is silent. `string`: on which of a set it is played, as in `Strings.of_key`.
-
-        It takes half a millisecond, and the first time some more.
-
-        Raises:
-            ValueError: the key has no possible string.
-        """
+        """As `string_of`."""
         found = self.strings.of_key(key, string)
         if found is None:
             return None
@@ -67,20 +47,6 @@ class LoudKeys:
         level = float(10 ** (self.patch.level_db / 20)) / self.patch.course.strings
         sound = self._sound(found, resonator, string)
         return LoudKey(found, resonator, self._gain(sound) * self._limit * level)
-
-    def string_of(self, key: int, string: int | None = None) -> KeyString | None:
-        """As `of_key`, the string alone, which takes no time."""
-        found = self.strings.of_key(key, string)
-        if found is None:
-            return None
-        if self.recorded is not None and self.ear.pickup == "bridge":
-            raise ValueError(f"{self.patch.name}: a string learned from a recording has no force at a bridge")
-        if any(
-            not found.parameters.decay_rate(mode) < found.parameters.undamped_frequency(mode)
-            for mode in (1, found.modes)  # then of all between: see `engine.bounds.check_motion`
-        ):
-            raise ValueError(f"key {key} of {self.patch.name}: a mode is overdamped; lower the damping")
-        return found
 
     @cached_property
     def _limit(self) -> float:
@@ -150,12 +116,6 @@ class LoudKeys:
         return np.minimum(resonator.sigma + shared, of.HIGHEST_SIGMA * resonator.omega)
 
 
-def polarisations_of(patch: Patch, preset: PresetInfo) -> Polarisations | None:
-    """Those of a patch; None: its strings move in one direction, or as a recording says."""
-    chosen = patch.polarisations
-    return None if chosen is None or preset.recorded is not None else Polarisations(**chosen.model_dump())
-
-
 def resonator_of(string: KeyString, patch: Patch, preset: PresetInfo) -> Resonator:
     """The modes of a key's string, as the patch says that it moves and decays."""
     moving = polarisations_of(patch, preset)
@@ -172,14 +132,6 @@ def resonator_of(string: KeyString, patch: Patch, preset: PresetInfo) -> Resonat
     return _with_losses(found, string.parameters, patch, preset)
 
 
-def retuned(resonator: Resonator, string: StringParameters, patch: Patch, preset: PresetInfo) -> Resonator:
-    """A resonator of `resonator_of` with the frequencies, decays and coupling of another string; same shapes."""
-    moving = polarisations_of(patch, preset)
-    if moving is None:
-        return _with_losses(preset.retuned(resonator, string), string, patch, preset)
-    return _with_losses(moving.retuned(resonator, string, patch.knobs.decay), string, patch, preset)
-
-
 def _with_losses(resonator: Resonator, string: StringParameters, patch: Patch, preset: PresetInfo) -> Resonator:
     if patch.losses is None or preset.recorded is not None:
         return resonator
@@ -190,8 +142,3 @@ def _with_losses(resonator: Resonator, string: StringParameters, patch: Patch, p
     )
     sigma = np.minimum(resonator.sigma + rates[partial], of.HIGHEST_SIGMA * resonator.omega)
     return replace(resonator, sigma=sigma)
-
-
-def on_string(string: KeyString, pluck: Pluck) -> Pluck:
-    """A pluck of the whole string, on the string that a key leaves of it."""
-    return replace(pluck, amplitude_mm=min(pluck.amplitude_mm * string.shortened, LARGEST_AMPLITUDE_MM))
