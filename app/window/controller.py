@@ -188,7 +188,7 @@ class Controller(QObject):
         everything = frozenset(OBSERVED)
         self.session.changed.connect(self._choices_changed)
         self.performance.choices_changed(everything)
-        self.instruments.choices_changed()
+        self.instruments.choices_changed(everything)
         self._choices_shown(everything)
         self._timer.start()
         window.closing.disconnect(self.sound.close)
@@ -457,7 +457,7 @@ class Controller(QObject):
 
     def _choices_changed(self, names: frozenset[str]) -> None:
         self.performance.choices_changed(names)
-        self.instruments.choices_changed()
+        self.instruments.choices_changed(names)
         self._choices_shown(names)
 
     def _choices_shown(self, names: frozenset[str]) -> None:

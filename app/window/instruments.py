@@ -6,12 +6,15 @@ import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import asdict, replace
+from functools import partial
 from typing import Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
 
 from app.export.struck import Struck
+from app.instrument.compiled import is_another
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
+from app.instrument.string_keys import on_string
 from app.instrument.strings import Strings
 from app.patches.drums import Drums
 from app.patches.instrument import SingleString
@@ -29,6 +32,7 @@ from app.session.slots import other_preset
 from app.views.controls.playing_keys import PlayingKeys
 from app.window.main_window import MainWindow
 from app.window.midi_control import MidiControl
+from engine.pluck import Pluck
 
 HIGHEST_KEY = 127
 LOOK_MS = 8  # until the player has reported the note of a key, between two looks
@@ -71,7 +75,9 @@ class Instruments(QObject):
         self._lock = threading.Lock()
         self._reported: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
         self.latest: Note | KeyNote | None = None
+        self._shown: Patch | None = None  # the instrument whose string is shown
         self._unknown: KeyNote | None = None  # the latest, which the player has not reported yet
+        self._drawn = False  # whether its pluck is the session's
         self._look_timer = QTimer(self, interval=LOOK_MS)
         self._look_timer.timeout.connect(self._look_at_key)
         self._down: dict[KeyPress, int] = {}  # the computer's keys, and what they play
@@ -97,27 +103,45 @@ class Instruments(QObject):
         entry = self._library.find(self._session.choices.preset)
         return PluckRange.of(entry.info if entry else None)
 
-    def choices_changed(self) -> None:
+    def choices_changed(self, names: frozenset[str]) -> None:
         self._keys.piano = self._session.choices.plays_patch
         self.midi.show_patch(self._session.choices.patch)
+        if "instrument" in names:
+            QTimer.singleShot(0, self, partial(self._show_own_string, "string" in names))
 
-    def play(self, event: Event, due: Due | None = None) -> None:
-        """Plays an event, at once or when it is due. Any thread."""
+    def _show_own_string(self, chosen: bool) -> None:
+        """Shows string and pluck of an instrument before it is played. `chosen`: a string was chosen with it."""
+        choices, before = self._session.choices, self._shown
+        patch = choices.instrument
+        self._shown = patch if isinstance(patch, Patch) else None
+        if not isinstance(patch, Patch) or isinstance(patch.strings, Drums):
+            return
+        another = before is not None and is_another(patch, before)
+        if choices.string is not None and (chosen or not another):
+            return
+        with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
+            if (found := Strings(patch).of_key(*self.shown_key(patch))) is not None:
+                pluck = on_string(found, patch.pluck.pluck(choices.velocity))
+                self._session.play(string=PhysicalString(**asdict(found.parameters)), **asdict(pluck))
+
+    def play(self, event: Event, due: Due | None = None, drawn: bool = False) -> None:
+        """Plays an event, at once or when it is due. Any thread. `drawn`: its pluck is the one of the session."""
         note = self._handle(event, due)
         if note is None:
             return
         self.latest = note
         if isinstance(note, KeyNote):
-            self._unknown, self.latest_key = note, (note.event.key, None)
+            self._unknown, self._drawn, self.latest_key = note, drawn, (note.event.key, None)
         else:
             self._unknown = None
-            self._tell(note.request)
+            self._tell(note.request, drawn)
         self._begun.emit()
 
-    def _tell(self, request: RenderRequest) -> None:
-        """The session is to show this string and its pluck."""
+    def _tell(self, request: RenderRequest, drawn: bool) -> None:
+        """The session is to show this string and its pluck; the string alone where it has drawn the pluck itself."""
         string = string_of(request.preset)
-        shown = {"string": None if string is None else PhysicalString(**asdict(string)), **asdict(request.pluck)}
+        shown: dict[str, Any] = {"string": None if string is None else PhysicalString(**asdict(string))}
+        shown |= {} if drawn else asdict(request.pluck)
         with self._lock:
             self._reported |= shown
 
@@ -137,32 +161,30 @@ class Instruments(QObject):
         (low, high), latest = patch.range, self.latest_key
         return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
 
-    @property
-    def _by_hand(self) -> NoteOn | None:
-        """The chosen pluck as a note of the key whose string is shown.
+    def _by_hand(self, pluck: Pluck) -> NoteOn | PluckAt:
+        """A pluck as a note of the key whose string is shown; of the string alone where keys do not play it so.
 
-        None: a single string is played, or the instrument has no such pluck, or another preset is compared.
+        These are a single string, a pluck of another shape than the instrument's, and one beside another preset.
         """
         choices = self._session.choices
-        patch, pluck = choices.instrument, choices.pluck
+        patch, alone = choices.instrument, PluckAt(pluck)
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums) or pluck.amplitude_mm == 0:
-            return None
+            return alone
         if pluck.shape != patch.pluck.shape or any(other_preset(each) for each in choices.voices):
-            return None
+            return alone
         key, number = self.shown_key(patch)
-        string = Strings(patch).of_key(key, number)
+        try:
+            string = Strings(patch).of_key(key, number)
+        except ValueError:  # reported when its key is struck
+            return alone
         if string is None:
-            return None
+            return alone
         velocity = patch.pluck.velocity_of(pluck.amplitude_mm / string.shortened)
         return NoteOn(key, velocity, KEYS, string=number, pluck=pluck)
 
     def pluck(self) -> None:
         """Plucks the string that is shown as it is chosen, where it can with all of its instrument."""
-        with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
-            if (event := self._by_hand) is not None:
-                self.play(event)
-                return
-        self.play(PluckAt(self._session.choices.pluck))
+        self.play(self._by_hand(self._session.choices.pluck), drawn=True)
 
     @property
     def struck(self) -> Struck | None:
@@ -203,7 +225,9 @@ class Instruments(QObject):
             self._play_preset(name)
             with self._lock:
                 self._reported |= {"instrument": SingleString(preset=name)}
-        self.play(PluckAt(pluck))
+            self.play(PluckAt(pluck))
+            return
+        self.play(self._by_hand(pluck))
 
     def _look_at_key(self) -> None:
         """Takes the string and the pluck of a key from the player's report, within a quantum of the device."""
@@ -217,7 +241,7 @@ class Instruments(QObject):
             return
         self.latest_key = note.event.key, note.string
         if note.request is not None:
-            self._tell(note.request)
+            self._tell(note.request, self._drawn)
             self._tell_session()
         elif note.of_drum:
             self.played.emit()

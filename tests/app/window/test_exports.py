@@ -21,6 +21,7 @@ from app.patches.patch import PhysicalString
 from app.window.controller import Controller
 from engine.presets import find_string, load_preset, read_string
 from engine.presets.finding import SHIPPED
+from tests.app.window.shown import key_is_shown
 
 LEFT = Qt.MouseButton.LeftButton
 
@@ -65,7 +66,7 @@ def test_a_note_is_exported_through_the_instrument_that_is_heard(
     short.session.update(instrument=guitar)
     qtbot.waitUntil(lambda: short.performance.notes.keys.player is not None)
     short.window.instrument.pressed.emit(60, 100, None)
-    qtbot.waitUntil(lambda: short.session.choices.string is not None)
+    qtbot.waitUntil(lambda: key_is_shown(short))
     export(qtbot, short, "Saved")
     (file,) = tmp_path.glob("*.wav")
     assert file.name == "Classical guitar C4 hard.wav"
@@ -90,7 +91,7 @@ def test_a_knob_that_was_turned_is_heard_in_the_file(
     short.session.update(instrument=find_patch("Classical guitar").patch)
     qtbot.waitUntil(lambda: short.performance.notes.keys.player is not None)
     short.window.instrument.pressed.emit(60, 100, None)
-    qtbot.waitUntil(lambda: short.session.choices.string is not None)
+    qtbot.waitUntil(lambda: key_is_shown(short))
     patch = short.session.choices.patch
     assert patch is not None
     short.session.update(patch=patch.with_value("pluck.position", 0.4))

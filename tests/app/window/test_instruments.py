@@ -11,6 +11,7 @@ from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE, PLACES
 from app.rendering.subject import path_of, string_of
 from app.window.controller import Controller
 from engine.pluck import Pluck
+from tests.app.window.shown import key_is_shown
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["window knows the key", "window is busy"])
@@ -20,7 +21,7 @@ def test_midi_selects_a_preset_of_one_string_after_a_key_of_a_patch(
     session, midi = played.session, played.instruments.midi
     played.window.instrument.pressed.emit(52, 100, None)
     if known:
-        qtbot.waitUntil(lambda: session.choices.string is not None)
+        qtbot.waitUntil(lambda: key_is_shown(played))
     midi._remember(midi.choices.model_copy(update={"notes": "preset"}))
     midi._receive(NoteOn(LOWEST_PLACE + played.library.names.index("second"), 100))  # as in mido's thread
     note = played.performance.notes._notes[-1]
@@ -54,7 +55,7 @@ def test_a_note_of_midi_sets_the_place_where_the_string_is_plucked(qtbot: QtBot,
     """Also while a patch is the instrument: on the string of the key that was struck last."""
     session, reach = played.session, played.instruments.reach
     played.window.instrument.pressed.emit(52, 100, None)
-    qtbot.waitUntil(lambda: session.choices.string is not None)
+    qtbot.waitUntil(lambda: key_is_shown(played))
     string = session.choices.string
     midi = played.instruments.midi
     midi._remember(midi.choices.model_copy(update={"notes": "position"}))
@@ -76,7 +77,7 @@ def test_places_are_prepared_where_keys_choose_them_alone(
     for key in (52, 55):
         played.window.instrument.pressed.emit(key, 100, None)
         qtbot.waitUntil(lambda key=key: played.instruments.latest_key == (key, None))  # type: ignore[misc]
-    qtbot.waitUntil(lambda: not played.instruments._reported and played.session.choices.string is not None)
+    qtbot.waitUntil(lambda: not played.instruments._reported and key_is_shown(played))
     assert prepared == []
     played.session.play_string()
     (positions,) = prepared

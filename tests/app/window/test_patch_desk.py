@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -12,9 +13,11 @@ from pytestqt.qtbot import QtBot
 
 from app.instrument.events import KEYS, NoteOff, NoteOn, PluckAt, TimedEvent
 from app.instrument.midi_file import midi_bytes
+from app.instrument.string_keys import on_string
+from app.instrument.strings import Strings
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
-from app.patches.patch import Macro, Patch, Pickup, Target
+from app.patches.patch import Macro, Patch, PhysicalString, Pickup, Target
 from app.patches.tuning import TuningChoice
 from app.playing.key_note import KeyNote
 from app.playing.note import Note
@@ -24,7 +27,9 @@ from app.views.string.view import StringView
 from app.window.controller import Controller
 from app.window.patch_desk import NOTE_REPORTED_AFTER_MS
 from engine.pluck import SHAPES
+from tests.app.instrument.conftest import STEEL
 from tests.app.instrument.seen import Seen, sounding
+from tests.app.window.shown import key_is_shown
 
 
 def press(qtbot: QtBot, controller: Controller, key: Qt.Key) -> None:
@@ -45,7 +50,7 @@ def keys_that_ring(played: Controller) -> set[int]:
 def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, played: Controller) -> None:
     press(qtbot, played, Qt.Key.Key_A)
     qtbot.waitUntil(lambda: keys_that_ring(played) == {48})
-    qtbot.waitUntil(lambda: played.session.choices.string is not None)
+    qtbot.waitUntil(lambda: key_is_shown(played))
     assert played.session.choices.preset == "studio_any_string"
     wanted_hz = 440 * 2 ** ((48 - 69) / 12)
 
@@ -63,7 +68,7 @@ def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, playe
 
 def test_a_pluck_by_hand_is_as_loud_as_the_key_whose_string_it_is(qtbot: QtBot, played: Controller) -> None:
     played.window.instrument.pressed.emit(52, 100, None)
-    qtbot.waitUntil(lambda: played.session.choices.string is not None)
+    qtbot.waitUntil(lambda: key_is_shown(played))
     (struck,) = ringing(played)
     note = played.performance.notes.handle(PluckAt(played.session.choices.pluck))
     assert isinstance(note, Note)
@@ -73,7 +78,7 @@ def test_a_pluck_by_hand_is_as_loud_as_the_key_whose_string_it_is(qtbot: QtBot, 
 
 def test_a_pluck_by_hand_is_a_note_of_the_instrument(qtbot: QtBot, played: Controller) -> None:
     played.window.instrument.pressed.emit(52, 100, None)
-    qtbot.waitUntil(lambda: played.session.choices.string is not None)
+    qtbot.waitUntil(lambda: key_is_shown(played))
     played.window.instrument.released.emit(52, None)
     shown = played.session.choices.string
     played.session.update(position=0.31, amplitude_mm=1.2)
@@ -98,7 +103,7 @@ def test_a_pluck_by_hand_that_the_instrument_does_not_have_is_of_the_string_alon
     qtbot: QtBot, played: Controller
 ) -> None:
     played.window.instrument.pressed.emit(52, 100, None)
-    qtbot.waitUntil(lambda: played.session.choices.string is not None)
+    qtbot.waitUntil(lambda: key_is_shown(played))
     own = played.session.choices.shape
     another = next(each for each in SHAPES if each != own)
     for changes in ({"shape": another}, {"b": "preset:nylon_linear_gaussian_16k_koopman"}):
@@ -602,3 +607,29 @@ def test_the_difference_is_heard_without_body_and_room(
     played.performance.hear_dry(False)  # a listening test has ended
     played.session.update(heard="a")
     assert dry == [True, True, True, False]
+
+
+def test_an_instrument_shows_its_own_string_before_it_is_played(qtbot: QtBot, played: Controller) -> None:
+    for name in ("classical_guitar", "concert_harp"):
+        patch = read_patch(PATCHES / f"{name}.json")
+        played.patches.choose(name)
+        key = sum(patch.range) // 2
+        string = Strings(patch).of_key(key)
+        assert string is not None
+        qtbot.waitUntil(lambda own=string: played.session.choices.string == PhysicalString(**asdict(own.parameters)))
+        own = on_string(string, patch.pluck.pluck(played.session.choices.velocity))
+        assert played.session.choices.pluck == own
+    qtbot.waitUntil(lambda: played.performance.playable)
+    played.pluck()
+    note = played.instruments.latest
+    assert isinstance(note, KeyNote) and note.event.key == key
+    assert abs(note.event.velocity - played.session.choices.velocity) <= 1
+    assert played.history.undo_words.startswith("instrument")
+
+
+def test_a_restored_string_stays(qtbot: QtBot, played: Controller) -> None:
+    patch = read_patch(PATCHES / "concert_harp.json")
+    string = PhysicalString(**asdict(STEEL))
+    played.session.update(instrument=patch, string=string, position=0.2)
+    qtbot.wait(50)
+    assert (played.session.choices.string, played.session.choices.position) == (string, 0.2)
