@@ -13,12 +13,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from engine import bounds
 from engine.resonators.base import Array
-from engine.resonators.drum import DrumModes
+
+if TYPE_CHECKING:
+    from engine.resonators.drum import DrumModes
 
 HERTZ = -0.2  # power of the speed in the time of contact
 FULL_SCALE_PA = 20.0  # the sound pressure at 1 m that is 0 dBFS, before the gain of a key

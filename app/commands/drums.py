@@ -350,18 +350,12 @@ def mode_rows(found: DrumModes, count: int) -> list[tuple[int, int, float, float
     """m, n, frequency in Hz, T60 in s and the mass with air, relatively, of the lowest modes."""
     import math
 
-    from engine.resonators.surface import Circle, Rectangle
-
-    rows, circles = [], dict[tuple[int, bool], int]()
+    rows, circles, surface = [], dict[tuple[int, int], int](), found.surface
     for place in range(count):
-        surface, omega, sigma = found.surface, float(found.omega[place]), float(found.sigma[place])
-        m = n = 0
-        if isinstance(surface, Rectangle):
-            m, n = int(surface.m[place]), int(surface.n[place])
-        elif isinstance(surface, Circle):
-            kind = int(surface.m[place]), bool(surface.sine[place])
-            circles[kind] = circles.get(kind, 0) + 1
-            m, n = kind[0], circles[kind]
+        omega, sigma = float(found.omega[place]), float(found.sigma[place])
+        m, n = int(surface.m[place]), int(surface.n[place])
+        if surface.round:
+            circles[m, n] = n = circles.get((m, n), 0) + 1
         t60_s = math.log(1000) / max(sigma, 1e-9)
         rows.append((m, n, omega / math.tau, t60_s, float(found.scale[place]) ** -2))
     return rows

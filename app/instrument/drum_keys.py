@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,15 +18,12 @@ from app.patches.patch import VELOCITIES, Patch
 from app.patches.tuning import Tuning
 from engine.kernels import playing_layout as of
 from engine.resonators.base import Array
-from engine.resonators.drum import DrumModes, DrumParameters
-from engine.resonators.surface import Circle
-from engine.strike import FULL_SCALE_PA, Strike
+from engine.strike import Strike
 from engine.voices import Ear
 
-TUNINGS = 6  # rounds of a secant method
-NEAR = 1e-4  # of a frequency, where it ends
-LOW_MODES_HZ, LOW_MODES = 3.0, 6  # among which its pitch is: below so many times the lowest, without air
-J01 = 2.404825557695773  # the first zero of J₀
+if TYPE_CHECKING:  # compiled functions that strings do without
+    from engine.resonators.drum import DrumModes, DrumParameters
+
 NEAREST_RIM = 0.98  # of half a drum: at the rim itself nothing moves
 
 
@@ -35,13 +33,13 @@ class DrumKey:
 
     Attributes:
         modes: with the patch's knobs, tuned to the key.
-        heard: weights of amplitudes in m, of full scale, (points, modes).
+        points: where it is heard.
     """
 
     key: int
     played: PlayedDrum
     modes: DrumModes
-    heard: Array
+    points: tuple[float, ...]
 
     def struck(self, place: tuple[float, float]) -> Array:
         """The speeds (modes,) that 1 N s of its mallet gives at a place, in half-lengths from the centre.
@@ -49,7 +47,7 @@ class DrumKey:
         A place beyond the rim is taken as the nearest one within.
         """
         place = on_the_drum(self.played, place)
-        return np.ascontiguousarray(self.modes.struck(place, self.played.mallet.mallet.radius_m))
+        return self.modes.struck(place, self.played.mallet.radius_m)
 
     def strike(self, velocity: float, curve: float = 0.0) -> Strike:
         """The blow of a velocity in 1 … 127."""
@@ -122,9 +120,7 @@ class DrumKeys:
             modes = self._modes(played, ratio)
         except ValueError as error:
             raise ValueError(f"key {key} of {self.patch.name}, {played.name}: {error}") from error
-        directions = [(2 * point - 1, 0.0) for point in self.ear.points]
-        heard = np.stack([modes.radiated(direction) for direction in directions]) / FULL_SCALE_PA
-        return DrumKey(key, played, modes, heard)
+        return DrumKey(key, played, modes, self.ear.points)
 
     def _modes(self, played: PlayedDrum, ratio: float) -> DrumModes:
         knobs, drum = self.patch.knobs, played.drum.parameters
@@ -144,54 +140,27 @@ class DrumKeys:
 
 @lru_cache(maxsize=256)
 def tuned(drum: DrumParameters, ratio: float, highest_hz: float) -> DrumModes:
-    """The modes of a drum whose pitch is raised by a ratio: a membrane's by its tension, a plate's by its size.
+    """The modes of a drum whose pitch is raised by a ratio; see `DrumParameters.tuned`.
 
     Raises:
         ValueError: it is out of its bounds then, or has no mode.
     """
-    if ratio == 1.0:
-        return drum.modes(highest_hz, of.MOST_DRUM_MODES)
-    if drum.tension_n_m == 0.0:
-        size = 1 / math.sqrt(ratio)
-        return replace(drum, length_m=drum.length_m * size, width_m=drum.width_m * size).modes(
-            highest_hz, of.MOST_DRUM_MODES
-        )
-    wanted = ratio * _principal(drum)
-    factor = ratio**2
-    for _ in range(TUNINGS):
-        changed = replace(drum, tension_n_m=drum.tension_n_m * factor)
-        off = wanted / _principal(changed)
-        if abs(off - 1) < NEAR:
-            break
-        factor *= off**2
-    return replace(drum, tension_n_m=drum.tension_n_m * factor).modes(highest_hz, of.MOST_DRUM_MODES)
-
-
-def _principal(drum: DrumParameters) -> float:
-    """ω of the mode that gives a drum its pitch: over a kettle (1,1), for (0,1) dies away at once; else the first."""
-    across = (
-        2 * J01 / drum.length_m
-        if drum.shape == "circle"
-        else math.hypot(math.pi / drum.length_m, math.pi / drum.width_m)
-    )
-    in_vacuo_hz = across * math.sqrt((drum.tension_n_m + drum.bending_nm * across**2) / drum.mass_kg_m2) / math.tau
-    modes = drum.modes(LOW_MODES_HZ * in_vacuo_hz, LOW_MODES)
-    place = int(np.argmax(modes.surface.m == 1)) if drum.cavity_m3 and isinstance(modes.surface, Circle) else 0
-    return float(modes.omega[place])
+    return drum.tuned(ratio, highest_hz).modes(highest_hz, of.MOST_DRUM_MODES)
 
 
 def block_of(found: DrumKey) -> Array:
     """The drum of a key as the kernels read it: see `playing_layout`."""
-    resonator, mallet = found.modes.resonator(np.zeros((1, 2))), found.played.mallet.mallet
-    n = resonator.modes
-    block = np.zeros(of.DRUM_HEADER + of.DRUM_ROWS * n)
-    block.view(np.int64)[of.DRUM_MODES] = n
-    block[of.DRUM_MALLET_KG], block[of.DRUM_CONTACT_S] = mallet.mass_kg, mallet.contact_s
-    block[of.DRUM_MASS_KG] = found.modes.mass_kg
-    block[of.DRUM_SOFTEST_M_S], block[of.DRUM_HARDEST_M_S] = found.played.softest_m_s, found.played.hardest_m_s
-    struck = found.struck(found.played.place)
-    rows = [resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch, struck]
-    for row, values in enumerate([*rows, *found.heard]):
-        first = of.DRUM_HEADER + row * n
-        block[first : first + n] = values
+    from engine.kernels import drum_modes as kernel
+    from engine.resonators.surface import tools
+
+    block = np.zeros(of.DRUM_HEADER + of.DRUM_ROWS * len(found.modes))
+    drum = struck_drum(found.played, found.modes.drum)
+    kernel.write(drum, found.modes.rows, np.array(found.points), tools(), block)
     return block
+
+
+def struck_drum(played: PlayedDrum, drum: DrumParameters) -> Array:
+    """A drum with its blow, as the kernels have it."""
+    mallet, place = played.mallet, on_the_drum(played, played.place)
+    blow = *place, mallet.mass_kg, mallet.radius_m, mallet.contact_s, played.softest_m_s, played.hardest_m_s
+    return np.concatenate([drum.numbers, blow])

@@ -12,7 +12,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,12 @@ from numpy.typing import NDArray
 from app.rendering.strobe import FLASH_HZ
 from app.rendering.take import SOURCES, Listened
 from engine.resonators.base import Array
-from engine.resonators.drum import DrumModes
-from engine.resonators.surface import Circle, Surface
 from engine.strike import FULL_SCALE_PA, Strike
 from engine.voices import Ear
+
+if TYPE_CHECKING:
+    from engine.resonators.drum import DrumModes
+    from engine.resonators.surface import Surface
 
 MOST_SHOWN = 160  # modes in a picture: their waves are wider than three points of its grid
 GRID = 57  # points of a picture along the longer side; odd: one is the centre
@@ -92,22 +94,22 @@ def grid_of(surface: Surface, sides: tuple[float, float], points: int = GRID) ->
     columns, rows = (max(3, 2 * round((points - 1) / 2 * side / longer) + 1) for side in sides)
     x, y = (np.arange(-(n // 2), n // 2 + 1) / (n // 2) for n in (columns, rows))
     grid = np.stack([part.ravel() for part in np.meshgrid(x, y[::-1])], axis=1)
-    inside = np.hypot(*grid.T) <= 1 if isinstance(surface, Circle) else np.ones(len(grid), bool)
+    inside = np.hypot(*grid.T) <= 1 if surface.round else np.ones(len(grid), bool)
     return inside.reshape(rows, columns), grid[inside]
 
 
 def head_of(modes: DrumModes) -> Head:
     """Made once for each drum, whatever its damping; half a second of work at most."""
-    drum, surface = modes.drum, modes.surface
+    drum, rows = modes.drum, modes.rows
     for known, head in _heads:
-        if known is surface:
+        if known is rows:
             return head
-    head = Head.of(surface, (drum.length_m, drum.width_m))
-    _heads.append((surface, head))
+    head = Head.of(modes.surface, (drum.length_m, drum.width_m))
+    _heads.append((rows, head))
     return head
 
 
-_heads: deque[tuple[Surface, Head]] = deque(maxlen=MOST_HEADS)  # the worker's
+_heads: deque[tuple[Array, Head]] = deque(maxlen=MOST_HEADS)  # the worker's
 
 
 class ModalMotion:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numba import carray, njit, types
 
-from engine.kernels import contact, mixer, player, sympathy
+from engine.kernels import contact, kit, mixer, player, sympathy
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.fourier import transform
@@ -17,7 +17,9 @@ from engine.kernels.memory import pointer
 ADDRESS = COUNT = types.int64
 RENDER = types.void(ADDRESS, COUNT, ADDRESS)
 BEGIN = types.void(ADDRESS)
-PLAY = SOUND = SYMPATHISE = types.void(ADDRESS, ADDRESS)
+PLAY = SOUND = SYMPATHISE = KIT_BEGIN = types.void(ADDRESS, ADDRESS)
+KIT_FOLLOW = types.void(ADDRESS, COUNT, types.float64)
+KIT_PREPARE = types.void(ADDRESS, ADDRESS, ADDRESS)
 PARTITION = types.void(ADDRESS, COUNT, COUNT, ADDRESS, ADDRESS)
 
 
@@ -38,6 +40,9 @@ def begin(player_at: int) -> None:
 def play(player_at: int, mixer_at: int) -> None:
     """What a player has to do before the mixer's next quantum."""
     player.play(player_at, mixer_at)
+
+
+kit_begin, kit_follow, kit_prepare = kit.begin, kit.follow, kit.prepare
 
 
 @njit(**COMPILED)

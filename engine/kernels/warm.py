@@ -83,6 +83,7 @@ def playing() -> None:
         each.compile("void(int64, int64)")
     CompiledPlayer(RATE_HZ, INFO.modes)
     _string()
+    _drum()
     _loudness()
 
 
@@ -138,6 +139,21 @@ def _string() -> None:
     for change in (strings.fretted, strings.bent, strings.slid, strings.damped):
         change(string, 1.5)
     strings.pitch_hz(string)
+
+
+def _drum() -> None:
+    """What makes modes of a drum, and a picture of it."""
+    from engine.kernels import drum_modes, playing_layout
+    from engine.resonators.drum import DrumParameters
+    from engine.resonators.surface import tools
+
+    drum = DrumParameters(air_kg_m3=1.2).tuned(1.1, 400)
+    found, blow = drum.modes(400), np.append(drum.numbers, np.zeros(drum_modes.DRUM - drum_modes.X))
+    found.struck((0.0, 0.0), 0.01)
+    found.radiated((0.0, 0.0))
+    found.resonator(np.zeros((1, 2)))
+    block = np.zeros(playing_layout.DRUM_HEADER + playing_layout.DRUM_ROWS * len(found))
+    drum_modes.write(blow, found.rows, np.zeros(1), tools(), block)
 
 
 def _loudness() -> None:

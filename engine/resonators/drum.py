@@ -7,23 +7,36 @@ plane, displacement raises the tension evenly, by C (1/A) ∫|∇w|² dA with C 
 
 Exact for membranes and rectangles that are supported at the edge. On a circle Dκ⁴ is an approximation, good where
 tension outweighs bending. Clamped plates and free edges (cymbals, gongs) need another model. Modes are normalised by
-their mass, which the air makes larger for low modes (`air`), so that k/η² is the same for all.
+their mass, which the air makes larger for low modes, so that k/η² is the same for all.
+
+A mode moves the air on both sides of an infinite baffle, in which the membrane lies, and radiates: most of all (0,1).
+D(s) is the share of the mode's square at a wavenumber s. The pressure that a plane wave of velocity v makes is
+iωρv/√(s² - k²), k = ω/c: a mass where s > k, a resistance where s < k. In modes above 16 radians of κa, D is
+concentrated at κ, so that the mass is ρ/√(κ² - k²) a side. Couplings between modes by the air are left out (Christian
+et al., JASA 76 (1984), 1336).
+
+In an open shell the air that a mode moves as a whole, its plane wave, is a column: an unflanged pipe, whose end
+reflects exp(-(ka)²/2) at 0.6133 a beyond it (Levine and Schwinger, Phys. Rev. 73 (1948), 383; the magnitude for
+ka < 1). It takes the place of a piston in a baffle (Morse and Ingard, Theoretical Acoustics (1968), 7.4).
+
+Frequencies of pairs differ to the first order of perturbation: κ² of cos θ falls by the ellipticity ε, that of sin θ
+rises; other pairs part with powers of ε. Computed by `engine.kernels.drum_modes`.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields, replace
-from typing import Literal, get_args
+from dataclasses import astuple, dataclass, fields, replace
+from functools import cached_property
 
 import numpy as np
 
 from engine import bounds
-from engine.resonators import air
+from engine.kernels import drum_modes as kernel
+from engine.resonators import surface
 from engine.resonators.base import Array, Resonator
-from engine.resonators.surface import Circle, Numbers, Rectangle, Surface, spread
+from engine.resonators.surface import SHAPES, DrumShape, Surface, tools
 
-DrumShape = Literal["circle", "rectangle", "bar"]
 MAY_BE_ZERO = frozenset(
     {"tension_n_m", "damping_d1_kg_m2_s", "damping_d3_kg_s", "uneven", "air_kg_m3", "cavity_m3", "shell_m"}
 )
@@ -65,10 +78,8 @@ class DrumParameters:
     shell_m: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.shape not in get_args(DrumShape):
-            raise ValueError(
-                f"drum parameter shape must be one of {', '.join(get_args(DrumShape))}, not {self.shape!r}"
-            )
+        if self.shape not in SHAPES:
+            raise ValueError(f"drum parameter shape must be one of {', '.join(SHAPES)}, not {self.shape!r}")
         for field in fields(self):
             if field.name == "shape":
                 continue
@@ -99,39 +110,41 @@ class DrumParameters:
     @property
     def bending_nm(self) -> float:
         """D = Eh³/12(1 - ν²); of a bar, which is free to widen, without ν."""
-        return self.youngs_modulus_pa * self.thickness_m**3 / (12 * self._held_across)
+        return self.stretching_n_m * self.thickness_m**2 / 6
 
     @property
     def stretching_n_m(self) -> float:
         """C = Eh/2(1 - ν²); of a bar without ν."""
-        return self.youngs_modulus_pa * self.thickness_m / (2 * self._held_across)
-
-    @property
-    def _held_across(self) -> float:
-        return 1.0 if self.shape == "bar" else 1 - self.poisson**2
+        return float(kernel.stretching(self.numbers))
 
     @property
     def ellipticity(self) -> float:
         """ε: the half-axes are a(1 ± ε)."""
         return (self.length_m - self.width_m) / (self.length_m + self.width_m)
 
-    def surface(self, wavenumber: float) -> Surface:
-        """Its modes up to a wavenumber."""
-        if self.shape == "bar":
-            return Rectangle.bar_below(self.length_m, self.width_m, wavenumber)
-        if self.shape == "rectangle":
-            return Rectangle.below(self.length_m, self.width_m, wavenumber)
-        return Circle.below((self.length_m + self.width_m) / 4, wavenumber)
+    @property
+    def aspect(self) -> float:
+        """Length by width; 1 of a circle. The same at all sizes, which differ by rounding."""
+        return 1.0 if self.shape == "circle" else float(f"{self.length_m / self.width_m:.12g}")
 
-    def highest_wavenumber(self, highest_hz: float, most: int = MOST_MODES) -> float:
-        """Up to which modes are looked at for the lowest below a frequency, so many at most."""
-        load = self.mass_kg_m2 * (2 * math.pi * highest_hz) ** 2
-        square = 2 * load / (self.tension_n_m + math.sqrt(self.tension_n_m**2 + 4 * self.bending_nm * load))
-        highest = 1.2 * math.sqrt(square) if self.air_kg_m3 else math.sqrt(square)
-        density = self.length_m * self.width_m / (4 * math.pi) * (math.pi / 4 if self.shape == "circle" else 1)
-        if density * highest**2 > bounds.MOST_SURFACE_MODES:  # Weyl's law
-            highest = math.sqrt(2.5 * (most + 50) / density)
-        return highest
+    @cached_property
+    def numbers(self) -> Array:
+        """As the kernels have it."""
+        return np.array([SHAPES.index(self.shape), *astuple(self)[1:]], np.float64)
+
+    def around(self, highest_hz: float, most: int = MOST_MODES) -> kernel.Around:
+        """What the kernels compute modes from: the surface's list, the air's table, and ka up to which it goes."""
+        size_m = kernel.size(self.numbers)
+        low = 1.2 * kernel.LOW_HZ * kernel.lowest(self.numbers) * size_m  # for its pitch
+        needed = (
+            max(kernel.reach(self.numbers, highest_hz, most), low),
+            4 * math.pi * highest_hz / kernel.AIR_M_S * size_m,
+        )
+        reach, ka = (2 ** (math.ceil(4 * math.log2(1.05 * each)) / 4) for each in needed)  # for its like too
+        air = (
+            surface.air_below(self.shape, self.aspect, ka, surface.POINTS) if self.air_kg_m3 else np.zeros((2, 0, 0))
+        )
+        return surface.modes_below(self.shape, self.aspect, reach), air, ka
 
     def modes(self, highest_hz: float, most: int = MOST_MODES) -> DrumModes:
         """Its lowest modes below a frequency, so many at most.
@@ -139,10 +152,26 @@ class DrumParameters:
         Raises:
             ValueError: there is none, or far too many; the message names the remedy.
         """
-        surface = self.surface(self.highest_wavenumber(highest_hz, most) * (1 + 1e-9))
-        if len(surface.wavenumber) == 0:
+        around, rows = self.around(highest_hz, most), np.empty((kernel.ROWS, most))
+        count = kernel.modes(self.numbers, around, highest_hz, most, _work(around[0]), rows)
+        if count == 0:
             raise ValueError(f"a drum has no mode below {highest_hz:g} Hz; tune it lower, or ask for higher modes")
-        return DrumModes.of(self, surface, highest_hz, most)
+        return DrumModes(self, rows[:, :count].copy())
+
+    def tuned(self, ratio: float, highest_hz: float) -> DrumParameters:
+        """The drum whose pitch is higher by a ratio: a membrane's by its tension, a plate's by its size.
+
+        Raises:
+            ValueError: it is out of its bounds then.
+        """
+        around, changed = self.around(highest_hz), self.numbers.copy()
+        kernel.tune(changed, ratio, around, _work(around[0]), np.empty((kernel.ROWS, kernel.LOW_MODES)))
+        length_m, width_m, tension_n_m = map(float, changed[[kernel.LENGTH, kernel.WIDTH, kernel.TENSION]])
+        return replace(self, length_m=length_m, width_m=width_m, tension_n_m=tension_n_m)
+
+
+def _work(rows: Array) -> Array:
+    return np.empty(4 * rows.shape[1] + kernel.ORDERS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,39 +179,34 @@ class DrumModes:
     """Modes of a drum by rising frequency; see the module.
 
     Attributes:
-        omega, sigma: with the air; (modes,).
+        rows: (7, modes): those of a surface, then ω, mass in kg/m², and what is radiated of σ.
         scale: √(μ/μ_n); mass-normalised shapes are smaller by it.
     """
 
     drum: DrumParameters
-    surface: Surface
-    omega: Array
-    sigma: Array
-    scale: Array
+    rows: Array
 
-    @classmethod
-    def of(cls, drum: DrumParameters, surface: Surface, highest_hz: float, most: int) -> DrumModes:
-        kappa, mu = surface.wavenumber, drum.mass_kg_m2
-        stiffness = drum.tension_n_m * kappa**2 + drum.bending_nm * kappa**4
-        mass, radiated = np.full(len(kappa), mu), np.zeros(len(kappa))
-        if drum.air_kg_m3:
-            mass, radiated = air.loaded(surface, stiffness, mu, drum.air_kg_m3, drum.shell_m)
-        squared = stiffness / mass
-        if drum.cavity_m3:
-            volumes = surface.transform(np.zeros_like(kappa), 0.0)
-            spring = air.DENSITY_KG_M3 * air.SPEED_M_S**2 / drum.cavity_m3
-            squared = squared + spring * volumes**2 * surface.area_m2 / mass
-        omega = np.sqrt(squared) * _split(drum, surface)
-        sigma = (drum.damping_d1_kg_m2_s + drum.damping_d3_kg_s * kappa**2) / (2 * mass) + radiated
-        order = np.argsort(omega, kind="stable")
-        order = order[omega[order] < 2 * math.pi * highest_hz][:most]
-        if len(order) == 0:
-            raise ValueError(f"a drum has no mode below {highest_hz:g} Hz; tune it lower, or ask for higher modes")
-        chosen: Numbers = order.astype(np.int64)
-        return cls(drum, surface.picked(chosen), omega[order], sigma[order], np.sqrt(mu / mass[order]))
+    @property
+    def omega(self) -> Array:
+        return self.rows[kernel.OMEGA]
+
+    @cached_property
+    def sigma(self) -> Array:
+        found = np.empty(len(self))
+        kernel.losses(self.drum.numbers, self.rows, found)
+        return found
+
+    @property
+    def scale(self) -> Array:
+        scale: Array = np.sqrt(self.drum.mass_kg_m2 / self.rows[kernel.MASS])
+        return scale
+
+    @cached_property
+    def surface(self) -> Surface:
+        return Surface(self.drum.numbers[:3], self.rows[: kernel.SURFACE])
 
     def __len__(self) -> int:
-        return len(self.omega)
+        return self.rows.shape[1]
 
     @property
     def stretch(self) -> Array:
@@ -195,11 +219,7 @@ class DrumModes:
 
     def damped(self, d1_kg_m2_s: float, d3_kg_s: float) -> DrumModes:
         """The same with other damping, which takes no time."""
-        drum = replace(self.drum, damping_d1_kg_m2_s=d1_kg_m2_s, damping_d3_kg_s=d3_kg_s)
-        own = self.drum
-        more = d1_kg_m2_s - own.damping_d1_kg_m2_s + (d3_kg_s - own.damping_d3_kg_s) * self.surface.wavenumber**2
-        sigma = self.sigma + more * self.scale**2 / (2 * own.mass_kg_m2)
-        return replace(self, drum=drum, sigma=sigma)
+        return replace(self, drum=replace(self.drum, damping_d1_kg_m2_s=d1_kg_m2_s, damping_d3_kg_s=d3_kg_s))
 
     def resonator(self, places: Array, *, tension_modulated: bool = True) -> Resonator:
         """For truth and models; its points are a few places (places, 2), from which amplitudes do not follow."""
@@ -218,11 +238,13 @@ class DrumModes:
     @property
     def mass_kg(self) -> float:
         """μA: of each mass-normalised mode."""
-        return self.drum.mass_kg_m2 * self.surface.area_m2
+        return float(kernel.mass_kg(self.drum.numbers))
 
     def struck(self, place: tuple[float, float], radius_m: float) -> Array:
         """Speeds (modes,) in m/s that a sudden blow of 1 N s gives, spread over a disc at a place."""
-        return self.shapes(np.array([place]))[:, 0] * spread(self.surface.wavenumber, radius_m) / self.mass_kg
+        found = np.empty(len(self))
+        kernel.struck(self.drum.numbers, self.rows, *map(float, place), radius_m, tools(), found)
+        return found
 
     def radiated(self, direction: tuple[float, float], distance_m: float = 1.0) -> Array:
         """Sound pressure in Pa (modes,) far off, of each mode at amplitude 1 m, as from a baffle.
@@ -233,19 +255,6 @@ class DrumModes:
         Args:
             direction: cosines along the two axes of the surface; (0, 0) is above the centre.
         """
-        x, y = direction
-        k = self.omega / air.SPEED_M_S * math.hypot(x, y)
-        found = self.surface.transform(k, math.atan2(y, x)) * self.surface.area_m2 * self.scale
-        return air.DENSITY_KG_M3 * self.omega**2 / (2 * math.pi * distance_m) * found
-
-
-def _split(drum: DrumParameters, surface: Surface) -> Array | float:
-    """Factors of frequency, (modes,): an ellipse parts the pairs of one nodal diameter, uneven tension all pairs.
-
-    First order of perturbation: κ² of cos θ falls by ε, that of sin θ rises. Other pairs part with powers of ε.
-    """
-    if not isinstance(surface, Circle):
-        return 1.0
-    side = np.where(surface.m == 0, 0.0, np.where(surface.sine, 1.0, -1.0))
-    found: Array = 1 + side * (np.where(surface.m == 1, drum.ellipticity / 2, 0.0) + drum.uneven / 2)
-    return found
+        found = np.empty(len(self))
+        kernel.radiated(self.drum.numbers, self.rows, *map(float, direction), tools(), found)
+        return found / distance_m

@@ -197,7 +197,8 @@ def _choice(name: str) -> ChoiceCost:
 
     def choose() -> int:
         tuned.cache_clear()
-        surface._known_zeros.cache_clear()
+        surface.modes_below.cache_clear()
+        surface.air_below.cache_clear()
         keys = DrumKeys(patch, Ear((0.4, 0.6)))
         return sum(keys.of_key(key) is not None for key in range(low, high + 1))
 

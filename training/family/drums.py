@@ -19,13 +19,12 @@ import torch
 from filelock import FileLock
 from torch import Tensor
 
+from engine.kernels.drum_modes import AIR_KG_M3
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
 from engine.models.koopman_tension import KoopmanTension
-from engine.resonators.air import DENSITY_KG_M3
 from engine.resonators.base import Array, Resonator
 from engine.resonators.drum import DrumModes, DrumParameters
-from engine.resonators.surface import spread
 from engine.strike import pulse_spectrum
 from engine.table import checked, read_table, write_table
 from engine.truth import ModalState, SplittingSolver
@@ -119,7 +118,7 @@ def _drawn(random: np.random.Generator, kind: Kind) -> DrumParameters:
         poisson=0.3 if metal else 0.38,
         tension_n_m=0.0,
         uneven=float(random.uniform(0, 0.01)) if circle else 0.0,
-        air_kg_m3=DENSITY_KG_M3 if not metal and random.random() < 0.5 else 0.0,
+        air_kg_m3=AIR_KG_M3 if not metal and random.random() < 0.5 else 0.0,
     )
     kappa = 2 * 2.4048 / length if circle else math.hypot(math.pi / length, math.pi / (length * ratio))
     if not metal:
@@ -137,10 +136,9 @@ def _start(
     random: np.random.Generator, modes: DrumModes, place: tuple[float, float], blow: bool
 ) -> tuple[Array, Array]:
     radius_m, contact_s = _between(random, RADIUS_M), _between(random, CONTACT_S)
-    still = np.zeros(len(modes))
+    still, pressed = np.zeros(len(modes)), modes.struck(place, radius_m)
     if blow:
-        return still, modes.struck(place, radius_m) * pulse_spectrum(modes.omega, contact_s)
-    pressed = modes.shapes(np.array([place]))[:, 0] * spread(modes.surface.wavenumber, radius_m)
+        return still, pressed * pulse_spectrum(modes.omega, contact_s)
     return pressed / modes.omega**2, still
 
 

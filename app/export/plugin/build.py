@@ -21,7 +21,7 @@ from engine.effects.room import room_noise
 from engine.whole_file import whole_file
 
 COMPILING = 0.97  # of the time of a first build, measured
-COMMON = ("instrument.c", "drums.c", "effects.c", "responses.c", "thread.c", "kernels.c")
+COMMON = ("instrument.c", "effects.c", "responses.c", "thread.c", "kernels.c")
 LIBRARY_ENDINGS = {"linux": ".so", "windows": ".dll", "macos": ".dylib"}
 VST3_ENDINGS = {"linux": ".so", "windows": ".vst3"}
 VST3_FOLDERS = {"linux-x64": "x86_64-linux", "linux-arm64": "aarch64-linux", "windows-x64": "x86_64-win"}

@@ -10,22 +10,14 @@ from __future__ import annotations
 import ctypes
 import uuid
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from app.export.plugin.parts import AMP, EFFECTS, drum_parts, effects_there, parts_of
+from app.export.plugin.parts import AMP, EFFECTS, effects_there, kit_of, parts_of
 from app.instrument.compiled import InstrumentPlayer
-from app.instrument.drum_keys import (
-    J01,
-    LOW_MODES,
-    LOW_MODES_HZ,
-    NEAR,
-    TUNINGS,
-    DrumKeys,
-    on_the_drum,
-)
+from app.instrument.drum_keys import DrumKeys
 from app.instrument.string_keys import StringKeys
 from app.instrument.table import PLAYED_PARAMETERS, WHEELED, wheel_goal
 from app.patches.drums import Drums
@@ -39,8 +31,6 @@ from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import Preset
-from engine.resonators import air
-from engine.strike import FULL_SCALE_PA
 from engine.voices.derivative import differentiator_taps
 from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S
 
@@ -56,23 +46,6 @@ NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
 SOURCE, VOLUME, VALUE, MACRO, EFFECT, AMPLIFIER = range(6)  # kinds of the shell's parameters
 SOURCE_ID = "source"
 SOURCES = ("model", "truth", "difference")
-DRUM_FIELDS = (
-    "length_m",
-    "width_m",
-    "thickness_m",
-    "density_kg_m3",
-    "youngs_modulus_pa",
-    "poisson",
-    "tension_n_m",
-    "damping_d1_kg_m2_s",
-    "damping_d3_kg_s",
-    "uneven",
-    "air_kg_m3",
-    "cavity_m3",
-    "shell_m",
-)
-MALLET_FIELDS = ("mass_kg", "radius_m", "contact_s")
-SHAPES = ("circle", "rectangle", "bar")  # of the shell
 DRUM_PARAMETERS = (
     "knobs.decay",
     "knobs.brightness_decay",
@@ -114,20 +87,6 @@ class _Macro(ctypes.Structure):
     _fields_ = (("count", ctypes.c_int32), ("spare", ctypes.c_int32), ("targets", _Target * MOST_TARGETS))
 
 
-class _Drum(ctypes.Structure):
-    _fields_ = (
-        *((name, ctypes.c_double) for name in (*DRUM_FIELDS, "x", "y", *MALLET_FIELDS, "air_reach")),
-        *((name, ctypes.c_int64) for name in ("shape", "list", "count", "air_list", "air_modes", "air_terms")),
-    )
-
-
-class _DrumKey(ctypes.Structure):
-    _fields_ = (
-        ("drum", ctypes.c_int64),
-        *((name, ctypes.c_double) for name in ("ratio", "softest_m_s", "hardest_m_s")),
-    )
-
-
 class _Header(ctypes.Structure):
     _fields_ = (
         ("magic", ctypes.c_char * 8),
@@ -161,9 +120,10 @@ class _Header(ctypes.Structure):
         *(
             (name, ctypes.c_int64)
             for name in (
-                "drums",
-                "drum_count",
-                "drum_keys",
+                "kit",
+                "kit_slots",
+                "kit_room",
+                "table_room",
                 "wheel_effect",
                 "modes",
                 "most_notes",
@@ -172,7 +132,6 @@ class _Header(ctypes.Structure):
         ("longest_s", ctypes.c_double),
         ("wheel_goal", ctypes.c_double),
         ("level", ctypes.c_double),
-        ("highest_hz", ctypes.c_double),
         ("id", ctypes.c_char * 128),
         ("name", ctypes.c_char * 64),
         ("description", ctypes.c_char * 512),
@@ -240,6 +199,7 @@ def image_of(patch: Patch, preset: Preset) -> Image:
         return first
 
     drums_at = table.memory.view(np.int64)[of.TABLE_DRUMS]
+    kit = kit_of(player.keys) if isinstance(player.keys, DrumKeys) else None
     memory = table.memory[: drums_at or None].copy()  # the shell computes the drums of keys
     memory.view(np.int64)[of.TABLE_PROGRAMS : of.TABLE_PROGRAMS + of.MOST_SOURCES] = 0
     header.table, header.table_slots = put(memory.tobytes()) // 8, len(memory)
@@ -258,8 +218,9 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     header.wheel_goal = wheel_goal(patch) or 0.0
     header.level = 10 ** (patch.level_db / 20)
 
-    if isinstance(player.keys, DrumKeys):
-        _put_drums(player.keys, header, put)
+    if kit is not None:
+        header.kit, header.kit_slots, header.kit_room = put(kit.memory.tobytes()) // 8, len(kit.memory), kit.room
+        header.table_room, header.modes = kit.table_room, kit.modes
     parts = parts_of(patch)
     if parts.modes is not None:
         header.body, header.body_modes = put(parts.modes.tobytes()) // 8, parts.modes.shape[1]
@@ -284,28 +245,6 @@ def image_of(patch: Patch, preset: Preset) -> Image:
         for id, each in parameters
     )
     return Image(id, patch.name, bytes(whole), tuple(controls), left_out)
-
-
-def _put_drums(own: DrumKeys, header: _Header, put: Callable[[bytes], int]) -> None:
-    """Writes what the shell computes the drums of keys from."""
-    made, records, known = drum_parts(own), list[_Drum](), dict[bytes, int]()
-
-    def put_once(content: bytes) -> int:
-        if content not in known:
-            known[content] = put(content) // 8
-        return known[content]
-
-    for each in made.drums:
-        drum, place = each.played.drum, on_the_drum(each.played, each.played.place)
-        values = (*(getattr(drum, name) for name in DRUM_FIELDS), *place)
-        values = (*values, *(getattr(each.played.mallet, name) for name in MALLET_FIELDS), each.air_reach)
-        surface, air = put_once(each.surface.tobytes()), put_once(each.air.tobytes())
-        _, modes, terms = each.air.shape
-        records.append(_Drum(*values, SHAPES.index(drum.shape), surface, each.surface.shape[1], air, modes, terms))
-    keys = [_DrumKey(*made.keys.get(key, (-1, 1.0, 0.0, 0.0))) for key in range(of.KEYS)]
-    header.drums, header.drum_count = put(b"".join(map(bytes, records))) // 8, len(records)
-    header.drum_keys = put(b"".join(map(bytes, keys))) // 8
-    header.modes, header.highest_hz = made.most_modes, own.drums.highest_hz
 
 
 def _sounds(keys: StringKeys | DrumKeys, key: int) -> bool:
@@ -414,18 +353,16 @@ def layout_header(version: str) -> str:
         "PLAYER_TAKEN PLAYER_QUEUED PLAYER_REPORTED PLAYER_RATE PLAYER_SOURCE_GAINS PLAYER_VALUES "
         "PLAYER_CHANNELS PLAYER_EVENTS PLAYER_REPORTS PLAYER_VOICES BEGAN REPORT_KIND REPORT_ID "
         "REPORT_CHANNEL REPORT_KEY REPORT_SLOTS PLAYER_WHEEL "
-        "TABLE_DRUMS TABLE_VALUES DECAY BRIGHTNESS_DECAY MODULUS_FACTOR POINT BODY_MIX TABLE_POINTS "
-        "DRUM_MODES DRUM_MALLET_KG DRUM_CONTACT_S DRUM_MASS_KG DRUM_SOFTEST_M_S DRUM_HARDEST_M_S DRUM_HEADER "
-        "DRUM_ROWS MOST_DRUM_MODES PLAYER_QUEUE PLAYER_NOTES NOTE_STATE NOTE_KEY NOTE_VOICES NOTE_SLOTS RINGS "
+        "BODY_MIX "
         "TABLE_BODY BODY_CROSS BODY_STEP BODY_HEADER BODY_POINTS BODY_LOWEST_HZ BODY_STEPS BODY_SLOTS",
     }
     lines = [f'#define LS_VERSION "{version}"']
     for module, names in wanted.items():
         lines += [f"#define {name} {getattr(module, name)}" for name in names.split()]
     none = of.voice_slots(0)
-    records = {"IMAGE": _Header, "PARAMETER": _Parameter, "MACRO": _Macro, "DRUM": _Drum, "DRUM_KEY": _DrumKey}
+    records = {"IMAGE": _Header, "PARAMETER": _Parameter, "MACRO": _Macro}
     lines += [f"#define {name}_BYTES {ctypes.sizeof(record)}" for name, record in records.items()]
-    lines += [f"#define {name} {_in_c(value)}" for name, value in {**_RESPONSES, **_DRUM_VALUES}.items()]
+    lines += [f"#define {name} {_in_c(value)}" for name, value in _RESPONSES.items()]
     lines += [
         f"#define VOICE_SLOTS_FIXED {none}",
         f"#define VOICE_SLOTS_A_MODE {of.voice_slots(1) - none}",
@@ -437,36 +374,6 @@ def layout_header(version: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-_DRUM_VALUES = {
-    **{
-        f"{name}_{end}": value
-        for name, field in (
-            ("LENGTH", "length_m"),
-            ("WIDTH", "width_m"),
-            ("MODULUS", "youngs_modulus_pa"),
-            ("TENSION", "tension_n_m"),
-            ("D1", "damping_d1_kg_m2_s"),
-            ("D3", "damping_d3_kg_s"),
-        )
-        for end, value in zip(("LOW", "HIGH"), bounds.DRUM[field], strict=True)
-    },
-    "MOST_SURFACE_MODES": bounds.MOST_SURFACE_MODES,
-    "AIR_KG_M3": air.DENSITY_KG_M3,
-    "AIR_M_S": air.SPEED_M_S,
-    "AIR_SIDES": air.SIDES,
-    "AIR_EXACT": air.EXACT,
-    "AIR_ROUNDS": air.ROUNDS,
-    "AIR_EXACT_ROUNDS": air.EXACT_ROUNDS,
-    "COLUMN_ROUNDS": air.COLUMN_ROUNDS,
-    "BEYOND_THE_END": air.BEYOND_THE_END,
-    "LEAST_VOLUME": air.LEAST_VOLUME,
-    "FULL_SCALE_PA": FULL_SCALE_PA,
-    "J01": J01,
-    "LOW_MODES_HZ": LOW_MODES_HZ,
-    "LOW_MODES": LOW_MODES,
-    "TUNINGS": TUNINGS,
-    "NEAR": NEAR,
-}
 _RESPONSES = {
     "LOUDNESS_LOW_HZ": impulse.LOUDNESS_HZ[0],
     "LOUDNESS_HIGH_HZ": impulse.LOUDNESS_HZ[1],

@@ -14,7 +14,10 @@ from typing import Any
 
 PREFIX = "ls_"  # of the entries' names
 # Entries of each; those that mixers call stand in its namespace under the same names
-PARTS = {"mixing": ("render", "partition"), "playing": ("play", "sound", "sympathise", "begin")}
+PARTS = {
+    "mixing": ("render", "partition"),
+    "playing": ("play", "sound", "sympathise", "begin", "kit_begin", "kit_follow", "kit_prepare"),
+}
 SELDOM = 50_000, 20, 50  # of objects and passes: a fifth of the time went to collections that freed next to nothing
 NOWHERE = 1  # an address that is never called
 

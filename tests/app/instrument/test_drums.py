@@ -208,7 +208,7 @@ def test_keys_tune_a_drum() -> None:
     for key in (45, 52):
         found = kettle.of_key(key)
         assert found is not None
-        principal.append(found.modes.omega[found.modes.surface.m == 1].min())  # type: ignore[attr-defined]
+        principal.append(found.modes.omega[found.modes.surface.m == 1].min())
     assert principal[1] / principal[0] == pytest.approx(2 ** (7 / 12), rel=1e-3)
 
 

@@ -1,22 +1,25 @@
-"""Modes of circle and rectangle: norms, transforms and edges, by sums over a fine grid."""
+"""Modes of circle and rectangle: norms, transforms and edges over a fine grid; Bessel functions are SciPy's."""
 
 import numpy as np
 import pytest
+import scipy
 
-from engine.resonators.surface import Circle, Rectangle, Surface, spread
+from engine.kernels import drum_modes as kernel
+from engine.resonators.base import Array
+from engine.resonators.surface import Surface, modes_below, tools
 
 SIDE = 301
 GRID = np.stack(np.meshgrid(*(np.linspace(-1, 1, SIDE),) * 2), axis=-1).reshape(-1, 2)
-CIRCLE, RECTANGLE = Circle.below(0.2, 60.0), Rectangle.below(0.4, 0.3, 60.0)
+CIRCLE, RECTANGLE = Surface.below("circle", 0.4, 0.4, 60.0), Surface.below("rectangle", 0.4, 0.3, 60.0)
 
 
 def cells(surface: Surface) -> np.ndarray:
     """The places of GRID on a surface."""
-    return GRID[np.hypot(*GRID.T) <= 1] if isinstance(surface, Circle) else GRID
+    return GRID[np.hypot(*GRID.T) <= 1] if surface.round else GRID
 
 
 def metres(surface: Surface) -> np.ndarray:
-    return np.array([0.2, 0.2] if isinstance(surface, Circle) else [0.2, 0.15])
+    return np.array([0.2, 0.2] if surface.round else [0.2, 0.15])
 
 
 @pytest.mark.parametrize("surface", [CIRCLE, RECTANGLE])
@@ -28,16 +31,24 @@ def test_shapes_are_orthonormal(surface: Surface) -> None:
 
 @pytest.mark.parametrize("surface", [CIRCLE, RECTANGLE])
 def test_transform_is_the_integral(surface: Surface) -> None:
-    s, angle = np.full(len(surface.wavenumber), 9.0), 0.4
+    angle = 0.4
     phase = 9.0 * (cells(surface) * metres(surface)) @ np.array([np.cos(angle), np.sin(angle)])
+    found = [
+        kernel.transform(surface.sides, surface.rows, mode, 9.0 * np.cos(angle), 9.0 * np.sin(angle), tools())
+        for mode in range(len(surface.m))
+    ]
     expected = np.abs((surface.shapes(cells(surface)) * np.exp(1j * phase)).mean(1))
-    assert np.allclose(np.abs(surface.transform(s, angle)), expected, atol=0.01)
+    assert np.allclose(np.abs(found), expected, atol=0.01)
 
 
 @pytest.mark.parametrize("surface", [CIRCLE.picked(np.arange(4)), RECTANGLE.picked(np.arange(4))])
 def test_density_holds_all_of_a_mode(surface: Surface) -> None:
-    s = np.linspace(0.05, 600, 6000)
-    assert np.allclose(surface.density(np.tile(s, (4, 1))).sum(1) * (s[1] - s[0]), 1, atol=2e-3)
+    s = np.linspace(0.01, 120, 6000)
+    found, out = np.zeros(4), np.empty(4)
+    for each in s:
+        kernel.densities(surface.sides, surface.rows, float(each), out, np.empty(kernel.ORDERS))
+        found += out * (s[1] - s[0])
+    assert np.allclose(found, 1, atol=2e-3)
 
 
 def test_frequencies_of_the_circle_are_zeros_of_bessel_functions() -> None:
@@ -49,10 +60,48 @@ def test_the_mean_over_a_disc() -> None:
     place, radius = np.array([0.3, -0.2]), 0.02
     disc = GRID[np.hypot(*GRID.T) <= 1] * (radius / metres(CIRCLE)) + place
     expected = CIRCLE.shapes(disc).mean(1)
-    found = CIRCLE.shapes(place[None])[:, 0] * spread(CIRCLE.wavenumber, radius)
+    spread = [kernel.spread(each * radius, tools()) for each in CIRCLE.wavenumber]
+    found = CIRCLE.shapes(place[None])[:, 0] * spread
     assert np.allclose(found, expected, atol=2e-3)
 
 
 def test_the_edge_rests() -> None:
     angle = np.linspace(0, 6, 20)
     assert np.abs(CIRCLE.shapes(np.stack([np.cos(angle), np.sin(angle)], axis=1))).max() < 1e-9
+
+
+@pytest.mark.parametrize("x", [0.0, 1e-5, 2e-4, 0.3, 5.0, 77.7, 280.0])
+def test_bessel_functions_are_scipys(x: float) -> None:
+    found = np.empty(300)
+    assert kernel.bessels(x, found) == pytest.approx(scipy.special.struve(1, x), abs=1e-14)
+    np.testing.assert_allclose(found, scipy.special.jv(np.arange(300), x), atol=2e-14)
+
+
+def test_zeros_are_scipys() -> None:
+    rows = modes_below("circle", 1.0, 60.0)
+    expected = [z for m in range(60) for z in scipy.special.jn_zeros(m, 20) for _ in range(2 if m else 1) if z <= 60]
+    np.testing.assert_allclose(rows[kernel.Z], sorted(expected), rtol=1e-12)
+    np.testing.assert_allclose(rows[kernel.SLOPE], scipy.special.jvp(rows[kernel.M], rows[kernel.Z]), atol=1e-13)
+
+
+def test_a_table_of_bessel_functions() -> None:
+    table = np.zeros((300, 100 + 2 * kernel.TERMS))
+    kernel.tabulate(table)
+    orders, x = np.arange(0, 120, 3), np.linspace(0, 29.9, 1234)
+    found = [[kernel.bessel(int(m), float(each), (table, np.empty(kernel.ORDERS))) for m in orders] for each in x]
+    np.testing.assert_allclose(found, scipy.special.jv(orders, x[:, None]), atol=5e-11)
+
+
+def test_the_air_at_a_circle_is_the_integral_with_scipys_functions() -> None:
+    low, ka, points = np.ascontiguousarray(modes_below("circle", 1.0, 16.0)[:, ::7]), 3.3, 4096
+    found: Array = np.empty((2, low.shape[1]))
+    kernel.air_at(np.array([0.0, 2.0, 2.0]), low, ka, 256, found, np.empty(low.shape[1] + kernel.ORDERS))
+    z, m = (row[:, None] for row in low[:2])
+
+    def shares(s: Array) -> Array:
+        return 2 * s * (z * scipy.special.jv(m, s) / (z * z - s * s)) ** 2
+
+    u, alpha = ((np.arange(points) + 0.5) / points * most for most in (128.0, np.pi / 2))
+    s = np.hypot(ka, u)
+    np.testing.assert_allclose(found[0], (shares(s) / s).sum(1) * u[0] * 2, rtol=3e-5)
+    np.testing.assert_allclose(found[1], shares(ka * np.sin(alpha)).sum(1) * alpha[0] * 2 / ka, rtol=2e-4)

@@ -6,7 +6,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "drums.h"
 #include "effects.h"
 #include "layout.h"
 
@@ -93,7 +92,8 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
   const parameter *of = &parameters_of(own->of)[place];
   if (of->kind == KIND_VALUE) {
     pushed(own, frame, PARAMETER, 0, of->index, value);
-    if (own->drums) drums_follow(own, of->index, value);
+    void *error = NULL, *result = NULL;
+    if (own->kit) own->kernels->kit_follow(&result, &error, number_of(own->kit), of->index, value);
   } else if (of->kind == KIND_VOLUME) {
     own->mixer[M_WANTED_VOLUME].real = pow(10, value / 20);
   } else if (of->kind == KIND_SOURCE) {
@@ -120,10 +120,11 @@ bool instrument_begin(instrument *own, double rate_hz) {
   own->player = calloc((size_t)(PLAYER_VOICES + MOST_NOTES * MOST_SOURCES * (VOICE_SLOTS_FIXED + of->modes * VOICE_SLOTS_A_MODE)),
                        sizeof(slot));
   own->scratch = calloc(QUANTUM, sizeof(slot));
-  own->table = copied(of, of->table, of->table_slots, drums_slots(of));
+  own->table = copied(of, of->table, of->table_slots, of->table_room);
   own->model = copied(of, of->model, of->model_slots, 0);
   own->truth = copied(of, of->truth, of->truth_slots, 0);
-  if (!own->mixer || !own->player || !own->scratch || !own->table || !own->model || !own->truth) {
+  own->kit = of->kit ? copied(of, of->kit, of->kit_slots, of->kit_room) : NULL;
+  if (!own->mixer || !own->player || !own->scratch || !own->table || !own->model || !own->truth || (of->kit && !own->kit)) {
     instrument_end(own);
     return false;
   }
@@ -152,7 +153,8 @@ bool instrument_begin(instrument *own, double rate_hz) {
     if (each->kind == KIND_EFFECT) own->effects.values[each->index] = own->values[place];
     if (each->kind == KIND_AMP) own->amp[each->index] = own->values[place];
   }
-  if (!drums_begin(own) || !effects_begin(own)) {
+  if (own->kit) own->kernels->kit_begin(&result, &error, number_of(own->kit), number_of(own->table));
+  if (!effects_begin(own)) {
     instrument_end(own);
     return false;
   }
@@ -171,8 +173,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
 
 void instrument_end(instrument *own) {
   effects_end(own);
-  drums_end(own);
-  slot **all[] = {&own->mixer, &own->player, &own->table, &own->model, &own->truth, &own->scratch};
+  slot **all[] = {&own->mixer, &own->player, &own->table, &own->model, &own->truth, &own->scratch, &own->kit};
   for (size_t place = 0; place < sizeof(all) / sizeof(*all); place++) {
     free(address(*all[place]));
     *all[place] = NULL;
@@ -329,14 +330,14 @@ void instrument_render(instrument *own, uint32_t frames, float *left, float *rig
   float *block = (float *)own->scratch;
   for (uint32_t done = 0; done < frames;) {
     int64_t rendered = own->mixer[M_LEFT].whole, left_over = frames - done;
+    void *error = NULL, *result = NULL;
     if (!rendered) {
       apply_due(own);
-      drums_prepare(own);
+      if (own->kit) own->kernels->kit_prepare(&result, &error, number_of(own->kit), number_of(own->table), number_of(own->player));
       if (effects_follow(own)) pushed(own, 0, PARAMETER, 0, BODY_MIX, own->effects.values[EFFECT_BODY_MIX]);
       rendered = QUANTUM;
     }
     int64_t count = rendered < left_over ? rendered : left_over;
-    void *error = NULL, *result = NULL;
     if (own->kernels->render(&result, &error, number_of(own->mixer), count, number_of(block))) memset(block, 0, 2 * QUANTUM * sizeof(float));
     for (int64_t frame = 0; frame < count; frame++) {
       left[done + frame] = right ? block[2 * frame] : 0.5f * (block[2 * frame] + block[2 * frame + 1]);

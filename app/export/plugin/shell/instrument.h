@@ -30,15 +30,6 @@ typedef struct {
   char name[64], module[64], unit[16], words[64];
 } parameter;
 
-typedef struct { /* as DrumParameters and PlayedDrum have it; the place of a blow is at the rim at most */
-  double length_m, width_m, thickness_m, density_kg_m3, youngs_modulus_pa, poisson, tension_n_m, d1_kg_m2_s, d3_kg_s;
-  double uneven, air_kg_m3, cavity_m3, shell_m, x, y, mallet_kg, radius_m, contact_s;
-  double air_reach;        /* ka up to which the image has what the air adds */
-  int64_t shape;
-  int64_t list, count;     /* of modes by rising wavenumber: rows of zeros of Bessel functions, of m, of n or whether sine */
-  int64_t air_list, air_modes, air_terms; /* two functions of modes, of so many terms */
-} drum;
-typedef struct { int64_t drum; double ratio, softest_m_s, hardest_m_s; } drum_key; /* drum: -1: none */
 typedef struct { int32_t count, spare; struct { int32_t parameter, spare; double low, high; } targets[MOST_MACRO_TARGETS]; } macro;
 typedef struct {
   char magic[8];
@@ -50,10 +41,10 @@ typedef struct {
   int64_t impulse, impulse_frames, impulse_channels; /* a body that is a response: 32-bit whole numbers */
   double body_s, body_subsonic_hz, impulse_hz, impulse_unit; /* at a size of 1 */
   double body_size;                                  /* of the instrument itself */
-  int64_t drums, drum_count, drum_keys; /* slots of drums, and of the drums of all keys; 0: strings */
+  int64_t kit, kit_slots, kit_room, table_room; /* drums, and slots behind kit and table in which they are computed; 0: strings */
   int64_t wheel_effect;        /* which of EFFECTS the modulation wheel moves, -1: none */
   int64_t modes, most_notes;
-  double longest_s, wheel_goal, level, highest_hz;
+  double longest_s, wheel_goal, level;
   char id[128], name[64], description[512], maker[64], features[128], category[16];
   uint8_t uid[16]; /* of VST3 */
 } image;
@@ -86,11 +77,10 @@ typedef struct {
   const image *of;
   const kernels *kernels;
   double rate_hz;
-  slot *mixer, *player, *table, *model, *truth, *scratch;
+  slot *mixer, *player, *table, *model, *truth, *scratch, *kit; /* kit: of drums, else NULL */
   effects effects;
   double amp[2];      /* drive and tone in dB; no drive: there is no amplifier */
   double values[MOST_PARAMETERS];
-  struct drums *drums;
   change changes[MOST_CHANGES];
   int32_t waiting;
   int64_t read;       /* reports */

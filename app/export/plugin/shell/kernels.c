@@ -5,8 +5,12 @@
 #define KERNELS(number)                                                                                                 \
   int32_t ls##number##_render(void *, void **, int64_t, int64_t, int64_t);                                              \
   int32_t ls##number##_begin(void *, void **, int64_t);                                                                 \
+  int32_t ls##number##_kit_begin(void *, void **, int64_t, int64_t);                                                    \
+  int32_t ls##number##_kit_follow(void *, void **, int64_t, int64_t, double);                                           \
+  int32_t ls##number##_kit_prepare(void *, void **, int64_t, int64_t, int64_t);                                         \
   int32_t ls##number##_partition(void *, void **, int64_t, int64_t, int64_t, int64_t, int64_t);                         \
-  static const kernels kernels##number = {ls##number##_render, ls##number##_begin, ls##number##_partition};
+  static const kernels kernels##number = {ls##number##_render, ls##number##_begin, ls##number##_kit_begin,              \
+    ls##number##_kit_follow, ls##number##_kit_prepare, ls##number##_partition};
 
 KERNELS(0)
 

@@ -1,0 +1,138 @@
+"""Drums of a plug-in: whose knobs are turned, and whose keys' blocks are written again when they are struck or heard.
+
+A kit is memory of numbers, as `written` lays it out: its values, its keys, its drums, and room to work in.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from engine.kernels import drum_modes as drums
+from engine.kernels import layout as at
+from engine.kernels import playing_layout as of
+from engine.kernels.compiled import COMPILED
+from engine.kernels.drum_modes import D1, D3, DRUM, HARDEST, MODULUS, ORDERS, ROWS, SOFTEST, SURFACE
+from engine.kernels.memory import part, reals, table, wholes
+from engine.kernels.playing_layout import KEYS
+
+# Slots of a kit, of a key and of a drum behind its own values. R real number, W whole number
+HIGHEST_HZ = 0  # R
+CAPACITY = 1  # W modes of a key
+MOST = 2  # W modes of a surface
+BESSELS, STEPS, COLUMNS = 3, 4, 5  # W slot of a table of Bessel functions, its rows and columns
+WORK = 6  # W slot
+FOUND = 7  # W slot of the modes of all keys, (KEYS, ROWS, CAPACITY)
+STALE = 8  # W whether any key is
+VALUES = 9  # R five, in the order of FOLLOWED
+FIRST_KEY = 14
+KEY_DRUM = 0  # W slot of its drum; 0: it has none
+KEY_RATIO, KEY_SOFTEST, KEY_HARDEST = 1, 2, 3  # R
+KEY_STALE = 4  # W sum of what of it has changed
+KEY_MODES = 5  # W
+KEY_TUNED = 6  # R its drum as it is tuned
+KEY = KEY_TUNED + DRUM
+LIST, LISTED, AIR, LOW, AIR_TERMS = range(DRUM, DRUM + 5)  # W slots of list and table, and their sizes
+AIR_REACH = DRUM + 5  # R
+DRUM_SLOTS = DRUM + 6
+
+FOLLOWED = (of.MODULUS_FACTOR, of.DECAY, of.BRIGHTNESS_DECAY, of.POINT, of.POINT + 1)
+MODES_MOVED, LOSSES_MOVED, PLACES_MOVED = 1, 2, 4
+MOVES = (MODES_MOVED, LOSSES_MOVED, LOSSES_MOVED, PLACES_MOVED, PLACES_MOVED)
+
+
+@njit(**COMPILED)
+def begin(kit_at: int, table_at: int) -> None:
+    """Writes all keys' blocks into an instrument's table."""
+    kit, counts, values = reals(kit_at), wholes(kit_at), part(reals(table_at), of.TABLE_VALUES, of.VALUES)
+    drums.tabulate(_bessels(kit, counts))
+    for which in FOLLOWED:
+        follow(kit_at, which, values[which])
+    for key in range(KEYS):
+        _update(kit_at, table_at, key)
+    counts[STALE] = 0
+
+
+@njit(**COMPILED)
+def follow(kit_at: int, which: int, value: float) -> None:
+    """One of the instrument's values has changed."""
+    kit, counts = reals(kit_at), wholes(kit_at)
+    for number in range(len(FOLLOWED)):
+        if which == FOLLOWED[number]:
+            kit[VALUES + number] = value
+            counts[STALE] = 1
+            for key in range(KEYS):
+                counts[FIRST_KEY + key * KEY + KEY_STALE] |= MOVES[number]
+
+
+@njit(**COMPILED)
+def prepare(kit_at: int, table_at: int, player_at: int) -> None:
+    """What is struck or heard in the next quantum follows."""
+    counts, players = wholes(kit_at), wholes(player_at)
+    if counts[STALE] == 0:
+        return
+    for taken in range(players[of.PLAYER_TAKEN], players[of.PLAYER_PUSHED]):
+        _strike(kit_at, table_at, players, of.PLAYER_EVENTS + taken % of.EVENTS * of.EVENT_SLOTS)
+    for place in range(players[of.PLAYER_QUEUED]):
+        _strike(kit_at, table_at, players, of.PLAYER_QUEUE + place * of.EVENT_SLOTS)
+    for number in range(of.MOST_NOTES):
+        note = of.PLAYER_NOTES + number * of.NOTE_SLOTS
+        key, voice = players[note + of.NOTE_KEY], players[note + of.NOTE_VOICES]
+        if players[note + of.NOTE_STATE] == of.RINGS and voice != 0:
+            moved = counts[FIRST_KEY + key * KEY + KEY_STALE] & PLACES_MOVED
+            if moved and wholes(voice)[at.NEXT_WEIGHTS] == 0:  # else it fades to other places yet
+                _update(kit_at, table_at, key)
+
+
+@njit(**COMPILED)
+def _bessels(kit: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    return table(kit, counts[BESSELS], counts[STEPS], counts[COLUMNS])
+
+
+@njit(**COMPILED)
+def _strike(kit_at: int, table_at: int, players: np.ndarray, event: int) -> None:
+    if players[event + of.EVENT_KIND] == of.NOTE_ON:
+        _update(kit_at, table_at, players[event + of.EVENT_KEY])
+
+
+@njit(**COMPILED)
+def _possible(drum: np.ndarray) -> bool:
+    """Whether `DrumParameters` would take it, as far as knobs and tuning change it."""
+    for value in range(1, drums.X):
+        if not drums.LOWEST[value - 1] <= drum[value] <= drums.HIGHEST[value - 1]:
+            return False
+    length, width = drum[drums.LENGTH], drum[drums.WIDTH]
+    return drum[drums.THICKNESS] <= (length if drum[drums.SHAPE] == drums.BAR else min(length, width)) / 10
+
+
+@njit(**COMPILED)
+def _update(kit_at: int, table_at: int, key: int) -> None:
+    """Writes the block of a key that is stale."""
+    kit, counts, keys, tables = reals(kit_at), wholes(kit_at), reals(table_at), wholes(table_at)
+    own, capacity = FIRST_KEY + key * KEY, counts[CAPACITY]
+    stale, drum = counts[own + KEY_STALE], counts[own + KEY_DRUM]
+    counts[own + KEY_STALE] = 0
+    if stale == 0 or drum == 0:
+        return
+    tuned, found = part(kit, own + KEY_TUNED, DRUM), table(kit, counts[FOUND] + key * ROWS * capacity, ROWS, capacity)
+    work = part(kit, counts[WORK], 4 * counts[MOST] + ORDERS)
+    if stale & MODES_MOVED:
+        for value in range(DRUM):
+            tuned[value] = kit[drum + value]
+        tuned[SOFTEST], tuned[HARDEST] = kit[own + KEY_SOFTEST], kit[own + KEY_HARDEST]
+        tuned[MODULUS] *= kit[VALUES]
+        counts[own + KEY_MODES] = 0
+        if _possible(tuned):
+            low, terms = counts[drum + LOW], counts[drum + AIR_TERMS]
+            air = part(kit, counts[drum + AIR], 2 * low * terms).reshape(2, low, terms)
+            around = table(kit, counts[drum + LIST], SURFACE, counts[drum + LISTED]), air, kit[drum + AIR_REACH]
+            drums.tune(tuned, kit[own + KEY_RATIO], around, work, found)
+            if _possible(tuned):
+                most = of.MOST_DRUM_MODES
+                counts[own + KEY_MODES] = drums.modes(tuned, around, kit[HIGHEST_HZ], most, work, found)
+    tuned[D1], tuned[D3] = kit[drum + D1] * kit[VALUES + 1], kit[drum + D3] * kit[VALUES + 2]
+    n, slots = counts[own + KEY_MODES], tables[of.TABLE_DRUMS]
+    block = slots + KEYS + key * (of.DRUM_HEADER + of.DRUM_ROWS * capacity)
+    points, tools = part(kit, VALUES + 3, tables[of.TABLE_POINTS]), (_bessels(kit, counts), work)
+    drums.write(tuned, found, points, tools, part(keys, block, of.DRUM_HEADER + of.DRUM_ROWS * n))
+    tables[slots + key] = block if n > 0 and _possible(tuned) else 0
