@@ -21,7 +21,7 @@ _TEMPORARY = "learned-strings-kernels"
 def _sources() -> list[Path]:
     """Of all functions that sound and pictures are made with, which call one another across files."""
     engine = Path(__file__).parents[1]
-    return sorted([*(engine / "kernels").glob("*.py"), *engine.glob("*/_*kernel.py")])
+    return sorted([*(engine / "kernels").rglob("*.py"), *engine.glob("*/_*kernel.py")])
 
 
 @cache

@@ -19,7 +19,7 @@ from engine.kernels.contact import sound
 from engine.kernels.convolver import convolve
 from engine.kernels.limiter import limit
 from engine.kernels.memory import fence, pointer
-from engine.kernels.player import play
+from engine.kernels.playing.events import play
 from engine.kernels.sympathy import sympathise
 from engine.kernels.voice import add, note_gap, take_over
 

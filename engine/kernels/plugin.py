@@ -8,11 +8,12 @@ from __future__ import annotations
 import numpy as np
 from numba import carray, njit, types
 
-from engine.kernels import contact, kit, mixer, player, sympathy
+from engine.kernels import contact, kit, mixer, sympathy
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.fourier import transform
 from engine.kernels.memory import pointer
+from engine.kernels.playing import events
 
 ADDRESS = COUNT = types.int64
 RENDER = types.void(ADDRESS, COUNT, ADDRESS)
@@ -33,13 +34,13 @@ def render(mixer_at: int, frames: int, out_at: int) -> None:
 @njit(**COMPILED)
 def begin(player_at: int) -> None:
     """Puts the wheels and pedals of a new player at rest."""
-    player.begin(player_at)
+    events.begin(player_at)
 
 
 @njit(**COMPILED)
 def play(player_at: int, mixer_at: int) -> None:
     """What a player has to do before the mixer's next quantum."""
-    player.play(player_at, mixer_at)
+    events.play(player_at, mixer_at)
 
 
 kit_begin, kit_follow, kit_prepare = kit.begin, kit.follow, kit.prepare

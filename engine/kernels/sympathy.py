@@ -26,7 +26,7 @@ from engine.kernels import playing_layout as of
 from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import pointer
-from engine.kernels.player import string_of
+from engine.kernels.playing.keys import string_of
 
 HIGHEST_HZ = 4_000.0  # of partials: an estimate, above it boards pass hardly anything to other strings
 PARTIALS = 8  # of a string

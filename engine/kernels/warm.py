@@ -77,9 +77,10 @@ def _beside(work: str) -> AbstractContextManager[object]:
 
 def playing() -> None:
     """What makes voices of events, for strings and drums."""
-    from engine.kernels import contact, player, sympathy
+    from engine.kernels import contact, sympathy
+    from engine.kernels.playing import events
 
-    for each in (player.play, contact.sound, sympathy.sympathise):
+    for each in (events.play, contact.sound, sympathy.sympathise):
         each.compile("void(int64, int64)")
     CompiledPlayer(RATE_HZ, INFO.modes)
     _string()

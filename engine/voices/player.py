@@ -177,7 +177,7 @@ class CompiledPlayer:
     """
 
     def __init__(self, rate_hz: int, modes: int = of.MOST_MODES, most_notes: int = 40) -> None:
-        from engine.kernels.player import begin  # Numba only when it is needed
+        from engine.kernels.playing.events import begin  # Numba only when it is needed
 
         self.rate_hz = rate_hz
         self.memory = memory = np.zeros(of.player_slots(modes + of.MOST_PAIRS))
@@ -277,7 +277,7 @@ class CompiledPlayer:
 
     def catch_up(self, mixer: Mixer) -> None:
         """Plays what is due in the mixer's next quantum now, where no device takes its frames."""
-        from engine.kernels.player import play
+        from engine.kernels.playing.events import play
 
         with self._lock:
             while True:

@@ -32,7 +32,7 @@ from app.instrument.events import (
 )
 from app.instrument.strings import pitch_hz_of
 from app.patches.patch import Knobs, OpenString, Patch, StringSet
-from engine.kernels.player import WIDEST_SEMITONES
+from engine.kernels.playing.channels import WIDEST_SEMITONES
 from engine.kernels.playing_layout import BEGAN
 from engine.presets import Preset
 from engine.voices import Mixer

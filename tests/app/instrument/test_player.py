@@ -31,7 +31,7 @@ from engine.excitation import blow_factor, release_factor
 from engine.kernels import playing_layout as of
 from engine.kernels.layout import QUANTUM
 from engine.kernels.loudness import k_weight
-from engine.kernels.player import PLUCK_STOPS_S
+from engine.kernels.playing.notes import PLUCK_STOPS_S
 from engine.kernels.playing_layout import WANTED_DB
 from engine.pluck import FULL_SCALE_M
 from engine.presets import Preset, load_preset

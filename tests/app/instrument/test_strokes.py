@@ -28,7 +28,10 @@ from app.instrument.events import (
 from app.patches.patch import Fretted, Patch, Pickup, Polarisations, Technique
 from engine.kernels import playing_layout as of
 from engine.kernels.layout import QUANTUM
-from engine.kernels.player import CHORD_S, TOUCH_PERIODS, USUAL_HARMONIC, USUAL_STRUM_MS, USUAL_TREMOLO_HZ
+from engine.kernels.playing.chords import CHORD_S, USUAL_STRUM_MS
+from engine.kernels.playing.hands import USUAL_TREMOLO_HZ
+from engine.kernels.playing.keys import USUAL_HARMONIC
+from engine.kernels.playing.notes import TOUCH_PERIODS
 from engine.kernels.strings import TOUCH_RESISTANCE
 from engine.presets import Preset
 from engine.resonators.string import StringParameters

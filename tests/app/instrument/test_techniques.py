@@ -22,7 +22,7 @@ from app.instrument.events import (
 )
 from app.instrument.offline import render_events
 from app.patches.patch import Damping, Patch
-from engine.kernels.player import SLIDE_S
+from engine.kernels.playing.channels import SLIDE_S
 from engine.kernels.strings import MUTED_M, MUTED_SIGMA
 from engine.presets import Preset
 

@@ -1,0 +1,1 @@
+"""The compiled player: from events to voices."""

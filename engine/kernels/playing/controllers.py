@@ -1,0 +1,102 @@
+"""What controllers of MIDI do."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from engine.kernels import contact
+from engine.kernels import playing_layout as of
+from engine.kernels.compiled import COMPILED
+from engine.kernels.playing import changes, channels, chords, hands, slots, voices
+
+KNOB_S = 0.04  # of the glide to other modes
+MOD_WHEEL, SLIDE_TIME, SUSTAIN, PORTAMENTO, SOFT, LEGATO, SLIDE = 1, 5, 64, 65, 67, 68, 74
+HARMONICS, TREMOLO, STRUM, SOUND_OFF, RESET, NOTES_OFF = 80, 81, 82, 120, 121, 123
+PEDAL_DOWN = 64  # from this value on
+SWITCHES = (of.CHANNEL_LEGATO, of.CHANNEL_SLIDES, of.CHANNEL_HARMONICS, of.CHANNEL_TREMOLO, of.CHANNEL_STRUMS)
+
+
+@njit(**COMPILED)
+def stop(player: np.ndarray, players: np.ndarray, seconds: float, frame: int) -> None:
+    """Lets all strings fade out, those too that nobody plays, and forgets their places."""
+    for number in range(of.MOST_NOTES):
+        note = slots.note(number)
+        if players[note + of.NOTE_STATE] == of.RINGS:
+            voices.release_note(player, players, note, seconds, frame)
+            players[note + of.NOTE_HAS_PLACE] = 0
+    for each in range(of.CHANNELS):
+        channels.release_keys(players, each)
+    chords.forget_turns(player, players, of.POLY, -1)
+    players[of.PLAYER_NEXT_UP] = 0
+    players[of.PLAYER_SYMPATHY_STOPS] = slots.quanta(player, max(seconds, hands.STOP_S)) + 2
+    contact.hush(players, slots.quanta(player, max(seconds, hands.STOP_S)))
+
+
+@njit(**COMPILED)
+def controller(
+    player: np.ndarray,
+    players: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    channel: int,
+    number: int,
+    value: int,
+    frame: int,
+    now: int,
+) -> None:
+    mode, own, wheel = tables[of.TABLE_MODE], slots.channel(channel), tables[of.TABLE_WHEEL]
+    turns = 0 <= wheel < of.KNOBS or wheel == of.MUTE
+    if number == SUSTAIN:
+        players[own + of.CHANNEL_PEDAL] = value >= PEDAL_DOWN
+        changes.damp_unkept(player, players, table, tables, frame, now)
+    elif number == SLIDE:
+        players[own + of.CHANNEL_SLIDE] = max(value, 0)
+    elif number == SOFT:
+        player[own + of.CHANNEL_MUTE] = min(max(value, 0), 127) / 127
+        changes.glide(player, players, table, tables, channel, changes.DAMPER_S, frame, now)
+    elif number == LEGATO:
+        players[own + of.CHANNEL_LEGATO] = value >= PEDAL_DOWN
+    elif number == PORTAMENTO:
+        players[own + of.CHANNEL_SLIDES] = value >= PEDAL_DOWN
+    elif number == HARMONICS:
+        players[own + of.CHANNEL_HARMONICS] = value >= PEDAL_DOWN
+    elif number == TREMOLO:
+        players[own + of.CHANNEL_TREMOLO] = value >= PEDAL_DOWN
+    elif number == STRUM:
+        players[own + of.CHANNEL_STRUMS] = value >= PEDAL_DOWN
+    elif number == SLIDE_TIME:
+        players[own + of.CHANNEL_TIME] = min(max(value, 0), 127)
+    elif number == MOD_WHEEL:
+        players[of.PLAYER_WHEEL] = value
+        players[of.PLAYER_WHEEL_BY] = channel
+        if turns:
+            changes.glide(player, players, table, tables, -1, KNOB_S, frame, now)
+    elif number == SOUND_OFF:
+        stop(player, players, hands.STOP_S, frame)
+    elif number == NOTES_OFF:
+        for each in range(of.CHANNELS):
+            if channels.is_master(mode, channel, each):
+                channels.release_keys(players, each)
+        chords.forget_turns(player, players, mode, channel)
+        for each in range(of.MOST_NOTES):
+            note = slots.note(each)
+            if channels.is_master(mode, channel, players[note + of.NOTE_CHANNEL]) and slots.sounds(players, note):
+                players[note + of.NOTE_HELD] = 0
+                players[note + of.NOTE_KEPT] = 0
+                changes.damp(player, players, table, tables, each, frame, now)
+    elif number == RESET:
+        for each in range(of.CHANNELS):
+            if channels.is_master(mode, channel, each):
+                channels.rest(player, players, each, 0, 0)
+                player[slots.channel(each) + of.CHANNEL_MUTE] = 0.0
+                for switch in SWITCHES:
+                    players[slots.channel(each) + switch] = 0
+        if channels.is_master(mode, channel, players[of.PLAYER_WHEEL_BY]):
+            players[of.PLAYER_WHEEL] = 0
+        changes.damp_unkept(player, players, table, tables, frame, now)
+        changes.glide(player, players, table, tables, channel, hands.BEND_S, frame, now)
+        if turns:
+            changes.glide(player, players, table, tables, -1, KNOB_S, frame, now)
+    elif channels.set_range(player, players, own, number, value):
+        changes.glide(player, players, table, tables, channel, hands.BEND_S, frame, now)

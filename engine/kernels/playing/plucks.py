@@ -1,0 +1,149 @@
+"""A pluck as amplitudes of partials: its shape, its release, its parts in both directions."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from engine.kernels import playing_layout as of
+from engine.kernels import strings
+from engine.kernels.compiled import COMPILED
+
+
+@njit(**COMPILED)
+def pull(
+    player: np.ndarray,
+    table: np.ndarray,
+    tables: np.ndarray,
+    modes: int,
+    position: float,
+    peak_m: float,
+    width: float,
+) -> float:
+    """The amplitudes of the modes of a pluck, and its highest point in m: its shape on the grid, then sines.
+
+    Those of a blow are divided by its width, the shape's area over its height; `release_pluck` does the rest.
+    """
+    grid, shape, highest = tables[of.TABLE_GRID], tables[of.TABLE_SHAPE], 0.0
+    if shape == of.ROUNDED:
+        _round(player, table, grid, modes, position, peak_m, width)
+        return peak_m
+    for point in range(grid):
+        x = point / (grid - 1)
+        distance = (x - position) / width
+        if shape == of.TRIANGULAR:
+            found = peak_m * min(x / position, (1 - x) / (1 - position))
+        elif point == 0 or point == grid - 1:
+            found = 0.0
+        elif shape == of.GAUSSIAN:
+            found = peak_m * math.exp(-distance * distance)
+        else:
+            found = peak_m / 2 * (1 + math.cos(2 * math.pi * distance)) if abs(distance) < 0.5 else 0.0
+        player[of.PLAYER_PULLED + point] = found
+        highest = max(highest, found)
+    turn = 2 * (grid - 1)
+    for mode in range(modes):
+        total, place = 0.0, 0
+        for point in range(1, grid - 1):
+            place += mode + 1
+            if place >= turn:
+                place -= turn
+            total += player[of.PLAYER_PULLED + point] * table[of.TABLE_SINES + place]
+        player[of.PLAYER_AMPLITUDES + mode] = total * (2 / (grid - 1))
+    if tables[of.TABLE_STRIKES] != 0:
+        area = 0.0
+        for point in range(grid):
+            area += player[of.PLAYER_PULLED + point] / (peak_m * (grid - 1))
+        for mode in range(modes):
+            player[of.PLAYER_AMPLITUDES + mode] /= area
+    return highest
+
+
+@njit(**COMPILED)
+def _round(
+    player: np.ndarray, table: np.ndarray, grid: int, modes: int, position: float, peak_m: float, width: float
+) -> None:
+    """The amplitudes of the modes of a rounded triangle: as `excitation.rounded`.
+
+    It peaks where the force pulls: elsewhere it is straight.
+    """
+    turn, highest = 2 * (grid - 1), 0.0
+    near = int((position - width / 2) * (grid - 1)) - 1
+    far = int((position + width / 2) * (grid - 1)) + 2
+    low, high = max(near, 1), min(far, grid - 2) + 1
+    player[of.PLAYER_PULLED + low : of.PLAYER_PULLED + high] = 0.0
+    for mode in range(1, grid - 1):
+        half = mode * width / 2
+        spread = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
+        each, place = math.sin(math.pi * mode * position) / (mode * mode) * spread, mode * low % turn
+        for point in range(low, high):
+            player[of.PLAYER_PULLED + point] += each * table[of.TABLE_SINES + place]
+            place += mode
+            if place >= turn:
+                place -= turn
+        if mode <= modes:
+            player[of.PLAYER_AMPLITUDES + mode - 1] = each
+    for point in range(low, high):
+        highest = max(highest, player[of.PLAYER_PULLED + point])
+    for mode in range(modes):
+        player[of.PLAYER_AMPLITUDES + mode] *= peak_m / highest
+
+
+@njit(**COMPILED)
+def release_pluck(player: np.ndarray, tables: np.ndarray, own: np.ndarray, partials: int, release_s: float) -> None:
+    """Releases a pluck's partials within a time, or strikes them for so long: as `excitation`."""
+    for mode in range(partials if tables[of.TABLE_STRIKES] != 0 else 0):
+        share = math.sqrt(strings.omega_squared(own, 1) / strings.omega_squared(own, mode + 1))
+        player[of.PLAYER_AMPLITUDES + mode] *= 2 / math.pi * share
+    for mode in range(partials if release_s > 0.0 else 0):
+        half = math.sqrt(strings.omega_squared(own, mode + 1)) * release_s / (2 * math.pi)
+        left = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
+        player[of.PLAYER_AMPLITUDES + mode] *= left
+
+
+@njit(**COMPILED)
+def varied(stroke: int, key: int, which: int) -> float:
+    """A number in -1 … 1 for each stroke: the same for the same strokes (splitmix64)."""
+    mixed = np.uint64(stroke * 4096 + key * 16 + which + 1) * np.uint64(0x9E3779B97F4A7C15)
+    mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    mixed = mixed ^ (mixed >> np.uint64(31))
+    return float(np.int64(mixed >> np.uint64(12))) / 2.0**51 - 1
+
+
+@njit(**COMPILED)
+def split(player: np.ndarray, table: np.ndarray, tables: np.ndarray, partials: int, turned: float) -> int:
+    """Splits a pluck's partials into modes of both polarisations; how many partials have two.
+
+    Args:
+        turned: by so many rad from the instrument's angle.
+    """
+    pairs = min(tables[of.TABLE_PAIRS], partials)
+    if pairs == 0:
+        return 0
+    first, cosine, sine = of.PLAYER_AMPLITUDES, math.cos(turned), math.sin(turned)
+    normal, along = table[of.TABLE_PULLED], table[of.TABLE_PULLED + 1]
+    for mode in range(partials + pairs - 1, -1, -1):
+        amplitude = player[first + strings.partial_of(mode, pairs) - 1]
+        second = strings.direction_of(mode, pairs) == 1
+        part = along * cosine + normal * sine if second else normal * cosine - along * sine
+        if mode >= 2 * pairs:  # heard as the others are
+            part = 1 / table[of.TABLE_HEARD]
+        player[first + mode] = part * amplitude
+    return pairs
+
+
+@njit(**COMPILED)
+def reference_share(player: np.ndarray) -> float:
+    """The share of the velocities at which keys are equally loud."""
+    return ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0 ** -player[of.PLAYER_VALUES + of.CURVE])
+
+
+@njit(**COMPILED)
+def contact_s(softest_ms: float, hardest_ms: float, share: float) -> float:
+    """The time in which a pluck releases the string, or a hammer touches it, of a share of the velocities."""
+    if softest_ms <= 0.0 or hardest_ms <= 0.0:
+        return 0.0
+    return softest_ms / 1000 * (hardest_ms / softest_ms) ** share
