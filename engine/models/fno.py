@@ -18,13 +18,13 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, cast
+from typing import TYPE_CHECKING, ClassVar
 
 import torch
 from torch import Tensor, nn
 from torch.utils.checkpoint import checkpoint
 
-from engine.models._fno_rollout import FGRURollout, FRNNRollout, channel_matrices, joined
+from engine.models._fno_rollout import channel_matrices, fgru_rollout, frnn_rollout, joined
 from engine.models._fno_transform import transform_matrices
 from engine.models.base import Physics, StringModel, check_initialisation
 from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
@@ -163,7 +163,7 @@ class _FourierRecurrent(StringModel[FieldState]):
 class FGRU(_FourierRecurrent):
     """See the module."""
 
-    kept_fields = 8
+    kept_fields = 20
 
     def __init__(self, configuration: FGRUConfiguration) -> None:
         super().__init__(configuration.grid_points, configuration.width)
@@ -182,7 +182,7 @@ class FGRU(_FourierRecurrent):
         z, r, candidate = (channel_matrices(layer.weight) for layer in (self.z_layer, self.r_layer, self.h_layer))
         gates_bias = torch.cat([self.z_layer.bias_field(), self.r_layer.bias_field()], dim=1)
         weights = joined(z, r), gates_bias, candidate, self.h_layer.bias_field()
-        return cast("Tensor", FGRURollout.apply(hidden, *weights, steps))
+        return fgru_rollout(hidden, *weights, steps)
 
     def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
         from engine.models import _fno_kernel as kernel  # Numba only when it is needed
@@ -200,7 +200,7 @@ class FRNN(_FourierRecurrent):
     def __init__(self, configuration: FRNNConfiguration) -> None:
         super().__init__(configuration.grid_points, configuration.width)
         self.configuration = configuration
-        self.kept_fields = 4 * configuration.depth
+        self.kept_fields = 10 * configuration.depth
         sizes = configuration.grid_points, configuration.width
         self.fourier_layers = nn.ModuleList(FourierConvolution(*sizes) for _ in range(configuration.depth))
         self.pointwise_layers = nn.ModuleList(
@@ -217,7 +217,7 @@ class FRNN(_FourierRecurrent):
         biases = torch.stack([layer.bias_field() for layer in self._convolutions])
         pointwise = torch.stack([layer.weight for layer in self._pointwise])
         offsets = torch.stack([layer.bias for layer in self._pointwise])
-        return cast("Tensor", FRNNRollout.apply(hidden, matrices, biases, pointwise, offsets, steps))
+        return frnn_rollout(hidden, matrices, biases, pointwise, offsets, steps)
 
     @property
     def _convolutions(self) -> list[FourierConvolution]:
