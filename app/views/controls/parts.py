@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import TypeVar
 
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QComboBox,
-    QDialog,
     QFrame,
     QHBoxLayout,
     QLabel,
@@ -145,16 +144,6 @@ def read_only_text(name: str, text: str = "") -> QPlainTextEdit:
     box.setAccessibleName(name)
     box.setTabChangesFocus(True)
     return box
-
-
-def copy_and_close(dialog: QDialog, text: Callable[[], str], word: str, tip: str) -> QHBoxLayout:
-    """The last row of a dialog whose text is for a report: a button `word` that copies it, and Close."""
-    copy = QPushButton(word)
-    copy.setToolTip(tip)
-    copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(text()))
-    close = QPushButton("Close", default=True)
-    close.clicked.connect(dialog.accept)
-    return filled(QHBoxLayout(), copy, None, close)
 
 
 def vertical_rule() -> QFrame:
