@@ -92,8 +92,7 @@ class FiguresTable(QTableWidget):
         self.horizontalHeader().setHighlightSections(False)
         self.clicked.connect(lambda index: self.row_clicked.emit(self._key(index)))
         self.doubleClicked.connect(lambda index: self.row_double_clicked.emit(self._key(index)))
-
-        theme.changes.theme_changed.connect(lambda: self._fill(self.rows))
+        theme.changes.theme_changed.connect(self._take_theme)
 
     def show_rows(self, rows: Sequence[TableRow]) -> None:
         """Replaces all rows; the chosen one stays chosen where it is still there."""
@@ -108,6 +107,9 @@ class FiguresTable(QTableWidget):
             for number, column in enumerate(self._columns):
                 self.setItem(place, number, _Cell(column, row, row.values[number], self._dimmed))
         self.setSortingEnabled(True)  # sorts them again
+
+    def _take_theme(self) -> None:
+        self._fill(self.rows)
 
     def set_dimmed(self, dimmed: bool) -> None:
         """Makes all rows grey: they are of an earlier pluck."""
