@@ -1,9 +1,9 @@
-"""The recurrences of `fno` for training: any number of strings at once.
+"""The recurrences of `fno`, which gradients pass through: any number of strings at once.
 
-The definition spends most of its time on transforms of a length with a large prime factor, on complex products of
-single frequencies, and on calls. Here a step is some ten matrix products: the folded transforms (`_fno_transform`) of
-all strings together, and at each frequency one real matrix for real and imaginary parts of all channels; the gates z
-and r, which see the same field, in one.
+As written, a step would spend most of its time on transforms of a length with a large prime factor, on complex
+products of single frequencies, and on calls. Here it is some ten matrix products: the folded transforms
+(`_fno_transform`) of all strings together, and at each frequency one real matrix for real and imaginary parts of all
+channels; the gates z and r, which see the same field, in one.
 
 Fields are (points, batch, width), spectra (frequencies, batch, 2·width) with the real parts first.
 """
