@@ -83,10 +83,9 @@ def words_label() -> ElidedLabel:
     return label
 
 
-def keeps_own_keys(event: QEvent) -> bool:
-    """Accepts the override of a shortcut on Enter or Esc, so that the widget gets the key; whether it was one."""
-    asks = event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
-    if asks and event.key() in (*ENTER_KEYS, Qt.Key.Key_Escape):  # type: ignore[attr-defined]
+def keeps_keys(event: QEvent, *keys: Qt.Key) -> bool:
+    """Accepts the override of a shortcut on one of these, so that the widget gets the key; whether it was one."""
+    if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and event.key() in keys:
         event.accept()
         return True
     return False

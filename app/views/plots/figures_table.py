@@ -19,7 +19,7 @@ from PySide6.QtWidgets import (
 )
 
 from app.views import theme
-from app.views.controls.parts import ENTER_KEYS, keeps_own_keys, lay_out_view, tool_button
+from app.views.controls.parts import ENTER_KEYS, keeps_keys, lay_out_view, tool_button
 from app.views.controls.plain import plain_tip
 from app.views.controls.segments import SMALL
 
@@ -148,7 +148,7 @@ class FiguresTable(QTableWidget):
 
     def event(self, event: QEvent) -> bool:
         """Keeps Enter and Esc, which are shortcuts of the window, while the table has the focus."""
-        return keeps_own_keys(event) or super().event(event)
+        return keeps_keys(event, *ENTER_KEYS, Qt.Key.Key_Escape) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.matches(QKeySequence.StandardKey.Copy):
