@@ -210,7 +210,7 @@ def compare(
                 "modes": struck.resonator.modes,
                 "tension_rise": struck.tension_rise,
                 "rel_mse": whole.rel_mse,
-                "windows": [asdict(each) for each in windows],
+                "windows": [{"start_s": w.start_s, "stop_s": w.stop_s, "rel_mse": w.rel_mse} for w in windows],
             }
         )
         return

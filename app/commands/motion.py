@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -175,8 +176,10 @@ def compare(
         return
     print(f"{one_line(str(loaded.name))}: rel. MSE {number(found['rel_mse'])}, rel. MAE {number(found['rel_mae'])}")
     columns = ("from s", "to s", "rel. MSE", "rel. MAE", "")
+    figures = ("start_s", "stop_s", "rel_mse", "rel_mae")
     rows = [
-        [*list(w.values())[:4], "past the training horizon" if w["past_horizon"] else ""] for w in found["windows"]
+        [*(w[name] for name in figures), "past the training horizon" if w["past_horizon"] else ""]
+        for w in found["windows"]
     ]
     print_table(columns, rows)
 
@@ -187,28 +190,17 @@ def _comparison(preset: Preset, pluck: Pluck, steps: int) -> dict[str, Any]:
     info = preset.info
     seconds = steps / info.rate_hz
     sums = _compared(preset, pluck, steps)
-    total = sums.total()
     windows = [
-        {
-            "start_s": w.start_s,
-            "stop_s": w.stop_s,
-            "rel_mse": w.rel_mse,
-            "rel_mae": w.rel_mae,
-            "past_horizon": w.start_s >= info.horizon_s,
-        }
+        {**asdict(w), "past_horizon": w.start_s >= info.horizon_s}
         for w in sums.windows(info.rate_hz, window_edges(seconds, info))
     ]
     return {
         "preset": preset.name,
         "rate_hz": info.rate_hz,
-        "position": pluck.position,
-        "amplitude_mm": pluck.amplitude_mm,
-        "shape": pluck.shape,
-        "width": pluck.width,
+        **asdict(pluck),
         "seconds": seconds,
         "horizon_s": info.horizon_s,
-        "rel_mse": total.rel_mse,
-        "rel_mae": total.rel_mae,
+        **asdict(sums.total()),
         "windows": windows,
         "warnings": outside_training(info, pluck),
     }

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from app.audio.sound import Sound
 from app.instrument.drum_keys import DrumKeys
 from app.playing.key_note import KeyNote
 from app.presets.library import Library
@@ -20,39 +19,20 @@ class Blows:
 
     Args:
         submit: hands a request to the render worker.
+
+    Attributes:
+        shown: the motion that is shown.
     """
 
-    def __init__(
-        self, session: Session, library: Library, sound: Sound, submit: Callable[[BlowRequest], None]
-    ) -> None:
-        self._session, self._library, self._sound, self._submit = session, library, sound, submit
+    def __init__(self, session: Session, library: Library, submit: Callable[[BlowRequest], None]) -> None:
+        self._session, self._library, self._submit = session, library, submit
         self._asked: tuple[BlowRequest, KeyNote] | None = None  # the latest blow, rendered or not
-        self._shown: Playhead[BlowTake] = Playhead()
-
-    @property
-    def take(self) -> BlowTake | None:
-        """The motion that is shown."""
-        return self._shown.take
-
-    @property
-    def position_s(self) -> float:
-        """The playhead: the time in the shown motion that is heard now, or where it stands."""
-        return self._shown.position_s(self._sound.mixer.output_latency_s)
-
-    @property
-    def moving(self) -> bool:
-        """Whether the playhead moves."""
-        return self._shown.moving
-
-    @property
-    def audible(self) -> bool:
-        """Whether the blow that is shown rings."""
-        return self._shown.audible
+        self.shown: Playhead[BlowTake] = Playhead()
 
     @property
     def settled(self) -> bool:
         """Whether motion and signals are complete, so that views need not look for more."""
-        asked, take = self._asked, self._shown.take
+        asked, take = self._asked, self.shown.take
         return asked is None or (
             take is not None and take.complete and take.request.same_motion(asked[0]) and take.listened.complete
         )
@@ -71,8 +51,8 @@ class Blows:
             strike = Strike(note.event.place, strike.speed_m_s, strike.mallet)
         request = BlowRequest(entry.path, found.modes, strike, choices.seconds, choices.ear)
         self._asked = request, note
-        if self._shown.take is not None and request.same_motion(self._shown.take.request):
-            self._shown = Playhead(self._shown.take, note)
+        if self.shown.take is not None and request.same_motion(self.shown.take.request):
+            self.shown = Playhead(self.shown.take, note)
         self._submit(request)
 
     def listen(self) -> None:
@@ -93,23 +73,13 @@ class Blows:
 
     def started(self, take: BlowTake) -> bool:
         """Takes a motion that was begun; whether it is of the latest blow and not shown yet."""
-        if self._asked is None or take is self._shown.take or not take.request.same_motion(self._asked[0]):
+        if self._asked is None or take is self.shown.take or not take.request.same_motion(self._asked[0]):
             return False
-        note, before = self._asked[1], self._shown
+        note, before = self._asked[1], self.shown
         parked = before.note is None and before.take is not None and before.take.request.strike is take.request.strike
-        self._shown = Playhead(take, None, before.parked_s) if parked else Playhead(take, note)
+        self.shown = Playhead(take, None, before.parked_s) if parked else Playhead(take, note)
         return True
-
-    def seek(self, position_s: float) -> None:
-        """Moves the playhead; the sound continues."""
-        if self._shown.take is not None:
-            self._shown.note = None
-            self._shown.parked_s = min(max(position_s, 0.0), self._shown.take.seconds)
-
-    def stop(self) -> None:
-        """The playhead stays where it is."""
-        self.seek(self.position_s)
 
     def forget(self) -> None:
         """Another instrument is played."""
-        self._asked, self._shown = None, Playhead()
+        self._asked, self.shown = None, Playhead()

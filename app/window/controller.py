@@ -34,9 +34,8 @@ from app.shared.vocabulary import Face
 from app.views.controls.app_menu import ENTRIES
 from app.views.controls.knob import Knob
 from app.views.controls.slot_buttons import SLOTS
-from app.views.dialogs.about_dialog import AboutDialog
 from app.views.dialogs.abx_dialog import AbxDialog
-from app.views.dialogs.help_dialog import HelpDialog
+from app.views.dialogs.help_dialog import ABOUT, HelpDialog
 from app.views.dialogs.learn_dialog import LearnDialog
 from app.views.dialogs.preset_card import preset_browser
 from app.views.drum.view import DrumView
@@ -263,7 +262,7 @@ class Controller(QObject):
             "audio": self.audio.show_dialog,
             "midi": lambda: self.instruments.midi.show_dialog(window),
             "help": self.show_help,
-            "about": lambda: AboutDialog(about_text(self._settings_path, SHIPPED), window).open(),
+            "about": lambda: self.show_help(ABOUT),
         }
         for name, do in does.items():
             window.action[name].triggered.connect(lambda _=False, do=do: do())
@@ -353,13 +352,14 @@ class Controller(QObject):
         self._settings = self._settings.model_copy(update={"abx": dialog.choices()})
         dialog.deleteLater()
 
-    def show_help(self) -> None:
+    def show_help(self, topic: str = "") -> None:
         if self._help is None:
             self._fill_decks()
             views = [(panel.title, panel.help) for panel in self.panels if panel.help]
             keys = [*PLAYED_KEYS, *((entry.key_name, entry.does) for entry in ENTRIES.values() if entry.key)]
-            self._help = HelpDialog(keys, views, log_file(), self.window)
-        self._help.show()
+            about = about_text(self._settings_path, SHIPPED)
+            self._help = HelpDialog(keys, views, log_file(), about, self.window)
+        self._help.open_at(topic)
         self._help.raise_()
 
     def take_file(self, file: Path) -> None:

@@ -9,6 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,7 +24,6 @@ from app.shared.heap import collect_anywhere, collect_between_events, return_lar
 from app.shared.log import crashes_written, faults_logged, log_fault
 from app.views.theme import apply_theme
 from app.window.display import check_display
-from app.window.faults import Faults
 from app.window.main_window import MainWindow
 from app.window.settings import Settings, load_settings, settings_file
 
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 Alive = Callable[["Controller"], None]
 CANNOT_START = "The models cannot be loaded, so the program cannot be used."
+UNEXPECTED = "An unexpected error. Sound and picture may continue; if they do not, restart the program."
 PATIENCE_S = 5.0  # for the sound device and the patch's preset, before a file is taken
 LOOK_MS = 20
 
@@ -62,11 +63,10 @@ class _Start(QObject):
         path: Path,
         notice: str,
         alive: Alive,
-        faults: Faults,
         files: Sequence[Path],
     ) -> None:
         super().__init__()
-        self._faults, self._files = faults, list(files)
+        self._files = list(files)
         self._window, self._settings, self._path, self._notice = window, settings, path, notice
         self._alive = alive
         self._thread = threading.Thread(target=self._load, name="engine-loader")
@@ -120,10 +120,10 @@ class _Start(QObject):
         QTimer.singleShot(LOOK_MS, self, self._follow_up)
 
     def _failed(self, error: Exception) -> None:
-        """Shows the error in a dialog; the window stays until its user closes it."""
+        """Shows the error as a notice; the window stays until its user closes it."""
         collect_anywhere()
         self._window.show_failed()
-        self._faults.report(log_fault(error, "while the engine was loaded"), CANNOT_START)
+        self._window.notices.faulted.emit(CANNOT_START, log_fault(error, "while the engine was loaded"))
 
 
 def load_engine() -> None:
@@ -180,9 +180,8 @@ def run(
     window = MainWindow()
     window.show_face(settings.choices.face)
     window.restore_geometry(settings.window_geometry)
-    faults = Faults(window)
-    start = _Start(window, settings, path, notice, alive, faults, files)
-    with crashes_written(), faults_logged(faults.report):
+    start = _Start(window, settings, path, notice, alive, files)
+    with crashes_written(), faults_logged(partial(window.notices.faulted.emit, UNEXPECTED)):
         watch(window)
         window.show()
         status = application.exec()

@@ -68,7 +68,7 @@ class Performance(QObject):
         self._sources = Sources()
         self.notes = Notes(sound, self._sources, library.find, mail.refused.emit, sound.set_effects)
         self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable)
-        self._blows = Blows(session, library, sound, self._worker.submit)
+        self._blows = Blows(session, library, self._worker.submit)
         mail.struck.connect(self._blow_started)
         mail.blow_complete.connect(self._blow_finished)
 
@@ -85,6 +85,11 @@ class Performance(QObject):
     @property
     def _of_drums(self) -> bool:
         return self._session.choices.drums is not None
+
+    @property
+    def _playhead(self) -> Playhead[Take] | Playhead[BlowTake]:
+        """That of the motion that is shown."""
+        return self._blows.shown if self._of_drums else self._shown
 
     @property
     def ready(self) -> bool:
@@ -111,16 +116,12 @@ class Performance(QObject):
     @property
     def position_s(self) -> float:
         """The playhead: the time in the shown motion that is heard now, or where it stands."""
-        if self._of_drums:
-            return self._blows.position_s
-        return self._shown.position_s(self._sound.mixer.output_latency_s)
+        return self._playhead.position_s(self._sound.mixer.output_latency_s)
 
     @property
     def moving(self) -> bool:
         """Whether the playhead moves."""
-        if self._of_drums:
-            return self._blows.moving
-        return self._shown.moving
+        return self._playhead.moving
 
     @property
     def settled(self) -> bool:
@@ -136,13 +137,14 @@ class Performance(QObject):
 
     def moment(self, elapsed_s: float) -> Moment:
         """What panels show now; `elapsed_s`: since they were shown the last one."""
-        blow, of = (self._blows.take, self._blows) if self._of_drums else (None, self._shown)
-        return Moment(self.take, self.position_s, self.moving, elapsed_s, blow, of.audible)
+        blow = self._blows.shown.take if self._of_drums else None
+        return Moment(self.take, self.position_s, self.moving, elapsed_s, blow, self._playhead.audible)
 
     def catch_up(self, panel: Panel) -> None:
         """Shows a panel that was made late the motion that it has missed."""
-        if self._of_drums and self._blows.take is not None:
-            panel.blow_started(self._blows.take)
+        if self._of_drums and (blow := self._blows.shown.take) is not None:
+            if not panel.of_strings:
+                panel.take_started(blow)
         elif self.take is not None:
             panel.take_started(self.take)
             if self._shown.errors is not None:
@@ -166,24 +168,17 @@ class Performance(QObject):
     def stop(self) -> None:
         """Everything fades out; the playhead stays."""
         self._forget_turn()
-        if self._of_drums:
-            self._blows.stop()
-            self.notes.stop()
-            return
-        self._shown.parked_s = self.position_s
-        self._shown.note = None
+        self._playhead.park(self.position_s)
         self.notes.stop()
 
     def seek(self, position_s: float) -> None:
         """Moves the playhead; while notes ring, one that begins there replaces them."""
-        if self._of_drums:
-            self._blows.seek(position_s)
-        if self.take is None:
+        if (take := self._playhead.take) is None:
             return
-        position_s = min(max(position_s, 0.0), self.take.seconds)
+        position_s = min(max(position_s, 0.0), take.seconds)
         self._forget_turn()
-        self._shown.note, self._shown.parked_s = None, position_s
-        if self.playing and (note := self.notes.ring(position_s, alone=True)) is not None:
+        self._playhead.park(position_s)
+        if not self._of_drums and self.playing and (note := self.notes.ring(position_s, alone=True)) is not None:
             self.notes.latest = self._shown.note = note
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -338,12 +333,13 @@ class Performance(QObject):
         if not self._of_drums or not self._blows.started(take):  # overtaken by the next one
             return
         for panel in self._panels:
-            panel.blow_started(take)
+            if not panel.of_strings:
+                panel.take_started(take)
         self._tell("Rendering …")
         self._window.show_growth("")
 
     def _blow_finished(self, take: BlowTake) -> None:
-        if self._of_drums and take is self._blows.take:
+        if self._of_drums and take is self._blows.shown.take:
             self._tell(f"Error of this blow: {percent(math.sqrt(take.errors.rel_mse))} over the drum")
 
     def _other_refused(self, preset: str, message: str) -> None:

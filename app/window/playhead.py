@@ -35,6 +35,10 @@ class Playhead(Generic[Shown]):
             heard_s = max(self.note.seconds - latency_s, self.note.from_s)
         return min(max(heard_s, 0.0), self.take.seconds)
 
+    def park(self, position_s: float) -> None:
+        """It stands at a time of the motion from now on."""
+        self.note, self.parked_s = None, position_s
+
     @property
     def moving(self) -> bool:
         """Whether it moves."""

@@ -41,27 +41,19 @@ class DiagonalModel(AnyFrameModel[KoopmanState]):
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (..., points) of latents (..., state_size)."""
 
-    @abstractmethod
-    def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
-        """Displacement (batch, count, points) of frames first … first + count - 1."""
-
     def advance(self, state: KoopmanState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, KoopmanState]:
-        most = self._frames_at_once(len(state.origin))
+        first, last = state.step + 1, state.step + steps
         blocks = [
-            self.render(state.origin, state.step + 1 + done, min(most, steps - done), readout)
-            for done in range(0, steps, most)
+            self.decode(self.successive_latents(state.origin, done, min(FRAMES_AT_ONCE, last + 1 - done)), readout)
+            for done in range(first, last + 1, FRAMES_AT_ONCE)
         ]
-        return torch.cat(blocks, dim=1), KoopmanState(state.origin, state.step + steps)
+        return torch.cat(blocks, dim=1), KoopmanState(state.origin, last)
 
     def sample(
         self, state: KoopmanState, frames: Tensor, steps: int, readout: Tensor | None = None
     ) -> tuple[Tensor, KoopmanState]:
         found = self.decode(self.latents(state.origin, state.step + frames), readout)
         return found, KoopmanState(state.origin, state.step + steps)
-
-    def _frames_at_once(self, batch: int) -> int:
-        """Frames in a block of a long advance."""
-        return FRAMES_AT_ONCE
 
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
         """z_k = λᵏ z₀ of any frames (int64, any order), complex (batch, frames, state_size)."""
@@ -73,13 +65,10 @@ class DiagonalModel(AnyFrameModel[KoopmanState]):
         As products of a coarse table, exact in float64 before it is rounded, and a fine one: one product a frame
         instead of a sine and a cosine.
         """
-        coarse = self.coarse_latents(origin, torch.arange(first, first + count, SEGMENT, device=origin.device))
+        starts = self.powers(torch.arange(first, first + count, SEGMENT, device=origin.device))
+        coarse = (origin[:, None] * starts).to(origin.dtype)
         fine = self.powers(torch.arange(min(SEGMENT, count), device=origin.device)).to(origin.dtype)
         return (coarse[:, :, None] * fine).flatten(1, 2)[:, :count]
-
-    def coarse_latents(self, origin: Tensor, frames: Tensor) -> Tensor:
-        """As `latents`, with the product in float64."""
-        return (origin[:, None] * self.powers(frames)).to(origin.dtype)
 
 
 class LearnedEigenvalues(DiagonalModel):
@@ -96,11 +85,6 @@ class LearnedEigenvalues(DiagonalModel):
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
         return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
-
-
-def energy(latents: Tensor) -> Tensor:
-    """Σ|z|² of latents (..., n): real (...)."""
-    return torch.view_as_real(latents).flatten(-2).square().sum(-1)
 
 
 def dense(latents: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor:

@@ -86,9 +86,6 @@ class DMD(DiagonalModel):
         real, imaginary = read_weight(self.modes, readout).chunk(2, dim=-1)
         return dense(latents, torch.cat([real, -imaginary], dim=-1))
 
-    def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
-        return self.decode(self.successive_latents(origin, first, count), readout)
-
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
         return [torch.complex(self.magnitude_log.double(), self.angle.double())]

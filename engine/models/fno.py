@@ -9,22 +9,22 @@ convolution (`FourierConvolution`), and every step is
 
 with the same map of each point from the initial displacement to h and from h to the displacement.
 
-The modules are the definition. Where a gradient is wanted, roll-outs compute the same with fewer and larger products
-(`_fno_rollout`); where none is, on the CPU in single precision, a compiled kernel does (`_fno_kernel`). A listening
-point costs what the grid costs: the recurrence needs the whole field.
+Roll-outs take few and large products (`_fno_rollout`), and gradients pass through them; where none is wanted, on the
+CPU in single precision, a compiled kernel is faster (`_fno_kernel`). A listening point costs what the grid costs: the
+recurrence needs the whole field.
 """
 
 from __future__ import annotations
 
 from abc import abstractmethod
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, cast
+from typing import TYPE_CHECKING, ClassVar
 
 import torch
 from torch import Tensor, nn
 from torch.utils.checkpoint import checkpoint
 
-from engine.models._fno_rollout import FGRURollout, FRNNRollout, channel_matrices, joined
+from engine.models._fno_rollout import channel_matrices, fgru_rollout, frnn_rollout, joined
 from engine.models._fno_transform import transform_matrices
 from engine.models.base import Physics, StringModel, check_initialisation
 from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
@@ -55,13 +55,6 @@ class FourierConvolution(nn.Module):
         self.weight = nn.Parameter(torch.zeros(grid_points, width, 2, width))  # frequency, in, real/imaginary, out
         self.bias = nn.Parameter(torch.zeros(grid_points, 2, width))
 
-    def forward(self, field: Tensor) -> Tensor:
-        """(batch, grid_points, width) to the same shape."""
-        points = field.shape[1]
-        spectrum = torch.fft.rfft(field, n=2 * points, dim=1)[:, :points]
-        spectrum = torch.einsum("bki,kio->bko", spectrum, torch.complex(self.weight[:, :, 0], self.weight[:, :, 1]))
-        return torch.fft.irfft(spectrum, n=2 * points, dim=1)[:, :points] + self.bias_field()
-
     def bias_field(self) -> Tensor:
         """The bias in space (grid_points, width)."""
         points = len(self.bias)
@@ -75,7 +68,7 @@ class FourierConvolution(nn.Module):
 
 
 class _FourierRecurrent(StringModel[FieldState]):
-    """What both cells share: the maps in and out, and the choice of the definition or the kernel."""
+    """What both cells share: the maps in and out, and the choice of the roll-out or the kernel."""
 
     initialisations: ClassVar = {"paper": ""}
     kept_fields: int  # of a step, for its gradient
@@ -87,12 +80,8 @@ class _FourierRecurrent(StringModel[FieldState]):
         self.out_mapping = nn.Linear(width, 1)
 
     @abstractmethod
-    def step(self, hidden: Tensor) -> Tensor:
-        """One sample of the definition: (batch, grid_points, width) to the same shape."""
-
-    @abstractmethod
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
-        """The definition, faster: (grid_points, batch, width) to the fields after each step (steps, …)."""
+        """(grid_points, batch, width) to the fields after each step (steps, …)."""
 
     @abstractmethod
     def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
@@ -102,20 +91,16 @@ class _FourierRecurrent(StringModel[FieldState]):
         return FieldState(self.in_mapping(displacement[..., None]))
 
     def advance(self, state: FieldState, steps: int, readout: Tensor | None = None) -> tuple[Tensor, FieldState]:
-        frames, hidden = self._advance_any_way(state.hidden, steps)
+        hidden = state.hidden
+        learning = torch.is_grad_enabled() and any(t.requires_grad for t in (hidden, *self.parameters()))
+        paired = hidden.shape[-1] % 2 == 0  # the kernel takes channels two at a time
+        compiled = paired and not learning and hidden.device.type == "cpu" and hidden.dtype == torch.float32
+        frames, hidden = (self._advance_compiled if compiled else self._advance_plain)(hidden, steps)
         if readout is not None:
             frames = frames @ readout.to(frames)
         return frames, FieldState(hidden)
 
-    def _advance_any_way(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
-        if torch.is_grad_enabled() and any(t.requires_grad for t in (hidden, *self.parameters())):
-            return self._advance_learning(hidden, steps)
-        paired = hidden.shape[-1] % 2 == 0  # the kernel takes channels two at a time
-        if paired and hidden.device.type == "cpu" and hidden.dtype == torch.float32:
-            return self._advance_compiled(hidden, steps)
-        return self._stretch(hidden, steps)
-
-    def _advance_learning(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
+    def _advance_plain(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
         fields, parts = hidden.transpose(0, 1).contiguous(), []
         # a gradient needs much of every step: more than fits is kept for one stretch, computed again for the others
         step_bytes = self.kept_fields * fields.numel() * fields.element_size()
@@ -129,13 +114,6 @@ class _FourierRecurrent(StringModel[FieldState]):
             fields = part[-1]
             parts.append(self.out_mapping(part)[..., 0])
         return torch.cat(parts).permute(2, 0, 1), fields.transpose(0, 1)
-
-    def _stretch(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
-        frames = []
-        for _ in range(steps):
-            hidden = self.step(hidden)
-            frames.append(self.out_mapping(hidden)[..., 0])
-        return torch.stack(frames, dim=1), hidden
 
     def _advance_compiled(self, hidden: Tensor, steps: int) -> tuple[Tensor, Tensor]:
         fields = hidden.detach().clone(memory_format=torch.contiguous_format)
@@ -163,7 +141,7 @@ class _FourierRecurrent(StringModel[FieldState]):
 class FGRU(_FourierRecurrent):
     """See the module."""
 
-    kept_fields = 8
+    kept_fields = 20
 
     def __init__(self, configuration: FGRUConfiguration) -> None:
         super().__init__(configuration.grid_points, configuration.width)
@@ -173,16 +151,11 @@ class FGRU(_FourierRecurrent):
         self.r_layer = FourierConvolution(*sizes)
         self.h_layer = FourierConvolution(*sizes)
 
-    def step(self, hidden: Tensor) -> Tensor:
-        z = torch.sigmoid(self.z_layer(hidden))
-        r = torch.sigmoid(self.r_layer(hidden))
-        return (1 - z) * hidden + z * torch.tanh(self.h_layer(r * hidden))
-
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
         z, r, candidate = (channel_matrices(layer.weight) for layer in (self.z_layer, self.r_layer, self.h_layer))
         gates_bias = torch.cat([self.z_layer.bias_field(), self.r_layer.bias_field()], dim=1)
         weights = joined(z, r), gates_bias, candidate, self.h_layer.bias_field()
-        return cast("Tensor", FGRURollout.apply(hidden, *weights, steps))
+        return fgru_rollout(hidden, *weights, steps)
 
     def _render(self, hidden: kernel.Array, frames: kernel.Array) -> None:
         from engine.models import _fno_kernel as kernel  # Numba only when it is needed
@@ -200,24 +173,19 @@ class FRNN(_FourierRecurrent):
     def __init__(self, configuration: FRNNConfiguration) -> None:
         super().__init__(configuration.grid_points, configuration.width)
         self.configuration = configuration
-        self.kept_fields = 4 * configuration.depth
+        self.kept_fields = 10 * configuration.depth
         sizes = configuration.grid_points, configuration.width
         self.fourier_layers = nn.ModuleList(FourierConvolution(*sizes) for _ in range(configuration.depth))
         self.pointwise_layers = nn.ModuleList(
             nn.Linear(configuration.width, configuration.width) for _ in range(configuration.depth)
         )
 
-    def step(self, hidden: Tensor) -> Tensor:
-        for convolve, pointwise in zip(self.fourier_layers, self.pointwise_layers, strict=True):
-            hidden = torch.relu(convolve(hidden)) + pointwise(hidden)
-        return hidden
-
     def rollout(self, hidden: Tensor, steps: int) -> Tensor:
         matrices = torch.stack([channel_matrices(layer.weight) for layer in self._convolutions])
         biases = torch.stack([layer.bias_field() for layer in self._convolutions])
         pointwise = torch.stack([layer.weight for layer in self._pointwise])
         offsets = torch.stack([layer.bias for layer in self._pointwise])
-        return cast("Tensor", FRNNRollout.apply(hidden, matrices, biases, pointwise, offsets, steps))
+        return frnn_rollout(hidden, matrices, biases, pointwise, offsets, steps)
 
     @property
     def _convolutions(self) -> list[FourierConvolution]:

@@ -76,7 +76,9 @@ from engine.models.string_modes import StringModes
 GAIN_LIMIT = 6.0 * math.log(10) / 20  # b in nepers: the largest change of level that Re f can add up to
 RATE_UNIT = 1e-3  # of K E and of g in rad and nepers a sample: a weight of 1 turns a phase by 1 rad in a horizon
 SEGMENT = 8  # samples at most between the times at which a render computes gain and phase again
-SETTLED = 16  # node spacings after which the segments of a sample may be as long as those
+# Node spacings h after which the segments of a voice may be as long as those: of the energies' decay at any rate σ at
+# most h|f| (h/t)³ · 27e⁻³/384 is left, 1e-6 h|f|, and between two nodes the network's integral is a cubic itself.
+SETTLED = 16
 SILENCE = -40.0  # nepers in normalised units (4e-18) below which a render leaves a latent out
 NUMBERS_AT_ONCE = 2**17  # frames times latents in a block of a long advance: what suits a processor's cache
 
@@ -183,29 +185,16 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
     def sample(
         self, state: IntegratedPhaseState, frames: Tensor, steps: int, readout: Tensor | None = None
     ) -> tuple[Tensor, IntegratedPhaseState]:
-        """See the contract.
-
-        Segments are longer once t ≥ 16h. What changes f on a time scale of h has faded by then: of the energies'
-        decay at any rate σ at most h|f| (h/t)³ · 27e⁻³/384 is left, 1e-6 h|f|, and where a segment lies between two
-        nodes the network's integral is a cubic itself.
-        """
-        rates, spacing = self._rates(), self.configuration.node_spacing
-        early = min(steps, max(0, SETTLED * spacing - state.time))
-        blocks, done = [], 0
-        for count, samples in ((early, SEGMENT), (steps - early, spacing)):
-            if count:
-                here = frames[(frames > done) & (frames <= done + count)] - done
-                block, state = self._pick(state, rates, here, count, samples, readout)
-                blocks.append(block)
-                done += count
-        return torch.cat(blocks, dim=1), state
+        rates, times, end = self._rates(), (state.time + frames).double(), state.time + steps
+        motion, integral = self._move(state, rates, times, end)
+        latents = _latents(state.origin, rates, times, motion)
+        return self.decode(latents, readout), IntegratedPhaseState(state.origin, end, integral)
 
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
         """z of any frames ≥ 0 (whole or not, any order), complex (batch, frames, state_size)."""
         rates, times = self._rates(), frames.double()
         motion, _ = self._move(_at_rest(origin), rates, times, 0)
-        factor = torch.polar(torch.exp(motion.gain - rates.sigma * times[:, None]), motion.phase)
-        return (origin[:, None] * factor).to(origin.dtype)
+        return _latents(origin, rates, times, motion)
 
     def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (..., points) of latents (..., state_size)."""
@@ -235,26 +224,6 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         frames = self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, segments.alive)
         frames = frames.permute(1, 2, 0, 3).flatten(1, 2)
         return frames[:, segments.begin : segments.begin + count], later
-
-    def _pick(
-        self,
-        state: IntegratedPhaseState,
-        rates: _Rates,
-        frames: Tensor,
-        count: int,
-        samples: int,
-        readout: Tensor | None,
-    ) -> tuple[Tensor, IntegratedPhaseState]:
-        """Some of the next `count` frames, from segments of at most `samples`, and the state after all of them."""
-        length = min(samples, self.configuration.node_spacing)
-        segments, later = self._segments(state, rates, count, length)
-        alive = segments.alive
-        number, offset = (segments.begin + frames - 1) // length, (segments.begin + frames - 1) % length
-        basis = hermite(length, segments.ends)[offset]
-        log_radius, phase = torch.einsum("fk,kpbfn->pbfn", basis, segments.ends[..., alive][:, :, :, number])
-        dtype = self.decoder.weight.dtype
-        radius, phase = torch.exp(log_radius.to(dtype)), torch.remainder(phase, 2 * math.pi).to(dtype)
-        return self._displacement(radius * torch.cos(phase), radius * torch.sin(phase), readout, alive), later
 
     def _segments(
         self, state: IntegratedPhaseState, rates: _Rates, count: int, length: int
@@ -321,7 +290,8 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         """
         spacing = self.configuration.node_spacing
         first, last = _integrated_nodes(state.time, spacing), _integrated_nodes(end, spacing)
-        segments = max(1, math.ceil(float(times.max()) / spacing) - first, last - first)
+        latest = max(times.tolist(), default=0.0)
+        segments = max(1, math.ceil(latest / spacing) - first, last - first)
         nodes = torch.arange(2 * segments + 1, device=times.device).double() * (spacing / 2) + first * spacing
         f = self._higher_orders(energy * torch.exp(-2 * rates.sigma * nodes[:, None]), rates)
         positions = torch.cat([times / spacing - first, times.new_tensor([float(last - first)])])
@@ -477,6 +447,12 @@ def _integrated_nodes(time: int, spacing: int) -> int:
 def _at_rest(origin: Tensor) -> IntegratedPhaseState:
     batch, n = origin.shape
     return IntegratedPhaseState(origin, 0, origin.real.new_zeros(batch, 2 * n, dtype=torch.float64))
+
+
+def _latents(origin: Tensor, rates: _Rates, times: Tensor, motion: _Motion) -> Tensor:
+    """z at `times` since frame 0, complex (batch, times, state_size)."""
+    factor = torch.polar(torch.exp(motion.gain - rates.sigma * times[:, None]), motion.phase)
+    return (origin[:, None] * factor).to(origin.dtype)
 
 
 def _mlp(values: int, widths: tuple[int, ...], outputs: int, last_bias: bool = True) -> nn.Sequential | None:

@@ -65,9 +65,6 @@ class Koopman(LearnedEigenvalues):
             hidden = layer(nn.functional.selu(hidden))
         return linear(nn.functional.selu(hidden), *read_layer(others[-1], readout))
 
-    def render(self, origin: Tensor, first: int, count: int, readout: Tensor | None) -> Tensor:
-        return self.decode(self.successive_latents(origin, first, count), readout)
-
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.
 

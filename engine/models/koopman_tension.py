@@ -187,18 +187,12 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
     def advance(
         self, state: KoopmanTensionState, steps: int, readout: Tensor | None = None
     ) -> tuple[Tensor, KoopmanTensionState]:
-        return self._advance(state, None, steps, readout)
+        return self._by_nodes(state, lambda part, step: self._frames(part, step, None, steps, readout))
 
     def sample(
         self, state: KoopmanTensionState, frames: Tensor, steps: int, readout: Tensor | None = None
     ) -> tuple[Tensor, KoopmanTensionState]:
         """See the contract. It steps through all frames, which costs little beside their shapes."""
-        return self._advance(state, frames, steps, readout)
-
-    def _advance(
-        self, state: KoopmanTensionState, frames: Tensor | None, steps: int, readout: Tensor | None
-    ) -> tuple[Tensor, KoopmanTensionState]:
-        """The next `steps` frames, or those of them with these numbers."""
         return self._by_nodes(state, lambda part, step: self._frames(part, step, frames, steps, readout))
 
     def _by_nodes(self, state: KoopmanTensionState, run: Run) -> tuple[Tensor, KoopmanTensionState]:

@@ -14,7 +14,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, cast
+from typing import ClassVar, cast
 
 import torch
 from torch import Tensor, nn
@@ -54,77 +54,36 @@ def evolve(log_eigenvalues: Tensor, state: Tensor, steps: int, dtype: torch.dtyp
     return states.flatten(0, 1)[:steps], last
 
 
-def accumulate(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor, backwards: bool) -> tuple[Tensor, Tensor]:
+def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
     """x_k = λ x_{k-1} + v_k in two levels: inside all chunks at once, then from chunk to chunk.
 
     The carry is complex128 and its powers of λ are exact, so the rounding of `inputs` is bounded by what one chunk
-    collects, however long the layer remembers and wherever a caller splits the time.
+    collects, however long the layer remembers and wherever a caller splits the time. Rendering on a CPU takes
+    `FoldedBlock` instead.
 
     Args:
         inputs: v, complex (steps, batch, n).
         state: x before the first step, complex128 (batch, n).
-        backwards: run from the last step to the first.
 
     Returns:
-        All states, like `inputs`, and the last one computed, complex128.
+        All states, like `inputs`, and the last one, complex128.
     """
     steps, *row = inputs.shape
     length = min(CHUNK, steps)
-    chunks = -(-steps // length)
-    missing = chunks * length - steps
-    if missing:
-        zeros = inputs.new_zeros(missing, *row)
-        inputs = torch.cat([zeros, inputs] if backwards else [inputs, zeros])
-    along = -1 if backwards else 1
+    missing = -steps % length
+    given = torch.cat([inputs, inputs.new_zeros(missing, *row)]).unflatten(0, (-1, length)).unbind(1)
     power = first_powers(log_eigenvalues, length)
-
-    given = inputs.unflatten(0, (chunks, length))
-    states = torch.empty_like(given)
-    rows_given, rows = given.unbind(1)[::along], states.unbind(1)[::along]  # each (chunks, batch, n)
-    rows[0].copy_(rows_given[0])
-    eigenvalue = power[0].to(inputs.dtype)
-    for k in range(1, length):
-        torch.addcmul(rows_given[k], eigenvalue, rows[k - 1], out=rows[k])
-
+    rows, eigenvalue = [given[0]], power[0].to(inputs.dtype)  # each (chunks, batch, n)
+    for each in given[1:]:
+        rows.append(torch.addcmul(each, eigenvalue, rows[-1]))
     carries = [state]
-    for end in rows[-1].to(state.dtype).unbind(0)[::along][:-1]:
+    for end in rows[-1].to(state.dtype)[:-1]:
         carries.append(torch.addcmul(end, power[-1], carries[-1]))
     final = length - 1 - missing
-    last = torch.addcmul(rows[final].unbind(0)[::along][-1].to(state.dtype), power[final], carries[-1])
-
-    carried = torch.stack(carries[::along]).to(inputs.dtype)
-    factor = (power.flip(0) if backwards else power).to(inputs.dtype)
-    states.addcmul_(factor[:, None], carried[:, None])
-    return states.flatten(0, 1).narrow(0, missing if backwards else 0, steps), last
-
-
-class _Recurrence(torch.autograd.Function):
-    """`accumulate` with its adjoint, which is the same recurrence with λ̄, backwards in time."""
-
-    @staticmethod
-    def forward(ctx: Any, inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        states, last = accumulate(inputs, log_eigenvalues, state, backwards=False)
-        ctx.set_materialize_grads(False)  # training rarely uses `last`
-        ctx.save_for_backward(states, log_eigenvalues, state)
-        return states, last
-
-    @staticmethod
-    def backward(ctx: Any, grad_states: Tensor | None, grad_last: Tensor | None) -> tuple[Tensor, Tensor, Tensor]:
-        states, log_eigenvalues, state = ctx.saved_tensors
-        grad_states = torch.zeros_like(states) if grad_states is None else grad_states
-        if grad_last is not None:
-            grad_states = torch.cat([grad_states[:-1], grad_states[-1:] + grad_last])
-        conjugate = log_eigenvalues.conj().resolve_conj()
-        adjoint, _ = accumulate(grad_states, conjugate, torch.zeros_like(state), backwards=True)
-        first = adjoint[0].to(state.dtype)
-        slope = (states[:-1].conj() * adjoint[1:]).sum((0, 1)) + (state.conj() * first).sum(0)
-        return adjoint, conjugate.exp() * slope, conjugate.exp() * first
-
-
-def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-    """x_k = λ x_{k-1} + v_k as in `accumulate`, with its adjoint. Rendering on a CPU takes `FoldedBlock` instead."""
-    states, last = _Recurrence.apply(inputs, log_eigenvalues, state)
-    return states, last
+    last = torch.addcmul(rows[final][-1].to(state.dtype), power[final], carries[-1])
+    carried = torch.stack(carries).to(inputs.dtype)[:, None]
+    states = torch.addcmul(torch.stack(rows, dim=1), power.to(inputs.dtype)[:, None], carried)
+    return states.flatten(0, 1)[:steps], last
 
 
 def draw_lecun(shape: tuple[int, ...], fan_in: int, generator: torch.Generator) -> Tensor:

@@ -6,6 +6,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from engine.models.fno import FourierConvolution
 from engine.pluck import Pluck
 from engine.resonators import sine_transform
 from engine.resonators.base import Resonator
@@ -37,3 +38,10 @@ def draw(kind: str, count: int, modes: int, seed: int = 0) -> Tensor:
 def of_tension_rise(resonator: Resonator, amplitudes: Tensor, rise: float) -> Tensor:
     """The amplitudes, scaled to a rise of tension."""
     return amplitudes * float(np.sqrt(rise / resonator.relative_tension_rise(amplitudes.numpy())))
+
+
+def convolved(layer: FourierConvolution, field: Tensor) -> Tensor:
+    """A Fourier convolution by its definition, (batch, grid_points, width) to the same shape."""
+    points, weight = field.shape[1], torch.complex(layer.weight[:, :, 0], layer.weight[:, :, 1])
+    spectrum = torch.einsum("bki,kio->bko", torch.fft.rfft(field, n=2 * points, dim=1)[:, :points], weight)
+    return torch.fft.irfft(spectrum, n=2 * points, dim=1)[:, :points] + layer.bias_field()

@@ -215,9 +215,8 @@ class _Measurement:
         sums = (motion.string.windows(info.rate_hz, edges), motion.sound.windows(info.rate_hz, edges))
         found["windows"] = [
             {
+                **asdict(window),
                 **self._label(window.start_s, window.stop_s),
-                "rel_mse": window.rel_mse,
-                "rel_mae": window.rel_mae,
                 **_with_se(motion.string, *(round(at_s * info.rate_hz) for at_s in (window.start_s, window.stop_s))),
                 "null_depth_db": heard.null_depth_db,
                 "spectral_convergence": spectrum.convergence,

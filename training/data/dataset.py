@@ -12,10 +12,9 @@ import os
 import shutil
 import zlib
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 import torch
@@ -138,24 +137,6 @@ def _map(file: Path, shape: tuple[int, int, int], checksum: int) -> np.ndarray[A
     return values
 
 
-class _ArrayFile:
-    """A float32 .npy file that is written row by row, so that a full disk is an OSError and not a broken mapping."""
-
-    def __init__(self, path: Path, shape: tuple[int, int, int]) -> None:
-        self._file: BinaryIO = path.open("wb")
-        self.checksum = 0
-        header = {"descr": "<f4", "fortran_order": False, "shape": shape}
-        np.lib.format.write_array_header_1_0(self._file, header)
-
-    def write(self, rows: Tensor) -> None:
-        values = np.ascontiguousarray(rows.numpy(), dtype="<f4")
-        self._file.write(values.data)
-        self.checksum = zlib.crc32(values.tobytes(), self.checksum)
-
-    def close(self) -> None:
-        self._file.close()
-
-
 def _generate(configuration: DatasetConfiguration, folder: Path, progress: Callable[[int, int], None]) -> None:
     """Writes into another folder that is renamed when it is whole; the caller holds the lock."""
     unfinished = folder.with_suffix(".unfinished")
@@ -176,10 +157,13 @@ def _generate(configuration: DatasetConfiguration, folder: Path, progress: Calla
 
 
 def _simulate(c: DatasetConfiguration, file: Path, progress: Callable[[int, int], None]) -> int:
-    """Writes the amplitudes; their checksum."""
+    """Writes the amplitudes row by row, so that a full disk is an OSError and no broken mapping; their checksum."""
     solver = SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps)
     initial = draw_initial(c)
-    with closing(_ArrayFile(file, _amplitudes_shape(c))) as amplitudes:
+    checksum = 0
+    with file.open("wb") as amplitudes:
+        header = {"descr": "<f4", "fortran_order": False, "shape": _amplitudes_shape(c)}
+        np.lib.format.write_array_header_1_0(amplitudes, header)
         for first in range(0, c.count, CHUNK):
             progress(first, c.count)
             state = ModalState.at_rest(initial[first : first + CHUNK])
@@ -187,8 +171,10 @@ def _simulate(c: DatasetConfiguration, file: Path, progress: Callable[[int, int]
             for done in range(0, c.steps, FRAMES_AT_ONCE * c.stride):
                 block, state = solver.advance(state, min(FRAMES_AT_ONCE * c.stride, c.steps - done))
                 frames.append(block[:, c.stride - 1 :: c.stride])
-            amplitudes.write(torch.cat(frames, dim=1))
-        return amplitudes.checksum
+            rows = np.ascontiguousarray(torch.cat(frames, dim=1).numpy(), dtype="<f4")
+            amplitudes.write(rows.data)
+            checksum = zlib.crc32(rows.data, checksum)
+    return checksum
 
 
 def displacement_deviation(amplitudes: np.ndarray[Any, Any], shapes: Array) -> float:

@@ -251,40 +251,23 @@ def measure_drum(
     """The errors of players on the drum of a number; in the tenth second, too, where it decays `SLOWER` times."""
     struck = draw_drum(number, seed)
     if tenth:
-        slow = replace(struck.resonator, sigma=struck.resonator.sigma / SLOWER)
-        struck = replace(struck, resonator=slow)
-    seconds = 10 if tenth else 1
-    true = true_motion(struck, rate_hz)
-    playing = {name: play(struck, rate_hz) for name, play in players.items()}
-    weight = torch.from_numpy(struck.weight)
-    wrong = {name: np.zeros(2) for name in players}
-    energy, spent = np.zeros(2), dict.fromkeys(players, 0.0)
-    for second in range(seconds):
-        window, done = (0 if second == 0 else 1), 0
-        while done < rate_hz:
-            frames = min(AT_ONCE, rate_hz - done)
-            done += frames
-            expected, counts = true(frames), second in (0, 9)
-            energy[window] += float((expected.square() @ weight).sum()) if counts else 0.0
-            for name, more in playing.items():
-                begun = time.process_time()
-                found = more(frames)
-                spent[name] += (time.process_time() - begun) if second == 0 else 0.0
-                if counts:
-                    wrong[name][window] += float(((found - expected).square() @ weight).sum())
+        struck = replace(struck, resonator=replace(struck.resonator, sigma=struck.resonator.sigma / SLOWER))
+    _, first, *others = motion_errors(struck, players, rate_hz, (10 if tenth else 1) * rate_hz)
     size = np.square(struck.amplitudes_m) + np.square(struck.speeds_m_s / struck.resonator.omega)
-    sounds = energy[1] > UNHEARD * float(size @ struck.weight) * rate_hz
-    reported = (struck.kind, struck.pitch_hz, struck.resonator.modes, struck.tension_rise)
-    blow = "blow" if struck.speeds_m_s.any() else "pressed"
+    silent_below = UNHEARD * float(size @ struck.weight) * rate_hz
+    last = others[-1] if tenth and others[-1].energy > silent_below else None
     return [
         DrumError(
             number,
             name,
-            *reported,
-            blow,
-            _finite(wrong[name][0] / energy[0]),
-            _finite(wrong[name][1] / energy[1]) if tenth and sounds else None,
-            spent[name],
+            struck.kind,
+            struck.pitch_hz,
+            struck.resonator.modes,
+            struck.tension_rise,
+            "blow" if struck.speeds_m_s.any() else "pressed",
+            first.rel_mse[name],
+            None if last is None else last.rel_mse[name],
+            first.processor_s[name],
             SLOWER if tenth else 1.0,
         )
         for name in players
@@ -293,11 +276,13 @@ def measure_drum(
 
 @dataclass(frozen=True)
 class Window:
-    """Relative squared errors over the surface between two times, by player."""
+    """Relative squared errors over the surface between two times, by player; `energy`: what they are relative to."""
 
     start_s: float
     stop_s: float
+    energy: float
     rel_mse: Mapping[str, float]
+    processor_s: Mapping[str, float]
 
 
 @torch.inference_mode()
@@ -310,25 +295,27 @@ def motion_errors(
 ) -> list[Window]:
     """The errors of players over the first frames: in all, then in each second."""
     true, weight = true_motion(struck, rate_hz), torch.from_numpy(struck.weight)
-    playing = {name: play(struck, rate_hz) for name, play in players.items()}
-    wrong: dict[str, list[float]] = {name: [] for name in players}
-    energy: list[float] = []
+    playing = [play(struck, rate_hz) for play in players.values()]
     edges = [*range(0, frames, rate_hz), frames]
-    for first, stop in pairwise(edges):
-        for series in (energy, *wrong.values()):
-            series.append(0.0)
+    energy = np.zeros(len(edges) - 1)
+    wrong, spent = np.zeros((2, len(edges) - 1, len(players)))
+    for part, (first, stop) in enumerate(pairwise(edges)):
         for begin in range(first, stop, AT_ONCE):
             count = min(AT_ONCE, stop - begin)
             expected = true(count)
-            energy[-1] += float((expected.square() @ weight).sum())
-            for name, more in playing.items():
-                wrong[name][-1] += float(((more(count) - expected).square() @ weight).sum())
+            energy[part] += float((expected.square() @ weight).sum())
+            for place, more in enumerate(playing):
+                begun = time.process_time()
+                found = more(count)
+                spent[part, place] += time.process_time() - begun
+                wrong[part, place] += float(((found - expected).square() @ weight).sum())
             report((begin + count) / frames)
 
-    def window(first: int, stop: int, seconds: slice) -> Window:
-        whole = sum(energy[seconds])
-        errors = {name: _finite(sum(each[seconds]) / whole) if whole else math.nan for name, each in wrong.items()}
-        return Window(first / rate_hz, stop / rate_hz, errors)
+    def window(first: int, stop: int, of: slice) -> Window:
+        whole = float(energy[of].sum())
+        errors = [_finite(each / whole) if whole else math.nan for each in wrong[of].sum(0)]
+        by_player = (dict(zip(players, each, strict=True)) for each in (errors, spent[of].sum(0).tolist()))
+        return Window(first / rate_hz, stop / rate_hz, whole, *by_player)
 
     parts = [window(*ends, slice(place, place + 1)) for place, ends in enumerate(pairwise(edges))]
     return [window(0, frames, slice(None)), *parts]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import plistlib
 import shutil
 import sys
 import tempfile
@@ -9,7 +10,6 @@ from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
 from urllib.parse import quote
-from xml.sax.saxutils import escape
 
 import numpy as np
 
@@ -80,10 +80,16 @@ def _placed(library: Path, images: Sequence[Image], form: str, target: str, path
         binary = f"{path.stem}{LIBRARY_ENDINGS[system]}"
         inside = {binary: library, **_turtle(images, binary)}
     elif system == "macos":
-        plist = _PLIST.format(name=escape(path.stem), id="".join(c if c.isalnum() else "-" for c in path.stem))
+        plist = {
+            "CFBundleExecutable": path.stem,
+            "CFBundleIdentifier": f"org.learned-strings.{''.join(c if c.isalnum() else '-' for c in path.stem)}",
+            "CFBundleName": path.stem,
+            "CFBundlePackageType": "BNDL",
+            "CFBundleVersion": "1",
+        }
         inside = {
             f"Contents/MacOS/{path.stem}": library,
-            "Contents/Info.plist": plist,
+            "Contents/Info.plist": plistlib.dumps(plist).decode(),
             "Contents/PkgInfo": "BNDL????",
         }
     elif form == "vst3":
@@ -199,13 +205,3 @@ _PREFIXES = {
     "doap": "http://usefulinc.com/ns/doap#",
     "foaf": "http://xmlns.com/foaf/0.1/",
 }
-_PLIST = """<?xml version="1.0" encoding="UTF-8"?>
-<!DOCTYPE plist PUBLIC "-//Apple//DTD PLIST 1.0//EN" "http://www.apple.com/DTDs/PropertyList-1.0.dtd">
-<plist version="1.0"><dict>
-<key>CFBundleExecutable</key><string>{name}</string>
-<key>CFBundleIdentifier</key><string>org.learned-strings.{id}</string>
-<key>CFBundleName</key><string>{name}</string>
-<key>CFBundlePackageType</key><string>BNDL</string>
-<key>CFBundleVersion</key><string>1</string>
-</dict></plist>
-"""

@@ -23,12 +23,11 @@ from PySide6.QtWidgets import (
     QHeaderView,
     QLineEdit,
     QPushButton,
-    QTreeView,
     QVBoxLayout,
     QWidget,
 )
 
-from app.views.controls.browser_rows import STAR, TITLE, Column, ListedRows, Row, RowsModel
+from app.views.controls.browser_rows import STAR, TITLE, Column, Row, RowList, listed_rows
 from app.views.controls.notice_bar import NoticeBar
 from app.views.controls.parts import combo_box, faint, filled, scrolled, tool_button
 from app.views.controls.plain import Label
@@ -96,8 +95,8 @@ class Browser(QFrame):
         self._filling = False
         self._rest = QTimer(self, interval=REST_MS, singleShot=True)
         self._rest.timeout.connect(self.play)
-        self._rows = RowsModel(columns)
-        self._listed = ListedRows(self._rows)
+        self._rows: Sequence[Row] = ()
+        self._favourites: Collection[str] = ()
         self.search = QLineEdit(placeholderText=f"Search {what}")
         self.search.setAccessibleName(f"Search {what}")
         self.search.setToolTip(f"Words in any order, separated by spaces or commas: {searched}")
@@ -135,9 +134,8 @@ class Browser(QFrame):
             parent.installEventFilter(self)
         self.hide()
 
-    def _build_list(self, columns: Sequence[Column]) -> QTreeView:
-        made = QTreeView(rootIsDecorated=False, itemsExpandable=False, uniformRowHeights=True, indentation=0)
-        made.setModel(self._listed)
+    def _build_list(self, columns: Sequence[Column]) -> RowList:
+        made = RowList(columns)
         made.setAccessibleName(self.what.capitalize())
         made.setToolTip("Arrows load, Space plays, Enter closes")
         made.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # some differ at the end
@@ -187,23 +185,22 @@ class Browser(QFrame):
         self._filling = True
         for number, box in enumerate(self.filters.values()):
             _refill(box, sorted({row.kinds[number] for row in rows}, key=lambda kind: (str(type(kind[0])), kind[0])))
-        self._rows.show(rows, favourites)
+        self._rows, self._favourites = rows, favourites
         if loaded != self.loaded:
             self.loaded = self.selected = loaded
         self._fill()
 
     def _fill(self) -> None:
         """Lists what passes the filter."""
-        listed, self._filling = self._listed, True
-        listed.words = self.words
-        listed.kinds = tuple(box.currentData() for box in self.filters.values())
-        listed.starred, listed.order = self.starred.isChecked(), max(0, self.order.currentIndex())
-        listed.refresh()
-        for row in range(listed.rowCount()):
-            heading = isinstance(listed.line(listed.index(row, STAR)), str)
-            self.list.setFirstColumnSpanned(row, QModelIndex(), heading)
+        kinds = [box.currentData() for box in self.filters.values()]
+        order = max(0, self.order.currentIndex())
+        self._filling = True
+        self.list.show_rows(
+            listed_rows(self._rows, self._favourites, self.words, kinds, self.starred.isChecked(), order),
+            self._favourites,
+        )
         self._filling = False
-        found, total = len(self.listed), len(self._rows.rows)
+        found, total = len(self.listed), self.total
         count = f"{found} of {total} {self.what}" if found < total else f"{total} {self.what}"
         self.state.setText(f"{count}   ·   your own: {self._folder}")
         self.select(self.selected)
@@ -212,11 +209,11 @@ class Browser(QFrame):
     @property
     def listed(self) -> list[str]:
         """The names that pass the filter, in the order shown: previous and next go through these."""
-        return [row.name for row in self._listed.listed]
+        return [row.name for row in self.list.rows]
 
     @property
     def total(self) -> int:
-        return len(self._rows.rows)
+        return len(self._rows)
 
     def clear_filter(self) -> None:
         """Lists all again; the order is no filter. Emits `listed_changed` once."""
@@ -235,7 +232,7 @@ class Browser(QFrame):
 
     def show_card(self, name: str) -> None:
         """Shows the card of a row; "" of none."""
-        row = next((row for row in self._listed.listed if row.name == name), None)
+        row = next((row for row in self.list.rows if row.name == name), None)
         self.delete.setText(DELETE)
         for button in (self.play_button, self.star):
             button.setVisible(row is not None)
@@ -243,7 +240,7 @@ class Browser(QFrame):
             button.setVisible(row is not None and row.own)
         nothing = f"No matching {self.what.removesuffix('es').removesuffix('s')}: clear the search or filters."
         self.card.setText(nothing if row is None else row.card())
-        self.star.setText("★  Favourite" if name in self._rows.favourites else "☆  Favourite")
+        self.star.setText("★  Favourite" if name in self._favourites else "☆  Favourite")
 
     def place(self) -> None:
         """Sets the geometry within the parent, under its notice; called when opened and when either changes."""
@@ -313,7 +310,7 @@ class Browser(QFrame):
 
         "" where none is listed.
         """
-        rows, words = self._listed.listed, self.words
+        rows, words = self.list.rows, self.words
         hits = [row.name for row in rows if all(word in row.title.casefold() for word in words)]
         hits = hits or [row.name for row in rows]
         return self.loaded if self.loaded in hits else next(iter(hits), "")
@@ -328,7 +325,7 @@ class Browser(QFrame):
         """Selects an entry, or the best hit where it is not listed. Loads nothing."""
         self.selected = name if name in self.listed else self.best_hit
         self._filling = True
-        self.list.setCurrentIndex(self._listed.index_of(self.selected))
+        self.list.setCurrentIndex(self.list.index_of(self.selected))
         self._filling = False
         self.show_card(self.selected)
 
@@ -388,11 +385,11 @@ class Browser(QFrame):
             self._rest.start()
 
     def _current_changed(self, index: QModelIndex) -> None:
-        if not self._filling and index.isValid() and isinstance(line := self._listed.line(index), Row):
+        if not self._filling and index.isValid() and isinstance(line := self.list.line(index), Row):
             self.load(line.name)
 
     def _clicked(self, index: QModelIndex) -> None:
-        line = self._listed.line(index)
+        line = self.list.line(index)
         if isinstance(line, str):
             self.select(self.selected)  # a heading took the mark
         elif index.column() == STAR:
@@ -402,7 +399,7 @@ class Browser(QFrame):
             self._start_rest()
 
     def _double_clicked(self, index: QModelIndex) -> None:
-        if index.column() != STAR and isinstance(self._listed.line(index), Row):
+        if index.column() != STAR and isinstance(self.list.line(index), Row):
             self.dismiss()
 
     def page(self) -> int:

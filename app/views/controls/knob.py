@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 
 from app.shared.parameters import Parameter
 from app.views import theme
+from app.views.controls.parts import ENTER_KEYS, keeps_keys
 from app.views.controls.plain import plain_tip
 
 SWEEP_DEGREES = 270
@@ -27,14 +28,13 @@ class _Editor(QLineEdit):
     given_up = Signal()
 
     def event(self, event: QEvent) -> bool:
-        if isinstance(event, QKeyEvent) and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Escape):
-            if event.type() == QEvent.Type.ShortcutOverride:
-                event.accept()
-                return True
-            if event.type() == QEvent.Type.KeyPress and event.key() == Qt.Key.Key_Escape:
-                self.given_up.emit()
-                return True
-        return super().event(event)
+        return keeps_keys(event, *ENTER_KEYS, Qt.Key.Key_Escape) or super().event(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:
+        if event.key() == Qt.Key.Key_Escape:
+            self.given_up.emit()
+        else:
+            super().keyPressEvent(event)
 
 
 class Knob(QWidget):
@@ -170,11 +170,7 @@ class Knob(QWidget):
 
     def event(self, event: QEvent) -> bool:
         """Keeps Page up and Page down, which are shortcuts of the window, while the knob has the focus."""
-        paging = (Qt.Key.Key_PageUp, Qt.Key.Key_PageDown)
-        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and event.key() in paging:
-            event.accept()
-            return True
-        return super().event(event)
+        return keeps_keys(event, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         fine = FINE if event.modifiers() & Qt.KeyboardModifier.ShiftModifier else 1.0

@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from datetime import datetime
 
-from PySide6.QtCore import QEvent, QPoint, Qt, QTimer
+from PySide6.QtCore import QEvent, QPoint, Qt, QTimer, Signal
 from PySide6.QtWidgets import QFrame, QHBoxLayout, QToolButton, QWidget
 
-from app.views.controls.notice import Notice
-from app.views.controls.notice_list import NoticeList
+from app.shared.log import log_file
+from app.views.controls.notice_list import Notice, NoticeList
 from app.views.controls.parts import tool_button
 from app.views.controls.plain import Label
+from engine.plain_text import one_line
 
 MOST_KEPT = 50
 INFORMED_MS = 8000  # a notice that is no error hides by itself
@@ -23,6 +24,8 @@ class NoticeBar(QFrame):
     It lies over its parent, of which it takes no room.
     """
 
+    faulted = Signal(str, str)  # an unexpected error, emitted in any thread: a sentence, and the traceback
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setObjectName("notice")
@@ -31,6 +34,7 @@ class NoticeBar(QFrame):
         self._list: NoticeList | None = None
         self._hide = QTimer(self, interval=INFORMED_MS, singleShot=True)
         self._hide.timeout.connect(self.hide)
+        self.faulted.connect(self._report_fault, Qt.ConnectionType.QueuedConnection)
         self.bell = Bell()  # placed by the window
         self.bell.clicked.connect(self.show_all)
         self._label = Label()
@@ -62,6 +66,10 @@ class NoticeBar(QFrame):
     def report(self, message: str, details: str = "") -> None:
         """Shows an error; the message says what to do about it."""
         self._take(Notice(message, details))
+
+    def _report_fault(self, sentence: str, text: str) -> None:
+        *_, error = text.strip().splitlines()
+        self.report(f"{sentence} {one_line(error)}", f"{text}\nPlease report it. It is also in {log_file()}.")
 
     def inform(self, message: str, details: str = "") -> None:
         """Shows a message that is no error."""

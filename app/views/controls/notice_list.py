@@ -3,15 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
-from PySide6.QtWidgets import QDialog, QListWidget, QVBoxLayout, QWidget
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QDialog, QHBoxLayout, QListWidget, QPushButton, QVBoxLayout, QWidget
 
-from app.views.controls.parts import copy_and_close, read_only_text
+from app.views.controls.parts import filled, push_button, read_only_text
 from app.views.controls.plain import Label
 
-if TYPE_CHECKING:
-    from app.views.controls.notice import Notice
+
+@dataclass(frozen=True)
+class Notice:
+    """Something went wrong, or is worth knowing: a message, how often it was shown, and when last."""
+
+    message: str
+    details: str = ""
+    error: bool = True  # False: information
+    times: int = 1
+    last_reported: str = ""  # hours:minutes:seconds
+
+    @property
+    def line(self) -> str:
+        return self.message + (f"  (×{self.times})" if self.times > 1 else "")
 
 
 class NoticeList(QDialog):
@@ -31,8 +44,11 @@ class NoticeList(QDialog):
         column.addWidget(self._list, 3)
         column.addWidget(Label("Details"))
         column.addWidget(self._details, 2)
-        tip = "Copy all notices with their details, for a bug report"
-        column.addLayout(copy_and_close(self, self.report, "Copy all", tip))
+        copy = push_button("Copy all", "Copy all notices with their details, for a bug report")
+        copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(self.report()))
+        close = QPushButton("Close", default=True)
+        close.clicked.connect(self.accept)
+        column.addLayout(filled(QHBoxLayout(), copy, None, close))
 
     def set_notices(self, notices: Sequence[Notice]) -> None:
         """`notices`: the latest last."""

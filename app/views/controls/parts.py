@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import TypeVar
 
 from PySide6.QtCore import QEvent, Qt
-from PySide6.QtGui import QGuiApplication, QKeyEvent
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QComboBox,
-    QDialog,
     QFrame,
     QHBoxLayout,
     QLabel,
@@ -84,10 +83,9 @@ def words_label() -> ElidedLabel:
     return label
 
 
-def keeps_own_keys(event: QEvent) -> bool:
-    """Accepts the override of a shortcut on Enter or Esc, so that the widget gets the key; whether it was one."""
-    asks = event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent)
-    if asks and event.key() in (*ENTER_KEYS, Qt.Key.Key_Escape):  # type: ignore[attr-defined]
+def keeps_keys(event: QEvent, *keys: Qt.Key) -> bool:
+    """Accepts the override of a shortcut on one of these, so that the widget gets the key; whether it was one."""
+    if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and event.key() in keys:
         event.accept()
         return True
     return False
@@ -145,16 +143,6 @@ def read_only_text(name: str, text: str = "") -> QPlainTextEdit:
     box.setAccessibleName(name)
     box.setTabChangesFocus(True)
     return box
-
-
-def copy_and_close(dialog: QDialog, text: Callable[[], str], word: str, tip: str) -> QHBoxLayout:
-    """The last row of a dialog whose text is for a report: a button `word` that copies it, and Close."""
-    copy = QPushButton(word)
-    copy.setToolTip(tip)
-    copy.clicked.connect(lambda: QGuiApplication.clipboard().setText(text()))
-    close = QPushButton("Close", default=True)
-    close.clicked.connect(dialog.accept)
-    return filled(QHBoxLayout(), copy, None, close)
 
 
 def vertical_rule() -> QFrame:

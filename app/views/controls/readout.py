@@ -31,4 +31,4 @@ class Readout(ElidedLabel):
         if wordings[0] != self.text():
             self.say(*wordings)
             # where there is too little room for it
-            self.setToolTip(wordings[0] if self.marked_up else plain_tip(wordings[0]))
+            self.setToolTip(plain_tip(wordings[0]))

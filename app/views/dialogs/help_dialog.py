@@ -12,6 +12,8 @@ from app.views.controls.parts import filled
 
 TEXT = Path(__file__).with_name("help.md")  # a part for each heading of the first level
 
+ABOUT = "About"
+
 
 class HelpDialog(QDialog):
     """Tabs of text that can be read, scrolled and copied with the keyboard.
@@ -20,6 +22,7 @@ class HelpDialog(QDialog):
         keys: (key, what it does).
         views: (title, what it shows).
         log: the file that errors are written to.
+        about: what the program is; its first line is a title.
     """
 
     def __init__(
@@ -27,6 +30,7 @@ class HelpDialog(QDialog):
         keys: Iterable[tuple[str, str]],
         views: Sequence[tuple[str, str]],
         log: Path,
+        about: str,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -42,9 +46,18 @@ class HelpDialog(QDialog):
         self._add("Views", "\n\n".join(f"### {title}\n\n{shows}" for title, shows in views))
         self._add("Models", parts["Models"])
         self._add("Errors", f"{parts['Errors']}\n\n`{log}`")
+        title, _, rest = about.partition("\n")
+        self._add(ABOUT, f"### {title}\n\n```\n{rest.strip()}\n```")
         close = QPushButton("Close", default=True)
         close.clicked.connect(self.accept)
         filled(QVBoxLayout(self), self.tabs, filled(QHBoxLayout(), None, close))
+
+    def open_at(self, topic: str) -> None:
+        """Shows the tab of this title; "": the one that was shown last."""
+        titles = [self.tabs.tabText(place) for place in range(self.tabs.count())]
+        if topic in titles:
+            self.tabs.setCurrentIndex(titles.index(topic))
+        self.show()
 
     def _add(self, title: str, markdown: str) -> None:
         page = QTextBrowser()

@@ -24,7 +24,7 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from app.shared.key_names import note_name
 from app.views import theme
-from app.views.controls.parts import ENTER_KEYS
+from app.views.controls.parts import ENTER_KEYS, keeps_keys
 
 LOWEST, HEIGHT = 72, 104  # of a surface in a low window, and otherwise, in pixels
 SOFTEST, HARDEST = 40, 127  # velocities of a click at the top and at the bottom of a place
@@ -325,14 +325,7 @@ class Playable(QWidget):
 
     def event(self, event: QEvent) -> bool:
         """Keeps Enter, which is a shortcut of the window, while the surface has the focus."""
-        if (
-            event.type() == QEvent.Type.ShortcutOverride
-            and isinstance(event, QKeyEvent)
-            and event.key() in ENTER_KEYS
-        ):
-            event.accept()
-            return True
-        return super().event(event)
+        return keeps_keys(event, *ENTER_KEYS) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         key = Qt.Key(event.key())

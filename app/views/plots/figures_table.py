@@ -4,37 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
-from PySide6.QtCore import (
-    QAbstractTableModel,
-    QEvent,
-    QModelIndex,
-    QPersistentModelIndex,
-    QSortFilterProxyModel,
-    Qt,
-    Signal,
-)
+from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, Qt, Signal
 from PySide6.QtGui import QColor, QGuiApplication, QKeyEvent, QKeySequence, QPalette
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
     QStyledItemDelegate,
     QStyleOptionViewItem,
-    QTableView,
+    QTableWidget,
+    QTableWidgetItem,
     QWidget,
 )
 
 from app.views import theme
-from app.views.controls.parts import ENTER_KEYS, keeps_own_keys, lay_out_view, tool_button
+from app.views.controls.parts import ENTER_KEYS, keeps_keys, lay_out_view, tool_button
 from app.views.controls.plain import plain_tip
 from app.views.controls.segments import SMALL
 
 Index = QModelIndex | QPersistentModelIndex
 Value = str | float | int | None
-RIGHT_ALIGNED = Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
 NARROWEST_PIXELS, WIDEST_PIXELS = 46, 260
-LEFT_ALIGNED = Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter
 
 
 @dataclass(frozen=True)
@@ -64,11 +55,7 @@ class TableRow:
     tip: str = ""
 
 
-def _colour(column: Column) -> str:
-    return theme.SOURCE_COLOURS[column.source] if column.source else theme.TEXT
-
-
-class FiguresTable(QTableView):
+class FiguresTable(QTableWidget):
     """A value of None is written as "–" and sorted last in either order."""
 
     row_clicked = Signal(object)  # its key
@@ -78,12 +65,14 @@ class FiguresTable(QTableView):
     escaped = Signal()
 
     def __init__(self, name: str, columns: Sequence[Column], parent: QWidget | None = None) -> None:
-        super().__init__(parent)
+        super().__init__(0, len(columns), parent)
         self.setAccessibleName(name)
-        self._rows = _Rows(columns)
-        self._sorted = _NoneLast()
-        self._sorted.setSourceModel(self._rows)
-        self.setModel(self._sorted)
+        self._columns, self._dimmed = columns, False
+        for place, column in enumerate(columns):
+            heading = QTableWidgetItem(column.title)
+            heading.setToolTip(f"{column.tip}\nClick to sort")
+            heading.setTextAlignment(_alignment(column))
+            self.setHorizontalHeaderItem(place, heading)
         self.setItemDelegate(_OwnColours(self))
         self.setSortingEnabled(True)
         self.sortByColumn(0, Qt.SortOrder.AscendingOrder)
@@ -103,22 +92,34 @@ class FiguresTable(QTableView):
         self.horizontalHeader().setHighlightSections(False)
         self.clicked.connect(lambda index: self.row_clicked.emit(self._key(index)))
         self.doubleClicked.connect(lambda index: self.row_double_clicked.emit(self._key(index)))
+        theme.changes.theme_changed.connect(self._take_theme)
 
     def show_rows(self, rows: Sequence[TableRow]) -> None:
         """Replaces all rows; the chosen one stays chosen where it is still there."""
         chosen = self.chosen_key
-        self._rows.replace(rows)
+        self._fill(rows)
         self.choose(chosen)
+
+    def _fill(self, rows: Sequence[TableRow]) -> None:
+        self.setSortingEnabled(False)
+        self.setRowCount(len(rows))
+        for place, row in enumerate(rows):
+            for number, column in enumerate(self._columns):
+                self.setItem(place, number, _Cell(column, row, row.values[number], self._dimmed))
+        self.setSortingEnabled(True)  # sorts them again
+
+    def _take_theme(self) -> None:
+        self._fill(self.rows)
 
     def set_dimmed(self, dimmed: bool) -> None:
         """Makes all rows grey: they are of an earlier pluck."""
-        self._rows.dimmed = dimmed
-        self.viewport().update()
+        self._dimmed = dimmed
+        self._fill(self.rows)
 
     @property
     def rows(self) -> list[TableRow]:
         """In the order in which they are shown."""
-        return [self._row(self._sorted.index(place, 0)) for place in range(self._sorted.rowCount())]
+        return [self._row(place) for place in range(self.rowCount())]
 
     @property
     def chosen_key(self) -> object:
@@ -138,7 +139,7 @@ class FiguresTable(QTableView):
 
     def text(self) -> str:
         """All that is shown, sorted as it is: headings and rows, tabs between, to paste into a spreadsheet."""
-        lines = [[column.title for column in self._rows.columns]]
+        lines = [[column.title for column in self._columns]]
         lines += [["" if value is None else f"{value}" for value in row.values] for row in self.rows]
         return "\n".join("\t".join(line) for line in lines) + "\n"
 
@@ -147,7 +148,7 @@ class FiguresTable(QTableView):
 
     def event(self, event: QEvent) -> bool:
         """Keeps Enter and Esc, which are shortcuts of the window, while the table has the focus."""
-        return keeps_own_keys(event) or super().event(event)
+        return keeps_keys(event, *ENTER_KEYS, Qt.Key.Key_Escape) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.matches(QKeySequence.StandardKey.Copy):
@@ -163,67 +164,32 @@ class FiguresTable(QTableView):
         else:
             super().keyPressEvent(event)
 
-    def _row(self, index: QModelIndex) -> TableRow:
-        return self._rows.rows[self._sorted.mapToSource(index).row()]
+    def _row(self, place: int) -> TableRow:
+        return cast("_Cell", self.item(place, 0)).row_shown
 
     def _key(self, index: QModelIndex) -> object:
-        return self._row(index).key
+        return self._row(index.row()).key
 
 
-class _Rows(QAbstractTableModel):
-    """The model of `FiguresTable`."""
+class _Cell(QTableWidgetItem):
+    """A value of a row."""
 
-    def __init__(self, columns: Sequence[Column]) -> None:
-        super().__init__()
-        self.columns = columns
-        self.rows: list[TableRow] = []
-        self.dimmed = False
+    def __init__(self, column: Column, row: TableRow, value: Value, dimmed: bool) -> None:
+        super().__init__("–" if value is None else column.text(value))
+        self.row_shown, self._value = row, value
+        self.setTextAlignment(_alignment(column))
+        self.setToolTip(plain_tip(row.tip))
+        if row.bold:
+            self.setFont(theme.small_font(12, bold=True))
+        own = theme.SOURCE_COLOURS[column.source] if column.source else theme.TEXT
+        self.setForeground(QColor(theme.FAINT if dimmed or row.grey or value is None else own))
 
-    def replace(self, rows: Sequence[TableRow]) -> None:
-        if [row.key for row in rows] == [row.key for row in self.rows]:  # the place of the scroll bar stays
-            self.rows = list(rows)
-            if rows:
-                self.dataChanged.emit(self.index(0, 0), self.index(len(rows) - 1, len(self.columns) - 1))
-            return
-        self.beginResetModel()
-        self.rows = list(rows)
-        self.endResetModel()
-
-    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008 (Qt's own default)
-        return 0 if parent.isValid() else len(self.rows)
-
-    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008
-        return 0 if parent.isValid() else len(self.columns)
-
-    def headerData(self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        if orientation == Qt.Orientation.Horizontal:
-            if role == Qt.ItemDataRole.DisplayRole:
-                return self.columns[section].title
-            if role == Qt.ItemDataRole.ToolTipRole:
-                return self.columns[section].tip + "\nClick to sort"
-            if role == Qt.ItemDataRole.TextAlignmentRole:
-                return self._alignment(section)
-        return None
-
-    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:
-        row, column = self.rows[index.row()], self.columns[index.column()]
-        value = row.values[index.column()]
-        if role == Qt.ItemDataRole.DisplayRole:
-            return "–" if value is None else column.text(value)
-        if role == Qt.ItemDataRole.UserRole:
-            return value
-        if role == Qt.ItemDataRole.TextAlignmentRole:
-            return self._alignment(index.column())
-        if role == Qt.ItemDataRole.FontRole and row.bold:
-            return theme.small_font(12, bold=True)
-        if role == Qt.ItemDataRole.ForegroundRole:
-            return QColor(theme.FAINT if self.dimmed or row.grey or value is None else _colour(column))
-        if role == Qt.ItemDataRole.ToolTipRole:
-            return plain_tip(row.tip) or None
-        return None
-
-    def _alignment(self, column: int) -> Qt.AlignmentFlag:
-        return LEFT_ALIGNED if self.columns[column].text is str else RIGHT_ALIGNED
+    def __lt__(self, other: QTableWidgetItem) -> bool:
+        one, another = self._value, cast("_Cell", other)._value
+        if one is None or another is None:
+            descending = self.tableWidget().horizontalHeader().sortIndicatorOrder() == Qt.SortOrder.DescendingOrder
+            return (one is None) == descending if (one is None) != (another is None) else False
+        return bool(one < another)  # type: ignore[operator]
 
 
 class _OwnColours(QStyledItemDelegate):
@@ -231,19 +197,12 @@ class _OwnColours(QStyledItemDelegate):
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
         super().initStyleOption(option, index)
-        colour = index.data(Qt.ItemDataRole.ForegroundRole)
-        option.palette.setColor(QPalette.ColorRole.HighlightedText, colour)
+        option.palette.setBrush(QPalette.ColorRole.HighlightedText, index.data(Qt.ItemDataRole.ForegroundRole))
 
 
-class _NoneLast(QSortFilterProxyModel):
-    """Sorts by value, with what has none at the end in either order."""
-
-    def lessThan(self, left: Index, right: Index) -> bool:
-        one, other = (self.sourceModel().data(index, Qt.ItemDataRole.UserRole) for index in (left, right))
-        descending = self.sortOrder() == Qt.SortOrder.DescendingOrder
-        if one is None or other is None:
-            return (one is None) == descending if (one is None) != (other is None) else False
-        return bool(one < other)
+def _alignment(column: Column) -> Qt.AlignmentFlag:
+    side = Qt.AlignmentFlag.AlignLeft if column.text is str else Qt.AlignmentFlag.AlignRight
+    return side | Qt.AlignmentFlag.AlignVCenter
 
 
 def lay_out_table(

@@ -6,7 +6,7 @@ import pyqtgraph as pg
 from PySide6.QtCore import QEvent, QPointF, Qt
 from PySide6.QtGui import QResizeEvent
 
-from app.views.controls.parts import keeps_own_keys
+from app.views.controls.parts import ENTER_KEYS, keeps_keys
 from app.views.plots.axis_label import UprightLabel, UprightTicks, fit_foot
 
 TIP_MS = 3000  # the tooltip covers what is pointed at
@@ -40,4 +40,4 @@ class PointedPlot(pg.PlotWidget):
 
     def event(self, event: QEvent) -> bool:
         """Keeps Enter and Esc, which are shortcuts of the window, while the plot has the focus."""
-        return keeps_own_keys(event) or bool(super().event(event))
+        return keeps_keys(event, *ENTER_KEYS, Qt.Key.Key_Escape) or bool(super().event(event))

@@ -24,7 +24,9 @@ from app.rendering import BlowTake, Sounding, Take
 from app.session.choices import Choices, Session
 from app.shared.worker import Job, Work
 from app.views.background import Background
+from app.views.controls.parts import lay_out_alone
 from app.views.controls.plain import Label
+from app.views.stage import StageView
 from engine.metrics import ErrorSums
 
 LEAST_HEIGHT = 84  # pixels
@@ -96,7 +98,7 @@ class Panel(QWidget):
         self._cover.setAutoFillBackground(True)
         self._cover.hide()
         self._seen_s = time.monotonic()
-        self._growing: Take | None = None  # jobs rest while it is rendered
+        self._growing: Take | BlowTake | None = None  # jobs rest while it is rendered
         self._grown = (-1, 0.0)  # its frames when it last grew, and when that was
 
     def cover(self, words: str) -> None:
@@ -117,11 +119,8 @@ class Panel(QWidget):
     def choices_changed(self, names: frozenset[str]) -> None:
         """Called with the fields of `Choices` that have new values; at the start with all of them."""
 
-    def blow_started(self, take: BlowTake) -> None:
-        """Called with another motion of a drum, which grows from now on; not where the panel is `of_strings`."""
-
-    def take_started(self, take: Take) -> None:
-        """Called with another motion, of which nothing is rendered yet; it grows from now on."""
+    def take_started(self, take: Take | BlowTake) -> None:
+        """Called with another motion, of which nothing is rendered yet; of a drum where it is not `of_strings`."""
         self._growing, self._grown = take, (-1, time.monotonic())
 
     def take_finished(self, take: Take, errors: ErrorSums) -> None:
@@ -162,6 +161,28 @@ class Panel(QWidget):
         if take.ready_frames != self._grown[0]:
             self._grown = (take.ready_frames, now_s)
         return now_s - self._grown[1] <= GIVEN_UP_S  # else its rendering was abandoned, or failed
+
+
+class StagePanel(Panel):
+    """The picture of the string or the drum, above the decks."""
+
+    on_stage = True
+
+    def _put_on_stage(self, view: StageView) -> None:
+        """Lays out the picture, and lets its gestures change the listening points."""
+        lay_out_alone(self, view)
+        view.listening_point_moved.connect(self._move_listening_point)
+        view.listening_point_reset.connect(self._reset_listening_point)
+        view.motion_toggled.connect(lambda on: self.session.update(motion=on))
+
+    def _move_listening_point(self, side: str, point: float) -> None:
+        if side == "right":
+            self.session.update(listen_right=min(max(point, 0.0), 1.0))
+        else:
+            self.session.move_listening_point(point)
+
+    def _reset_listening_point(self, side: str) -> None:
+        self._move_listening_point(side, Choices().listen_right if side == "right" else Choices().listen)
 
 
 _lock = threading.Lock()

@@ -6,25 +6,23 @@ import math
 
 from app.patches.drums import PlayedDrum
 from app.presets.library import Library
-from app.rendering import BlowTake
-from app.session.choices import Choices, Session
+from app.rendering import BlowTake, Take
+from app.session.choices import Session
 from app.session.listener import Listener
 from app.session.shown import LEGEND_FIELDS, ShownSource, shown_sources
 from app.session.silence import why_silent
 from app.shared.key_names import note_name
 from app.shared.vocabulary import DIFFERENCE
-from app.views.controls.parts import lay_out_alone
 from app.views.drum.axes import Place
 from app.views.drum.ink import HeadFrame
 from app.views.drum.view import DrumView
-from app.window.panels.base import Moment, Panel
+from app.window.panels.base import Moment, StagePanel
 
 HARDEST = 127
 DRAWN = ("model", "truth", DIFFERENCE)
 
 
-class DrumPanel(Panel):
-    on_stage = True
+class DrumPanel(StagePanel):
     of_strings = False
     key = "drum"
     title = "Drum"
@@ -37,13 +35,10 @@ class DrumPanel(Panel):
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
         self.view = DrumView()
-        lay_out_alone(self, self.view)
+        self._put_on_stage(self.view)
         self.view.struck.connect(self._strike)
         self.view.place_moved.connect(lambda x, y: self._aim((x, y)))
         self.view.place_reset.connect(self._reset_place)
-        self.view.listening_point_moved.connect(self._move_listening_point)
-        self.view.listening_point_reset.connect(self._reset_listening_point)
-        self.view.motion_toggled.connect(lambda on: session.update(motion=on))
         self._key: int | None = None
         self._shown: PlayedDrum | None = None  # whose place it is
         self._place: Place = (0.0, 0.0)
@@ -91,7 +86,7 @@ class DrumPanel(Panel):
             self._aim(place or drum.place)
         self._shown = drum
 
-    def blow_started(self, take: BlowTake) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         self._standing = ()
 
     def show_moment(self, moment: Moment) -> None:
@@ -133,12 +128,3 @@ class DrumPanel(Panel):
     def _reset_place(self) -> None:
         if (drum := self._drum) is not None:
             self._aim(drum.place)
-
-    def _move_listening_point(self, side: str, point: float) -> None:
-        if side == "right":
-            self.session.update(listen_right=min(max(point, 0.0), 1.0))
-        else:
-            self.session.move_listening_point(point)
-
-    def _reset_listening_point(self, side: str) -> None:
-        self._move_listening_point(side, Choices().listen_right if side == "right" else Choices().listen)

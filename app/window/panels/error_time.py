@@ -64,7 +64,7 @@ class ErrorTimePanel(TimePanel[ErrorCourse | BlowErrors]):
         self._curves = {name: item.plot(pen=pg.mkPen(colour, width=1)) for name, colour in colours.items()}
         dotted = {name: pg.mkPen(colours[name], width=1, style=Qt.PenStyle.DotLine) for name in ("rmse", "mae")}
         self._stored = {name: item.plot(pen=pen) for name, pen in dotted.items()}
-        self.readout.setTextFormat(Qt.TextFormat.AutoText)  # a legend in colours
+        self._legend = item.addLegend(offset=(-8, 4))
         self._stored_errors: dict[str, float] = {}
         self._measured: tuple[str, ...] = ("rmse", "mae")  # of a drum there is no mean of absolute errors
         self._range: tuple[float, float] | None = None
@@ -77,19 +77,14 @@ class ErrorTimePanel(TimePanel[ErrorCourse | BlowErrors]):
         if "seconds" in names:
             self.longer.setEnabled(self.session.choices.seconds < LONG_S)
 
-    def take_started(self, take: Take) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
-        rmse = None if take.info.rel_mse is None else math.sqrt(take.info.rel_mse)
-        stored = {"rmse": rmse, "mae": take.info.rel_mae}
-        self._start_over({name: error for name, error in stored.items() if error is not None}, take)
-
-    def blow_started(self, take: BlowTake) -> None:
-        super().blow_started(take)
-        self._start_over({}, take)  # the model was validated on no drum
-
-    def _start_over(self, stored_errors: dict[str, float], take: Sounding) -> None:
         self._measured = ("rmse",) if isinstance(take, BlowTake) else ("rmse", "mae")
-        self._stored_errors = stored_errors
+        self._stored_errors = {}  # the model was validated on no drum
+        if isinstance(take, Take):
+            rmse = None if take.info.rel_mse is None else math.sqrt(take.info.rel_mse)
+            stored = {"rmse": rmse, "mae": take.info.rel_mae}
+            self._stored_errors = {name: error for name, error in stored.items() if error is not None}
         for curve in self._curves.values():
             curve.setData([], [])
         for name, line in self._stored.items():
@@ -173,14 +168,13 @@ class ErrorTimePanel(TimePanel[ErrorCourse | BlowErrors]):
         return np.array([-2.0, 0.0, *stored])
 
     def _show_legend(self) -> None:
-        if self._level:
-            self.readout.rest("")
-            return
-        hues = {"rmse": theme.MODEL, "mae": theme.DIFFERENCE}
-        drawn = [(name, hue) for name, hue in hues.items() if name in self._measured]
-        text = "&nbsp;&nbsp;".join(f"<span style='color:{colour}'>— {name.upper()}</span>" for name, colour in drawn)
-        stored = [percent(self._stored_errors[name]) for name, _ in drawn if name in self._stored_errors]
-        self.readout.rest(*([f"{text}&nbsp;&nbsp; ⋯ validation {', '.join(stored)}"] if stored else []), text)
+        measured = () if self._level else self._measured
+        self._legend.clear()
+        self._legend.setLabelTextColor(theme.FAINT)
+        for name in measured:
+            self._legend.addItem(self._curves[name], name.upper())
+        stored = [percent(self._stored_errors[name]) for name in measured if name in self._stored_errors]
+        self.readout.rest(f"⋯ validation {', '.join(stored)}" if stored else "")
 
 
 def percent(error: float) -> str:

@@ -6,7 +6,7 @@ import math
 
 from app.analysis.take_partials import WINDOWS, PartialRow, take_partials
 from app.presets.library import Library
-from app.rendering import Take
+from app.rendering import BlowTake, Take
 from app.session.choices import Session
 from app.views.controls.parts import combo_box, words_label
 from app.views.controls.progress_strip import ProgressStrip
@@ -87,7 +87,7 @@ class PartialsPanel(Panel):
         if "solo" in names:
             self._show_solo()
 
-    def take_started(self, take: Take) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         self._waiting = self._rows = None
         self.background.cancel()
         self.table.set_dimmed(True)

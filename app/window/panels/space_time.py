@@ -9,7 +9,7 @@ from PySide6.QtCore import QRectF
 
 from app.analysis.space_time import Envelopes, Picture, picture
 from app.presets.library import Library
-from app.rendering import SOURCES, Sounding, Take
+from app.rendering import SOURCES, BlowTake, Sounding, Take
 from app.session.choices import Session
 from app.session.shown import readable_unit
 from app.views import theme
@@ -97,8 +97,9 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         if "listen" in names and self.session.choices.listen != self._listening.value():
             self._listening.setValue(self.session.choices.listen)
 
-    def take_started(self, take: Take) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
+        assert isinstance(take, Take)  # it draws no drums
         self._picture = None
         self._full_scale_mm = max(take.pluck.amplitude_mm, 1e-3)  # at a gain of 1
         self._image.clear()

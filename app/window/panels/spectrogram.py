@@ -94,16 +94,10 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         if "pickup" in names:
             self._bar_label.set(f"dB re {full_scale_words(self.session.choices)}", "dB")
 
-    def take_started(self, take: Take) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
-        self._fit_to(take, full_scale_words(self.session.choices))
-
-    def blow_started(self, take: BlowTake) -> None:
-        super().blow_started(take)
-        self._fit_to(take, f"{take.full_scale:g} Pa")
-
-    def _fit_to(self, take: Sounding, full_scale: str) -> None:
-        self._bar_label.set(f"dB re {full_scale}", "dB")
+        own = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
+        self._bar_label.set(f"dB re {own}", "dB")
         if take.rate_hz / 2 != self._highest_hz:
             self._highest_hz = take.rate_hz / 2
             self._label_frequencies()

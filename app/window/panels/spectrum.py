@@ -161,15 +161,11 @@ class SpectrumPanel(Panel):
         if "pickup" in names:
             self._label.set(f"dB re {full_scale_words(choices)}", "dB")
 
-    def take_started(self, take: Take) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         self._shown = self._standing = ()  # which would hold the last take
         self._partials_hz = take.partials_hz
-        self._label.set(f"dB re {full_scale_words(self.session.choices)}", "dB")
-
-    def blow_started(self, take: BlowTake) -> None:
-        self._shown = self._standing = ()
-        self._partials_hz = take.partials_hz
-        self._label.set(f"dB re {take.full_scale:g} Pa", "dB")
+        own = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
+        self._label.set(f"dB re {own}", "dB")
 
     def show_moment(self, moment: Moment) -> None:
         self._moments += 1

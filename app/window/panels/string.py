@@ -10,7 +10,7 @@ from app.instrument.beyond_training import outside_of_string
 from app.instrument.facts import by_two_numbers
 from app.presets.library import Library
 from app.presets.words import shape_word
-from app.rendering import Take
+from app.rendering import BlowTake, Take
 from app.rendering.take import Listened
 from app.session.choices import Choices, PluckedString, Session
 from app.session.listener import Listener
@@ -19,11 +19,10 @@ from app.session.shown import LEGEND_FIELDS, ShownSource, shown_sources
 from app.session.silence import why_difference_silent, why_silent
 from app.session.slots import info_of
 from app.shared.vocabulary import DIFFERENCE
-from app.views.controls.parts import lay_out_alone
 from app.views.string.ground import TrainedPlucks
 from app.views.string.ink import ShownPluck
 from app.views.string.view import StringView
-from app.window.panels.base import Moment, Panel
+from app.window.panels.base import Moment, StagePanel
 from engine.metrics import ErrorSums
 from engine.pluck import SHAPES, WIDTH_RANGE, Pluck
 from engine.presets import PresetInfo, outside_training
@@ -35,8 +34,7 @@ PLUCK_FIELDS = {"preset", *PluckedString.model_fields}
 WARNING_FIELDS = {"volume_db", *PLUCK_FIELDS, *Listener.model_fields, *Monitor.model_fields}
 
 
-class StringPanel(Panel):
-    on_stage = True
+class StringPanel(StagePanel):
     key = "string"
     title = "String"
     help = (
@@ -48,15 +46,12 @@ class StringPanel(Panel):
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
         self.view = StringView()
-        lay_out_alone(self, self.view)
+        self._put_on_stage(self.view)
         self.view.pluck_drawn.connect(session.move_pluck)
         self.view.pluck_released.connect(self.pluck_asked)
         self.view.pluck_reset.connect(self._reset_pluck)
         self.view.width_stepped.connect(self._step_width)
         self.view.shape_stepped.connect(self._step_shape)
-        self.view.listening_point_moved.connect(self._move_listening_point)
-        self.view.listening_point_reset.connect(self._reset_listening_point)
-        self.view.motion_toggled.connect(lambda on: session.update(motion=on))
         self.view.envelope_toggled.connect(lambda on: session.update(envelope=on))
         self._envelope: Envelope | None = None
         self._standing: tuple[object, ...] = ()
@@ -89,7 +84,7 @@ class StringPanel(Panel):
         sources = shown_sources(self.session.choices, self.library)
         return tuple(each for each in sources if each.heard) if self._plain else sources
 
-    def take_started(self, take: Take) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         self._envelope = Envelope()
         self._standing = ()
 
@@ -167,15 +162,6 @@ class StringPanel(Panel):
     def _step_shape(self, steps: int) -> None:
         here = SHAPES.index(self.session.choices.shape)
         self.session.update(shape=SHAPES[(here + steps) % len(SHAPES)])
-
-    def _move_listening_point(self, side: str, position: float) -> None:
-        if side == "right":
-            self.session.update(listen_right=min(max(position, 0.0), 1.0))
-        else:
-            self.session.move_listening_point(position)
-
-    def _reset_listening_point(self, side: str) -> None:
-        self._move_listening_point(side, Choices().listen_right if side == "right" else Choices().listen)
 
 
 def _label(choices: Choices) -> str:

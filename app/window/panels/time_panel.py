@@ -55,17 +55,11 @@ class TimePanel(Panel, Generic[G]):
         """Whether it shows the take as it is heard now."""
         return True
 
-    def take_started(self, take: Take) -> None:
-        self._forget(take)
-
-    def blow_started(self, take: BlowTake) -> None:
-        self._forget(take)
-
-    def _forget(self, coming: Sounding) -> None:
-        """Discards what was computed of the take before, in whose place this one comes."""
+    def take_started(self, take: Take | BlowTake) -> None:
+        """Discards what was computed of the take before."""
         self.background.cancel()
         self._made, self._shown = None, ()
-        self.plot.set_times(coming.seconds, coming.horizon_s)
+        self.plot.set_times(take.seconds, take.horizon_s)
 
     def show_moment(self, moment: Moment) -> None:
         self.plot.show_playhead(moment.position_s)

@@ -99,13 +99,7 @@ class WaveformPanel(Panel):
             self.set_sources(shown_sources(choices, self.library), part_words(choices))
             self._shown = ()
 
-    def take_started(self, take: Take) -> None:
-        self._begin(take)
-
-    def blow_started(self, take: BlowTake) -> None:
-        self._begin(take)
-
-    def _begin(self, take: Sounding) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         self._take, self._drawn, self._full = take, {}, 0.0
         self._shown = self._caught_up = ()  # which would hold the last take
         self._period_s = 1 / take.fundamental_hz

@@ -19,8 +19,7 @@ from app.patches.instrument import SingleString
 from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets
 from app.shared.parameters import PARAMETERS
-from app.views.controls.browser_rows import ListedRows, RowsModel
-from app.views.dialogs.preset_card import COLUMNS as BROWSER_COLUMNS
+from app.views.controls.browser_rows import listed_rows
 from app.views.dialogs.preset_card import preset_row
 from app.window.dropped_files import Dropped, receive, receive_body
 from engine.pluck import Pluck
@@ -253,13 +252,9 @@ def test_the_most_accurate_come_first_and_what_was_not_measured_last(
         add_heard(preset_folder, [heard(path, {"third": 3.0, "fourth": 0.1}[name])])
     library.refresh()
 
-    listed = ListedRows(rows := RowsModel(BROWSER_COLUMNS))
-
     def order(number: int = 0, favourites: tuple[str, ...] = (), words: str = "") -> list[str]:
-        rows.show([preset_row(entry) for entry in library.entries], favourites)
-        listed.order, listed.words = number, (words,) if words else ()
-        listed.refresh()
-        return [row.name for row in listed.listed]
+        rows = [preset_row(entry) for entry in library.entries]
+        return [row.name for row in listed_rows(rows, favourites, (words,), order=number)]
 
     assert order() == ["fourth", "third", "first", "second"]
     assert order(0, ("second", "third")) == ["third", "second", "fourth", "first"]
@@ -271,8 +266,6 @@ def test_the_most_accurate_come_first_and_what_was_not_measured_last(
 def test_the_filter_finds_words_in_any_order_and_every_kind(qtbot: QtBot, preset_folder: Path) -> None:
     low = preset_row(entry(name="low", title="Nylon B3, plucked"))
     high = preset_row(entry(name="high", title="Steel E4", rate_hz=16_000, tension_modulated=False, model="koopman"))
-    listed = ListedRows(rows := RowsModel(BROWSER_COLUMNS))
-    rows.show([low, high], {"high"})
     for words, kinds, starred, found in (
         ("", (), False, [high, low]),  # a favourite is on top
         ("b3 nyl", (), False, [low]),
@@ -285,7 +278,4 @@ def test_the_filter_finds_words_in_any_order_and_every_kind(qtbot: QtBot, preset
         ("koopman", ("", "", 16_000), False, [high]),
         ("", (), True, [high]),
     ):
-        listed.words, listed.kinds, listed.starred = tuple(words.split()), kinds, starred
-        listed.refresh()
-        assert listed.listed == found, (words, kinds)
-        assert listed.rowCount() == len(found) + bool(found), "with the heading"
+        assert listed_rows([low, high], {"high"}, words.split(), kinds, starred) == found, (words, kinds)

@@ -1,4 +1,4 @@
-"""An unexpected fault is written down, shown in one dialog, and a window without an engine stays to say so."""
+"""An unexpected fault is written down, shown as a notice, and a window without an engine stays to say so."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ import threading
 from pathlib import Path
 
 import pytest
-from PySide6.QtWidgets import QWidget
 from pytestqt.qtbot import QtBot
 
 from app.shared.log import FILE_VARIABLE, LARGEST_BYTES, OLDER_KEPT, faults_logged, log_fault, log_file
+from app.views.controls.notice_bar import NoticeBar
 from app.window.about import about_text
-from app.window.faults import Faults
 
 
 @pytest.fixture(autouse=True)
@@ -30,11 +29,11 @@ def log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "logs" / "here.log"
 
 
-def test_a_fault_of_any_thread_is_written_and_reported_in_one_dialog(qtbot: QtBot, log: Path) -> None:
-    window = QWidget()
-    qtbot.addWidget(window)
-    faults = Faults(window)
-    with faults_logged(faults.report):
+def test_a_fault_of_any_thread_is_written_and_reported(qtbot: QtBot, log: Path) -> None:
+    notices = NoticeBar()
+    qtbot.addWidget(notices)
+    qtbot.addWidget(notices.bell)
+    with faults_logged(lambda text: notices.faulted.emit("Unexpected.", text)):
         for number in range(3):
             thread = threading.Thread(target=lambda: 1 / 0, name=f"unlucky-{number}")
             thread.start()
@@ -43,11 +42,12 @@ def test_a_fault_of_any_thread_is_written_and_reported_in_one_dialog(qtbot: QtBo
             raise LookupError("in a slot")
         except LookupError as error:
             sys.excepthook(LookupError, error, error.__traceback__)
-    qtbot.waitUntil(lambda: faults.dialog is not None and "LookupError: in a slot" in faults.dialog.text)
+    qtbot.waitUntil(lambda: notices.text == "Unexpected. LookupError: in a slot")
     text = log.read_text("utf-8")
-    assert faults.dialog is not None
-    for words in ("ZeroDivisionError", "unlucky-0", "unlucky-2", "LookupError: in a slot", "Traceback"):
-        assert words in text and words in faults.dialog.text
+    reported = "".join(notice.details for notice in notices.notices)
+    for words in ("ZeroDivisionError", "unlucky-2", "LookupError: in a slot", "Traceback"):
+        assert words in text and words in reported
+    assert [notice.times for notice in notices.notices] == [3, 1] and "unlucky-0" in text
     assert "Python" in text.splitlines()[0]
     assert str(log) in about_text(Path("here"), Path("there"))
 
@@ -95,18 +95,17 @@ def test_an_engine_that_cannot_be_loaded_is_shown(log: Path, tmp_path: Path) -> 
     code = """
 import gc
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QApplication, QLabel
-from app.views.dialogs.fault_dialog import FaultDialog
+from PySide6.QtWidgets import QApplication
 from app.window import main
+from app.window.main_window import MainWindow
 def broken():
     raise OSError("libtorch.so: cannot open shared object file")
 main.load_engine = broken
 application = QApplication([])
 def look():
     for dialog in application.topLevelWidgets():
-        if isinstance(dialog, FaultDialog) and dialog.isVisible():
-            words = " ".join(label.text() for label in dialog.findChildren(QLabel))
-            print("libtorch.so" in dialog.text, "cannot be loaded" in words, gc.isenabled())
+        if isinstance(dialog, MainWindow) and (text := dialog.notices.text):
+            print("libtorch.so" in text, "cannot be loaded" in text, gc.isenabled())
             application.closeAllWindows()
 timer = QTimer(interval=50)
 timer.timeout.connect(look)

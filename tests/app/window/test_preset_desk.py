@@ -40,15 +40,13 @@ def listed(browser: Browser) -> list[str]:
 
 
 def headings(browser: Browser) -> list[str]:
-    lines = (
-        browser._listed.line(browser.list.model().index(row, 0)) for row in range(browser.list.model().rowCount())
-    )
+    lines = (browser.list.line(browser.list.model().index(row, 0)) for row in range(browser.list.model().rowCount()))
     return [line for line in lines if isinstance(line, str)]
 
 
 def row_rect(browser: Browser, number: int) -> QRect:
     """Of a listed row, with its star."""
-    title = browser._listed.index_of(listed(browser)[number])
+    title = browser.list.index_of(listed(browser)[number])
     return browser.list.visualRect(title.siblingAtColumn(0)).united(browser.list.visualRect(title))
 
 
@@ -166,7 +164,7 @@ def test_the_marked_row_is_the_chosen_preset_or_the_first_hit(controller: Contro
     for words, marked in (("first", ["first"]), ("", ["second"]), ("zzz", []), ("", ["second"])):
         browser.search.setText(words)
         rows = browser.list.selectionModel().selectedRows()
-        assert [browser._listed.line(row).name for row in rows] == marked
+        assert [browser.list.line(row).name for row in rows] == marked
 
 
 def test_the_card_and_the_keys_are_those_of_the_first_hit(
@@ -218,7 +216,7 @@ def test_studio_presets_are_a_group_of_their_own_before_the_research_ones(
     """The headings are passed over by arrows and page keys, which go through both groups in the listed order."""
 
     def groups() -> dict[str, int]:
-        rows = browser._listed.listed
+        rows = browser.list.rows
         return {heading: sum(row.heading == heading for row in rows) for heading in headings(browser)}
 
     shutil.copy(small_preset, preset_folder / "studio_zither.safetensors")
@@ -360,7 +358,7 @@ def test_browser_and_card_say_how_true_a_preset_sounds(
     browser.dismiss()
     controller.presets.toggle()
     assert listed(browser) == ["second", "first"]  # what was not measured is last
-    rows = [browser._listed.index_of(name) for name in listed(browser)]
+    rows = [browser.list.index_of(name) for name in listed(browser)]
     assert [row.siblingAtColumn(4).data() for row in rows] == ["pitch 13 cents too high …", "not measured"]
     assert "&lt;i&gt;sma&lt;/i&gt; str" in rows[0].data(Qt.ItemDataRole.ToolTipRole)
     assert "evaluate first --heard --write" in browser.card.text()

@@ -75,22 +75,6 @@ def test_any_splitting_into_blocks_is_the_same_motion(readout: torch.Tensor | No
 
 
 @torch.no_grad()
-@pytest.mark.parametrize("readout", [None, listening_weights([0.37], 101)])
-@pytest.mark.parametrize("how", ["paper", "physics"])
-def test_interpolated_multipliers_are_close_to_those_of_every_frame(how: str, readout: torch.Tensor | None) -> None:
-    model = small_model(how=how)
-    initial = 3 * torch.randn(2, 101, generator=torch.Generator().manual_seed(1))
-    interpolated = model(initial, 5000, readout)
-    model.multiplier_tolerance = 0.0
-    exact = model(initial, 5000, readout)
-    assert not torch.equal(interpolated, exact)
-    torch.testing.assert_close(interpolated, exact, rtol=0, atol=1e-5 * float(exact.abs().max()))
-    model.multiplier_tolerance = 1e-5
-    model.train()  # training has no tolerance
-    torch.testing.assert_close(model(initial, 5000, readout), exact, rtol=0, atol=0)
-
-
-@torch.no_grad()
 def test_phases_stay_exact_after_a_million_steps() -> None:
     """The latents of a render, against powers taken one by one in float64; slow decays, so that something is left."""
     model = small_model()

@@ -7,6 +7,7 @@ from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
 from engine.models.fno import FGRU, FRNN, FourierConvolution
 from engine.models.string_modes import StringModes
 from engine.resonators.sine_transform import synthesis_matrix
+from tests.engine.tensors import convolved
 from training.research.fourier_wiring import Kernels, shared_coupling, store_in_fgru, store_in_frnn
 
 POINTS = 31
@@ -91,7 +92,7 @@ def test_kernels_pass_spread_and_gather() -> None:
     field = torch.zeros(1, POINTS, 4, dtype=torch.float64)
     field[0, -1, 0] = 3.0
     with torch.no_grad():
-        found = layer(field)[0]
+        found = convolved(layer, field)[0]
     expected = torch.zeros(POINTS, 4, dtype=torch.float64)
     expected[5, 0], expected[-4, 1], expected[:, 2] = 1.5, 6.0, 3 * shape
     torch.testing.assert_close(found[:, :3], expected[:, :3], rtol=0, atol=1e-12)

@@ -30,13 +30,9 @@ static const void *host_extension(const clap_host *host, const char *id) {
 
 /* Ports */
 
-static uint32_t audio_count(const clap_plugin *plugin, bool is_input) {
-  (void)plugin;
-  return is_input ? 0 : 1;
-}
+static uint32_t audio_count(const clap_plugin *, bool is_input) { return is_input ? 0 : 1; }
 
-static bool audio_get(const clap_plugin *plugin, uint32_t index, bool is_input, clap_audio_port *port) {
-  (void)plugin;
+static bool audio_get(const clap_plugin *, uint32_t index, bool is_input, clap_audio_port *port) {
   if (is_input || index) return false;
   memset(port, 0, sizeof *port);
   snprintf(port->name, sizeof port->name, "Output");
@@ -47,13 +43,9 @@ static bool audio_get(const clap_plugin *plugin, uint32_t index, bool is_input, 
   return true;
 }
 
-static uint32_t note_count(const clap_plugin *plugin, bool is_input) {
-  (void)plugin;
-  return is_input ? 1 : 0;
-}
+static uint32_t note_count(const clap_plugin *, bool is_input) { return is_input ? 1 : 0; }
 
-static bool note_get(const clap_plugin *plugin, uint32_t index, bool is_input, clap_note_port *port) {
-  (void)plugin;
+static bool note_get(const clap_plugin *, uint32_t index, bool is_input, clap_note_port *port) {
   if (!is_input || index) return false;
   memset(port, 0, sizeof *port);
   snprintf(port->name, sizeof port->name, "Notes");
@@ -168,8 +160,7 @@ static void take_event(shell *own, const clap_event *event, uint32_t at) {
   }
 }
 
-static void param_flush(const clap_plugin *plugin, const clap_in_events *in, const clap_out_events *out) {
-  (void)out;
+static void param_flush(const clap_plugin *plugin, const clap_in_events *in, const clap_out_events *) {
   for (uint32_t place = 0; in && place < in->size(in); place++) take_event(shell_of(plugin), in->get(in, place), 0);
 }
 
@@ -198,17 +189,11 @@ static bool state_load(const clap_plugin *plugin, const clap_istream *stream) {
   return true;
 }
 
-static uint32_t latency_get(const clap_plugin *plugin) {
-  (void)plugin;
-  return instrument_latency();
-}
+static uint32_t latency_get(const clap_plugin *) { return instrument_latency(); }
 
 static uint32_t tail_get(const clap_plugin *plugin) { return instrument_tail(&shell_of(plugin)->own); }
 
-static bool no_requirement(const clap_plugin *plugin) {
-  (void)plugin;
-  return false;
-}
+static bool no_requirement(const clap_plugin *) { return false; }
 
 static bool set_mode(const clap_plugin *plugin, int32_t mode) {
   shell_of(plugin)->own.effects.offline = mode == CLAP_RENDER_OFFLINE;
@@ -244,10 +229,7 @@ static const clap_render render = {no_requirement, set_mode};
 
 /* The plug-in */
 
-static bool shell_init(const clap_plugin *plugin) {
-  (void)plugin;
-  return true;
-}
+static bool shell_init(const clap_plugin *) { return true; }
 
 static void shell_deactivate(const clap_plugin *plugin) {
   shell *own = shell_of(plugin);
@@ -257,8 +239,7 @@ static void shell_deactivate(const clap_plugin *plugin) {
   own->active = false;
 }
 
-static bool shell_activate(const clap_plugin *plugin, double rate_hz, uint32_t least, uint32_t most) {
-  (void)least;
+static bool shell_activate(const clap_plugin *plugin, double rate_hz, uint32_t, uint32_t most) {
   shell *own = shell_of(plugin);
   shell_deactivate(plugin);
   own->spare = calloc(most ? most : 1, sizeof(float));
@@ -284,8 +265,7 @@ static void shell_reset(const clap_plugin *plugin) {
 
 typedef struct { const clap_out_events *out; uint32_t last; } ends;
 
-static void push_end(void *context, int64_t id, int32_t channel, int32_t key, uint32_t offset) {
-  (void)offset;
+static void push_end(void *context, int64_t id, int32_t channel, int32_t key, uint32_t) {
   const ends *to = context;
   clap_event_note note = {{sizeof note, to->last, 0, CLAP_NOTE_END, 0}, (int32_t)(id - 1), 0, (int16_t)channel, (int16_t)key, 0};
   if (to->out) to->out->try_push(to->out, &note.header);
@@ -325,8 +305,7 @@ static int32_t shell_process(const clap_plugin *plugin, const clap_process *proc
   return instrument_silent(&own->own) ? CLAP_SLEEP : CLAP_CONTINUE;
 }
 
-static const void *shell_extension(const clap_plugin *plugin, const char *id) {
-  (void)plugin;
+static const void *shell_extension(const clap_plugin *, const char *id) {
   static const struct { const char *id; const void *extension; } all[] = {
       {"clap.audio-ports", &audio_ports}, {"clap.note-ports", &note_ports}, {"clap.params", &params}, {"clap.state", &state},
       {"clap.latency", &latency},         {"clap.tail", &tail},             {"clap.render", &render},
@@ -346,8 +325,7 @@ static const char *features[MOST_IMAGES][MOST_FEATURES + 1];
 static char provider_id[160];
 static const clap_preset_descriptor provider_descriptor = {CLAP_VERSION_USED, provider_id, "Instruments", "Learned Strings"};
 
-static bool entry_init(const char *path) {
-  (void)path;
+static bool entry_init(const char *) {
   snprintf(provider_id, sizeof provider_id, "%s.presets", image_count == 1 ? images[0]->id : "org.learned-strings.bank");
   for (int32_t each = 0; each < image_count; each++) {
     const image *of = images[each];
@@ -363,18 +341,13 @@ static bool entry_init(const char *path) {
 
 static void entry_deinit(void) {}
 
-static uint32_t factory_count(const clap_factory *factory) {
-  (void)factory;
-  return (uint32_t)image_count;
-}
+static uint32_t factory_count(const clap_factory *) { return (uint32_t)image_count; }
 
-static const clap_descriptor *factory_descriptor(const clap_factory *factory, uint32_t index) {
-  (void)factory;
+static const clap_descriptor *factory_descriptor(const clap_factory *, uint32_t index) {
   return index < (uint32_t)image_count ? &descriptors[index] : NULL;
 }
 
-static const clap_plugin *factory_create(const clap_factory *factory, const clap_host *host, const char *id) {
-  (void)factory;
+static const clap_plugin *factory_create(const clap_factory *, const clap_host *host, const char *id) {
   for (int32_t each = 0; each < image_count; each++) {
     if (strcmp(id, images[each]->id)) continue;
     shell *own = calloc(1, sizeof *own);
@@ -401,8 +374,7 @@ static bool provider_init(const clap_preset_provider *provider) {
 
 static void provider_destroy(const clap_preset_provider *provider) { free((void *)provider); }
 
-static bool provider_metadata(const clap_preset_provider *provider, uint32_t kind, const char *location, const clap_preset_receiver *to) {
-  (void)provider, (void)location;
+static bool provider_metadata(const clap_preset_provider *, uint32_t kind, const char *, const clap_preset_receiver *to) {
   if (!to || !to->begin_preset || kind != CLAP_PRESET_IN_PLUGIN) return false;
   for (int32_t each = 0; each < image_count; each++) {
     const image *of = images[each];
@@ -417,23 +389,15 @@ static bool provider_metadata(const clap_preset_provider *provider, uint32_t kin
   return true;
 }
 
-static const void *provider_extension(const clap_preset_provider *provider, const char *id) {
-  (void)provider, (void)id;
-  return NULL;
-}
+static const void *provider_extension(const clap_preset_provider *, const char *) { return NULL; }
 
-static uint32_t provider_count(const clap_preset_factory *factory) {
-  (void)factory;
-  return 1;
-}
+static uint32_t provider_count(const clap_preset_factory *) { return 1; }
 
-static const clap_preset_descriptor *provider_at(const clap_preset_factory *factory, uint32_t index) {
-  (void)factory;
+static const clap_preset_descriptor *provider_at(const clap_preset_factory *, uint32_t index) {
   return index ? NULL : &provider_descriptor;
 }
 
-static const clap_preset_provider *provider_create(const clap_preset_factory *factory, const clap_preset_indexer *indexer, const char *id) {
-  (void)factory;
+static const clap_preset_provider *provider_create(const clap_preset_factory *, const clap_preset_indexer *indexer, const char *id) {
   clap_preset_provider *own = indexer && id && !strcmp(id, provider_id) ? malloc(sizeof *own) : NULL;
   if (own)
     *own = (clap_preset_provider){&provider_descriptor, (void *)indexer, provider_init, provider_destroy, provider_metadata, provider_extension};

@@ -48,8 +48,7 @@ typedef struct {
   float seen[MOST_PARAMETERS];
 } shell;
 
-static void *instantiate(const lv2_descriptor_t *descriptor, double rate_hz, const char *path, const lv2_feature *const *features) {
-  (void)path;
+static void *instantiate(const lv2_descriptor_t *descriptor, double rate_hz, const char *, const lv2_feature *const *features) {
   const lv2_map *map = NULL;
   for (; features && *features; features++)
     if (!strcmp((*features)->uri, "http://lv2plug.in/ns/ext/urid#map")) map = (*features)->data;
@@ -130,10 +129,7 @@ static void cleanup(void *handle) {
   free(handle);
 }
 
-static const void *extension_data(const char *uri) {
-  (void)uri;
-  return NULL;
-}
+static const void *extension_data(const char *) { return NULL; }
 
 LS_EXPORT const lv2_descriptor_t *lv2_descriptor(uint32_t index) {
   enum { MOST_IMAGES = 128 };

@@ -82,10 +82,7 @@ static uint32_t release(void *interface) {
   return left;
 }
 
-static int32_t initialize(void *interface, void *context) {
-  (void)interface, (void)context;
-  return VST_OK;
-}
+static int32_t initialize(void *, void *) { return VST_OK; }
 
 static void deactivate(shell *own) {
   if (own->active) own->plugin->deactivate(own->plugin);
@@ -178,40 +175,26 @@ static const clap_event *events_get(const clap_in_events *list, uint32_t place) 
 
 /* Component */
 
-static int32_t controller_class(void *interface, vst_uid id) {
-  (void)interface, (void)id;
-  return VST_MISSING; /* it is its own controller */
-}
+static int32_t controller_class(void *, vst_uid) { return VST_MISSING; } /* it is its own controller */
 
-static int32_t set_io_mode(void *interface, int32_t mode) {
-  (void)interface, (void)mode;
-  return VST_OK;
-}
+static int32_t set_io_mode(void *, int32_t) { return VST_OK; }
 
 static bool is_bus(int32_t media, int32_t direction) {
   return (media == VST_AUDIO && direction == VST_OUTPUT) || (media == VST_EVENTS && direction == VST_INPUT);
 }
 
-static int32_t bus_count(void *interface, int32_t media, int32_t direction) {
-  (void)interface;
-  return is_bus(media, direction);
-}
+static int32_t bus_count(void *, int32_t media, int32_t direction) { return is_bus(media, direction); }
 
-static int32_t bus_info(void *interface, int32_t media, int32_t direction, int32_t index, vst_bus *bus) {
-  (void)interface;
+static int32_t bus_info(void *, int32_t media, int32_t direction, int32_t index, vst_bus *bus) {
   if (!is_bus(media, direction) || index) return VST_BAD_ARGUMENT;
   *bus = (vst_bus){media, direction, media == VST_AUDIO ? 2 : MIDI_CHANNELS, {0}, VST_MAIN, VST_DEFAULT_ACTIVE};
   write_text(bus->name, 128, media == VST_AUDIO ? "Output" : "Notes");
   return VST_OK;
 }
 
-static int32_t routing(void *interface, void *in, void *out) {
-  (void)interface, (void)in, (void)out;
-  return VST_MISSING;
-}
+static int32_t routing(void *, void *, void *) { return VST_MISSING; }
 
-static int32_t activate_bus(void *interface, int32_t media, int32_t direction, int32_t index, uint8_t state) {
-  (void)interface, (void)state;
+static int32_t activate_bus(void *, int32_t media, int32_t direction, int32_t index, uint8_t) {
   return is_bus(media, direction) && !index ? VST_OK : VST_BAD_ARGUMENT;
 }
 
@@ -260,27 +243,19 @@ static const vst_component component = {query, add_reference, release, initializ
 
 enum { STEREO = 3 };
 
-static int32_t set_arrangements(void *interface, uint64_t *inputs, int32_t input_count, uint64_t *outputs, int32_t output_count) {
-  (void)interface, (void)inputs;
+static int32_t set_arrangements(void *, uint64_t *, int32_t input_count, uint64_t *outputs, int32_t output_count) {
   return !input_count && output_count == 1 && outputs[0] == STEREO ? VST_OK : VST_FALSE;
 }
 
-static int32_t arrangement(void *interface, int32_t direction, int32_t index, uint64_t *found) {
-  (void)interface;
+static int32_t arrangement(void *, int32_t direction, int32_t index, uint64_t *found) {
   if (direction != VST_OUTPUT || index) return VST_BAD_ARGUMENT;
   *found = STEREO;
   return VST_OK;
 }
 
-static int32_t can_sample_size(void *interface, int32_t size) {
-  (void)interface;
-  return size ? VST_FALSE : VST_OK; /* 32 bits */
-}
+static int32_t can_sample_size(void *, int32_t size) { return size ? VST_FALSE : VST_OK; } /* 32 bits */
 
-static uint32_t latency(void *interface) {
-  (void)interface;
-  return instrument_latency();
-}
+static uint32_t latency(void *) { return instrument_latency(); }
 
 static int32_t setup(void *interface, vst_setup *wanted) {
   shell *own = shell_of(interface);
@@ -409,10 +384,7 @@ static const vst_processor processor = {query, add_reference, release, set_arran
 
 static int32_t set_component_state(void *interface, vst_stream *stream) { return set_state(interface, stream); }
 
-static int32_t no_state(void *interface, vst_stream *stream) {
-  (void)interface, (void)stream;
-  return VST_OK;
-}
+static int32_t no_state(void *, vst_stream *) { return VST_OK; }
 
 static int32_t parameter_count(void *interface) {
   return (int32_t)shell_of(interface)->of->parameter_count + MIDI_CHANNELS * CONTROLLER_COUNT;
@@ -510,22 +482,15 @@ static int32_t set_shown(void *interface, uint32_t id, double value) {
   return VST_OK;
 }
 
-static int32_t set_handler(void *interface, void *handler) {
-  (void)interface, (void)handler;
-  return VST_OK;
-}
+static int32_t set_handler(void *, void *) { return VST_OK; }
 
-static void *create_view(void *interface, const char *name) {
-  (void)interface, (void)name;
-  return NULL;
-}
+static void *create_view(void *, const char *) { return NULL; }
 
 static const vst_controller controller = {query, add_reference, release, initialize, terminate, set_component_state, no_state, no_state,
                                           parameter_count, parameter_info, text_of, value_of, plain_of, normal_of, shown, set_shown,
                                           set_handler, create_view};
 
-static int32_t assignment(void *interface, int32_t bus, int16_t channel, int16_t number, uint32_t *id) {
-  (void)interface;
+static int32_t assignment(void *, int32_t bus, int16_t channel, int16_t number, uint32_t *id) {
   if (bus || channel < 0 || channel >= MIDI_CHANNELS) return VST_FALSE;
   for (int32_t place = 0; place < CONTROLLER_COUNT; place++) {
     if (CONTROLLERS[place] != number) continue;
@@ -540,13 +505,9 @@ static const vst_midi_mapping midi_mapping = {query, add_reference, release, ass
 static const struct { uint32_t id; const char *title, *units; double standard; int32_t flags; } EXPRESSED[] = {
     {VST_TUNING, "Tuning", "semitones", 0.5, VST_BIPOLAR}, {VST_BRIGHTNESS, "Brightness", "", 0, VST_ABSOLUTE}};
 
-static int32_t expression_count(void *interface, int32_t bus, int16_t channel) {
-  (void)interface, (void)channel;
-  return bus ? 0 : 2;
-}
+static int32_t expression_count(void *, int32_t bus, int16_t) { return bus ? 0 : 2; }
 
-static int32_t expression_info(void *interface, int32_t bus, int16_t channel, int32_t index, vst_expression *info) {
-  (void)interface, (void)channel;
+static int32_t expression_info(void *, int32_t bus, int16_t, int32_t index, vst_expression *info) {
   if (bus || index < 0 || index > 1) return VST_BAD_ARGUMENT;
   memset(info, 0, sizeof *info);
   info->id = EXPRESSED[index].id;
@@ -559,22 +520,15 @@ static int32_t expression_info(void *interface, int32_t bus, int16_t channel, in
   return VST_OK;
 }
 
-static int32_t expression_text(void *interface, int32_t bus, int16_t channel, uint32_t id, double value, vst_text text) {
-  (void)interface, (void)bus, (void)channel, (void)id, (void)value, (void)text;
-  return VST_MISSING;
-}
+static int32_t expression_text(void *, int32_t, int16_t, uint32_t, double, vst_text) { return VST_MISSING; }
 
-static int32_t expression_value(void *interface, int32_t bus, int16_t channel, uint32_t id, const uint16_t *text, double *value) {
-  (void)interface, (void)bus, (void)channel, (void)id, (void)text, (void)value;
+static int32_t expression_value(void *, int32_t, int16_t, uint32_t, const uint16_t *, double *) {
   return VST_MISSING;
 }
 
 static const vst_expressions expressions = {query, add_reference, release, expression_count, expression_info, expression_text, expression_value};
 
-static uint32_t requirements(void *interface) {
-  (void)interface;
-  return 0; /* neither tempo nor position */
-}
+static uint32_t requirements(void *) { return 0; } /* neither tempo nor position */
 
 static const vst_requirements required = {query, add_reference, release, requirements};
 
@@ -595,10 +549,7 @@ static int32_t query(void *interface, const vst_uid id, void **found) {
 
 /* The CLAP plug-in's host */
 
-static const void *host_extension(const clap_host *host, const char *id) {
-  (void)host, (void)id;
-  return NULL;
-}
+static const void *host_extension(const clap_host *, const char *) { return NULL; }
 
 static void host_ignores(const clap_host *host) { (void)host; }
 
@@ -623,26 +574,18 @@ static int32_t factory_query(void *interface, const vst_uid id, void **found) {
   return known ? VST_OK : VST_NO_INTERFACE;
 }
 
-static uint32_t one_reference(void *interface) {
-  (void)interface;
-  return 1;
-}
+static uint32_t one_reference(void *) { return 1; }
 
-static int32_t factory_info(void *interface, vst_factory_info *info) {
-  (void)interface;
+static int32_t factory_info(void *, vst_factory_info *info) {
   memset(info, 0, sizeof *info);
   strncpy(info->vendor, images[0]->maker, sizeof info->vendor - 1);
   info->flags = VST_FACTORY_UNICODE;
   return VST_OK;
 }
 
-static int32_t class_count(void *interface) {
-  (void)interface;
-  return image_count;
-}
+static int32_t class_count(void *) { return image_count; }
 
-static int32_t class_info2(void *interface, int32_t index, vst_class2 *info) {
-  (void)interface;
+static int32_t class_info2(void *, int32_t index, vst_class2 *info) {
   if (index < 0 || index >= image_count) return VST_BAD_ARGUMENT;
   const image *of = images[index];
   memset(info, 0, sizeof *info);
@@ -680,8 +623,7 @@ static int32_t class_info3(void *interface, int32_t index, vst_class3 *info) {
   return VST_OK;
 }
 
-static int32_t create(void *interface, const char *id, const char *wanted, void **found) {
-  (void)interface;
+static int32_t create(void *, const char *id, const char *wanted, void **found) {
   *found = NULL;
   for (int32_t each = 0; each < image_count; each++) {
     vst_uid own_id;
@@ -713,10 +655,7 @@ static int32_t create(void *interface, const char *id, const char *wanted, void 
   return VST_NO_INTERFACE;
 }
 
-static int32_t set_context(void *interface, void *context) {
-  (void)interface, (void)context;
-  return VST_OK;
-}
+static int32_t set_context(void *, void *) { return VST_OK; }
 
 static const vst_factory factory_table = {factory_query, one_reference, one_reference, factory_info, class_count,
                                           class_info, create, class_info2, class_info3, set_context};

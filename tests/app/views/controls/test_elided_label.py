@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from app.views.controls.elided_label import ElidedLabel
@@ -33,21 +32,3 @@ def test_a_readout_rests_on_its_own_words(qtbot: QtBot) -> None:
     assert readout.shown == readout.toolTip() == "1.305 s   106 Hz"
     readout.report("")
     assert readout.shown == "every frame"
-
-
-def test_a_legend_in_colours_has_a_shorter_wording_too(qtbot: QtBot) -> None:
-    readout = Readout()
-    qtbot.addWidget(readout)
-    readout.setTextFormat(Qt.TextFormat.AutoText)
-    short = "<span style='color:#ff0000'>RMSE</span>"
-    readout.rest(f"{short} and its validation in many words", short)
-    readout.resize(600, 20)
-    assert readout.shown != short
-    plain = readout.fontMetrics().horizontalAdvance("RMSE and its validation in many words")
-    readout.resize(plain - 20, 20)
-    assert readout.shown == short  # not the longer one in two lines
-    readout.resize(60, 20)
-    assert readout.shown == short
-    picture = readout.grab().toImage()
-    colours = [picture.pixelColor(x, y) for x in range(picture.width()) for y in range(picture.height())]
-    assert any(colour.red() > 150 and colour.green() < 90 for colour in colours)

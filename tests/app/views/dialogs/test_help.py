@@ -11,7 +11,6 @@ from pytestqt.qtbot import QtBot
 from app.presets.words import model_word
 from app.shared.log import log_file
 from app.views.controls.app_menu import ENTRIES
-from app.views.dialogs.about_dialog import AboutDialog
 from app.views.dialogs.help_dialog import help_parts
 from app.window.about import about_text, library_versions
 from app.window.controller import Controller
@@ -37,10 +36,12 @@ def test_help_has_every_key_view_and_model(qtbot: QtBot, controller: Controller)
     for title in models:
         assert title in texts["Models"]
     assert str(log_file()) in texts["Errors"]
+    controller.window.action["about"].trigger()
+    assert dialog.tabs.tabText(dialog.tabs.currentIndex()) == "About" and "DAFx24" in texts["About"]
     dialog.close()
 
 
-def test_about_can_be_copied_whole(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_about_has_versions_files_and_the_paper(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", "my/own")
     text = about_text(Path("here/settings.json"), Path("there"))
     for part in (
@@ -55,6 +56,3 @@ def test_about_can_be_copied_whole(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch
     ):
         assert part in text
     assert "not installed" not in library_versions().values()
-    dialog = AboutDialog(text)
-    qtbot.addWidget(dialog)
-    assert dialog.windowTitle() == "About"

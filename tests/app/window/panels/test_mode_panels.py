@@ -134,7 +134,7 @@ def test_partials_of_the_pluck_before_are_grey(qtbot: QtBot, controller: Control
     def colours() -> set[str]:
         model = partials.table.model()
         role = Qt.ItemDataRole.ForegroundRole
-        return {model.index(0, column).data(role).name() for column in range(3)}
+        return {model.index(0, column).data(role).color().name() for column in range(3)}
 
     assert len(colours()) > 1
     controller.session.update(position=0.6)
