@@ -29,7 +29,8 @@ def recordings(
         ),
     ] = None,
     synthetic: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Instead: N synthetic notes, and how intervals hold them.")
+        int | None,
+        typer.Option(min=1, metavar="N", help="Instead: N synthetic notes, how intervals hold them, or neighbours."),
     ] = None,
     json: Json = False,
 ) -> None:
@@ -40,9 +41,13 @@ def recordings(
     from app.audio.note_file import NoteFileError, read_note
     from tests.bench.recordings.coverage import FIRST_SEED, coverage
     from tests.bench.recordings.evaluate import dynamics, evaluate, table
-    from tests.bench.recordings.instrument import attacks, neighbours
+    from tests.bench.recordings.instrument import attacks, neighbours, synthetic_neighbours
     from tests.bench.recordings.pitch import pitches, pitches_of
 
+    if synthetic is not None and only_neighbours:
+        with progress("bench recordings") as report:
+            _print_values(synthetic_neighbours(range(FIRST_SEED, FIRST_SEED + synthetic), report), json)
+        return
     if synthetic is not None:
         with progress("bench recordings") as report:
             held = coverage(range(FIRST_SEED, FIRST_SEED + synthetic), lambda done: report(done / synthetic))

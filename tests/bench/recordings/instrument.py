@@ -6,7 +6,7 @@ import itertools
 import math
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +22,7 @@ from app.shared.parameters import NOISE_DB
 from engine.folders import FOLDER_VARIABLE
 from engine.kernels.playing_layout import PART_S
 from engine.presets import Preset, load_preset
+from tests.bench.recordings.synthetic import synthetic_note
 from training.recording.attack import first_distance_db
 from training.recording.learn import Learned, examined, learn
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, RecordingError
@@ -34,6 +35,7 @@ Progress = Callable[[float], None]
 
 VELOCITY = 100  # of the recorded note
 SEMITONES = (1.5, 4.5)  # between neighbours: a whole tone to a major third
+FRETTED = 3.0  # of synthetic ones: as between most of the recordings
 HIGHEST_PARTIAL = 12  # whose frequency is compared
 MOST_CENTS, MOST_DECAY_OFF, MOST_DISTANCE_DB = 3.0, 0.3, 8.0
 
@@ -88,6 +90,18 @@ def neighbours(recordings: Recordings, progress: Progress) -> dict[str, list[flo
             if not near or first[-2] != second[-2] or other.note.rate_hz != played.learned.note.rate_hz:
                 continue
             _compare(values, played, other, ratio)
+    return values
+
+
+def synthetic_neighbours(seeds: Sequence[int], progress: Progress) -> dict[str, list[float]]:
+    """The same of synthetic notes of one string, open and FRETTED semitones higher."""
+    values: dict[str, list[float]] = {}
+    for done, seed in enumerate(seeds):
+        progress(done / len(seeds))
+        both = {f"{name}_ma": synthetic_note(seed, fretted=at) for name, at in (("open", 0.0), ("fretted", FRETTED))}
+        found = neighbours({name: (note.samples, note.rate_hz) for name, note in both.items()}, lambda share: None)
+        for name, each in found.items():
+            values.setdefault(name, []).extend(each)
     return values
 
 

@@ -50,8 +50,13 @@ def synthetic_note(
     rise_cents: float = 15.0,
     f0_range_hz: tuple[float, float] = (60.0, 350.0),
     highest_hz: float = HIGHEST_HZ,
+    fretted: float = 0.0,
 ) -> SyntheticNote:
-    """A note drawn by its seed: a string, plucked anywhere, two polarisations, six body modes."""
+    """A note drawn by its seed: a string, plucked anywhere, two polarisations, six body modes.
+
+    Args:
+        fretted: semitones by which the string is shortened; all else of a seed stays.
+    """
     random = np.random.default_rng(seed)
     low, high = map(math.log, f0_range_hz)
     f0 = float(np.exp(random.uniform(low, high)))
@@ -62,7 +67,8 @@ def synthetic_note(
     d1 = 2 * mass * random.uniform(0.6, 2.0)
     d3 = 2 * mass * random.uniform(1.0, 4.0) / (math.pi * 1_000 / (f0 * length)) ** 2
     second = stiffness * tension * length**2 / (math.pi**2 * modulus)
-    string = StringParameters(length, area, second, mass / area, modulus, d1, d3, tension)
+    ratio = 2 ** (fretted / 12)
+    string = StringParameters(length / ratio, area, second, mass / area, modulus, d1, d3, tension)
     law = string.resonator(count, grid_points=count + 2)
     split = 2 ** (random.uniform(0.4, 2.0, count) / 1200)
     slower = np.exp(random.uniform(-0.7, 0.7, count))  # than the first, or faster
@@ -102,7 +108,7 @@ def synthetic_note(
         len(sound) + round(LEAD_S * RATE_HZ)
     )
     partials = _truth(scale * heard * q, omega, sigma)
-    return SyntheticNote(sound, RATE_HZ, f0, stiffness, partials)
+    return SyntheticNote(sound, RATE_HZ, f0 * ratio, stiffness * ratio**2, partials)
 
 
 def _truth(amplitude: Array, omega: Array, sigma: Array) -> tuple[TruePartial, ...]:
