@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 
-from tests.bench.recordings.evaluate import table
+from tests.bench.recordings.evaluate import at_level, below, held_out, table, with_level
 from tests.bench.recordings.instrument import attacks, neighbours
 from tests.bench.recordings.pitch import pitches, pitches_of
 from tests.bench.recordings.synthetic import synthetic_note
+from training.recording.fit import LearnedNote
+from training.recording.glide import CENTS, Glide
+from training.recording.refine import Pole
 
 
 def test_pitch_is_found_blind_and_named() -> None:
@@ -34,3 +39,16 @@ def test_a_key_of_neighbouring_pitch_is_compared_with_its_recording() -> None:
     rows = {row[0]: row[1:] for row in table({"a share": [1.0, 0.0], "a figure": [0.5, 2.0]})}
     assert rows["a share, share"] == (0.5, None, 2)
     assert rows["a figure"][0] == pytest.approx(1.25)
+
+
+def test_a_softer_stroke_glides_less() -> None:
+    """Its level is found with its pitch; gain, delay and pitch alone do not give its glide."""
+    rate, shares = 4_000, np.array([10.0, 30.0, 10.0]) * CENTS
+    poles = [Pole(complex(-2.0 * k, 2 * math.pi * 100 * k), 1 / k + 0j, k) for k in range(1, 7)]
+    loud = LearnedNote(rate, 100.0, 0.0, Glide(shares), (*poles, Pole(-9.0 + 6_000j, 0.1 + 0j)))
+    t = np.arange(2 * rate) / rate
+    truth = 0.1 * at_level(loud, 0.8).render(t * 2 ** (2 / 1200))
+    error, pitch = held_out(truth, loud.render, t, rate)
+    assert error > 0.02
+    assert with_level(truth, lambda level: at_level(loud, level).render, t, rate, pitch) < 1e-3
+    assert len(below(loud, 1_500).poles) == 5  # 600 Hz and less

@@ -2,8 +2,9 @@
 
 Each recording is learned alone. The baselines are linear: one and two poles a partial, of the same series, without
 glide and without free poles. The unseen half is the part from 1.25 s to the end of the fit, after a fit of the first
-1.25 s. A held-out take is played by another take's poles and glide, at one gain, one delay and one pitch. A held-out
-dynamic is played by poles that takes of other dynamics share; its amplitudes, pitch and glide are fitted.
+1.25 s. A held-out take is played by another take's poles and glide, at one gain, one delay, one pitch and one level,
+with the square of which the glide goes. A held-out dynamic is played by poles that takes of other dynamics share; its
+amplitudes, pitch and glide are fitted.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ HALF_S = 1.25
 COARSE_HZ = 8_000  # takes are compared below 4 kHz
 MOST_PITCH = 0.006  # that another take may be higher or lower, as a share
 MOST_DELAY_S = 0.012
+MOST_OF_TAKES = 0.10  # the aim of a held-out take's ESR
+LEVEL_STEPS = (3e-4, 0.15)  # of pitch and level, at first
 LEAST_RISE = 6e-4  # of the frequencies, one cent: a smaller glide cannot be separated from none
 GLIDE_STEPS = (3e-4, 4e-3, 4e-3, 3e-3)  # of pitch and shares, at first
 
@@ -183,7 +186,10 @@ def _coarse(note: Note) -> tuple[Array, Array]:
 def _takes(
     first: tuple[Note, Series, LearnedNote], second: tuple[Note, Series, LearnedNote], values: dict[str, list[float]]
 ) -> None:
-    """One take against another: the recordings, the poles with their amplitudes, and with amplitudes fitted again."""
+    """One take against another: the recordings, the poles with their amplitudes, and with amplitudes fitted again.
+
+    The level bends the recording as well, by the learned glide, so that both have as many numbers.
+    """
     (note, _, learned), (other, _, _) = first, second
     if note.rate_hz != other.rate_hz:
         return
@@ -197,37 +203,78 @@ def _takes(
     )
     t, whole = np.arange(len(truth)) / rate, np.arange(len(samples)) / rate - begins
     take = interpolate.CubicSpline(whole, samples)
-    _append(values, "take against take, ESR", _held_out(truth, take, t, rate))
-    _append(values, "held-out take, ESR", _held_out(truth, learned.render, t, rate))
+    learned = below(learned, rate)
+
+    def bent(level: float) -> Callable[[Array], Array]:
+        return lambda t: take(learned.glide.times(at_level(learned, level).glide.tau(t)))
+
+    def played(level: float) -> Callable[[Array], Array]:
+        return at_level(learned, level).render
+
+    for name, sound, at in (("take against take", take, bent), ("held-out take", learned.render, played)):
+        error, pitch = held_out(truth, sound, t, rate)
+        _append(values, f"{name}, ESR", error)
+        error = with_level(truth, at, t, rate, pitch)
+        _append(values, f"{name}, level too, ESR", error)
+        _append(values, f"{name}, level too, at most 0.10", float(error <= MOST_OF_TAKES))
     _append(values, "held-out take, amplitudes refitted, ESR", _refitted(truth, learned, t, False))
 
 
-def _held_out(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: float) -> float:
-    """The least ESR over one pitch, one gain and one delay."""
+def held_out(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: float) -> tuple[float, float]:
+    """The least ESR over one pitch, one gain and one delay; the pitch."""
 
     def left(pitch: float) -> float:
-        best, delay = np.inf, 0.0
-        for _ in range(3):
-            moved, _, more = aligned(truth, sound(np.maximum(t - delay, -0.008) * (1 + pitch)), rate_hz)
-            wrong = truth - moved
-            best = min(best, float(wrong @ wrong))
-            if abs(more) < 1e-5 or abs(delay + more) > MOST_DELAY_S:
-                break
-            delay += more
-        return best
+        return _misses(truth, sound, t, rate_hz, pitch)
 
     grid = np.linspace(-MOST_PITCH, MOST_PITCH, 21)
-    place = min(grid, key=left)
+    place = float(min(grid, key=left))
     step = float(grid[1] - grid[0])
     found = optimize.minimize_scalar(
         left, bounds=(place - step, place + step), method="bounded", options={"xatol": 2e-6}
     )
-    return float(min(found.fun, left(place)) / max(float(truth @ truth), 1e-30))
+    return min((float(found.fun), float(found.x)), (left(place), place))
+
+
+def at_level(learned: LearnedNote, level: float) -> LearnedNote:
+    """Struck at a level, 1 being its own: tension and glide go with its square, as the string's law demands."""
+    return replace(learned, glide=Glide(learned.glide.shares * level**2))
+
+
+def with_level(
+    truth: Array, at: Callable[[float], Callable[[Array], Array]], t: Array, rate_hz: float, pitch: float
+) -> float:
+    """The least ESR over one level besides, of the sound at each level; 1 is its own."""
+
+    def left(x: Array) -> float:
+        return _misses(truth, at(x[1]), t, rate_hz, x[0])
+
+    start = np.array([pitch, 1.0])
+    corners = np.stack([start, *(start + step for step in np.diag(LEVEL_STEPS))])
+    options = {"maxfev": 60, "initial_simplex": corners, "xatol": 2e-6, "fatol": 1e-5}
+    return float(optimize.minimize(left, start, method="Nelder-Mead", options=options).fun)
+
+
+def _misses(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: float, pitch: float) -> float:
+    """The ESR at a pitch, with the best gain and delay."""
+    best, delay = np.inf, 0.0
+    for _ in range(3):
+        moved, _, more = aligned(truth, sound(np.maximum(t - delay, -FIT_BEGINS_S) * (1 + pitch)), rate_hz)
+        wrong = truth - moved
+        best = min(best, float(wrong @ wrong))
+        if abs(more) < 1e-5 or abs(delay + more) > MOST_DELAY_S:
+            break
+        delay += more
+    return best / max(float(truth @ truth), 1e-30)
+
+
+def below(learned: LearnedNote, rate_hz: float) -> LearnedNote:
+    """Without the poles that a rate cannot hold."""
+    return replace(learned, poles=tuple(pole for pole in learned.poles if pole.hz < 0.4 * rate_hz))
 
 
 def _refitted(truth: Array, learned: LearnedNote, t: Array, glides: bool) -> float:
     """The least ESR over one pitch, all amplitudes, and the glide where it `glides`: poles alone carry over."""
-    poles = [pole for pole in learned.poles if pole.hz < 0.4 / (t[1] - t[0])]
+    poles = below(learned, 1 / (t[1] - t[0])).poles
     s = np.array([pole.s for pole in poles])[:, None]
     of_string = np.array([pole.partial > 0 for pole in poles])[:, None]
     whole = float(truth @ truth)
@@ -271,4 +318,4 @@ def table(values: Mapping[str, Sequence[float]]) -> list[Sequence[Any]]:
     return rows
 
 
-__all__ = ["FIT_LASTS_S", "evaluate", "table"]
+__all__ = ["FIT_LASTS_S", "at_level", "below", "evaluate", "held_out", "table", "with_level"]
