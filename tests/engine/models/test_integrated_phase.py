@@ -320,7 +320,7 @@ def test_sizes_and_name() -> None:
     "sizes", [{"grid_points": 0}, {"state_size": -1}, {"eigenvalue_widths": (4, 0)}, {"node_spacing": 0}]
 )
 def test_impossible_sizes_are_named(sizes: dict) -> None:
-    with pytest.raises(ValueError, match=f"{next(iter(sizes))} must be at least 1"):
+    with pytest.raises(ValueError, match=f"{next(iter(sizes))} must lie in 1"):
         IntegratedPhaseConfiguration(**sizes)
 
 
