@@ -156,7 +156,7 @@ def test_phases_stay_exact_at_a_listening_point() -> None:
     late = type(state)(state.origin, 1_000_000, state.integral)
     weights = listening_weights([0.37], 101)
     heard, _ = model.advance(late, 300, weights)
-    exact = model.decode(model.latents(state.origin, 1_000_000 + torch.arange(1, 301)), weights)
+    exact = model.decode(model.latents(state.origin, 1_000_000 + torch.arange(1, 301))) @ weights.float()
     assert relative(heard, exact) < 1e-5
 
 
