@@ -32,6 +32,9 @@ SIZES: Mapping[str, tuple[int, int]] = {
     "layers": (0, 64),
     "lags": (1, 64),
     "node_spacing": (1, 1_000_000),
+    "modes": (1, 65_536),
+    "degree": (0, 32),
+    "hippo_blocks": (1, 2_048),
 }
 OTHER_SIZES = (-65_536, 65_536)
 MOST_LAYERS_OF_WIDTHS = 16
@@ -138,7 +141,7 @@ def check_sizes(configuration: object) -> None:
                 )
             for entry in value:
                 if isinstance(entry, int | float):
-                    check(field.name, entry, (-LARGEST_WIDTH, LARGEST_WIDTH))
+                    check(field.name, entry, (1, LARGEST_WIDTH))
 
 
 def brief(value: object) -> str:

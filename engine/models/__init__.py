@@ -9,9 +9,8 @@ import importlib
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from engine import bounds
 from engine.models import configurations as sizes
-from engine.schema import SchemaError, read, without_retired
+from engine.schema import read, without_retired
 
 if TYPE_CHECKING:
     from engine.models.base import StringModel
@@ -73,12 +72,7 @@ def read_model_configuration(name: str, data: object, where: str) -> Any:
     Raises:
         SchemaError, KeyError: as `build_model`.
     """
-    configuration: Any = read(MODELS[name][1], without_retired(data, RETIRED.get(name, {}), where), where)
-    try:
-        bounds.check_sizes(configuration)
-    except ValueError as error:
-        raise SchemaError(f"{where}: {error}") from error
-    return configuration
+    return read(MODELS[name][1], without_retired(data, RETIRED.get(name, {}), where), where)
 
 
 __all__ = ["MODELS", "OF_MANY_STRINGS", "RETIRED", "build_model", "model_class", "read_model_configuration"]

@@ -49,10 +49,8 @@ class DiagonalModel(AnyFrameModel[KoopmanState]):
         ]
         return torch.cat(blocks, dim=1), KoopmanState(state.origin, last)
 
-    def sample(
-        self, state: KoopmanState, frames: Tensor, steps: int, readout: Tensor | None = None
-    ) -> tuple[Tensor, KoopmanState]:
-        found = self.decode(self.latents(state.origin, state.step + frames), readout)
+    def sample(self, state: KoopmanState, frames: Tensor, steps: int) -> tuple[Tensor, KoopmanState]:
+        found = self.decode(self.latents(state.origin, state.step + frames))
         return found, KoopmanState(state.origin, state.step + steps)
 
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor:

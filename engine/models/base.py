@@ -112,14 +112,14 @@ class AnyFrameModel(StringModel[State]):
     """
 
     @abstractmethod
-    def sample(self, state: State, frames: Tensor, steps: int, readout: Tensor | None = None) -> tuple[Tensor, State]:
-        """As `advance`, of which only some frames are computed.
+    def sample(self, state: State, frames: Tensor, steps: int) -> tuple[Tensor, State]:
+        """As `advance` on the grid, of which only some frames are computed.
 
         Args:
             frames: their numbers, ascending, of 1 … steps; int64 (frames,).
 
         Returns:
-            displacement (batch, frames, points or grid_points), and the state after all `steps`.
+            displacement (batch, frames, grid_points), and the state after all `steps`.
         """
 
 

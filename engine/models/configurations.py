@@ -5,21 +5,20 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from engine.bounds import MOST_MATRIX_NUMBERS
+from engine import bounds
 
 LEAST_PHASE = 0.02  # of `koopman_tension` between nodes: a voice of more would take too much of the device's time
 
 
-def check_sizes(configuration: object, *names: str) -> None:
-    """Raises ValueError, naming the field, where a size or one of a tuple of sizes is below 1."""
-    for name in names:
-        value = getattr(configuration, name)
-        if any(size < 1 for size in (value if isinstance(value, tuple) else (value,))):
-            raise ValueError(f"{name} must be at least 1, not {value}")
+class _Sizes:
+    """Raises ValueError, naming the field, where a size is out of its bounds."""
+
+    def __post_init__(self) -> None:
+        bounds.check_sizes(self)
 
 
 @dataclass(frozen=True)
-class DMDConfiguration:
+class DMDConfiguration(_Sizes):
     """Sizes; the defaults are the paper's (10,200 parameters: 50 complex eigenvalues, and modes on 101 points).
 
     Attributes:
@@ -32,7 +31,7 @@ class DMDConfiguration:
     rank: int = 50
 
     def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "lags", "rank")
+        super().__post_init__()
         if self.rank > self.lags * self.grid_points:
             raise ValueError(
                 f"rank must be at most lags times grid_points, {self.lags * self.grid_points}, not {self.rank}"
@@ -40,7 +39,7 @@ class DMDConfiguration:
 
 
 @dataclass(frozen=True)
-class KoopmanConfiguration:
+class KoopmanConfiguration(_Sizes):
     """Sizes; the defaults are the paper's (191,077 parameters).
 
     Attributes:
@@ -56,12 +55,9 @@ class KoopmanConfiguration:
     decoder_widths: tuple[int, ...] = (128, 128)
     mixing_layer: bool = True
 
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "state_size", "encoder_widths", "decoder_widths")
-
 
 @dataclass(frozen=True)
-class KoopmanVarConfiguration:
+class KoopmanVarConfiguration(_Sizes):
     """Sizes; the defaults are the paper's (134,885 parameters).
 
     Attributes:
@@ -73,12 +69,9 @@ class KoopmanVarConfiguration:
     state_size: int = 128
     multiplier_widths: tuple[int, ...] = (128, 128, 128)
 
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "state_size", "multiplier_widths")
-
 
 @dataclass(frozen=True)
-class IntegratedPhaseConfiguration:
+class IntegratedPhaseConfiguration(_Sizes):
     """Sizes. An empty tuple of widths leaves that network out.
 
     Attributes:
@@ -98,12 +91,9 @@ class IntegratedPhaseConfiguration:
     node_spacing: int = 40
     second_order: bool = False
 
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "state_size", "encoder_widths", "eigenvalue_widths", "node_spacing")
-
 
 @dataclass(frozen=True)
-class KoopmanTensionConfiguration:
+class KoopmanTensionConfiguration(_Sizes):
     """Sizes.
 
     Attributes:
@@ -120,18 +110,16 @@ class KoopmanTensionConfiguration:
     highest_phase: float = 1.56
 
     def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "modes")
-        if self.modes * self.grid_points > MOST_MATRIX_NUMBERS:
-            raise ValueError(f"modes times grid_points must be at most {MOST_MATRIX_NUMBERS}")
-        if not 0 <= self.degree <= 32:
-            raise ValueError(f"degree must lie in 0 … 32, not {self.degree}")
+        super().__post_init__()
+        if self.modes * self.grid_points > bounds.MOST_MATRIX_NUMBERS:
+            raise ValueError(f"modes times grid_points must be at most {bounds.MOST_MATRIX_NUMBERS}")
         for name in ("node_phase", "highest_phase"):
             if not LEAST_PHASE <= getattr(self, name) <= math.pi:
                 raise ValueError(f"{name} must lie in {LEAST_PHASE} … π, not {getattr(self, name)}")
 
 
 @dataclass(frozen=True)
-class FGRUConfiguration:
+class FGRUConfiguration(_Sizes):
     """Sizes; the defaults are the paper's (640,033 parameters).
 
     Attributes:
@@ -141,12 +129,9 @@ class FGRUConfiguration:
     grid_points: int = 101
     width: int = 32
 
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "width")
-
 
 @dataclass(frozen=True)
-class FRNNConfiguration:
+class FRNNConfiguration(_Sizes):
     """Sizes; the defaults are the paper's (643,201 parameters).
 
     Attributes:
@@ -158,12 +143,9 @@ class FRNNConfiguration:
     width: int = 32
     depth: int = 3
 
-    def __post_init__(self) -> None:
-        check_sizes(self, "grid_points", "width", "depth")
-
 
 @dataclass(frozen=True)
-class LRUConfiguration:
+class LRUConfiguration(_Sizes):
     """Sizes; the defaults are the paper's (636,221 parameters).
 
     Attributes:
@@ -175,14 +157,9 @@ class LRUConfiguration:
     state_size: int = 128
     layers: int = 8
 
-    def __post_init__(self) -> None:
-        for name, least in (("grid_points", 3), ("state_size", 1), ("layers", 0)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
-
 
 @dataclass(frozen=True)
-class S5Configuration:
+class S5Configuration(_Sizes):
     """Sizes; the defaults are the paper's (307,879 parameters).
 
     Attributes:
@@ -197,9 +174,7 @@ class S5Configuration:
     layers: int = 6
 
     def __post_init__(self) -> None:
-        for name, least in (("grid_points", 3), ("state_size", 2), ("hippo_blocks", 1), ("layers", 0)):
-            if getattr(self, name) < least:
-                raise ValueError(f"{name} must be at least {least}, not {getattr(self, name)}")
+        super().__post_init__()
         if self.state_size % (2 * self.hippo_blocks):
             raise ValueError(
                 f"state_size must be a multiple of twice the {self.hippo_blocks} hippo_blocks, not {self.state_size}"

@@ -40,12 +40,10 @@ def slope_at_rest(log_eigenvalues: Tensor) -> Tensor:
     return log_eigenvalues.real / log_eigenvalues.imag
 
 
-def draw_ring(
-    size: int, generator: torch.Generator, inner: float = 0.99, outer: float = 1.0
-) -> tuple[Tensor, Tensor]:
-    """ν_log and θ_log, float64 (size,), of eigenvalues uniform in the ring inner ≤ |λ| ≤ outer (the paper, §4.2)."""
+def draw_ring(size: int, generator: torch.Generator) -> tuple[Tensor, Tensor]:
+    """ν_log and θ_log, float64 (size,), of eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1 (the paper, §4.2)."""
     u = torch.rand(2, size, generator=generator, dtype=torch.float64)
-    radius_squared = inner**2 + u[0] * (outer**2 - inner**2)
+    radius_squared = 0.99**2 + u[0] * (1 - 0.99**2)
     return torch.log(-0.5 * torch.log(radius_squared)), torch.log(2 * math.pi * u[1])
 
 

@@ -182,13 +182,11 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
             blocks.append(block)
         return torch.cat(blocks, dim=1), state
 
-    def sample(
-        self, state: IntegratedPhaseState, frames: Tensor, steps: int, readout: Tensor | None = None
-    ) -> tuple[Tensor, IntegratedPhaseState]:
+    def sample(self, state: IntegratedPhaseState, frames: Tensor, steps: int) -> tuple[Tensor, IntegratedPhaseState]:
         rates, times, end = self._rates(), (state.time + frames).double(), state.time + steps
         motion, integral = self._move(state, rates, times, end)
         latents = _latents(state.origin, rates, times, motion)
-        return self.decode(latents, readout), IntegratedPhaseState(state.origin, end, integral)
+        return self.decode(latents), IntegratedPhaseState(state.origin, end, integral)
 
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
         """z of any frames ≥ 0 (whole or not, any order), complex (batch, frames, state_size)."""
@@ -196,9 +194,9 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         motion, _ = self._move(_at_rest(origin), rates, times, 0)
         return _latents(origin, rates, times, motion)
 
-    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
-        """Displacement (..., points) of latents (..., state_size)."""
-        return self._displacement(latents.real, latents.imag, readout, slice(None))
+    def decode(self, latents: Tensor) -> Tensor:
+        """Displacement (..., grid_points) of latents (..., state_size)."""
+        return self._displacement(latents.real, latents.imag, None, slice(None))
 
     def _rates(self) -> _Rates:
         # below, σ is as good as none, and one of zero would be divided by; above, all is over within a sample

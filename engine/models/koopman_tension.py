@@ -189,11 +189,9 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
     ) -> tuple[Tensor, KoopmanTensionState]:
         return self._by_nodes(state, lambda part, step: self._frames(part, step, None, steps, readout))
 
-    def sample(
-        self, state: KoopmanTensionState, frames: Tensor, steps: int, readout: Tensor | None = None
-    ) -> tuple[Tensor, KoopmanTensionState]:
+    def sample(self, state: KoopmanTensionState, frames: Tensor, steps: int) -> tuple[Tensor, KoopmanTensionState]:
         """See the contract. It steps through all frames, which costs little beside their shapes."""
-        return self._by_nodes(state, lambda part, step: self._frames(part, step, frames, steps, readout))
+        return self._by_nodes(state, lambda part, step: self._frames(part, step, frames, steps, None))
 
     def _by_nodes(self, state: KoopmanTensionState, run: Run) -> tuple[Tensor, KoopmanTensionState]:
         """Strings with the same number of nodes go together."""

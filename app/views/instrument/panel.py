@@ -25,7 +25,7 @@ from PySide6.QtWidgets import (
 from app.views import theme
 from app.views.controls.parts import tool_button
 from app.views.controls.plain import Label
-from app.views.controls.segments import Segments, Switches
+from app.views.controls.segments import Segments
 from app.views.controls.sideways import Sideways
 from app.views.instrument.neck import Neck
 from app.views.instrument.patch_bar import PatchBar
@@ -105,7 +105,7 @@ class InstrumentPanel(QFrame):
         self._drums = False
         self.touch = Segments("Key while another is held", _TOUCHES)
         self.touch.chosen.connect(self._choose_touch)
-        self.techniques = Switches("Technique", _TECHNIQUES)
+        self.techniques = Segments("Technique", _TECHNIQUES, switches=True)
         self.techniques.switched.connect(self.technique_switched)
         self._choice = Segments("Surface", _SURFACES)
         self._choice.chosen.connect(self.show_surface)

@@ -172,7 +172,7 @@ def test_one_lag_is_the_plain_dmd() -> None:
 
 def test_impossible_sizes_are_named() -> None:
     for name in ("grid_points", "lags", "rank"):
-        with pytest.raises(ValueError, match=f"{name} must be at least 1"):
+        with pytest.raises(ValueError, match=f"{name} must lie in 1"):
             DMDConfiguration(**{name: 0})
     with pytest.raises(ValueError, match="rank must be at most lags times grid_points, 20, not 50"):
         DMDConfiguration(grid_points=10)

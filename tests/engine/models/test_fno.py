@@ -283,5 +283,5 @@ def test_impossible_sizes_are_named(sizes: dict[str, int]) -> None:
     (name,) = sizes
     for kind in (FGRUConfiguration, FRNNConfiguration):
         if name in kind.__dataclass_fields__:
-            with pytest.raises(ValueError, match=f"{name} must be at least 1"):
+            with pytest.raises(ValueError, match=f"{name} must lie in 1"):
                 kind(**sizes)

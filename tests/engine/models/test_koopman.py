@@ -160,7 +160,7 @@ def test_long_renders_stay_finite_and_come_to_rest() -> None:
 
 @pytest.mark.parametrize("name", ["grid_points", "state_size", "encoder_widths", "decoder_widths"])
 def test_impossible_sizes_are_named(name: str) -> None:
-    with pytest.raises(ValueError, match=f"{name} must be at least 1"):
+    with pytest.raises(ValueError, match=f"{name} must lie in 1"):
         KoopmanConfiguration(**{name: (4, 0) if name.endswith("widths") else 0})  # type: ignore[arg-type]
 
 

@@ -145,7 +145,7 @@ def test_long_renders_stay_finite_and_decay() -> None:
 
 @pytest.mark.parametrize("sizes", [{"grid_points": 0}, {"state_size": -1}, {"multiplier_widths": (4, 0)}])
 def test_impossible_sizes_are_named(sizes: dict) -> None:
-    with pytest.raises(ValueError, match=f"{next(iter(sizes))} must be at least 1"):
+    with pytest.raises(ValueError, match=f"{next(iter(sizes))} must lie in 1"):
         KoopmanVarConfiguration(**sizes)
 
 
