@@ -55,7 +55,7 @@ def synthetic_note(
     """A note drawn by its seed: a string, plucked anywhere, two polarisations, six body modes.
 
     Args:
-        fretted: semitones by which the string is shortened; all else of a seed stays.
+        fretted: semitones of the string's shortening; all else of a seed stays.
     """
     random = np.random.default_rng(seed)
     low, high = map(math.log, f0_range_hz)
