@@ -1,7 +1,7 @@
 """What a recording adds to the string of a key: as `engine.resonators.recorded.RecordedString.resonator`.
 
 Each partial has two modes, side by side, of the first and of the second polarisation. What single partials of the
-recorded note add to the law fades with the distance of the string in pitch.
+recorded note add to the law fades with the distance of the string in pitch, to what the note has at that frequency.
 """
 
 from __future__ import annotations
@@ -24,21 +24,25 @@ def modes_of(tables: np.ndarray, partials: int) -> int:
 
 
 @njit(**EXACT)
-def _near(table: np.ndarray, tables: np.ndarray, string: np.ndarray) -> float:
-    """How much of the note's own a string has: 1 at the recorded pitch."""
+def _above(table: np.ndarray, tables: np.ndarray, string: np.ndarray) -> float:
+    """The pitch of a string over that of the recorded note."""
     hz = math.sqrt(strings.omega_squared(string, 1)) / (2 * math.pi)
-    away = 12 * math.log2(hz / table[tables[of.TABLE_RECORDED] + of.RECORDED_HZ]) / FADES_SEMITONES
-    return math.exp(-away * away)
+    return hz / table[tables[of.TABLE_RECORDED] + of.RECORDED_HZ]
 
 
 @njit(**EXACT)
-def _own(table: np.ndarray, tables: np.ndarray, which: int, partial: int, near: float) -> float:
+def _own(table: np.ndarray, tables: np.ndarray, which: int, partial: int, above: float) -> float:
     """One of the five values of a partial, from 0; ratios fade by their logarithms."""
     first = tables[of.TABLE_RECORDED]
     rest, known = table[first + of.RECORDED_REST + which], tables[first + of.RECORDED_PARTIALS]
-    value = rest
+    row = first + of.RECORDED_HEADER + 2 * tables[first + of.RECORDED_SMOOTH] + which * known
+    value, there = rest, round((partial + 1) * above) - 1  # the note's partial of nearly the same frequency
     if partial < known:
-        value = table[first + of.RECORDED_HEADER + 2 * tables[first + of.RECORDED_SMOOTH] + which * known + partial]
+        value = table[row + partial]
+    if which != of.CENTS and 0 <= there < known:
+        rest = table[row + there]
+    away = 12 * math.log2(above) / FADES_SEMITONES
+    near = math.exp(-away * away)
     if which == of.RATIO or which == of.SECOND_RATIO:
         return math.exp(near * math.log(value) + (1 - near) * math.log(rest))
     return near * value + (1 - near) * rest
@@ -67,25 +71,25 @@ def _smooth(table: np.ndarray, tables: np.ndarray, hz: float) -> float:
 @njit(**EXACT)
 def split(table: np.ndarray, tables: np.ndarray, string: np.ndarray, modes: int, amplitudes: np.ndarray) -> None:
     """Splits a pluck's partials, the first of `amplitudes` (modes,), into the modes of both polarisations."""
-    near = _near(table, tables, string)
+    above = _above(table, tables, string)
     for mode in range(modes - 1, -1, -1):
-        share = _own(table, tables, of.SECOND_SHARE, mode // 2, near)
+        share = _own(table, tables, of.SECOND_SHARE, mode // 2, above)
         amplitudes[mode] = amplitudes[mode // 2] * (share if mode % 2 == 1 else 1 - share)
 
 
 @njit(**EXACT)
 def correct(table: np.ndarray, tables: np.ndarray, string: np.ndarray, modes: int, rows: np.ndarray) -> None:
     """Changes ω² and σ of the law, the first two rows of `rows` (4 modes,), to those of the recorded string."""
-    near, highest = _near(table, tables, string), 0.0
+    above, highest = _above(table, tables, string), 0.0
     for mode in range(modes):
         partial = mode // 2
         omega, sigma = math.sqrt(rows[mode]), rows[modes + mode]
-        first = omega * 2.0 ** (_own(table, tables, of.CENTS, partial, near) / 1200)
-        sigma *= _smooth(table, tables, omega / (2 * math.pi)) * _own(table, tables, of.RATIO, partial, near)
+        first = omega * 2.0 ** (_own(table, tables, of.CENTS, partial, above) / 1200)
+        sigma *= _smooth(table, tables, omega / (2 * math.pi)) * _own(table, tables, of.RATIO, partial, above)
         sigma = min(sigma, of.HIGHEST_SIGMA * first)
         if mode % 2 == 1:
-            first *= 2.0 ** (_own(table, tables, of.SECOND_CENTS, partial, near) / 1200)
-            sigma = min(sigma * _own(table, tables, of.SECOND_RATIO, partial, near), of.HIGHEST_SIGMA * first)
+            first *= 2.0 ** (_own(table, tables, of.SECOND_CENTS, partial, above) / 1200)
+            sigma = min(sigma * _own(table, tables, of.SECOND_RATIO, partial, above), of.HIGHEST_SIGMA * first)
         highest = max(highest, first)  # the order of modes stays
         rows[mode] = highest * highest
         rows[modes + mode] = sigma

@@ -201,8 +201,7 @@ class RecordedString:
         law = string.resonator(partials, tension_modulated=tension_modulated, grid_points=grid_points)
         omega, sigma = law.omega, law.sigma
         hz = omega / (2 * math.pi)
-        fade = math.exp(-((12 * math.log2(hz[0] / self.pitch_hz) / FADES_SEMITONES) ** 2))
-        own = {name: self._faded(name, partials, fade) for name in OF_PARTIALS}
+        own = {name: self._faded(name, partials, hz[0] / self.pitch_hz) for name in OF_PARTIALS}
         smooth = np.exp(np.interp(np.log(hz), np.log(self.smooth_hz), np.log(self.smooth_ratio)))
         first = omega * 2 ** (own["cents"] / 1200)
         sigma = np.minimum(sigma * smooth * own["ratio"], 0.5 * first)
@@ -224,17 +223,25 @@ class RecordedString:
         )
 
     def rest(self, name: str) -> float:
-        """To what a value of `OF_PARTIALS` fades with the distance in pitch."""
+        """To what a value of `OF_PARTIALS` fades with the distance in pitch where the note has no such frequency."""
         shared = _SHARED.get(name)
         return float(np.median(np.asarray(getattr(self, name)))) if shared is None else shared
 
-    def _faded(self, name: str, partials: int, fade: float) -> Array:
-        """The note's own values for so many partials, faded to the value that all of its partials share."""
-        known, rest = np.asarray(getattr(self, name), float)[:partials], self.rest(name)
-        padded = np.concatenate([known, np.full(partials - len(known), rest)])
+    def _faded(self, name: str, partials: int, above: float) -> Array:
+        """The note's own values for so many partials of a string whose pitch is `above` times its own.
+
+        They fade to those of its partials of nearly the same frequency: the bridge and the body, which make them, do
+        not move with the pitch. So keys keep slow and fast partials, not their median.
+        """
+        known, k = np.asarray(getattr(self, name), float), np.arange(partials)
+        there = np.rint((k + 1) * above).astype(int) - 1
+        shared = (there >= 0) & (there < len(known)) & (name != "cents")
+        rest = np.where(shared, known[np.clip(there, 0, len(known) - 1)], self.rest(name))
+        own = np.where(k < len(known), known[np.minimum(k, len(known) - 1)], self.rest(name))
+        fade = math.exp(-((12 * math.log2(above) / FADES_SEMITONES) ** 2))
         if name.endswith("ratio"):
-            return np.exp(fade * np.log(padded) + (1 - fade) * math.log(rest))
-        return fade * padded + (1 - fade) * rest
+            return np.asarray(np.exp(fade * np.log(own) + (1 - fade) * np.log(rest)))
+        return np.asarray(fade * own + (1 - fade) * rest)
 
 
 _SHARED = {"cents": 0.0, "ratio": 1.0}  # the others fade to the median of the note's partials
