@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engine.resonators.recorded import RecordedAttack, RecordedNote, RecordedString
+from engine.resonators.recorded import FADES_SEMITONES, RecordedAttack, RecordedNote, RecordedString
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, write
 
@@ -36,6 +36,16 @@ def test_at_its_pitch_the_notes_own_modes() -> None:
     cents = 1200 * np.log2(resonator.omega / np.repeat(law.omega, 2))
     assert np.allclose(cents, [5, 6, -3, -1, 2, 5], atol=1e-6)
     assert np.allclose(resonator.sigma / np.repeat(law.sigma, 2), [1, 2, 4, 4, 2, 1])
+
+
+def test_other_keys_have_the_decays_of_the_notes_partials_at_their_frequencies() -> None:
+    octave = replace(STRING, length_m=STRING.length_m * 2)
+    resonator, law = recorded().resonator(octave, 8), octave.resonator(4)
+    ratios = resonator.sigma / np.repeat(law.sigma, 2)
+    fade = np.exp(-((12 / FADES_SEMITONES) ** 2))
+    assert fade < 1e-4
+    # partials 2 and 4 lie at the note's first and second
+    assert np.allclose(ratios[[2, 3, 6, 7]], [1, 2, 4, 4], rtol=1e-4)
 
 
 def test_two_octaves_away_the_smooth_decay_alone() -> None:
