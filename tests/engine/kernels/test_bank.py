@@ -73,7 +73,7 @@ def test_at_any_rate_it_is_the_model_at_those_times(
         times = frames.double() * preset.info.rate_hz / rate_hz
         weights = torch.from_numpy(STEREO.weights(preset.info.grid_points))
         expected = (
-            preset.model.decode(preset.model.latents(state.origin, times), weights)[0].double().numpy()
+            (preset.model.decode(preset.model.latents(state.origin, times))[0].double() @ weights).numpy()
             * preset.info.scale_m
             / FULL_SCALE_M
         )

@@ -381,9 +381,9 @@ def test_a_patch_that_is_turned_meanwhile_waits_for_the_next_time(
     notes.gate.set()
     qtbot.waitUntil(lambda: "6 samples, " in dialog.state.text())
     assert {note[0].knobs.decay for note in notes.rendered} == {patch.knobs.decay}
-    run(qtbot, dialog, "Loading")
+    dialog.save.click()
+    qtbot.waitUntil(lambda: notes.rendered[-1][0].knobs.decay == 3.0)
     qtbot.waitUntil(lambda: "6 samples, " in dialog.state.text())
-    assert notes.rendered[-1][0].knobs.decay == 3.0
 
 
 def test_every_control_of_the_dialog_has_a_name_and_a_tip(made) -> None:
