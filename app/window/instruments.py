@@ -110,19 +110,23 @@ class Instruments(QObject):
             QTimer.singleShot(0, self, partial(self._show_own_string, "string" in names))
 
     def _show_own_string(self, chosen: bool) -> None:
-        """Shows string and pluck of an instrument before it is played. `chosen`: a string was chosen with it."""
+        """Shows string and pluck of an instrument before it is played, and its pluck when that is turned.
+
+        `chosen`: a string was chosen with it, and stays.
+        """
         choices, before = self._session.choices, self._shown
         patch = choices.instrument
         self._shown = patch if isinstance(patch, Patch) else None
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums):
             return
         another = before is not None and is_another(patch, before)
-        if choices.string is not None and (chosen or not another):
+        own = choices.string is None or (another and not chosen)
+        if not own and (before is None or another or patch.pluck == before.pluck):
             return
         with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
             if (found := Strings(patch).of_key(*self.shown_key(patch))) is not None:
-                pluck = on_string(found, patch.pluck.pluck(choices.velocity))
-                self._session.play(string=PhysicalString(**asdict(found.parameters)), **asdict(pluck))
+                shown = asdict(on_string(found, patch.pluck.pluck(choices.velocity)))
+                self._session.play(**shown, **({"string": PhysicalString(**asdict(found.parameters))} if own else {}))
 
     def play(self, event: Event, due: Due | None = None, drawn: bool = False) -> None:
         """Plays an event, at once or when it is due. Any thread. `drawn`: its pluck is the one of the session."""

@@ -627,6 +627,26 @@ def test_an_instrument_shows_its_own_string_before_it_is_played(qtbot: QtBot, pl
     assert played.history.undo_words.startswith("instrument")
 
 
+def test_the_pluck_that_is_shown_follows_the_knobs_of_the_pluck(qtbot: QtBot, played: Controller) -> None:
+    played.patches.choose("classical_guitar")
+    played.window.instrument.pressed.emit(52, 100, None)
+    qtbot.waitUntil(lambda: key_is_shown(played))
+    string, patch = played.session.choices.string, played.session.choices.patch
+    assert patch is not None
+    played.session.update(position=0.45)
+    pluck = patch.pluck.model_copy(update={"position": 0.22, "shape": "raised_cosine"})
+    turned = patch.model_copy(update={"pluck": pluck})
+    played.session.update(patch=turned)
+    qtbot.waitUntil(lambda: played.session.choices.position == 0.22)
+    assert (played.session.choices.shape, played.session.choices.string) == ("raised_cosine", string)
+    played.pluck()
+    assert isinstance(played.instruments.latest, KeyNote)
+    played.session.update(position=0.45)
+    played.session.update(patch=turned.with_value("knobs.decay", 2.0))
+    qtbot.wait(20)
+    assert played.session.choices.position == 0.45, "a knob of the string leaves what was drawn"
+
+
 def test_a_restored_string_stays(qtbot: QtBot, played: Controller) -> None:
     patch = read_patch(PATCHES / "concert_harp.json")
     string = PhysicalString(**asdict(STEEL))
