@@ -6,7 +6,6 @@ import contextlib
 import threading
 from collections.abc import Callable
 from dataclasses import asdict, replace
-from functools import partial
 from typing import Any
 
 from PySide6.QtCore import QObject, Qt, QTimer, Signal
@@ -35,6 +34,7 @@ from app.window.midi_control import MidiControl
 from engine.pluck import Pluck
 
 HIGHEST_KEY = 127
+OWN_MS = 60  # after another instrument, or the last turn of a knob, until its own pluck is shown
 LOOK_MS = 8  # until the player has reported the note of a key, between two looks
 
 
@@ -76,6 +76,9 @@ class Instruments(QObject):
         self._reported: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
         self.latest: Note | KeyNote | None = None
         self._shown: Patch | None = None  # the instrument whose string is shown
+        self._string_chosen = False  # with an instrument that is not shown yet; it stays then
+        self._own_timer = QTimer(self, interval=OWN_MS, singleShot=True)
+        self._own_timer.timeout.connect(self._show_own_string)
         self._unknown: KeyNote | None = None  # the latest, which the player has not reported yet
         self._drawn = False  # whether its pluck is the session's
         self._look_timer = QTimer(self, interval=LOOK_MS)
@@ -95,6 +98,7 @@ class Instruments(QObject):
 
     def close(self) -> None:
         self._look_timer.stop()
+        self._own_timer.stop()
         self.midi.close()
 
     @property
@@ -107,13 +111,13 @@ class Instruments(QObject):
         self._keys.piano = self._session.choices.plays_patch
         self.midi.show_patch(self._session.choices.patch)
         if "instrument" in names:
-            QTimer.singleShot(0, self, partial(self._show_own_string, "string" in names))
+            self._string_chosen |= "string" in names
+            self._own_timer.start()
 
-    def _show_own_string(self, chosen: bool) -> None:
-        """Shows string and pluck of an instrument before it is played, and its pluck when that is turned.
-
-        `chosen`: a string was chosen with it, and stays.
-        """
+    def _show_own_string(self) -> None:
+        """Shows string and pluck of an instrument before it is played, and its pluck when that is turned."""
+        self._own_timer.stop()
+        chosen, self._string_chosen = self._string_chosen, False
         choices, before = self._session.choices, self._shown
         patch = choices.instrument
         self._shown = patch if isinstance(patch, Patch) else None
@@ -188,6 +192,8 @@ class Instruments(QObject):
 
     def pluck(self) -> None:
         """Plucks the string that is shown as it is chosen, where it can with all of its instrument."""
+        if self._own_timer.isActive():
+            self._show_own_string()
         self.play(self._by_hand(self._session.choices.pluck), drawn=True)
 
     @property

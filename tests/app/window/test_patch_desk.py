@@ -25,6 +25,7 @@ from app.rendering.subject import string_of
 from app.shared.key_names import note_name
 from app.views.string.view import StringView
 from app.window.controller import Controller
+from app.window.instruments import OWN_MS
 from app.window.patch_desk import NOTE_REPORTED_AFTER_MS
 from engine.pluck import SHAPES
 from tests.app.instrument.conftest import STEEL
@@ -630,7 +631,7 @@ def test_an_instrument_shows_its_own_string_before_it_is_played(qtbot: QtBot, pl
 def test_the_pluck_that_is_shown_follows_the_knobs_of_the_pluck(qtbot: QtBot, played: Controller) -> None:
     played.patches.choose("classical_guitar")
     played.window.instrument.pressed.emit(52, 100, None)
-    qtbot.waitUntil(lambda: key_is_shown(played))
+    qtbot.waitUntil(lambda: key_is_shown(played) and not played.instruments._own_timer.isActive())
     string, patch = played.session.choices.string, played.session.choices.patch
     assert patch is not None
     played.session.update(position=0.45)
@@ -643,7 +644,7 @@ def test_the_pluck_that_is_shown_follows_the_knobs_of_the_pluck(qtbot: QtBot, pl
     assert isinstance(played.instruments.latest, KeyNote)
     played.session.update(position=0.45)
     played.session.update(patch=turned.with_value("knobs.decay", 2.0))
-    qtbot.wait(20)
+    qtbot.wait(2 * OWN_MS)
     assert played.session.choices.position == 0.45, "a knob of the string leaves what was drawn"
 
 
@@ -651,5 +652,5 @@ def test_a_restored_string_stays(qtbot: QtBot, played: Controller) -> None:
     patch = read_patch(PATCHES / "concert_harp.json")
     string = PhysicalString(**asdict(STEEL))
     played.session.update(instrument=patch, string=string, position=0.2)
-    qtbot.wait(50)
+    qtbot.wait(2 * OWN_MS)
     assert (played.session.choices.string, played.session.choices.position) == (string, 0.2)
