@@ -28,10 +28,11 @@ SEVEN_KEYS = "7\n0\n127\n60\n69\n440\n7\n" + "".join(f"{n}\n" for n in range(7))
 
 
 @pytest.fixture
-def patched(controller: Controller) -> Controller:
-    """A window in which keys play a patch."""
+def patched(qtbot: QtBot, controller: Controller) -> Controller:
+    """A window in which keys play a patch, whose own string is shown."""
     controller.patches.choose("classical_guitar")
     assert controller.patches.patch is not None
+    qtbot.waitUntil(lambda: controller.session.choices.string is not None)
     return controller
 
 
