@@ -126,7 +126,14 @@ def heard_note(
     entry = library.find(choices.preset)
     if entry is None:
         return None
-    note = Note(
+    note = note_of(choices, entry, through, struck)
+    saved: PlayedSource = "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
+    return HeardNote(note, saved, another is not None, choices.difference_gain_db, _words(entry.title, choices))
+
+
+def note_of(choices: Choices, entry: PresetEntry, through: Through | None, struck: Struck | None) -> Note:
+    """The chosen pluck, or the key `struck`, played by a preset."""
+    return Note(
         entry.path,
         entry.info.rate_hz,
         choices.pluck,
@@ -138,8 +145,6 @@ def heard_note(
         struck,
         _name(choices, entry) if struck is None else struck_name(struck),
     )
-    saved: PlayedSource = "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
-    return HeardNote(note, saved, another is not None, choices.difference_gain_db, _words(entry.title, choices))
 
 
 def _name(choices: Choices, entry: PresetEntry) -> str:
