@@ -45,7 +45,7 @@ from app.window.about import about_text
 from app.window.appearance import Appearance
 from app.window.audio_control import AudioControl
 from app.window.dropped_files import Dropped, receive, receive_body
-from app.window.exports import Exports, note_of
+from app.window.exports import Exports, note_of, note_words
 from app.window.instruments import Instruments
 from app.window.main_window import PLAYED_KEYS, MainWindow
 from app.window.panels import Panel, StringPanel
@@ -332,12 +332,11 @@ class Controller(QObject):
             self.window.notices.report("The listening test needs a preset that can be plucked: choose one first.")
             return
         try:
-            material = material_of(entry, choices, struck)
+            words = note_words(entry.title, choices) if struck is None else struck.words
+            material = material_of(entry, choices, words, struck)
         except PresetError as error:
             self.window.notices.report(str(error))
             return
-        if choices.solo:
-            self.window.notices.report(f"The listening test plays all modes, although mode {choices.solo} is soloed.")
         self.performance.stop()
         note = note_of(choices, entry, self.performance.through(choices), struck)
         render = partial(self.performance.notes.compute, partial(note.compared, choices.seconds))

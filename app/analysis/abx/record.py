@@ -47,6 +47,7 @@ class AbxRecord(BaseModel):
     """The result; before the test what is compared, without trials.
 
     Attributes:
+        words: what is compared, for people.
         pluck: its fields and where it is heard, by name; of a key of an instrument those of `StruckKey`.
         through: the sound device, and how it was played.
         trials: those that were answered, in order.
@@ -60,6 +61,7 @@ class AbxRecord(BaseModel):
     date: AwareDatetime = Field(default_factory=lambda: datetime.now().astimezone().replace(microsecond=0))
     a: Candidate
     b: Candidate
+    words: str = ""
     pluck: dict[str, object]
     through: dict[str, object]
     planned_trials: Annotated[int, Field(ge=1, le=MOST_TRIALS)]
@@ -93,10 +95,11 @@ class AbxRecord(BaseModel):
         return "This test did not show that you can tell them apart."
 
 
-def material_of(entry: PresetEntry, choices: Choices, struck: Struck | None = None) -> AbxRecord:
+def material_of(entry: PresetEntry, choices: Choices, words: str, struck: Struck | None = None) -> AbxRecord:
     """Model (A) and truth (B) of a preset, plucked and heard as chosen.
 
     Args:
+        words: for people.
         struck: the key of an instrument that is compared; None: the chosen string by itself.
 
     Raises:
@@ -110,7 +113,7 @@ def material_of(entry: PresetEntry, choices: Choices, struck: Struck | None = No
         pluck = choices.model_dump(mode="json", include=fields)
     else:
         pluck = {"seconds": choices.seconds, **StruckKey.of(struck).model_dump(mode="json")}
-    return AbxRecord(a=a, b=b, pluck=pluck, through=dict(through), planned_trials=1, seed=0)
+    return AbxRecord(a=a, b=b, words=words, pluck=pluck, through=dict(through), planned_trials=1, seed=0)
 
 
 def p_text(p_value: float) -> str:

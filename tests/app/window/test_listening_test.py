@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from app.analysis.abx.trials import AbxChoices
@@ -131,6 +132,7 @@ def test_a_key_is_compared_as_the_instrument_plays_it(qtbot: QtBot, played: Cont
     pluck, sounds = dialog._material.pluck, dialog._rendering.result(30)
     assert (pluck["instrument"], pluck["velocity"] == 70) == ("Steel-string acoustic", struck)
     assert (pluck["pluck"] is None) == struck
+    assert found.words in [each.text() for each in dialog._setup.findChildren(QLabel)]
     for source in ("model", "truth"):
         preset, rate_hz = load_preset(entry.path), played.sound.rate_hz
         alone = found.sound(preset, source, rate_hz, 0.5, None, True, lambda share: None)
