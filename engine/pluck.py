@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Shape = Literal["gaussian", "triangular", "raised_cosine", "rounded"]
-SHAPES: tuple[Shape, ...] = get_args(Shape)
+SHAPES: tuple[Shape, ...] = get_args(Shape)  # numbers of the kernels
 POSITION_RANGE = (0.02, 0.98)
 WIDTH_RANGE = (0.02, 1.0)
 LARGEST_AMPLITUDE_MM = 20.0

@@ -8,9 +8,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from app.export.choices import Chosen, ExportChoices
 from app.export.files import WavReport, export_sounds
-from app.export.sound import SoundRequest, Through
+from app.export.sound import VOICES, SoundRequest, Through, render_voices
 from app.export.struck import Struck
 from app.shared.key_names import note_name
 from app.shared.vocabulary import Pickup, PlayedSource, Source
@@ -50,6 +53,46 @@ class Note:
     def can_be_alone(self) -> bool:
         """Whether there is an instrument, and a string that can be heard without it."""
         return self.through is not None or (self.struck is not None and not self.struck.of_drum)
+
+    def request(
+        self,
+        source: Source,
+        seconds: float,
+        rate_hz: int,
+        alone: bool = False,
+        difference_gain_db: float = 0.0,
+        decay_db: float | None = None,
+    ) -> SoundRequest:
+        """What is rendered of it; `alone`: its string without the instrument, where there is one.
+
+        Raises:
+            PresetError: the preset cannot be used.
+        """
+        preset, struck = load_preset(self.preset), None if alone and self.can_be_alone else self.struck
+        if preset.info.family is not None and struck is None:  # it plays any string at any rate
+            preset = of_string(preset, self.string, rate_hz or None)
+        return SoundRequest(
+            preset,
+            self.pluck,
+            self.listen,
+            seconds,
+            source,
+            self.listen_right,
+            self.pickup,
+            difference_gain_db,
+            decay_db,
+            None if alone else self.through,
+            struck,
+        )
+
+    def compared(self, seconds: float, rate_hz: int) -> Mapping[str, NDArray[np.float32]]:
+        """Model and truth by source, (frames, channels), without amplifier, body and room.
+
+        Raises:
+            PresetError, Runaway: the preset cannot be used, or its output grew without bound.
+        """
+        voices = render_voices(self.request("difference", seconds, rate_hz), VOICES, rate_hz)
+        return {source: sound[:].astype(np.float32) for source, sound in voices.sounds.items()}
 
     def file_name(self, source: Source) -> str:
         """Its name, and the source where that is not the model."""
@@ -129,23 +172,14 @@ class NoteExport:
 
     def written(self, progress: Progress) -> list[WavReport]:
         """As `run`, with reports in place of words."""
-        note, choices = self.note, self.choices
-        preset = load_preset(note.preset)
-        struck = None if choices.alone and note.can_be_alone else note.struck
-        if preset.info.family is not None and struck is None:  # it plays any string at any rate
-            preset = of_string(preset, note.string, choices.rate_hz or None)
-        request = SoundRequest(
-            preset,
-            note.pluck,
-            note.listen,
-            choices.longest_s if choices.until_decayed else choices.seconds,
+        choices, decays = self.choices, self.choices.until_decayed
+        request = self.note.request(
             next(iter(self.paths)),
-            note.listen_right,
-            note.pickup,
+            choices.longest_s if decays else choices.seconds,
+            choices.rate_hz,
+            choices.alone,
             choices.difference_gain_db if "difference" in self.paths else 0.0,
-            choices.decay_db if choices.until_decayed else None,
-            None if choices.alone else note.through,
-            struck,
+            choices.decay_db if decays else None,
         )
         return export_sounds(request, self.paths, choices.wav, progress=progress)
 

@@ -37,7 +37,7 @@ class NoteOn:
 
     Attributes:
         place: where a drum is struck, from its centre in half-lengths, x and y; None: at its own place.
-        pluck: by hand, of which place, amplitude and width count; None: as the instrument and the velocity have it.
+        pluck: by hand; None: as the instrument and the velocity have it.
             The string rings until the key is released, and no key is down.
         string: on which string of a set, from the highest, 0; None: the channel or the key chooses.
     """

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.instrument.compiled import InstrumentPlayer
-from app.instrument.drum_keys import DrumKeys
 from app.instrument.effects import channels_of, effects_of
 from app.instrument.events import (
     MOD_WHEEL,
@@ -21,14 +20,12 @@ from app.instrument.events import (
     TimedEvent,
     moves_effects,
 )
-from app.instrument.string_keys import StringKeys
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.layout import AHEAD, QUANTUM
 from engine.presets import Preset
-from engine.voices import Ear, Mixer
+from engine.voices import Mixer
 
-SOURCES = ("model", "truth")
 BLOCK_FRAMES = 4_096
 LONGEST_TAIL_S = 60.0
 SILENT_DB = -80.0  # re full scale: it ends with the last block whose peak is above; 20 dB SPL where that is 100
@@ -208,27 +205,3 @@ def render_note(
     if not math.isfinite(float(np.abs(sound).max())):
         raise ValueError(f"key {key} at velocity {velocity}: its sound is not finite")
     return sound
-
-
-def render_blow(
-    patch: Patch, preset: Preset, blow: NoteOn, ear: Ear, seconds: float, rate_hz: int
-) -> dict[str, NDArray[np.float32]]:
-    """Model and truth of one blow on a drum by source, (frames, points of the ear) each.
-
-    Body, room, limiter and the gain of other sources are left out.
-
-    Raises:
-        ValueError: the key has no drum.
-    """
-    found: dict[str, NDArray[np.float32]] = {}
-    keys: StringKeys | DrumKeys | None = None
-    for source in SOURCES:
-        player = InstrumentPlayer(patch, preset, rate_hz, {source: 1.0}, ear, varied=False, keys=keys)
-        keys, mixer = player.keys, Mixer(rate_hz, limited=False)
-        if player.silent(blow.key):
-            raise ValueError(f"{patch.name} has no drum on key {blow.key}; choose another key")
-        mixer.set_player(player.compiled)
-        player.handle(blow)
-        blocks = [mixer.render(QUANTUM) for _ in range(-(-round(seconds * rate_hz) // QUANTUM))]
-        found[source] = np.concatenate(blocks)[: round(seconds * rate_hz), : len(ear.points)]
-    return found

@@ -18,7 +18,7 @@ from app.shared.parameters import OF_PATCHES
 from engine.contact import CONTACTS
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
-from engine.pluck import FULL_SCALE_M
+from engine.pluck import FULL_SCALE_M, SHAPES
 from engine.presets import Preset
 from engine.resonators.polarised import PAIRS
 from engine.resonators.recorded import OF_PARTIALS, RecordedAttack, RecordedString
@@ -53,12 +53,6 @@ PLAYED_PARAMETERS = (
 )
 WHEELED = PLAYED_PARAMETERS[: of.BODY_MIX]  # what the kernel turns with the modulation wheel
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
-SHAPES = {
-    "gaussian": of.GAUSSIAN,
-    "triangular": of.TRIANGULAR,
-    "raised_cosine": of.RAISED_COSINE,
-    "rounded": of.ROUNDED,
-}
 BENDS = {"tension": of.BY_TENSION, "length": of.BY_LENGTH}
 SOURCES = ("model", "truth")
 HALVINGS = 8  # of the way to the wheel's end, until the value there is within its bounds
@@ -116,7 +110,7 @@ def table_of(
     counts = memory.view(np.int64)
     counts[of.TABLE_MODE], counts[of.TABLE_BEND_BY] = MODES[patch.mode], BENDS[patch.bend_by]
     counts[of.TABLE_LOW], counts[of.TABLE_HIGH] = patch.range
-    counts[of.TABLE_SHAPE], counts[of.TABLE_STOPS] = SHAPES[patch.pluck.shape], patch.pluck.stops
+    counts[of.TABLE_SHAPE], counts[of.TABLE_STOPS] = SHAPES.index(patch.pluck.shape), patch.pluck.stops
     counts[of.TABLE_STRIKES] = patch.pluck.is_blow
     counts[of.TABLE_LET_RING] = patch.damping.let_ring
     counts[of.TABLE_POINTS], counts[of.TABLE_VELOCITY] = len(ear.points), ear.pickup == "velocity"

@@ -63,7 +63,7 @@ class KeyNote:
             self._begun, self.gain = report, report.gain
             self.string = report.string if report.string >= 0 else None
             if report.parameters is not None:
-                pluck = self.patch.pluck.pluck(self.event.velocity)
+                pluck = self.event.pluck or self.patch.pluck.pluck(self.event.velocity)
                 pluck = pluck.moved(position=report.position, amplitude_mm=report.amplitude_mm)
                 if pluck.shape != "triangular":
                     pluck = pluck.moved(width=report.width)

@@ -16,13 +16,10 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TypeVar
 
 from app.audio.sound import Sound, SoundStatus
 from app.instrument.events import Event, NoteOn, PluckAt
-from app.instrument.offline import render_blow
 from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
@@ -42,7 +39,7 @@ from app.shared.vocabulary import OTHER
 from engine.effects import Effects
 from engine.pluck import Pluck
 from engine.presets import PresetError
-from engine.voices import Ear, Mixer, Voice, render_voice
+from engine.voices import Ear, Mixer, Voice
 
 MOST_NOTES = 40  # that ring at once; the oldest makes room
 STOLEN_S = 0.03  # the fade of one that makes room
@@ -54,6 +51,7 @@ MOST_CARRIED = 4  # notes that ring on when the device changes its rate
 LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the mixer
 
 Report = Callable[[str, str], None]  # a message and its details
+Made = TypeVar("Made")
 
 
 class Notes:
@@ -216,7 +214,7 @@ class Notes:
             return None
         note.release_at(frame)
         struck = note.request if isinstance(note, KeyNote) else None
-        same = struck is not None and (struck.preset, struck.pluck.shape) == (chosen.preset, chosen.pluck.shape)
+        same = struck is not None and struck.preset == chosen.preset
         if isinstance(note, KeyNote) and same and set(self._voices_of(chosen)) <= set(SOURCES):
             due = Due(mixer, frame, time.monotonic() + early / mixer.rate_hz)
             return self.keys.handle(replace(note.event, pluck=chosen.pluck), due, 0.0, self._adopt)
@@ -271,32 +269,9 @@ class Notes:
 
         self.in_background(work)
 
-    def render(self, request: RenderRequest, rate_hz: int) -> Future[Mapping[str, NDArray[np.float32]]]:
-        """Model and truth of a pluck, (frames, channels), rendered in the background and not played."""
-
-        def work() -> Mapping[str, NDArray[np.float32]]:
-            loaded, found = self._sources.load(request.preset), {}
-            for source in SOURCES:
-                program = self._sources.program(request.preset, source, rate_hz)
-                found[source] = render_voice(
-                    program, loaded.model, loaded.preset.info, request.pluck, request.ear, request.seconds
-                )
-            return found
-
-        return self._helper.submit(work)
-
-    def render_blow(
-        self, patch: Patch, blow: NoteOn, ear: Ear, seconds: float, rate_hz: int
-    ) -> Future[Mapping[str, NDArray[np.float32]]]:
-        """The same of a blow on a drum; see `app.instrument.offline.render_blow`. The patch is the one that plays."""
-
-        def work() -> Mapping[str, NDArray[np.float32]]:
-            player = self.keys.player
-            if player is None or player.patch.preset != patch.preset:
-                raise ValueError(f"{patch.name} is still being loaded; open the test again")
-            return render_blow(patch, player.preset, blow, ear, seconds, rate_hz)
-
-        return self._helper.submit(work)
+    def compute(self, work: Callable[[int], Made], rate_hz: int) -> Future[Made]:
+        """What `work` makes at a rate, in the helper's thread, after what waits there."""
+        return self._helper.submit(work, rate_hz)
 
     # What there is
 

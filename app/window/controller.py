@@ -45,7 +45,7 @@ from app.window.about import about_text
 from app.window.appearance import Appearance
 from app.window.audio_control import AudioControl
 from app.window.dropped_files import Dropped, receive, receive_body
-from app.window.exports import Exports
+from app.window.exports import Exports, note_of, note_words
 from app.window.instruments import Instruments
 from app.window.main_window import PLAYED_KEYS, MainWindow
 from app.window.panels import Panel, StringPanel
@@ -326,19 +326,20 @@ class Controller(QObject):
             self.window.transport.show_playing(self.performance.playing)
 
     def listening_test(self) -> None:
-        """Opens the ABX test of the chosen pluck, or blow on a drum; until it is closed nothing else plays."""
-        entry, choices, key = self.entry, self.session.choices, self.instruments.drum_key
-        blow = None if key is None else NoteOn(key, choices.velocity, place=self.drum.place)
+        """Opens the ABX test of what an export would write; until it is closed nothing else plays."""
+        entry, choices, struck = self.entry, self.session.choices, self.instruments.struck
         if entry is None:
             self.window.notices.report("The listening test needs a preset that can be plucked: choose one first.")
             return
         try:
-            material = material_of(entry, choices, blow)
+            words = note_words(entry.title, choices) if struck is None else struck.words
+            material = material_of(entry, choices, words, struck)
         except PresetError as error:
             self.window.notices.report(str(error))
             return
         self.performance.stop()
-        render = partial(self.performance.render_sound, choices, blow)
+        note = note_of(choices, entry, self.performance.through(choices), struck)
+        render = partial(self.performance.notes.compute, partial(note.compared, choices.seconds))
         self.performance.hear_dry(True)
         self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window)
         self._abx.finished.connect(self._listening_test_ended)

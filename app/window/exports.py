@@ -126,7 +126,14 @@ def heard_note(
     entry = library.find(choices.preset)
     if entry is None:
         return None
-    note = Note(
+    note = note_of(choices, entry, through, struck)
+    saved: PlayedSource = "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
+    return HeardNote(note, saved, another is not None, choices.difference_gain_db, note_words(entry.title, choices))
+
+
+def note_of(choices: Choices, entry: PresetEntry, through: Through | None, struck: Struck | None) -> Note:
+    """The chosen pluck, or the key `struck`, played by a preset."""
+    return Note(
         entry.path,
         entry.info.rate_hz,
         choices.pluck,
@@ -138,8 +145,6 @@ def heard_note(
         struck,
         _name(choices, entry) if struck is None else struck_name(struck),
     )
-    saved: PlayedSource = "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
-    return HeardNote(note, saved, another is not None, choices.difference_gain_db, _words(entry.title, choices))
 
 
 def _name(choices: Choices, entry: PresetEntry) -> str:
@@ -152,8 +157,8 @@ def _name(choices: Choices, entry: PresetEntry) -> str:
     return musical_name(title, string.undamped_frequency(1) / math.tau, *amplitudes_mm, choices.amplitude_mm)
 
 
-def _words(title: str, choices: Choices) -> str:
-    """The pluck and where it is heard."""
+def note_words(title: str, choices: Choices) -> str:
+    """The pluck and where it is heard, for people."""
     width = "" if choices.shape == "triangular" else f" {choices.width:.3f} wide"
     string = f", a string of {choices.string.first_hz:.1f} Hz" if choices.string else ""
     pluck = f"{shape_word(choices.shape)}{width}, at {choices.position:.2f}, {choices.amplitude_mm:.3g} mm"

@@ -172,13 +172,13 @@ class Instruments(QObject):
     def _by_hand(self, pluck: Pluck) -> NoteOn | PluckAt:
         """A pluck as a note of the key whose string is shown; of the string alone where keys do not play it so.
 
-        These are a single string, a pluck of another shape than the instrument's, and one beside another preset.
+        These are a single string, and one beside another preset.
         """
         choices = self._session.choices
         patch, alone = choices.instrument, PluckAt(pluck)
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums) or pluck.amplitude_mm == 0:
             return alone
-        if pluck.shape != patch.pluck.shape or any(other_preset(each) for each in choices.voices):
+        if any(other_preset(each) for each in choices.voices):
             return alone
         key, number = self.shown_key(patch)
         try:
@@ -198,17 +198,19 @@ class Instruments(QObject):
 
     @property
     def struck(self) -> Struck | None:
-        """The key of the instrument that an export plays: the latest note, of drums else the one shown.
+        """The key of the instrument that an export and the listening test play: the latest note, else the one shown.
 
-        None: a string was plucked by itself.
+        None: a string is plucked by itself.
         """
-        patch, latest = self._session.choices.instrument, self.latest
+        choices, latest = self._session.choices, self.latest
+        patch = choices.instrument
         if not isinstance(patch, Patch):
             return None
         if isinstance(latest, KeyNote) and latest.patch.name == patch.name:
             return Struck(patch, latest.event)
         drum = self.drum_key
-        return None if drum is None else Struck(patch, NoteOn(drum, self._session.choices.velocity, KEYS))
+        event = self._by_hand(choices.pluck) if drum is None else NoteOn(drum, choices.velocity, KEYS)
+        return Struck(patch, event) if isinstance(event, NoteOn) else None
 
     def strike(self, x: float | None = None, y: float | None = None, velocity: float | None = None) -> None:
         """Strikes the drum that is shown.

@@ -8,16 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from concurrent.futures import Future
 from dataclasses import replace
 
-import numpy as np
-from numpy.typing import NDArray
 from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
 from app.export.sound import Through
-from app.instrument.events import NoteOn
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
@@ -238,19 +234,6 @@ class Performance(QObject):
         if patch is None:
             return None
         return Through.of(patch, 1.0 if string is None else keys.gain_of(string.parameters))
-
-    def render_sound(
-        self, choices: Choices, blow: NoteOn | None, rate_hz: int
-    ) -> Future[Mapping[str, NDArray[np.float32]]]:
-        """Model and truth of a pluck as they are heard, (frames, channels) by source, rendered in the background.
-
-        `choices.preset` must be in the library. With a blow, that of the drum that it is on.
-        """
-        if blow is not None and choices.patch is not None:
-            return self.notes.render_blow(choices.patch, blow, choices.ear, choices.seconds, rate_hz)
-        asked = request_of(choices, self._library)
-        assert asked is not None
-        return self.notes.render(asked, rate_hz)
 
     def close(self) -> None:
         """Ends the threads; may be called again."""

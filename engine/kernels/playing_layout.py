@@ -55,7 +55,7 @@ EVENT_CHANNEL = 2  # W 0 … 16
 EVENT_KEY = 3  # W of a note; the number of a controller, or of one of the values
 EVENT_VALUE = 4  # R velocity, bend in -1 … 1, value of a controller or a parameter, semitones, seconds of a fade
 EVENT_ID = 5  # W which reports of a note carry; of the notes that are tuned, choked or cancelled; 0: any
-EVENT_POSITION = 6  # R of a pluck by hand, as the next two; 0: of one by the instrument and the velocity
+EVENT_POSITION = 6  # R of a pluck by hand, as amplitude, width and shape; 0: of one by instrument and velocity
 EVENT_AMPLITUDE_MM = 7  # R
 EVENT_TABLE = 8  # W address of a table
 EVENT_STRUCK_S = 9  # R the device clock's time of the gesture
@@ -65,12 +65,13 @@ EVENT_STRUCK_MODES = 12  # W how many they are
 EVENT_CHORD = 13  # W the chord in which a note waits for its turn; 0: none
 EVENT_CAME = 14  # W the frame at which it would have begun alone
 EVENT_STRING = 15  # W of a note: string n of a set from the highest, as n + 1; 0: the channel or the key chooses
-EVENT_SLOTS = 16
+EVENT_SHAPE = 16  # W
+EVENT_SLOTS = 17
 MOST_SOURCES = 4
 
 # Slots of an instrument's table
 POLY, GUITAR, MPE = 0, 1, 2
-GAUSSIAN, TRIANGULAR, RAISED_COSINE, ROUNDED = 0, 1, 2, 3
+GAUSSIAN, TRIANGULAR, RAISED_COSINE, ROUNDED = 0, 1, 2, 3  # as in `engine.pluck.SHAPES`
 BRIDGE = -1.0  # a listening point that is none: the force on the end at 0
 BY_TENSION, BY_LENGTH = 0, 1
 KEYS = 128

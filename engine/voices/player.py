@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.memory import publish
-from engine.pluck import Pluck
+from engine.pluck import SHAPES, Pluck
 from engine.resonators.string import StringParameters
 from engine.voices.mixer import Mixer
 
@@ -42,6 +42,7 @@ EVENT = np.dtype(
         ("chord", np.int64),
         ("came", np.int64),
         ("string", np.int64),
+        ("shape", np.int64),
     ]
 )
 REPORT = np.dtype(
@@ -226,8 +227,7 @@ class CompiledPlayer:
         Args:
             kind: one of `playing_layout`, as all that follows.
             frame: of the mixer, at which it counts; 0: at once.
-            by_hand: place, amplitude and width of the pluck of a note, in the instrument's shape; None: as the
-                instrument and the velocity have them.
+            by_hand: the pluck of a note; None: as the instrument and the velocity have it.
             note: the number of the note that is tuned, choked or cancelled; 0: all.
             struck: speeds (modes,) that 1 N s gives to a drum where it is struck; None: at its own place.
             string: of a note: on which of a set it is played, from the highest, 0; None: channel or key choose.
@@ -240,9 +240,9 @@ class CompiledPlayer:
                 self._struck[number] = struck
                 while len(self._struck) > of.EVENTS + of.QUEUED:
                     del self._struck[next(iter(self._struck))]
-            at, mm, width = (0, 0, 0) if by_hand is None else (by_hand.position, by_hand.amplitude_mm, by_hand.width)
+            at, mm, width, shape = (0, 0, 0, 0) if by_hand is None else _drawn(by_hand)
             head = (frame, kind, channel, key, value, id, at, mm, 0, struck_s, width, row, modes)
-            self._push((*head, 0, 0, 0 if string is None else string + 1))
+            self._push((*head, 0, 0, 0 if string is None else string + 1, shape))
         return number
 
     def take(self, table: Table, frame: int = 0) -> None:
@@ -429,6 +429,10 @@ class CompiledPlayer:
             bool(counts[of.CHANNEL_TREMOLO]),
             bool(counts[of.CHANNEL_STRUMS]),
         )
+
+
+def _drawn(pluck: Pluck) -> tuple[float, float, float, int]:
+    return pluck.position, pluck.amplitude_mm, pluck.width, SHAPES.index(pluck.shape)
 
 
 def _alive(voices: Iterable[NDArray[np.float64]]) -> list[NDArray[np.float64]]:

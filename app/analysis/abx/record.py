@@ -10,7 +10,7 @@ from platformdirs import user_documents_path
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, computed_field
 
 from app.analysis.abx.trials import LEVEL, MOST_TRIALS, Trial, p_value
-from app.instrument.events import NoteOn
+from app.export.struck import Struck, StruckKey
 from app.presets.library import PresetEntry
 from app.session.choices import Choices, PluckedString
 from app.session.listener import Listener
@@ -18,8 +18,7 @@ from app.shared.version import program_version
 from engine.presets import preset_digest
 from engine.result_file import WriteError, explain, whole_file
 
-PLUCK_FIELDS = {"seconds", *PluckedString.model_fields, *Listener.model_fields} - {"listen_right", "stereo"}
-BLOW_FIELDS = {"seconds", "listen"}
+PLUCK_FIELDS = {"seconds", *PluckedString.model_fields, *Listener.model_fields} - {"listen_right", "stereo", "solo"}
 MEANING = (
     "The p-value is the probability that guessing alone would give at least this many right answers. "
     f"Below {LEVEL:g}, luck is an unlikely explanation; a larger value does not show that A and B sound the same, "
@@ -48,7 +47,8 @@ class AbxRecord(BaseModel):
     """The result; before the test what is compared, without trials.
 
     Attributes:
-        pluck: its fields, or those of a blow on a drum, and where it is heard, by name.
+        words: what is compared, for people.
+        pluck: its fields and where it is heard, by name; of a key of an instrument those of `StruckKey`.
         through: the sound device, and how it was played.
         trials: those that were answered, in order.
         remark: why the test is not complete, if that is known.
@@ -61,6 +61,7 @@ class AbxRecord(BaseModel):
     date: AwareDatetime = Field(default_factory=lambda: datetime.now().astimezone().replace(microsecond=0))
     a: Candidate
     b: Candidate
+    words: str = ""
     pluck: dict[str, object]
     through: dict[str, object]
     planned_trials: Annotated[int, Field(ge=1, le=MOST_TRIALS)]
@@ -94,22 +95,25 @@ class AbxRecord(BaseModel):
         return "This test did not show that you can tell them apart."
 
 
-def material_of(entry: PresetEntry, choices: Choices, blow: NoteOn | None = None) -> AbxRecord:
+def material_of(entry: PresetEntry, choices: Choices, words: str, struck: Struck | None = None) -> AbxRecord:
     """Model (A) and truth (B) of a preset, plucked and heard as chosen.
 
     Args:
-        blow: on a drum of the instrument, where drums are played.
+        words: for people.
+        struck: the key of an instrument that is compared; None: the chosen string by itself.
 
     Raises:
         PresetError: its file cannot be read.
     """
     digest = preset_digest(entry.path)
     a, b = (Candidate(label=label, preset=entry.name, preset_sha256=digest) for label in ("Model", "Truth"))
-    fields = (PLUCK_FIELDS if blow is None else BLOW_FIELDS) | ({"listen_right"} if choices.stereo else set())
-    pluck, through = choices.model_dump(mode="json", include=fields), {"volume_db": choices.volume_db}
-    if blow is not None and choices.patch is not None:
-        pluck |= {"instrument": choices.patch.name, "key": blow.key, "velocity": blow.velocity, "place": blow.place}
-    return AbxRecord(a=a, b=b, pluck=pluck, through=dict(through), planned_trials=1, seed=0)
+    through = {"volume_db": choices.volume_db}
+    if struck is None:
+        fields = PLUCK_FIELDS | ({"listen_right"} if choices.stereo else set())
+        pluck = choices.model_dump(mode="json", include=fields)
+    else:
+        pluck = {"seconds": choices.seconds, **StruckKey.of(struck).model_dump(mode="json")}
+    return AbxRecord(a=a, b=b, words=words, pluck=pluck, through=dict(through), planned_trials=1, seed=0)
 
 
 def p_text(p_value: float) -> str:

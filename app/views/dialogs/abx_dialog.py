@@ -75,7 +75,11 @@ class AbxDialog(QDialog):
         self._folder = choices.folder
         self._volume_db = float(str(material.through["volume_db"]))
         labels = material.a.label, material.b.label
-        self._setup, self._trial, self._result = SetupPage(labels, choices), TrialPage(labels), ResultPage()
+        self._setup, self._trial, self._result = (
+            SetupPage(material.words, labels, choices),
+            TrialPage(labels),
+            ResultPage(),
+        )
         self._pages = QStackedWidget()
         for page in (self._setup, self._trial, self._result):
             self._pages.addWidget(page)

@@ -36,11 +36,11 @@ _LARGE = "QPushButton { font-size: 17px; min-height: 74px; min-width: 130px; }"
 
 
 class SetupPage(QWidget):
-    """Asks with signals; `show_state` says whether the test can start."""
+    """Asks with signals; `show_state` says whether the test can start. `words`: what is compared."""
 
     audition_asked = Signal(str)  # "A" or "B"
 
-    def __init__(self, labels: Sequence[str], choices: AbxChoices) -> None:
+    def __init__(self, words: str, labels: Sequence[str], choices: AbxChoices) -> None:
         super().__init__()
         tip = "Fixed before the start: a test that could stop at any time would prove nothing"
         self.trials: QSpinBox = count_box("Number of trials", MOST_TRIALS, choices.trials, tip)
@@ -53,6 +53,7 @@ class SetupPage(QWidget):
         self.close_button = push_button("Close", "Close the listening test")
         self._listen = []
         form = QFormLayout()
+        form.addRow(form_label("Note"), label(text=words))
         for name, text in zip("AB", labels, strict=True):
             listen = push_button(f"▶  Hear {name}", f"Listen to {name} before the test ({name})")
             listen.clicked.connect(lambda _=False, name=name: self.audition_asked.emit(name))

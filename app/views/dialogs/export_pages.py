@@ -478,7 +478,7 @@ def _note_words(heard: HeardNote, alone: bool) -> str:
     if alone:
         return f"{heard.words}. The string alone"
     if note.struck is not None:
-        return f"Latest note: {note.struck.words}, held, with the present settings"
+        return f"Note: {note.struck.words}, held, with the present settings"
     if note.through is None:
         return heard.words
     there = "body, room and level" if note.through.body.name or note.through.room.mix > 0 else "level"

@@ -103,7 +103,7 @@ def _look_at_peaks(player: np.ndarray, players: np.ndarray, table: np.ndarray, t
     width = player[values + of.WIDTH]
     width *= (player[values + of.WIDTH_HARD] / width) ** share
     partials = min(players[of.PLAYER_MODES] - of.MOST_PAIRS, of.MOST_MODES)
-    plucks.pull(player, table, tables, partials, player[values + of.POSITION], 1.0, width)
+    plucks.pull(player, table, tables, tables[of.TABLE_SHAPE], partials, player[values + of.POSITION], 1.0, width)
     for mode in range(partials):
         player[of.PLAYER_REFERENCE + mode] = player[of.PLAYER_AMPLITUDES + mode]
     (body, mix), highest = _body(player, table, tables), 0.0

@@ -238,7 +238,8 @@ def note_on(
         touched = keys.node_of(player, players, table, tables, channel, modes)
         if touched > 0 and not by_hand:
             position = min(position, HARMONIC_REACH / touched)
-        highest_m = plucks.pull(player, table, tables, modes, position, amplitude_mm / 1000, width)
+        shape = players[event + of.EVENT_SHAPE] if by_hand else tables[of.TABLE_SHAPE]
+        highest_m = plucks.pull(player, table, tables, shape, modes, position, amplitude_mm / 1000, width)
         plucks.release_pluck(player, tables, own, modes, release_s)
         if tables[of.TABLE_RECORDED] != 0:
             modes = recorded.modes_of(tables, modes)

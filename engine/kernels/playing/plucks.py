@@ -17,6 +17,7 @@ def pull(
     player: np.ndarray,
     table: np.ndarray,
     tables: np.ndarray,
+    shape: int,
     modes: int,
     position: float,
     peak_m: float,
@@ -26,7 +27,7 @@ def pull(
 
     Those of a blow are divided by its width, the shape's area over its height; `release_pluck` does the rest.
     """
-    grid, shape, highest = tables[of.TABLE_GRID], tables[of.TABLE_SHAPE], 0.0
+    grid, highest = tables[of.TABLE_GRID], 0.0
     if shape == of.ROUNDED:
         _round(player, table, grid, modes, position, peak_m, width)
         return peak_m

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from app.patches.library import read_patch
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
 from engine.resonators.sine_transform import project
+from engine.sources import ModelSource
 from engine.voices import Ear, Mixer, Voice, model_program, voice_blocks
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
@@ -51,6 +53,20 @@ def test_body_room_and_level_are_those_that_a_device_is_given(tmp_path: Path) ->
     assert found.shape == (14_400, 2)
     assert (found[:until] == played[:until]).all()
     assert np.abs(found).max() > 0.01
+
+
+@pytest.mark.parametrize("preset", [PRESET, SHIPPED / "nylon_nonlinear_gaussian_16k_lru.safetensors"])
+def test_what_is_compared_is_the_string_at_its_level_without_body_and_room(preset: Path) -> None:
+    """Of a compiled voice, and of a model that is rendered."""
+    note = replace(a_note(listen_right=0.6), preset=preset)
+    loaded = load_preset(preset)
+    model, ear = model_program(loaded, 48_000), Ear((0.37, 0.6))
+    source = ModelSource(loaded) if model.rendered else None
+    found = note.compared(0.2, 48_000)
+    assert {name: samples.shape for name, samples in found.items()} == dict.fromkeys(("model", "truth"), (9_600, 2))
+    alone = np.concatenate([*voice_blocks(model, source, loaded.info, note.pluck, ear, 0.2)])
+    np.testing.assert_allclose(found["model"], 0.5 * alone, rtol=1e-6, atol=1e-9)
+    assert 0 < np.abs(found["model"] - found["truth"]).max() < np.abs(found["truth"]).max()
 
 
 @pytest.mark.parametrize("source", ["model", "difference"])

@@ -25,13 +25,13 @@ from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn
 from app.instrument.string_keys import StringKeys, on_string
 from app.instrument.table import PLAYED_PARAMETERS, _with_recorded
 from app.patches.library import find_patch, read_patch
-from app.patches.patch import Losses, Patch, Pickup, Polarisations
+from app.patches.patch import Losses, Noise, Patch, Pickup, Polarisations
 from app.patches.tuning import TuningChoice
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.layout import QUANTUM
 from engine.kernels.recorded import correct
-from engine.pluck import Pluck
+from engine.pluck import SHAPES, Pluck, Shape
 from engine.presets import Preset
 from engine.resonators.string import StringParameters
 from engine.voices import Mixer
@@ -331,6 +331,20 @@ def test_a_pluck_by_hand_with_the_values_of_a_velocity_sounds_like_its_key(
         pluck = on_string(found, patch.pluck.pluck(90))
         sound = rendered(one, [(0, NoteOn(key, 90))], 100)
         assert difference(sound, rendered(other, [(0, NoteOn(key, 1, pluck=pluck))], 100)) < 1e-9
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_a_pluck_by_hand_has_its_own_shape(shipped: dict[str, Patch], preset: Preset, shape: Shape) -> None:
+    """As in an instrument that plucks so, whose keys have other gains."""
+    patch = changed(shipped["classical_guitar"], noise=Noise(), sympathy_s_kg=0.0)
+    alike = changed(patch, pluck=patch.pluck.model_copy(update={"shape": shape}))
+    heard = []
+    for each in (patch, alike):
+        stage = Compiled(each, preset)
+        sound = rendered(stage, [(0, NoteOn(52, 90, pluck=Pluck(0.3, 2.5, shape, 0.2)))], 100)
+        (gain,) = (report.gain for report in stage.player.reports() if report.kind == of.BEGAN)
+        heard.append(sound / gain)
+    assert difference(*heard) < 1e-9
 
 
 def test_a_pluck_by_hand_is_exact_where_strokes_vary(shipped: dict[str, Patch], preset: Preset) -> None:

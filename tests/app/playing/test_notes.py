@@ -591,20 +591,6 @@ def test_another_rate_while_a_model_is_rendered(
     assert np.abs(seconds_of(sound.mixer, 0.05)).max() > 0.01
 
 
-def test_a_pluck_for_a_file_is_rendered_without_a_device(
-    notes: Notes, sources: Sources, sound: Any, bank: Path, small_preset: Path, pluck_of: PluckOf, strike: Strike
-) -> None:
-    found = notes.render(pluck_of(bank, seconds=0.2, ear=Ear((0.37, 0.6))), RATE_HZ).result(30)
-    assert {name: samples.shape for name, samples in found.items()} == dict.fromkeys(
-        ("model", "truth"), (round(0.2 * RATE_HZ), 2)
-    )
-    heard = alone(sources, pluck_of(bank), 0.2)
-    np.testing.assert_allclose(found["model"][:-AHEAD, 0], heard[AHEAD:], atol=1e-6)
-    rendered = notes.render(pluck_of(small_preset, seconds=0.2), RATE_HZ).result(30)
-    assert np.abs(rendered["model"]).max() > 0.01
-    assert not sound.mixer.voices
-
-
 def test_strikes_come_from_many_threads(
     notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike
 ) -> None:

@@ -146,14 +146,14 @@ def test_space_and_a_click_strike_the_drum_that_was_struck_last(qtbot: QtBot, ki
 def test_the_listening_test_compares_model_and_truth_of_a_blow(qtbot: QtBot, kit: Controller) -> None:
     kit.window.instrument.pressed.emit(38, 127, None)
     kit._tick()
-    kit.session.update(velocity=100, stereo=True, seconds=0.5)
-    kit.drum._aim((0.2, -0.1))
+    kit.session.update(stereo=True, seconds=0.5)
+    kit.instruments.strike(0.2, -0.1, 100)
     kit.listening_test()
     dialog = kit._abx
     assert dialog is not None
-    blow = {"instrument": "Concert toms", "key": 38, "velocity": 100, "place": (0.2, -0.1)}
+    blow = {"instrument": "Concert toms", "key": 38, "velocity": 100, "place": [0.2, -0.1]}
     assert blow.items() <= dialog._material.pluck.items()
-    assert {"seconds", "listen", "listen_right"} < dialog._material.pluck.keys()
+    assert {"seconds", "instrument_sha256"} < dialog._material.pluck.keys()
     assert "amplitude_mm" not in dialog._material.pluck
     qtbot.waitUntil(lambda: dialog._stimuli is not None, timeout=30_000)
     made = dialog._stimuli

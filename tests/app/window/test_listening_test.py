@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from app.analysis.abx.trials import AbxChoices
@@ -21,6 +23,7 @@ from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings, load_settings
 from engine.pluck import Pluck
+from engine.presets import load_preset
 from engine.voices import Mixer
 
 Open = Callable[[AudioDevice, float, Mixer], Output]
@@ -113,6 +116,27 @@ def test_instruments_are_silent_meanwhile_and_the_test_keeps_its_pluck(qtbot: Qt
     assert first is not None
     dialog._ask_for_sound()  # as after a change of the device's rate
     assert (dialog._rendering.result(20)["model"] == model).all()
+    dialog.abandon()
+
+
+@pytest.mark.parametrize("struck", [True, False])
+def test_a_key_is_compared_as_the_instrument_plays_it(qtbot: QtBot, played: Controller, struck: bool) -> None:
+    """With its noise and the neighbours of its string; before a key is struck, the pluck that is shown."""
+    qtbot.waitUntil(lambda: played.session.choices.string is not None)
+    if struck:
+        played.instruments.play(events.NoteOn(52, 70))
+        qtbot.waitUntil(lambda: played.instruments.latest.known)  # type: ignore[union-attr]
+    played.listening_test()
+    dialog, found, entry = played._abx, played.instruments.struck, played.entry
+    assert dialog is not None and dialog._rendering is not None and found is not None and entry is not None
+    pluck, sounds = dialog._material.pluck, dialog._rendering.result(30)
+    assert (pluck["instrument"], pluck["velocity"] == 70) == ("Steel-string acoustic", struck)
+    assert (pluck["pluck"] is None) == struck
+    assert found.words in [each.text() for each in dialog._setup.findChildren(QLabel)]
+    for source in ("model", "truth"):
+        preset, rate_hz = load_preset(entry.path), played.sound.rate_hz
+        alone = found.sound(preset, source, rate_hz, 0.5, None, True, lambda share: None)
+        assert (np.concatenate(list(alone)) == sounds[source]).all()
     dialog.abandon()
 
 

@@ -100,17 +100,22 @@ def test_a_pluck_by_hand_is_a_note_of_the_instrument(qtbot: QtBot, played: Contr
     assert sent is not None and sent.event.pluck == played.session.choices.pluck
 
 
-def test_a_pluck_by_hand_that_the_instrument_does_not_have_is_of_the_string_alone(
+def test_a_pluck_by_hand_has_any_shape_but_beside_another_preset_it_is_of_the_string_alone(
     qtbot: QtBot, played: Controller
 ) -> None:
     played.window.instrument.pressed.emit(52, 100, None)
     qtbot.waitUntil(lambda: key_is_shown(played))
     own = played.session.choices.shape
     another = next(each for each in SHAPES if each != own)
-    for changes in ({"shape": another}, {"b": "preset:nylon_linear_gaussian_16k_koopman"}):
-        played.session.update(**{"shape": own, "b": "truth", **changes})
-        played.pluck()
-        assert isinstance(played.performance.notes.latest, Note)
+    played.session.update(shape=another)
+    played.pluck()
+    note = played.instruments.latest
+    assert isinstance(note, KeyNote)
+    qtbot.waitUntil(lambda: note.request is not None)
+    assert (note.request.pluck.shape, played.session.choices.shape) == (another, another)  # type: ignore[union-attr]
+    played.session.update(b="preset:nylon_linear_gaussian_16k_koopman")
+    played.pluck()
+    assert isinstance(played.performance.notes.latest, Note)
 
 
 def test_each_turn_of_a_loop_is_a_note_of_the_instrument(qtbot: QtBot, played: Controller) -> None:

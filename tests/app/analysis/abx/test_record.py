@@ -66,7 +66,7 @@ def test_the_chosen_pluck_and_string_are_kept(preset_folder: Path) -> None:
     string = PhysicalString(**{name: getattr(own, name) for name in PhysicalString.model_fields})
     for stereo, chosen in ((False, None), (True, string)):
         choices = Choices(instrument=SingleString(preset=entry.name), position=0.3, string=chosen, stereo=stereo)
-        pluck = material_of(entry, choices).pluck
+        pluck = material_of(entry, choices, "").pluck
         assert pluck["position"] == 0.3
         assert pluck["string"] == (chosen and chosen.model_dump(mode="json"))
         assert ("listen_right" in pluck) == stereo
