@@ -12,7 +12,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -266,13 +266,3 @@ class BlowTake:
             model = parts[0]
             found = model.size_m[flash] * np.cos(slowed + model.angle[flash] - angle) - found
         return np.asarray(found * self.scale)
-
-
-class BlowListener(Protocol):
-    """Called with the worker's results, in the worker's thread."""
-
-    def blow_started(self, take: BlowTake) -> None:
-        """A new blow has its first block."""
-
-    def blow_finished(self, take: BlowTake) -> None:
-        """Motion, signals and errors are complete."""

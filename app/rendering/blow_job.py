@@ -9,9 +9,10 @@ from concurrent.futures import Executor
 import numpy as np
 import torch
 
-from app.rendering.blow import RATE_HZ, BlowListener, BlowRequest, BlowTake, ModalMotion, head_of
+from app.rendering.blow import RATE_HZ, BlowRequest, BlowTake, ModalMotion, head_of
 from app.rendering.loaded import Loaded
 from app.rendering.rendering import Rendering
+from app.rendering.request import RenderListener
 from app.rendering.strobe import FLASH_HZ
 from app.rendering.subject import Subject
 from app.rendering.take import SOURCES, Listened, Signal
@@ -31,22 +32,15 @@ Advance = Callable[[int], Array]
 
 
 class BlowJob(Rendering[BlowRequest, BlowTake]):
-    """Renders a blow of a preset of many strings; `listener` is called in the thread that calls `advance`."""
+    """Renders a blow of a preset of many strings."""
 
     def __init__(
-        self, request: BlowRequest, load: Callable[[Subject], Loaded], listener: BlowListener, helper: Executor
+        self, request: BlowRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
     ) -> None:
-        super().__init__(request, load, helper)
-        self._listener = listener
+        super().__init__(request, load, listener, helper)
         self._movers: dict[str, _Mover] = {}
         self._weights = np.zeros((0, 0))  # of the signals that are rendered
         self._coming: tuple[Listened, dict[str, _Mover]] | None = None  # signals of other listening points
-
-    def _report_started(self, take: BlowTake) -> None:
-        self._listener.blow_started(take)
-
-    def _report_finished(self, take: BlowTake) -> None:
-        self._listener.blow_finished(take)
 
     def _seconds_of(self, take: BlowTake) -> float:
         return take.ready_frames / RATE_HZ

@@ -13,7 +13,6 @@ from app.rendering.strobe import Strobe
 from app.rendering.subject import Subject
 from app.rendering.take import SOURCES, Listened, Motion, Take, picture_stride
 from app.shared.vocabulary import OTHER
-from engine.metrics import ErrorSums
 from engine.presets import PresetError
 from engine.sources import ModelSource
 from engine.voices import Ear
@@ -23,7 +22,7 @@ BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next
 
 
 class Job(Rendering[RenderRequest, Take]):
-    """Renders a pluck; `listener` is called in the thread that calls `advance`.
+    """Renders a pluck.
 
     Requests for the same motion differ in listening points, slow motion or other presets.
     """
@@ -31,19 +30,11 @@ class Job(Rendering[RenderRequest, Take]):
     def __init__(
         self, request: RenderRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
     ) -> None:
-        super().__init__(request, load, helper)
-        self._listener = listener
+        super().__init__(request, load, listener, helper)
         self._lines: dict[str, Line] = {}
         self._strobe: Strobe | None = None
         self._coming: Listened | None = None  # signals at new listening points, until they are complete
-        self._errors = ErrorSums(0)
         self._measured = 1  # pictures; the first is no prediction
-
-    def _report_started(self, take: Take) -> None:
-        self._listener.take_started(take)
-
-    def _report_finished(self, take: Take) -> None:
-        self._listener.take_finished(take, self._errors)
 
     def _seconds_of(self, take: Take) -> float:
         return take.ready_frames / take.picture_hz
@@ -76,7 +67,6 @@ class Job(Rendering[RenderRequest, Take]):
         ):
             motion = take.motions[name]
             self._lines[name] = Line(source, program, info, request.pluck, motion, request.seconds, stride)
-        self._errors = ErrorSums(take.frames - 1)
         take.listened = self._listened(request.ear)
         return take
 
@@ -156,7 +146,7 @@ class Job(Rendering[RenderRequest, Take]):
         first, stop = self._measured, take.ready_frames
         if stop > first:
             model, truth = (take.motions[name].read(first, stop)[None] for name in SOURCES)
-            self._errors.add(model, truth, first - 1, row=0)
+            take.errors.add(model, truth, first - 1, row=0)
             self._measured = stop
 
 

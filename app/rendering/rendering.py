@@ -8,15 +8,18 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 from typing import Generic, TypeVar
 
+from app.rendering.blow import BlowRequest, BlowTake
 from app.rendering.loaded import Loaded
+from app.rendering.request import RenderListener, RenderRequest
 from app.rendering.subject import Subject
+from app.rendering.take import Take
 
-Request = TypeVar("Request")
-Made = TypeVar("Made")
+Request = TypeVar("Request", RenderRequest, BlowRequest)
+Made = TypeVar("Made", Take, BlowTake)
 
 
 class Rendering(ABC, Generic[Request, Made]):
-    """Renders a request; `advance` does the next block of it.
+    """Renders a request; `advance` does the next block of it, and calls `listener` in its thread.
 
     Args:
         load: returns a preset's model and truth; raises PresetError.
@@ -26,10 +29,12 @@ class Rendering(ABC, Generic[Request, Made]):
         take: the result, which grows; None before the first block.
     """
 
-    def __init__(self, request: Request, load: Callable[[Subject], Loaded], helper: Executor) -> None:
-        self.request = request
+    def __init__(
+        self, request: Request, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
+    ) -> None:
+        self.request: Request = request
         self.take: Made | None = None
-        self._load, self._helper = load, helper
+        self._load, self._listener, self._helper = load, listener, helper
         self._finished = False  # whether the listener has been called for it
         self._begun_s = time.monotonic()
 
@@ -40,9 +45,9 @@ class Rendering(ABC, Generic[Request, Made]):
     def announce(self) -> None:
         """Reports again what there is: the window may have shown another motion in between."""
         if self.take is not None:
-            self._report_started(self.take)
+            self._listener.take_started(self.take)
             if self._finished:
-                self._report_finished(self.take)
+                self._listener.take_finished(self.take)
 
     @property
     def age_s(self) -> float:
@@ -70,10 +75,10 @@ class Rendering(ABC, Generic[Request, Made]):
         take = self.take = self.take or self._begin()
         self._continue(take)
         if begins:
-            self._report_started(take)
+            self._listener.take_started(take)
         if not self._finished and self._complete(take):
             self._finished = True
-            self._report_finished(take)
+            self._listener.take_finished(take)
 
     @abstractmethod
     def _begin(self) -> Made:
@@ -94,11 +99,3 @@ class Rendering(ABC, Generic[Request, Made]):
     @abstractmethod
     def _seconds_of(self, take: Made) -> float:
         """How much of the motion is rendered."""
-
-    @abstractmethod
-    def _report_started(self, take: Made) -> None:
-        """To the listener."""
-
-    @abstractmethod
-    def _report_finished(self, take: Made) -> None:
-        """To the listener."""

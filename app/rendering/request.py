@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from app.rendering.blow import BlowTake
 from app.rendering.subject import Subject
 from app.rendering.take import Take
-from engine.metrics import ErrorSums
 from engine.pluck import Pluck
 from engine.voices import Ear
 
@@ -44,11 +44,11 @@ class RenderRequest:
 class RenderListener(Protocol):
     """Called with the worker's results, in the worker's thread."""
 
-    def take_started(self, take: Take) -> None:
-        """A new pluck has its first block."""
+    def take_started(self, take: Take | BlowTake) -> None:
+        """A new pluck or blow has its first block."""
 
-    def take_finished(self, take: Take, errors: ErrorSums) -> None:
-        """Its pictures and signals are complete; `errors` are the model's over the pictures."""
+    def take_finished(self, take: Take | BlowTake) -> None:
+        """Its motion, signals and errors are complete."""
 
     def other_failed(self, preset: str, message: str) -> None:
         """Another preset's model cannot be rendered beside this one; as a source it is at rest."""

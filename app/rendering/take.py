@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.rendering.strobe import Flashes, Strobe
+from engine.metrics import ErrorSums
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.sources import StringSource
@@ -163,6 +164,7 @@ class Take:
         motions: by source; those of other presets' models each at its own rate and on its own grid.
         listened: the signals of all of them; replaced as a whole when the listening points change.
         fundamental_hz: of the string at small amplitudes.
+        errors: of the model, over the pictures after the first that are ready.
     """
 
     def __init__(
@@ -186,6 +188,7 @@ class Take:
         self.frames = self.motions["truth"].frames
         self.listened = Listened(ear, {name: Signal(info.rate_hz, len(ear.points), seconds) for name in SOURCES})
         self.fundamental_hz = float(info.resonator.omega[0]) / (2 * np.pi)
+        self.errors = ErrorSums(self.frames - 1)
 
     @property
     def rate_hz(self) -> int:

@@ -10,9 +10,9 @@ import time
 import traceback
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
-from app.rendering.blow import BlowListener, BlowRequest
+from app.rendering.blow import BlowRequest
 from app.rendering.job import Job
 from app.rendering.loaded import Loaded
 from app.rendering.request import RenderListener, RenderRequest
@@ -31,10 +31,6 @@ LOOK_AGAIN_S = 0.01
 PATIENCE_S = 5.0  # for the first sound
 
 
-class WorkListener(RenderListener, BlowListener, Protocol):
-    """Of plucks and of blows."""
-
-
 class RenderWorker:
     """A thread with a mailbox that holds the latest request.
 
@@ -47,7 +43,7 @@ class RenderWorker:
 
     def __init__(
         self,
-        listener: WorkListener,
+        listener: RenderListener,
         load: Callable[[Subject], Loaded],
         hurried: Callable[[], bool] = lambda: False,
         sounds: Callable[[], bool] = lambda: True,

@@ -36,7 +36,6 @@ from app.window.main_window import MainWindow
 from app.window.panels import Moment, Panel
 from app.window.playhead import Playhead
 from app.window.render_signals import RenderSignals
-from engine.metrics import ErrorSums
 
 GROWN, NOTICEABLE = 3.0, 0.01  # times the preset's own error, and the least share, from which an error has grown
 PLACED = {"instrument", *PluckedString.model_fields} - {"position"}  # what plucks at ten places depend on
@@ -65,8 +64,6 @@ class Performance(QObject):
         self.notes = Notes(sound, self._sources, library.find, mail.refused.emit, sound.set_effects)
         self._worker = RenderWorker(mail, self._sources.load, lambda: self.notes.ringing > 0, lambda: self.playable)
         self._blows = Blows(session, library, self._worker.submit)
-        mail.struck.connect(self._blow_started)
-        mail.blow_complete.connect(self._blow_finished)
 
     @property
     def entry(self) -> PresetEntry | None:
@@ -143,8 +140,8 @@ class Performance(QObject):
                 panel.take_started(blow)
         elif self.take is not None:
             panel.take_started(self.take)
-            if self._shown.errors is not None:
-                panel.take_finished(self.take, self._shown.errors)
+            if self._shown.finished:
+                panel.take_finished(self.take)
 
     # Intents
 
@@ -288,42 +285,39 @@ class Performance(QObject):
 
     # Signals of the render worker
 
-    def _take_started(self, take: Take) -> None:
-        if take is self._shown.take or not self._is_of_chosen(take):  # shown already, or overtaken by the next one
+    def _take_started(self, take: Take | BlowTake) -> None:
+        if isinstance(take, BlowTake):
+            if not self._of_drums or not self._blows.started(take):  # overtaken by the next one
+                return
+        elif take is self._shown.take or not self._is_of_chosen(take):  # shown already, or overtaken
             return
-        self._shown = Playhead(take)
+        else:
+            self._shown = Playhead(take)
         for panel in self._panels:
-            panel.take_started(take)
+            if not (panel.of_strings and self._of_drums):
+                panel.take_started(take)
         self.follow()
         self._tell("Rendering …")
         self._window.show_growth("")
 
-    def _take_finished(self, take: Take, errors: ErrorSums) -> None:
-        if take is not self.take or self._shown.errors is not None:
+    def _take_finished(self, take: Take | BlowTake) -> None:
+        if isinstance(take, BlowTake):
+            if self._of_drums and take is self._blows.shown.take:
+                self._tell(f"Error of this blow: {percent(math.sqrt(take.errors.rel_mse))} over the drum")
             return
-        self._shown.errors = errors
+        if take is not self.take or self._shown.finished:
+            return
+        self._shown.finished = True
         for panel in self._panels:
-            panel.take_finished(take, errors)
+            panel.take_finished(take)
         if reason := why_ran_away(take):
             self._window.notices.report(reason)
-        windows = errors.windows(take.picture_hz, (0.0, take.info.horizon_s, max(take.seconds, take.info.horizon_s)))
+        trained_s = take.info.horizon_s
+        windows = take.errors.windows(take.picture_hz, (0.0, trained_s, max(take.seconds, trained_s)))
         places = ("in the training range", "beyond")
         parts = [f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, places, strict=False)]
         self._tell("Error of this pluck: " + ", ".join(parts))
         self._window.show_growth(growth_words([w.rel_mae for w in windows], take.info.rel_mae))
-
-    def _blow_started(self, take: BlowTake) -> None:
-        if not self._of_drums or not self._blows.started(take):  # overtaken by the next one
-            return
-        for panel in self._panels:
-            if not panel.of_strings:
-                panel.take_started(take)
-        self._tell("Rendering …")
-        self._window.show_growth("")
-
-    def _blow_finished(self, take: BlowTake) -> None:
-        if self._of_drums and take is self._blows.shown.take:
-            self._tell(f"Error of this blow: {percent(math.sqrt(take.errors.rel_mse))} over the drum")
 
     def _other_refused(self, preset: str, message: str) -> None:
         self._window.notices.report(f"{preset} cannot be heard beside this preset: {message}")

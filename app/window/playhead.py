@@ -8,7 +8,6 @@ from typing import Generic, TypeVar
 from app.playing.key_note import KeyNote
 from app.playing.note import Note
 from app.rendering import BlowTake, Take
-from engine.metrics import ErrorSums
 
 Shown = TypeVar("Shown", Take, BlowTake)
 
@@ -18,13 +17,13 @@ class Playhead(Generic[Shown]):
     """A motion and the note whose time it follows; without a note it stands at `parked_s`.
 
     Attributes:
-        errors: of the whole motion; None: it is not complete.
+        finished: whether the motion is known to be complete.
     """
 
     take: Shown | None = None
     note: Note | KeyNote | None = None
     parked_s: float = 0.0
-    errors: ErrorSums | None = None
+    finished: bool = False
 
     def position_s(self, latency_s: float) -> float:
         """The time in the motion that is heard now, or where it stands; `latency_s`: of the output."""

@@ -5,31 +5,22 @@ from __future__ import annotations
 from PySide6.QtCore import QObject, Signal
 
 from app.rendering import BlowTake, Take
-from engine.metrics import ErrorSums
 
 
 class RenderSignals(QObject):
     """Its methods are called in other threads; see `RenderListener`."""
 
-    started = Signal(object)  # Take
-    finished = Signal(object, object)  # Take, ErrorSums
-    struck = Signal(object)  # BlowTake
-    blow_complete = Signal(object)  # BlowTake
+    started = Signal(object)  # Take or BlowTake
+    finished = Signal(object)  # the same
     other_refused = Signal(str, str)  # name of the preset, message
     failed = Signal(str, str)  # message, details
     refused = Signal(str, str)  # a pluck cannot be played: message, details
 
-    def take_started(self, take: Take) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         self.started.emit(take)
 
-    def take_finished(self, take: Take, errors: ErrorSums) -> None:
-        self.finished.emit(take, errors)
-
-    def blow_started(self, take: BlowTake) -> None:
-        self.struck.emit(take)
-
-    def blow_finished(self, take: BlowTake) -> None:
-        self.blow_complete.emit(take)
+    def take_finished(self, take: Take | BlowTake) -> None:
+        self.finished.emit(take)
 
     def other_failed(self, preset: str, message: str) -> None:
         self.other_refused.emit(preset, message)

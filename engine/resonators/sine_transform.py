@@ -55,6 +55,13 @@ def to_modes(displacement: NDArray[np.floating], modes: int) -> Array:
 
 def to_grid(amplitudes: NDArray[np.floating], grid_points: int) -> Array:
     """Modal amplitudes (..., modes) to displacement (..., grid_points), of the same unit."""
+    modes = amplitudes.shape[-1]
+    if amplitudes.ndim == 1 and grid_points * modes > LARGEST_KEPT:  # a picture: making its table would take 7 ms
+        _check(grid_points, modes)
+        turns = np.fft.ifft(np.append(0.0, amplitudes), 2 * (grid_points - 1), norm="forward")
+        shape: Array = turns.imag[:grid_points].copy()
+        shape[[0, -1]] = 0.0
+        return shape
     return amplitudes @ synthesis_matrix(grid_points, amplitudes.shape[-1])
 
 

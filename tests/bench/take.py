@@ -12,9 +12,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from app.playing.sources import Sources
-from app.rendering import RenderRequest, Take
+from app.rendering import RenderRequest
 from app.rendering.job import Job
-from engine.metrics import ErrorSums
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import SHIPPED
 from engine.voices import Ear
@@ -57,9 +56,9 @@ class TakeBenchmark:
 class _Nobody:
     """A listener that does nothing."""
 
-    def take_started(self, take: Take) -> None: ...
+    def take_started(self, take: object) -> None: ...
 
-    def take_finished(self, take: Take, errors: ErrorSums) -> None: ...
+    def take_finished(self, take: object) -> None: ...
 
     def other_failed(self, preset: str, message: str) -> None: ...
 

@@ -27,7 +27,6 @@ from app.views.background import Background
 from app.views.controls.parts import lay_out_alone
 from app.views.controls.plain import Label
 from app.views.stage import StageView
-from engine.metrics import ErrorSums
 
 LEAST_HEIGHT = 84  # pixels
 GIVEN_UP_S = 0.5  # a take that has not grown for so long is not waited for
@@ -123,8 +122,8 @@ class Panel(QWidget):
         """Called with another motion, of which nothing is rendered yet; of a drum where it is not `of_strings`."""
         self._growing, self._grown = take, (-1, time.monotonic())
 
-    def take_finished(self, take: Take, errors: ErrorSums) -> None:
-        """Called when all of it is rendered, with the sums of its errors."""
+    def take_finished(self, take: Take) -> None:
+        """Called when all of it is rendered, with its errors."""
 
     def show_moment(self, moment: Moment) -> None:
         """Called while the panel is visible: for the string 60 times a second, for the others 30, less at rest."""

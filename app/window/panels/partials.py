@@ -12,7 +12,6 @@ from app.views.controls.parts import combo_box, words_label
 from app.views.controls.progress_strip import ProgressStrip
 from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
-from engine.metrics import ErrorSums
 from engine.partials import LEAST_DECAY_DB
 
 
@@ -93,7 +92,7 @@ class PartialsPanel(Panel):
         self.table.set_dimmed(True)
         self._say("The partials of the new pluck follow when it is rendered")
 
-    def take_finished(self, take: Take, errors: ErrorSums) -> None:
+    def take_finished(self, take: Take) -> None:
         self._waiting = take
 
     def show_moment(self, moment: Moment) -> None:

@@ -23,7 +23,6 @@ from app.views.string.ground import TrainedPlucks
 from app.views.string.ink import ShownPluck
 from app.views.string.view import StringView
 from app.window.panels.base import Moment, StagePanel
-from engine.metrics import ErrorSums
 from engine.pluck import SHAPES, WIDTH_RANGE, Pluck
 from engine.presets import PresetInfo, outside_training
 
@@ -88,7 +87,7 @@ class StringPanel(StagePanel):
         self._envelope = Envelope()
         self._standing = ()
 
-    def take_finished(self, take: Take, errors: ErrorSums) -> None:
+    def take_finished(self, take: Take) -> None:
         self._take = take
 
     def show_moment(self, moment: Moment) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.rendering import blow_job
+from app.rendering import Take, blow_job
 from app.rendering.blow import RATE_HZ, BlowRequest, BlowTake, Head
 from app.rendering.blow_job import BlowJob
 from app.rendering.loaded import Loaded
@@ -45,11 +45,17 @@ class Log:
     def __init__(self) -> None:
         self.calls: list[str] = []
 
-    def blow_started(self, take: BlowTake) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         self.calls.append("started")
 
-    def blow_finished(self, take: BlowTake) -> None:
+    def take_finished(self, take: Take | BlowTake) -> None:
         self.calls.append("finished")
+
+    def other_failed(self, preset: str, message: str) -> None:
+        raise AssertionError(message)
+
+    def render_failed(self, message: str, detail: str) -> None:
+        raise AssertionError(message)
 
 
 @pytest.fixture
@@ -202,15 +208,9 @@ def test_the_worker_renders_blows() -> None:
     done, takes = threading.Event(), []
 
     class Listener(Log):
-        def blow_finished(self, take: BlowTake) -> None:
+        def take_finished(self, take: Take | BlowTake) -> None:
             takes.append(take)
             done.set()
-
-        def take_started(self, take: object) -> None: ...
-
-        def take_finished(self, take: object, errors: object) -> None: ...
-
-        def other_failed(self, preset: str, message: str) -> None: ...
 
         def render_failed(self, message: str, detail: str) -> None:
             raise AssertionError(message + detail)

@@ -12,7 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 from app.playing.sources import Sources
-from app.rendering import SOURCES, RenderRequest, Take
+from app.rendering import SOURCES, BlowTake, RenderRequest, Take
 from app.rendering.job import Job
 from engine.metrics import ErrorSums
 from engine.pluck import Pluck
@@ -37,16 +37,17 @@ class Heard:
     """Hears what a job says."""
 
     def __init__(self) -> None:
-        self.errors: ErrorSums | None = None
+        self.finished: Take | None = None
 
-    def take_started(self, take: Take) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
         assert take.ready_frames > 1
 
-    def take_finished(self, take: Take, errors: ErrorSums) -> None:
+    def take_finished(self, take: Take | BlowTake) -> None:
+        assert isinstance(take, Take)
         assert take.complete
         assert take.listened.complete
-        assert self.errors is None
-        self.errors = errors
+        assert self.finished is None
+        self.finished = take
 
     def other_failed(self, preset: str, message: str) -> None:
         raise AssertionError(message)
@@ -196,7 +197,7 @@ def test_the_error_that_is_reported_is_that_of_every_frame(job: Render, sources:
     every = ErrorSums(model.shape[1])
     every.add(model, truth)
     assert every.total().rel_mse < 2e-7
-    reported = made._listener.errors.total()  # type: ignore[attr-defined]
+    reported = made._listener.finished.errors.total()  # type: ignore[attr-defined]
     assert reported.rel_mse == pytest.approx(every.total().rel_mse, rel=0.06)
     assert reported.rel_mae == pytest.approx(every.total().rel_mae, rel=0.03)
 

@@ -14,7 +14,7 @@ import pytest
 import torch
 
 from app.playing.sources import Sources
-from app.rendering import RenderRequest, RenderWorker, Take
+from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering import worker as worker_module
 from app.rendering.line import Line
 from engine.metrics import ErrorSums
@@ -33,16 +33,18 @@ class Heard:
 
     def __init__(self) -> None:
         self.started: list[Take] = []
-        self.finished: list[tuple[Take, ErrorSums]] = []
+        self.finished: list[Take] = []
         self.failed: list[str] = []
         self.others_failed: list[str] = []
 
-    def take_started(self, take: Take) -> None:
+    def take_started(self, take: Take | BlowTake) -> None:
+        assert isinstance(take, Take)
         assert take.ready_frames > 1, "there is something to draw"
         self.started.append(take)
 
-    def take_finished(self, take: Take, errors: ErrorSums) -> None:
-        self.finished.append((take, errors))
+    def take_finished(self, take: Take | BlowTake) -> None:
+        assert isinstance(take, Take)
+        self.finished.append(take)
 
     def other_failed(self, preset: str, message: str) -> None:
         self.others_failed.append(f"{preset}: {message}")
@@ -93,7 +95,7 @@ def test_a_take_is_what_its_sources_give_in_one_piece(
     worker.submit(request_of(small_preset))
     wait_until(lambda: bool(heard.finished))
     (take,) = heard.started
-    assert take is heard.finished[0][0]
+    assert take is heard.finished[0]
     assert take.complete
     assert take.frames == 4_001
     loaded = sources.load(small_preset)
@@ -111,7 +113,7 @@ def test_the_latest_request_wins(
         worker.submit(request_of(small_preset, pluck=Pluck(position, 3.0), seconds=4.0))
     submitted.set()
     wait_until(lambda: bool(heard.finished))
-    assert [take.pluck.position for take, _ in heard.finished] == [0.5]
+    assert [take.pluck.position for take in heard.finished] == [0.5]
 
 
 def test_a_motion_that_is_asked_for_again_is_announced_again(
@@ -214,7 +216,8 @@ def test_the_error_that_is_reported_is_that_of_the_take(
 ) -> None:
     worker.submit(request_of(small_preset))
     wait_until(lambda: bool(heard.finished))
-    take, errors = heard.finished[0]
+    take = heard.finished[0]
+    errors = take.errors
     expected = ErrorSums(take.frames - 1)
     expected.add(*(take.motion_m(name)[None, 1:].copy() for name in ("model", "truth")))
     assert errors.total() == expected.total()
@@ -242,7 +245,7 @@ def test_another_presets_model_moves_beside_it(
     assert not take.motions["preset:broken"].read().any()
     assert not take.listened.signals["preset:broken"].read().any()
     assert all(started is take for started in heard.started)
-    assert {id(finished) for finished, _ in heard.finished} == {id(take)}
+    assert {id(finished) for finished in heard.finished} == {id(take)}
 
 
 def test_another_pluck_does_not_wait_for_the_one_before(
@@ -261,5 +264,5 @@ def test_another_pluck_does_not_wait_for_the_one_before(
     wait_until(lambda: len(heard.started) == 2)
     monkeypatch.undo()
     wait_until(lambda: bool(heard.finished))
-    assert heard.finished[0][0] is heard.started[1]
+    assert heard.finished[0] is heard.started[1]
     assert not heard.started[0].complete

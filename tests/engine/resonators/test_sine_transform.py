@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from engine.resonators import sine_transform
-from engine.resonators.sine_transform import listening_weights, mode_shapes, to_grid, to_modes
+from engine.resonators.sine_transform import LARGEST_KEPT, listening_weights, mode_shapes, to_grid, to_modes
 
 
 @pytest.mark.parametrize("modes", [1, 10, 25, 99])
@@ -40,3 +40,12 @@ def test_large_tables_are_not_remembered() -> None:
     large = sine_transform.synthesis_matrix(1_003, 1_001)
     assert sine_transform._sines.cache_info().currsize == before
     assert np.array_equal(large[:7], sine_transform.synthesis_matrix(1_003, 7))
+
+
+@pytest.mark.parametrize(("grid_points", "modes"), [(801, 799), (1_201, 90)])
+def test_a_large_picture_is_that_of_its_table(grid_points: int, modes: int) -> None:
+    amplitudes = np.random.default_rng(0).normal(size=modes)
+    assert grid_points * modes > LARGEST_KEPT
+    found, table = to_grid(amplitudes, grid_points), to_grid(amplitudes[None], grid_points)[0]
+    np.testing.assert_allclose(found, table, atol=1e-11)
+    assert found[0] == found[-1] == 0
