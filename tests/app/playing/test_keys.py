@@ -44,6 +44,7 @@ from app.playing.playback import Playback
 from app.playing.sources import Sources
 from engine.effects import Effects
 from engine.kernels import playing_layout as of
+from engine.pluck import Pluck
 from engine.voices import Ear, Mixer
 from engine.voices.voice import FADE_S
 from tests.app.instrument.seen import Seen, seen, taken_up
@@ -560,6 +561,21 @@ def test_of_another_device_an_event_counts_at_once(played: Notes, sound: Any) ->
     sound.mixer.render(64)
     played.look()
     assert made.began_frame == 64
+
+
+def test_a_recording_forgets_the_turn_of_a_loop_that_never_came(
+    played: Notes, sound: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = 1_000.0
+    monkeypatch.setattr(recorder, "time", SimpleNamespace(monotonic=lambda: now_s))
+    played.keys.begin_recording()
+    turn, other = NoteOn(45, 90, pluck=Pluck(0.3, 2.0)), NoteOn(50, 90)
+    for event in (turn, other):
+        played.handle(event, Due(sound.mixer, 48_000, now_s + 0.2))
+    played.keys.recorder.cancel(turn)
+    now_s += 0.3
+    found = [each.event for each in played.keys.recorder.end() if isinstance(each.event, NoteOn)]
+    assert found == [other]
 
 
 def test_a_recording_has_the_events_of_a_file_when_they_are_heard(
