@@ -245,7 +245,7 @@ class InstrumentPlayer:
                 of.NOTE_ON,
                 key=event.key,
                 value=event.velocity,
-                by_hand=event.pluck,
+                by_hand=None if self._of_drums else event.pluck,
                 struck_s=struck_s,
                 struck=struck,
                 string=event.string,

@@ -177,6 +177,8 @@ class Notes:
         reach, chosen = self._reach, self._chosen
         if reach is None or not isinstance(event, NoteOn) or event.velocity <= 0:
             return event
+        if event.pluck is not None:  # by hand, before another thread chose a single string
+            return PluckAt(event.pluck)
         return PluckAt(reach.pluck(event.key, event.velocity, Pluck() if chosen is None else chosen.pluck))
 
     def ring(self, from_s: float = 0.0, begin_frame: int = 0, alone: bool = False) -> Note | None:

@@ -53,12 +53,16 @@ class EventRecorder:
         if full and not reported:
             self._report(FULL, "")
 
-    def cancel(self) -> None:
-        """Forgets events whose time is still to come."""
+    def cancel(self, event: Event | None = None) -> None:
+        """Forgets events whose time is still to come, or this one of them."""
         with self._lock:
             if self._recorded is not None:
                 played_s = time.monotonic() - self._began_s
-                self._recorded = [each for each in self._recorded if each.time_s <= played_s]
+                self._recorded = [
+                    each
+                    for each in self._recorded
+                    if each.time_s <= played_s or (event is not None and each.event != event)
+                ]
 
     def end(self) -> list[TimedEvent]:
         """The events, with times in s from the first note on; empty where there was no note.

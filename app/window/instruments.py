@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 from collections.abc import Callable
 from dataclasses import asdict, replace
@@ -14,10 +15,10 @@ from app.export.struck import Struck
 from app.instrument.compiled import is_another
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
 from app.instrument.string_keys import on_string
-from app.instrument.strings import Strings
+from app.instrument.strings import Strings, pitch_hz_of
 from app.patches.drums import Drums
 from app.patches.instrument import SingleString
-from app.patches.patch import Patch, PhysicalString
+from app.patches.patch import Patch, PhysicalString, StringSet
 from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, PluckRange, place_of, semitone_of, turn
@@ -26,12 +27,13 @@ from app.playing.note import Note
 from app.presets.library import Library
 from app.rendering import RenderRequest
 from app.rendering.subject import string_of
-from app.session.choices import Session
+from app.session.choices import PluckedString, Session
 from app.session.slots import other_preset
 from app.views.controls.playing_keys import PlayingKeys
 from app.window.main_window import MainWindow
 from app.window.midi_control import MidiControl
 from engine.pluck import Pluck
+from engine.resonators.string import StringParameters
 
 HIGHEST_KEY = 127
 OWN_MS = 60  # after another instrument, or the last turn of a knob, until its own pluck is shown
@@ -48,8 +50,8 @@ class Instruments(QObject):
 
     Attributes:
         latest: the note that was begun last; None before the first.
-        latest_key: the key of a patch that was struck last, and on which string of its set, as in `KeyNote`; None
-            before the first.
+        latest_key: the key of a patch that was struck last, or whose string was restored, and on which string of its
+            set, as in `KeyNote`; None before the first.
     """
 
     played = Signal()  # a note has begun, and the session has its values
@@ -76,7 +78,7 @@ class Instruments(QObject):
         self._reported: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
         self.latest: Note | KeyNote | None = None
         self._shown: Patch | None = None  # the instrument whose string is shown
-        self._string_chosen = False  # with an instrument that is not shown yet; it stays then
+        self._chosen: frozenset[str] = frozenset()  # of string and pluck with an instrument that is not shown yet
         self._own_timer = QTimer(self, interval=OWN_MS, singleShot=True)
         self._own_timer.timeout.connect(self._show_own_string)
         self._unknown: KeyNote | None = None  # the latest, which the player has not reported yet
@@ -111,21 +113,26 @@ class Instruments(QObject):
         self._keys.piano = self._session.choices.plays_patch
         self.midi.show_patch(self._session.choices.patch)
         if "instrument" in names:
-            self._string_chosen |= "string" in names
+            self._chosen |= names & PluckedString.model_fields.keys()
             self._own_timer.start()
 
     def _show_own_string(self) -> None:
-        """Shows string and pluck of an instrument before it is played, and its pluck when that is turned."""
+        """Shows string and pluck of an instrument before it is played, and its pluck when that is turned.
+
+        What was chosen with the instrument stays, as what undo or a file restores.
+        """
         self._own_timer.stop()
-        chosen, self._string_chosen = self._string_chosen, False
+        chosen, self._chosen = self._chosen, frozenset()
         choices, before = self._session.choices, self._shown
         patch = choices.instrument
         self._shown = patch if isinstance(patch, Patch) else None
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums):
             return
         another = before is not None and is_another(patch, before)
-        own = choices.string is None or (another and not chosen)
-        if not own and (before is None or another or patch.pluck == before.pluck):
+        own = choices.string is None or (another and "string" not in chosen)
+        if choices.string is not None and not own and (another or before is None):
+            self.latest_key = _key_of(patch, choices.string.parameters) or self.latest_key
+        if not own and (before is None or patch.pluck == before.pluck or (another and chosen - {"string"})):
             return
         with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
             if (found := Strings(patch).of_key(*self.shown_key(patch))) is not None:
@@ -139,7 +146,9 @@ class Instruments(QObject):
             return
         self.latest = note
         if isinstance(note, KeyNote):
-            self._unknown, self._drawn, self.latest_key = note, drawn, (note.event.key, None)
+            with self._lock:
+                self._unknown, self._drawn = note, drawn
+            self.latest_key = note.event.key, note.event.string
         else:
             self._unknown = None
             self._tell(note.request, drawn)
@@ -198,18 +207,21 @@ class Instruments(QObject):
 
     @property
     def struck(self) -> Struck | None:
-        """The key of the instrument that an export and the listening test play: the latest note, else the one shown.
+        """The key of the instrument that an export and the listening test play: the latest, else the one shown.
 
-        None: a string is plucked by itself.
+        After a pluck by hand it is the pluck that is shown. None: a string is plucked by itself.
         """
-        choices, latest = self._session.choices, self.latest
+        choices, latest, drum = self._session.choices, self.latest, self.drum_key
         patch = choices.instrument
         if not isinstance(patch, Patch):
             return None
-        if isinstance(latest, KeyNote) and latest.patch.name == patch.name:
-            return Struck(patch, latest.event)
-        drum = self.drum_key
-        event = self._by_hand(choices.pluck) if drum is None else NoteOn(drum, choices.velocity, KEYS)
+        event: NoteOn | PluckAt
+        if isinstance(latest, KeyNote) and latest.patch.name == patch.name and latest.event.pluck is None:
+            event = latest.event
+        elif drum is not None:
+            event = NoteOn(drum, choices.velocity, KEYS)
+        else:
+            event = self._by_hand(choices.pluck)
         return Struck(patch, event) if isinstance(event, NoteOn) else None
 
     def strike(self, x: float | None = None, y: float | None = None, velocity: float | None = None) -> None:
@@ -247,7 +259,10 @@ class Instruments(QObject):
         note = self._unknown
         if note is not None and not note.known:
             return
-        self._unknown = None
+        with self._lock:
+            if self._unknown is not note:  # another was begun just now
+                return
+            self._unknown = None
         self._look_timer.stop()
         if note is None or note is not self.latest:  # another pluck was begun meanwhile
             return
@@ -294,3 +309,23 @@ class Instruments(QObject):
         key = self._down.pop(press, None)
         if key is not None:
             self.play(NoteOff(key, KEYS))
+
+
+def _key_of(patch: Patch, string: StringParameters) -> tuple[int, int | None] | None:
+    """The key with the pitch of a string, and on which of a set it has its length; None: there is no such key."""
+    strings, pitch_hz = Strings(patch), pitch_hz_of(string)
+    low, high = patch.range
+    key = next((key for key in range(low, high + 1) if _same(strings.pitch_hz(key) or 0.0, pitch_hz)), None)
+    if key is None:
+        return None
+    for number in (None, *range(len(patch.strings.strings) if isinstance(patch.strings, StringSet) else 0)):
+        with contextlib.suppress(ValueError):  # reported when it is struck
+            found = strings.of_key(key, number)
+            if found is not None and _same(found.parameters.length_m, string.length_m):
+                return key, number
+    return key, None
+
+
+def _same(value: float, other: float) -> bool:
+    """Within rounding, for the player computes strings too."""
+    return math.isclose(value, other, rel_tol=1e-6)

@@ -280,6 +280,8 @@ class Performance(QObject):
         turn, self._next_turn = self._next_turn, None
         if turn is not None:
             turn.release(0.0)
+            if isinstance(turn, KeyNote):
+                self.notes.keys.recorder.cancel(turn.event)
             if self._shown.note is not None:
                 self._shown.note.release_at(0)
 

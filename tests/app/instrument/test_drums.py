@@ -20,6 +20,7 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, read_patch
 from app.patches.patch import Patch, Room
 from engine.kernels import playing_layout as of
+from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
 from engine.voices import Ear, Mixer
 
@@ -263,3 +264,16 @@ def test_a_player_of_strings_takes_no_drums() -> None:
     player = InstrumentPlayer(guitar, PRESET, RATE_HZ, {"model": 1.0})
     with pytest.raises(ValueError, match="has drums"):
         player.keys_of(KIT)
+
+
+def test_a_pluck_by_hand_strikes_a_drum_as_its_velocity_says() -> None:
+    """A file may ask for it, and a preview of drums may hear what was meant for a string."""
+    blows = [
+        list(
+            render_events(KIT, PRESET, [TimedEvent(0.0, NoteOn(40, 90, pluck=pluck))], RATE_HZ, "model", seconds=0.3)
+        )
+        for pluck in (None, Pluck(0.3, 2.0))
+    ]
+    plain, by_hand = (np.concatenate(blocks) for blocks in blows)
+    assert np.abs(plain).max() > 0.01
+    np.testing.assert_array_equal(by_hand, plain)

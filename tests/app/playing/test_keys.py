@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from threading import Event, Thread
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -36,6 +36,7 @@ from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Body, Patch
+from app.playing import recorder
 from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.notes import Notes
@@ -43,6 +44,7 @@ from app.playing.playback import Playback
 from app.playing.sources import Sources
 from engine.effects import Effects
 from engine.kernels import playing_layout as of
+from engine.pluck import Pluck
 from engine.voices import Ear, Mixer
 from engine.voices.voice import FADE_S
 from tests.app.instrument.seen import Seen, seen, taken_up
@@ -479,11 +481,15 @@ def test_releases_and_bends_of_a_file_count_at_their_frames(played: Notes, sound
     np.testing.assert_allclose(heard, np.concatenate(expected), atol=1e-6)
 
 
-def test_a_file_that_is_stopped_ends_what_was_handed_over(played: Notes, sound: Any, wait: Wait) -> None:
+def test_a_file_that_is_stopped_ends_what_was_handed_over(
+    played: Notes, sound: Any, wait: Wait, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = 1_000.0
+    monkeypatch.setattr(recorder, "time", SimpleNamespace(monotonic=lambda: now_s))
     ringing = strike(played, NoteOn(45, 90))
     sound.mixer.render(4_800)
     played.keys.begin_recording()
-    soon = Due(sound.mixer, sound.mixer.frames + 2_000, time.monotonic() + 0.04)
+    soon = Due(sound.mixer, sound.mixer.frames + 2_000, now_s + 0.04)
     later = [strike(played, NoteOn(key, 127), soon) for key in (45, 50)]
     played.cancel()
     played.handle(Controller(NOTES_OFF, 0))
@@ -492,6 +498,7 @@ def test_a_file_that_is_stopped_ends_what_was_handed_over(played: Notes, sound: 
     assert all(each.over and each.began_frame == 0 for each in later)
     assert now(played, ringing).damped, "it has its place again"
     assert not ringing.over
+    now_s += 1.0
     assert NoteOn(50, 127) not in [each.event for each in played.keys.recorder.end()]
     sound.mixer.render(24_000)
     assert np.abs(sound.mixer.render(4_800)).max() < 1e-4
@@ -556,14 +563,31 @@ def test_of_another_device_an_event_counts_at_once(played: Notes, sound: Any) ->
     assert made.began_frame == 64
 
 
-def test_a_recording_has_the_events_of_a_file_when_they_are_heard(played: Notes, sound: Any) -> None:
+def test_a_recording_forgets_the_turn_of_a_loop_that_never_came(
+    played: Notes, sound: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = 1_000.0
+    monkeypatch.setattr(recorder, "time", SimpleNamespace(monotonic=lambda: now_s))
     played.keys.begin_recording()
-    now_s = time.monotonic()
+    turn, other = NoteOn(45, 90, pluck=Pluck(0.3, 2.0)), NoteOn(50, 90)
+    for event in (turn, other):
+        played.handle(event, Due(sound.mixer, 48_000, now_s + 0.2))
+    played.keys.recorder.cancel(turn)
+    now_s += 0.3
+    found = [each.event for each in played.keys.recorder.end() if isinstance(each.event, NoteOn)]
+    assert found == [other]
+
+
+def test_a_recording_has_the_events_of_a_file_when_they_are_heard(
+    played: Notes, sound: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = 1_000.0
+    monkeypatch.setattr(recorder, "time", SimpleNamespace(monotonic=lambda: now_s))
+    played.keys.begin_recording()
     for key, after_s in ((45, 0.2), (50, 0.25), (62, 60.0)):
         played.handle(NoteOn(key, 90), Due(sound.mixer, round(48_000 * after_s), now_s + after_s))
     played.handle(NoteOn(57, 90))
-    while time.monotonic() < now_s + 0.3:
-        time.sleep(0.01)
+    now_s += 0.3
     found = played.keys.recorder.end()
     notes = {each.event.key: each.time_s for each in found if isinstance(each.event, NoteOn)}
     assert list(notes) == [57, 45, 50], "in their order; the last is not due yet"

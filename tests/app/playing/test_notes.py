@@ -653,6 +653,14 @@ def test_a_key_and_a_hand_at_one_place_sound_alike(notes: Notes, sound: Any, str
     np.testing.assert_allclose(heard[0], heard[1], atol=1e-6)
 
 
+def test_a_pluck_by_hand_keeps_its_place_where_a_single_string_is_chosen_meanwhile(
+    notes: Notes, sound: Any, string: PluckRange
+) -> None:
+    by_hand = Pluck(0.44, 3.0)
+    note = notes.handle(NoteOn(60, 90, pluck=by_hand))
+    assert isinstance(note, Note) and note.request.pluck == by_hand
+
+
 def test_a_pluck_at_a_place_waits_for_its_frame_and_can_be_cancelled(
     notes: Notes, sound: Any, string: PluckRange
 ) -> None:

@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+import shutil
+from dataclasses import asdict
+from pathlib import Path
+
 import pytest
 from pytestqt.qtbot import QtBot
 
 from app.instrument.events import NoteOn, PluckAt
+from app.instrument.strings import Strings
 from app.patches.instrument import SingleString
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
+from app.patches.patch import PhysicalString
+from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE, PLACES
 from app.rendering.subject import path_of, string_of
 from app.window.controller import Controller
 from engine.pluck import Pluck
+from engine.presets.finding import SHIPPED
 from tests.app.window.shown import key_is_shown
 
 
@@ -84,3 +94,49 @@ def test_places_are_prepared_where_keys_choose_them_alone(
     assert len(set(positions)) == PLACES
     played.session.update(amplitude_mm=3.3)
     assert len(prepared) == 2
+
+
+def test_a_pluck_by_hand_plays_the_string_that_was_restored(qtbot: QtBot, played: Controller) -> None:
+    """As at a start, or after undo: no key has been struck, or one of another instrument."""
+    patch = read_patch(PATCHES / "concert_harp.json")
+    string = Strings(patch).of_key(43)
+    assert string is not None
+    shown = PhysicalString(**asdict(string.parameters))
+    played.session.update(instrument=patch, string=shown, shape=patch.pluck.shape)
+    qtbot.waitUntil(lambda: played.performance.playable)
+    played.pluck()
+    note = played.instruments.latest
+    assert isinstance(note, KeyNote) and note.event.key == 43
+    qtbot.waitUntil(lambda: note.request is not None)
+    assert played.session.choices.string == shown
+
+
+def test_undo_of_an_instrument_with_another_preset_shows_its_pluck_again(
+    qtbot: QtBot, played: Controller, preset_folder: Path
+) -> None:
+    shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder / "another.safetensors")
+    played.library.refresh()
+    guitar = read_patch(PATCHES / "classical_guitar.json")
+    other = read_patch(PATCHES / "cimbalom.json").model_copy(update={"preset": "another"})
+    assert guitar.pluck.shape != other.pluck.shape
+    session, instruments = played.session, played.instruments
+    session.update(instrument=guitar)
+    qtbot.waitUntil(lambda: not instruments._own_timer.isActive())
+    string, shape = session.choices.string, session.choices.shape
+    assert string is not None and shape == guitar.pluck.shape
+    session.update(instrument=other)
+    qtbot.waitUntil(lambda: session.choices.shape == other.pluck.shape)
+    played.history.undo()
+    qtbot.waitUntil(lambda: not instruments._own_timer.isActive())
+    assert (session.choices.string, session.choices.shape) == (string, shape)
+
+
+def test_an_export_of_a_pluck_by_hand_has_the_pluck_that_is_shown(qtbot: QtBot, played: Controller) -> None:
+    session, instruments = played.session, played.instruments
+    qtbot.waitUntil(lambda: session.choices.string is not None and played.performance.playable)
+    played.pluck()
+    assert instruments.struck is not None and instruments.struck.event.pluck == session.choices.pluck
+    session.update(position=0.41)
+    assert instruments.struck.event.pluck == session.choices.pluck
+    session.update(shape="triangular")
+    assert instruments.struck is None, "the instrument does not play it so"

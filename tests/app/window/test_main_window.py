@@ -545,7 +545,7 @@ def test_a_browser_opens_under_a_notice_and_has_room_for_a_search(
         desk.toggle()
         browser = desk.browser
         qtbot.waitUntil(lambda: window.presets.geometry().bottom() < window.notices.y())
-        qtbot.waitUntil(lambda browser=browser: browser.y() > window.notices.geometry().bottom(), timeout=5000)
+        qtbot.waitUntil(lambda browser=browser: browser.y() > window.notices.geometry().bottom())
         assert browser.geometry().bottom() <= window.height()
         qtbot.waitUntil(lambda browser=browser: browser.layout().minimumSize().width() <= browser.width())
         assert browser.search.width() >= browser.search.minimumWidth() > 100

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+
 import numpy as np
 import pyqtgraph as pg
 import pytest
@@ -37,45 +39,55 @@ def line_columns(plot: KeptPlot) -> list[int]:
     return list(np.flatnonzero((seen(plot) == wanted).all(axis=2).sum(axis=0) > 100))
 
 
+def wait_for_line(qtbot: QtBot, plot: KeptPlot) -> None:
+    """Until it is drawn where it was put."""
+    qtbot.waitUntil(lambda: plot._moved.isEmpty() and plot._strip == plot._line_strip())
+
+
+def wait_for_picture(qtbot: QtBot, plot: KeptPlot) -> None:
+    """Until the line moves over a picture of the plot, which is painted whole before, however late."""
+    places = cycle((0.3, 0.6))
+
+    def is_kept() -> bool:
+        plot.move_line(next(places))
+        return plot._picture is not None
+
+    qtbot.waitUntil(is_kept)
+    wait_for_line(qtbot, plot)
+
+
 def test_the_line_is_where_it_was_put(qtbot: QtBot, plot: KeptPlot) -> None:
     places = []
     for at in (0.2, 0.5, 0.8):
         plot.move_line(at)
-        qtbot.wait(30)
+        wait_for_line(qtbot, plot)
         (column,) = line_columns(plot)
         places.append(column)
     assert np.diff(places, n=2) == pytest.approx(0, abs=1)
     plot.move_line(1.5)
-    qtbot.wait(30)
+    wait_for_line(qtbot, plot)
     assert line_columns(plot) == []
 
 
 def test_a_moved_line_leaves_the_plot_as_it_was(qtbot: QtBot, plot: KeptPlot) -> None:
-    painted: list[int] = []
-    scene = plot.scene()
-    scene.sigPrepareForPaint.connect(lambda: painted.append(1))
-    plot.move_line(2.0)
-    qtbot.wait(30)
-    before = plot._painted().toImage()
-    painted.clear()
+    wait_for_picture(qtbot, plot)
+    kept, painted = plot._picture, list[int]()
+    assert kept is not None
+    plot.scene().sigPrepareForPaint.connect(lambda: painted.append(1))
     for at in np.linspace(0.1, 0.9, 9):
         plot.move_line(float(at))
-        qtbot.wait(20)
-    assert len(painted) <= 1  # the kept picture is made once
-    assert plot._picture is not None
-    assert plot._picture.toImage() == before
+        wait_for_line(qtbot, plot)
+    assert painted == [], "the kept picture is made once"
+    assert plot._picture is kept
+    assert plot._painted().toImage() == kept.toImage()
 
 
 def test_a_changed_plot_is_painted_again(qtbot: QtBot, plot: KeptPlot) -> None:
-    plot.move_line(0.4)
-    qtbot.wait(30)
-    plot.move_line(0.5)
-    qtbot.wait(30)
+    wait_for_picture(qtbot, plot)
     kept = plot._picture
     assert kept is not None
     plot.plot([0, 1], [1, 0], pen=pg.mkPen(theme.TRUTH, width=1))
-    qtbot.wait(30)
-    plot.move_line(0.6)
-    qtbot.wait(30)
+    qtbot.waitUntil(lambda: plot._picture is None)
+    wait_for_picture(qtbot, plot)
     assert plot._picture is not None
     assert plot._picture.toImage() != kept.toImage()

@@ -52,8 +52,8 @@ def test_axes_stay_while_curves_move(
     with qtbot.waitExposed(view):
         view.show()
     draw(view, 0)
+    qtbot.waitUntil(lambda: painted != [])  # once
     qtbot.wait(100)
-    assert painted  # once
     painted.clear()
     for turn in range(1, 6):
         draw(view, turn)
@@ -76,5 +76,4 @@ def test_what_is_kept_follows_the_view(qtbot: QtBot, painted: list[pg.AxisItem])
     ):
         painted.clear()
         change()
-        qtbot.wait(50)
-        assert item.getAxis(side) in painted
+        qtbot.waitUntil(lambda side=side: item.getAxis(side) in painted)  # type: ignore[misc]
