@@ -119,8 +119,10 @@ static bool param_from_text(const clap_plugin *plugin, uint32_t id, const char *
     if (strlen(text) == (size_t)length && !strncmp(text, word, (size_t)length)) return *value = own->low + step, true;
   }
   char *end;
-  *value = strtod(text, &end);
-  return end != text;
+  double found = strtod(text, &end);
+  if (end == text || isnan(found)) return false;
+  *value = fmin(fmax(found, own->low), own->high);
+  return true;
 }
 
 /* `at`: the frame of what is rendered next, at which the event counts. */

@@ -240,7 +240,6 @@ void instrument_midi(instrument *own, uint32_t at, const uint8_t *bytes) {
 }
 
 void instrument_reset(instrument *own) {
-  own->waiting = 0;
   pushed(own, 0, CANCEL, 0, 0, 0);
   for (int32_t channel = 0; channel < CHANNELS; channel++) instrument_controller(own, 0, channel, 121, 0);
   instrument_controller(own, 0, 0, 120, 0);

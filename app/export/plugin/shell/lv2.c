@@ -78,6 +78,7 @@ static void connect_port(void *handle, uint32_t port, void *data) {
 
 static void activate(void *handle) {
   shell *own = handle;
+  instrument_reset_values(&own->own); /* ports that stand elsewhere follow */
   for (int32_t place = 0; place < own->own.of->parameter_count; place++) own->seen[place] = NAN;
   if (!instrument_begin(&own->own, own->rate_hz)) instrument_end(&own->own);
 }
