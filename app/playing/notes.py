@@ -208,19 +208,21 @@ class Notes:
             self._guarded(begin, note)()
         return note
 
-    def turn(self, note: Note | KeyNote, seconds: float) -> Note | KeyNote | None:
-        """Hands the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early."""
+    def turn(self, note: Note | KeyNote, seconds: float, event: NoteOn | PluckAt) -> Note | KeyNote | None:
+        """Hands the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early.
+
+        Args:
+            event: the chosen pluck, as a note of its instrument or of the string alone.
+        """
         mixer, frame = self._sound.mixer, note.frame_at(seconds)
-        chosen, early = self._chosen, frame - mixer.frames
-        if chosen is None or early > LOOP_AHEAD_S * mixer.rate_hz:
+        early = frame - mixer.frames
+        if self._chosen is None or early > LOOP_AHEAD_S * mixer.rate_hz:
             return None
         note.release_at(frame)
-        struck = note.request if isinstance(note, KeyNote) else None
-        same = struck is not None and struck.preset == chosen.preset
-        if isinstance(note, KeyNote) and same and set(self._voices_of(chosen)) <= set(SOURCES):
-            due = Due(mixer, frame, time.monotonic() + early / mixer.rate_hz)
-            return self.keys.handle(replace(note.event, pluck=chosen.pluck), due, 0.0, self._adopt)
-        return self.ring(begin_frame=frame)
+        if isinstance(event, PluckAt):
+            return self.ring(begin_frame=frame)
+        due = Due(mixer, frame, time.monotonic() + early / mixer.rate_hz)
+        return self.keys.handle(event, due, 0.0, self._adopt)
 
     def cancel(self) -> None:
         """What was handed over and is not due yet is not played."""

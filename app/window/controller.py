@@ -142,6 +142,7 @@ class Controller(QObject):
             self.performance.play_preset,
             self.performance.notes.look,
         )
+        self.performance.by_hand = self.instruments.by_hand
         self.instruments.played.connect(self.performance.follow)
         self.instruments.played.connect(self._show_struck)
         self.instruments.reported.connect(window.notices.report)

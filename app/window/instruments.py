@@ -199,11 +199,15 @@ class Instruments(QObject):
         velocity = patch.pluck.velocity_of(pluck.amplitude_mm / string.shortened)
         return NoteOn(key, velocity, KEYS, string=number, pluck=pluck)
 
+    def by_hand(self) -> NoteOn | PluckAt:
+        """The chosen pluck of the string that is shown, where it can be with all of its instrument."""
+        return self._by_hand(self._session.choices.pluck)
+
     def pluck(self) -> None:
-        """Plucks the string that is shown as it is chosen, where it can with all of its instrument."""
+        """Plucks the string that is shown as it is chosen."""
         if self._own_timer.isActive():
             self._show_own_string()
-        self.play(self._by_hand(self._session.choices.pluck), drawn=True)
+        self.play(self.by_hand(), drawn=True)
 
     @property
     def struck(self) -> Struck | None:
@@ -221,7 +225,7 @@ class Instruments(QObject):
         elif drum is not None:
             event = NoteOn(drum, choices.velocity, KEYS)
         else:
-            event = self._by_hand(choices.pluck)
+            event = self.by_hand()
         return Struck(patch, event) if isinstance(event, NoteOn) else None
 
     def strike(self, x: float | None = None, y: float | None = None, velocity: float | None = None) -> None:

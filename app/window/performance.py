@@ -7,13 +7,14 @@ pluck, and the views show it at the note's own time. All but `play_preset` runs 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
 from app.export.sound import Through
+from app.instrument.events import NoteOn, PluckAt
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
@@ -42,7 +43,11 @@ PLACED = {"instrument", *PluckedString.model_fields} - {"position"}  # what pluc
 
 
 class Performance(QObject):
-    """Owns the notes and the render worker. Times are in s from the pluck."""
+    """Owns the notes and the render worker. Times are in s from the pluck.
+
+    Attributes:
+        by_hand: the chosen pluck as an event, which loops play.
+    """
 
     def __init__(
         self, window: MainWindow, session: Session, library: Library, sound: Sound, panels: Sequence[Panel]
@@ -50,6 +55,7 @@ class Performance(QObject):
         super().__init__(window)
         self._window, self._session, self._library, self._sound = window, session, library, sound
         self._panels = panels
+        self.by_hand: Callable[[], NoteOn | PluckAt] = lambda: PluckAt(session.choices.pluck)
         self._asked: RenderRequest | None = None
         self._shown: Playhead[Take] = Playhead()
         self._next_turn: Note | KeyNote | None = None  # of the loop, which waits in the mixer for its frame
@@ -274,7 +280,7 @@ class Performance(QObject):
                 self._next_turn = None
             return
         if not (note.cut or note.released):
-            self._next_turn = self.notes.turn(note, take.seconds)
+            self._next_turn = self.notes.turn(note, take.seconds, self.by_hand())
 
     def _forget_turn(self) -> None:
         turn, self._next_turn = self._next_turn, None

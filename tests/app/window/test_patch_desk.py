@@ -135,6 +135,33 @@ def test_each_turn_of_a_loop_is_a_note_of_the_instrument(qtbot: QtBot, played: C
     assert len({each.request.pluck for each in begun[1:3]}) == 1  # type: ignore[attr-defined]
 
 
+def test_a_loop_stays_with_the_instrument_when_its_pluck_and_string_change(
+    qtbot: QtBot, played: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rung: list[object] = []
+    monkeypatch.setattr(played.performance.notes, "ring", lambda *places, **more: rung.append(more))
+    played.session.update(seconds=0.5, loop=True)
+    played.window.instrument.pressed.emit(52, 100, None)
+
+    def turns(key: int, position: float | None) -> bool:
+        latest, pluck = played.performance.notes.latest, played.session.choices.pluck
+        if not isinstance(latest, KeyNote) or latest.event.key != key or latest.event.pluck is None:
+            return False
+        return position in (None, latest.event.pluck.position) and latest.event.pluck == pluck
+
+    qtbot.waitUntil(lambda: turns(52, None))
+    played.session.update(position=0.41)
+    qtbot.waitUntil(lambda: turns(52, 0.41))
+    played.instruments.play(NoteOn(57, 80, KEYS))
+    qtbot.waitUntil(lambda: turns(57, None))
+    assert rung == [], "no string sounds by itself"
+    patch = played.session.choices.patch
+    assert patch is not None
+    shaped = patch.pluck.model_copy(update={"shape": "gaussian" if patch.pluck.shape != "gaussian" else "triangular"})
+    played.session.update(patch=patch.model_copy(update={"pluck": shaped}))
+    qtbot.waitUntil(lambda: played.session.choices.shape == shaped.shape and turns(57, None))
+
+
 def test_octave_and_velocity_keys(qtbot: QtBot, played: Controller) -> None:
     press(qtbot, played, Qt.Key.Key_X)
     press(qtbot, played, Qt.Key.Key_9)
