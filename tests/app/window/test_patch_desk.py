@@ -301,6 +301,20 @@ def test_an_old_search_does_not_hide_what_was_just_saved(played: Controller, mon
         played.patches.desk.toggle()
 
 
+def test_a_filter_that_previous_and_next_go_through_is_shown_and_cleared(played: Controller) -> None:
+    bar, browser = played.window.instrument.bar, played.patches.browser
+    assert not bar.filtered.isVisible()
+    browser.search.setText("mandolin")
+    played.patches.choose("mandolin")
+    assert bar.filtered.isVisible()
+    assert bar.filtered.text() == f"{len(browser.listed)} of {browser.total}  ✕"
+    bar.filtered.click()
+    assert not bar.filtered.isVisible()
+    assert len(browser.listed) == browser.total
+    bar.next_asked.emit()
+    assert played.session.choices.patch.name != "Mandolin"  # type: ignore[union-attr]
+
+
 def test_an_impossible_name_is_explained_and_asked_for_again(
     played: Controller, monkeypatch: pytest.MonkeyPatch
 ) -> None:
