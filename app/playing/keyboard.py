@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -47,6 +48,7 @@ _PIANO_LETTERS = dict(zip(_ROW_LETTERS + "'", _WHITE, strict=True)) | {
 LOWEST_C = 48  # the MIDI key that A plays at octave 0
 OCTAVE_STEPS = {"Z": -1, "X": 1}
 LOWEST_OCTAVE, HIGHEST_OCTAVE = -4, 4
+MOST = 0.8
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,16 @@ def semitone_of(press: KeyPress, platform: str = sys.platform) -> int | None:
 def letters_of(octave: int) -> dict[int, str]:
     """MIDI key -> what is printed on the computer's key that plays it."""
     return {LOWEST_C + 12 * octave + semitone: letter for letter, semitone in _PIANO_LETTERS.items()}
+
+
+def octave_near(octave: int, keys: Collection[int]) -> int:
+    """The octave nearest to `octave` where most of the computer's keys are among the MIDI `keys`.
+
+    Most: `MOST` of what the best octave has; some instruments have fewer keys than the computer.
+    """
+    counts = {each: len(letters_of(each).keys() & set(keys)) for each in range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)}
+    enough = MOST * max(counts.values())
+    return min((each for each in counts if counts[each] >= enough), key=lambda each: abs(each - octave))
 
 
 def octaves_of(low: int, high: int) -> tuple[int, int]:

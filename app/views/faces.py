@@ -14,7 +14,7 @@ Area = Literal[
     "views",  # the decks of plots
     "slots",  # A and B
     "pluck",  # shape, position, amplitude and width of the drawn pluck
-    "time",  # loop, duration and slow motion
+    "time",  # duration and slow motion
     "patch",  # the instrument's bar, the knobs of its string and of techniques
     "growth",  # header: a sign where the error grew
 ]  # the string, its listening point, the keys and the output are in both

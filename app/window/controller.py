@@ -409,7 +409,7 @@ class Controller(QObject):
         self.library.refresh()
         self.patches.reload()
         self.patches.take_file(kept.patch)
-        self.window.notices.report(f"{kept.patch.stem}: learned. Its report: {kept.report}")
+        self.window.notices.inform(f"{kept.patch.stem}: learned. Its report: {kept.report}")
 
     @property
     def entry(self) -> PresetEntry | None:

@@ -43,7 +43,7 @@ from app.patches.library import (
 from app.patches.patch import ASSIGNABLE, Body, Patch, StringSet
 from app.patches.tuning import SCALA_FILES, TuningChoice, read_scala
 from app.playing.key_note import KeyNote
-from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octaves_of
+from app.playing.keyboard import HIGHEST_OCTAVE, LOWEST_C, LOWEST_OCTAVE, letters_of, octave_near, octaves_of
 from app.playing.playback import Playback
 from app.presets.library import Library
 from app.session.choices import Session
@@ -109,6 +109,7 @@ class PatchDesk(QObject):
         )
         self.desk.reported.connect(self.reported)
         self._shown_s = 0.0
+        self._sounding: frozenset[int] = frozenset()  # MIDI keys of the patch for which the octave was judged last
         self._noted: Patch | None = None  # the patch, when the note in the bar was judged last
         self._reported_other = ""  # the source that a notice reported as not heard from keys
         self._playback = Playback(instruments.play, performance.notes, performance.notes.cancel)
@@ -128,6 +129,7 @@ class PatchDesk(QObject):
         bar.previous_asked.connect(lambda: self.desk.step(-1))
         bar.next_asked.connect(lambda: self.desk.step(1))
         bar.browse_asked.connect(self.desk.toggle)
+        bar.all_asked.connect(browser.clear_filter)
         bar.save_asked.connect(self.save)
         bar.rename_asked.connect(self.rename)
         bar.revert_asked.connect(self.revert)
@@ -145,6 +147,7 @@ class PatchDesk(QObject):
         panel.knobs.changed.connect(self.change)
         panel.knobs.figure_asked.connect(self.turn_to)
         browser.opened.connect(self.reload)
+        browser.listed_changed.connect(lambda: bar.filtered.show_listed(len(browser.listed), browser.total))
         browser.played.connect(self.audition)
         browser.delete_asked.connect(self.delete)
         browser.rename_asked.connect(self.rename)
@@ -397,12 +400,15 @@ class PatchDesk(QObject):
         return (LOWEST_OCTAVE, HIGHEST_OCTAVE) if self.patch is None else octaves_of(*self.patch.range)
 
     def _keep_octave_in_range(self, asked: bool) -> None:
-        """Moves the octave of the computer's keys to where one sounds, and says why.
+        """Moves the octave of the computer's keys to where one sounds, or most do with another range; says why.
 
         `asked`: the octave was to change; otherwise another patch made it change.
         """
         patch, octave, (lowest, highest) = self.patch, self._session.choices.octave, self._octaves
         within = min(max(octave, lowest), highest)
+        before, self._sounding = self._sounding, frozenset() if patch is None else _keys_of(patch)
+        if self._sounding and not asked and self._sounding != before:
+            within = octave_near(octave, self._sounding)
         if patch is None or within == octave:
             return
         end = "Lowest octave" if octave < lowest else "Highest octave"
@@ -555,3 +561,11 @@ class PatchDesk(QObject):
 
 def _note(key: int) -> list[TimedEvent]:
     return [TimedEvent(0.0, NoteOn(key, AUDITION_VELOCITY, KEYS)), TimedEvent(AUDITION_S, NoteOff(key, KEYS))]
+
+
+def _keys_of(patch: Patch) -> frozenset[int]:
+    """The MIDI keys that sound."""
+    low, high = patch.range
+    keys = range(low, high + 1)
+    drums = patch.strings if isinstance(patch.strings, Drums) else None
+    return frozenset(key for key in keys if drums is None or drums.of_key(key) is not None)

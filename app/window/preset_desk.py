@@ -50,7 +50,7 @@ class PresetDesk(BrowserDesk):
     def _show_bar(self) -> None:
         name, browser = self._chosen(), self.browser
         self._bar.set_chosen(self._library.find(name), name in self.favourites)
-        self._bar.set_listed(len(browser.listed), browser.total)
+        self._bar.filtered.show_listed(len(browser.listed), browser.total)
 
     def _library_changed(self) -> None:
         """Shows what there is now; a filter that hides an added preset is cleared."""

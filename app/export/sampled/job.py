@@ -19,6 +19,7 @@ from app.export.sampled.plan import NoteRenderer, SampledPlan, SampledSource, Zo
 from app.export.sampled.sample import StoredSample, encoded, sample_of
 from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
+from app.shared.key_names import note_name
 from app.shared.worker import Progress
 from engine.result_file import WriteError, explain, whole_file
 
@@ -139,7 +140,7 @@ def _rendered(plan: SampledPlan, folder: Path, render: NoteRenderer, progress: P
     made = {}
     started = time.monotonic()
     for done, zone in enumerate(plan.zones):
-        share, text = done / len(plan.zones), f"key {zone.key}, velocity {zone.velocity}"
+        share, text = done / len(plan.zones), f"{note_name(zone.key)}, velocity {zone.velocity}"
         if done == 1:
             started = time.monotonic()  # the first note also loads and compiles
         left_s = (time.monotonic() - started) * (len(plan.zones) - done) / (done - 1) if done > 1 else None

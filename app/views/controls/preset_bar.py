@@ -11,6 +11,7 @@ from PySide6.QtCore import Signal
 from PySide6.QtWidgets import QHBoxLayout, QWidget
 
 from app.views.controls.elided_label import ElidedLabel
+from app.views.controls.filter_button import FilterButton
 from app.views.controls.name_button import NameButton
 from app.views.controls.parts import tool_button
 
@@ -37,10 +38,8 @@ class PresetBar(QWidget):
         self.name.setMinimumWidth(100)
         self.name.setMaximumWidth(560)
         self.name.clicked.connect(self.browse_asked)
-        self.filtered = tool_button("", "Clear the filter")
-        self.filtered.setObjectName("filter")
+        self.filtered = FilterButton("presets")
         self.filtered.clicked.connect(self.all_asked)
-        self.filtered.hide()
         self.card = ElidedLabel()
         self.card.setObjectName("faint")
         row = QHBoxLayout(self)
@@ -51,16 +50,6 @@ class PresetBar(QWidget):
         row.addWidget(following)
         row.addWidget(self.filtered)
         row.addStretch(1)
-
-    def set_listed(self, listed: int, total: int) -> None:
-        """How many presets pass the browser's filter."""
-        self.filtered.setVisible(listed < total)
-        self.filtered.setText(f"{listed} of {total}  ✕")
-        self.filtered.setAccessibleName(f"Filtered: {listed} of {total} presets; clear the filter")
-        self.filtered.setToolTip(
-            f"{listed} of {total} presets match the filter; previous and next step through these.\n"
-            "Click to clear the filter"
-        )
 
     def set_chosen(self, entry: PresetEntry | None, favourite: bool = False) -> None:
         """None: there is no preset."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 SLOTS = ("a", "b")
 DIFFERENCE_GAINS_DB = range(0, int(DIFFERENCE_GAIN_RANGE_DB[1]) + 1, 10)
 WIDTH, NARROW_WIDTH, TIGHT_WIDTH = 148, 108, 82  # fixed, so that a longer title moves nothing
-PADDING = 18  # of the style sheet, with the borders
+PADDING = 16  # of the style sheet, with the borders
 
 _SOURCES = (
     ("model", "Model of the chosen preset"),

@@ -68,10 +68,10 @@ class TransportBar(QFrame):
         self.areas: dict[Area, tuple[QWidget, ...]] = {
             "slots": (self._group(self.slots),),
             "pluck": (self._group(*pluck),),
-            "time": (self._loop, self._group(knobs["seconds"], knobs["speed"])),
+            "time": (self._group(knobs["seconds"], knobs["speed"]),),
         }
         row.addLayout(self._build_transport())
-        for group in (self.areas["slots"][0], self.areas["pluck"][0], listener, self.areas["time"][1]):
+        for group in (self.areas["slots"][0], self.areas["pluck"][0], listener, self.areas["time"][0]):
             row.addWidget(group)
         self._space = QSpacerItem(0, 0, QSizePolicy.Policy.Expanding)
         row.addItem(self._space)

@@ -50,6 +50,7 @@ class SetupPage(QWidget):
         self._needed, self._warning = label("faint"), label("warning")
         self.start = push_button("Start the test", "Begin the first trial")
         self.start.setObjectName("play")
+        self.start.setDefault(True)  # at first it is disabled and cannot have the focus
         self.close_button = push_button("Close", "Close the listening test")
         self._listen = []
         form = QFormLayout()

@@ -79,9 +79,11 @@ class LearnDialog(QDialog):
         self.name.setAccessibleName("Name of the instrument")
         self.kind = combo_box("Instrument", KINDS, "guitar")
         self.kind.setToolTip("For what a sound does not give: density and length")
-        tip = "Assumed where it is 0"
+        tip = "Type it where you know it; otherwise it is assumed"
         self.length_m = spin_box("Sounding length", (0, LONGEST_M), 0, tip, " m", 3, 0.01)
         self.gauge_mm = spin_box("Diameter", (0, THICKEST_MM), 0, tip, " mm", 2, 0.05)
+        for box in (self.length_m, self.gauge_mm):
+            box.setSpecialValueText("assumed")  # where it is 0
         self.state = label("faint", selectable=True)
         self.bar = QProgressBar(maximum=1000)
         self.bar.setAccessibleName("Progress")

@@ -24,6 +24,7 @@ from PySide6.QtWidgets import (
 from app.patches.patch import Macro, Patch
 from app.patches.tuning import TuningChoice
 from app.shared.parameters import MACROS, OF_PATCHES
+from app.views.controls.filter_button import FilterButton
 from app.views.controls.knob import Knob
 from app.views.controls.name_button import NameButton
 from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
@@ -57,6 +58,7 @@ class PatchBar(QFrame):
     recording_save_asked = Signal()  # one that is not saved yet
     recording_discard_asked = Signal()
     scala_remove_asked = Signal()  # the Scala scale and keyboard mapping of the patch
+    all_asked = Signal()  # clear the browser's filter
     octave_asked = Signal(int)  # up or down by so many
     macro_turned = Signal(int, float)  # its number from 0, its value 0 … 1
     changed = Signal(str, float)  # a field of a patch and its new value
@@ -149,6 +151,8 @@ class PatchBar(QFrame):
         return column
 
     def _build_state(self) -> QHBoxLayout:
+        self.filtered = FilterButton("instruments")
+        self.filtered.clicked.connect(self.all_asked)
         self.note = words_label()
         self.scala = tool_button("Scala  ✕", "Remove the Scala tuning of the instrument")
         self.scala.setObjectName("solo")
@@ -183,6 +187,7 @@ class PatchBar(QFrame):
             button.setObjectName("chip")
         row = QHBoxLayout()
         row.setSpacing(8)
+        row.addWidget(self.filtered)
         row.addWidget(self.note, 1)
         for widget in (self.scala, lower, self.octave, higher, self.velocity, self.voices, self.record):
             row.addWidget(widget)

@@ -19,12 +19,14 @@ from engine.pluck import SHAPES
 
 HEAD_HEIGHT, FACTS_HEIGHT, SPACING = 13, 16, 4
 WIDTHS = {  # in pixels, by the longest name or value
-    "tuning.transpose": 62,
-    "knobs.gauge": 58,
-    "knobs.density": 76,
-    "knobs.stiffness": 62,
-    "pluck.width": 66,
-    "pluck.width_hard": 66,
+    "tuning.transpose": 58,
+    "knobs.gauge": 56,
+    "knobs.density": 68,
+    "knobs.stiffness": 56,
+    "pluck.width": 62,
+    "pluck.width_hard": 62,
+    "pluck.release_ms": 73,
+    "pluck.release_hard_ms": 73,
 }  # the others are narrow
 NO_A4 = (
     "The Scala keyboard mapping of this instrument has a reference pitch of its own, so that A4 would change nothing"

@@ -15,6 +15,7 @@ from app.playing.keyboard import (
     KeyPress,
     PluckRange,
     letters_of,
+    octave_near,
     octaves_of,
     place_of,
     semitone_of,
@@ -134,6 +135,14 @@ def test_octaves_are_those_in_which_a_key_sounds(low: int, keys: int) -> None:
         if any(low <= LOWEST_C + 12 * octave + semitone <= high for semitone in own)
     ]
     assert octaves_of(low, high) == (sounding[0], sounding[-1])
+
+
+def test_the_octave_is_the_nearest_with_most_keys() -> None:
+    guitar, toms, three_pads = range(40, 87), range(36, 52), (50, 51, 52)  # E2 to D6, C2 to D♯3
+    assert [octave_near(octave, guitar) for octave in (-4, -1, 0, 2, 4)] == [0, 0, 0, 2, 2]
+    assert [octave_near(octave, toms) for octave in (-4, 0, 4)] == [-1, -1, -1]
+    assert octave_near(0, three_pads) == 0
+    assert octave_near(3, range(120, 128)) == 3, "no octave has any of them"
 
 
 def test_a_range_that_no_key_reaches_has_the_nearest_octave() -> None:

@@ -8,7 +8,7 @@ import pyqtgraph as pg
 import pytest
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QColor
-from PySide6.QtWidgets import QApplication, QCheckBox
+from PySide6.QtWidgets import QApplication, QCheckBox, QInputDialog, QLineEdit
 from pytestqt.qtbot import QtBot
 
 from app.presets.library import Library
@@ -29,6 +29,16 @@ from app.window.panels.waveform import WaveformPanel
 def dark_again() -> Iterator[None]:
     yield
     theme.use(theme.DARK)
+
+
+def test_a_question_for_a_name_has_room_for_one(qtbot: QtBot) -> None:
+    dialog = QInputDialog()
+    qtbot.addWidget(dialog)
+    dialog.setStyleSheet(theme._style_sheet())
+    dialog.setTextValue("Steel-string acoustic, felt, tuned to D")
+    dialog.show()
+    field = dialog.findChild(QLineEdit)
+    assert field.fontMetrics().horizontalAdvance(field.text()) < field.width()
 
 
 @pytest.mark.parametrize("chosen", [theme.DARK, theme.LIGHT], ids=["dark", "light"])

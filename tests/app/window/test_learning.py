@@ -40,6 +40,7 @@ def test_a_note_is_learned_compared_kept_and_played(qtbot: QtBot, played: Contro
     dialog = dialog_of(qtbot, played, note)
     assert dialog.string.isChecked()
     assert dialog.name.text() == "Low string"
+    assert dialog.length_m.text() == dialog.gauge_mm.text() == "assumed"
     dialog.kind.setCurrentIndex(dialog.kind.findData("bass"))
     dialog.start.click()
     assert not dialog.start.isEnabled()
@@ -57,6 +58,9 @@ def test_a_note_is_learned_compared_kept_and_played(qtbot: QtBot, played: Contro
     assert patch is not None
     assert (patch.name, patch.category, patch.preset) == ("Low string", "bass", "low_string")
     assert (own_bodies() / "low_string.wav").exists()
+    notice = played.window.notices.notices[-1]
+    assert notice.message.startswith("low_string: learned.")
+    assert not notice.error
     recorded = read_info(find_preset("low_string", [entry.path for entry in played.library.entries])).recorded
     assert recorded is not None
     assert recorded.errors["esr"] < 0.1

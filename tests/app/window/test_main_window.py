@@ -115,6 +115,15 @@ def tab_to(qtbot: QtBot, window: MainWindow, aim: QWidget) -> None:
     pytest.fail(f"Tab never came to {aim}")
 
 
+def test_a_loop_can_be_seen_and_ended_on_both_faces(controller: Controller) -> None:
+    loop = controller.window.transport._loop
+    for face in ("lab", "play"):
+        controller.session.update(face=face, loop=True)
+        assert loop.isVisible() and loop.isChecked()
+        loop.click()
+        assert not controller.session.choices.loop
+
+
 def test_enter_presses_what_tab_went_to_and_plucks_otherwise(qtbot: QtBot, controller: Controller) -> None:
     window, session = controller.window, controller.session
     plucked: list[bool] = []
@@ -209,7 +218,7 @@ def test_in_a_narrow_window_the_controls_stand_closer_and_all_are_seen(qtbot: Qt
 def test_in_a_small_window_with_a_filter_the_header_does_not_overlap(qtbot: QtBot, controller: Controller) -> None:
     window = controller.window
     bar = window.presets
-    bar.set_listed(1, 21)
+    bar.filtered.show_listed(1, 21)
     bar.name.setText("★  Nylon B3, random shapes, 16 kHz — Integrated phase, blind   ▾")
 
     def apart() -> bool:

@@ -186,14 +186,23 @@ def test_octave_keys_stop_where_no_key_sounds_and_the_strip_says_so(qtbot: QtBot
     assert played.session.choices.octave == 3
 
 
-def test_the_octave_moves_into_the_range_of_another_instrument(qtbot: QtBot, played: Controller) -> None:
+def test_the_octave_moves_to_where_most_keys_of_another_instrument_sound(played: Controller) -> None:
     played.session.update(octave=2)  # C5 to F6
     played.patches.choose("slack_bass")
-    assert played.session.choices.octave == 0
+    assert played.session.choices.octave == -1
     assert QToolTip.text() == "Octave moved: Slack bass has C1 to A♯3"
-    assert played.window.instrument.bar.octave.text() == "octave C3"
+    assert played.window.instrument.bar.octave.text() == "octave C2"
     played.patches.choose("concert_harp")
-    assert played.session.choices.octave == 0, "keys sound there"
+    assert played.session.choices.octave == -1, "all keys sound there"
+    played.patches.choose("mandolin")
+    assert played.session.choices.octave == 1, "at C3 the key A is below its lowest string"
+
+
+def test_a_turned_knob_leaves_the_octave_that_the_user_chose(played: Controller) -> None:
+    played.patches.choose("toy_wires")
+    played.session.update(octave=3)  # four keys sound
+    played.patches.change("knobs.decay", 3.0)
+    assert played.session.choices.octave == 3
 
 
 def test_places_are_still_there_without_pitches(qtbot: QtBot, played: Controller) -> None:
@@ -317,6 +326,20 @@ def test_an_old_search_does_not_hide_what_was_just_saved(played: Controller, mon
         played.patches.desk.toggle()
         assert (browser.search.text(), browser.selected) == ("", name.lower())
         played.patches.desk.toggle()
+
+
+def test_a_filter_that_previous_and_next_go_through_is_shown_and_cleared(played: Controller) -> None:
+    bar, browser = played.window.instrument.bar, played.patches.browser
+    assert not bar.filtered.isVisible()
+    browser.search.setText("mandolin")
+    played.patches.choose("mandolin")
+    assert bar.filtered.isVisible()
+    assert bar.filtered.text() == f"{len(browser.listed)} of {browser.total}  ✕"
+    bar.filtered.click()
+    assert not bar.filtered.isVisible()
+    assert len(browser.listed) == browser.total
+    bar.next_asked.emit()
+    assert played.session.choices.patch.name != "Mandolin"  # type: ignore[union-attr]
 
 
 def test_an_impossible_name_is_explained_and_asked_for_again(

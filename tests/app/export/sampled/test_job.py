@@ -56,7 +56,7 @@ def test_progress_has_the_note_and_the_time_left(patch: Patch, render: Render, t
 
     export_sampled(small(patch), tmp_path / "a.sfz", render, progress=progress)
     assert [share for share, _, _ in reported] == [part / 10 for part in range(10)]
-    assert reported[0][1:] == (f"key 50, velocity {small(patch).zones[0].velocity}", None)
+    assert reported[0][1:] == (f"D3, velocity {small(patch).zones[0].velocity}", None)
     assert [left_s is None for _, _, left_s in reported[:4]] == [True, True, False, False]  # the first also compiles
 
 

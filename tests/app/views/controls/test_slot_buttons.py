@@ -36,6 +36,13 @@ def test_a_matched_level_is_reported_with_its_unit(slots: SlotButtons) -> None:
     assert [button.text() for button in slots._buttons.values()] == ["A  MODEL  +0.1 dB", "B  TRUTH  -12.3 dB"]
 
 
+def test_in_the_least_room_model_and_truth_are_whole(slots: SlotButtons) -> None:
+    slots.show_choices(Choices(a="model", b="truth"))
+    slots.show_gains({})
+    slots.set_narrow(True, tight=True)
+    assert [button.text() for button in slots._buttons.values()] == ["A  MODEL", "B  TRUTH"]
+
+
 def test_narrow_the_gain_is_reported_without_its_unit_first(slots: SlotButtons) -> None:
     button = slots._buttons["b"]
     assert (button.width(), button.text()) == (WIDTH, "B  DIFF.  +20 dB")

@@ -92,6 +92,13 @@ def saved(tmp_path: Path) -> AbxRecord:
     return AbxRecord.model_validate_json(path.read_bytes())
 
 
+def test_enter_starts_the_test_from_the_number_of_trials(qtbot: QtBot, open_dialog: Open) -> None:
+    dialog = open_dialog()
+    dialog._setup.trials.setFocus()
+    qtbot.keyClick(dialog._setup.trials, Qt.Key.Key_Return)
+    assert dialog.testing
+
+
 def test_a_whole_test_by_keyboard(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
     seed, order = 4, draw_order(4, 3)
     dialog = open_dialog(seed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 from PySide6.QtCore import QEvent, Qt
+from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QApplication
 from pytestqt.qtbot import QtBot
 
@@ -35,6 +36,13 @@ def test_every_field_is_shown_and_can_be_turned_to_both_ends(knobs: StringKnobs,
             if field not in ("pluck.softest_mm", "pluck.hardest_mm"):  # which bound each other
                 assert guitar.with_value(field, value).value(field) == pytest.approx(value)
     assert knobs.knobs["tuning.a4_hz"].value == guitar.tuning.a4_hz
+
+
+def test_every_name_fits_its_knob(knobs: StringKnobs) -> None:
+    metrics = QFontMetrics(theme.small_font(9, grows=False))
+    for knob in knobs.knobs.values():
+        name = knob.accessibleName().upper()
+        assert metrics.horizontalAdvance(name) <= knob.sizeHint().width(), name
 
 
 def test_a_turn_is_reported_with_its_field(qtbot: QtBot, knobs: StringKnobs, guitar: Patch) -> None:
