@@ -41,9 +41,10 @@ if TYPE_CHECKING:
 EXPECTED = (NoteFileError, PatchError, PresetError, WriteError, ValueError)
 KINDS = (("Guitar", "guitar"), ("Bass", "bass"), ("Harp", "harp"), ("Piano", "piano"))
 LONGEST_M, THICKEST_MM = 5.0, 10.0
+ON_KEYS = "Keys will play a plucked string with these partials: close to the learned note, not equal to it."
 HEARD: tuple[tuple[Literal["recording", "learned"], str], ...] = (
     ("recording", "▶  Recording"),
-    ("learned", "▶  Learned string"),
+    ("learned", "▶  Learned note"),
 )
 
 
@@ -212,7 +213,7 @@ class LearnDialog(QDialog):
         self._pair = Pair(self._output.mixer, sounds)
         self.report.setPlainText("\n".join(as_text(self._learned)))
         self._pages.setCurrentIndex(1)
-        self._ready("Nothing is written yet.")
+        self._ready(f"Nothing is written yet. {ON_KEYS}")
         self.start.setText("Keep and play")
         self.start.setEnabled(True)
         self.heard["learned"].setFocus()

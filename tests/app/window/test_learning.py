@@ -11,7 +11,7 @@ from pytestqt.qtbot import QtBot
 
 from app.instrument.bodies import own_bodies
 from app.patches.library import own_patches
-from app.views.dialogs.learn_dialog import LearnDialog
+from app.views.dialogs.learn_dialog import ON_KEYS, LearnDialog
 from app.window.controller import Controller
 from engine.presets import find_preset, read_info
 from tests.bench.recordings.synthetic import synthetic_note
@@ -46,7 +46,8 @@ def test_a_note_is_learned_compared_kept_and_played(qtbot: QtBot, played: Contro
     assert not dialog.start.isEnabled()
     qtbot.waitUntil(lambda: dialog._learned is not None, timeout=LEARNED_MS)
     assert "error-to-signal ratio 0.0" in dialog.report.toPlainText()
-    assert not own_patches().exists()  # nothing is written yet
+    assert dialog.state.text() == f"Nothing is written yet. {ON_KEYS}"
+    assert not own_patches().exists()
     for heard, other in (("learned", "recording"), ("recording", "learned")):
         dialog.heard[heard].click()
         assert dialog._pair is not None
