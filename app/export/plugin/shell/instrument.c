@@ -264,8 +264,11 @@ void instrument_set(instrument *own, int32_t place, double value) {
 }
 
 static void wait_for(instrument *own, int64_t frame, int32_t place) {
-  if (own->waiting == MOST_CHANGES) {
-    own->lost++;
+  if (own->waiting == MOST_CHANGES) { /* the latest value counts, a little early */
+    int32_t last = MOST_CHANGES - 1;
+    while (last >= 0 && own->changes[last].parameter != place) last--;
+    if (last >= 0) own->changes[last].value = own->values[place];
+    else own->lost++;
     return;
   }
   own->changes[own->waiting++] = (change){frame, place, own->values[place]};

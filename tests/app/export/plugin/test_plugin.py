@@ -521,6 +521,20 @@ def test_a_reset_leaves_no_note_wheel_or_pedal(bank: Library) -> None:
     assert difference_db(played(instance, patch, 48_000), plain) < -80  # the limiter recovers from the loud note
 
 
+def test_the_last_of_many_values_counts(bank: Library) -> None:
+    instance, other = instance_of(bank, "electric_bass"), instance_of(bank, "electric_bass")
+    moved = [each for name, each in instance.parameters.items() if name not in ("Source", "volume")][:6]
+    ends = [param(511, each.id, each.low + 0.4 * (each.high - each.low)) for each in moved]
+    swept = [param(frame, each.id, each.high) for frame in range(511) for each in moved]
+    instance.render(512, swept + ends)
+    other.render(512, ends)
+    for each in (instance, other):
+        each.render(48_000, [])
+    assert instance.save() == other.save()
+    found, wanted = (each.render(9_600, [note_on(0, 40, 100)]) for each in (instance, other))
+    assert difference_db(found, wanted) < -80  # of body and room, which glide
+
+
 def test_a_parameter_that_moved_just_before_a_reset_counts(bank: Library) -> None:
     instance = instance_of(bank, "electric_bass")
     volume = instance.parameters["volume"].id
