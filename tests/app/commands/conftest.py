@@ -38,8 +38,9 @@ class Outcome:
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
-    """Runs a command line in this process."""
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Outcome]:
+    """Runs a command line in this process, without the lines of progress that a slow machine prints."""
+    monkeypatch.setattr("training.cli.console._Lines", lambda what, every_s: lambda *_, **__: None)
 
     def run(*words: object) -> Outcome:
         capsys.readouterr()
