@@ -262,7 +262,9 @@ static void stop_processing(const clap_plugin *plugin) { (void)plugin; }
 
 static void shell_reset(const clap_plugin *plugin) {
   shell *own = shell_of(plugin);
-  if (own->active) instrument_reset(&own->own);
+  if (!own->active) return;
+  own->loaded = false; /* all values are taken up */
+  instrument_reset(&own->own);
 }
 
 typedef struct { const clap_out_events *out; uint32_t last; } ends;

@@ -112,15 +112,16 @@ static void begin_mix(instrument *own) {
   const double *powers = e->heard->powers[(body > 0 ? POWER_BODY : 0) + (room > 0 ? POWER_ROOM : 0)];
   for (int32_t each = 0; each < 16; each++) power += weights[each / 4] * weights[each % 4] * powers[each];
   for (int32_t each = 0; each < 1 + MIX_PARTS; each++) e->weights[each] = weights[each] / fmax(sqrt(power), 1e-30);
+  e->mixing_to = idle(own);
   for (int32_t which = 0; which < MIX_PARTS; which++)
-    if (e->heard->parts[which]) memcpy(idle(own), e->heard->parts[which], I_HEADER * sizeof(slot));
+    if (e->heard->parts[which]) memcpy(e->mixing_to, e->heard->parts[which], I_HEADER * sizeof(slot));
   e->mixing_at = I_HEADER;
 }
 
 /* Mixes more of it; what is ready is handed to the convolver, which fades to it. */
 static void mix_on(instrument *own, int64_t most) {
   effects *e = &own->effects;
-  slot *to = idle(own);
+  slot *to = e->mixing_to;
   int64_t first = e->mixing_at, end = first + most < e->heard->slots ? first + most : e->heard->slots;
   for (int64_t place = first; place < end; place++) to[place].real = 0;
   for (int32_t which = 0; which < MIX_PARTS; which++)
@@ -136,6 +137,7 @@ static void mix_on(instrument *own, int64_t most) {
 }
 
 enum { MIXED_A_QUANTUM = 16384 }; /* slots: some ten microseconds */
+_Static_assert(I_HEADER + 4 * EARLY * (QUANTUM + 1) < MIXED_A_QUANTUM, "the first quantum hears no more");
 
 /* Takes up what the thread has made. */
 static bool adopt(instrument *own) {
@@ -208,8 +210,6 @@ bool effects_begin(instrument *own) {
     e->convolver[C_SINES + k].real = e->workshop[C_SINES + k].real = sin(turn);
   }
   e->convolver[C_CAPACITY].whole = late;
-  e->convolver[C_FADE_WINDOWS].whole = (int64_t)ceil(CONVOLVER_FADE_S * own->rate_hz / WINDOW);
-  e->convolver[C_STEP].whole = -1;
   if (!e->heard || e->heard->hz != own->rate_hz || e->heard->size != size || e->heard->t60_s != t60_s) {
     effects_free(own);
     if (!(e->heard = prepare(own, size, t60_s))) return false;
@@ -218,12 +218,34 @@ bool effects_begin(instrument *own) {
     if (!(e->mixes[each] = calloc((size_t)slots_of(e->most_frames), sizeof(slot)))) return false;
   int64_t body = own->table[TABLE_BODY].whole;
   if (body) memcpy(own->table + body, e->heard->curves, sizeof e->heard->curves);
-  own->mixer[M_CONVOLVER].whole = number_of(e->convolver);
-  begin_mix(own);
-  if (e->mixing_at >= 0) mix_on(own, e->heard->slots);
   e->ends = false;
   e->thread = thread_begin(work, own); /* without it, size and time stay as they are */
   return true;
+}
+
+slot *effects_mixed(const instrument *own) {
+  bool done = own->effects.mixing_at < 0;
+  return done ? (slot *)(intptr_t)own->mixer[M_EFFECTS].whole : NULL;
+}
+
+void effects_reset(instrument *own, slot *mixed) {
+  effects *e = &own->effects;
+  slot *convolver = e->convolver, capacity = convolver[C_CAPACITY];
+  memset(convolver, 0, C_COSINES * sizeof(slot));
+  memset(convolver + C_SINES + 2 * WINDOW, 0, (C_LATE - C_SINES - 2 * WINDOW) * sizeof(slot));
+  convolver[C_CAPACITY] = capacity;
+  convolver[C_FADE_WINDOWS].whole = (int64_t)ceil(CONVOLVER_FADE_S * own->rate_hz / WINDOW);
+  convolver[C_STEP].whole = -1;
+  own->mixer[M_CONVOLVER].whole = number_of(convolver);
+  own->mixer[M_EFFECTS].whole = number_of(mixed);
+  e->mixing_at = -1;
+  bool same = mixed && wanted(own, EFFECT_BODY_MIX) == e->mixing[0] && wanted(own, EFFECT_ROOM_MIX) == e->mixing[1];
+  if (adopt(own) || !same) {
+    begin_mix(own);
+    if (e->mixing_at < 0) return;
+    mix_on(own, MIXED_A_QUANTUM);
+    own->mixer[M_EFFECTS].whole = number_of(e->mixing_to); /* what is heard later is mixed before */
+  }
 }
 
 void effects_end(instrument *own) {

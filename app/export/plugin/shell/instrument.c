@@ -93,7 +93,9 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
   if (of->kind == KIND_VALUE) {
     pushed(own, frame, PARAMETER, 0, of->index, value);
     void *error = NULL, *result = NULL;
-    if (own->kit) own->kernels->kit_follow(&result, &error, number_of(own->kit), of->index, value);
+    if (own->kit && value != own->followed[place])
+      own->kernels->kit_follow(&result, &error, number_of(own->kit), of->index, value);
+    own->followed[place] = value;
   } else if (of->kind == KIND_VOLUME) {
     own->mixer[M_WANTED_VOLUME].real = pow(10, value / 20);
   } else if (of->kind == KIND_SOURCE) {
@@ -109,6 +111,54 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
     own->amp[of->index] = value;
     follow_amp(own);
   }
+}
+
+/* Mixer and player as new ones. Voices and scratch are written before they are read. */
+static void rest(instrument *own) {
+  const image *of = own->of;
+  double rate_hz = own->rate_hz;
+  slot *mixer = own->mixer, *player = own->player;
+  memset(mixer, 0, M_SCRATCH * sizeof(slot));
+  memset(mixer + M_AMPLIFIER, 0, (MIXER_SLOTS - M_AMPLIFIER) * sizeof(slot));
+  memset(player, 0, PLAYER_VOICES * sizeof(slot));
+  mixer[M_RATE].real = rate_hz;
+  mixer[M_CHANNELS].whole = 2;
+  mixer[M_LIMITING].whole = 1;
+  mixer[M_WANTED_VOLUME].real = mixer[M_REDUCTION].real = 1;
+  for (int frame = 0; frame < AHEAD; frame++) mixer[M_GAINS + frame].real = 1;
+  mixer[M_RELEASE].real = exp(-1 / (LIMITER_RELEASE_S * rate_hz));
+  mixer[M_SMOOTHING].real = exp(-1 / (VOLUME_SMOOTHING_S * rate_hz));
+  const double *taps = (const double *)of + of->taps;
+  for (int tap = 0; tap < 2 * REACH + 1; tap++) mixer[M_TAPS + tap].real = taps[tap] * rate_hz;
+  mixer[M_ADDRESS].whole = number_of(mixer);
+  mixer[M_PLAYER].whole = number_of(player);
+  player[PLAYER_RATE].real = rate_hz;
+  player[PLAYER_MODES].whole = of->modes;
+  player[PLAYER_MOST].whole = of->most_notes;
+  void *error = NULL, *result = NULL;
+  own->kernels->begin(&result, &error, number_of(player));
+  for (int32_t place = 0; place < of->parameter_count; place++) {
+    const parameter *each = &parameters_of(of)[place];
+    if (each->kind == KIND_EFFECT) own->effects.values[each->index] = own->values[place];
+    if (each->kind == KIND_AMP) own->amp[each->index] = own->values[place];
+  }
+}
+
+void instrument_reset(instrument *own) {
+  slot *heard = effects_mixed(own);
+  rest(own);
+  own->waiting = 0;
+  own->read = 0;
+  slot *event = pushed(own, 0, TABLE, 0, 0, 0);
+  event[EVENT_TABLE].whole = number_of(own->table);
+  for (int32_t place = 0; place < own->of->parameter_count; place++) {
+    const parameter *each = &parameters_of(own->of)[place];
+    double value = own->values[place];
+    bool always = each->kind == KIND_SOURCE || each->kind == KIND_VOLUME;
+    if (always || value != each->standard || value != own->followed[place]) apply(own, place, value, 0);
+  }
+  own->mixer[M_VOLUME].real = own->mixer[M_WANTED_VOLUME].real;
+  effects_reset(own, heard);
 }
 
 bool instrument_begin(instrument *own, double rate_hz) {
@@ -128,46 +178,18 @@ bool instrument_begin(instrument *own, double rate_hz) {
     instrument_end(own);
     return false;
   }
-  slot *mixer = own->mixer, *player = own->player;
-  mixer[M_RATE].real = rate_hz;
-  mixer[M_CHANNELS].whole = 2;
-  mixer[M_LIMITING].whole = 1;
-  mixer[M_WANTED_VOLUME].real = mixer[M_VOLUME].real = mixer[M_REDUCTION].real = 1;
-  for (int frame = 0; frame < AHEAD; frame++) mixer[M_GAINS + frame].real = 1;
-  mixer[M_RELEASE].real = exp(-1 / (LIMITER_RELEASE_S * rate_hz));
-  mixer[M_SMOOTHING].real = exp(-1 / (VOLUME_SMOOTHING_S * rate_hz));
-  const double *taps = (const double *)of + of->taps;
-  for (int tap = 0; tap < 2 * REACH + 1; tap++) mixer[M_TAPS + tap].real = taps[tap] * rate_hz;
-  mixer[M_ADDRESS].whole = number_of(mixer);
-  mixer[M_PLAYER].whole = number_of(player);
   own->model[S_RATE].real = own->truth[T_RATE].real = rate_hz;
   own->table[TABLE_PROGRAMS].whole = number_of(own->model);
   own->table[TABLE_PROGRAMS + 1].whole = number_of(own->truth);
-  player[PLAYER_RATE].real = rate_hz;
-  player[PLAYER_MODES].whole = of->modes;
-  player[PLAYER_MOST].whole = of->most_notes;
   void *error = NULL, *result = NULL;
-  own->kernels->begin(&result, &error, number_of(player));
-  for (int32_t place = 0; place < of->parameter_count; place++) {
-    const parameter *each = &parameters_of(of)[place];
-    if (each->kind == KIND_EFFECT) own->effects.values[each->index] = own->values[place];
-    if (each->kind == KIND_AMP) own->amp[each->index] = own->values[place];
-  }
   if (own->kit) own->kernels->kit_begin(&result, &error, number_of(own->kit), number_of(own->table));
+  for (int32_t place = 0; place < of->parameter_count; place++) own->followed[place] = parameters_of(of)[place].standard;
+  rest(own);
   if (!effects_begin(own)) {
     instrument_end(own);
     return false;
   }
-  own->waiting = 0;
-  own->read = 0;
-  slot *event = pushed(own, 0, TABLE, 0, 0, 0);
-  event[EVENT_TABLE].whole = number_of(own->table);
-  for (int32_t place = 0; place < of->parameter_count; place++) {
-    const parameter *each = &parameters_of(of)[place];
-    bool always = each->kind == KIND_SOURCE || each->kind == KIND_VOLUME;
-    if (always || own->values[place] != each->standard) apply(own, place, own->values[place], 0);
-  }
-  mixer[M_VOLUME].real = mixer[M_WANTED_VOLUME].real;
+  instrument_reset(own);
   return true;
 }
 
@@ -237,12 +259,6 @@ void instrument_midi(instrument *own, uint32_t at, const uint8_t *bytes) {
     }
     default: break;
   }
-}
-
-void instrument_reset(instrument *own) {
-  pushed(own, 0, CANCEL, 0, 0, 0);
-  for (int32_t channel = 0; channel < CHANNELS; channel++) instrument_controller(own, 0, channel, 121, 0);
-  instrument_controller(own, 0, 0, 120, 0);
 }
 
 static double bounded(const parameter *of, double value) {

@@ -63,7 +63,7 @@ typedef struct {
   double values[EFFECTS];         /* the latest */
   slot *convolver, *workshop;     /* of the audio thread, and of the other one */
   prepared *heard;                /* what is mixed from; it is kept from rate to rate */
-  slot *mixes[2];                 /* what is heard, and the next */
+  slot *mixes[2], *mixing_to;     /* what is heard, and the next; the one that is mixed */
   int64_t most_frames, mixing_at; /* of a response; the next slot that is mixed, -1: none is */
   double mixing[2], weights[1 + MIX_PARTS]; /* of the latest mix */
   void *thread;                   /* it computes a response of `size` and `t60_s` whenever another one is asked for */
@@ -80,7 +80,7 @@ typedef struct {
   slot *mixer, *player, *table, *model, *truth, *scratch, *kit; /* kit: of drums, else NULL */
   effects effects;
   double amp[2];      /* drive and tone in dB; no drive: there is no amplifier */
-  double values[MOST_PARAMETERS];
+  double values[MOST_PARAMETERS], followed[MOST_PARAMETERS]; /* followed: by the kit */
   change changes[MOST_CHANGES];
   int32_t waiting;
   int64_t read;       /* reports */
@@ -110,7 +110,7 @@ void instrument_choke(instrument *, uint32_t at, int64_t id, int32_t channel, in
 void instrument_change(instrument *, uint32_t at, int32_t parameter, double value);
 void instrument_follow(instrument *, int32_t parameter);            /* its value counts from the next frame on */
 void instrument_set(instrument *, int32_t parameter, double value); /* while nothing is rendered */
-void instrument_reset(instrument *); /* silence, and all wheels and pedals at rest */
+void instrument_reset(instrument *); /* as instrument_begin leaves it, with the values of now; it allocates nothing */
 void instrument_render(instrument *, uint32_t frames, float *left, float *right);
 void instrument_report_ends(instrument *, note_ended, void *context);
 bool instrument_silent(const instrument *);

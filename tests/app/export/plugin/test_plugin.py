@@ -510,15 +510,31 @@ def test_tuning_one_note_leaves_the_others(bank: Library) -> None:
     assert difference_db(bent - sound(), alone) < -100  # in the sum only single precision is lost
 
 
-def test_a_reset_leaves_no_note_wheel_or_pedal(bank: Library) -> None:
-    patch = patch_of("electric_bass")
-    plain = played(instance_of(bank, "electric_bass"), patch, 48_000)
-    instance = instance_of(bank, "electric_bass")
-    events = [midi(0, 0xE0, 0, 100), midi(0, 0xB0, 64, 127), note_on(10, 40, 120), note_on(450, 45, 120)]
-    instance.render(512, events)
+@pytest.mark.parametrize("name", NAMES)
+def test_after_a_reset_it_is_as_a_new_one(bank: Library, name: str) -> None:
+    patch = patch_of(name)
+    low = max(patch.range[0], min(52, patch.range[1] - 20))
+    instance, fresh = instance_of(bank, name), instance_of(bank, name)
+    pedals = [midi(0, 0xE0, 0, 100), midi(0, 0xB0, 1, 90), midi(0, 0xB0, 64, 127), midi(0, 0xB1, 101, 0)]
+    events = [*pedals, *(note_on(10 + 900 * each, low + 2 * each, 90 + 4 * each) for each in range(9))]
+    instance.render(9_000, events)
     instance.reset()
-    instance.render(48_000, [])
-    assert difference_db(played(instance, patch, 48_000), plain) < -80  # the limiter recovers from the loud note
+    silence = instance.render(48_000, [])
+    assert np.array_equal(silence, fresh.render(48_000, []))
+    assert not silence.any() or (patch.amp.drive_db > 0 and np.abs(silence).max() < 1e-15)  # as when new
+    instance.render(9_000, events)
+    names = {"volume", "decay", "modulus", "pluck position", "release", "body mix", "room", "amplifier drive"}
+    for moved in (each for shown, each in instance.parameters.items() if shown in names):
+        instance.block(1, [param(instance.frame, moved.id, moved.low + 0.3 * (moved.high - moved.low))])
+    state = instance.save()
+    fresh.deactivate()
+    assert fresh.load(state)
+    fresh.activate(48_000)
+    instance.reset()
+    assert instance.save() == state
+    wanted = played(fresh, patch, 48_000)
+    assert np.abs(wanted).max() > 1e-3
+    assert np.array_equal(played(instance, patch, 48_000), wanted)
 
 
 def test_the_last_of_many_values_counts(bank: Library) -> None:
