@@ -26,6 +26,7 @@ SMOOTH_OCTAVES = 0.4  # half width of the window in which decays are averaged
 MOST_NODES = 24
 MOST_BESIDE_SMOOTH = 5.0
 MOST_OFF_CENTS = 25.0  # an estimate: a partial further from the series is pulled by the body, and decays with it
+NEAR_CENTS = 12.0  # an estimate: a partial with a pole so near has no other further off
 PULLED_WEIGHT = 1e-3
 LEAST_SHARE = 1e-8  # of the strongest partial's energy, for a partial whose decay counts
 
@@ -109,7 +110,7 @@ def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
     """The partials with their poles, at rest; those without energy are left out."""
     found = []
     for number in sorted({pole.partial for pole in learned.poles if pole.partial}):
-        poles = polarisations([pole for pole in learned.poles if pole.partial == number and pole.a])
+        poles = polarisations(_of_string(learned, number))
         if not poles:
             continue
         if number in learned.spreads:
@@ -126,6 +127,25 @@ def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
         found.append(Partial(number, hz, 0.5 * energy / moment, float(np.abs(a).sum()), energy, tuple(poles)))
     loudest = max((each.energy for each in found), default=0.0)
     return tuple(each for each in found if each.energy > LEAST_SHARE * loudest)
+
+
+def _of_string(learned: LearnedNote, number: int) -> list[Pole]:
+    """The poles that a partial's polarisations are among: its own and free ones, near their place in the series.
+
+    What is further off is a resonance of the body. A partial that has nothing near is pulled by it: its own stay.
+    """
+    place = learned.f0_hz * number * math.sqrt(1 + learned.stiffness * number**2)
+    far = 300 * math.log2((number + 1) / number)  # a quarter of the way to the next partial
+    own = [pole for pole in learned.poles if pole.partial == number and pole.a]
+    free = [pole for pole in learned.poles if pole.partial == 0 and pole.a and pole.hz > 0]
+    off = {id(pole): abs(1200 * math.log2(pole.hz / place)) for pole in (*own, *free)}
+    for reach in (NEAR_CENTS, MOST_OFF_CENTS):
+        near = [pole for pole in own if off[id(pole)] < reach]
+        if len(near) > 1:
+            return near
+        if near:
+            return near + [pole for pole in free if off[id(pole)] < min(reach, far)]
+    return own
 
 
 def physics_of(learned: LearnedNote) -> Physics:
@@ -263,10 +283,10 @@ def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[f
         place = each.number - 1
         first = each.poles[0]
         cents[place] = 1200 * math.log2(abs(first.s) / omega[place])
-        apart = first.decay / smooth[place]
-        if not 1 / MOST_BESIDE_SMOOTH < apart < MOST_BESIDE_SMOOTH:
+        beside = [pole.decay / smooth[place] for pole in each.poles]
+        if not any(1 / MOST_BESIDE_SMOOTH < apart < MOST_BESIDE_SMOOTH for apart in beside):
             continue  # of noise or the body, not of the string: it decays as its neighbours do
-        ratio[place] = apart
+        ratio[place] = first.decay / smooth[place]
         if len(each.poles) == 2:
             second = each.poles[1]
             second_cents[place] = _split(each.poles)
