@@ -28,6 +28,8 @@ MOST_BESIDE_SMOOTH = 5.0
 MOST_OFF_CENTS = 25.0  # an estimate: a partial further from the series is pulled by the body, and decays with it
 NEAR_CENTS = 12.0  # an estimate: a partial with a pole so near has no other further off
 PULLED_WEIGHT = 1e-3
+NEARLY_ALIKE = 1.12  # an estimate: times the least misfit of a place where the string may have been pulled
+COMB_FLOOR = 0.15  # partials that the pluck hardly excites say nothing of the body
 LEAST_SHARE = 1e-8  # of the strongest partial's energy, for a partial whose decay counts
 
 
@@ -248,20 +250,26 @@ def _damping(physics: Physics, mass: float, length: float) -> tuple[float, float
 
 
 def pluck_place(physics: Physics) -> float:
-    """Where a triangle was pulled, below one half, by the comb of the partials' amplitudes; it is a guess."""
+    """Where a triangle was pulled, below one half, by the comb of the partials' amplitudes; it is a guess.
+
+    Of places that fit nearly alike, that whose nodes cost the instrument least: it cannot make up for a node.
+    """
     k = np.array([each.number for each in physics.partials], float)
     level = np.log([each.amplitude for each in physics.partials])
     if len(k) < 6:
         return 0.2
     k, level = k[:40], level[:40]
     smooth = np.stack([np.ones_like(k), np.log(k), np.log(k) ** 2, k], 1)
-    best = (math.inf, 0.2)
+    found = []
     for place in np.linspace(0.06, 0.5, 111):
-        comb = np.log(np.maximum(np.abs(np.sin(math.pi * k * place)), 0.08))
+        heights = np.abs(np.sin(math.pi * k * place))
+        comb = np.log(np.maximum(heights, 0.08))
         solution, *_ = np.linalg.lstsq(smooth, level - comb, rcond=None)
         left = float(np.sum((level - comb - smooth @ solution) ** 2))
-        best = min(best, (left, float(place)))
-    return round(best[1], 3)
+        missing = np.log(COMB_FLOOR / np.clip(heights, 1e-3, COMB_FLOOR))
+        found.append((left, float(np.sum(missing**2)), float(place)))
+    most = NEARLY_ALIKE * min(left for left, _, _ in found)
+    return round(min((missing, place) for left, missing, place in found if left <= most)[1], 3)
 
 
 def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[float, ...]]:
