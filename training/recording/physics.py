@@ -26,7 +26,10 @@ SMOOTH_OCTAVES = 0.4  # half width of the window in which decays are averaged
 MOST_NODES = 24
 MOST_BESIDE_SMOOTH = 5.0
 MOST_OFF_CENTS = 25.0  # an estimate: a partial further from the series is pulled by the body, and decays with it
+NEAR_CENTS = 12.0  # an estimate: a partial with a pole so near has no other further off
 PULLED_WEIGHT = 1e-3
+NEARLY_ALIKE = 1.12  # an estimate: times the least misfit of a place where the string may have been pulled
+COMB_FLOOR = 0.15  # partials that the pluck hardly excites say nothing of the body
 LEAST_SHARE = 1e-8  # of the strongest partial's energy, for a partial whose decay counts
 
 
@@ -109,7 +112,7 @@ def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
     """The partials with their poles, at rest; those without energy are left out."""
     found = []
     for number in sorted({pole.partial for pole in learned.poles if pole.partial}):
-        poles = polarisations([pole for pole in learned.poles if pole.partial == number and pole.a])
+        poles = polarisations(_of_string(learned, number))
         if not poles:
             continue
         if number in learned.spreads:
@@ -126,6 +129,25 @@ def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
         found.append(Partial(number, hz, 0.5 * energy / moment, float(np.abs(a).sum()), energy, tuple(poles)))
     loudest = max((each.energy for each in found), default=0.0)
     return tuple(each for each in found if each.energy > LEAST_SHARE * loudest)
+
+
+def _of_string(learned: LearnedNote, number: int) -> list[Pole]:
+    """The poles that a partial's polarisations are among: its own and free ones, near their place in the series.
+
+    What is further off is a resonance of the body. A partial that has nothing near is pulled by it: its own stay.
+    """
+    place = learned.f0_hz * number * math.sqrt(1 + learned.stiffness * number**2)
+    far = 300 * math.log2((number + 1) / number)  # a quarter of the way to the next partial
+    own = [pole for pole in learned.poles if pole.partial == number and pole.a]
+    free = [pole for pole in learned.poles if pole.partial == 0 and pole.a and pole.hz > 0]
+    off = {id(pole): abs(1200 * math.log2(pole.hz / place)) for pole in (*own, *free)}
+    for reach in (NEAR_CENTS, MOST_OFF_CENTS):
+        near = [pole for pole in own if off[id(pole)] < reach]
+        if len(near) > 1:
+            return near
+        if near:
+            return near + [pole for pole in free if off[id(pole)] < min(reach, far)]
+    return own
 
 
 def physics_of(learned: LearnedNote) -> Physics:
@@ -228,20 +250,26 @@ def _damping(physics: Physics, mass: float, length: float) -> tuple[float, float
 
 
 def pluck_place(physics: Physics) -> float:
-    """Where a triangle was pulled, below one half, by the comb of the partials' amplitudes; it is a guess."""
+    """Where a triangle was pulled, below one half, by the comb of the partials' amplitudes; it is a guess.
+
+    Of places that fit nearly alike, that whose nodes cost the instrument least: it cannot make up for a node.
+    """
     k = np.array([each.number for each in physics.partials], float)
     level = np.log([each.amplitude for each in physics.partials])
     if len(k) < 6:
         return 0.2
     k, level = k[:40], level[:40]
     smooth = np.stack([np.ones_like(k), np.log(k), np.log(k) ** 2, k], 1)
-    best = (math.inf, 0.2)
+    found = []
     for place in np.linspace(0.06, 0.5, 111):
-        comb = np.log(np.maximum(np.abs(np.sin(math.pi * k * place)), 0.08))
+        heights = np.abs(np.sin(math.pi * k * place))
+        comb = np.log(np.maximum(heights, 0.08))
         solution, *_ = np.linalg.lstsq(smooth, level - comb, rcond=None)
         left = float(np.sum((level - comb - smooth @ solution) ** 2))
-        best = min(best, (left, float(place)))
-    return round(best[1], 3)
+        missing = np.log(COMB_FLOOR / np.clip(heights, 1e-3, COMB_FLOOR))
+        found.append((left, float(np.sum(missing**2)), float(place)))
+    most = NEARLY_ALIKE * min(left for left, _, _ in found)
+    return round(min((missing, place) for left, missing, place in found if left <= most)[1], 3)
 
 
 def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[float, ...]]:
@@ -263,10 +291,10 @@ def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[f
         place = each.number - 1
         first = each.poles[0]
         cents[place] = 1200 * math.log2(abs(first.s) / omega[place])
-        apart = first.decay / smooth[place]
-        if not 1 / MOST_BESIDE_SMOOTH < apart < MOST_BESIDE_SMOOTH:
+        beside = [pole.decay / smooth[place] for pole in each.poles]
+        if not any(1 / MOST_BESIDE_SMOOTH < apart < MOST_BESIDE_SMOOTH for apart in beside):
             continue  # of noise or the body, not of the string: it decays as its neighbours do
-        ratio[place] = apart
+        ratio[place] = first.decay / smooth[place]
         if len(each.poles) == 2:
             second = each.poles[1]
             second_cents[place] = _split(each.poles)

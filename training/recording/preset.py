@@ -17,7 +17,7 @@ from engine.resonators.recorded import RecordedNote, RecordedString
 from training.recording.fit import LearnedNote
 from training.recording.glide import TIMES_S
 from training.recording.note import FIT_BEGINS_S, Note
-from training.recording.physics import Physics, Strung, corrections
+from training.recording.physics import COMB_FLOOR, Physics, Strung, corrections
 
 Array = NDArray[np.float64]
 
@@ -25,7 +25,6 @@ BASE = "studio_any_string"  # whose curves play every string
 LEAST_GRID = 101
 BODY_S = 0.25
 BODY_RANGE_DB = 70.0
-COMB_FLOOR = 0.15  # partials that the pluck hardly excites say nothing of the body
 
 
 @dataclass(frozen=True)

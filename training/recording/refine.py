@@ -36,7 +36,7 @@ MOST_GLIDE = (-0.02, 0.08)  # of each share
 MOST_PITCH = 0.02  # of a take, above the first or below
 LARGEST_STEP = 60.0  # of ω in rad/s
 MOST_SPLIT_CENTS = 25.0  # between two polarisations
-MOST_DECAYS_APART = 8.0
+MOST_DECAYS_APART = 12.0
 
 
 @dataclass(frozen=True)
@@ -270,14 +270,14 @@ def polarisations(poles: list[Pole]) -> list[Pole]:
     """
     if not poles:
         return []
-    main = max(poles, key=lambda pole: abs(pole.a) ** 2 / pole.decay)
+    main, *others = sorted(poles, key=lambda pole: -(abs(pole.a) ** 2) / pole.decay)
     kept = [
         pole
-        for pole in poles
+        for pole in others
         if abs(1200 * math.log2(pole.hz / main.hz)) < MOST_SPLIT_CENTS
         and 1 / MOST_DECAYS_APART < pole.decay / main.decay < MOST_DECAYS_APART
     ]
-    return sorted(kept, key=lambda pole: pole.hz)
+    return sorted([main, *kept[:1]], key=lambda pole: pole.hz)
 
 
 def real_rows(columns: Complex) -> Array:

@@ -59,7 +59,7 @@ class Instrument:
 
 
 def attacks(recordings: Recordings, progress: Progress) -> dict[str, list[float]]:
-    """Log spectral distance of the first 30 ms of the own key, without the recorded attack, and as learned."""
+    """The own key: log spectral distance of its first 30 ms without and with an attack; distance and decays after."""
     values: dict[str, list[float]] = {}
     with _instruments(recordings, progress) as instruments:
         for each in instruments.values():
@@ -71,6 +71,7 @@ def attacks(recordings: Recordings, progress: Progress) -> dict[str, list[float]
                 found = each.sound(each.learned.physics.f0_hz, PART_S, note.rate_hz, attack)[: len(truth)]
                 distance = first_distance_db(truth, found, note.rate_hz)
                 values.setdefault(f"first 30 ms {name}, distance in dB", []).append(distance)
+            _compare(values, "own key", each, each.learned)
     return values
 
 
@@ -89,7 +90,8 @@ def neighbours(recordings: Recordings, progress: Progress) -> dict[str, list[flo
             near = low < abs(12 * math.log2(ratio)) < high
             if not near or first[-2] != second[-2] or other.note.rate_hz != played.learned.note.rate_hz:
                 continue
-            _compare(values, played, other, ratio)
+            _compare_stiffness(values, played, other, ratio)
+            _compare(values, "neighbour", played, other)
     return values
 
 
@@ -105,27 +107,27 @@ def synthetic_neighbours(seeds: Sequence[int], progress: Progress) -> dict[str, 
     return values
 
 
-def _compare(values: dict[str, list[float]], played: Instrument, other: Learned, ratio: float) -> None:
-    physics, note = other.physics, other.note
+def _compare_stiffness(values: dict[str, list[float]], played: Instrument, other: Learned, ratio: float) -> None:
     predicted = played.learned.physics.stiffness * ratio**2  # of a string that is shortened
     square = HIGHEST_PARTIAL**2
-    cents = 600 * math.log2((1 + predicted * square) / (1 + physics.stiffness * square))
+    cents = 600 * math.log2((1 + predicted * square) / (1 + other.physics.stiffness * square))
+    values.setdefault("neighbour, 12th partial off by B, cents", []).append(abs(cents))
+    values.setdefault("neighbour, at most 3 cents by B", []).append(float(abs(cents) <= MOST_CENTS))
+
+
+def _compare(values: dict[str, list[float]], what: str, played: Instrument, other: Learned) -> None:
+    """The key at a note's pitch beside its recording."""
+    physics, note = other.physics, other.note
     truth = note.fitted()
     found = played.sound(physics.f0_hz, FIT_BEGINS_S + FIT_LASTS_S, note.rate_hz, attack=False)
     found = found[round(FIT_BEGINS_S * note.rate_hz) :][: len(truth)]
     distance = errors_of(truth, found, note.rate_hz, note.noise_power).distance_db
     bands = [each for each in bands_of(truth, found, note.rate_hz, note.noise_power) if math.isfinite(each.learned_s)]
     decays = [abs(each.learned_s / each.recorded_s - 1) for each in bands]
-    figures = {
-        "neighbour, 12th partial off by B, cents": abs(cents),
-        "neighbour, at most 3 cents by B": float(abs(cents) <= MOST_CENTS),
-        "neighbour, distance in dB": distance,
-        "neighbour, distance at most 8 dB": float(distance <= MOST_DISTANCE_DB),
-    }
-    for name, value in figures.items():
-        values.setdefault(name, []).append(value)
-    values.setdefault("neighbour, decay of octaves off, share", []).extend(decays)
-    values.setdefault("neighbour, decay of octaves at most 30 % off", []).extend(
+    values.setdefault(f"{what}, distance in dB", []).append(distance)
+    values.setdefault(f"{what}, distance at most 8 dB", []).append(float(distance <= MOST_DISTANCE_DB))
+    values.setdefault(f"{what}, decay of octaves off, share", []).extend(decays)
+    values.setdefault(f"{what}, decay of octaves at most 30 % off", []).extend(
         float(each <= MOST_DECAY_OFF) for each in decays
     )
 
