@@ -211,7 +211,7 @@ def test_progress_is_shown_and_the_choices_wait(
     qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     qtbot.waitUntil(lambda: dialog.bar.isVisible() and dialog.bar.value() == 500)
     fourth = SampledPlan(patch, SMALL["keys"], layers=SMALL["layers"]).zones[3]
-    assert f"key 61, velocity {fourth.velocity}, about " in dialog.state.text()
+    assert f"C♯4, velocity {fourth.velocity}, about " in dialog.state.text()
     assert " s left. You can play on meanwhile." in dialog.state.text()
     notes.gate.set()
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
