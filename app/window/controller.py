@@ -45,7 +45,7 @@ from app.window.about import about_text
 from app.window.appearance import Appearance
 from app.window.audio_control import AudioControl
 from app.window.dropped_files import Dropped, receive, receive_body
-from app.window.exports import Exports, note_of, note_words
+from app.window.exports import Exports, all_modes_words, note_of, note_words
 from app.window.instruments import Instruments
 from app.window.main_window import PLAYED_KEYS, MainWindow
 from app.window.panels import Panel, StringPanel
@@ -333,7 +333,7 @@ class Controller(QObject):
             self.window.notices.report("The listening test needs a preset that can be plucked: choose one first.")
             return
         try:
-            words = note_words(entry.title, choices) if struck is None else struck.words
+            words = note_words(entry.title, choices) if struck is None else struck.words + all_modes_words(choices)
             material = material_of(entry, choices, words, struck)
         except PresetError as error:
             self.window.notices.report(str(error))

@@ -168,5 +168,9 @@ def note_words(title: str, choices: Choices) -> str:
     if choices.pickup == "bridge":
         heard = "heard at the bridge"
     kind = ", magnetic pick-up" if choices.pickup == "velocity" else ""
-    modes = f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""
-    return f"{title}{string}: {pluck}, {heard}{kind}{modes}"
+    return f"{title}{string}: {pluck}, {heard}{kind}{all_modes_words(choices)}"
+
+
+def all_modes_words(choices: Choices) -> str:
+    """That files and listening tests have all modes; "" where none is soloed."""
+    return f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""

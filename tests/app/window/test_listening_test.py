@@ -126,13 +126,15 @@ def test_a_key_is_compared_as_the_instrument_plays_it(qtbot: QtBot, played: Cont
     if struck:
         played.instruments.play(events.NoteOn(52, 70))
         qtbot.waitUntil(lambda: played.instruments.latest.known)  # type: ignore[union-attr]
+    played.session.update(solo=2)
     played.listening_test()
     dialog, found, entry = played._abx, played.instruments.struck, played.entry
     assert dialog is not None and dialog._rendering is not None and found is not None and entry is not None
     pluck, sounds = dialog._material.pluck, dialog._rendering.result(30)
     assert (pluck["instrument"], pluck["velocity"] == 70) == ("Steel-string acoustic", struck)
     assert (pluck["pluck"] is None) == struck
-    assert found.words in [each.text() for each in dialog._setup.findChildren(QLabel)]
+    shown = [each.text() for each in dialog._setup.findChildren(QLabel)]
+    assert f"{found.words}. All modes, although mode 2 is soloed" in shown
     for source in ("model", "truth"):
         preset, rate_hz = load_preset(entry.path), played.sound.rate_hz
         alone = found.sound(preset, source, rate_hz, 0.5, None, True, lambda share: None)
