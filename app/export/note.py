@@ -63,7 +63,12 @@ class Note:
         difference_gain_db: float = 0.0,
         decay_db: float | None = None,
     ) -> SoundRequest:
-        """What is rendered of it; `alone`: its string without the instrument, where there is one.
+        """What is rendered of it.
+
+        Args:
+            rate_hz: of the sound; 0: the preset's own.
+            alone: its string without the instrument, where there is one.
+            decay_db: as in `SoundRequest`.
 
         Raises:
             PresetError: the preset cannot be used.

@@ -48,7 +48,7 @@ _PIANO_LETTERS = dict(zip(_ROW_LETTERS + "'", _WHITE, strict=True)) | {
 LOWEST_C = 48  # the MIDI key that A plays at octave 0
 OCTAVE_STEPS = {"Z": -1, "X": 1}
 LOWEST_OCTAVE, HIGHEST_OCTAVE = -4, 4
-MOST = 0.8
+MOST_OF_BEST = 0.8  # of the keys that sound in the best octave: an estimate
 
 
 @dataclass(frozen=True)
@@ -128,12 +128,13 @@ def letters_of(octave: int) -> dict[int, str]:
 
 
 def octave_near(octave: int, keys: Collection[int]) -> int:
-    """The octave nearest to `octave` where most of the computer's keys are among the MIDI `keys`.
+    """The octave nearest to `octave` where nearly as many of the computer's keys sound as in the best one.
 
-    Most: `MOST` of what the best octave has; some instruments have fewer keys than the computer.
+    Args:
+        keys: of MIDI, which sound; some instruments have fewer than the computer.
     """
     counts = {each: len(letters_of(each).keys() & set(keys)) for each in range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)}
-    enough = MOST * max(counts.values())
+    enough = MOST_OF_BEST * max(counts.values())
     return min((each for each in counts if counts[each] >= enough), key=lambda each: abs(each - octave))
 
 
