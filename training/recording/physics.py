@@ -26,6 +26,7 @@ SMOOTH_OCTAVES = 0.4  # half width of the window in which decays are averaged
 MOST_NODES = 24
 MOST_BESIDE_SMOOTH = 5.0
 MOST_OFF_CENTS = 25.0  # an estimate: a partial further from the series is pulled by the body, and decays with it
+MOST_DECAYS_APART = 12.0  # an estimate, of two polarisations; intervals are stated for closer ones
 NEAR_CENTS = 12.0  # an estimate: a partial with a pole so near has no other further off
 PULLED_WEIGHT = 1e-3
 NEARLY_ALIKE = 1.12  # an estimate: times the least misfit of a place where the string may have been pulled
@@ -112,7 +113,7 @@ def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
     """The partials with their poles, at rest; those without energy are left out."""
     found = []
     for number in sorted({pole.partial for pole in learned.poles if pole.partial}):
-        poles = polarisations(_of_string(learned, number))
+        poles = polarisations(_of_string(learned, number), MOST_DECAYS_APART)
         if not poles:
             continue
         if number in learned.spreads:

@@ -36,7 +36,7 @@ MOST_GLIDE = (-0.02, 0.08)  # of each share
 MOST_PITCH = 0.02  # of a take, above the first or below
 LARGEST_STEP = 60.0  # of ω in rad/s
 MOST_SPLIT_CENTS = 25.0  # between two polarisations
-MOST_DECAYS_APART = 12.0
+MOST_DECAYS_APART = 8.0
 
 
 @dataclass(frozen=True)
@@ -263,7 +263,7 @@ class Fit:
         return square, right, variance * GLIDE_FIRMNESS / (cents * CENTS) ** 2
 
 
-def polarisations(poles: list[Pole]) -> list[Pole]:
+def polarisations(poles: list[Pole], most_decays_apart: float = MOST_DECAYS_APART) -> list[Pole]:
     """The loudest pole of a partial and the one that may be its other polarisation, the lower one first.
 
     A pole that is far off, or decays at another rate altogether, is the body's.
@@ -275,7 +275,7 @@ def polarisations(poles: list[Pole]) -> list[Pole]:
         pole
         for pole in others
         if abs(1200 * math.log2(pole.hz / main.hz)) < MOST_SPLIT_CENTS
-        and 1 / MOST_DECAYS_APART < pole.decay / main.decay < MOST_DECAYS_APART
+        and 1 / most_decays_apart < pole.decay / main.decay < most_decays_apart
     ]
     return sorted([main, *kept[:1]], key=lambda pole: pole.hz)
 
