@@ -109,6 +109,10 @@ AMP_TONE_DB = (-12.0, 12.0)
 
 # Work
 MOST_RUNS = 2_000  # of a plan
+MOST_WORKERS = 1_024  # processes, and threads of one of them
+MOST_RETRIES = 100  # of a run that fails
+LARGEST_SEED = 2**63 - 1
+MOST_TRAJECTORIES = 1_000_000  # of a data set
 LARGEST_DATASET_BYTES = 64 * 2**30
 
 

@@ -12,11 +12,14 @@ import typer
 from app.commands.motion import Solver
 from app.commands.render import BitsOption
 from app.shared.vocabulary import PlayedSource
+from engine.bounds import MOST_FRAMES
 from training.cli import arguments
 from training.cli.arguments import Json
-from training.cli.console import Failure, number, print_json, print_table, progress
+from training.cli.console import Failure, Report, number, print_json, print_table, progress
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from app.commands.arrays import Array
     from app.instrument.drum_keys import DrumKey
     from app.patches.patch import Patch
@@ -39,7 +42,7 @@ Place = Annotated[
 ]
 Rate = Annotated[int, typer.Option(min=8_000, max=192_000, metavar="HZ", help="Sample rate.")]
 OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (steps + 1, rows, columns) in m.")]
-Steps = Annotated[int, typer.Option(min=1, help="Frames after the blow.")]
+Steps = Annotated[int, typer.Option(min=1, max=MOST_FRAMES, help="Frames after the blow.")]
 Points = Annotated[
     int, typer.Option(min=3, max=513, metavar="N", help="Points of the grid along the longer side, rounded to odd.")
 ]
@@ -50,6 +53,7 @@ LONGEST_S = 60.0
 HIGHEST_HZ = 20_000.0  # of a drum's file
 FILE_KEY = 60  # on which the drum of a file is played
 FRAMES_AT_ONCE = 1_200
+LARGEST_SHAPES_BYTES = 512 * 2**20  # of all modes on the grid
 
 
 @drums.callback()
@@ -106,11 +110,12 @@ def simulate(
     from training.family.drums import linear_drum, true_motion
 
     blow = _blow_of(drum, key, velocity, place)
-    if solver == "dop853":
-        motion = _dop853(blow.struck(linear), rate, steps)
-    else:
-        motion = (linear_drum if linear else true_motion)(blow.struck(), rate)
-    _write(out, blow, motion, steps, points)
+    with progress(out.name) as report:
+        if solver == "dop853":
+            motion = _dop853(blow.struck(linear), rate, steps, report)
+        else:
+            motion = (linear_drum if linear else true_motion)(blow.struck(), rate)
+        _write(out, blow, motion, steps, points, report)
 
 
 @drums.command()
@@ -130,7 +135,8 @@ def predict(
     OUT is as that of `drums simulate`.
     """
     blow = _blow_of(drum, key, velocity, place, preset)
-    _write(out, blow, blow.player()(blow.struck(), rate), steps, points)
+    with progress(out.name) as report:
+        _write(out, blow, blow.player()(blow.struck(), rate), steps, points, report)
 
 
 @drums.command()
@@ -312,18 +318,29 @@ def _with_file(path: Path) -> Patch:
     return Patch(name="Drum", category="drums", strings=Drums(drums=(drum,), highest_hz=HIGHEST_HZ))
 
 
-def _dop853(struck: StruckDrum, rate_hz: int, steps: int) -> Blocks:
+def _dop853(struck: StruckDrum, rate_hz: int, steps: int, report: Report) -> Blocks:
     import torch
 
     from engine.truth import ModalState, solve_dop853
 
     state = ModalState(*(torch.from_numpy(part)[None] for part in (struck.amplitudes_m, struck.speeds_m_s)))
-    frames = iter(solve_dop853(struck.resonator, state, rate_hz, steps)[0, 1:].split(FRAMES_AT_ONCE))
-    return lambda count: next(frames)
+    amplitudes = solve_dop853(struck.resonator, state, rate_hz, steps, report=report)[0, 1:]
+    first = 0
+
+    def following(count: int) -> Tensor:
+        nonlocal first
+        first += count
+        return amplitudes[first - count : first]
+
+    return following
 
 
-def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int) -> None:
-    """Writes the displacement (steps + 1, rows, columns) in m, from the blow on."""
+def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, report: Report) -> None:
+    """Write the displacement (steps + 1, rows, columns) in m, from the blow on.
+
+    Raises:
+        Failure: the file or the modes' shapes on the grid would be too large.
+    """
     import numpy as np
 
     from app.commands import arrays
@@ -331,19 +348,24 @@ def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int) -> N
 
     found = blow.key.modes
     inside, places = grid_of(found.surface, (found.drum.length_m, found.drum.width_m), points)
-    shapes = found.shapes(places)
     arrays.check_result_size(1, steps + 1, inside.size)
+    if (size := 8 * len(found) * len(places)) > LARGEST_SHAPES_BYTES:
+        raise Failure(
+            f"the shapes of {len(found)} modes at {len(places)} points would take {size / 2**20:.0f} MiB, more than "
+            f"the {LARGEST_SHAPES_BYTES // 2**20} MiB allowed; lower --points"
+        )
+    shapes = found.shapes(places)
+    at_once = max(1, min(FRAMES_AT_ONCE, arrays.BYTES_AT_ONCE // (8 * inside.size)))
 
     def pictures() -> Iterator[Array]:
         yield np.zeros((1, *inside.shape))
-        for first in range(0, steps, FRAMES_AT_ONCE):
-            amplitudes = motion(min(FRAMES_AT_ONCE, steps - first)).numpy()
+        for first in range(0, steps, at_once):
+            amplitudes = motion(min(at_once, steps - first)).numpy()
             block = np.zeros((len(amplitudes), *inside.shape))
             block[:, inside] = amplitudes @ shapes
             yield block
 
-    with progress(out.name) as report:
-        arrays.write_array(out, (steps + 1, *inside.shape), pictures(), report)
+    arrays.write_array(out, (steps + 1, *inside.shape), pictures(), report)
 
 
 def mode_rows(found: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:

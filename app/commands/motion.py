@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import typer
 
 from app.commands import options
+from engine.bounds import MOST_FRAMES, MOST_SUBSTEPS, SIZES
 from engine.plain_text import one_line
 from training.cli import arguments
-from training.cli.console import Failure, number, print_json, print_table, progress, say
+from training.cli.console import Failure, Report, number, print_json, print_table, progress, say
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 
 InputFile = Annotated[Path, typer.Argument(metavar="U0.npy", help="Initial displacement (batch, points) in m.")]
 OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (batch, steps + 1, points) in m.")]
-Steps = Annotated[int, typer.Option(min=1, help="Frames after the initial one.")]
+Steps = Annotated[int, typer.Option(min=1, max=MOST_FRAMES, help="Frames after the initial one.")]
 STRING_KINDS = ("linear", "nonlinear")
 Solver = Literal["fast", "dop853"]
 LONGEST_S = 600.0  # the longest comparison
@@ -47,6 +48,7 @@ def simulate(
         int | None,
         typer.Option(
             min=1,
+            max=SIZES["modes"][1],
             metavar="M",
             help="Number of modes; default all below 20 kHz and half the rate, as many as the grid of U0 holds.",
         ),
@@ -58,6 +60,7 @@ def simulate(
         int | None,
         typer.Option(
             min=1,
+            max=MOST_SUBSTEPS,
             metavar="N",
             help="Sub-steps of the fast solver per sample: fewer are faster, and less accurate. Default: enough for "
             "a relative error of 1e-7 on the paper's data.",
@@ -94,9 +97,11 @@ def simulate(
     except ValueError as error:
         raise Failure(f"{string}: {error}") from error
     resonator = parameters.resonator(modes, tension_modulated=tension_modulated, grid_points=points)
-    fast = solver == "fast"
-    motion = _fast(resonator, rate, steps, substeps) if fast else _dop853(resonator, rate, steps)
     with progress("simulate") as report:
+        if solver == "fast":
+            motion = _fast(resonator, rate, steps, substeps)
+        else:
+            motion = _dop853(resonator, rate, steps, len(initial), report)
         arrays.write_motion(out, initial, steps, motion, report)
     if (peak_m := float(abs(initial).max())) > arrays.IMPLAUSIBLE_PEAK_M:
         say(f"note: {u0} rises to {peak_m:g} m; displacement is in metres")
@@ -263,12 +268,23 @@ def _fast(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None
     return motion
 
 
-def _dop853(resonator: Resonator, rate_hz: float, steps: int) -> Motion:
+def _dop853(resonator: Resonator, rate_hz: float, steps: int, trajectories: int, report: Report) -> Motion:
     from engine.truth import ModalState, solve_dop853
 
+    solved = 0
+
     def motion(initial: Array) -> Iterator[Array]:
-        start = ModalState.at_rest(resonator.to_modes(initial))
-        yield resonator.to_grid(solve_dop853(resonator, start, rate_hz, steps).numpy())
+        nonlocal solved
+        before, solved = solved, solved + len(initial)
+        starts = ModalState.at_rest(resonator.to_modes(initial))
+        amplitudes = solve_dop853(
+            resonator,
+            starts,
+            rate_hz,
+            steps,
+            report=lambda share: report((before + share * len(initial)) / trajectories),
+        )
+        yield resonator.to_grid(amplitudes.numpy())
 
     return motion
 

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import BinaryIO
+from typing import BinaryIO, TypeVar
 
 import numpy as np
 import soundfile
@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from app.export.recording import Sound, blocks
 from app.shared.vocabulary import BITS, Bits
 
+T = TypeVar("T")
 RATE_RANGE_HZ = (1_000, 384_000)
 LONGEST_TAG_BYTES = 2_000  # libsndfile does not read back INFO texts of 2048 bytes or more
 NORMALISED_PEAK = 10 ** (-1 / 20)  # -1 dBFS: leaves headroom for peaks between samples
@@ -115,22 +116,38 @@ def write_wav(
 
 
 class _Noting:
-    """A file for libsndfile, which cannot pass on an OSError: the first one is kept and raised by `check`."""
+    """A file for libsndfile, which cannot pass on an OSError: the first one is kept and raised by `check`.
+
+    A full disk fails any of the calls, as a seek writes what is buffered. After the first failure nothing more is
+    written, and the calls return what satisfies libsndfile.
+    """
 
     def __init__(self, file: BinaryIO) -> None:
         self._file = file
         self._error: OSError | None = None
-        self.seek, self.tell, self.read = file.seek, file.tell, file.read
 
     def write(self, data: bytes) -> int:
+        return self._try(self._file.write, data, failed=len(data))
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        return self._try(self._file.seek, offset, whence, failed=0)
+
+    def tell(self) -> int:
+        return self._try(self._file.tell, failed=0)
+
+    def read(self, size: int = -1) -> bytes:
+        return self._try(self._file.read, size, failed=b"")
+
+    def _try(self, call: Callable[..., T], *arguments: object, failed: T) -> T:
         if self._error is None:
             try:
-                return self._file.write(data)
+                return call(*arguments)
             except OSError as error:
                 self._error = error
-        return len(data)
+        return failed
 
     def check(self) -> None:
+        """Raise the OSError of the first call that failed, if one did."""
         if self._error is not None:
             raise self._error
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 from collections.abc import Callable, Sequence
@@ -157,8 +158,10 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
     except OSError as error:
         raise WriteError(explain(body.parent, error)) from error
     response = body_response(first.physics, first.strung, len(recorded.cents), BODY_RATE_HZ)
+    encoded = io.BytesIO()  # libsndfile cannot pass on the error of a full disk
+    soundfile.write(encoded, 0.9 * response, BODY_RATE_HZ, subtype="PCM_24", format="WAV")
     with whole_file(body) as file:
-        soundfile.write(file, 0.9 * response, BODY_RATE_HZ, subtype="PCM_24", format="WAV")
+        file.write(encoded.getvalue())
     attack = attack_of(patch, first.note, recorded.note)
     if attack is not None:
         recorded = replace(recorded, attack=attack[0])

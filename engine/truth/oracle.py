@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import torch
 from numpy.typing import NDArray
@@ -9,6 +11,8 @@ from torch import Tensor
 
 from engine.resonators.base import Resonator
 from engine.truth.state import ModalState
+
+REPORT_EVERY = 0.01  # of a trajectory
 
 
 def solve_dop853(
@@ -19,8 +23,12 @@ def solve_dop853(
     *,
     rtol: float = 1e-12,
     atol: float = 1e-14,
+    report: Callable[[float], None] = lambda share: None,
 ) -> Tensor:
     """Modal amplitudes of frames 0 … steps, float64 (batch, steps + 1, modes), by DOP853 (Eq. 4).
+
+    Args:
+        report: called with the share that is done, 0 … 1, about a hundred times a trajectory.
 
     Raises:
         RuntimeError: the integrator gave up on a trajectory.
@@ -31,15 +39,23 @@ def solve_dop853(
     stiffness, friction = resonator.omega**2, 2 * resonator.sigma
     eta_squared, coupling = resonator.stretch, resonator.coupling
 
-    def right_side(_time_s: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+    reported = 0.0
+
+    def right_side(time_s: float, y: NDArray[np.float64]) -> NDArray[np.float64]:
+        nonlocal reported
+        share = (len(trajectories) + time_s / span_s[1]) / len(starts)
+        if share >= reported + REPORT_EVERY / len(starts):
+            reported = share
+            report(min(share, 1.0))
         q, v = y[:modes], y[modes:]
         return np.concatenate([v, -(stiffness + coupling * (eta_squared @ (q * q))) * q - friction * v])
 
     times_s = np.arange(steps + 1) / rate_hz
-    trajectories = []
-    for start in torch.cat([state.amplitude, state.velocity], dim=1).numpy():
-        span = (0.0, float(times_s[-1]))
-        solution = solve_ivp(right_side, span, start, "DOP853", times_s, rtol=rtol, atol=atol)
+    span_s = (0.0, float(times_s[-1]))
+    starts = torch.cat([state.amplitude, state.velocity], dim=1).numpy()
+    trajectories: list[NDArray[np.float64]] = []
+    for start in starts:
+        solution = solve_ivp(right_side, span_s, start, "DOP853", times_s, rtol=rtol, atol=atol)
         if not solution.success:
             raise RuntimeError(f"DOP853 failed: {solution.message}")
         trajectories.append(solution.y[:modes].T)

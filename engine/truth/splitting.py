@@ -16,7 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 import torch
 from torch import Tensor
 
-from engine.bounds import SUBSTEPS_IN_A_PERIOD
+from engine.bounds import MOST_SUBSTEPS, SUBSTEPS_IN_A_PERIOD
 from engine.kernels.scheme import KICKS, ROTATIONS
 from engine.resonators.base import Resonator
 from engine.truth.linear import damped_rotation
@@ -55,8 +55,8 @@ class SplittingSolver:
     ) -> None:
         if not rate_hz > 0:
             raise ValueError(f"sample rate must be above 0 Hz, not {rate_hz}")
-        if substeps is not None and substeps < 1:
-            raise ValueError(f"substeps must be at least 1, not {substeps}")
+        if substeps is not None and not 1 <= substeps <= MOST_SUBSTEPS:
+            raise ValueError(f"substeps must lie in 1 … {MOST_SUBSTEPS}, not {substeps}")
         if not 0 <= silence < 1:
             raise ValueError(f"silence must be a share from 0 to below 1, not {silence}")
         modes = self.modes = resonator.modes

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
+from engine.bounds import SIZES
+
 if TYPE_CHECKING:
     from engine.presets import Preset
 
@@ -42,6 +44,7 @@ StringModes = Annotated[
     typer.Option(
         "--modes",
         min=1,
+        max=SIZES["modes"][1],
         metavar="M",
         help="For a preset of many strings: number of modes; default all below 20 kHz.",
     ),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
+from engine.bounds import LARGEST_SEED, MOST_TRAJECTORIES
 from engine.pluck import DEFAULT_LISTEN
 from training.cli import arguments
 from training.cli.arguments import Cache, Json, check_range, open_preset_of_string
@@ -44,7 +45,8 @@ def evaluate(
         bool, typer.Option("--partials", help="Level, phase, frequency, decay and glide of each mode, too.")
     ] = False,
     trajectories: Annotated[
-        int | None, typer.Option(min=1, metavar="N", help="Only the first N of a split; default all.")
+        int | None,
+        typer.Option(min=1, max=MOST_TRAJECTORIES, metavar="N", help="Only the first N of a split; default all."),
     ] = None,
     fresh: Annotated[
         int | None,
@@ -56,7 +58,7 @@ def evaluate(
             help=f"Measure N new plucks instead of a split; default {FEWEST_PLUCKS} for a preset of many strings.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the draw of --held-out.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Of the draw of --held-out.")] = 1,
     string: arguments.StringName = None,
     rate: arguments.StringRate = None,
     modes: arguments.StringModes = None,

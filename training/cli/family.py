@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from engine.bounds import LARGEST_SEED
 from training.cli.arguments import Json, PresetName, open_preset
 from training.cli.console import Failure, Shares, number, print_json, print_table, progress
 
@@ -24,7 +25,7 @@ Strings = Annotated[
     int, typer.Option(min=1, max=10_000, help="Held-out strings inside the family, and as many beyond.")
 ]
 Rate = Annotated[int, typer.Option(min=1_000, max=192_000, metavar="HZ", help="Sample rate.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed of the strings that are drawn.")]
+Seed = Annotated[int, typer.Option(min=0, max=LARGEST_SEED, help="Seed of the strings that are drawn.")]
 
 
 @family.command()

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from engine.bounds import MOST_RETRIES, MOST_WORKERS
 from engine.plain_text import duration, one_line
 from training.cli.arguments import Cache, Device, Json, Runs
 from training.cli.console import Failure, Report, bars, number, print_json, print_table, say
@@ -36,12 +37,20 @@ def sweep(
         ),
     ] = None,
     workers: Annotated[
-        int | None, typer.Option(min=1, help="Runs at once; default one on each core, or --per-device on each GPU.")
+        int | None,
+        typer.Option(
+            min=1, max=MOST_WORKERS, help="Runs at once; default one on each core, or --per-device on each GPU."
+        ),
     ] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Threads of the CPU in each worker.")] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, max=MOST_WORKERS, help="Threads of the CPU in each worker.")
+    ] = None,
     device: Annotated[Device, typer.Option(help="auto: CUDA if it can be used.")] = "auto",
     per_device: Annotated[
-        int, typer.Option(min=1, help="Runs at once on each GPU: several small models fill it better than one.")
+        int,
+        typer.Option(
+            min=1, max=MOST_WORKERS, help="Runs at once on each GPU: several small models fill it better than one."
+        ),
     ] = 1,
     results: Annotated[
         Path | None,
@@ -49,7 +58,7 @@ def sweep(
     ] = None,
     runs: Runs = None,
     cache: Cache = None,
-    retries: Annotated[int, typer.Option(min=0, help="Further tries of a run that failed.")] = 1,
+    retries: Annotated[int, typer.Option(min=0, max=MOST_RETRIES, help="Further tries of a run that failed.")] = 1,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="List the runs in their order, and train none.")] = False,
     json: Json = False,
 ) -> None:

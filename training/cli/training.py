@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from engine.bounds import LARGEST_SEED, MOST_WORKERS
 from engine.plain_text import duration
 from training.cli.arguments import Cache, Device, Runs
 from training.cli.console import Failure, number, progress, say
@@ -39,12 +40,15 @@ def train(
         int | None,
         typer.Option(
             min=0,
+            max=LARGEST_SEED,
             metavar="N",
             help="Of weights and batches, in place of the run's own; it is named CONFIG_seedN then.",
         ),
     ] = None,
     device: Annotated[Device, typer.Option(help="auto: CUDA if it can be used.")] = "cpu",
-    threads: Annotated[int | None, typer.Option(min=1, help="Threads of the CPU; default all cores.")] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, max=MOST_WORKERS, help="Threads of the CPU; default all cores.")
+    ] = None,
     cache: Cache = None,
 ) -> None:
     """Train a preset and measure its errors.
