@@ -82,15 +82,19 @@ class Recipe:
     coupling_rate: float = 1.0  # learning rate of an integrated phase's K, as a share
     weight_decay: float = 0.01  # decoupled, AdamW's
     eigenvalue_decay: bool = False  # whether it decays the eigenvalues' parameters too
-    clip_norm: float = 1.0
+    slow_parameters: tuple[str, ...] = ()  # that learn at eigenvalue_rate; empty: those of the model's eigenvalues
+    clip_norm: float = 1.0  # of the gradient …
+    clip_eigenvalues: bool = True  # … with that of the slow parameters; else of the others alone
     loss: Literal["mse", "log10_mse", "relative_mse"] = "mse"  # of the prediction; relative: to each string's own
     latent_epochs: int = 0  # at first, in which Koopman's encoder learns the latents of its matching pursuit
     latent_learning_rate: float = 3e-3  # the peak of these epochs' own cycle
     latent_polish: int = 0  # the last steps of these epochs are L-BFGS over all trajectories (`pursuit`)
+    fixed_batches: bool = False  # an epoch draws the order of the batches, not their trajectories
     steps_per_batch: int = 64  # random frames of a batch; 0: every frame of the horizon
     first_horizon: int = 150  # frames; grows geometrically to all of them …
     grow_until: float = 0.5  # … over this share of the run
     consistency_weight: float = 0.01  # α₃ of the paper's loss, whose α₁ and α₂ are 1
+    koopman_terms: Literal["text", "published"] = "text"  # of the paper's loss, or of its authors' script
     flip: bool = True  # sign and mirror augmentation: -u and u(ℓ-x) are solutions too
     validate_every: int = 10  # epochs
     patience: int = 0  # epochs without a better validation error until the run ends early; 0: never
@@ -191,7 +195,7 @@ def digest_of(plain: dict[str, Any]) -> str:
 
 
 # fields of earlier versions, and the only value that they ever had in a run that was kept
-RETIRED = {"random_start": False, "koopman_terms": "text", "prediction_weight": 1.0, "encoding_weight": 1.0}
+RETIRED = {"random_start": False, "prediction_weight": 1.0, "encoding_weight": 1.0}
 
 
 def read_configuration(plain: Any, where: str) -> TrainingConfiguration:

@@ -80,6 +80,17 @@ class LearnedEigenvalues(DiagonalModel):
     def powers(self, frames: Tensor) -> Tensor:
         return eigenvalues.powers(eigenvalues.log_eigenvalues(self.nu_log, self.theta_log), frames)
 
+    def observed(self, latents: Tensor) -> Tensor:
+        """The states that the decoder reads, complex like `latents` (..., state_size): the latents themselves."""
+        return latents
+
+    @abstractmethod
+    def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
+        """Displacement (..., points) of observed states (..., state_size)."""
+
+    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
+        return self.read(self.observed(latents), readout)
+
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
         return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]

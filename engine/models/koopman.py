@@ -56,11 +56,11 @@ class Koopman(LearnedEigenvalues):
     def encode(self, displacement: Tensor) -> KoopmanState:
         return KoopmanState(pack(self.encoder(displacement)), 0)
 
-    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
+    def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
         first, *others = dense_layers(self.decoder)
         if not others:
-            return dense(latents, *read_layer(first, readout))
-        hidden = dense(latents, first.weight, first.bias)
+            return dense(states, *read_layer(first, readout))
+        hidden = dense(states, first.weight, first.bias)
         for layer in others[:-1]:
             hidden = layer(nn.functional.selu(hidden))
         return linear(nn.functional.selu(hidden), *read_layer(others[-1], readout))

@@ -48,9 +48,12 @@ class KoopmanVar(LearnedEigenvalues):
     def encode(self, displacement: Tensor) -> KoopmanState:
         return KoopmanState(pack(self.encoder(displacement)), 0)
 
-    def decode(self, latents: Tensor, readout: Tensor | None = None) -> Tensor:
-        multipliers = pack(self.multiplier(latents.real.square() + latents.imag.square()))
-        return dense(latents * multipliers, *read_layer(self.decoder, readout))
+    def observed(self, latents: Tensor) -> Tensor:
+        """The multiplied states m(|z|²) ⊙ z."""
+        return latents * pack(self.multiplier(latents.real.square() + latents.imag.square()))
+
+    def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
+        return dense(states, *read_layer(self.decoder, readout))
 
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
         """See the contract.

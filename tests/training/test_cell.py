@@ -9,6 +9,7 @@ from engine.models import MODELS, OF_MANY_STRINGS
 from engine.models.configurations import LRUConfiguration
 from engine.schema import SchemaError
 from training.cell import Case, Cell, configuration_of, load, recipe_names
+from training.fitting.fit import learning_rate_at
 from training.start import starts_of
 
 OF_CELLS = sorted(MODELS.keys() - OF_MANY_STRINGS)
@@ -40,7 +41,7 @@ def test_every_cell_of_the_tables_can_be_built() -> None:
 
 
 @pytest.mark.parametrize("model", OF_CELLS)
-@pytest.mark.parametrize("recipe", ["ours", "paper"])
+@pytest.mark.parametrize("recipe", ["ours", "paper", "published"])
 def test_a_recipe_starts_as_its_model_can(model: str, recipe: str) -> None:
     configuration = configuration_of(Cell(model, True, "noise", 16000, recipe=recipe))
     assert configuration.recipe.start in ("", *starts_of(model))
@@ -55,6 +56,24 @@ def test_the_papers_recipe_is_the_papers() -> None:
     fgru = configuration_of(Cell("fgru", True, "noise", 4000, 400, "paper")).recipe
     assert (fgru.epochs, fgru.schedule, fgru.loss, fgru.batch_size) == (2000, "one_cycle", "log10_mse", 256)
     assert (fgru.peak_learning_rate, fgru.peak_learning_rate * fgru.start_share) == pytest.approx((1e-3, 1e-4))
+
+
+def test_the_published_recipe_is_the_scripts() -> None:
+    """The table of differences between the paper's text and its script, in docs/reproduce.md."""
+    recipes = {
+        model: configuration_of(Cell(model, True, "noise", 4000, 400, "published")).recipe
+        for model in ("koopman", "koopman_var", "lru", "s5")
+    }
+    for recipe in recipes.values():
+        assert (recipe.epochs, recipe.batch_size, recipe.peak_learning_rate) == (2500, 50, 0.001)
+        assert (recipe.steps_per_batch, recipe.flip, recipe.patience, recipe.start) == (0, False, 0, "")
+        assert (recipe.fixed_batches, recipe.validate_every, recipe.clip_norm) == (True, 50, 1.0)
+        assert [learning_rate_at(recipe, share) for share in (0, 0.5, 1)] == pytest.approx([1e-3, 5e-4, 0])
+    assert {recipes[model].koopman_terms for model in ("koopman", "koopman_var")} == {"published"}
+    slow = {name: (set(r.slow_parameters), r.eigenvalue_rate, r.clip_eigenvalues) for name, r in recipes.items()}
+    assert slow["lru"] == ({"nu_log", "theta_log", "gamma_log", "B", "C"}, 0.25, False)
+    assert slow["koopman"] == slow["koopman_var"] == ({"nu_log", "theta_log", "gamma_log"}, 0.25, False)
+    assert slow["s5"] == (set(), 1.0, True)
 
 
 def test_a_digest_is_for_good() -> None:
@@ -91,7 +110,10 @@ def test_titles_do_not_enter_the_digest_but_the_seed_does() -> None:
     [
         ("nylon_nonlinear_noise_16k_foo", "model 'foo' is not one of dmd, koopman"),
         ("nylon_nonlinear_noise_8k_lru", "rate_hz must be one of 4000, 16000"),
-        ("nylon_nonlinear_noise_4k_lru_400_theirs", "recipe 'theirs' is not one of blind, hinted, ours, paper"),
+        (
+            "nylon_nonlinear_noise_4k_lru_400_theirs",
+            "recipe 'theirs' is not one of blind, hinted, ours, paper, published",
+        ),
         ("nylon_nonlinear_noise_4k_lru_0", "horizon must be at least 1"),
         ("no_such_thing", "no training configuration 'no_such_thing'"),
     ],
@@ -122,7 +144,7 @@ def test_a_case_matches_what_it_names() -> None:
     assert not Case(tension_modulated=False).matches(cell)
     with pytest.raises(ValueError, match="model 'koop' is not one of"):
         Case(model=("koop",))
-    assert recipe_names() == ["blind", "hinted", "ours", "paper"]
+    assert recipe_names() == ["blind", "hinted", "ours", "paper", "published"]
 
 
 def test_a_model_of_many_strings_is_no_cells() -> None:

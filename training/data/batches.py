@@ -65,6 +65,9 @@ def flips(count: int, generator: torch.Generator, device: torch.device) -> tuple
 def batches(recipe: Recipe, count: int, epoch: int) -> tuple[Tensor, ...]:
     """The rows of each batch of an epoch: every trajectory once."""
     generator = torch.Generator().manual_seed(recipe.seed * 7_368_787 + epoch)
+    if recipe.fixed_batches:
+        fixed = torch.arange(count).split(recipe.batch_size)
+        return tuple(fixed[batch] for batch in torch.randperm(len(fixed), generator=generator))
     return torch.randperm(count, generator=generator).split(recipe.batch_size)
 
 

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, cast
 
@@ -243,7 +244,9 @@ class _Run:
         """A step of the optimiser against `loss`; `error` is reported."""
         self._optimiser.zero_grad(set_to_none=True)
         loss.backward()
-        torch.nn.utils.clip_grad_norm_(self._model.parameters(), self._recipe.clip_norm)
+        *faster, slow = (group["params"] for group in self._optimiser.param_groups)
+        bounded = [*chain.from_iterable(faster), *(slow if self._recipe.clip_eigenvalues else ())]
+        torch.nn.utils.clip_grad_norm_(bounded, self._recipe.clip_norm)
         self._optimiser.step()
         self._total += error
 
@@ -361,7 +364,8 @@ def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer
     others: list[torch.nn.Parameter] = []
     for name, parameter in model.named_parameters():
         last = name.rpartition(".")[2]
-        declared = (model.eigenvalue_parameters, eigenvalues), (model.coupling_parameters, coupling)
+        slow = recipe.slow_parameters or model.eigenvalue_parameters
+        declared = (slow, eigenvalues), (model.coupling_parameters, coupling)
         next((group for names, group in declared if last in names), others).append(parameter)
     groups = [
         {"params": others, "share": 1.0},

@@ -4,9 +4,10 @@ Koopman models are trained on prediction, encoding and consistency (§4.2); the 
 models on its logarithm. All take any selection of frames: a Koopman rollout needs no recursion, the others run up to
 the last of them.
 
-They follow the paper's text; its authors' code (rodrigodzf/physmodjax, `lindyn_loss`) compares φ(u_k) with
-Koopman_var's multiplied states, and encodes all frames. The text sums over grid points and latents where means are
-taken here: with 101 points and 128 latents that counts consistency 0.79 times as much.
+They follow the paper's text, or with `koopman_terms = "published"` its authors' script (rodrigodzf/physmodjax,
+`lindyn_loss`): that encodes and decodes all frames without Koopman_var's multiplier, and compares φ(u_k) with the
+multiplied states. The text sums over grid points and latents where means are taken here: with 101 points and 128
+latents that counts consistency 0.79 times as much.
 """
 
 from __future__ import annotations
@@ -32,6 +33,14 @@ class KoopmanModel(Protocol):
     def decode(self, latents: Tensor) -> Tensor: ...
 
 
+@runtime_checkable
+class ObservedModel(KoopmanModel, Protocol):
+    """A Koopman model whose decoder reads states that follow from the latents."""
+
+    def observed(self, latents: Tensor) -> Tensor: ...
+    def read(self, states: Tensor) -> Tensor: ...
+
+
 def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tuple[Tensor, Tensor]:
     """The loss that is minimised, and the mean square of the prediction's error alone.
 
@@ -39,15 +48,30 @@ def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tupl
     """
     if not isinstance(model, KoopmanModel):
         return _prediction(_predicted(model, batch), batch.target, recipe)
+    if recipe.koopman_terms == "published" and isinstance(model, ObservedModel):
+        return _published_loss(model, batch, recipe)
     origin = model.encode(batch.initial).origin
     latents = model.latents(origin, batch.frames)
     loss, prediction = _prediction(model.decode(latents), batch.target, recipe)
     loss = loss + _mean_square(model.decode(origin), batch.initial)
     if recipe.consistency_weight:
         encoded = model.encode(batch.target.flatten(0, 1)).origin.view_as(latents)
-        consistency = torch.view_as_real(encoded - latents).square().sum(-1).mean()
-        loss = loss + recipe.consistency_weight * consistency
+        loss = loss + recipe.consistency_weight * _consistency(latents, encoded)
     return loss, prediction
+
+
+def _published_loss(model: ObservedModel, batch: Batch, recipe: Recipe) -> tuple[Tensor, Tensor]:
+    """The loss of the authors' script: encoding on all frames, consistency of what the decoder reads."""
+    frames = torch.cat([batch.initial[:, None], batch.target], dim=1)
+    encoded = model.encode(frames.flatten(0, 1)).origin.unflatten(0, frames.shape[:2])
+    states = model.observed(model.latents(encoded[:, 0], batch.frames))
+    loss, prediction = _prediction(model.read(states), batch.target, recipe)
+    loss = loss + _mean_square(model.read(encoded), frames)
+    return loss + recipe.consistency_weight * _consistency(states, encoded[:, 1:]), prediction
+
+
+def _consistency(states: Tensor, encoded: Tensor) -> Tensor:
+    return torch.view_as_real(encoded - states).square().sum(-1).mean()
 
 
 def _predicted(model: StringModel[Any], batch: Batch) -> Tensor:

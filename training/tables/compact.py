@@ -20,6 +20,7 @@ STARTS = {
     "matching pursuit": "modes of the string",
     "averaging": "averaged equations",
 }
+RECIPE_WORDS = {"paper": ", paper's recipe", "published": ", authors' script"}
 
 
 def as_compact(rows: Sequence[Row], recipe: RecipeChoice = "all", metric: str = "rel_mse") -> str:
@@ -47,8 +48,7 @@ def given(line: Line) -> str:
     words = STARTS.get(line.initialisation, line.initialisation) if line.structured else "displacement only"
     if line.initialisation == "paper":
         words = "random weights"
-    if line.recipe == "paper":
-        words += ", paper's recipe"
+    words += RECIPE_WORDS.get(line.recipe, "")
     return f"{words}, hinted" if line.hints else words
 
 

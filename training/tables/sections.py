@@ -27,7 +27,7 @@ from training.tables.paper import (
 
 NOT_RUN = "not run"  # what is said in place of a figure
 NO_ERRORS = Errors(None, None)
-RecipeChoice = Literal["ours", "blind", "hinted", "paper", "all"]
+RecipeChoice = Literal["ours", "blind", "hinted", "paper", "published", "all"]
 
 
 @dataclass(frozen=True)

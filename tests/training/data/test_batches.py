@@ -58,6 +58,14 @@ def test_an_epoch_holds_every_trajectory_once_and_repeats_by_its_number() -> Non
     assert not torch.equal(found[0], batches(recipe, 20, 4)[0])
 
 
+def test_fixed_batches_keep_their_trajectories_and_change_their_order() -> None:
+    recipe = Recipe(epochs=1, batch_size=5, fixed_batches=True)
+    table = [list(range(first, first + 5)) for first in range(0, 20, 5)]
+    orders = [[rows.tolist() for rows in batches(recipe, 20, epoch)] for epoch in range(8)]
+    assert all(sorted(order) == table for order in orders)
+    assert len({str(order) for order in orders}) > 1
+
+
 def test_of_data_with_a_stride_only_kept_frames_are_asked(tmp_path: Path) -> None:
     configuration = DatasetConfiguration("pluck", 4000, 5, steps=450, stride=9, count=20)
     dataset = load_dataset(configuration, tmp_path)

@@ -45,7 +45,7 @@ def weights(folder: Path) -> dict[str, torch.Tensor]:
     return dict(Checkpoint.load(folder / "checkpoint.safetensors").model)
 
 
-@pytest.mark.parametrize("recipe", ["ours", "paper"])
+@pytest.mark.parametrize("recipe", ["ours", "paper", "published"])
 @pytest.mark.parametrize("model", SMALL)
 def test_every_model_learns_by_every_recipe(small_dataset: Dataset, runs: Path, model: str, recipe: str) -> None:
     seen: list[Progress] = []
@@ -60,6 +60,21 @@ def test_every_model_learns_by_every_recipe(small_dataset: Dataset, runs: Path, 
     assert found.validation.total().rel_mae == min(e.rel_mae for e in (*starts, *(p.validation for p in seen)) if e)
     measured = evaluate_model(found.model, small_dataset, "validation", horizon).total()
     assert measured.rel_mae == pytest.approx(found.validation.total().rel_mae, rel=1e-5)
+
+
+def test_the_bound_of_the_gradient_can_leave_the_eigenvalues_out(small_dataset: Dataset, runs: Path) -> None:
+    """The first moments of one step with a tiny bound: those of nu_log and theta_log alone are not scaled down."""
+    largest = {}
+    for bounded in (True, False):
+        configuration = small(
+            "koopman", "published", epochs=1, batch_size=16, clip_norm=1e-9, clip_eigenvalues=bounded, patience=0
+        )
+        folder = runs / str(bounded)
+        fit(configuration, small_dataset, folder)
+        saved = Checkpoint.load(folder / "checkpoint.safetensors").optimiser
+        largest[bounded] = [float(moments["exp_avg"].abs().max()) for moments in saved.values()]
+    assert max(largest[True]) < 1e-9
+    assert sum(moment > 1e-8 for moment in largest[False]) == 2
 
 
 def test_training_that_only_harms_leaves_the_start(small_dataset: Dataset, runs: Path) -> None:

@@ -24,6 +24,26 @@ def model_and_batch() -> tuple[KoopmanVar, Batch]:
     return model, Batch(torch.randn(2, 101, generator=draw, dtype=torch.float64), frames, target)
 
 
+def test_the_published_loss_is_the_scripts_sum_of_means() -> None:
+    """Written out with real numbers, as `lindyn_loss` of rodrigodzf/physmodjax takes its means."""
+    model, batch = model_and_batch()
+    recipe = Recipe(epochs=1, koopman_terms="published", consistency_weight=0.005)
+    loss, prediction = training_loss(model, batch, recipe)
+
+    frames = torch.cat([batch.initial[:, None], batch.target], dim=1)
+    encoded = model.encoder(frames)  # real parts first
+    eigenvalues = torch.exp(torch.complex(-model.nu_log.exp(), model.theta_log.exp()))
+    origin = torch.complex(*encoded[:, 0].chunk(2, dim=-1))
+    latents = torch.stack([origin * eigenvalues**k for k in (1, 3, 4)], dim=1)
+    factor = torch.complex(*model.multiplier(latents.abs().square()).chunk(2, dim=-1))
+    states = torch.cat([(latents * factor).real, (latents * factor).imag], dim=-1)
+    predicted = mean_square(model.decoder(states) - batch.target)
+    reconstruction = mean_square(model.decoder(encoded) - frames)
+    linear_dynamics = mean_square(states - encoded[:, 1:])
+    assert float(prediction) == pytest.approx(predicted, rel=1e-9)
+    assert float(loss.detach()) == pytest.approx(predicted + reconstruction + 0.01 * linear_dynamics, rel=1e-9)
+
+
 def mean_square(values: torch.Tensor) -> float:
     return float(values.detach().square().mean())
 
