@@ -110,6 +110,7 @@ AMP_TONE_DB = (-12.0, 12.0)
 # Work
 MOST_RUNS = 2_000  # of a plan
 MOST_WORKERS = 1_024  # processes, and threads of one of them
+MOST_SEEDS = 100  # that are trained together
 MOST_RETRIES = 100  # of a run that fails
 LARGEST_SEED = 2**63 - 1
 MOST_TRAJECTORIES = 1_000_000  # of a data set

@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -30,50 +31,59 @@ from training.data.draws import (
     WIDTH_RANGE,
 )
 from training.evaluate import evaluate_model
-from training.fitting.fit import Diverged, FitResult, Progress, fit
+from training.fitting.fit import Diverged, FitResult, Progress, Seed, fit_seeds
 from training.fitting.log import TrainingLog
 from training.results import QUARTERS, Row
 from training.row_errors import REPEATED, configuration_of, row_errors
 from training.start import knowledge_of
 
 
-def _trained(
-    configuration: TrainingConfiguration,
-    dataset: Dataset,
-    output: Path,
-    run_folder: Path,
-    *,
-    device: torch.device | str,
-    report: Callable[[Progress], None],
-    checkpoint_every_s: float | None,
-) -> dict[str, Any]:
-    """Makes the preset `output`, or continues with the run in `run_folder`; its errors and what it took, as in a row.
+@dataclass(frozen=True)
+class NamedRun:
+    """A run with its name and its recipe as a row carries them, and its preset's file.
 
-    An epoch is in `run_folder`/log.csv when it is reported; the run ends with a plot, log.png.
+    Attributes:
+        preset: None: NAME.safetensors in the run's folder.
+        report: receives the run's progress.
+    """
+
+    name: str
+    recipe: str
+    configuration: TrainingConfiguration
+    preset: Path | None = None
+    report: Callable[[Progress], None] = lambda progress: None
+
+    def output(self, runs: Path) -> Path:
+        return self.preset or runs / self.name / f"{self.name}.safetensors"
+
+
+def _logged(run: NamedRun, runs: Path) -> Seed:
+    """The run as a training whose epochs are in runs/NAME/log.csv when they are reported.
 
     Raises:
-        Diverged, ValueError: see `fit`.
-        RuntimeError: the preset that was written is not the model that was trained.
-        OSError: a folder cannot be written.
+        OSError: the preset's folder cannot be written.
     """
+    output = run.output(runs)
     output.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryFile(dir=output.parent):
         pass  # a folder that cannot be written is reported before the work
-    log = TrainingLog(run_folder / "log.csv")
+    log = TrainingLog(runs / run.name / "log.csv")
 
     def log_and_report(progress: Progress) -> None:
         if progress.ends_epoch:
             log.add(progress)
-        report(progress)
+        run.report(progress)
 
-    result = fit(
-        configuration,
-        dataset,
-        run_folder,
-        device=device,
-        report=log_and_report,
-        checkpoint_every_s=checkpoint_every_s,
-    )
+    return Seed(run.configuration, runs / run.name, log_and_report)
+
+
+def _saved(configuration: TrainingConfiguration, dataset: Dataset, result: FitResult, output: Path) -> dict[str, Any]:
+    """Write the preset `output` of a finished fit; its errors and what it took, as in a row.
+
+    Raises:
+        RuntimeError: the preset that was written is not the model that was trained.
+        OSError: the folder cannot be written.
+    """
     model = result.model.cpu()
     sums = {"validation": result.validation, "test": evaluate_model(model, dataset, "test", configuration.steps)}
     figures = row_errors(model, dataset, sums, configuration.steps)
@@ -97,67 +107,92 @@ def run_row(
     preset: Path | None = None,
     checkpoint_every_s: float | None = None,
 ) -> Row:
-    """A run as a row of the results file. Where it was done before, its row is read and nothing is trained.
+    """The row of one run; see `run_rows`."""
+    run = NamedRun(name, recipe, configuration, preset, report)
+    (row,) = run_rows([run], runs, cache=cache, device=device, waits=waits, checkpoint_every_s=checkpoint_every_s)
+    return row
 
-    Where the preset of a run that was done is elsewhere, it is written again from the run's checkpoint.
 
-    A run that diverges is a result too: a row that says so.
+def run_rows(
+    named: Sequence[NamedRun],
+    runs: Path,
+    *,
+    cache: Path | None = None,
+    device: torch.device | str = "cpu",
+    waits: Callable[[], None] = lambda: None,
+    checkpoint_every_s: float | None = None,
+) -> list[Row]:
+    """Runs that differ in their seeds alone, trained together, as rows of the results file.
+
+    Where a run was done before, its row is read and it is not trained. Where its preset is elsewhere, it is written
+    again from the run's checkpoint. A run that diverges is a result too: a row that says so.
 
     Args:
-        name, recipe: as the row shall carry them.
-        runs: the run's folder is runs/name: checkpoint, log and its plot, row, and the preset where `preset` is None.
-        waits: is called where another process trains in that folder, whose end is awaited.
+        runs: a run's folder is runs/NAME: checkpoint, log and its plot, row, and the preset if it has no other place.
+        waits: is called where another process trains in such a folder, whose end is awaited.
 
     Raises:
-        ValueError, RuntimeError, OSError: see `_trained`.
+        ValueError, RuntimeError, OSError: see `fit_seeds`, `_logged` and `_saved`.
     """
-    folder = runs / name
-    folder.mkdir(parents=True, exist_ok=True)
-    # never two in one folder, even where a worker that was taken for dead still trains
-    with _held(folder / "run.lock", waits):
-        file = folder / "row.json"
-        output = preset or folder / f"{name}.safetensors"
-        known = _read_row(file) if file.exists() else None
-        if known is not None and known.digest != configuration.digest:
-            known = None
-        if known is not None and _made_by(configuration, output):
-            return known
-        dataset = load_dataset(configuration.data, cache)
-        facts: dict[str, Any] = {
-            "digest": configuration.digest,
-            "name": name,
-            "model": configuration.model,
-            "string": "nonlinear" if configuration.data.tension_modulated else "linear",
-            "initial": configuration.data.initial,
-            "rate_hz": configuration.data.rate_hz,
-            "horizon": configuration.steps,
-            "recipe": recipe,
-            "seed": configuration.recipe.seed,
-            "initialisation": configuration.start,
-            "device": torch.device(device).type,
-            "threads": torch.get_num_threads(),
-            "hardware": provenance.hardware(device),
-            "torch": torch.__version__,
-            "commit": provenance.commit(),
-        }
-        try:
-            figures = _trained(
-                configuration,
-                dataset,
-                output,
-                folder,
-                device=device,
-                report=report,
-                checkpoint_every_s=checkpoint_every_s,
-            )
-        except Diverged as error:
-            return Row(**facts, status="diverged", message=str(error), finished=provenance.now())
-        row = Row(**facts, status="done", finished=provenance.now(), **figures)
-        if known is not None and (known.rel_mse, known.seconds) == (row.rel_mse, row.seconds):
-            return known  # the preset alone was missing: where and when it was trained stays
-        with whole_file(file) as unfinished:
-            unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
-        return row
+    with ExitStack() as locks:
+        # never two in one folder, even where a worker that was taken for dead still trains
+        for run in sorted(named, key=lambda run: run.name):  # in one order, or two processes could await each other
+            (runs / run.name).mkdir(parents=True, exist_ok=True)
+            locks.enter_context(_held(runs / run.name / "run.lock", waits))
+        rows = {run.name: row for run in named if (row := _known_row(run, runs)) is not None}
+        left = [run for run in named if run.name not in rows or not _made_by(run.configuration, run.output(runs))]
+        if left:
+            dataset = load_dataset(left[0].configuration.data, cache)
+            seeds = [_logged(run, runs) for run in left]
+            outcomes = fit_seeds(seeds, dataset, device=device, checkpoint_every_s=checkpoint_every_s)
+            for run, outcome in zip(left, outcomes, strict=True):
+                rows[run.name] = _row(run, outcome, dataset, runs, device, rows.get(run.name))
+        return [rows[run.name] for run in named]
+
+
+def _known_row(run: NamedRun, runs: Path) -> Row | None:
+    """The row that the run left in its folder; None where there is none, or one of another configuration."""
+    file = runs / run.name / "row.json"
+    row = _read_row(file) if file.exists() else None
+    return row if row is not None and row.digest == run.configuration.digest else None
+
+
+def _row(
+    run: NamedRun,
+    outcome: FitResult | Diverged,
+    dataset: Dataset,
+    runs: Path,
+    device: torch.device | str,
+    known: Row | None,
+) -> Row:
+    """The row of a run that has ended; its preset and row are written."""
+    configuration = run.configuration
+    facts: dict[str, Any] = {
+        "digest": configuration.digest,
+        "name": run.name,
+        "model": configuration.model,
+        "string": "nonlinear" if configuration.data.tension_modulated else "linear",
+        "initial": configuration.data.initial,
+        "rate_hz": configuration.data.rate_hz,
+        "horizon": configuration.steps,
+        "recipe": run.recipe,
+        "seed": configuration.recipe.seed,
+        "initialisation": configuration.start,
+        "device": torch.device(device).type,
+        "threads": torch.get_num_threads(),
+        "hardware": provenance.hardware(device),
+        "torch": torch.__version__,
+        "commit": provenance.commit(),
+    }
+    if isinstance(outcome, Diverged):
+        return Row(**facts, status="diverged", message=str(outcome), finished=provenance.now())
+    figures = _saved(configuration, dataset, outcome, run.output(runs))
+    row = Row(**facts, status="done", finished=provenance.now(), **figures)
+    if known is not None and (known.rel_mse, known.seconds) == (row.rel_mse, row.seconds):
+        return known  # the preset alone was missing: where and when it was trained stays
+    with whole_file(runs / run.name / "row.json") as unfinished:
+        unfinished.write_text(json.dumps(write(row), indent=2), encoding="utf-8")
+    return row
 
 
 def _made_by(configuration: TrainingConfiguration, preset: Path) -> bool:

@@ -57,6 +57,7 @@ class StringModel(nn.Module, ABC, Generic[State]):
     # names of parameters, or of their last parts, that a recipe gives a rate of their own
     eigenvalue_parameters: ClassVar[frozenset[str]] = frozenset()
     coupling_parameters: ClassVar[frozenset[str]] = frozenset()
+    mapped: ClassVar[bool] = True  # whether `torch.func.vmap` can map copies of it in training
 
     @classmethod
     def own_initialisation(cls) -> str:

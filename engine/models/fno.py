@@ -71,6 +71,7 @@ class _FourierRecurrent(StringModel[FieldState]):
     """What both cells share: the maps in and out, and the choice of the roll-out or the kernel."""
 
     initialisations: ClassVar = {"paper": ""}
+    mapped: ClassVar = False  # its training calls compiled code
     kept_fields: int  # of a step, for its gradient
 
     def __init__(self, grid_points: int, width: int) -> None:

@@ -145,10 +145,8 @@ class DiagonalSSM(nn.Module, ABC):
 
     def output(self, states: Tensor) -> Tensor:
         """Re(C̄ x), (..., outputs)."""
-        matrix = (
-            torch.conj_physical(torch.view_as_complex(self.C)) * self.conjugates
-        )  # Re(c x) = c_re x_re - c_im x_im
-        return linear(torch.view_as_real(states).flatten(-2), torch.view_as_real(matrix).flatten(1))
+        signs = self.conjugates * self.C.new_tensor([1.0, -1.0])  # Re(c x) = c_re x_re - c_im x_im
+        return linear(torch.view_as_real(states).flatten(-2), (self.C * signs).flatten(1))
 
     def forward(self, inputs: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """y (steps, batch, outputs) for u (steps, batch, inputs), and the last x."""

@@ -4,22 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from statistics import mean, stdev
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from engine.bounds import LARGEST_SEED, MOST_WORKERS
+from engine.bounds import LARGEST_SEED, MOST_SEEDS, MOST_WORKERS
 from engine.plain_text import duration
 from training.cli.arguments import Cache, Device, Runs
 from training.cli.console import Failure, number, progress, say
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from training.cli.console import Report
     from training.configuration import DatasetConfiguration, TrainingConfiguration
     from training.data.dataset import Dataset
     from training.fitting.fit import Progress
+    from training.results import Row
+    from training.run import NamedRun
 
 Configuration = Annotated[
     str,
@@ -45,6 +48,12 @@ def train(
             help="Of weights and batches, in place of the run's own; it is named CONFIG_seedN then.",
         ),
     ] = None,
+    seeds: Annotated[
+        int,
+        typer.Option(
+            min=1, max=MOST_SEEDS, metavar="N", help="Train N seeds together, the run's own or --seed first."
+        ),
+    ] = 1,
     device: Annotated[Device, typer.Option(help="auto: CUDA if it can be used.")] = "cpu",
     threads: Annotated[
         int | None, typer.Option(min=1, max=MOST_WORKERS, help="Threads of the CPU; default all cores.")
@@ -57,27 +66,19 @@ def train(
     """
     import torch
 
-    from training.cell import Cell, load
-    from training.run import default_runs, run_row
+    from training.run import default_runs, run_rows
 
-    configuration, name = load(config), Path(config).stem
-    if seed is not None and seed != configuration.recipe.seed:
-        name += f"_seed{seed}"
-        if (cell := Cell.parse(config)) is None:
-            title, recipe = f"{configuration.title}, seed {seed}", replace(configuration.recipe, seed=seed)
-            configuration = replace(configuration, title=title, recipe=recipe)
-        elif cell.seed:
-            raise typer.BadParameter(f"{config} has a seed already; leave one out", param_hint="--seed")
-        else:
-            configuration = load(name)
-    cell = Cell.parse(name)
+    if seeds > 1 and output is not None:
+        raise typer.BadParameter(
+            "is of one preset; several --seeds write into their runs' folders", param_hint="--output"
+        )
     folder = runs or default_runs()
-    file = output or folder / name / f"{name}.safetensors"
+    begun: list[Progress] = []  # empty where all was finished already
+    with_seeds = [_with_seed(config, seed, number) for number in range(seeds)]
     if threads is not None:
         torch.set_num_threads(threads)
     try:
-        load_data(configuration.data, cache)
-        begun: list[Progress] = []  # empty where the run was finished already
+        load_data(with_seeds[0][1].data, cache)
         with progress("train") as report:
             shown = training_report(report)
 
@@ -85,35 +86,80 @@ def train(
                 begun.append(each)
                 shown(each)
 
-            row = run_row(
-                name,
-                cell.recipe if cell else "",
-                configuration,
+            named = [_named(name, configuration, output, follow) for name, configuration in with_seeds]
+            rows = run_rows(
+                named,
                 folder,
                 cache=cache,
                 device=_device(device),
-                report=follow,
-                waits=lambda: say(f"{folder / name}: another process trains there; waiting for its end"),
-                preset=file,
+                waits=lambda: say(f"{folder / named[0].name}: another process trains there; waiting for its end"),
             )
     except KeyboardInterrupt:
-        say(f"stopped; the same command continues with {folder / name}")
+        say(f"stopped; the same command continues with {folder / with_seeds[0][0]}")
         raise
-    if row.status != "done":
-        raise Failure(f"{name}: {row.message}")
+    for run, row in zip(named, rows, strict=True):
+        if row.status != "done":
+            raise Failure(f"{run.name}: {row.message}")
+        _tell_row(run.output(folder), row)
+    if seeds > 1:
+        _tell_mean(rows)
+    print_known(known_errors(with_seeds[0][1]))
+    if not begun:
+        print("finished earlier, nothing was trained now")
+    for run in named:
+        _tell_heard(run.output(folder))
+
+
+def _with_seed(config: str, seed: int | None, number: int) -> tuple[str, TrainingConfiguration]:
+    """Name and configuration of a run with its own seed or `seed`, plus `number`.
+
+    Raises:
+        typer.BadParameter: the name has a seed, and another is asked for.
+    """
+    from training.cell import Cell, load
+
+    configuration, name = load(config), Path(config).stem
+    wanted = (configuration.recipe.seed if seed is None else seed) + number
+    if wanted == configuration.recipe.seed:
+        return name, configuration
+    cell = Cell.parse(config)
+    if cell is not None and cell.seed:
+        raise typer.BadParameter(f"{config} has a seed already; leave one out", param_hint="--seed")
+    name += f"_seed{wanted}"
+    if cell is not None:
+        return name, load(name)
+    title, recipe = f"{configuration.title}, seed {wanted}", replace(configuration.recipe, seed=wanted)
+    return name, replace(configuration, title=title, recipe=recipe)
+
+
+def _named(
+    name: str, configuration: TrainingConfiguration, output: Path | None, report: Callable[[Progress], None]
+) -> NamedRun:
+    from training.cell import Cell
+    from training.run import NamedRun
+
+    cell = Cell.parse(name)
+    return NamedRun(name, cell.recipe if cell else "", configuration, output, report)
+
+
+def _tell_row(file: Path, row: Row) -> None:
     print(file)
     for split, mse, mae in (
         ("validation", row.rel_mse, row.rel_mae),
         ("test", row.test_rel_mse, row.test_rel_mae),
     ):
         print(f"{split:<11} rel. MSE {number(mse)}, rel. MAE {number(mae)}")
-    print_known(known_errors(configuration))
     if row.start_rel_mse is not None and row.start_rel_mae is not None:
         print(f"untrained   rel. MSE {number(row.start_rel_mse)}, rel. MAE {number(row.start_rel_mae)} (validation)")
-    when = "" if begun else "; finished earlier, nothing was trained now"
     epoch = "" if row.epochs == 1 else f", best epoch {row.best_epoch}"  # a closed form has one
-    print(f"trained in  {duration(row.seconds or 0.0)}{epoch}{when}")
-    _tell_heard(file)
+    print(f"trained in  {duration(row.seconds or 0.0)}{epoch}")
+
+
+def _tell_mean(rows: Sequence[Row]) -> None:
+    """Print mean and standard deviation of the validation errors, as the paper's tables state them."""
+    errors = {"MSE": [row.rel_mse or 0.0 for row in rows], "MAE": [row.rel_mae or 0.0 for row in rows]}
+    words = ", ".join(f"rel. {name} {number(mean(found))} ± {number(stdev(found))}" for name, found in errors.items())
+    print(f"{len(rows)} seeds{'':<4} {words} (validation)")
 
 
 Known = dict[str, tuple[float | None, float | None]]

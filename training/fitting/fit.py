@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import Any, cast
@@ -25,9 +25,10 @@ from engine.models.base import StringModel
 from engine.plain_text import one_line
 from engine.schema import SchemaError, read, write
 from training.configuration import Recipe, TrainingConfiguration, read_configuration
-from training.data.batches import TrainingData, batches
+from training.data.batches import Batch, TrainingData, batches
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
+from training.fitting import together
 from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.fitting.losses import training_loss
 from training.fitting.soap import SOAP
@@ -106,36 +107,105 @@ def fit(
         Diverged: the loss became infinite or not a number, or no validation error was ever a number.
         ValueError: the checkpoint there is damaged or of another configuration.
     """
-    if configuration.start == LEAST_SQUARES:
-        return _fit_at_once(configuration, dataset, report)
-    begun = time.monotonic()
-    run = _Run(configuration, dataset, torch.device(device))
-    path = run_folder / "checkpoint.safetensors"
+    seed = Seed(configuration, run_folder, report)
+    (outcome,) = fit_seeds([seed], dataset, device=device, checkpoint_every_s=checkpoint_every_s)
+    if isinstance(outcome, Diverged):
+        raise outcome
+    return outcome
+
+
+@dataclass(frozen=True)
+class Seed:
+    """One of the trainings of `fit_seeds`; the arguments are those of `fit`."""
+
+    configuration: TrainingConfiguration
+    run_folder: Path
+    report: Callable[[Progress], None] = lambda progress: None
+
+
+def fit_seeds(
+    seeds: Sequence[Seed],
+    dataset: Dataset,
+    *,
+    device: torch.device | str = "cpu",
+    checkpoint_every_s: float | None = None,
+) -> list[FitResult | Diverged]:
+    """Train or continue runs that differ in their seeds alone, step by step together; see `fit`.
+
+    Runs at the same step take one pass (`fitting.together`). Those behind, as after a kill between two checkpoints,
+    catch up first. A run that diverges leaves the others.
+
+    Returns:
+        The outcome of each. Seconds are the shares of the time that all took.
+
+    Raises:
+        ValueError: a checkpoint is damaged or of another configuration, or the runs differ in more than their seeds.
+    """
+    first = seeds[0].configuration
+    if any(replace(each.configuration.recipe, seed=first.recipe.seed) != first.recipe for each in seeds) or any(
+        (each.configuration.model, each.configuration.data, each.configuration.steps)
+        != (first.model, first.data, first.steps)
+        for each in seeds
+    ):
+        raise ValueError("runs that are trained together must differ in their seeds alone")
+    if first.start == LEAST_SQUARES:
+        return [_fit_at_once(each.configuration, dataset, each.report) for each in seeds]
     every_s = CHECKPOINT_EVERY_S if checkpoint_every_s is None else checkpoint_every_s
-    if path.exists():
-        run.restore(Checkpoint.load(path), path)
-    else:
-        run.measure_start()
-        run.seconds = time.monotonic() - begun
-    started = saved = reported = time.monotonic()
-    first_step, earlier_s = run.step, run.seconds
-    while not run.ended:
-        run.train_step()
-        validation = None
+    under_way = [_UnderWay(each, dataset, torch.device(device)) for each in seeds]
+    started = before = time.monotonic()
+    iterations = 0
+    while left := [each for each in under_way if not each.ended]:
+        step = min(each.run.step for each in left)
+        group = [each for each in left if each.run.step == step]
+        train_step([each.run for each in group])
+        now, iterations = time.monotonic(), iterations + 1
+        for each in group:
+            each.run.seconds += (now - before) / len(group)
+            each.follow_step((now - started) / iterations, every_s)
+        before = now
+    return [each.outcome() for each in under_way]
+
+
+class _UnderWay:
+    """A run of several, with its checkpoint's file and what was last saved and reported."""
+
+    def __init__(self, seed: Seed, dataset: Dataset, device: torch.device) -> None:
+        begun = time.monotonic()
+        self.run = _Run(seed.configuration, dataset, device)
+        self._path, self._report = seed.run_folder / "checkpoint.safetensors", seed.report
+        self.diverged: Diverged | None = None
+        if self._path.exists():
+            self.run.restore(Checkpoint.load(self._path), self._path)
+        else:
+            self.run.measure_start()
+            self.run.seconds = time.monotonic() - begun
+        self._saved = self._reported = time.monotonic()
+
+    @property
+    def ended(self) -> bool:
+        return self.diverged is not None or self.run.ended
+
+    def outcome(self) -> FitResult | Diverged:
+        try:
+            return self.diverged or self.run.result()
+        except Diverged as error:
+            return error
+
+    def follow_step(self, step_s: float, every_s: float) -> None:
+        """Validate, report and save what is due after a step that took about `step_s`."""
+        run, validation = self.run, None
         if run.ends_epoch:
             if not math.isfinite(run.loss):
-                raise Diverged(f"the loss is {run.loss} in epoch {run.epoch}; lower peak_learning_rate")
+                self.diverged = Diverged(f"the loss is {run.loss} in epoch {run.epoch}; lower peak_learning_rate")
+                return
             validation = run.validate() if run.validation_is_due else None
         now = time.monotonic()
-        step_s = (now - started) / (run.step - first_step)
-        run.seconds = earlier_s + now - started
-        if run.ends_epoch or now - reported > TELL_EVERY_S:
-            report(run.progress(validation, step_s))
-            reported = now
-        if now - saved + step_s > every_s or run.ended:
-            run.checkpoint().save(path)
-            saved = now
-    return run.result()
+        if run.ends_epoch or now - self._reported > TELL_EVERY_S:
+            self._report(run.progress(validation, step_s))
+            self._reported = now
+        if now - self._saved + step_s > every_s or run.ended:
+            run.checkpoint().save(self._path)
+            self._saved = now
 
 
 def learning_rate_at(recipe: Recipe, share: float) -> float:
@@ -156,29 +226,43 @@ def horizon_at(recipe: Recipe, share: float, steps: int) -> int:
     return round(first * (steps / first) ** (share / recipe.grow_until))
 
 
+def train_step(runs: Sequence[_Run]) -> None:
+    """Take the next step of runs that are at the same one, in one pass where their model allows it."""
+    for run in runs:
+        run.begin_step()
+    models = [run.model for run in runs]
+    batches = [] if len(runs) == 1 or runs[0].learns_latents else [run.draw() for run in runs]
+    if not batches or not together.can_be_mapped(models, batches):
+        for run in runs:
+            run.train_alone()
+        return
+    for run, error in zip(runs, together.backward(models, batches, runs[0].recipe), strict=True):
+        run.descend(error)
+
+
 class _Run:
     """A training between two steps: all that a checkpoint holds."""
 
     def __init__(self, configuration: TrainingConfiguration, dataset: Dataset, device: torch.device) -> None:
         recipe = configuration.recipe
-        self._configuration, self._recipe, self._dataset = configuration, recipe, dataset
-        self._model, latents = begin(configuration, dataset)
+        self._configuration, self.recipe, self._dataset = configuration, recipe, dataset
+        self.model, latents = begin(configuration, dataset)
         self._latents = latents.to(device) if latents else None
-        self._model.to(device)
+        self.model.to(device)
         self._data = TrainingData(dataset, device)
         self._per_epoch = -(-self._data.count // recipe.batch_size)
-        self._optimiser = _optimiser(self._model, recipe)
+        self._optimiser = _optimiser(self.model, recipe)
         self._average: AveragedModel | None = None
         if recipe.average_decay:
             mean = get_ema_multi_avg_fn(recipe.average_decay)
-            self._average = AveragedModel(self._model, multi_avg_fn=mean, use_buffers=True)
+            self._average = AveragedModel(self.model, multi_avg_fn=mean, use_buffers=True)
         self.step, self.seconds = 0, 0.0
         self._total = torch.zeros((), device=device)  # of this epoch's losses
         self._start: RelativeError | None = None
         self._best: RelativeError | None = None
         self._best_sums: ErrorSums | None = None  # None where they were measured before the last checkpoint
         self._best_epoch = 0
-        self._best_model = _copy(self._model)
+        self._best_model = _copy(self.model)
 
     @property
     def epoch(self) -> int:
@@ -191,68 +275,90 @@ class _Run:
 
     @property
     def ended(self) -> bool:
-        patience = self._recipe.patience
+        patience = self.recipe.patience
         # while the latents are learned there is no prediction, and so none that is no better
         since = max(self._best_epoch, self._latent_steps // self._per_epoch)
         patience_exhausted = patience > 0 and self.epoch - since >= patience
-        return self.ends_epoch and (self.epoch >= self._recipe.epochs or patience_exhausted)
+        return self.ends_epoch and (self.epoch >= self.recipe.epochs or patience_exhausted)
 
     @property
     def _latent_steps(self) -> int:
         """Those in which the encoder learns the fitted latents; until their end there is no prediction."""
-        return min(self._recipe.latent_epochs, self._recipe.epochs) * self._per_epoch
+        return min(self.recipe.latent_epochs, self.recipe.epochs) * self._per_epoch
 
     @property
     def validation_is_due(self) -> bool:
         if self.step <= self._latent_steps:
             return self.step == self._latent_steps
-        return self.epoch % self._recipe.validate_every == 0 or self.epoch == self._recipe.epochs
+        return self.epoch % self.recipe.validate_every == 0 or self.epoch == self.recipe.epochs
 
     @property
     def loss(self) -> float:
         """Mean square of the predictions' errors, so far in this epoch."""
         return float(self._total) / ((self.step - 1) % self._per_epoch + 1)
 
-    def train_step(self) -> None:
-        recipe, model = self._recipe, self._model
+    @property
+    def learns_latents(self) -> bool:
+        return self._latents is not None and self.step < self._latent_steps
+
+    def begin_step(self) -> None:
+        """Set the next step's rates, and draw its epoch's batches."""
+        recipe, model = self.recipe, self.model
         epoch, number = divmod(self.step, self._per_epoch)
         if number == 0:
             self._batches = batches(recipe, self._data.count, epoch)
             self._total.zero_()
-        horizon, learning_rate = self._schedules()
+        _, learning_rate = self._schedules()
         for group in self._optimiser.param_groups:
             group["lr"] = learning_rate * group["share"]
         model.train()
         if self.step >= recipe.batch_statistics_until * recipe.epochs * self._per_epoch:
             _keep_statistics(model)
-        if self._latents is not None and self.step < self._latent_steps:
-            if self.step >= self._latent_steps - recipe.latent_polish:
-                self._total += self._latents.polish(model, recipe)
-            else:
-                self._descend(*self._latents.loss(model, recipe, self._batches[number], self.step))
+
+    def train_alone(self) -> None:
+        """Take the step that was begun."""
+        if not self.learns_latents:
+            self._descend(*training_loss(self.model, self.draw(), self.recipe))
+        elif self.step >= self._latent_steps - self.recipe.latent_polish:
+            assert self._latents is not None
+            self.end_step(self._latents.polish(self.model, self.recipe))
         else:
-            batch = self._data.draw(recipe, self._batches[number], horizon, self.step)
-            self._descend(*training_loss(model, batch, recipe))
-        self.step += 1
-        if self._latents is not None and self.step == self._latent_steps:
-            self._latents.yield_latents(model)
-            self._optimiser = _optimiser(model, recipe)
-        if self._average is not None and self.step >= self._latent_steps:
-            self._average.update_parameters(model)
+            assert self._latents is not None
+            rows = self._batches[self.step % self._per_epoch]
+            self._descend(*self._latents.loss(self.model, self.recipe, rows, self.step))
+
+    def draw(self) -> Batch:
+        """The batch of the step that was begun."""
+        horizon, _ = self._schedules()
+        return self._data.draw(self.recipe, self._batches[self.step % self._per_epoch], horizon, self.step)
 
     def _descend(self, loss: Tensor, error: Tensor) -> None:
         """A step of the optimiser against `loss`; `error` is reported."""
         self._optimiser.zero_grad(set_to_none=True)
         loss.backward()
+        self.descend(error)
+
+    def descend(self, error: Tensor) -> None:
+        """A step of the optimiser against the gradients that the weights have; `error` is reported."""
         *faster, slow = (group["params"] for group in self._optimiser.param_groups)
-        bounded = [*chain.from_iterable(faster), *(slow if self._recipe.clip_eigenvalues else ())]
-        torch.nn.utils.clip_grad_norm_(bounded, self._recipe.clip_norm)
+        bounded = [*chain.from_iterable(faster), *(slow if self.recipe.clip_eigenvalues else ())]
+        torch.nn.utils.clip_grad_norm_(bounded, self.recipe.clip_norm)
         self._optimiser.step()
+        self.end_step(error)
+
+    def end_step(self, error: Tensor) -> None:
+        """Count the step, whose mean square of the prediction's error is `error`."""
         self._total += error
+        self.step += 1
+        if self._latents is not None and self.step == self._latent_steps:
+            self._latents.yield_latents(self.model)
+            self._optimiser = _optimiser(self.model, self.recipe)
+        if self._average is not None and self.step >= self._latent_steps:
+            self._average.update_parameters(self.model)
 
     def _schedules(self) -> tuple[int, float]:
         """Horizon and learning rate of the next step."""
-        recipe, latent_steps = self._recipe, self._latent_steps
+        recipe, latent_steps = self.recipe, self._latent_steps
         if self.step < latent_steps:
             peak = recipe.latent_learning_rate / recipe.peak_learning_rate
             return self._configuration.steps, peak * learning_rate_at(recipe, self.step / latent_steps)
@@ -261,7 +367,7 @@ class _Run:
 
     def progress(self, validation: RelativeError | None, step_s: float) -> Progress:
         """`step_s`: what a step has taken."""
-        epochs, (horizon, learning_rate) = self._recipe.epochs, self._schedules()
+        epochs, (horizon, learning_rate) = self.recipe.epochs, self._schedules()
         steps = epochs * self._per_epoch
         left_s = step_s * (steps - self.step)
         at = (self.step, steps, self.epoch, epochs, horizon, learning_rate)
@@ -303,10 +409,10 @@ class _Run:
         }
         average = self._average.state_dict() if self._average is not None else {}
         moments = optimiser_moments(self._optimiser)
-        return Checkpoint(self._model.state_dict(), self._best_model, average, moments, facts)
+        return Checkpoint(self.model.state_dict(), self._best_model, average, moments, facts)
 
     def restore(self, checkpoint: Checkpoint, path: Path) -> None:
-        facts, device = checkpoint.facts, next(self._model.parameters()).device
+        facts, device = checkpoint.facts, next(self.model.parameters()).device
         try:  # read, not compared as it is: fields that came later have their defaults
             other = read_configuration(facts["configuration"], f"{path}: configuration")
             self.step, self.seconds = int(facts["step"]), float(facts["seconds"])
@@ -324,7 +430,7 @@ class _Run:
                 f"{path}: was trained with other settings; delete it to start again, or give another --runs"
             )
         try:
-            self._model.load_state_dict(dict(checkpoint.model))
+            self.model.load_state_dict(dict(checkpoint.model))
             if self._average is not None:
                 self._average.load_state_dict(dict(checkpoint.average))
             restore_moments(self._optimiser, checkpoint.optimiser)
@@ -332,11 +438,11 @@ class _Run:
             message = one_line(f"{path}: damaged checkpoint ({error}); delete it to start the run again")
             raise ValueError(message) from error
         self._best_model = {name: t.to(device) for name, t in checkpoint.best_model.items()}
-        self._batches = batches(self._recipe, self._data.count, self.step // self._per_epoch)
+        self._batches = batches(self.recipe, self._data.count, self.step // self._per_epoch)
 
     def _measured(self) -> StringModel[Any]:
         """The model that the run is judged by: the running mean of its weights, where it keeps one."""
-        return self._model if self._average is None else cast("StringModel[Any]", self._average.module)
+        return self.model if self._average is None else cast("StringModel[Any]", self._average.module)
 
 
 def _fit_at_once(

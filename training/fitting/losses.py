@@ -34,9 +34,11 @@ class KoopmanModel(Protocol):
 
 
 @runtime_checkable
-class ObservedModel(KoopmanModel, Protocol):
+class ObservedModel(Protocol):
     """A Koopman model whose decoder reads states that follow from the latents."""
 
+    def encode(self, displacement: Tensor) -> Any: ...
+    def latents(self, origin: Tensor, frames: Tensor) -> Tensor: ...
     def observed(self, latents: Tensor) -> Tensor: ...
     def read(self, states: Tensor) -> Tensor: ...
 
@@ -46,10 +48,10 @@ def training_loss(model: StringModel[Any], batch: Batch, recipe: Recipe) -> tupl
 
     Consistency compares with the encoded truth; without a weight it costs nothing.
     """
-    if not isinstance(model, KoopmanModel):
-        return _prediction(_predicted(model, batch), batch.target, recipe)
     if recipe.koopman_terms == "published" and isinstance(model, ObservedModel):
         return _published_loss(model, batch, recipe)
+    if not isinstance(model, KoopmanModel):
+        return _prediction(_predicted(model, batch), batch.target, recipe)
     origin = model.encode(batch.initial).origin
     latents = model.latents(origin, batch.frames)
     loss, prediction = _prediction(model.decode(latents), batch.target, recipe)

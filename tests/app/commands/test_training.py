@@ -113,6 +113,20 @@ def test_a_run_of_ones_own_takes_another_seed(run, place: Place) -> None:
     assert twice.status == 2 and "has a seed already" in twice.err
 
 
+def test_seeds_are_trained_together_and_their_mean_is_printed(run, place: Place) -> None:
+    runs = place.folder / "runs"
+    done = run("train", place.configuration, "--runs", runs, "--seeds", 2, *place.cache)
+    assert done.status == 0, done.err
+    names = ("tiny", "tiny_seed1")
+    errors = [load_preset(runs / name / f"{name}.safetensors").info.rel_mse for name in names]
+    middle, deviation = sum(errors) / 2, abs(errors[0] - errors[1]) / 2**0.5
+    assert f"2 seeds     rel. MSE {middle:.4g} ± {deviation:.4g}" in done.out
+    again = run("train", place.configuration, "--runs", runs, "--seeds", 2, *place.cache)
+    assert "finished earlier, nothing was trained now" in again.out
+    usage = run(*place.train("one"), "--seeds", 2).usage
+    assert "--output" in usage
+
+
 def test_a_killed_run_goes_on_to_the_same_weights(run, place: Place, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("training.fitting.fit.CHECKPOINT_EVERY_S", -1)
     assert run(*place.train("whole")).status == 0

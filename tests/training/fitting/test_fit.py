@@ -18,7 +18,7 @@ from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting import fit as module
 from training.fitting.checkpoint import Checkpoint
-from training.fitting.fit import Diverged, Progress, fit, horizon_at, learning_rate_at
+from training.fitting.fit import Diverged, Progress, Seed, fit, fit_seeds, horizon_at, learning_rate_at
 from training.fitting.losses import training_loss
 from training.start import new_model
 
@@ -137,17 +137,17 @@ def test_a_polish_is_too_and_lowers_the_error(
     assert losses[0] < 0.5 * losses[1]
 
 
+def cut_after(epoch: int) -> Callable[[Progress], None]:
+    def report(progress: Progress) -> None:
+        if progress.epoch == epoch:
+            raise KeyboardInterrupt
+
+    return report
+
+
 def check_cuts(configuration: TrainingConfiguration, small_dataset: Dataset, runs: Path) -> None:
     """The same weights with cuts after the second and the third epoch of four."""
     whole = fit(configuration, small_dataset, runs / "whole", checkpoint_every_s=-1)
-
-    def cut_after(epoch: int) -> Callable[[Progress], None]:
-        def report(progress: Progress) -> None:
-            if progress.epoch == epoch:
-                raise KeyboardInterrupt
-
-        return report
-
     for epoch in (2, 3):  # the second cut continues from the first one's checkpoint
         with pytest.raises(KeyboardInterrupt):
             fit(configuration, small_dataset, runs / "cut", report=cut_after(epoch), checkpoint_every_s=-1)
@@ -303,3 +303,86 @@ def test_a_model_that_no_preset_can_hold_is_refused_before_it_is_trained(small_d
     configuration = replace(small("koopman"), model_configuration={"encoder_widths": [4096, 4096]})
     with pytest.raises(ValueError, match="lower its widths"):
         new_model(configuration, small_dataset.scale_m)
+
+
+@pytest.mark.parametrize("recipe", ["ours", "published"])
+@pytest.mark.parametrize("model", SMALL)
+def test_a_seed_trained_with_others_is_the_seed_alone(
+    small_dataset: Dataset, runs: Path, model: str, recipe: str
+) -> None:
+    """The losses of 50 steps agree to 1e-5; a learning rate of the paper's size, or rounding would grow."""
+    horizon = 12 if model in ("fgru", "frnn") else 40
+    epochs = 25 if model not in ("fgru", "frnn") else 4
+    changes = {"epochs": epochs, "validate_every": 25, "peak_learning_rate": 1e-4}
+    if recipe == "published":
+        changes["steps_per_batch"] = 0  # the same frames for all
+    if (model, recipe) == ("koopman", "ours"):
+        changes |= {"latent_epochs": 5, "latent_polish": 1}
+    configurations = [small(model, recipe, horizon, seed=seed, **changes) for seed in range(3)]
+    losses: dict[str, list[list[float]]] = {"alone": [], "together": []}
+
+    def seeds(way: str) -> list[Seed]:
+        found = []
+        for configuration in configurations:
+            own: list[float] = []
+            losses[way].append(own)
+            folder = runs / way / str(configuration.recipe.seed)
+            found.append(Seed(configuration, folder, lambda p, own=own: own.append(p.loss) if p.ends_epoch else None))  # type: ignore[misc]
+        return found
+
+    for seed in seeds("alone"):
+        fit_seeds([seed], small_dataset)
+    fit_seeds(seeds("together"), small_dataset)
+    assert [len(own) for own in losses["together"]] == [epochs] * 3
+    torch.testing.assert_close(torch.tensor(losses["together"]), torch.tensor(losses["alone"]), rtol=1e-5, atol=0)
+
+
+def test_seeds_of_one_run_take_one_pass(small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    passes = []
+    together = module.together.backward
+    monkeypatch.setattr(
+        module.together, "backward", lambda models, *rest: passes.append(len(models)) or together(models, *rest)
+    )
+    fit_seeds(
+        [Seed(small("s5", "published", steps_per_batch=0, seed=n), runs / str(n)) for n in range(2)], small_dataset
+    )
+    assert passes == [2] * 8
+
+
+def test_seeds_that_were_cut_apart_end_as_the_whole(small_dataset: Dataset, runs: Path) -> None:
+    """One seed is a checkpoint ahead: the other catches up, and both end as without the cut, to rounding."""
+    configurations = [small("koopman_var", seed=n) for n in range(2)]
+    ahead = runs / "cut" / "0"
+    with pytest.raises(KeyboardInterrupt):
+        fit(configurations[0], small_dataset, ahead, report=cut_after(2), checkpoint_every_s=-1)
+    for way in ("whole", "cut"):
+        fit_seeds([Seed(c, runs / way / str(n)) for n, c in enumerate(configurations)], small_dataset)
+    for n in range(2):
+        whole, cut = (weights(runs / way / str(n)) for way in ("whole", "cut"))
+        for name, weight in whole.items():
+            torch.testing.assert_close(cut[name], weight, rtol=1e-4, atol=1e-6)
+
+
+def test_a_seed_that_diverges_leaves_the_others(
+    small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loss = module.training_loss
+    monkeypatch.setattr(module.together, "can_be_mapped", lambda *_: False)
+    first: list[object] = []
+
+    def broken(model: Any, *rest: Any) -> tuple[torch.Tensor, torch.Tensor]:
+        first.append(model)
+        value, error = loss(model, *rest)
+        return (value, error * math.inf) if model is first[0] else (value, error)
+
+    monkeypatch.setattr(module, "training_loss", broken)
+    broke, well = fit_seeds([Seed(small("koopman_var", seed=n), runs / str(n)) for n in range(2)], small_dataset)
+    assert isinstance(broke, Diverged)
+    assert not isinstance(well, Diverged)
+    assert well.epochs == 4
+
+
+def test_seeds_of_different_runs_are_refused(small_dataset: Dataset, runs: Path) -> None:
+    mixed = [Seed(small("koopman", epochs=n), runs / str(n)) for n in (2, 3)]
+    with pytest.raises(ValueError, match="differ in their seeds alone"):
+        fit_seeds(mixed, small_dataset)
