@@ -21,7 +21,7 @@ from app.export.plugin import build
 from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, this_target
 from app.export.plugin.identity import held_in
-from app.export.plugin.image import Image, image_of
+from app.export.plugin.image import Image, _Header, image_of
 from app.export.plugin.objects import objects_of, reason_of
 from app.instrument.events import HARMONICS, STRUM, TREMOLO, Controller, NoteOn, PatchTurned, TimedEvent
 from app.instrument.offline import render_events
@@ -31,7 +31,7 @@ from app.patches.patch import Patch, Technique
 from app.shared.parameters import OF_PATCHES
 from engine.python_process import python_command, python_environment
 from engine.result_file import WriteError
-from tests.app.export.plugin import host
+from tests.app.export.plugin import host, lv2_host
 from tests.app.export.plugin.host import (
     IN_FILE,
     IN_PLUGIN,
@@ -658,6 +658,25 @@ def test_targets_are_known_and_an_unknown_one_is_refused(objects: Path) -> None:
         objects_of("amiga", objects)
     assert set(TARGETS) == {"linux-x64", "linux-arm64", "windows-x64", "macos-x64", "macos-arm64"}
     assert host.NOTE_ON == 0
+
+
+def test_names_in_any_script_are_plug_ins_of_their_own(objects: Path, tmp_path: Path) -> None:
+    names = ("é" * 60, "古琴" * 18, "古琴" * 18 + "!", "🎸" * 60, "My bass!", "my bass-", "My bass", "عود", "!!!")
+    harp, preset = patch_of("concert_harp"), preset_of("concert_harp")
+    made = [image_of(harp.model_copy(update={"name": name}), preset) for name in names]
+    library = Library(build_plugin(made, "clap", this_target(), tmp_path / "bank", objects))
+    assert list(library.plugins) == [image.id for image in made]
+    assert len({bytes(_Header.from_buffer_copy(image.content).uid) for image in made}) == len(names)
+    for id in library.plugins:
+        assert library.create(id).save()
+    library.destroy_instances()
+    bundle = build_plugin(made, "lv2", this_target(), tmp_path / "bank", objects)
+    for image in made:
+        lv2_host.Instance(bundle, image.id, image.parameters, 48_000).destroy()
+    if shutil.which("lv2ls"):
+        environment = {**os.environ, "LV2_PATH": str(tmp_path)}
+        done = subprocess.run(["lv2ls"], env=environment, capture_output=True, text=True, check=True)
+        assert sorted(done.stdout.splitlines()) == sorted(f"urn:{image.id}" for image in made)
 
 
 def test_two_instruments_of_one_name_are_no_bank(images: list[Image], objects: Path, tmp_path: Path) -> None:
