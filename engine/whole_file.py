@@ -1,34 +1,80 @@
-"""Files that are written whole or not at all."""
+"""Files and folders that are written whole or not at all, and what killed processes have left of them."""
 
 from __future__ import annotations
 
 import os
 import platform
 import re
+import shutil
+import tempfile
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+ENDING = ".unfinished"
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """A path beside `path` to write to: it takes its place when the block ends well, and an error leaves nothing.
 
-    What a process that was killed has left of the same file is removed first.
+    What killed processes have left in its folder is removed first.
 
     Raises:
         OSError: the folder is not there or cannot be written, or the disk is full; it names `path`.
     """
-    stem = f".{path.name[:100]}.{this_computer()}"
-    _remove_left_over(path.parent, stem)
-    unfinished = path.with_name(f"{stem}-{os.getpid()}.unfinished")
+    remove_left_over(path.parent)
+    unfinished = path.with_name(f"{_mark(path.name)}{ENDING}")
     try:
         with naming(path):
             yield unfinished
             unfinished.replace(path)
     finally:
         unfinished.unlink(missing_ok=True)
+
+
+@contextmanager
+def whole_folder(path: Path) -> Iterator[Path]:
+    """A folder beside `path` to fill: it takes its place when the block ends well, and an error leaves nothing.
+
+    Raises:
+        OSError: see `whole_file`.
+    """
+    with working_folder(path.parent, path.name) as working:
+        made, before = working / "made", working / "before"
+        made.mkdir()
+        yield made
+        with naming(path):
+            if path.exists():
+                path.replace(before)
+            try:
+                made.replace(path)
+            except OSError:
+                if before.exists():
+                    before.replace(path)
+                raise
+
+
+@contextmanager
+def working_folder(parent: Path, name: str) -> Iterator[Path]:
+    """A folder for the time of the block. What killed processes have left in `parent` is removed first.
+
+    Raises:
+        OSError: `parent` is not there or cannot be written; it names `parent`.
+    """
+    made = lasting_folder(parent, name)
+    try:
+        yield made
+    finally:
+        shutil.rmtree(made, ignore_errors=True)
+
+
+def lasting_folder(parent: Path, name: str) -> Path:
+    """A new folder for the time of this process, which removes it; see `working_folder`."""
+    remove_left_over(parent)
+    with naming(parent):
+        return Path(tempfile.mkdtemp(prefix=f"{_mark(name)}-", suffix=ENDING, dir=parent))
 
 
 @contextmanager
@@ -43,14 +89,31 @@ def naming(path: Path) -> Iterator[None]:
         raise
 
 
-def _remove_left_over(folder: Path, stem: str) -> None:
-    """Of processes of this computer that are no more; another's, in a shared folder, cannot be asked about."""
-    pattern = re.compile(re.escape(stem) + r"-(\d{1,9})\.unfinished")
-    with suppress(OSError):
-        for name in os.listdir(folder):  # noqa: PTH208 - names alone: the folder may be large
-            found = pattern.fullmatch(name)
-            if found and not is_alive(int(found[1])):
-                (folder / name).unlink(missing_ok=True)
+def remove_left_over(folder: Path) -> None:
+    """Removes unfinished files and folders of this user's processes that are no more.
+
+    Those of other users or computers stay: in a shared folder, nobody here knows whether they are under way.
+    """
+    pattern = re.compile(rf"\..+\.{this_computer()}-(\d{{1,9}})(-\w+)?{re.escape(ENDING)}", re.DOTALL)
+    with suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            found = pattern.fullmatch(entry.name)
+            if not found or not _is_own(entry) or is_alive(int(found[1])):
+                continue
+            if entry.is_dir(follow_symlinks=False):
+                shutil.rmtree(entry.path, ignore_errors=True)
+            else:
+                Path(entry.path).unlink(missing_ok=True)
+
+
+def _is_own(entry: os.DirEntry[str]) -> bool:
+    return not hasattr(os, "getuid") or entry.stat(follow_symlinks=False).st_uid == os.getuid()
+
+
+def _mark(name: str) -> str:
+    """The beginning of an unfinished file's name: what it becomes, and the process that writes it."""
+    short = os.fsencode(name)[:100].decode(errors="ignore")
+    return f".{short}.{this_computer()}-{os.getpid()}"
 
 
 def this_computer() -> str:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 ALL = "all"
 BANK = "Learned Strings"
+LONGEST_BANK_NAME = 60  # characters, as of an instrument's
 
 
 def plugin(
@@ -34,15 +35,19 @@ def plugin(
     ] = "this",
     out: Annotated[Path | None, typer.Option("--out", "-o", metavar="FOLDER", help="Default: this folder.")] = None,
     install: Annotated[bool, typer.Option("--install", help="Put it where this user's hosts look for it.")] = False,
+    replace: Annotated[
+        bool, typer.Option("--replace", help="Replace a plug-in that holds other instruments, too.")
+    ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Build nothing; print sizes.")] = False,
 ) -> None:
     """Build a plug-in that plays instruments in a DAW, without Python inside.
 
-    Several instruments make one bank. The first build takes about a minute, later ones seconds. It needs the
-    extra learned-strings[plugin].
+    Several instruments make one bank, named by them. The first build takes about a minute, later ones seconds. It
+    needs the extra learned-strings[plugin].
     """
-    from app.export.plugin.build import build_plugin
+    from app.export.plugin.build import build_plugin, plugin_path
     from app.export.plugin.formats import FORMATS, TARGETS, install_folder, this_target
+    from app.export.plugin.identity import check_kept
     from app.export.plugin.image import image_of
     from app.patches.library import SHIPPED, find_patch, list_patches
     from engine.kernels import cache
@@ -65,15 +70,29 @@ def plugin(
             return
         kept = cache.folder() or Path(tempfile.gettempdir())
         targets = tuple(TARGETS) if target == ALL else (this_target() if target == "this" else target,)
-        name = chosen[0].name if len(chosen) == 1 else BANK
+        ids = {image.id for image in images}
+        name = BANK if instruments == [ALL] else _bank_name([patch.name for patch in chosen])
+        wanted = list[tuple[str, str, Path]]()
         for each in targets:
             for kind in FORMATS if form == ALL else (form,):
                 folder = install_folder(kind, each) if install else (out or Path()) / (each if target == ALL else "")
-                began_s = time.monotonic()
-                path = build_plugin(images, kind, each, folder / name, kept, _Steps())
-                print(f"{one_line(str(path))}: {_size(path) / 1e6:.1f} MB, {time.monotonic() - began_s:.1f} s")
+                wanted.append((kind, each, plugin_path(folder / name, kind)))
+        if not replace:
+            for _, _, path in wanted:  # all before the first is written
+                check_kept(path, ids)
+        for kind, each, path in wanted:
+            began_s, there = time.monotonic(), path.exists()
+            build_plugin(images, kind, each, path, kept, _Steps(), replace=replace)
+            done = f"{_size(path) / 1e6:.1f} MB, {time.monotonic() - began_s:.1f} s"
+            print(f"{one_line(str(path))}: {done}{', replaces the one before' if there else ''}")
     except (ValueError, OSError) as error:
         raise Failure(str(error)) from error
+
+
+def _bank_name(names: Sequence[str]) -> str:
+    """The name of the file, by what it holds; where two banks have one name, the second is refused."""
+    whole = " + ".join(names)
+    return whole if len(names) == 1 or len(whole) <= LONGEST_BANK_NAME else f"{names[0]} + {len(names) - 1} others"
 
 
 def _print_sizes(images: Sequence[Image]) -> None:

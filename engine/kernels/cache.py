@@ -5,7 +5,6 @@ from __future__ import annotations
 import atexit
 import hashlib
 import os
-import re
 import shutil
 import tempfile
 from collections.abc import Iterator
@@ -13,9 +12,7 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
-from engine.whole_file import is_alive, this_computer
-
-_TEMPORARY = "learned-strings-kernels"
+from engine.whole_file import lasting_folder
 
 
 def _sources() -> list[Path]:
@@ -44,28 +41,11 @@ def folder() -> Path | None:
         if _can_be_written(place):
             return place
     try:
-        _remove_left_over(Path(tempfile.gettempdir()))
-        made = Path(tempfile.mkdtemp(prefix=f"{_TEMPORARY}-{this_computer()}-{os.getpid()}-"))
+        made = lasting_folder(Path(tempfile.gettempdir()), "learned-strings-kernels")
     except OSError:
         return None
     atexit.register(shutil.rmtree, made, ignore_errors=True)
     return made
-
-
-def _remove_left_over(place: Path) -> None:
-    """Folders of this user's processes that were killed; those of others, or elsewhere, are not ours to judge."""
-    pattern = re.compile(rf"{_TEMPORARY}-{this_computer()}-(\d{{1,9}})-\w+")
-    with os.scandir(place) as entries:
-        for entry in entries:
-            found = pattern.fullmatch(entry.name)
-            if found and _is_own_folder(entry) and not is_alive(int(found[1])):
-                shutil.rmtree(entry.path, ignore_errors=True)
-
-
-def _is_own_folder(entry: os.DirEntry[str]) -> bool:
-    if not entry.is_dir(follow_symlinks=False):
-        return False
-    return not hasattr(os, "getuid") or entry.stat(follow_symlinks=False).st_uid == os.getuid()
 
 
 def _places() -> Iterator[Path]:

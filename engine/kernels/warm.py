@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import astuple
@@ -22,6 +21,7 @@ from engine.kernels import cache, layout
 from engine.models._tension_arrays import CURVES
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, TrainedRange
+from engine.python_process import python_command, python_environment
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import listening_weights, project
 from engine.resonators.string import StringParameters
@@ -71,8 +71,8 @@ def _beside(work: str) -> AbstractContextManager[object]:
     """Another process does a function of this module meanwhile; what it leaves undone, this one does later."""
     if cache.folder() is None or os.cpu_count() == 1:
         return nullcontext()
-    code = f"import sys; sys.path[:] = {sys.path!r}; from engine.kernels import warm; warm.{work}()"
-    return subprocess.Popen([sys.executable, "-c", code])
+    code = f"from engine.kernels import warm; warm.{work}()"
+    return subprocess.Popen(python_command("-c", code), env=python_environment())
 
 
 def playing() -> None:

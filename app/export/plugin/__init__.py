@@ -1,6 +1,7 @@
 """An instrument as a native plug-in: its image, the kernels' object code, a shell in C, and their linking.
 
 formats   kinds of plug-ins, systems, and where hosts look for them
+identity  an instrument's identifier, and those in a built plug-in
 image     an instrument as one block of bytes that the shell reads, and the header of offsets
 parts     what macros change: body, room, levels of keys
 objects   the compiled kernels for each system

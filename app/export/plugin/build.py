@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import errno
+import hashlib
+import os
 import plistlib
+import re
 import shutil
-import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from importlib.resources import files
@@ -14,12 +17,17 @@ from urllib.parse import quote
 import numpy as np
 
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, check_compiler
+from app.export.plugin.identity import PREFIX, check_kept, lost_with
 from app.export.plugin.image import MAKER, NOISE_FRAMES, NOISE_UNIT, Image, layout_header
-from app.export.plugin.objects import STUBS, objects_of, run_waiting
+from app.export.plugin.objects import STUBS, objects_of, reason_of, run_waiting
 from app.shared.version import program_version
 from engine.effects.room import room_noise
-from engine.whole_file import whole_file
+from engine.python_process import python_command, python_environment
+from engine.result_file import WriteError, explain
+from engine.whole_file import naming, whole_file, whole_folder, working_folder
 
+MOST_IMAGES = 128  # of the shell
+FULL_BYTES = 2**24  # where less is left, a build that failed has filled the disk
 COMPILING = 0.97  # of the time of a first build, measured
 COMMON = ("instrument.c", "effects.c", "responses.c", "thread.c", "kernels.c")
 LIBRARY_ENDINGS = {"linux": ".so", "windows": ".dll", "macos": ".dylib"}
@@ -34,32 +42,69 @@ def build_plugin(
     path: Path,
     cache: Path,
     advanced: Callable[[str, float], None] = lambda step, share: None,
+    *,
+    replace: bool = False,
 ) -> Path:
     """Builds a plug-in that holds these instruments: the file, or the folder of the bundle.
 
+    One that is there is replaced as a whole.
+
     Args:
         form: one of FORMATS.
-        path: without an ending it gets that of the format.
+        path: see `plugin_path`.
         cache: a folder that keeps object files for the next build.
         advanced: is called a few times a second with the name of the step and the share of the whole build that is
             done, 0 … 1; may raise, to end it.
+        replace: a plug-in that is there and holds other instruments, too.
 
     Raises:
-        PluginError: the compiler is not installed, or linking failed.
+        PluginError: the compiler is not installed, linking failed, two instruments have one name, or what is there
+            would be lost.
         ObjectError: the kernels cannot be compiled for the target.
+        WriteError: a file cannot be written.
     """
     check_compiler()
+    names = [image.name for image in images]
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise PluginError(f"two instruments are named {twice}: hosts know them by their names; rename one")
+    if len(images) > MOST_IMAGES:
+        raise PluginError(f"a bank has at most {MOST_IMAGES} instruments, not {len(images)}; build several")
+    path = plugin_path(path, form)
+    (lost_with if replace else check_kept)(path, {image.id for image in images})
+    try:
+        return _built(images, form, target, path, cache, advanced)
+    except OSError as error:
+        raise WriteError(explain(Path(os.fsdecode(error.filename or path)), error)) from error
+
+
+def plugin_path(path: Path, form: str) -> Path:
+    """The path with the ending of the format."""
+    ending = FORMATS[form].ending
+    return path if path.suffix == ending else path.with_name(path.name + ending)
+
+
+def _built(
+    images: Sequence[Image],
+    form: str,
+    target: str,
+    path: Path,
+    cache: Path,
+    advanced: Callable[[str, float], None],
+) -> Path:
     own = FORMATS[form]
-    path = path if path.suffix == own.ending else path.with_name(path.name + own.ending)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with working_folder(path.parent, path.name):  # it can be written: found before work that takes a minute
+        pass
     kernels = objects_of(target, cache, lambda share: advanced("compiling the kernels", COMPILING * share))
     advanced("linking", COMPILING)
-    with tempfile.TemporaryDirectory(prefix="learned-strings-plugin-") as name:
-        folder = Path(name)
-        for source in files("app.export.plugin").joinpath("shell").iterdir():
-            (folder / source.name).write_bytes(source.read_bytes())
-        (folder / "layout.h").write_text(layout_header(program_version()), encoding="utf-8")
-        (folder / "stubs.c").write_text(_stubs(), encoding="utf-8")
-        (folder / "images.c").write_text(_images(images, folder), encoding="utf-8")
+    with working_folder(Path(tempfile.gettempdir()), "learned-strings-plugin") as folder:
+        with naming(folder.parent):
+            for source in files("app.export.plugin").joinpath("shell").iterdir():
+                (folder / source.name).write_bytes(source.read_bytes())
+            (folder / "layout.h").write_text(layout_header(program_version()), encoding="utf-8")
+            (folder / "stubs.c").write_text(_stubs(), encoding="utf-8")
+            (folder / "images.c").write_text(_images(images, folder), encoding="utf-8")
         library = folder / "library"
         _link(
             folder,
@@ -82,7 +127,7 @@ def _placed(library: Path, images: Sequence[Image], form: str, target: str, path
     elif system == "macos":
         plist = {
             "CFBundleExecutable": path.stem,
-            "CFBundleIdentifier": f"org.learned-strings.{''.join(c if c.isalnum() else '-' for c in path.stem)}",
+            "CFBundleIdentifier": f"{PREFIX}{hashlib.sha256(os.fsencode(path.stem)).hexdigest()[:16]}",  # plain ASCII
             "CFBundleName": path.stem,
             "CFBundlePackageType": "BNDL",
             "CFBundleVersion": "1",
@@ -94,19 +139,18 @@ def _placed(library: Path, images: Sequence[Image], form: str, target: str, path
         }
     elif form == "vst3":
         inside = {f"Contents/{VST3_FOLDERS[target]}/{path.stem}{VST3_ENDINGS[system]}": library}
-    path.parent.mkdir(parents=True, exist_ok=True)
     if not inside:
         with whole_file(path) as part:
             shutil.copyfile(library, part)
         return path
-    for name, content in inside.items():
-        place = path / name
-        place.parent.mkdir(parents=True, exist_ok=True)
-        with whole_file(place) as part:
+    with whole_folder(path) as made:
+        for name, content in inside.items():
+            place = made / name
+            place.parent.mkdir(parents=True, exist_ok=True)
             if isinstance(content, Path):
-                shutil.copyfile(content, part)
+                shutil.copyfile(content, place)
             else:
-                part.write_text(content, encoding="utf-8")
+                place.write_text(content, encoding="utf-8")
     return path
 
 
@@ -143,20 +187,25 @@ def _link(
     library: Path,
     waiting: Callable[[], None],
 ) -> None:
-    command = [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[target].linker, "-shared", "-O2", "-std=c23"]
+    command = python_command("-m", "ziglang", "cc", "-target", TARGETS[target].linker, "-shared", "-O2", "-std=c23")
     command += ["-fvisibility=hidden", "-fno-sanitize=all", "-s", "-fPIC", "-o", str(library)]
     command += [*(str(folder / name) for name in sources), *map(str, kernels), "-lm"]
     if target.startswith("linux"):
         command.append("-lpthread")
-    code, said = run_waiting([command], None, lambda _: waiting())
+    code, said = run_waiting([command], python_environment(), lambda _: waiting())
+    full = code and shutil.disk_usage(folder).free < FULL_BYTES  # then even words of the compiler may be lost
+    if full or "NoSpaceLeft" in said or os.strerror(errno.ENOSPC) in said:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder.parent))
     if code:
-        raise PluginError(f"linking for {target} failed: {said.strip()[-600:]}")
+        remedy = "; set ZIG_GLOBAL_CACHE_DIR to a folder that can be written" if "cache dir" in said else ""
+        raise PluginError(f"linking for {target} failed: {reason_of(code, said)}{remedy}")
 
 
 def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
     """The descriptions of an LV2 bundle, by file name."""
     prefixes = "".join(f"@prefix {name}: <{uri}> .\n" for name, uri in _PREFIXES.items())
     listed, described = [prefixes], [prefixes]
+    minor, micro = _lv2_version(program_version())
     for image in images:
         head = f"<urn:{image.id}> a lv2:Plugin, lv2:InstrumentPlugin, doap:Project ;"
         listed.append(f"{head}\n  lv2:binary <{quote(binary)}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
@@ -184,11 +233,22 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
         described.append(
             f'{head}\n  doap:name "{_quoted(image.name)}" ;\n  doap:maintainer [ foaf:name "{MAKER}" ] ;\n'
             "  doap:license <https://opensource.org/license/mit> ;\n"
-            "  lv2:requiredFeature urid:map ;\n  lv2:optionalFeature lv2:hardRTCapable ;\n  lv2:port "
+            f"  lv2:minorVersion {minor} ; lv2:microVersion {micro} ;\n"
+            "  lv2:requiredFeature urid:map ;\n  lv2:optionalFeature lv2:hardRTCapable ;\n"
+            "  lv2:extensionData state:interface ;\n  lv2:port "
             + " ,\n  ".join(f"[\n    {port} ;\n  ]" for port in ports)
             + " .\n"
         )
     return {"manifest.ttl": "\n".join(listed), "instruments.ttl": "\n".join(described)}
+
+
+def _lv2_version(version: str) -> tuple[int, int]:
+    """The minor and the micro version, which rise with the program's: even for a release, odd for all before it."""
+    found = re.match(r"(\d{1,4})\.(\d{1,3})(?:\.(\d{1,4}))?(.*)", version)
+    if found is None:
+        return 1, 1
+    major, minor, patch, rest = found.groups()
+    return 2 * (1000 * int(major) + int(minor)), 2 * int(patch or 0) + bool(rest)
 
 
 def _quoted(text: str) -> str:
@@ -203,5 +263,6 @@ _PREFIXES = {
     "rdf": "http://www.w3.org/1999/02/22-rdf-syntax-ns#",
     "rdfs": "http://www.w3.org/2000/01/rdf-schema#",
     "doap": "http://usefulinc.com/ns/doap#",
+    "state": "http://lv2plug.in/ns/ext/state#",
     "foaf": "http://xmlns.com/foaf/0.1/",
 }

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from app.export.plugin.identity import identifier
 from app.export.plugin.parts import AMP, EFFECTS, effects_there, kit_of, parts_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
@@ -232,8 +233,8 @@ def image_of(patch: Patch, preset: Preset) -> Image:
         header.impulse_hz, header.impulse_unit = parts.impulse_hz, unit
     header.body_size = patch.body.size
     header.longest_s = MOST_LOUD_S
-    id = f"org.learned-strings.{''.join(c if c.isalnum() else '-' for c in patch.name.lower())}"
-    header.id, header.name, header.maker = id.encode()[:127], _bytes(patch.name, 63), MAKER.encode()
+    id = identifier(patch.name)
+    header.id, header.name, header.maker = id.encode(), _bytes(patch.name, 63), MAKER.encode()
     header.uid[:] = uuid.uuid5(uuid.NAMESPACE_URL, f"urn:{id}").bytes
     header.description = _bytes(patch.description, 511)
     header.features = f"instrument {'drum' if drums else 'synthesizer'} stereo".encode()

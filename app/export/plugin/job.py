@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from app.export.plugin.formats import check_compiler, install_folder, this_target
+from app.export.plugin.identity import holding, identifier, lost_with
 from app.patches.patch import Patch
 from app.shared.worker import Progress
 
@@ -30,6 +31,13 @@ class PluginExport:
     def folder(self) -> Path:
         return self.path.parent
 
+    def replaces(self) -> str:
+        """What is there and would be replaced, in words; "": nothing. Raises PluginError: it must not be."""
+        if not self.path.exists():
+            return ""
+        lost = lost_with(self.path, {identifier(self.patch.name)})
+        return f"The plug-in that is there {holding(lost)}: replaced." if lost else "Replaces the one before."
+
     def run(self, progress: Progress) -> str:
         """See `ExportJob`."""
         check_compiler()
@@ -45,7 +53,7 @@ class PluginExport:
             progress(share, step.capitalize())
 
         kept = cache.folder() or Path(tempfile.gettempdir())
-        path = build_plugin([image], self.form, self.target, self.path, kept, advanced)
+        path = build_plugin([image], self.form, self.target, self.path, kept, advanced, replace=True)
         if self.target != this_target():
             return f"Built {path}. Copy it to the other computer."
         if path.parent == install_folder(self.form, self.target):

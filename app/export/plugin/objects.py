@@ -19,6 +19,8 @@ from pathlib import Path
 
 from app.export.plugin import texts
 from app.export.plugin.formats import TARGETS, Target
+from engine.python_process import python_command, python_environment
+from engine.result_file import explain
 from engine.whole_file import whole_file
 
 WAIT_S = 0.1
@@ -115,12 +117,19 @@ def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Call
         ObjectError: one failed.
     """
     code, said = run_waiting(
-        [[sys.executable, "-m", module, *arguments] for arguments in calls],
+        [python_command("-m", module, *arguments) for arguments in calls],
         _environment(),
         lambda dots: advanced(min(dots / (steps * len(calls)), 1.0)),
     )
     if code:
-        raise ObjectError(f"the kernels cannot be compiled: {said.strip()[-400:]}")
+        raise ObjectError(f"the kernels cannot be compiled: {reason_of(code, said)}")
+
+
+def reason_of(code: int, said: str) -> str:
+    """Why a process failed, in a line: its first line that names an error, else its last; else its exit status."""
+    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    named = [line for line in lines if "error:" in line.lower()]
+    return next(iter(named or lines[-1:]), f"its process ended with status {code}; free some memory and try again")
 
 
 def run_waiting(
@@ -152,10 +161,9 @@ def run_waiting(
 
 
 def _environment() -> dict[str, str]:
-    root = str(Path(sys.modules["engine"].__file__ or "").parents[1])
-    kept = {name: value for name, value in os.environ.items() if not name.startswith("NUMBA_")}
+    kept = {name: value for name, value in python_environment().items() if not name.startswith("NUMBA_")}
     processor = {"NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
-    return {**kept, **processor, "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1", "PYTHONPATH": root}
+    return {**kept, **processor, "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
 
 
 def _compiled(text: str, target: Target, number: int) -> bytes:
@@ -223,3 +231,5 @@ if __name__ == "__main__":
         Path(path).write_bytes(made)
     except ObjectError as error:
         sys.exit(str(error))
+    except OSError as error:
+        sys.exit(explain(Path(path).parent, error))

@@ -12,6 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from engine.result_file import explain
+
 PREFIX = "ls_"  # of the entries' names
 # Entries of each; those that mixers call stand in its namespace under the same names
 PARTS = {
@@ -105,4 +107,8 @@ def text(part: str) -> str:
 
 if __name__ == "__main__":
     gc.set_threshold(*SELDOM)
-    Path(sys.argv[2]).write_text(text(sys.argv[1]), encoding="utf-8")
+    written, place = text(sys.argv[1]), Path(sys.argv[2])
+    try:
+        place.write_text(written, encoding="utf-8")
+    except OSError as error:
+        sys.exit(explain(place.parent, error))

@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 import soundfile
@@ -22,6 +21,7 @@ from app.export.sampled.sfz import sfz_gain_db, sfz_text
 from app.shared.key_names import note_name
 from app.shared.worker import Progress
 from engine.result_file import WriteError, explain, whole_file
+from engine.whole_file import working_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -97,8 +97,8 @@ def export_sampled(
     if not soundfont:
         _check_replaceable(folder, out)
     try:
-        with TemporaryDirectory(prefix=f".{folder.name}_", dir=out.parent) as unfinished:
-            made = Path(unfinished) / folder.name
+        with working_folder(out.parent, folder.name) as unfinished:
+            made = unfinished / folder.name
             made.mkdir()
             samples = _rendered(plan, made, render, progress)
             if soundfont:

@@ -446,14 +446,15 @@ class PluginPage(ExportPage):
         return PluginExport(patch, preset, self.form.currentData(), self.system.currentData(), self.file.path)
 
     def offer(self) -> tuple[str, str]:
-        return "Replace" if self.job().path.exists() else "Export", PLUGIN_NOTE
+        replaces = self.job().replaces()
+        return ("Replace", f"{replaces} {PLUGIN_NOTE}") if replaces else ("Export", PLUGIN_NOTE)
 
     def _suggest_name(self) -> None:
         form, system = self.form.currentData(), self.system.currentData()
         self.file.suffix = FORMATS[form].ending
         if self._subject is not None:
             folder = install_folder(form, system) if system == _this_system() else Path.home()
-            self.file.suggest(str(folder / (plain_stem(self._subject.patch.name) + self.file.suffix)))
+            self.file.suggest(str(folder / (self._subject.patch.name + self.file.suffix)))
 
 
 PAGES: dict[Kind, type[ExportPage]] = {

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection, wait
 from typing import Any
 
+from engine.python_process import safe_children
 from engine.schema import write
 from training.sweeping.workers.base import DEATHS, Ended, Event, Noted, Task, Workers, given_up
 from training.sweeping.workers.layout import Layout
@@ -67,7 +68,8 @@ class _ProcessWorkers:
             place.process = self._context.Process(
                 target=_serve, args=(theirs, dict(place.environment)), daemon=True, name="learned-strings worker"
             )
-            place.process.start()
+            with safe_children():
+                place.process.start()
             theirs.close()  # so that its death is the end of the pipe
         assert place.connection is not None
         with suppress(OSError):  # a process that has died meanwhile is found by `next`

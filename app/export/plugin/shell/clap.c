@@ -19,7 +19,6 @@ typedef struct {
   instrument own;
   bool active;
   atomic_bool loaded; /* a state or preset that the next block takes up */
-  float *spare; /* where the host gives one channel, or none */
 } shell;
 
 static shell *shell_of(const clap_plugin *plugin) { return plugin->data; }
@@ -140,9 +139,8 @@ static void take_event(shell *own, const clap_event *event, uint32_t at) {
   if (!own->active) return;
   if (event->type == CLAP_NOTE_ON) {
     const clap_event_note *note = (const clap_event_note *)event;
-    double velocity = 127 * note->velocity;
     instrument_note_on(to, at, note->note_id >= 0 ? note->note_id + 1 : 0, note->channel < 0 ? 0 : note->channel, note->key,
-                       velocity < 1 ? 1 : velocity);
+                       127 * note->velocity);
   } else if (event->type == CLAP_NOTE_OFF) {
     const clap_event_note *note = (const clap_event_note *)event;
     int32_t channel = note->channel < 0 ? 0 : note->channel;
@@ -153,6 +151,7 @@ static void take_event(shell *own, const clap_event *event, uint32_t at) {
     instrument_choke(to, at, note->note_id >= 0 ? note->note_id + 1 : 0, note->channel, note->key);
   } else if (event->type == CLAP_NOTE_EXPRESSION) {
     const clap_event_expression *each = (const clap_event_expression *)event;
+    if (!isfinite(each->value)) return;
     if (each->id == CLAP_EXPRESSION_TUNING)
       instrument_tune(to, at, each->note_id >= 0 ? each->note_id + 1 : 0, each->channel, each->key, each->value);
     else if (each->id == CLAP_EXPRESSION_BRIGHTNESS)
@@ -172,7 +171,8 @@ static const clap_params params = {param_count, param_info, param_value, param_t
 
 static bool state_save(const clap_plugin *plugin, const clap_ostream *stream) {
   uint8_t bytes[8 + 12 * MOST_PARAMETERS];
-  int64_t size = instrument_save(&shell_of(plugin)->own, bytes, sizeof bytes), done = 0;
+  const instrument *own = &shell_of(plugin)->own;
+  int64_t size = state_write(own->of, own->values, bytes, sizeof bytes), done = 0;
   while (done < size) {
     int64_t count = stream->write(stream, bytes + done, (uint64_t)(size - done));
     if (count <= 0) return false;
@@ -182,11 +182,11 @@ static bool state_save(const clap_plugin *plugin, const clap_ostream *stream) {
 }
 
 static bool state_load(const clap_plugin *plugin, const clap_istream *stream) {
-  uint8_t bytes[8 + 12 * 4096];
+  uint8_t bytes[MOST_STATE_BYTES];
   int64_t size = 0, count;
   while (size < (int64_t)sizeof bytes && (count = stream->read(stream, bytes + size, sizeof bytes - (uint64_t)size)) > 0) size += count;
   shell *own = shell_of(plugin);
-  if (!instrument_load(&own->own, bytes, (int32_t)size)) return false;
+  if (!instrument_load(&own->own, bytes, size)) return false;
   own->loaded = true;
   return true;
 }
@@ -236,16 +236,13 @@ static bool shell_init(const clap_plugin *) { return true; }
 static void shell_deactivate(const clap_plugin *plugin) {
   shell *own = shell_of(plugin);
   instrument_end(&own->own);
-  free(own->spare);
-  own->spare = NULL;
   own->active = false;
 }
 
 static bool shell_activate(const clap_plugin *plugin, double rate_hz, uint32_t, uint32_t most) {
   shell *own = shell_of(plugin);
   shell_deactivate(plugin);
-  own->spare = calloc(most ? most : 1, sizeof(float));
-  own->active = own->spare && rate_hz >= 1000 && rate_hz <= 1e6 && instrument_begin(&own->own, rate_hz);
+  own->active = most >= 1 && most <= INT32_MAX && instrument_begin(&own->own, rate_hz);
   own->loaded = false;
   return own->active;
 }
@@ -330,7 +327,8 @@ static char provider_id[160];
 static const clap_preset_descriptor provider_descriptor = {CLAP_VERSION_USED, provider_id, "Instruments", "Learned Strings"};
 
 static bool entry_init(const char *) {
-  snprintf(provider_id, sizeof provider_id, "%s.presets", image_count == 1 ? images[0]->id : "org.learned-strings.bank");
+  if (image_count == 1) snprintf(provider_id, sizeof provider_id, "%s.presets", images[0]->id);
+  else strcpy(provider_id, "org.learned-strings.bank.presets"); /* whole, so that it is not read as an instrument's */
   for (int32_t each = 0; each < image_count; each++) {
     const image *of = images[each];
     memcpy(feature_words[each], of->features, sizeof of->features);

@@ -161,9 +161,12 @@ void instrument_reset(instrument *own) {
   effects_reset(own, heard);
 }
 
+bool rate_is_possible(double rate_hz) { return rate_hz >= 1000 && rate_hz <= 1e6; } /* NaN is not */
+
 bool instrument_begin(instrument *own, double rate_hz) {
   const image *of = own->of;
   instrument_end(own);
+  if (!rate_is_possible(rate_hz)) return false;
   own->rate_hz = rate_hz;
   own->kernels = kernels_here();
   own->mixer = calloc(MIXER_SLOTS, sizeof(slot));
@@ -212,8 +215,8 @@ void instrument_free(instrument *own) {
 static bool plausible(int32_t channel, int32_t key) { return channel >= 0 && channel < CHANNELS && key >= 0 && key < KEYS; }
 
 void instrument_note_on(instrument *own, uint32_t at, int64_t id, int32_t channel, int32_t key, double velocity) {
-  if (!plausible(channel, key)) return;
-  slot *event = pushed(own, frame_of(own, at), NOTE_ON, channel, key, velocity);
+  if (!plausible(channel, key) || !isfinite(velocity)) return;
+  slot *event = pushed(own, frame_of(own, at), NOTE_ON, channel, key, fmin(fmax(velocity, 1), 127));
   if (event) event[EVENT_ID].whole = id;
 }
 
@@ -236,7 +239,7 @@ static void pushed_for(instrument *own, uint32_t at, int64_t kind, int64_t id, i
 }
 
 void instrument_tune(instrument *own, uint32_t at, int64_t id, int32_t channel, int32_t key, double semitones) {
-  if (isfinite(semitones)) pushed_for(own, at, TUNE, id, channel, key, semitones);
+  if (isfinite(semitones)) pushed_for(own, at, TUNE, id, channel, key, fmin(fmax(semitones, -120), 120)); /* of CLAP */
 }
 
 void instrument_choke(instrument *own, uint32_t at, int64_t id, int32_t channel, int32_t key) {
@@ -261,12 +264,10 @@ void instrument_midi(instrument *own, uint32_t at, const uint8_t *bytes) {
   }
 }
 
-static double bounded(const parameter *of, double value) {
-  if (!(value >= of->low)) return of->low;
-  return value > of->high ? of->high : value;
-}
+static double bounded(const parameter *of, double value) { return fmin(fmax(value, of->low), of->high); }
 
 void instrument_set(instrument *own, int32_t place, double value) {
+  if (!isfinite(value)) return; /* the last one stays */
   own->values[place] = bounded(&parameters_of(own->of)[place], value);
   const parameter *of = &parameters_of(own->of)[place];
   if (of->kind != KIND_MACRO) return;
@@ -295,6 +296,7 @@ void instrument_follow(instrument *own, int32_t place) { wait_for(own, frame_of(
 void instrument_change(instrument *own, uint32_t at, int32_t place, double value) {
   const image *of = own->of;
   int64_t frame = frame_of(own, at);
+  if (!isfinite(value)) return;
   instrument_set(own, place, value);
   wait_for(own, frame, place);
   if (parameters_of(of)[place].kind != KIND_MACRO) return;
@@ -389,33 +391,44 @@ bool instrument_silent(const instrument *own) {
 
 static const uint32_t STATE_VERSION = 1;
 
-int32_t instrument_save(const instrument *own, uint8_t *bytes, int32_t room) {
-  int32_t count = (int32_t)own->of->parameter_count, size = 8 + 12 * count;
+int32_t state_write(const image *of, const double *values, uint8_t *bytes, int32_t room) {
+  int32_t count = (int32_t)of->parameter_count, size = 8 + 12 * count;
   if (size > room) return -1;
   memcpy(bytes, &STATE_VERSION, 4);
   memcpy(bytes + 4, &count, 4);
   for (int32_t place = 0; place < count; place++) {
-    memcpy(bytes + 8 + 12 * place, &parameters_of(own->of)[place].id, 4);
-    memcpy(bytes + 12 + 12 * place, &own->values[place], 8);
+    memcpy(bytes + 8 + 12 * place, &parameters_of(of)[place].id, 4);
+    memcpy(bytes + 12 + 12 * place, &values[place], 8);
   }
   return size;
 }
 
-bool instrument_load(instrument *own, const uint8_t *bytes, int32_t size) {
+bool state_read(const image *of, const uint8_t *bytes, int64_t size, double *values) {
   uint32_t version;
   int32_t count;
-  if (size < 8) return false;
+  double found[MOST_PARAMETERS];
+  if (size < 8 || size > MOST_STATE_BYTES) return false;
   memcpy(&version, bytes, 4);
   memcpy(&count, bytes + 4, 4);
   if (version != STATE_VERSION || count < 0 || count > 4096 || size < 8 + 12 * count) return false;
-  instrument_reset_values(own);
+  memcpy(found, values, (size_t)of->parameter_count * sizeof(double));
   for (int32_t each = 0; each < count; each++) {
     uint32_t id;
     double value;
     memcpy(&id, bytes + 8 + 12 * each, 4);
     memcpy(&value, bytes + 12 + 12 * each, 8);
-    int32_t place = parameter_with_id(own->of, id);
-    if (place >= 0) own->values[place] = bounded(&parameters_of(own->of)[place], value);
+    if (!isfinite(value)) return false;
+    int32_t place = parameter_with_id(of, id);
+    if (place >= 0) found[place] = bounded(&parameters_of(of)[place], value);
   }
+  memcpy(values, found, (size_t)of->parameter_count * sizeof(double));
+  return true;
+}
+
+bool instrument_load(instrument *own, const uint8_t *bytes, int64_t size) {
+  double values[MOST_PARAMETERS];
+  for (int32_t place = 0; place < own->of->parameter_count; place++) values[place] = parameters_of(own->of)[place].standard;
+  if (!state_read(own->of, bytes, size, values)) return false;
+  memcpy(own->values, values, (size_t)own->of->parameter_count * sizeof(double));
   return true;
 }

@@ -20,7 +20,7 @@ enum { AMP_DRIVE_DB, AMP_TONE_DB };
 enum { PART_BODY, PART_ROOM, PART_BOTH, MIX_PARTS };
 enum { POWER_BODY = 1, POWER_ROOM = 2, POWER_CASES = 4 }; /* which of both are heard: a sum of these */
 enum { SOURCE_MODEL, SOURCE_TRUTH, SOURCE_DIFFERENCE };
-enum { MOST_PARAMETERS = 64, MOST_MACRO_TARGETS = 8, MOST_CHANGES = 512 };
+enum { MOST_PARAMETERS = 64, MOST_MACRO_TARGETS = 8, MOST_CHANGES = 512, MOST_STATE_BYTES = 8 + 12 * 4096 };
 
 typedef struct {
   uint32_t id;
@@ -93,7 +93,8 @@ typedef void (*note_ended)(void *context, int64_t id, int32_t channel, int32_t k
 const parameter *parameters_of(const image *);
 int32_t parameter_with_id(const image *, uint32_t id);
 void instrument_reset_values(instrument *);
-bool instrument_begin(instrument *, double rate_hz);   /* allocates; false where there is no memory */
+bool instrument_begin(instrument *, double rate_hz);   /* allocates; false where there is no memory, or no such rate */
+bool rate_is_possible(double rate_hz);
 void instrument_end(instrument *);
 void instrument_free(instrument *); /* and what is kept from rate to rate */
 uint32_t instrument_latency(void);
@@ -115,8 +116,10 @@ void instrument_render(instrument *, uint32_t frames, float *left, float *right)
 void instrument_report_ends(instrument *, note_ended, void *context);
 bool instrument_silent(const instrument *);
 
-/* State: a version, then ids and values. */
-int32_t instrument_save(const instrument *, uint8_t *bytes, int32_t room);
-bool instrument_load(instrument *, const uint8_t *bytes, int32_t count);
+/* State: a version, a count, then ids and a value for each. What is damaged or holds no finite numbers changes nothing.
+   Parameters that a state leaves out keep their value in `values`; unknown ones are ignored. */
+int32_t state_write(const image *, const double *values, uint8_t *bytes, int32_t room); /* its size; -1: no room */
+bool state_read(const image *, const uint8_t *bytes, int64_t size, double *values);
+bool instrument_load(instrument *, const uint8_t *bytes, int64_t size); /* what is left out has its default */
 
 #endif

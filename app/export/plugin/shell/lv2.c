@@ -1,5 +1,8 @@
 /* The instrument as an LV2 plug-in; its interface is written from LV2's public documentation (https://lv2plug.in).
-   Ports: 0 events, 1 left, 2 right, 3 latency, then one for each parameter. */
+   Ports: 0 events, 1 left, 2 right, 3 latency, then one for each parameter.
+
+   A macro moves parameters whose ports stay where they are: ports belong to the host. So a saved state holds all values,
+   and the ports at which they were reached. A port that a host sets as it was saved then changes nothing. */
 
 #include <math.h>
 #include <stdio.h>
@@ -38,20 +41,35 @@ _Static_assert(sizeof(lv2_event) == 16, "lv2_event");
 
 enum { PORT_EVENTS, PORT_LEFT, PORT_RIGHT, PORT_LATENCY, PORT_FIRST };
 
+typedef int32_t (*lv2_store)(void *handle, uint32_t key, const void *value, size_t size, uint32_t type, uint32_t flags);
+typedef const void *(*lv2_retrieve)(void *handle, uint32_t key, size_t *size, uint32_t *type, uint32_t *flags);
+typedef struct {
+  int32_t (*save)(void *, lv2_store, void *handle, uint32_t flags, const lv2_feature *const *);
+  int32_t (*restore)(void *, lv2_retrieve, void *handle, uint32_t flags, const lv2_feature *const *);
+} lv2_state;
+enum { STATE_SUCCESS, STATE_UNKNOWN, STATE_BAD_TYPE, STATE_BAD_FLAGS, STATE_NO_FEATURE, STATE_NO_PROPERTY };
+enum { STATE_IS_POD = 1, STATE_IS_PORTABLE = 2 };
+
 typedef struct {
   instrument own;
   double rate_hz;
-  uint32_t midi;
+  uint32_t midi, chunk, values_key, ports_key;
   const lv2_sequence *events;
   float *left, *right, *latency;
   const float *ports[MOST_PARAMETERS];
-  float seen[MOST_PARAMETERS];
+  double seen[MOST_PARAMETERS];     /* of ports: the values that the parameters have followed */
+  double restored[MOST_PARAMETERS]; /* of ports, with a state; NaN: the port has been there, or elsewhere, since */
+  bool begun, loaded;               /* begun: nothing is rendered yet; loaded: a state that the next block takes up */
 } shell;
+
+/* Single precision, as ports have it. */
+static double port_standard(const shell *own, int32_t place) { return (float)parameters_of(own->own.of)[place].standard; }
 
 static void *instantiate(const lv2_descriptor_t *descriptor, double rate_hz, const char *, const lv2_feature *const *features) {
   const lv2_map *map = NULL;
   for (; features && *features; features++)
     if (!strcmp((*features)->uri, "http://lv2plug.in/ns/ext/urid#map")) map = (*features)->data;
+  if (!rate_is_possible(rate_hz)) return NULL;
   for (int32_t each = 0; map && each < image_count; each++) {
     char uri[160];
     snprintf(uri, sizeof uri, "urn:%s", images[each]->id);
@@ -60,8 +78,13 @@ static void *instantiate(const lv2_descriptor_t *descriptor, double rate_hz, con
     if (!own) return NULL;
     own->rate_hz = rate_hz;
     own->midi = map->map(map->handle, "http://lv2plug.in/ns/ext/midi#MidiEvent");
+    own->chunk = map->map(map->handle, "http://lv2plug.in/ns/ext/atom#Chunk");
+    own->values_key = map->map(map->handle, "urn:org.learned-strings:state#values");
+    own->ports_key = map->map(map->handle, "urn:org.learned-strings:state#ports");
     own->own.of = images[each];
     instrument_reset_values(&own->own);
+    for (int32_t place = 0; place < images[each]->parameter_count; place++)
+      own->seen[place] = port_standard(own, place), own->restored[place] = NAN;
     return own;
   }
   return NULL;
@@ -78,19 +101,31 @@ static void connect_port(void *handle, uint32_t port, void *data) {
 
 static void activate(void *handle) {
   shell *own = handle;
-  instrument_reset_values(&own->own); /* ports that stand elsewhere follow */
-  for (int32_t place = 0; place < own->own.of->parameter_count; place++) own->seen[place] = NAN;
-  if (!instrument_begin(&own->own, own->rate_hz)) instrument_end(&own->own);
+  own->begun = instrument_begin(&own->own, own->rate_hz);
+  own->loaded = false; /* all values are taken up */
 }
 
+/* A port counts when it moves: a macro may have moved its parameter since. */
 static void follow_ports(shell *own) {
+  bool moved = false;
   for (int32_t place = 0; place < own->own.of->parameter_count; place++) {
-    if (!own->ports[place] || *own->ports[place] == own->seen[place]) continue;
-    float value = *own->ports[place];
-    bool first = isnan(own->seen[place]);
+    const parameter *each = &parameters_of(own->own.of)[place];
+    double value = own->ports[place] ? *own->ports[place] : NAN;
+    if (!isfinite(value)) continue;
+    value = (float)fmin(fmax(value, each->low), each->high);
+    bool back = value == own->restored[place], other = value != own->seen[place];
+    if (back || other) own->restored[place] = NAN;
     own->seen[place] = value;
-    if (!first || value != (float)parameters_of(own->own.of)[place].standard) instrument_change(&own->own, 0, place, value);
+    if (back || !other) continue;
+    if (value == port_standard(own, place)) value = each->standard;
+    if (own->begun) instrument_set(&own->own, place, value);
+    else instrument_change(&own->own, 0, place, value);
+    moved = true;
   }
+  if (own->begun && (moved || own->loaded)) instrument_reset(&own->own); /* nothing sounds: no knob glides */
+  else if (own->loaded)
+    for (int32_t place = 0; place < own->own.of->parameter_count; place++) instrument_follow(&own->own, place);
+  own->loaded = false;
 }
 
 static void run(void *handle, uint32_t frames) {
@@ -103,6 +138,7 @@ static void run(void *handle, uint32_t frames) {
     return;
   }
   follow_ports(own);
+  if (frames) own->begun = false;
   const char *next = NULL, *end = NULL;
   if (own->events && own->events->atom.size >= 8) {
     next = (const char *)own->events + sizeof(lv2_sequence);
@@ -130,7 +166,48 @@ static void cleanup(void *handle) {
   free(handle);
 }
 
-static const void *extension_data(const char *) { return NULL; }
+static int32_t save(void *handle, lv2_store store, void *with, uint32_t, const lv2_feature *const *) {
+  shell *own = handle;
+  uint8_t bytes[8 + 12 * MOST_PARAMETERS];
+  const struct { uint32_t key; const double *values; } parts[] = {{own->values_key, own->own.values}, {own->ports_key, own->seen}};
+  for (int32_t each = 0; each < 2; each++) {
+    int32_t size = state_write(own->own.of, parts[each].values, bytes, sizeof bytes);
+    int32_t result = store(with, parts[each].key, bytes, (size_t)size, own->chunk, STATE_IS_POD | STATE_IS_PORTABLE);
+    if (result != STATE_SUCCESS) return result;
+  }
+  return STATE_SUCCESS;
+}
+
+/* Both parts are read before either counts. */
+static int32_t restore(void *handle, lv2_retrieve retrieve, void *with, uint32_t, const lv2_feature *const *) {
+  shell *own = handle;
+  const image *of = own->own.of;
+  double values[MOST_PARAMETERS], ports[MOST_PARAMETERS];
+  const struct { uint32_t key; double *values; } parts[] = {{own->values_key, values}, {own->ports_key, ports}};
+  for (int32_t place = 0; place < of->parameter_count; place++) {
+    values[place] = parameters_of(of)[place].standard;
+    ports[place] = port_standard(own, place);
+  }
+  for (int32_t each = 0; each < 2; each++) {
+    size_t size = 0;
+    uint32_t type = 0, flags = 0;
+    const uint8_t *bytes = retrieve(with, parts[each].key, &size, &type, &flags);
+    if (!bytes) return STATE_NO_PROPERTY;
+    if (type != own->chunk) return STATE_BAD_TYPE;
+    if (size > MOST_STATE_BYTES || !state_read(of, bytes, (int64_t)size, parts[each].values)) return STATE_UNKNOWN;
+  }
+  for (int32_t place = 0; place < of->parameter_count; place++) {
+    own->own.values[place] = values[place];
+    own->restored[place] = (float)ports[place];
+  }
+  own->loaded = true;
+  return STATE_SUCCESS;
+}
+
+static const void *extension_data(const char *uri) {
+  static const lv2_state state = {save, restore};
+  return strcmp(uri, "http://lv2plug.in/ns/ext/state#interface") ? NULL : &state;
+}
 
 LS_EXPORT const lv2_descriptor_t *lv2_descriptor(uint32_t index) {
   enum { MOST_IMAGES = 128 };

@@ -145,7 +145,8 @@ static void add_midi(shell *own, uint32_t frame, uint8_t status, int32_t one, in
 
 static void add_change(shell *own, uint32_t frame, uint32_t id, double value) {
   int32_t channel, number, place = parameter_with_id(own->of, id);
-  value = value >= 0 ? value > 1 ? 1 : value : 0;
+  if (!isfinite(value)) return; /* the last one stays */
+  value = fmin(fmax(value, 0), 1);
   if (place >= 0) {
     any_event *event = add_event(own, frame, CLAP_PARAM_VALUE, sizeof event->param, MOST_CHANGED);
     if (!event) return;
@@ -259,7 +260,7 @@ static uint32_t latency(void *) { return instrument_latency(); }
 
 static int32_t setup(void *interface, vst_setup *wanted) {
   shell *own = shell_of(interface);
-  if (wanted->sample_size || !(wanted->rate_hz >= 1000 && wanted->rate_hz <= 1e6)) return VST_FALSE;
+  if (wanted->sample_size || wanted->most_frames < 1 || !rate_is_possible(wanted->rate_hz)) return VST_FALSE;
   own->rate_hz = wanted->rate_hz;
   own->most_frames = wanted->most_frames;
   const clap_render *render = own->plugin->get_extension(own->plugin, "clap.render");
@@ -465,7 +466,8 @@ static double shown(void *interface, uint32_t id) {
 static int32_t set_shown(void *interface, uint32_t id, double value) {
   shell *own = shell_of(interface);
   int32_t channel, number, place = parameter_with_id(own->of, id);
-  value = value >= 0 ? value > 1 ? 1 : value : 0;
+  if (!isfinite(value)) return VST_BAD_ARGUMENT;
+  value = fmin(fmax(value, 0), 1);
   if (place >= 0) {
     own->shown[place] = value;
     if (own->active) return VST_OK;

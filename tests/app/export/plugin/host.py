@@ -508,6 +508,12 @@ class Instance:
         assert self._own.start_processing(self.at)
         self.frame = 0
 
+    def accepts(self, rate_hz: float, most: int) -> bool:
+        """Whether it can be activated so; it is left as it was."""
+        found = bool(self._own.activate(self.at, rate_hz, 1, most))
+        self._own.deactivate(self.at)
+        return found
+
     def deactivate(self) -> None:
         self._own.stop_processing(self.at)
         self._own.deactivate(self.at)

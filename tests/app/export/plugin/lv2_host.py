@@ -1,4 +1,4 @@
-"""An LV2 host: loads a bundle, connects its ports, sends MIDI, takes sound. Written from LV2's documents."""
+"""An LV2 host: loads a bundle, connects its ports, sends MIDI, takes sound, keeps state; from LV2's documents."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import ctypes as c
 import struct
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,10 @@ from app.export.plugin.image import Control
 
 P = c.c_void_p
 MAP = "http://lv2plug.in/ns/ext/urid#map"
+CHUNK, STATE = "http://lv2plug.in/ns/ext/atom#Chunk", "http://lv2plug.in/ns/ext/state#interface"
+POD, PORTABLE = 1, 2
 EVENTS, LEFT, RIGHT, LATENCY, FIRST = range(5)
+State = dict[str, bytes]  # a property's value by its key; each is a chunk
 
 
 class Descriptor(c.Structure):
@@ -41,38 +45,97 @@ class Feature(c.Structure):
     _fields_ = (("uri", c.c_char_p), ("data", P))
 
 
-class Instance:
-    """A plug-in of a bundle; `values` are its control ports, in the order of `controls`."""
+STORE = c.CFUNCTYPE(c.c_int, P, c.c_uint32, P, c.c_size_t, c.c_uint32, c.c_uint32)
+RETRIEVE = c.CFUNCTYPE(P, P, c.c_uint32, c.POINTER(c.c_size_t), c.POINTER(c.c_uint32), c.POINTER(c.c_uint32))
 
-    def __init__(self, bundle: Path, id: str, controls: Sequence[Control], rate_hz: int) -> None:
+
+class StateInterface(c.Structure):
+    _fields_ = (
+        ("save", c.CFUNCTYPE(c.c_int, P, STORE, P, c.c_uint32, P)),
+        ("restore", c.CFUNCTYPE(c.c_int, P, RETRIEVE, P, c.c_uint32, P)),
+    )
+
+
+class Refused(Exception):
+    """The plug-in makes no instance."""
+
+
+class Instance:
+    """A plug-in of a bundle; `values` are its control ports, in the order of `controls`.
+
+    Args:
+        active: else the caller activates it.
+    """
+
+    def __init__(
+        self, bundle: Path, id: str, controls: Sequence[Control], rate_hz: float, active: bool = True
+    ) -> None:
         (binary,) = bundle.glob("*.so")
         find = c.CDLL(str(binary)).lv2_descriptor
         find.restype = c.POINTER(Descriptor)
         found = {each.contents.uri: each for each in iter(map(find, range(1000)).__next__, None) if each}
         self._own = found[f"urn:{id}".encode()].contents
-        uris = list[bytes]()
+        self._uris = list[bytes]()
 
         def number(_handle: int, uri: bytes) -> int:
-            if uri not in uris:
-                uris.append(uri)
-            return 1 + uris.index(uri)
+            if uri not in self._uris:
+                self._uris.append(uri)
+            return 1 + self._uris.index(uri)
 
         self._map = UridMap(None, MAP_FN(number))
         self._feature = Feature(MAP.encode(), c.addressof(self._map))
         features = (P * 2)(c.addressof(self._feature), None)
         self._midi = number(0, b"http://lv2plug.in/ns/ext/midi#MidiEvent")
+        self._chunk = number(0, CHUNK.encode())
         self._at = self._own.instantiate(c.addressof(self._own), rate_hz, str(bundle).encode(), features)
-        assert self._at
+        if not self._at:
+            raise Refused
         self.values = np.array([each.standard for each in controls], np.float32)
         self._latency = np.zeros(1, np.float32)
         for place in range(len(controls)):
             self._own.connect_port(self._at, FIRST + place, self.values[place:].ctypes.data)
         self._own.connect_port(self._at, LATENCY, self._latency.ctypes.data)
+        if active:
+            self.activate()
+
+    def activate(self) -> None:
         self._own.activate(self._at)
 
     def activate_again(self) -> None:
         self._own.deactivate(self._at)
-        self._own.activate(self._at)
+        self.activate()
+
+    def save(self) -> State:
+        """Without the values of ports, which hosts save themselves."""
+        state = State()
+
+        def store(_handle: int, key: int, value: int, size: int, kind: int, flags: int) -> int:
+            assert (kind, flags) == (self._chunk, POD | PORTABLE)
+            state[self._uris[key - 1].decode()] = c.string_at(value, size)
+            return 0
+
+        assert self._state.save(self._at, STORE(store), None, POD | PORTABLE, None) == 0
+        return state
+
+    def restore(self, state: State, kind: str = CHUNK) -> bool:
+        """Whether it was accepted."""
+        kept = {key: c.create_string_buffer(value, len(value)) for key, value in state.items()}
+        known = self._map.map(None, kind.encode())
+
+        def retrieve(_handle: int, key: int, size: Any, found: Any, flags: Any) -> int | None:
+            value = kept.get(self._uris[key - 1].decode())
+            if value is None:
+                return None
+            size[0], found[0], flags[0] = len(value), known, POD | PORTABLE
+            return c.addressof(value)
+
+        return self._state.restore(self._at, RETRIEVE(retrieve), None, 0, None) == 0
+
+    @property
+    def _state(self) -> StateInterface:
+        at = self._own.extension_data(STATE.encode())
+        assert at, "no state"
+        return c.cast(at, c.POINTER(StateInterface)).contents
 
     def render(self, frames: int, messages: Sequence[tuple[int, bytes]], block: int = 512) -> NDArray[np.float32]:
         """(frames, 2), without the latency; `messages` are pairs of a frame, in order, and three bytes of MIDI."""

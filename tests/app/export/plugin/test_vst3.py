@@ -162,3 +162,29 @@ def test_pedalboard_plays_it(bundle: Path, bank: host.Library, tmp_path: Path) -
     assert count > RATE_HZ
     latest = min(difference_db(sound[skip:][:count], wanted[: len(sound[skip:][:count])]) for skip in (0, 64, 96))
     assert latest < -120
+
+
+IMPOSSIBLE_HZ = (0.0, -1.0, float("nan"), float("inf"), 999.0, 1e300)
+NOT_FINITE = (float("nan"), float("inf"), float("-inf"))
+
+
+def test_impossible_rates_and_blocks_are_refused(library: Library) -> None:
+    instance = library.create(patch_of("electric_bass").name)
+    assert not any(instance.accepts(rate_hz) for rate_hz in IMPOSSIBLE_HZ)
+    assert not any(instance.accepts(RATE_HZ, most) for most in (0, -1, -(2**31)))
+    instance.activate(RATE_HZ)
+    assert np.abs(instance.block(4_096, [(0, vst3_host.note_on(40, 100))])).max() > 0.01
+    instance.destroy()
+
+
+def test_values_without_a_finite_number_are_ignored(library: Library) -> None:
+    plain, instance = active(library, "electric_bass"), active(library, "electric_bass")
+    ids = [each.id for each in instance.parameters.values()]
+    state = instance.save()
+    assert not any(instance.set_value(id, bad) for id in ids for bad in NOT_FINITE)
+    changes = [(0, id, bad) for bad in NOT_FINITE for id in ids]
+    struck = [(0, vst3_host.note_on(40, 100)), (0, vst3_host.note_on(45, float("nan")))]
+    assert np.array_equal(instance.block(4_096, struck, changes), plain.block(4_096, struck[:1]))
+    assert instance.save() == state == plain.save()
+    for each in (plain, instance):
+        each.destroy()

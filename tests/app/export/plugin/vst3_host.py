@@ -209,9 +209,12 @@ class Instance:
         self.frame = 0
         self.moved: dict[int, float] = {}  # parameters that the plug-in has moved
 
+    def accepts(self, rate_hz: float, most: int = 4096) -> bool:
+        setup = Setup(0, 0, most, rate_hz)
+        return bool(self.processor.call(7, I32, c.pointer(setup)) == OK)  # type: ignore[union-attr]
+
     def activate(self, rate_hz: float) -> None:
-        setup = Setup(0, 0, 4096, rate_hz)
-        assert self.processor.call(7, I32, c.pointer(setup)) == OK  # type: ignore[union-attr]
+        assert self.accepts(rate_hz)
         assert self.component.call(11, I32, c.c_uint8(1)) == OK
         assert self.processor.call(8, I32, c.c_uint8(1)) == OK  # type: ignore[union-attr]
         self.frame = 0
@@ -240,6 +243,10 @@ class Instance:
 
     def value(self, id: int) -> float:
         return float(self.controller.call(14, F64, U32(id)))  # type: ignore[union-attr]
+
+    def set_value(self, id: int, value: float) -> bool:
+        """In the controller."""
+        return bool(self.controller.call(15, I32, U32(id), F64(value)) == OK)  # type: ignore[union-attr]
 
     def shown(self, id: int, value: float) -> str:
         found = (c.c_uint16 * 128)()

@@ -66,6 +66,24 @@ def test_a_soundfont_leaves_no_folder(patch: Patch, render: Render, tmp_path: Pa
 
 
 @KINDS
+def test_what_a_killed_export_left_goes_with_the_next(
+    kind: str, patch: Patch, render: Render, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as killed:
+        killed.setattr("engine.whole_file.os.getpid", lambda: 999_999_999)
+        killed.setattr("engine.whole_file.shutil.rmtree", lambda *_, **__: None)
+
+        def die(*_: object, **__: object) -> np.ndarray:
+            raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            export_sampled(small(patch), tmp_path / f"a.{kind}", die)
+    (left,) = tmp_path.iterdir()
+    export_sampled(small(patch), tmp_path / f"b.{kind}", render)
+    assert not left.exists()
+
+
+@KINDS
 def test_a_cancelled_export_leaves_nothing(kind: str, patch: Patch, render: Render, tmp_path: Path) -> None:
     with pytest.raises(Cancelled):
         export_sampled(small(patch), tmp_path / f"a.{kind}", render, progress=cancelled(lambda: True))
