@@ -27,8 +27,9 @@ def one_line(text: str, most: int = LONGEST_MESSAGE) -> str:
 
 
 def duration(seconds: float) -> str:
-    """A duration in words, such as "8.2 s", "32 s", "3 min 20 s", "2 h 5 min"."""
+    """A duration in words, such as "25 ms", "0.25 s", "8.24 s", "32 s", "3 min 20 s", "2 h 5 min"."""
     if seconds < 59.5:
-        return f"{seconds:.1f} s" if seconds < 9.95 else f"{seconds:.0f} s"
+        short = f"{1000 * seconds:.3g} ms" if 0 < seconds < 0.0995 else f"{seconds:.3g} s"
+        return short if seconds < 9.95 else f"{seconds:.0f} s"
     minutes, rest = divmod(round(seconds), 60)
     return f"{minutes} min {rest} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60} min"

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from engine.plain_text import one_line
+from engine.plain_text import duration, one_line
 from training.cli.arguments import Json
 from training.cli.console import print_json, say
 
@@ -42,4 +42,4 @@ def info(
     if not isinstance(origin, Recipe):
         say(f"note: {one_line(origin.words)}")
     elif origin.source != "truth" and (origin.decay_db is not None or origin.seconds > origin.horizon_s):
-        say(f"note: from {origin.horizon_s:g} s on, the model is past its training")
+        say(f"note: from {duration(origin.horizon_s)} on, the model is past its training")

@@ -209,6 +209,7 @@ def _write(request: SoundRequest, out: Path, settings: WavSettings) -> None:
 
 
 def _notes(request: SoundRequest, written: WavReport) -> list[str]:
+    from engine.plain_text import duration
     from engine.presets import outside_training
 
     info = request.preset.info
@@ -216,9 +217,9 @@ def _notes(request: SoundRequest, written: WavReport) -> list[str]:
     if request.source != "truth":
         notes += [f"warning: {words}" for words in outside_training(info, request.pluck)]
     if written.past_training_s > 0:
-        notes.append(f"note: from {info.horizon_s:g} s on, the model is past its training")
+        notes.append(f"note: from {duration(info.horizon_s)} on, the model is past its training")
     if not written.decayed:
-        notes.append(f"note: the sound had not fallen by {request.decay_db:g} dB after {written.seconds:g} s")
+        notes.append(f"note: the sound had not fallen by {request.decay_db:g} dB after {duration(written.seconds)}")
     return notes
 
 

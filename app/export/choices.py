@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from app.shared.vocabulary import Bits
 
@@ -20,7 +20,7 @@ class ExportChoices(BaseModel):
     Attributes:
         source: "files" for model and truth in a file each.
         rate_hz: 0 for the model's own.
-        alone: the string without level, body and room of the instrument.
+        alone: the string without its instrument; not remembered, so that each dialog offers the audible sound first.
     """
 
     model_config = ConfigDict(extra="ignore")  # versions with a page for batches have more fields
@@ -35,7 +35,7 @@ class ExportChoices(BaseModel):
     seconds: float = 4.0
     normalise: bool = True
     difference_gain_db: float = 20.0
-    alone: bool = False
+    alone: bool = Field(False, exclude=True)
 
     @property
     def wav(self) -> WavSettings:

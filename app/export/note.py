@@ -1,4 +1,4 @@
-"""A note as WAV files: a key of an instrument, a pluck with its body, room and level, or a string alone."""
+"""A note as WAV files: a string that is plucked by itself, or a key as its instrument plays it."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from numpy.typing import NDArray
 
 from app.export.choices import Chosen, ExportChoices
 from app.export.files import WavReport, export_sounds
-from app.export.sound import VOICES, SoundRequest, Through, render_voices
+from app.export.sound import VOICES, SoundRequest, render_voices
 from app.export.struck import Struck
 from app.shared.key_names import note_name
 from app.shared.vocabulary import Pickup, PlayedSource, Source
 from app.shared.worker import Progress
+from engine.plain_text import duration
 from engine.pluck import Pluck
 from engine.presets import load_preset, of_string
 from engine.resonators.string import StringParameters
@@ -28,13 +29,13 @@ LEAST_MM = 0.05  # softer plucks count as this soft
 
 @dataclass(frozen=True)
 class Note:
-    """A pluck, where and through what it is heard.
+    """A pluck and where it is heard, or a key of an instrument.
 
     Attributes:
         preset: its file; preset_rate_hz: the rate of its model.
         string: the one that a preset of many plays; None: the preset's own.
-        through: the instrument's level, body and room; None: there is no instrument, or it is `struck`.
-        struck: a key of the instrument; pluck and listening points are then those of its string alone.
+        struck: a key of an instrument; pluck and listening points are then those of its string alone. None: no
+            instrument has any part in the sound.
         name: for its file, see `musical_name`; empty: that of the preset.
     """
 
@@ -45,14 +46,13 @@ class Note:
     listen_right: float | None = None
     pickup: Pickup = "displacement"
     string: StringParameters | None = None
-    through: Through | None = None
     struck: Struck | None = None
     name: str = ""
 
     @property
     def can_be_alone(self) -> bool:
-        """Whether there is an instrument, and a string that can be heard without it."""
-        return self.through is not None or (self.struck is not None and not self.struck.of_drum)
+        """Whether an instrument plays it, whose string can be heard without that."""
+        return self.struck is not None and not self.struck.of_drum
 
     def request(
         self,
@@ -67,7 +67,7 @@ class Note:
 
         Args:
             rate_hz: of the sound; 0: the preset's own.
-            alone: its string without the instrument, where there is one.
+            alone: the string without its instrument.
             decay_db: as in `SoundRequest`.
 
         Raises:
@@ -86,8 +86,7 @@ class Note:
             self.pickup,
             difference_gain_db,
             decay_db,
-            None if alone else self.through,
-            struck,
+            struck=struck,
         )
 
     def compared(self, seconds: float, rate_hz: int) -> Mapping[str, NDArray[np.float32]]:
@@ -197,10 +196,10 @@ def _words(reports: list[WavReport], of_family: bool) -> list[str]:
     lines = []
     for report in reports:
         level = f"peak {report.peak_db:.1f} dBFS, {report.clipped} clipped"
-        lines.append(f"Saved {report.path} ({report.seconds:.2f} s, {level}).")
+        lines.append(f"Saved {report.path} ({duration(report.seconds)}, {level}).")
     if (past_s := max(report.past_training_s for report in reports)) and not of_family:
         trained_s = max(report.seconds for report in reports) - past_s
-        lines.append(f"The model was trained on the first {trained_s:.2f} s.")
+        lines.append(f"The model was trained on the first {duration(trained_s)}.")
     if not reports[0].decayed:
         lines.append("Not decayed at the maximum length: faded out there.")
     if any(report.clipped for report in reports):

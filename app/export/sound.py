@@ -18,7 +18,7 @@ from app.export.recording import BLOCK_FRAMES, Recording, Sound, blocks
 from app.export.struck import Struck
 from app.instrument.bodies import body_digest
 from app.instrument.effects import channels_of, effects_from
-from app.patches.patch import Amp, Body, Patch, Room
+from app.patches.patch import Amp, Body, Room
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PICKUPS, Pickup, Source
 from app.shared.worker import Progress
 from engine.effects import Effects
@@ -40,7 +40,7 @@ Samples = NDArray[np.float64]
 
 
 class Through(BaseModel):
-    """What an instrument adds to a string that is plucked by hand.
+    """What an instrument added to a string that was plucked by hand, in recipes of earlier versions.
 
     Attributes:
         instrument: its name.
@@ -58,19 +58,6 @@ class Through(BaseModel):
     amp: Amp = Amp()
     level_db: float = 0.0
     body_sha256: str = ""
-
-    @classmethod
-    def of(cls, patch: Patch, gain: float) -> Through:
-        digest = body_digest(patch.body.name)
-        return cls(
-            instrument=patch.name,
-            gain=gain,
-            body=patch.body,
-            room=patch.room,
-            amp=patch.amp,
-            level_db=patch.level_db,
-            body_sha256=digest,
-        )
 
     @property
     def effects(self) -> Effects | None:

@@ -30,6 +30,19 @@ def effects_from(chosen: ChosenBody, room: ChosenRoom, amp: ChosenAmp, level_db:
     return None if body is None and made is None and driven is None else Effects(body, made, driven)
 
 
+def added_words(patch: Patch) -> str:
+    """What an instrument adds to the sound of its strings or drums, for people."""
+    parts = {
+        "amplifier": patch.amp.drive_db > 0,
+        "body": bool(patch.body.name) and patch.body.mix > 0,
+        "room": patch.room.mix > 0,
+        "sympathetic strings": patch.sympathy_s_kg > 0,
+        "level": True,
+    }
+    *others, last = [name for name, there in parts.items() if there]
+    return f"{', '.join(others)} and {last}" if others else last
+
+
 def body_problem(patch: Patch) -> str:
     """Why its body is not heard, in one line; "" where nothing is wrong."""
     problem = _body(patch.body)[1]

@@ -25,7 +25,6 @@ from app.playing.sources import Sources
 from engine.effects import Effects
 from engine.kernels.playing_layout import BEGAN
 from engine.presets import PresetError
-from engine.resonators.string import StringParameters
 from engine.voices import Ear, Mixer
 
 SEEN_DB = 70.0  # below full scale: softer strings do not light their keys
@@ -95,7 +94,6 @@ class Keys:
         self._wanted: _Wanted | None = None
         self._completed: _Wanted | None = None  # the latest wish for which all is computed, or tried
         self._path = Path()
-        self._latest: KeyNote | None = None
         self._effects: Effects | None = None  # as set
         self._dry = False
         self._switches: dict[tuple[int, int], Controller] = {}  # the latest of each channel, which players take over
@@ -165,7 +163,6 @@ class Keys:
             if struck is None or not id:
                 return None
             note = self._notes[player, id] = KeyNote(player, mixer, id, struck, self._path, frame)
-            self._latest = note
             begun(note)
             return note
 
@@ -240,11 +237,6 @@ class Keys:
         if player is not None:
             return player.heard_through
         return None if wanted is None else wanted.patch
-
-    def gain_of(self, string: StringParameters | None) -> float:
-        """The factor of the string that a key played last, so that a pluck by hand is as loud; 1 for any other."""
-        note = self._latest
-        return 1.0 if note is None or string is None or note.parameters != string else note.gain
 
     def begin_recording(self) -> None:
         """Records events from now on, wheels and pedals as they stand; an earlier recording is discarded."""

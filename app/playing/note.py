@@ -18,7 +18,6 @@ class Note:
     Args:
         request: the string, how it is plucked, where it is heard, and other presets for the same pluck.
         sources: those that get a voice: "model", "truth", and `OTHER` + the name of another preset.
-        gain: a factor for all its sources, besides the monitor's.
         from_s: where in its motion it begins.
         begin_frame: the frame of the mixer at which it begins; 0: at once.
 
@@ -36,11 +35,10 @@ class Note:
         self,
         request: RenderRequest,
         sources: tuple[str, ...],
-        gain: float = 1.0,
         from_s: float = 0.0,
         begin_frame: int = 0,
     ) -> None:
-        self.request, self.sources, self.gain = request, sources, gain
+        self.request, self.sources = request, sources
         self.from_s, self.begin_frame = from_s, begin_frame
         self.voices: dict[str, Voice] = {}
         self.match: Mapping[str, float] | None = None

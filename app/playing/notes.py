@@ -32,7 +32,7 @@ from app.playing.note import Note
 from app.playing.sources import Sources
 from app.presets.library import PresetEntry
 from app.rendering import RenderRequest
-from app.rendering.subject import Subject, path_of, string_of
+from app.rendering.subject import Subject, path_of
 from app.session.monitor import Monitor
 from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import OTHER
@@ -102,14 +102,18 @@ class Notes:
 
         Args:
             patch: one that is loaded while a single string is played, so that its keys sound at once when it is.
+                Its notes fade out, so that the string is heard by itself.
         """
         single = isinstance(instrument, SingleString)
         entry = self._find(instrument.preset) if single else None
         reach = PluckRange.of(entry.info if entry is not None else None) if single else None
         with self._lock:
+            plucked_before = self._reach is not None
             self._reach, self._ear, chosen = reach, ear, self._chosen
             if chosen is not None and entry is not None and path_of(chosen.preset) != entry.path:
                 self._chosen = replace(chosen, preset=entry.path)
+        if single and not plucked_before:
+            self.keys.stop(REPLACED_S)
         self.keys.set_patch(instrument if isinstance(instrument, Patch) else patch, ear)
         self._hear_effects()
 
@@ -143,7 +147,7 @@ class Notes:
                 self._ask_match(note)
 
     def hear_dry(self, dry: bool) -> None:
-        """Whether body and room are left out; a single string has none."""
+        """Whether body and room are left out; beside a single string, nothing rings on in them."""
         self._dry = dry
         self._hear_effects()
 
@@ -196,8 +200,7 @@ class Notes:
     def _ring(
         self, chosen: RenderRequest, from_s: float, begin_frame: int, struck_s: float = 0.0, waits: bool = False
     ) -> Note:
-        gain = self.keys.gain_of(string_of(chosen.preset))
-        note = Note(chosen, self._voices_of(chosen), gain, from_s, begin_frame)
+        note = Note(chosen, self._voices_of(chosen), from_s, begin_frame)
         note.ahead_of_event = waits
         with self._lock:
             self._notes.append(note)
@@ -288,6 +291,13 @@ class Notes:
     def buffer_s(self) -> float:
         """The length of the device's buffer: so much may be rendered at once."""
         return self._sound.status().latency_s
+
+    @property
+    def match(self) -> Mapping[str, float] | None:
+        """By source, the factor that brings the chosen pluck to the level of the truth; None: not known yet."""
+        with self._lock:
+            chosen = self._chosen
+            return None if chosen is None else self._levels.of(Note(chosen, self._voices_of(chosen)))
 
     @property
     def ringing(self) -> int:
@@ -501,7 +511,7 @@ class Notes:
 
     def _apply_monitor(self, note: Note, at_once: bool = False) -> None:
         for source, voice in note.voices.items():
-            gain = note.gain * self._monitor.gain(source, note.voices.keys(), note.match)
+            gain = self._monitor.gain(source, note.voices.keys(), note.match)
             voice.set_gain(gain)
             if at_once:
                 voice.start_with_gain(gain)

@@ -38,6 +38,7 @@ class Pair:
         for name, samples in self._samples.items():
             voice = Voice.of_samples(plain_program(self.mixer.rate_hz), samples)
             voice.loop()
+            voice.begin_at_once()  # the samples have a fade-in of their own, or none that may be added
             voice.start_with_gain(float(name == self._heard))
             self._voices[name] = voice
         self.mixer.add(*self._voices.values())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from engine.presets import PresetInfo
 
 _MODELS = {
@@ -21,6 +23,7 @@ _MODELS = {
 
 
 LEAST_SHARE = 1e-5  # smaller ones are shown as less than this
+NOTICEABLE = 0.01  # relative error from which a model is called inaccurate
 
 
 def model_word(model: str) -> str:
@@ -57,6 +60,18 @@ def size_word(size_bytes: int) -> str:
 def error_word(info: PresetInfo) -> str:
     """The relative mean absolute error on validation data, in percent; "–" where it is not known."""
     return "–" if info.rel_mae is None else percent(info.rel_mae)
+
+
+def judged(outside: str, error: float) -> tuple[str, bool]:
+    """What lies outside the training, after what the error says of it; and whether that is a warning.
+
+    Args:
+        outside: as of `outside_training`, joined; "": nothing.
+        error: the largest relative error of the pluck; not a number: not measured yet.
+    """
+    if not outside or math.isnan(error):
+        return outside, False
+    return (f"inaccurate: {outside}", True) if error >= NOTICEABLE else (f"accurate, although {outside}", False)
 
 
 def percent(share: float, digits: int = 2) -> str:

@@ -207,6 +207,17 @@ class Take:
         return self.listened.ear.full_scale
 
     @property
+    def error(self) -> float:
+        """The larger of `errors_by_training` as far as there are, so far; not a number where there are none."""
+        return max((each for each in self.errors_by_training if not math.isnan(each)), default=math.nan)
+
+    @property
+    def errors_by_training(self) -> tuple[float, ...]:
+        """Relative mean absolute errors within the time of the training, and beyond it where it reaches there."""
+        ends_s = 0.0, self.horizon_s, max(self.seconds, self.horizon_s)
+        return tuple(window.rel_mae for window in self.errors.windows(self.picture_hz, ends_s))
+
+    @property
     def picture_hz(self) -> float:
         """Pictures of model and truth per second."""
         return self.info.rate_hz / self.stride

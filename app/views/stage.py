@@ -51,7 +51,7 @@ class StageView(QWidget):
         self.setAccessibleName(name)
         self.setToolTip(tip)
         self._listening: dict[str, float] = {"left": DEFAULT_LISTEN}
-        self._warning = ""
+        self._warning, self._grave = "", True
         self._sources: tuple[ShownSource, ...] = DEFAULT_SOURCES
         self._drag: str | None = None  # a side, or what else is dragged
         self._hovered: str | None = None
@@ -71,9 +71,9 @@ class StageView(QWidget):
 
     # State
 
-    def set_warning(self, text: str) -> None:
-        """Why there is no sound, or what is wrong with it; "" for neither."""
-        self._warning = text
+    def set_warning(self, text: str, grave: bool = True) -> None:
+        """Why there is no sound, or what is wrong with it; "" for neither. `grave`: in the colour of warnings."""
+        self._warning, self._grave = text, grave
         self.update()
 
     def set_plain(self, plain: bool) -> None:
@@ -141,6 +141,7 @@ class StageView(QWidget):
             self.devicePixelRatioF(),
             self._sources,
             self._warning,
+            self._grave,
             self._plain,
             theme.present,
             self.hasFocus(),
@@ -155,7 +156,8 @@ class StageView(QWidget):
             paint_backdrop(painter, self.width(), self.height())
             self._paint_ground(painter)
             if not self._plain:
-                paint_legend(painter, self._sources, self._warning, self._toggles[0].x() - 14)
+                colour = theme.WARNING if self._grave else theme.FAINT
+                paint_legend(painter, self._sources, self._warning, colour, self._toggles[0].x() - 14)
             elif remark := self._warning or self._heard_remark:
                 paint_remark(painter, self.width(), remark)
             if self.hasFocus():
@@ -177,8 +179,10 @@ def paint_backdrop(painter: QPainter, width: float, height: float) -> None:
     painter.drawRoundedRect(QRectF(0.5, 0.5, width - 1, height - 1), 6, 6)
 
 
-def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: str, right: float) -> None:
-    """Paints the sources and, to their right, the warning, as far as `right` in pixels.
+def paint_legend(
+    painter: QPainter, sources: tuple[ShownSource, ...], warning: str, colour: str, right: float
+) -> None:
+    """Paints the sources and, to their right, the warning in its colour, as far as `right` in pixels.
 
     Where both do not fit, the titles of the sources are cut first, but they keep LEGEND_SHARE of the line.
     """
@@ -186,7 +190,7 @@ def paint_legend(painter: QPainter, sources: tuple[ShownSource, ...], warning: s
     room = right - MARGIN_X
     x = paint_sources(painter, sources, MARGIN_X, LEGEND_Y, MARGIN_X + max(room - warned, LEGEND_SHARE * room))
     if warning:
-        painter.setPen(QColor(theme.WARNING))
+        painter.setPen(QColor(colour))
         painter.setFont(theme.small_font(11))
         place = QRectF(x, LEGEND_Y - 10, max(0.0, right - x - 8), 20)
         text = painter.fontMetrics().elidedText(warning, Qt.TextElideMode.ElideRight, int(place.width()))

@@ -29,6 +29,7 @@ from app.presets.library import Library, PresetEntry
 from app.session.choices import OBSERVED, Session
 from app.session.history import History
 from app.session.slots import missing_presets
+from app.session.through import through_words
 from app.shared.log import log_file
 from app.shared.vocabulary import Face
 from app.views.controls.app_menu import ENTRIES
@@ -172,7 +173,6 @@ class Controller(QObject):
             self.session,
             self.library,
             self.patches.recordings,
-            self.performance.through,
             lambda: self.instruments.struck,
             (settings.export, settings.sampled),
             window,
@@ -339,7 +339,7 @@ class Controller(QObject):
             self.window.notices.report(str(error))
             return
         self.performance.stop()
-        note = note_of(choices, entry, self.performance.through(choices), struck)
+        note = note_of(choices, entry, struck)
         render = partial(self.performance.notes.compute, partial(note.compared, choices.seconds))
         self.performance.hear_dry(True)
         self._abx = AbxDialog(self.sound, material, self._settings.abx, render, self.window)
@@ -478,6 +478,7 @@ class Controller(QObject):
         if names & {"instrument", "patch"}:
             self._show_kind()
         window.show_solo(choices.solo)
+        window.show_through(*through_words(choices))
         self.patches.choices_changed(names)
         self.exports.choices_changed(names)
         if "volume_db" in names and self._abx is None:  # a blind test keeps the one that it began with

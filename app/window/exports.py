@@ -13,7 +13,6 @@ from app.export.choices import ExportChoices
 from app.export.note import HeardNote, Note, musical_name, struck_name
 from app.export.played import PlayedExport
 from app.export.sampled.choices import SampledChoices
-from app.export.sound import Through
 from app.export.struck import Struck
 from app.patches.patch import Patch
 from app.playing.keyboard import PluckRange
@@ -34,8 +33,7 @@ class Exports(QObject):
     """Lives as long as the window; `reported` has notices for the user.
 
     Args:
-        through: what the present instrument adds to a string of `Choices`; None: nothing.
-        struck: the key of the instrument that an export plays; None: a pluck is heard.
+        struck: the key of the instrument that an export plays; None: a string is plucked by itself.
     """
 
     reported = Signal(str)
@@ -45,14 +43,13 @@ class Exports(QObject):
         session: Session,
         library: Library,
         recordings: Recordings,
-        through: Callable[[Choices], Through | None],
         struck: Callable[[], Struck | None],
         choices: tuple[ExportChoices, SampledChoices],
         window: QWidget,
     ) -> None:
         super().__init__(window)
         self._session, self._library, self._window = session, library, window
-        self._recordings, self._through, self._struck = recordings, through, struck
+        self._recordings, self._struck = recordings, struck
         self._choices = choices
         self.dialog: ExportDialog | None = None
         recordings.save_asked.connect(lambda: self.open("performance"))
@@ -98,7 +95,7 @@ class Exports(QObject):
         player = None if patch is None else self._library.find(patch.preset)
         instrument = None if patch is None or player is None else HeardInstrument(patch, player)
         return {
-            "note": heard_note(choices, self._library, self._through(choices), self._struck()),
+            "note": heard_note(choices, self._library, self._struck()),
             "performance": played and HeardPerformance(played, None if preset is None else preset.path),
             "sampler": instrument,
             "plugin": instrument,
@@ -115,23 +112,23 @@ class Exports(QObject):
         self.dialog = None
 
 
-def heard_note(
-    choices: Choices, library: Library, through: Through | None, struck: Struck | None = None
-) -> HeardNote | None:
-    """The chosen pluck or key as it is heard, of another preset where that is heard; None: there is no preset."""
-    source, another = choices.source_heard, library.find(other_preset(choices.source_heard) or "")
-    if another is not None:
+def heard_note(choices: Choices, library: Library, struck: Struck | None = None) -> HeardNote | None:
+    """The chosen pluck as it is heard, of another preset where that is heard; or the key, which an instrument plays.
+
+    None: there is no preset.
+    """
+    source, another = choices.source_heard, None
+    if struck is None and (another := library.find(other_preset(source) or "")) is not None:
         choices = choices.changed({"preset": another.name})
-        struck = None
     entry = library.find(choices.preset)
     if entry is None:
         return None
-    note = note_of(choices, entry, through, struck)
+    note = note_of(choices, entry, struck)
     saved: PlayedSource = "truth" if source == "truth" else "difference" if source == DIFFERENCE else "model"
     return HeardNote(note, saved, another is not None, choices.difference_gain_db, note_words(entry.title, choices))
 
 
-def note_of(choices: Choices, entry: PresetEntry, through: Through | None, struck: Struck | None) -> Note:
+def note_of(choices: Choices, entry: PresetEntry, struck: Struck | None) -> Note:
     """The chosen pluck, or the key `struck`, played by a preset."""
     return Note(
         entry.path,
@@ -141,7 +138,6 @@ def note_of(choices: Choices, entry: PresetEntry, through: Through | None, struc
         choices.listen_right if choices.stereo else None,
         choices.pickup,
         None if choices.string is None else choices.string.parameters,
-        None if struck is not None else through,
         struck,
         _name(choices, entry) if struck is None else struck_name(struck),
     )

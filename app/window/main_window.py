@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
@@ -33,6 +34,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from app.presets.words import judged
 from app.shared.vocabulary import Face
 from app.views import theme
 from app.views.controls.app_menu import AppMenu, menu_button
@@ -136,8 +138,11 @@ class MainWindow(QMainWindow):
         self.growth_sign = Label("i")
         self.growth_sign.setObjectName("badge")
         self.growth_sign.setAccessibleName("Error of the model")
+        self.through_label = words_label()
+        self.through_label.setObjectName("faint")
         self.outside_label = words_label()
-        self.outside_label.setObjectName("warning")
+        self._outside, self._of_shown = "", True
+        self._error = math.nan
         self._lay_out()
         self.setAcceptDrops(True)
         enter = QShortcut(QKeySequence("Return"), self)
@@ -176,6 +181,7 @@ class MainWindow(QMainWindow):
         for part in (self.presets.card, self._solo):  # of one height, so that the solo button moves nothing
             theme.fix_size(part, height=FACTS_HEIGHT)
         facts.addWidget(self.presets.card, 3)
+        facts.addWidget(self.through_label, 2)
         facts.addWidget(self.outside_label, 2)
         facts.addWidget(self._solo)
         facts.addWidget(self.error_label)
@@ -356,10 +362,33 @@ class MainWindow(QMainWindow):
         known = bool(self.rate_label.text())
         self.rate_label.setVisible(self._alive and known and (fault or self._shows("test")))
 
-    def show_outside(self, text: str) -> None:
-        """What of the latest note lies outside the training; "" for nothing."""
-        self.outside_label.say(text, text.replace(" is outside the trained ", ", trained "), "outside training")
-        self.outside_label.setToolTip(plain_tip(text))
+    def show_through(self, text: str, *shorter: str) -> None:
+        """What keys sound through in the Lab, with shorter wordings; "" where a string sounds alone."""
+        self.through_label.say(text, *shorter)
+        self.through_label.setToolTip(plain_tip(text))
+        self.through_label.setVisible(bool(text))
+
+    def show_outside(self, text: str, of_shown: bool = True) -> None:
+        """What of the latest note lies outside the training; "" for nothing.
+
+        Args:
+            of_shown: whether that note is the pluck that is shown; else a knob was turned since.
+        """
+        self._outside, self._of_shown = text, of_shown
+        self._show_outside()
+
+    def show_error(self, error: float) -> None:
+        """The largest relative error of the pluck that is shown; not a number until it is measured."""
+        self._error = error
+        self._show_outside()
+
+    def _show_outside(self) -> None:
+        text, grave = judged(self._outside, self._error if self._of_shown else math.nan)
+        label = self.outside_label
+        label.say(text, text.replace(" is outside the trained ", ", trained "), "outside training")
+        label.setToolTip(plain_tip(text))
+        label.setObjectName("warning" if grave else "faint")
+        label.style().polish(label)
 
     def show_growth(self, text: str) -> None:
         """That the error of the latest pluck grew; "" where it did not."""

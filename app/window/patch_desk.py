@@ -82,7 +82,7 @@ class PatchDesk(QObject):
 
     reported = Signal(str)  # an error, for the user
     informed = Signal(str)  # what went well
-    outside_changed = Signal(str)  # what of the latest note lies outside the training; "": nothing
+    outside_changed = Signal(str, bool)  # what of the latest note lies outside the training; whether it is shown
 
     def __init__(
         self,
@@ -452,11 +452,13 @@ class PatchDesk(QObject):
     def _show_latest_note(self) -> None:
         if self.patch is not None:
             self._show_string(self.patch)
-        self._say("; ".join(self._outside()))
+        latest, patch = self._instruments.latest, self.patch
+        turned = isinstance(latest, KeyNote) and patch is not None and latest.patch != patch
+        self._say("; ".join(self._outside()), of_shown=not turned)
 
-    def _say(self, outside: str) -> None:
+    def _say(self, outside: str, of_shown: bool = True) -> None:
         """Reports what is outside the training; in the bar, how pitches are had where there is no patch."""
-        self.outside_changed.emit(outside)
+        self.outside_changed.emit(outside, of_shown)
         self._panel.bar.show_note("" if self.patch is not None else NO_PATCH)
 
     def _outside(self) -> list[str]:

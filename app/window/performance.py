@@ -13,7 +13,6 @@ from dataclasses import replace
 from PySide6.QtCore import QObject
 
 from app.audio.sound import Sound
-from app.export.sound import Through
 from app.instrument.events import NoteOn, PluckAt
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch
@@ -23,10 +22,10 @@ from app.playing.note import Note
 from app.playing.notes import Notes
 from app.playing.sources import Sources
 from app.presets.library import Library, PresetEntry
-from app.presets.words import model_word, percent
+from app.presets.words import NOTICEABLE, model_word, percent
 from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering.subject import path_of, string_of
-from app.session.choices import Choices, PluckedString, Session
+from app.session.choices import PluckedString, Session
 from app.session.listener import Listener
 from app.session.monitor import Monitor
 from app.session.silence import why_ran_away
@@ -38,7 +37,7 @@ from app.window.panels import Moment, Panel
 from app.window.playhead import Playhead
 from app.window.render_signals import RenderSignals
 
-GROWN, NOTICEABLE = 3.0, 0.01  # times the preset's own error, and the least share, from which an error has grown
+GROWN = 3.0  # times the preset's own error, from which an error has grown
 PLACED = {"instrument", *PluckedString.model_fields} - {"position"}  # what plucks at ten places depend on
 
 
@@ -131,8 +130,10 @@ class Performance(QObject):
 
     @property
     def match(self) -> Mapping[str, float] | None:
-        """By source, the factor that brings the latest note to the level of the truth; None: not known yet."""
-        return None if self.notes.latest is None else self.notes.latest.match
+        """By source, the factor that brings what is chosen to the level of the truth; None: not known yet."""
+        latest = self.notes.latest
+        keys = isinstance(latest, KeyNote) and self._session.choices.plays_patch
+        return latest.match if latest is not None and keys else self.notes.match
 
     def moment(self, elapsed_s: float) -> Moment:
         """What panels show now; `elapsed_s`: since they were shown the last one."""
@@ -230,14 +231,6 @@ class Performance(QObject):
             choices = choices.changed({"patch": patch})
         self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
 
-    def through(self, choices: Choices) -> Through | None:
-        """What the instrument adds to the chosen string: its level, body and room; None: there is no instrument."""
-        keys, string = self.notes.keys, choices.string
-        patch = keys.heard_through
-        if patch is None:
-            return None
-        return Through.of(patch, 1.0 if string is None else keys.gain_of(string.parameters))
-
     def close(self) -> None:
         """Ends the threads; may be called again."""
         self.notes.stop()
@@ -306,6 +299,7 @@ class Performance(QObject):
                 panel.take_started(take)
         self.follow()
         self._tell("Rendering …")
+        self._window.show_error(math.nan)
         self._window.show_growth("")
 
     def _take_finished(self, take: Take | BlowTake) -> None:
@@ -320,12 +314,11 @@ class Performance(QObject):
             panel.take_finished(take)
         if reason := why_ran_away(take):
             self._window.notices.report(reason)
-        trained_s = take.info.horizon_s
-        windows = take.errors.windows(take.picture_hz, (0.0, trained_s, max(take.seconds, trained_s)))
-        places = ("in the training range", "beyond")
-        parts = [f"{percent(w.rel_mae)} {place}" for w, place in zip(windows, places, strict=False)]
+        errors, places = take.errors_by_training, ("in the training range", "beyond")
+        parts = [f"{percent(error)} {place}" for error, place in zip(errors, places, strict=False)]
         self._tell("Error of this pluck: " + ", ".join(parts))
-        self._window.show_growth(growth_words([w.rel_mae for w in windows], take.info.rel_mae))
+        self._window.show_error(take.error)
+        self._window.show_growth(growth_words(errors, take.info.rel_mae))
 
     def _other_refused(self, preset: str, message: str) -> None:
         self._window.notices.report(f"{preset} cannot be heard beside this preset: {message}")

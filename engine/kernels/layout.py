@@ -106,7 +106,8 @@ JAVARI_MASS = 73  # R kg: of a mode
 JAVARI_GIVE = 74  # R m/N: how far it gives way to a force within a step; 0: the rows are not prepared
 JAVARI_HEARD = 75  # R full scale over N: of that force
 JAVARI_FORCE = 76  # R N: in the frame before
-HEADER = 77
+OF_INSTRUMENT = 77  # W whether it has part in sympathy, amplifier, body and room; else it is heard as it is
+HEADER = 78
 
 
 @njit(**COMPILED)

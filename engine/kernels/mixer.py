@@ -72,21 +72,7 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
         while whole[at.PREVIOUS_VOICE] != 0 and whole[at.BEGIN_AT] < counts[at.M_FRAMES] + at.QUANTUM:
             take_over(voice, counts[at.M_FRAMES], mixer[at.M_SCRATCH : at.M_AMPLIFIER])
     given_s = now_s + at.AHEAD / mixer[at.M_RATE] if counts[at.M_LIMITING] else now_s
-    kept = 0
-    for place in range(counts[at.M_ACTIVE]):
-        address = counts[at.M_VOICES + place]
-        voice = carray(pointer(address), (1 << 40,), np.float64)
-        if voice.view(np.int64)[at.COURSE] != 0:
-            state = courses.add(mixer, place, given_s)
-        else:
-            state = add(voice, mixer, given_s)
-        fence()
-        voice.view(np.int64)[at.STATE] = state  # one that is over may be freed from here on
-        if state == at.SOUNDING or state == at.WAITING:
-            counts[at.M_VOICES + kept] = address
-            kept += 1
-    fence()
-    counts[at.M_ACTIVE] = kept
+    _add_voices(mixer, 1, given_s)
     if before != 0:
         sound(before, counts[at.M_ADDRESS])
         sympathise(before, counts[at.M_ADDRESS])
@@ -95,7 +81,30 @@ def _quantum(mixer: np.ndarray, now_s: float) -> None:
         sympathise(player, counts[at.M_ADDRESS])
     amplify(mixer)
     convolve(mixer)
+    _add_voices(mixer, 0, given_s)
     _finish(mixer)
+
+
+@njit(**COMPILED)
+def _add_voices(mixer: np.ndarray, of_instrument: int, given_s: float) -> None:
+    """Adds the next quantum of an instrument's voices (1), or of all others (0), to the mix."""
+    counts, kept = mixer.view(np.int64), 0
+    for place in range(counts[at.M_ACTIVE]):
+        address = counts[at.M_VOICES + place]
+        voice = carray(pointer(address), (1 << 40,), np.float64)
+        if voice.view(np.int64)[at.OF_INSTRUMENT] == of_instrument:
+            if voice.view(np.int64)[at.COURSE] != 0:
+                state = courses.add(mixer, place, given_s)
+            else:
+                state = add(voice, mixer, given_s)
+            fence()
+            voice.view(np.int64)[at.STATE] = state  # one that is over may be freed from here on
+            if state != at.SOUNDING and state != at.WAITING:
+                continue
+        counts[at.M_VOICES + kept] = address
+        kept += 1
+    fence()
+    counts[at.M_ACTIVE] = kept
 
 
 @njit(**COMPILED)

@@ -78,6 +78,7 @@ class Mixer:
     def add(self, *voices: Voice) -> None:
         """Hands voices over: they begin together, with the next quantum. Any thread, at once.
 
+        They are heard as they are: an instrument that is played in the same mixer adds nothing to them.
         Those for which there is no room are refused, and over.
 
         Raises:
@@ -134,7 +135,7 @@ class Mixer:
         ]
 
     def set_effects(self, effects: Effects | None) -> None:
-        """All voices sound through these from now on: amplifier, body and room, before the volume. Any thread.
+        """A player's voices sound through these from now on: amplifier, body and room, before the volume. Any thread.
 
         What has been played rings on in them. They are faded to within three windows of the convolver (64 ms at
         48 kHz, of which the last is the fade), at once where nothing has been rendered yet. It takes the caller some

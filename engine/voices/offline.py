@@ -47,6 +47,7 @@ class OfflineVoice:
     ) -> None:
         self.voice = Voice(program, initial_m, ear, gain, seconds, source_rate_hz)
         self.voice.never_ends()
+        self.voice.sound_through_effects()
         self._mixer = Mixer(program.rate_hz, limited=False)
         self._mixer.set_effects(effects)
         self._mixer.add(self.voice)

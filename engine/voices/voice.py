@@ -212,6 +212,10 @@ class Voice:
         """Before it is handed over: without the fade-in, as the string moves."""
         self._counts[at.ATTACK] = 0
 
+    def sound_through_effects(self) -> None:
+        """Before it is handed over: it sounds through the mixer's amplifier, body and room, as an instrument's do."""
+        self._counts[at.OF_INSTRUMENT] = 1
+
     def never_ends(self) -> None:
         """It continues when it has become silent: its renderer knows how long."""
         self.memory[at.SILENT] = -math.inf

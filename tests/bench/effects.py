@@ -101,7 +101,9 @@ def _quanta_us(effects: Effects | None, exchanged: bool, sounding: bool = True) 
     mixer.set_effects(effects)
     frames = round((SECONDS + FILLING_S) * RATE_HZ) if sounding else 64
     draw = np.random.default_rng(0)
-    mixer.add(Voice.of_samples(plain_program(RATE_HZ), draw.uniform(-0.1, 0.1, (frames, 2)).astype(np.float32)))
+    voice = Voice.of_samples(plain_program(RATE_HZ), draw.uniform(-0.1, 0.1, (frames, 2)).astype(np.float32))
+    voice.sound_through_effects()
+    mixer.add(voice)
     mixer.render(round(FILLING_S * RATE_HZ) // at.WINDOW * at.WINDOW)
     found = []
     for number in range(round(SECONDS * RATE_HZ) // at.QUANTUM):

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 
 from app.export.choices import Chosen, ExportChoices
 from app.export.job import ExportJob
-from app.export.note import HeardNote, NoteExport
+from app.export.note import HeardNote, Note, NoteExport
 from app.export.played import Played, PlayedExport, recorded_files
 from app.export.plugin.formats import FORMATS, PluginError, check_compiler, install_folder, this_target
 from app.export.plugin.job import PluginExport
@@ -32,7 +32,7 @@ from app.export.sampled.job import plain_stem, planned
 from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampledPlan
 from app.export.sampled.words import counted, megabytes, needed_bytes, number_of, pitch_words, size_words
 from app.export.sound import DECAY_RANGE_DB, LONGEST_S
-from app.instrument.effects import body_problem
+from app.instrument.effects import added_words, body_problem
 from app.instrument.events import NoteOn
 from app.patches.patch import Patch
 from app.presets.library import PresetEntry
@@ -155,7 +155,9 @@ class NotePage(ExportPage):
         self.what = label("faint")
         self.source = combo_box("Source", SOURCE_NAMES, export.source)
         self.source.setToolTip("What to save")
-        self.alone = check_box("String alone", export.alone, "Leaves out level, body and room of the instrument")
+        self.through = check_box("On", True, "Off: the string alone, without the instrument")
+        self.through.setAccessibleName("Instrument")
+        self.through_words = label()
         limits = 0.1, LONGEST_S
         ends = (("Until it has decayed", True), ("Fixed", False))
         self.length = combo_box("Length", ends, export.until_decayed)
@@ -171,15 +173,19 @@ class NotePage(ExportPage):
         )
         self.file = FilePicker(export.folder, "With two files, the source is appended to each name")
         self.names = faint()
+        through = row_of(self.through, self.through_words)
+        through.setStretch(1, 1)
+        through.setStretch(2, 0)
         rows: Rows = {
             "Sound": self.what,
-            "Source": row_of(self.source, self.gain, self.alone),
+            "Source": row_of(self.source, self.gain),
+            "Instrument": through,
             "Length": row_of(self.length, self.decay, self.longest, self.seconds),
             "File": self.file,
             "Saved as": self.names,
         }
         self._form = _lay_out(self, rows)
-        controls = (self.source, self.alone, self.length, self.decay, self.longest, self.seconds, self.gain)
+        controls = (self.source, self.through, self.length, self.decay, self.longest, self.seconds, self.gain)
         for signal in (*_watch(controls, self.changed), wav.changed):
             signal.connect(self._show)
         self.file.changed.connect(self._show)
@@ -198,7 +204,7 @@ class NotePage(ExportPage):
         return {
             "folder": self.file.folder,
             "source": self.source.currentData(),
-            "alone": self.alone.isChecked(),
+            "alone": not self.through.isChecked(),
             "until_decayed": self.length.currentData(),
             "decay_db": self.decay.value(),
             "longest_s": self.longest.value(),
@@ -231,10 +237,11 @@ class NotePage(ExportPage):
         if self._subject is None:
             return
         note = self._subject.note
-        self.alone.setVisible(note.can_be_alone)
         source, rate_hz = self.source.currentData(), self._wav.rate.currentData()
         self.gain.setVisible(source == "difference")
-        alone = note.can_be_alone and self.alone.isChecked()
+        alone = note.can_be_alone and not self.through.isChecked()
+        self.through.setVisible(note.can_be_alone)
+        self.through_words.setText(_through_words(note, alone, source))
         self.what.setText(_note_words(self._subject, alone))
         beyond = f"adds no bandwidth: the model ends at {note.preset_rate_hz / 2000:g} kHz"
         own = "" if rate_hz else f"{note.preset_rate_hz / 1000:g} kHz"
@@ -474,16 +481,20 @@ def _this_system() -> str:
 
 
 def _note_words(heard: HeardNote, alone: bool) -> str:
-    """What is exported: a key as the instrument plays it, or a pluck and what the instrument adds."""
-    note = heard.note
+    """What is exported: a key as the instrument plays it, or a pluck."""
+    struck = None if alone else heard.note.struck
+    return heard.words if struck is None else f"Note: {struck.words}, held, with the present settings"
+
+
+def _through_words(note: Note, alone: bool, source: Chosen) -> str:
+    """What of an instrument is in the file."""
+    if note.struck is None:
+        return "None: the string alone, as it is heard"
     if alone:
-        return f"{heard.words}. The string alone"
-    if note.struck is not None:
-        return f"Note: {note.struck.words}, held, with the present settings"
-    if note.through is None:
-        return heard.words
-    there = "body, room and level" if note.through.body.name or note.through.room.mix > 0 else "level"
-    return f"{heard.words}. With the {there} of {note.through.instrument}"
+        return f"The string alone, without {note.struck.patch.name}"
+    if source == "difference":
+        return f"{note.struck.patch.name}, without amplifier, body and room, as a difference is heard"
+    return f"{note.struck.patch.name} with {added_words(note.struck.patch)}, as it is heard"
 
 
 def _lay_out(page: QWidget, rows: Rows) -> QFormLayout:

@@ -91,7 +91,7 @@ def preset_summary(entry: PresetEntry) -> list[str]:
     info = entry.info
     model, rate = model_word(info.model), rate_word(info.rate_hz)
     string = "tension-modulated string" if info.tension_modulated else "linear string"
-    trained, parameters = f"trained on {info.horizon_s:g} s", f"{entry.parameters:,} parameters"
+    trained, parameters = f"trained on {duration(info.horizon_s)}", f"{entry.parameters:,} parameters"
     error = [f"validation error {error_word(info)}"] if info.rel_mae is not None else []
     if error and info.test_rel_mae is not None:
         error = [f"{error[0]}, test {percent(info.test_rel_mae)}"]
@@ -113,7 +113,10 @@ def _facts(entry: PresetEntry) -> list[tuple[str, str]]:
         ("Model", model_word(info.model) + (f": {meaning}" if meaning else "")),
         ("Size", f"{entry.parameters:,} parameters, {size_word(entry.size_bytes)}"),
         ("Rate", f"{rate_word(info.rate_hz)}: no sound above {rate_word(info.rate_hz // 2)}"),
-        ("Trained on", f"the first {info.horizon_s:g} s ({initial_word(info.initial)}); past that it extrapolates"),
+        (
+            "Trained on",
+            f"the first {duration(info.horizon_s)} ({initial_word(info.initial)}); past that it extrapolates",
+        ),
     ]
     audible = info.string.modes_below(info.rate_hz / 2)
     if audible < info.modes:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from app.analysis.heard import HeardMotion
@@ -9,7 +10,7 @@ from app.analysis.moment import Envelope, frame_at
 from app.instrument.beyond_training import outside_of_string
 from app.instrument.facts import by_two_numbers
 from app.presets.library import Library
-from app.presets.words import shape_word
+from app.presets.words import judged, shape_word
 from app.rendering import BlowTake, Take
 from app.rendering.take import Listened
 from app.session.choices import Choices, PluckedString, Session
@@ -69,7 +70,7 @@ class StringPanel(StagePanel):
             self.view.set_sources(self._sources)
             self._shown = self._standing = ()
         if "face" in names:
-            self.view.set_warning(self._pluck_warning())
+            self.view.set_warning(*self._pluck_warning())
         if names & {"motion", "envelope"}:
             self.view.set_shown(choices.motion, choices.envelope)
 
@@ -89,6 +90,7 @@ class StringPanel(StagePanel):
 
     def take_finished(self, take: Take) -> None:
         self._take = take
+        self.view.set_warning(*self._pluck_warning())
 
     def show_moment(self, moment: Moment) -> None:
         take, position_s, choices = moment.take, moment.position_s, self.session.choices
@@ -121,7 +123,7 @@ class StringPanel(StagePanel):
         take = self._take
         if take is not None and take.listened is not self._judged and take.listened.complete:
             self._judged = take.listened
-            self.view.set_warning(self._pluck_warning())
+            self.view.set_warning(*self._pluck_warning())
 
     def _show_pluck(self) -> None:
         choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
@@ -130,20 +132,22 @@ class StringPanel(StagePanel):
         left, right = choices.listen, choices.listen_right if choices.stereo else None
         view.set_listening_points(*((None, None) if choices.pickup == "bridge" else (left, right)))
         view.set_trained(_trained(info_of(choices, entry), choices.pluck) if entry else TrainedPlucks())
-        view.set_warning(self._pluck_warning())
+        view.set_warning(*self._pluck_warning())
 
-    def _pluck_warning(self) -> str:
+    def _pluck_warning(self) -> tuple[str, bool]:
+        """Why nothing is heard, or what lies outside the training; and whether that is a warning."""
         choices, entry = self.session.choices, self.library.find(self.session.choices.preset)
         silent = why_silent(choices, self.library)
         if not silent and choices.source_heard == DIFFERENCE and self._take is not None:
             silent = why_difference_silent(choices, self._take)
         if silent or self._plain or entry is None:
-            return silent
+            return silent, True
+        error = math.nan if self._take is None else self._take.error
         patch, string = choices.patch, choices.string
         if patch is None or string is None or not choices.plays_patch:
-            return "; ".join(outside_training(info_of(choices, entry), choices.pluck))
+            return judged("; ".join(outside_training(info_of(choices, entry), choices.pluck)), error)
         heard = by_two_numbers(patch, string.parameters)  # as the head of the Lab reports it
-        return "; ".join(outside_of_string(entry.info, heard, choices.pluck))
+        return judged("; ".join(outside_of_string(entry.info, heard, choices.pluck)), error)
 
     # Gestures
 

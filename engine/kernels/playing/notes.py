@@ -336,6 +336,7 @@ def note_on(
             continue
         wholes(address)[at.BEGIN_AT] = frame
         reals(address)[at.STRUCK_S] = player[event + of.EVENT_STRUCK_S]
+        wholes(address)[at.OF_INSTRUMENT] = 1
         spared = players[of.PLAYER_SPARES] != 0 and player[of.PLAYER_SOURCE_GAINS + source] == 0.0
         if mixers[at.M_ACTIVE] < at.MOST_VOICES and not spared:
             mixers[at.M_VOICES + mixers[at.M_ACTIVE]] = address

@@ -43,7 +43,17 @@ def test_progress_shows_a_files_name_as_it_is(
 
 @pytest.mark.parametrize(
     ("seconds", "text"),
-    [(8.24, "8.2 s"), (200, "3 min 20 s"), (7500, "2 h 5 min"), (59.99, "1 min 0 s"), (31.9, "32 s")],
+    [
+        (0.025, "25 ms"),
+        (0.25, "0.25 s"),
+        (1 / 3, "0.333 s"),
+        (1.0, "1 s"),
+        (8.24, "8.24 s"),
+        (200, "3 min 20 s"),
+        (7500, "2 h 5 min"),
+        (59.99, "1 min 0 s"),
+        (31.9, "32 s"),
+    ],
 )
 def test_durations_are_words(seconds: float, text: str) -> None:
     assert console.duration(seconds) == text

@@ -23,7 +23,7 @@ from app.instrument.events import (
     PatchTurned,
     TimedEvent,
 )
-from app.instrument.offline import BLOCK_FRAMES, SILENT_DB, channels_played, render_events, render_note
+from app.instrument.offline import BLOCK_FRAMES, SILENT_DB, OfflinePlayer, channels_played, render_events, render_note
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, PluckChoices, Room
@@ -37,7 +37,7 @@ from engine.pluck import FULL_SCALE_M
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters
-from engine.voices import Ear, Mixer
+from engine.voices import Ear, Mixer, Voice, plain_program
 from engine.voices.player import Report
 from tests.app.instrument.loud import LoudKeys
 from tests.app.instrument.seen import Seen, seen, sounding, taken_up
@@ -581,3 +581,24 @@ def test_a_wheel_that_moves_while_a_knob_is_turned_is_followed(patch: Patch, pre
     for each in stage.play(Bend(1.0)):
         assert each.now.damping_d1_kg_m_s == pytest.approx(2 * each.own.damping_d1_kg_m_s)
         assert each.now.tension_n > 1.2 * each.own.tension_n
+
+
+@pytest.mark.parametrize("name", ["brass_strung_harp", "electric_guitar_bridge_pick_up", "tanpura_drone"])
+def test_what_is_handed_to_its_mixer_and_what_it_plays_add_up(preset: Preset, name: str) -> None:
+    """A string of the Lab neither sounds through an instrument that rings nor moves its other strings."""
+    patch = read_patch(PATCHES / f"{name}.json")
+    strangers = np.random.default_rng(0).uniform(-0.5, 0.5, (RATE_HZ // 2, 2)).astype(np.float32)
+
+    def mixed(plays: bool, adds: bool) -> NDArray[np.float64]:
+        stage = OfflinePlayer(patch, preset, RATE_HZ, {"model": 1.0}, limited=False, varied=False, dry=False)
+        if plays:
+            stage.handle(NoteOn(sum(patch.range) // 2, 100), 0)
+        if adds:
+            stage.mixer.add(Voice.of_samples(plain_program(RATE_HZ), strangers))
+        return stage.render(RATE_HZ).astype(np.float64)
+
+    both, own, alone = mixed(True, True), mixed(True, False), mixed(False, True)
+    np.testing.assert_allclose(both, own + alone, atol=1e-6)
+    assert np.abs(own).max() > 0.01
+    np.testing.assert_allclose(alone[200 : RATE_HZ // 2], strangers[200:], atol=1e-6)
+    assert np.abs(alone[RATE_HZ // 2 :]).max() < 1e-12

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
-from app.presets.words import percent
+from app.presets.words import judged, percent
 
 
 @pytest.mark.parametrize(
@@ -20,3 +22,13 @@ from app.presets.words import percent
 )
 def test_a_percentage_has_few_digits_and_no_exponent(share: float, words: str) -> None:
     assert percent(share) == words
+
+
+@pytest.mark.parametrize(
+    ("error", "words", "grave"),
+    [(math.nan, "{}", False), (1e-6, "accurate, although {}", False), (0.03, "inaccurate: {}", True)],
+)
+def test_the_measured_error_decides_whether_to_warn(error: float, words: str, grave: bool) -> None:
+    outside = "decay time near 3 kHz 1.9 s is outside the trained 0.1 … 1 s"
+    assert judged(outside, error) == (words.format(outside), grave)
+    assert judged("", error) == ("", False)

@@ -244,7 +244,8 @@ def test_a_blow_is_exported_as_a_note(qtbot: QtBot, kit: Controller, tmp_path: P
     dialog = kit.exports.dialog
     assert dialog is not None
     assert "Concert toms, D2 at velocity 120" in dialog.note.what.text()
-    assert not dialog.note.alone.isVisible(), "there is no string"
+    assert not dialog.note.through.isVisible(), "there is no string"
+    assert dialog.note.through_words.text() == "Concert toms with room and level, as it is heard"
     dialog.save.click()
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     file = tmp_path / "Concert toms D2 hard.wav"

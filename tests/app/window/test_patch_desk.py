@@ -11,7 +11,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QInputDialog, QToolTip
 from pytestqt.qtbot import QtBot
 
-from app.instrument.events import KEYS, NoteOff, NoteOn, PluckAt, TimedEvent
+from app.instrument.events import KEYS, NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.instrument.string_keys import on_string
 from app.instrument.strings import Strings
@@ -21,7 +21,6 @@ from app.patches.patch import Macro, Patch, PhysicalString, Pickup, Target
 from app.patches.tuning import TuningChoice
 from app.playing.key_note import KeyNote
 from app.playing.note import Note
-from app.rendering.subject import string_of
 from app.shared.key_names import note_name
 from app.views.string.view import StringView
 from app.window.controller import Controller
@@ -65,16 +64,6 @@ def test_a_key_plays_a_pitch_and_the_window_shows_its_string(qtbot: QtBot, playe
     assert not ringing(played)[0].damped
     qtbot.keyRelease(played.window, Qt.Key.Key_A)
     qtbot.waitUntil(lambda: ringing(played)[0].damped)
-
-
-def test_a_pluck_by_hand_is_as_loud_as_the_key_whose_string_it_is(qtbot: QtBot, played: Controller) -> None:
-    played.window.instrument.pressed.emit(52, 100, None)
-    qtbot.waitUntil(lambda: key_is_shown(played))
-    (struck,) = ringing(played)
-    note = played.performance.notes.handle(PluckAt(played.session.choices.pluck))
-    assert isinstance(note, Note)
-    assert string_of(note.request.preset) == struck.own
-    assert note.gain == pytest.approx(struck.gain) != 1
 
 
 def test_a_pluck_by_hand_is_a_note_of_the_instrument(qtbot: QtBot, played: Controller) -> None:

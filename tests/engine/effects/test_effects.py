@@ -38,6 +38,7 @@ def test_the_mixer_gives_the_same_as_arrays_are_given(effects: Effects) -> None:
     sound = pink(60_000).astype(np.float32)
     voice = Voice.of_samples(plain_program(RATE_HZ), sound)
     voice.memory.view(np.int64)[at.ATTACK] = 0
+    voice.sound_through_effects()
     mixer = Mixer(RATE_HZ, limited=False)
     mixer.set_effects(effects)
     mixer.add(voice)

@@ -24,6 +24,7 @@ def noise(frames: int, points: int = 2, seed: int = 1) -> NDArray[np.float32]:
 def of(samples: NDArray[np.float32], gain: float = 1.0) -> Voice:
     voice = Voice.of_samples(plain_program(RATE_HZ), samples)
     voice.start_with_gain(gain)
+    voice.sound_through_effects()
     voice.memory.view(np.int64)[at.ATTACK] = 0
     return voice
 

@@ -18,15 +18,17 @@ from app.export.choices import ExportChoices
 from app.export.note import HeardNote
 from app.export.recipe import read_recipe
 from app.export.sampled.choices import SampledChoices
-from app.export.sound import Through
+from app.export.struck import Struck
+from app.instrument.events import NoteOn
 from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Pickup
+from app.patches.patch import Patch
 from app.presets.library import Library, list_presets
 from app.session.choices import Choices
 from app.views.dialogs.export_dialog import ExportDialog
 from app.window.exports import heard_note
+from engine.presets import SHIPPED
 
 
 @pytest.fixture
@@ -36,12 +38,13 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> object:
     folder.mkdir()
     for name in ("small", "other"):
         shutil.copy(small_preset, folder / f"{name}.safetensors")
+    shutil.copy(SHIPPED / "studio_any_string.safetensors", folder)
     library = Library(list_presets(folder)[0])
 
     def note(heard: dict[str, object]) -> HeardNote | None:
         choices = Choices(instrument=SingleString(preset="small"), position=0.4).changed(heard)
-        through = None if choices.patch is None else Through.of(choices.patch, 0.5)
-        return heard_note(choices, library, through)
+        struck = Struck(choices.instrument, NoteOn(59, 100)) if isinstance(choices.instrument, Patch) else None
+        return heard_note(choices, library, struck)
 
     def make(more: dict[str, object] | None = None, heard: dict[str, object] | None = None) -> ExportDialog:
         settings = {"folder": str(tmp_path), "rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
@@ -177,26 +180,44 @@ def test_a_name_without_its_suffix_gets_it(made) -> None:
     assert [path.name for path in dialog.note.paths().values()] == ["guitar v1.2.wav"]
 
 
-def test_what_the_patch_adds_is_heard_in_the_file_unless_the_string_alone_is_wanted(
+def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_wanted(
     qtbot: QtBot, made, tmp_path: Path
 ) -> None:
+    """One line says which, with words and not in small print."""
     guitar = read_patch(PATCHES / "classical_guitar.json")
-    dialog = made({}, {"instrument": guitar.model_copy(update={"preset": "small", "pickup": Pickup(points=(0.1,))})})
-    assert "With the body, room and level of Classical guitar" in dialog.note.what.text()
+    dialog = made({}, {"instrument": guitar})
+    page = dialog.note
+    assert page.through.isVisible() and page.through.isChecked()
+    words = "Classical guitar with body, room, sympathetic strings and level, as it is heard"
+    assert (page.through_words.text(), page.through_words.objectName()) == (words, "")
     run(qtbot, dialog, "Saved")
     path = tmp_path / "Classical guitar B3 hard.wav"
-    through = read_recipe(path).through
-    assert through is not None and (through.gain, through.body, through.room) == (0.5, guitar.body, guitar.room)
+    struck = read_recipe(path).struck
+    assert struck is not None and (struck.instrument, struck.key) == (guitar.name, 59)
     assert soundfile.info(path).channels == 2
     heard = path.read_bytes()
-    dialog.note.alone.setChecked(True)
-    assert "The string alone" in dialog.note.what.text()
+    page.through.setChecked(False)
+    assert page.through_words.text() == "The string alone, without Classical guitar"
     run(qtbot, dialog, "Rendering")
     qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
     assert soundfile.info(path).channels == 1 and path.read_bytes() != heard
-    assert read_recipe(path).through is None
-    assert dialog.choices().alone
-    assert "alone" not in made({}).note.what.text()
+    assert read_recipe(path).struck is None
+    again = made(dialog.choices().model_dump(), {"instrument": guitar})
+    assert again.note.through.isChecked(), "the audible sound is offered first"
+
+
+def test_a_preset_has_no_instrument_whatever_was_played_before(made) -> None:
+    guitar = read_patch(PATCHES / "classical_guitar.json")
+    choices = {"instrument": SingleString(preset="small"), "kept": guitar}
+    page = made({}, choices).note
+    assert not page.through.isVisible()
+    assert page.through_words.text() == "None: the string alone, as it is heard"
+    assert page.job().note.struck is None
+
+
+def test_a_difference_says_what_it_is_heard_without(made) -> None:
+    page = made({}, {"instrument": read_patch(PATCHES / "classical_guitar.json"), "a": "difference"}).note
+    assert "without amplifier, body and room, as a difference is heard" in page.through_words.text()
 
 
 def test_it_follows_another_pluck_until_it_begins(qtbot: QtBot, made, tmp_path: Path) -> None:

@@ -1,0 +1,22 @@
+"""The instrument that keys sound through in the Lab, in words; there is none where a string sounds alone."""
+
+from __future__ import annotations
+
+from app.instrument.effects import added_words
+from app.patches.patch import Patch
+from app.session.choices import Choices
+from app.session.slots import other_preset
+from app.shared.vocabulary import DIFFERENCE
+
+
+def through_words(choices: Choices) -> tuple[str, ...]:
+    """What keys sound through, in words, the longest wording first; one empty text where a string sounds alone."""
+    patch = choices.instrument
+    if not isinstance(patch, Patch):
+        return ("",)
+    name = f"heard through {patch.name}"
+    if any(other_preset(each) for each in choices.voices):
+        return f"keys are {name}, a string plucked by hand alone", f"keys {name}"
+    if choices.source_heard == DIFFERENCE:
+        return f"{name} without amplifier, body and room", name
+    return f"{name}: {added_words(patch)}", name
