@@ -23,6 +23,7 @@ from app.instrument.events import Event, NoteOn, PluckAt
 from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
+from app.playing.dropping import drop
 from app.playing.due import Due
 from app.playing.key_note import SOURCES, KeyNote
 from app.playing.keyboard import PluckRange
@@ -34,6 +35,7 @@ from app.presets.library import PresetEntry
 from app.rendering import RenderRequest
 from app.rendering.subject import Subject, path_of, string_of
 from app.session.monitor import Monitor
+from app.shared.log import faultless
 from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import OTHER
 from engine.effects import Effects
@@ -52,6 +54,7 @@ LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the m
 
 Report = Callable[[str, str], None]  # a message and its details
 Made = TypeVar("Made")
+MadeNote = TypeVar("MadeNote", Note, KeyNote, Note | KeyNote)
 
 
 class Notes:
@@ -75,7 +78,8 @@ class Notes:
         report: Report,
         set_effects: Callable[[Effects | None], None] = lambda effects: None,
     ) -> None:
-        self._sound, self._sources, self._find, self._report = sound, sources, find, report
+        self._sound, self._sources, self._find = sound, sources, find
+        self._report = report = faultless(report, "while a note was reported")
         self._lock = threading.RLock()
         self._notes: list[Note | KeyNote] = []
         self._monitor = Monitor()
@@ -135,8 +139,7 @@ class Notes:
         with self._lock:
             self._monitor, self._compared = monitor, compared
             notes = self._plucks()
-            for note in notes:
-                self._apply_monitor(note)
+            self._each(notes, self._apply_monitor)
         self._set_gains_of_keys()
         for note in notes:
             if not note.pending and not note.over:
@@ -156,8 +159,15 @@ class Notes:
         """Plays an event, at once or when it is due; the note that it began, or None.
 
         Keys of a single string are places along it. Its note sounds with the next quantum of the device, unless
-        presets must be loaded or a model is rendered ahead.
+        presets must be loaded or a model is rendered ahead. An event that fails costs itself alone, and is reported.
         """
+        try:
+            return self._handle(event, due)
+        except Exception as error:
+            drop(None, error, self._report)
+            return None
+
+    def _handle(self, event: Event, due: Due | None) -> Note | KeyNote | None:
         struck_s = self._sound.now_s() if due is None else 0.0  # only gestures are timed
         placed = self._place(event)
         if not isinstance(placed, PluckAt):
@@ -198,11 +208,11 @@ class Notes:
     ) -> Note:
         gain = self.keys.gain_of(string_of(chosen.preset))
         note = Note(chosen, self._voices_of(chosen), gain, from_s, begin_frame)
-        note.ahead_of_event = waits
+        note.ahead_of_event, loaded = waits, self._loaded(note)
         with self._lock:
             self._notes.append(note)
         begin = partial(self._begin, note, struck_s)
-        if from_s > 0 or not self._loaded(note):
+        if from_s > 0 or not loaded:
             self.in_background(begin, note)
         else:
             self._guarded(begin, note)()
@@ -235,8 +245,7 @@ class Notes:
     def stop(self, seconds: float = STOP_S) -> None:
         """Lets all notes fade out; those that wait will not sound."""
         with self._lock:
-            for note in self._notes:
-                note.release(seconds)
+            self._each(self._notes, lambda note: note.release(seconds))
         self.keys.stop(seconds)
 
     # Ahead of events
@@ -310,17 +319,8 @@ class Notes:
         with self._lock:
             self._move_to_new_mixer()
             self._notes = [note for note in self._notes if not note.over]
-            for each in self._notes:
-                ahead = isinstance(each, Note) and each.ahead
-                if not each.timed and not ahead and (latency_s := each.latency_s) is not None:
-                    each.timed = True
-                    self._latencies_s.append(latency_s)
-            for note in self._plucks():
-                if note.ahead and note.match is None and not note.pending:
-                    self._ask_match(note)
-                if self._ear is not None:
-                    for voice in note.voices.values():
-                        voice.listen(self._ear)
+            self._each(self._notes, self._take_latency)
+            self._each(self._plucks(), self._follow)
 
     def close(self) -> None:
         """Ends the threads; may be called again."""
@@ -329,6 +329,28 @@ class Notes:
         self._ahead.close()
 
     # How it is done
+
+    def _each(self, notes: Sequence[MadeNote], work: Callable[[MadeNote], None]) -> None:
+        """Does `work` with each note; one with which it fails is dropped, and the others continue."""
+        for note in notes:
+            try:
+                work(note)
+            except Exception as error:
+                drop(note, error, self._report)
+
+    def _take_latency(self, note: Note | KeyNote) -> None:
+        ahead = isinstance(note, Note) and note.ahead
+        if not note.timed and not ahead and (latency_s := note.latency_s) is not None:
+            note.timed = True
+            self._latencies_s.append(latency_s)
+
+    def _follow(self, note: Note) -> None:
+        """Lets a note be heard where all are, and as loud as the truth once that is known."""
+        if note.ahead and note.match is None and not note.pending:
+            self._ask_match(note)
+        if self._ear is not None:
+            for voice in note.voices.values():
+                voice.listen(self._ear)
 
     def _set_gains_of_keys(self) -> None:
         """Sets which sources of keys are heard; both are of one string, whose levels match as they are."""
@@ -496,8 +518,7 @@ class Notes:
     def _make_room(self, most: int) -> None:
         """Releases the oldest notes where more than `most` ring."""
         ringing = [note for note in self._notes if not note.over and not note.released]
-        for note in ringing[: max(0, len(ringing) - most)]:
-            note.release(STOLEN_S)
+        self._each(ringing[: max(0, len(ringing) - most)], lambda note: note.release(STOLEN_S))
 
     def _apply_monitor(self, note: Note, at_once: bool = False) -> None:
         for source, voice in note.voices.items():
@@ -512,7 +533,7 @@ class Notes:
 
     def _take_match(self, key: tuple[object, ...], match: Mapping[str, float]) -> None:
         with self._lock:
-            for note in self._plucks():
-                if note.matching_key == key:
-                    note.match = match
-                    self._apply_monitor(note)
+            notes = [note for note in self._plucks() if note.matching_key == key]
+            for note in notes:
+                note.match = match
+            self._each(notes, self._apply_monitor)
