@@ -414,6 +414,19 @@ def test_latencies_are_noted_once_a_note(
     assert len(notes.latencies_s) == 1, "a turn of a loop is no gesture"
 
 
+@pytest.mark.parametrize("now_s", [1.795774879e9, -20.0, float("nan"), float("inf"), 0.0, -1e300])
+def test_a_latency_that_cannot_be_is_not_noted(
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike, now_s: float
+) -> None:
+    """The clock of gestures and that of the device's calls have two bases, or one of them none."""
+    sound.now_s = lambda: now_s
+    note = strike(pluck_of(bank))
+    seconds_of(sound.mixer, 0.01)
+    notes.poll()
+    assert note.began and note.latency_s is None
+    assert notes.latencies_s == ()
+
+
 def test_a_note_waits_for_its_frame(notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike) -> None:
     first = strike(pluck_of(bank))
     seconds_of(sound.mixer, 0.1)
