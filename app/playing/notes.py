@@ -48,7 +48,8 @@ STOLEN_S = 0.03  # the fade of one that makes room
 STOP_S = 0.012  # the fade of `stop`
 REPLACED_S = 0.02  # the fade of notes that another replaces
 BUSY = 0.75  # load of the device: above it the oldest notes end, so that the others have no gaps
-LEAST_RELIEF = 2  # notes that end then, at each look at the load
+LOOKS = 10  # at the load, 0.5 s or more, all of which it is above: another program's burst raises it for less
+LEAST_RELIEF = 2  # notes that end then
 MOST_CARRIED = 4  # notes that ring on when the device changes its rate
 LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the mixer
 
@@ -91,6 +92,8 @@ class Notes:
         self._dry = False
         self._ahead = Ahead()
         self._latencies_s: deque[float] = deque(maxlen=100)
+        self._loads: deque[float] = deque(maxlen=LOOKS)
+        self._frames_looked = 0  # of the mixer, when its load was looked at
         self._helper = ThreadPoolExecutor(1, "notes-helper", lower_priority, (Rank.BACKGROUND,))
         self._levels = Levels(sources, self.in_background)
         self._closed = False
@@ -507,13 +510,21 @@ class Notes:
     def _bound_load(self, status: SoundStatus) -> None:
         """Ends the oldest notes where the device has no time for all. In the caretaker's thread of the sound.
 
+        Bursts of other programs raise the load as well: what they cost is their own length, and no note ends.
         It looks at the keys' notes too, so that their ends are reported while the window is busy.
         """
         self.look()
-        if status.load > BUSY:
+        frames, before = self._sound.mixer.frames, self._frames_looked
+        if frames == before:  # the load is that of the look before
+            return
+        self._frames_looked = frames
+        self._loads.append(status.load)
+        load = min(self._loads) if len(self._loads) == LOOKS else 0.0
+        if load > BUSY:
+            self._loads.clear()
             with self._lock:
                 ringing = self.ringing
-                self._make_room(max(1, min(ringing - LEAST_RELIEF, int(ringing * BUSY / status.load))))
+                self._make_room(max(1, min(ringing - LEAST_RELIEF, int(ringing * BUSY / load))))
 
     def _make_room(self, most: int) -> None:
         """Releases the oldest notes where more than `most` ring."""
