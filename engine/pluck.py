@@ -14,6 +14,7 @@ SHAPES: tuple[Shape, ...] = get_args(Shape)  # numbers of the kernels
 POSITION_RANGE = (0.02, 0.98)
 WIDTH_RANGE = (0.02, 1.0)
 LARGEST_AMPLITUDE_MM = 20.0
+AMPLITUDE_MM_RANGE = (0.0, LARGEST_AMPLITUDE_MM)
 FULL_SCALE_M = 0.010  # the displacement that is 0 dBFS in sound
 FULL_SCALE_M_S = 30.0  # the velocity that is 0 dBFS: a Gaussian of width 0.08 is as loud as its displacement
 FULL_SCALE_N = 20.0  # the force at the bridge that is 0 dBFS: a Gaussian of width 0.06 and 20 mm on a nylon B3
@@ -45,7 +46,7 @@ class Pluck:
         for name, value, (low, high), unit in (
             ("position", self.position, POSITION_RANGE, ""),
             ("width", self.width, WIDTH_RANGE, ""),
-            ("amplitude", self.amplitude_mm, (0.0, LARGEST_AMPLITUDE_MM), " mm"),
+            ("amplitude", self.amplitude_mm, AMPLITUDE_MM_RANGE, " mm"),
         ):
             if not low <= value <= high:
                 raise ValueError(f"{name} must lie in {low:g} … {high:g}{unit}, not {value:g}{unit}")
@@ -55,6 +56,13 @@ class Pluck:
     def moved(self, **changes: float | str) -> Pluck:
         """A copy with some values changed."""
         return replace(self, **changes)  # type: ignore[arg-type]
+
+    def nearest(self, **changes: float) -> Pluck:
+        """A copy with some values changed, each to the nearest within its range; not a number is the lowest."""
+        ranges = {"position": POSITION_RANGE, "width": WIDTH_RANGE, "amplitude_mm": AMPLITUDE_MM_RANGE}
+        return self.moved(
+            **{name: min(max(ranges[name][0], value), ranges[name][1]) for name, value in changes.items()}
+        )
 
     def displacement(self, grid_points: int) -> NDArray[np.float64]:
         """The raw shape in m before any projection on modes, float64 (grid_points,)."""

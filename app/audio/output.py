@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 import time
 from typing import Protocol
@@ -11,6 +12,7 @@ from app.audio.devices import AudioDevice, close_device, open_device
 from app.audio.problems import refused
 from app.shared.thread_priority import native_threads, put_first
 from engine.voices.mixer import Mixer
+from engine.voices.voice import possible_s
 
 STALLED_AFTER_S = 2.5  # without a call: longer than any start of a sound server that was seen
 LOST_AFTER_S = 6.0  # a stall of this length does not end: the device was unplugged, or its driver hangs
@@ -24,7 +26,7 @@ class Output(Protocol):
     Attributes:
         device: None for the clock.
         rate_hz: at which frames are taken.
-        latency_s: the length of the output's buffer, as reported when it was opened.
+        latency_s: the length of the output's buffer, as reported when it was opened; as asked for, if that cannot be.
     """
 
     device: AudioDevice | None
@@ -32,7 +34,7 @@ class Output(Protocol):
     latency_s: float
 
     def now_s(self) -> float:
-        """The output's time in seconds, on the clock of the times at which voices began."""
+        """The output's time in seconds, on the clock of the times at which voices began; 0: not known."""
 
     def load(self) -> float:
         """The share of the output's time that the mixer takes, 0 … 1."""
@@ -61,7 +63,7 @@ class DeviceOutput:
         self._closed = False
         threads = native_threads()
         self._stream = open_device(device, buffer_s, mixer)
-        self.latency_s = float(self._stream.latency)
+        self.latency_s = possible_s(self._stream.latency) or buffer_s
         self._calls, self._called_s = mixer.calls, time.monotonic()
         try:
             self._stream.start()
@@ -74,10 +76,12 @@ class DeviceOutput:
         with self._closing:  # called from any thread: PortAudio must not be given a stream that was freed
             if self._closed:
                 raise RuntimeError("the output has been closed")
-            return float(self._stream.time)
+            now_s = float(self._stream.time)
+        return now_s if math.isfinite(now_s) else 0.0
 
     def load(self) -> float:
-        return float(self._stream.cpu_load)
+        load = float(self._stream.cpu_load)
+        return max(load, 0.0) if math.isfinite(load) else 0.0
 
     def stalled(self) -> bool:
         return self._silent_s() > STALLED_AFTER_S

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -14,6 +15,7 @@ class ProblemKind(StrEnum):
     STALLED = "stalled"
     VANISHED = "vanished"
     OTHER = "other"
+    INTERNAL = "internal"
 
 
 @dataclass(frozen=True)
@@ -91,6 +93,27 @@ def stalled(device_name: str) -> AudioProblem:
         ProblemKind.STALLED,
         f"The sound output “{device_name}” stopped. The computer may be too busy.",
         "The app keeps trying. If it does not recover, choose a larger buffer or another output in Audio.",
+    )
+
+
+def internal(detail: str) -> AudioProblem:
+    return AudioProblem(
+        ProblemKind.INTERNAL,
+        "An internal error occurred while the sound was supervised. Playback continues.",
+        "Please report the details.",
+        detail,
+    )
+
+
+def unexpected(error: Exception, device_name: str) -> AudioUnavailable:
+    """Returns what became of a device while it was looked for or opened, where that is no known fault of devices."""
+    return AudioUnavailable(
+        AudioProblem(
+            ProblemKind.OTHER,
+            f"The sound output “{device_name}” could not be opened because of an internal error.",
+            "The app keeps trying. Choose another output in the audio settings, and please report the details.",
+            "".join(traceback.format_exception(error)),
+        )
     )
 
 

@@ -13,11 +13,13 @@ import traceback
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from queue import Empty, SimpleQueue
 
 from app.audio.devices import AudioDevice, default_device, find
 from app.audio.output import ClockOutput, DeviceOutput, Output
-from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, stalled, vanished
+from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, internal, stalled, unexpected, vanished
+from app.shared.log import faultless, log_fault
 from engine.effects import Effects
 from engine.voices.mixer import Gap, Mixer
 
@@ -25,6 +27,8 @@ DEFAULT_RATE_HZ = 48_000  # until a device says otherwise
 BUFFER_S = 0.012
 TRY_AGAIN_S = 0.5  # between two looks for a device that vanished; one takes 25 ms of a processor
 LOOK_EVERY_S = 0.05  # the caretaker's period
+RESTART_AFTER = 20  # looks at the output that failed, 1 s: it is opened again then
+MOST_FAULTS = 20  # different internal ones that are reported
 MOST_GAPS = 200  # kept; older ones are dropped
 JOIN_TIMEOUT_S = 5.0
 
@@ -82,7 +86,7 @@ class Sound:
     """Public methods may be called from any thread; all but `set_effects` and `close` return at once.
 
     Args:
-        on_problem: called once for each fault of a device, from the caretaker thread.
+        on_problem: called once for each fault of a device or of the supervision, from the caretaker thread.
         rate_hz: of the mixer until a device is opened.
         look_up, open_output: find and open a device; replaced in tests.
     """
@@ -94,7 +98,8 @@ class Sound:
         look_up: LookUp = look_up,
         open_output: Open = DeviceOutput,
     ) -> None:
-        self._on_problem, self._look_up, self._open_output = on_problem, look_up, open_output
+        self._on_problem = faultless(on_problem or (lambda problem: None), "while a fault of the sound was reported")
+        self._look_up, self._open_output = look_up, open_output
         self._watch: Callable[[SoundStatus], None] = lambda status: None
         self.mixer = Mixer(rate_hz)
         self._output: Output = ClockOutput(self.mixer)
@@ -107,9 +112,11 @@ class Sound:
         self._lost: _Wish | None = None  # its device vanished while it was in use: opened again when it is back
         self._try_again_s = 0.0
         self._stalled = False  # whether a stall has been reported
+        self._calls_before = 0  # of the mixer, by other outputs
         self._gaps: deque[Gap] = deque(maxlen=MOST_GAPS)
         self._status = SoundStatus(rate_hz=rate_hz)
-        self._changes_done = 0
+        self._changes_done = self._failed_looks = 0
+        self._faults: set[str] = set()
         self._caretaker = threading.Thread(target=self._supervise, name="sound-caretaker", daemon=True)
         self._caretaker.start()
 
@@ -194,25 +201,42 @@ class Sound:
             while not self._closing.is_set():
                 self._woken.wait(LOOK_EVERY_S)
                 self._woken.clear()
-                self._process_requests()
+                self._carry_on(self._process_requests)
                 if self._closing.is_set():
                     break
-                self._look_at_output()
-                self.mixer.forget_ended()
-                self._gaps.extend(self.mixer.new_gaps())
-                self._publish()
-                self._watch(self._status)
-        except Exception:
-            self._report(
-                AudioProblem(
-                    ProblemKind.OTHER,
-                    "Playback has stopped because of an internal error.",
-                    "Restart the app, and please report the details.",
-                    traceback.format_exc(),
-                )
-            )
+                if self._carry_on(self._look_at_output) and self._carry_on(self._publish):
+                    self._failed_looks = 0
+                else:
+                    self._failed_looks += 1
+                    if self._failed_looks % RESTART_AFTER == 0:
+                        self._carry_on(self._restart)
+                self._carry_on(self._free_ended)
+                self._carry_on(lambda: self._watch(self._status))
         finally:
-            self._output.close()
+            self._close()
+
+    def _carry_on(self, work: Callable[[], None]) -> bool:
+        """Does `work`; whether it could. A fault of it is reported once, and all else continues."""
+        try:
+            work()
+            return True
+        except Exception as error:
+            where = "".join(traceback.format_tb(error.__traceback__))
+            if where not in self._faults and len(self._faults) < MOST_FAULTS:
+                self._faults.add(where)
+                self._on_problem(internal(log_fault(error, "while the sound was supervised")))
+            return False
+
+    def _restart(self) -> None:
+        """Opens the output again, which cannot be supervised as it is."""
+        device = self._output.device
+        if device is not None:
+            self._be_silent()
+            self._lose(replace(self._wish, device=self._wish.device or device))
+
+    def _free_ended(self) -> None:
+        self.mixer.forget_ended()
+        self._gaps.extend(self.mixer.new_gaps())
 
     def _process_requests(self) -> None:
         while True:
@@ -220,8 +244,10 @@ class Sound:
                 wish = self._wishes.get_nowait()
             except Empty:
                 return
-            self._change(wish)
-            self._changes_done += 1  # published with the device and the rate that came of it
+            try:
+                self._change(wish)
+            finally:
+                self._changes_done += 1  # published with the device and the rate that came of it
 
     def _change(self, wish: _Wish) -> None:
         before = self._wish if self._output.device is not None else None
@@ -230,7 +256,7 @@ class Sound:
         try:
             if wish.rescan or present is None:
                 self._be_silent()
-            device = wish.at_its_rate(self._look_up(wish.device, wish.rescan or present is None))
+            device = self._found(wish, wish.rescan or present is None)
             if device == self._output.device and self._wish == wish:
                 return
             self._be_silent()  # it might refuse to be opened twice
@@ -238,9 +264,18 @@ class Sound:
         except AudioUnavailable as error:
             if before is not None and present is not None:
                 self._reopen(present, before)
-            elif error.kind is ProblemKind.VANISHED:  # it may still be plugged in
+            elif error.kind in (ProblemKind.VANISHED, ProblemKind.OTHER):  # it may come yet
                 self._lose(wish)
             self._report(error.problem)
+
+    def _found(self, wish: _Wish, rescan: bool) -> AudioDevice:
+        """The device that is wished for. Raises AudioUnavailable: there is none now, or it cannot be looked for."""
+        try:
+            return wish.at_its_rate(self._look_up(wish.device, rescan))
+        except AudioUnavailable:
+            raise
+        except Exception as error:
+            raise unexpected(error, wish.device.name if wish.device else "default") from error
 
     def _adopt(self, device: AudioDevice, wish: _Wish) -> None:
         """Opens a device, with the present mixer where rate and channels stay, else with a new one.
@@ -253,14 +288,15 @@ class Sound:
         if rate_hz != mixer.rate_hz or channels != mixer.channels:
             mixer = Mixer(rate_hz, channels)
             self._set_up(mixer)  # or its first frames would be loud
-        old = self._output
-        old.close()
+        self._close()
         try:
             self._output = self._open_output(device, wish.buffer_s_at(rate_hz), mixer)
-        except AudioUnavailable:
+        except Exception as error:
             self._output = ClockOutput(self.mixer)
-            raise
-        self.mixer, self._wish, self._stalled = mixer, wish, False
+            if isinstance(error, AudioUnavailable):
+                raise
+            raise unexpected(error, device.name) from error
+        self.mixer, self._wish, self._stalled, self._calls_before = mixer, wish, False, mixer.calls
         self._set_up(mixer)  # what was set while the device was being opened went to the old one
         self._status = replace(self._status, problem=None)
 
@@ -269,7 +305,7 @@ class Sound:
         given: object = None
         while given != (wished := (self._volume_db, self._effects)):
             mixer.set_volume(10 ** (wished[0] / 20))
-            mixer.set_effects(wished[1])
+            self._carry_on(partial(mixer.set_effects, wished[1]))  # else all would be silent
             given = wished
 
     def _reopen(self, device: AudioDevice, wish: _Wish) -> None:
@@ -281,16 +317,19 @@ class Sound:
 
     def _be_silent(self) -> None:
         if self._output.device is not None:
-            self._output.close()
+            self._close()
             self._output = ClockOutput(self.mixer)
+
+    def _close(self) -> None:
+        faultless(self._output.close, "while the sound output was closed")()
 
     def _look_at_output(self) -> None:
         output = self._output
         if output.device is not None and output.lost():
-            device = output.device
-            self._be_silent()
-            self._lose(replace(self._wish, device=self._wish.device or device))
-            self._report(vanished(device.name).problem)
+            if not self._resume(output.device):
+                self._be_silent()
+                self._lose(replace(self._wish, device=self._wish.device or output.device))
+                self._report(vanished(output.device.name).problem)
         elif output.stalled() and not self._stalled and output.device is not None:
             self._stalled = True
             self._report(stalled(output.device.name))
@@ -300,10 +339,22 @@ class Sound:
         if self._lost is not None and time.monotonic() >= self._try_again_s:
             self._try_again_s = time.monotonic() + TRY_AGAIN_S
             try:
-                self._adopt(self._lost.at_its_rate(self._look_up(self._lost.device, True)), self._lost)
+                self._adopt(self._found(self._lost, True), self._lost)
                 self._lost = None
             except AudioUnavailable:
                 pass
+
+    def _resume(self, device: AudioDevice) -> bool:
+        """Opens a device at once that has played and stands: a driver gives up under load, too. Whether it could."""
+        began_s, mixer = time.monotonic(), self.mixer
+        if mixer.calls == self._calls_before:
+            return False
+        try:
+            self._adopt(device, self._wish)
+        except AudioUnavailable:
+            return False
+        self._gaps.append(Gap(mixer.seconds, "device", 1000 * (time.monotonic() - began_s)))
+        return True
 
     def _lose(self, wish: _Wish) -> None:
         """Marks an output as lost: it is opened again when it is back, and until then no fault is reported."""
@@ -312,8 +363,7 @@ class Sound:
     def _report(self, problem: AudioProblem) -> None:
         # before the call, because the callee may read the status
         self._status = replace(self._status, problem=str(problem), device=self._output.device)
-        if self._on_problem is not None:
-            self._on_problem(problem)
+        self._on_problem(problem)
 
     def _publish(self) -> None:
         output = self._output

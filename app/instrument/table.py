@@ -80,8 +80,8 @@ def wheeled(patch: Patch, wheel: int, *parts: str) -> Patch:
     goal = wheel_goal(patch) if wheel and patch.mod_wheel.startswith(parts) else None
     if goal is None:
         return patch
-    value = patch.value(patch.mod_wheel)
-    return patch.with_value(patch.mod_wheel, value + wheel / 127 * (goal - value))
+    value, share = patch.value(patch.mod_wheel), min(max(wheel, 0), 127) / 127
+    return patch.with_value(patch.mod_wheel, value + share * (goal - value))
 
 
 def programs_of(preset: Preset, rate_hz: int, sources: Iterable[str], drums: bool) -> tuple[NDArray[np.float64], ...]:

@@ -156,11 +156,10 @@ class PluckChoices(Value):
     def pluck(self, velocity: float) -> Pluck:
         """The pluck of a velocity in 1 … 127, which need not be an integer; others count as the nearest."""
         share = self._share(velocity)
-        return Pluck(
-            self.position,
-            self.softest_mm * (self.hardest_mm / self.softest_mm) ** share,
-            self.shape,
-            self.width * (self.width_hard / self.width) ** share,
+        return Pluck(shape=self.shape).nearest(  # a power of a ratio may miss its end
+            position=self.position,
+            amplitude_mm=self.softest_mm * (self.hardest_mm / self.softest_mm) ** share,
+            width=self.width * (self.width_hard / self.width) ** share,
         )
 
     def velocity_of(self, amplitude_mm: float) -> int:

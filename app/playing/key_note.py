@@ -64,9 +64,8 @@ class KeyNote:
             self.string = report.string if report.string >= 0 else None
             if report.parameters is not None:
                 pluck = self.event.pluck or self.patch.pluck.pluck(self.event.velocity)
-                pluck = pluck.moved(position=report.position, amplitude_mm=report.amplitude_mm)
-                if pluck.shape != "triangular":
-                    pluck = pluck.moved(width=report.width)
+                width = pluck.width if pluck.shape == "triangular" else report.width
+                pluck = pluck.nearest(position=report.position, amplitude_mm=report.amplitude_mm, width=width)
                 self.request = RenderRequest(StringOf(self._path, report.parameters), pluck, 0.0, self.ear)
             self.look()
         else:

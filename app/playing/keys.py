@@ -18,6 +18,7 @@ from app.instrument.effects import body_problem, effects_of
 from app.instrument.events import RESET, SWITCHES, Controller, Event, NoteOn, PatchTurned, moves_effects
 from app.patches.drums import Drums
 from app.patches.patch import Patch
+from app.playing.dropping import drop
 from app.playing.due import Due
 from app.playing.key_note import AS_THEY_ARE, KeyNote
 from app.playing.recorder import EventRecorder
@@ -181,7 +182,10 @@ class Keys:
                     note = self._notes.get((player, report.id))
                     if note is None:
                         continue
-                    note.take(report)
+                    try:
+                        note.take(report)
+                    except Exception as error:
+                        drop(note, error, self._report)
                     if note.over:
                         del self._notes[player, report.id]
                     elif report.kind == BEGAN:

@@ -23,6 +23,7 @@ from app.instrument.events import Event, NoteOn, PluckAt
 from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from app.playing.ahead import Ahead, AheadVoice
+from app.playing.dropping import drop
 from app.playing.due import Due
 from app.playing.key_note import SOURCES, KeyNote
 from app.playing.keyboard import PluckRange
@@ -34,6 +35,7 @@ from app.presets.library import PresetEntry
 from app.rendering import RenderRequest
 from app.rendering.subject import Subject, path_of
 from app.session.monitor import Monitor
+from app.shared.log import faultless
 from app.shared.thread_priority import Rank, lower_priority
 from app.shared.vocabulary import OTHER
 from engine.effects import Effects
@@ -46,12 +48,14 @@ STOLEN_S = 0.03  # the fade of one that makes room
 STOP_S = 0.012  # the fade of `stop`
 REPLACED_S = 0.02  # the fade of notes that another replaces
 BUSY = 0.75  # load of the device: above it the oldest notes end, so that the others have no gaps
-LEAST_RELIEF = 2  # notes that end then, at each look at the load
+LOOKS = 10  # at the load, 0.5 s or more, all of which it is above: another program's burst raises it for less
+LEAST_RELIEF = 2  # notes that end then
 MOST_CARRIED = 4  # notes that ring on when the device changes its rate
 LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the mixer
 
 Report = Callable[[str, str], None]  # a message and its details
 Made = TypeVar("Made")
+MadeNote = TypeVar("MadeNote", Note, KeyNote, Note | KeyNote)
 
 
 class Notes:
@@ -75,7 +79,8 @@ class Notes:
         report: Report,
         set_effects: Callable[[Effects | None], None] = lambda effects: None,
     ) -> None:
-        self._sound, self._sources, self._find, self._report = sound, sources, find, report
+        self._sound, self._sources, self._find = sound, sources, find
+        self._report = report = faultless(report, "while a note was reported")
         self._lock = threading.RLock()
         self._notes: list[Note | KeyNote] = []
         self._monitor = Monitor()
@@ -87,6 +92,8 @@ class Notes:
         self._dry = False
         self._ahead = Ahead()
         self._latencies_s: deque[float] = deque(maxlen=100)
+        self._loads: deque[float] = deque(maxlen=LOOKS)
+        self._frames_looked = 0  # of the mixer, when its load was looked at
         self._helper = ThreadPoolExecutor(1, "notes-helper", lower_priority, (Rank.BACKGROUND,))
         self._levels = Levels(sources, self.in_background)
         self._closed = False
@@ -139,8 +146,7 @@ class Notes:
         with self._lock:
             self._monitor, self._compared = monitor, compared
             notes = self._plucks()
-            for note in notes:
-                self._apply_monitor(note)
+            self._each(notes, self._apply_monitor)
         self._set_gains_of_keys()
         for note in notes:
             if not note.pending and not note.over:
@@ -160,8 +166,15 @@ class Notes:
         """Plays an event, at once or when it is due; the note that it began, or None.
 
         Keys of a single string are places along it. Its note sounds with the next quantum of the device, unless
-        presets must be loaded or a model is rendered ahead.
+        presets must be loaded or a model is rendered ahead. An event that fails costs itself alone, and is reported.
         """
+        try:
+            return self._handle(event, due)
+        except Exception as error:
+            drop(None, error, self._report)
+            return None
+
+    def _handle(self, event: Event, due: Due | None) -> Note | KeyNote | None:
         struck_s = self._sound.now_s() if due is None else 0.0  # only gestures are timed
         placed = self._place(event)
         if not isinstance(placed, PluckAt):
@@ -201,11 +214,11 @@ class Notes:
         self, chosen: RenderRequest, from_s: float, begin_frame: int, struck_s: float = 0.0, waits: bool = False
     ) -> Note:
         note = Note(chosen, self._voices_of(chosen), from_s, begin_frame)
-        note.ahead_of_event = waits
+        note.ahead_of_event, loaded = waits, self._loaded(note)
         with self._lock:
             self._notes.append(note)
         begin = partial(self._begin, note, struck_s)
-        if from_s > 0 or not self._loaded(note):
+        if from_s > 0 or not loaded:
             self.in_background(begin, note)
         else:
             self._guarded(begin, note)()
@@ -238,8 +251,7 @@ class Notes:
     def stop(self, seconds: float = STOP_S) -> None:
         """Lets all notes fade out; those that wait will not sound."""
         with self._lock:
-            for note in self._notes:
-                note.release(seconds)
+            self._each(self._notes, lambda note: note.release(seconds))
         self.keys.stop(seconds)
 
     # Ahead of events
@@ -320,17 +332,8 @@ class Notes:
         with self._lock:
             self._move_to_new_mixer()
             self._notes = [note for note in self._notes if not note.over]
-            for each in self._notes:
-                ahead = isinstance(each, Note) and each.ahead
-                if not each.timed and not ahead and (latency_s := each.latency_s) is not None:
-                    each.timed = True
-                    self._latencies_s.append(latency_s)
-            for note in self._plucks():
-                if note.ahead and note.match is None and not note.pending:
-                    self._ask_match(note)
-                if self._ear is not None:
-                    for voice in note.voices.values():
-                        voice.listen(self._ear)
+            self._each(self._notes, self._take_latency)
+            self._each(self._plucks(), self._follow)
 
     def close(self) -> None:
         """Ends the threads; may be called again."""
@@ -339,6 +342,28 @@ class Notes:
         self._ahead.close()
 
     # How it is done
+
+    def _each(self, notes: Sequence[MadeNote], work: Callable[[MadeNote], None]) -> None:
+        """Does `work` with each note; one with which it fails is dropped, and the others continue."""
+        for note in notes:
+            try:
+                work(note)
+            except Exception as error:
+                drop(note, error, self._report)
+
+    def _take_latency(self, note: Note | KeyNote) -> None:
+        ahead = isinstance(note, Note) and note.ahead
+        if not note.timed and not ahead and (latency_s := note.latency_s) is not None:
+            note.timed = True
+            self._latencies_s.append(latency_s)
+
+    def _follow(self, note: Note) -> None:
+        """Lets a note be heard where all are, and as loud as the truth once that is known."""
+        if note.ahead and note.match is None and not note.pending:
+            self._ask_match(note)
+        if self._ear is not None:
+            for voice in note.voices.values():
+                voice.listen(self._ear)
 
     def _set_gains_of_keys(self) -> None:
         """Sets which sources of keys are heard; both are of one string, whose levels match as they are."""
@@ -495,19 +520,26 @@ class Notes:
     def _bound_load(self, status: SoundStatus) -> None:
         """Ends the oldest notes where the device has no time for all. In the caretaker's thread of the sound.
 
+        Bursts of other programs raise the load as well: what they cost is their own length, and no note ends.
         It looks at the keys' notes too, so that their ends are reported while the window is busy.
         """
         self.look()
-        if status.load > BUSY:
+        frames, before = self._sound.mixer.frames, self._frames_looked
+        if frames == before:  # the load is that of the look before
+            return
+        self._frames_looked = frames
+        self._loads.append(status.load)
+        load = min(self._loads) if len(self._loads) == LOOKS else 0.0
+        if load > BUSY:
+            self._loads.clear()
             with self._lock:
                 ringing = self.ringing
-                self._make_room(max(1, min(ringing - LEAST_RELIEF, int(ringing * BUSY / status.load))))
+                self._make_room(max(1, min(ringing - LEAST_RELIEF, int(ringing * BUSY / load))))
 
     def _make_room(self, most: int) -> None:
         """Releases the oldest notes where more than `most` ring."""
         ringing = [note for note in self._notes if not note.over and not note.released]
-        for note in ringing[: max(0, len(ringing) - most)]:
-            note.release(STOLEN_S)
+        self._each(ringing[: max(0, len(ringing) - most)], lambda note: note.release(STOLEN_S))
 
     def _apply_monitor(self, note: Note, at_once: bool = False) -> None:
         for source, voice in note.voices.items():
@@ -522,7 +554,7 @@ class Notes:
 
     def _take_match(self, key: tuple[object, ...], match: Mapping[str, float]) -> None:
         with self._lock:
-            for note in self._plucks():
-                if note.matching_key == key:
-                    note.match = match
-                    self._apply_monitor(note)
+            notes = [note for note in self._plucks() if note.matching_key == key]
+            for note in notes:
+                note.match = match
+            self._each(notes, self._apply_monitor)

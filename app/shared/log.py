@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 from types import TracebackType
+from typing import ParamSpec
 
 from platformdirs import user_log_path
 
@@ -27,6 +28,7 @@ OLDER_KEPT = 2  # earlier log files
 MOST_KINDS = 200  # different exceptions that are written in one run
 FILE_VARIABLE = "LEARNED_STRINGS_LOG"
 
+P = ParamSpec("P")
 _log = logging.getLogger("learned_strings")
 
 
@@ -105,6 +107,18 @@ def log_fault(error: BaseException, where: str) -> str:
     text = f"{where}\n{''.join(traceback.format_exception(error))}"
     _log.error("%s", text)
     return text
+
+
+def faultless(work: Callable[P, object], where: str) -> Callable[P, None]:
+    """`work`, whose exceptions are written to the log and go no further: what it reports to must not stop sound."""
+
+    def guarded(*values: P.args, **named: P.kwargs) -> None:
+        try:
+            work(*values, **named)
+        except Exception as error:
+            log_fault(error, where)
+
+    return guarded
 
 
 def _open(path: Path) -> logging.Handler | None:

@@ -64,7 +64,10 @@ class AudioControl(QObject):
         )
 
     def report(self, problem: AudioProblem) -> None:
-        """Shows a fault of the output as a notice, with what plays on."""
+        """Shows a fault of the output as a notice, with what plays on; an internal one stays, for its report."""
+        if problem.kind is ProblemKind.INTERNAL:
+            self._window.notices.report(str(problem), problem.detail)
+            return
         if self._notice:
             self._window.notices.withdraw(self._notice)  # one notice about the sound at a time
         self._notice = str(problem)

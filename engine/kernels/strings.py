@@ -90,7 +90,10 @@ def pitch_hz(string: np.ndarray) -> float:
 
 @njit(**EXACT)
 def turned(string: np.ndarray, knobs: np.ndarray, out: np.ndarray) -> None:
-    """The string with multipliers, as `app.patches.patch.Knobs` says; pitch and decay rates stay, nearly."""
+    """The string with multipliers, as `app.patches.patch.Knobs` says; pitch and decay rates stay, nearly.
+
+    Each number stays within its bounds: a knob turns no string into an impossible one.
+    """
     area = knobs[of.GAUGE] ** 2
     heavier = area * knobs[of.DENSITY_FACTOR]
     out[of.LENGTH] = string[of.LENGTH] * knobs[of.LENGTH_FACTOR] * math.sqrt(knobs[of.TENSION_FACTOR])
@@ -101,6 +104,9 @@ def turned(string: np.ndarray, knobs: np.ndarray, out: np.ndarray) -> None:
     out[of.D1] = string[of.D1] * knobs[of.DECAY] * heavier
     out[of.D3] = string[of.D3] * knobs[of.BRIGHTNESS_DECAY] * heavier
     out[of.TENSION] = string[of.TENSION] * heavier * knobs[of.TENSION_FACTOR] * knobs[of.LENGTH_FACTOR] ** 2
+    for place in range(of.STRING):
+        low, high = _BOUNDS[place]
+        out[place] = min(max(out[place], low), high)
 
 
 @njit(**EXACT)

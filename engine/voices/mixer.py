@@ -16,7 +16,7 @@ from engine.kernels import layout as at
 from engine.kernels.memory import publish
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.voices.derivative import differentiator_taps
-from engine.voices.voice import Voice
+from engine.voices.voice import Voice, possible_s
 
 if TYPE_CHECKING:
     from engine.voices.player import CompiledPlayer
@@ -30,7 +30,7 @@ CAUSES = {at.CAUSE_DEVICE: "device", at.CAUSE_STARVED: "rendering", at.CAUSE_RUN
 
 @dataclass(frozen=True)
 class Gap:
-    """A silence that nobody asked for: when, as seconds of sound since the mixer began, and why."""
+    """A silence that nobody asked for: when, as seconds of sound since the mixer began, why, and 0 ms if unknown."""
 
     time_s: float
     cause: str
@@ -228,10 +228,10 @@ class Mixer:
     def output_latency_s(self) -> float:
         """From a voice to the loudspeaker: the limiter's delay, and from a callback to its first sample.
 
-        The latter is what the device said last; 0 where it says nothing.
+        The latter is what the device said last; 0 where it says nothing, or what cannot be.
         """
         delay_s = at.AHEAD / self.rate_hz if self._counts[at.M_LIMITING] else 0.0
-        return delay_s + max(0.0, float(self.memory[at.M_DAC_S] - self.memory[at.M_NOW_S]))
+        return delay_s + (possible_s(self.memory[at.M_DAC_S] - self.memory[at.M_NOW_S]) or 0.0)
 
     def take_peak(self) -> float:
         """The highest sample since it was asked for the last time."""
@@ -251,7 +251,8 @@ class Mixer:
         for number in range(max(self._gaps_read, total - at.GAPS), total):
             slot = at.M_GAP_LIST + number % at.GAPS * at.GAP_FIELDS
             frame, milliseconds, cause = self.memory[slot : slot + at.GAP_FIELDS]
-            found.append(Gap(frame / self.rate_hz, CAUSES.get(int(cause), "unknown"), float(milliseconds)))
+            lasted_ms = 1000 * (possible_s(milliseconds / 1000) or 0.0)
+            found.append(Gap(float(frame) / self.rate_hz, CAUSES.get(int(cause), "unknown"), lasted_ms))
         self._gaps_read = total
         return found
 

@@ -21,6 +21,7 @@ from engine.kernels.memory import publish
 from engine.pluck import SHAPES, Pluck
 from engine.resonators.string import StringParameters
 from engine.voices.mixer import Mixer
+from engine.voices.voice import possible_s
 
 AT_HAND = 16  # notes whose memory is there from the start
 PAGE_SLOTS = 512  # of 4 kB
@@ -94,7 +95,7 @@ class Report:
         string: on which of a set it is played, from the highest, 0; -1: the key chooses.
         table: serial of its instrument's table.
         position, amplitude_mm, width: of the pluck.
-        parameters: of its string as its key had it; None for drums.
+        parameters: of its string as its key had it; None for drums, and for a string beyond the bounds.
         note: which of the player's notes it is.
     """
 
@@ -307,16 +308,15 @@ class CompiledPlayer:
             self._flush()
         total, found = int(self._counts[of.PLAYER_REPORTED]), []
         self.missed |= total > self._read + of.REPORTS
-        for number in range(max(self._read, total - of.REPORTS), total):
+        first, self._read = max(self._read, total - of.REPORTS), total
+        for number in range(first, total):
             record = self._reports[number % of.REPORTS].copy()
             if int(self._counts[of.PLAYER_REPORTED]) - number >= of.REPORTS:
                 self.missed = True  # it was written again meanwhile
                 continue
             known = {name: record[name].item() for name in REPORTED}
             struck = record["kind"] == of.BEGAN and record["modes"] > 0
-            parameters = StringParameters(*record["own"].tolist()) if struck else None
-            found.append(Report(**known, parameters=parameters))
-        self._read = total
+            found.append(Report(**known, parameters=_string(record["own"]) if struck else None))
         with self._lock:
             for each in found:
                 self._struck.pop(each.id, None)
@@ -341,10 +341,8 @@ class CompiledPlayer:
         """Of a note's string: where it glides to, times how far the first mode of a voice has still to go."""
         if note[of.NOTE_DRUM]:
             return None
-        row = note.view(np.float64)[of.NOTE_STRING_NOW : of.NOTE_STRING_NOW + of.STRING].tolist()
-        try:
-            own = StringParameters(*row)
-        except ValueError:  # of a drum, or bent beyond the bounds
+        own = _string(note.view(np.float64)[of.NOTE_STRING_NOW : of.NOTE_STRING_NOW + of.STRING])
+        if own is None:
             return None
         modes = int(voice.view(np.int64)[at.MODES])
         first = (int(voice.ctypes.data) - self.address) // 8 + at.state(modes) + at.OMEGA_SQUARED * modes
@@ -370,7 +368,7 @@ class CompiledPlayer:
         frames = max((int(whole[at.FRAME]) for whole in counts), default=0)
         began = max((int(whole[at.BEGAN_FRAME]) for whole in counts), default=0)
         known = began > 0 and bool(voices[0][at.STRUCK_S])
-        took_s = float(voices[0][at.BEGAN_S] - voices[0][at.STRUCK_S]) if known else None
+        took_s = possible_s(voices[0][at.BEGAN_S] - voices[0][at.STRUCK_S]) if known else None
         return Playing(frames / self.rate_hz, max(0, began), took_s)
 
     @property
@@ -429,6 +427,14 @@ class CompiledPlayer:
             bool(counts[of.CHANNEL_TREMOLO]),
             bool(counts[of.CHANNEL_STRUMS]),
         )
+
+
+def _string(row: NDArray[np.float64]) -> StringParameters | None:
+    """A string of the player's memory; None: it is bent beyond the bounds."""
+    try:
+        return StringParameters(*row.tolist())
+    except ValueError:
+        return None
 
 
 def _drawn(pluck: Pluck) -> tuple[float, float, float, int]:

@@ -16,6 +16,12 @@ from engine.voices.ear import Ear
 from engine.voices.programs import Program
 
 SPARE_S = 0.1  # of samples that are rendered ahead, behind that fade
+LONGEST_WAIT_S = 10.0  # between two readings of a device's clock that are of one sound
+
+
+def possible_s(seconds: float) -> float | None:
+    """The time between two readings of a device's clock; None: it cannot be, as where they have two bases."""
+    return float(seconds) if 0.0 <= seconds <= LONGEST_WAIT_S else None
 
 
 class Voice:
@@ -116,10 +122,10 @@ class Voice:
 
     @property
     def struck_to_began_s(self) -> float | None:
-        """From the gesture to the callback that gave its first samples to the device; None until then."""
+        """From the gesture to the callback that gave its first samples to the device; None: not known."""
         if self._counts[at.BEGAN_FRAME] < 0 or not self.memory[at.STRUCK_S]:
             return None
-        return float(self.memory[at.BEGAN_S] - self.memory[at.STRUCK_S])
+        return possible_s(self.memory[at.BEGAN_S] - self.memory[at.STRUCK_S])
 
     @property
     def level_db(self) -> float:

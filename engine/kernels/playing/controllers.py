@@ -68,7 +68,7 @@ def controller(
     elif number == SLIDE_TIME:
         players[own + of.CHANNEL_TIME] = min(max(value, 0), 127)
     elif number == MOD_WHEEL:
-        players[of.PLAYER_WHEEL] = value
+        players[of.PLAYER_WHEEL] = min(max(value, 0), 127)
         players[of.PLAYER_WHEEL_BY] = channel
         if turns:
             changes.glide(player, players, table, tables, -1, KNOB_S, frame, now)

@@ -17,7 +17,7 @@ from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, reals, wholes
 from engine.kernels.playing import changes, channels, gains, keys, plucks, slots, voices
-from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE
+from engine.pluck import LARGEST_AMPLITUDE_MM
 
 MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the key
 STOLEN_S = 0.03  # of the fade of a note that makes room
@@ -27,10 +27,7 @@ PLUCK_STOPS_S = 0.006  # in which a string is stopped by what plucks it again
 TOUCH_PERIODS = 12.0  # of the string
 HARMONIC_REACH = 0.4  # of the way to the first node, where harmonics are plucked at the farthest
 
-# By how much a pluck varies from stroke to stroke, at most, where an instrument varies by 1. Estimates: repeats then
-# differ by about -20 dB; those of a player that was recorded do by -4 … -12 dB
-VARIES_PLACE, VARIES_DB, VARIES_WIDTH, VARIES_RELEASE = 0.08, 1.0, 0.12, 0.2  # shares, dB
-VARIES_ANGLE = math.radians(8.0)
+VARIES_RELEASE, VARIES_ANGLE = 0.2, math.radians(8.0)  # a share, rad: at most, as those of `plucks.vary`
 
 MEMBERS_APART = 1 << 16  # places of the strings of a course
 COURSES_VARY = 0.5  # by how much detuning varies from key to key, at most
@@ -216,7 +213,7 @@ def note_on(
             players[slots.channel(channel) + of.CHANNEL_SLIDE],
         )
         if by_hand:
-            position = min(max(player[event + of.EVENT_POSITION], POSITION_RANGE[0]), POSITION_RANGE[1])
+            position = player[event + of.EVENT_POSITION]
             width = player[event + of.EVENT_WIDTH]
         elif mode == of.MPE and slide >= 0:
             position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
@@ -228,16 +225,13 @@ def note_on(
         if varies > 0.0:
             stroke = players[of.PLAYER_AGE]
             if not by_hand:
-                position *= 1 + varies * VARIES_PLACE * plucks.varied(stroke, key, 0)
-                position = min(max(position, POSITION_RANGE[0]), POSITION_RANGE[1])
-                amplitude_mm *= 10.0 ** (varies * VARIES_DB / 20 * plucks.varied(stroke, key, 1))
-                amplitude_mm = min(amplitude_mm, LARGEST_AMPLITUDE_MM)
-                width *= 1 + varies * VARIES_WIDTH * plucks.varied(stroke, key, 2)
+                position, amplitude_mm, width = plucks.vary(position, amplitude_mm, width, varies, stroke, key)
             release_s *= 1 + varies * VARIES_RELEASE * plucks.varied(stroke, key, 3)
             turned = varies * VARIES_ANGLE * plucks.varied(stroke, key, 4)
         touched = keys.node_of(player, players, table, tables, channel, modes)
         if touched > 0 and not by_hand:
             position = min(position, HARMONIC_REACH / touched)
+        position, amplitude_mm, width = plucks.nearest(position, amplitude_mm, width)
         shape = players[event + of.EVENT_SHAPE] if by_hand else tables[of.TABLE_SHAPE]
         highest_m = plucks.pull(player, table, tables, shape, modes, position, amplitude_mm / 1000, width)
         plucks.release_pluck(player, tables, own, modes, release_s)

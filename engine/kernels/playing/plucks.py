@@ -10,6 +10,13 @@ from numba import njit
 from engine.kernels import playing_layout as of
 from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
+from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
+
+LEAST_AMPLITUDE_MM = 1e-6  # -200 dB of the largest: silence, and no division by zero
+
+# By how much a pluck varies from stroke to stroke, at most, where an instrument varies by 1. Estimates: repeats then
+# differ by about -20 dB; those of a player that was recorded do by -4 … -12 dB
+VARIES_PLACE, VARIES_DB, VARIES_WIDTH = 0.08, 1.0, 0.12  # shares, dB
 
 
 @njit(**COMPILED)
@@ -112,6 +119,28 @@ def varied(stroke: int, key: int, which: int) -> float:
     mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
     mixed = mixed ^ (mixed >> np.uint64(31))
     return float(np.int64(mixed >> np.uint64(12))) / 2.0**51 - 1
+
+
+@njit(**COMPILED)
+def nearest(position: float, amplitude_mm: float, width: float) -> tuple[float, float, float]:
+    """Position, amplitude and width of the nearest pluck within the ranges of `engine.pluck.Pluck`."""
+    return (
+        min(max(position, POSITION_RANGE[0]), POSITION_RANGE[1]),
+        min(max(amplitude_mm, LEAST_AMPLITUDE_MM), LARGEST_AMPLITUDE_MM),
+        min(max(width, WIDTH_RANGE[0]), WIDTH_RANGE[1]),
+    )
+
+
+@njit(**COMPILED)
+def vary(
+    position: float, amplitude_mm: float, width: float, varies: float, stroke: int, key: int
+) -> tuple[float, float, float]:
+    """Position, amplitude and width of one stroke of a pluck, within their ranges."""
+    return nearest(
+        position * (1 + varies * VARIES_PLACE * varied(stroke, key, 0)),
+        amplitude_mm * 10.0 ** (varies * VARIES_DB / 20 * varied(stroke, key, 1)),
+        width * (1 + varies * VARIES_WIDTH * varied(stroke, key, 2)),
+    )
 
 
 @njit(**COMPILED)

@@ -1,5 +1,6 @@
 """Outputs are known by name, and what goes wrong with them is said in plain words."""
 
+import math
 import os
 import subprocess
 import sys
@@ -13,8 +14,9 @@ import app
 from app.audio.devices import AudioDevice, close_device, default_device, find, open_device, output_devices
 from app.audio.output import DeviceOutput
 from app.audio.problems import AudioUnavailable, ProblemKind
-from engine.kernels.layout import M_CALLS
+from engine.kernels.layout import CAUSE_DEVICE, M_CALLS, M_DAC_S
 from engine.kernels.mixer import call
+from engine.kernels.voice import note_gap
 from engine.voices import Mixer
 
 
@@ -141,6 +143,23 @@ def test_nothing_is_looked_for_again_while_a_stream_is_open(sounddevice: FakeSou
     assert sounddevice.streams[0].asked == ["abort", "close"]  # though it could not stop
     output_devices(rescan=True)
     assert sounddevice.restarts == 1
+
+
+@pytest.mark.parametrize("value", [0.0, float("nan"), float("inf"), float("-inf"), -1795774879.331, 1e12])
+def test_times_of_a_device_that_cannot_be_are_not_shown(
+    sounddevice: FakeSoundDevice, mixer: Mixer, monkeypatch: pytest.MonkeyPatch, value: float
+) -> None:
+    for name in ("latency", "time", "cpu_load"):
+        monkeypatch.setattr(FakeStream, name, value)
+    output = DeviceOutput(find("Speakers", "ALSA"), 0.05, mixer)
+    assert output.latency_s == 0.05, "as it was asked for"
+    assert math.isfinite(output.now_s()) and 0 <= output.load() < math.inf
+    mixer.memory[M_DAC_S] = value
+    assert 0 <= mixer.output_latency_s < 1
+    note_gap(mixer.memory, 100, 1000 * value, CAUSE_DEVICE)
+    (gap,) = mixer.new_gaps()
+    assert gap.milliseconds == 0.0
+    output.close()
 
 
 def test_an_output_plays_stalls_and_is_lost(

@@ -15,6 +15,7 @@ from app.audio.devices import AudioDevice
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, no_device, refused, vanished
 from app.audio.sound import BUFFER_S, Sound
 from engine.effects import Effects, Room
+from engine.kernels.layout import M_CALLS
 from engine.voices import Mixer, Voice, plain_program
 
 TIMEOUT_S = 10.0  # a busy computer's; nothing here takes so long
@@ -303,15 +304,114 @@ def test_what_has_rung_out_is_freed_and_gaps_are_kept(sound: Sound, desk: Desk) 
 
 
 def test_a_fault_of_the_program_is_reported_with_its_details(desk: Desk) -> None:
-    def broken(device: AudioDevice | None, rescan: bool) -> AudioDevice:
+    def faulty(device: AudioDevice | None, rescan: bool) -> AudioDevice:
         raise ZeroDivisionError("a mistake")
 
-    with Sound(desk.problems.append, look_up=broken, open_output=desk.open_output) as sound:
+    with Sound(desk.problems.append, look_up=faulty, open_output=desk.open_output) as sound:
         sound.open()
         wait_for(lambda: desk.problems != [])
     (problem,) = desk.problems
     assert "internal error" in problem.message
     assert "a mistake" in problem.detail
+
+
+def broken(*_: object) -> None:
+    raise ZeroDivisionError("a mistake")
+
+
+def plays_on(sound: Sound, desk: Desk) -> None:
+    """What is asked of it is done, and the mixer is still the device's."""
+    opened(sound, buffer_s=0.5)
+    wait_for(lambda: sound.status().latency_s == 0.5)
+    assert sound.mixer is desk.outputs[-1].mixer and not desk.outputs[-1].closed
+    voice = lasting(sound)
+    assert np.abs(sound.mixer.render(4800)).max() > 0.1
+    assert not voice.over
+
+
+@pytest.mark.parametrize("stage", ["watch", "forget_ended", "set_effects"])
+def test_a_fault_of_the_supervision_is_reported_once_and_sound_continues(
+    sound: Sound, desk: Desk, monkeypatch: pytest.MonkeyPatch, stage: str
+) -> None:
+    opened(sound)
+    if stage == "watch":
+        sound.watch(broken)
+    else:
+        monkeypatch.setattr(Mixer, stage, broken)
+        opened(sound, buffer_s=0.2)
+    wait_for(lambda: desk.problems != [])
+    plays_on(sound, desk)
+    (problem,) = desk.problems
+    assert problem.kind is ProblemKind.INTERNAL and "Playback continues" in problem.message
+    assert "a mistake" in problem.detail
+    assert sound.status().problem is None, "nothing is wrong with the device"
+
+
+def test_an_output_that_cannot_be_supervised_is_opened_again(
+    sound: Sound, desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sound_module, "RESTART_AFTER", 2)
+    opened(sound)
+    first = desk.outputs[0]
+
+    def close() -> None:
+        first.closed = True
+        broken()
+
+    monkeypatch.setattr(first, "load", broken)
+    monkeypatch.setattr(first, "close", close)
+    wait_for(lambda: len(desk.outputs) == 2)
+    plays_on(sound, desk)
+    assert [problem.kind for problem in desk.problems] == [ProblemKind.INTERNAL]
+
+
+def test_a_device_that_stops_under_load_is_opened_again_at_once(
+    sound: Sound, desk: Desk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nobody waits for it as for one that was unplugged, and what rings continues."""
+    monkeypatch.setattr(sound_module, "TRY_AGAIN_S", 1e6)
+    opened(sound)
+    voice = lasting(sound)
+    sound.mixer.memory.view(np.int64)[M_CALLS] += 1
+    desk.outputs[0].is_lost = True
+    wait_for(lambda: len(desk.outputs) == 2 and sound.status().gaps != ())
+    assert desk.outputs[0].closed and desk.problems == []
+    assert sound.mixer.voices == [voice]
+    (gap,) = sound.status().gaps
+    assert gap.cause == "device" and gap.milliseconds >= 0
+    desk.outputs[1].is_lost = True  # this one has never played
+    wait_for(lambda: desk.problems != [])
+    assert [problem.kind for problem in desk.problems] == [ProblemKind.VANISHED]
+
+
+@pytest.mark.parametrize("stage", ["look_up", "open_output"])
+def test_a_fault_while_a_device_is_opened_is_tried_again(
+    desk: Desk, monkeypatch: pytest.MonkeyPatch, stage: str
+) -> None:
+    monkeypatch.setattr(sound_module, "TRY_AGAIN_S", 0.05)
+    works, faults = getattr(desk, stage), [True, True]
+
+    def at_first_broken(*values: object) -> object:
+        if faults:
+            faults.pop()
+            broken()
+        return works(*values)
+
+    monkeypatch.setattr(desk, stage, at_first_broken)
+    with Sound(desk.problems.append, look_up=desk.look_up, open_output=desk.open_output) as sound:
+        sound.open()
+        wait_for(lambda: sound.status().device is not None)
+        assert [problem.kind for problem in desk.problems] == [ProblemKind.OTHER]
+        plays_on(sound, desk)
+
+
+def test_a_fault_where_problems_are_shown_stops_nothing(desk: Desk) -> None:
+    desk.refusals["Speakers"] = refused(OSError("busy"), "Speakers", 44_100)
+    with Sound(broken, look_up=desk.look_up, open_output=desk.open_output) as sound:
+        opened(sound)
+        opened(sound, desk.devices[1])
+        wait_for(lambda: sound.status().problem is not None)
+        plays_on(sound, desk)
 
 
 def test_who_hears_of_a_problem_finds_it_in_the_status(desk: Desk) -> None:

@@ -134,6 +134,12 @@ def test_the_oldest_notes_end_where_there_are_too_many(
     assert len(notes._notes) == 3
 
 
+def look(sound: Any) -> None:
+    """The sound's thread looks at the load of a device that has taken a quantum since."""
+    sound.mixer.render(at.QUANTUM)
+    sound.take_care()
+
+
 def test_where_the_device_has_no_time_left_notes_end(
     notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike
 ) -> None:
@@ -141,10 +147,12 @@ def test_where_the_device_has_no_time_left_notes_end(
     sound.take_care()
     assert notes.ringing == 6
     sound.load = 0.9
-    sound.take_care()
+    for _ in range(module.LOOKS):
+        assert notes.ringing == 6
+        look(sound)
     assert [note.released for note in struck] == [True, True, False, False, False, False]
-    for _ in range(6):
-        sound.take_care()
+    for _ in range(6 * module.LOOKS):
+        look(sound)
     assert not struck[-1].released, "one always rings"
 
 
@@ -153,8 +161,24 @@ def test_the_more_is_asked_of_the_device_the_more_notes_end_at_once(
 ) -> None:
     struck = [strike(pluck_of(bank)) for _ in range(16)]
     sound.load = 1.5
-    sound.take_care()
+    for _ in range(module.LOOKS):
+        look(sound)
     assert [note.released for note in struck] == [True] * 8 + [False] * 8
+
+
+def test_bursts_of_other_programs_end_no_note(
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike
+) -> None:
+    """A callback that waits for a processor raises the load far above 1; the next ones lower its mean again."""
+    struck = [strike(pluck_of(bank)) for _ in range(6)]
+    for load in (*[0.3, 12.0, 4.0, 1.1, 0.8] * 8, 0.3, *[7.0] * (module.LOOKS - 1), 0.3):
+        sound.load = load
+        look(sound)
+    sound.load = 7.0
+    look(sound)
+    for _ in range(3 * module.LOOKS):
+        sound.take_care()  # while the device is not called, this is no new load
+    assert not any(note.released for note in struck)
 
 
 def test_notes_end_under_load_while_the_window_hangs(
@@ -412,6 +436,19 @@ def test_latencies_are_noted_once_a_note(
     notes.poll()
     assert later.seconds > 0
     assert len(notes.latencies_s) == 1, "a turn of a loop is no gesture"
+
+
+@pytest.mark.parametrize("now_s", [1.795774879e9, -20.0, float("nan"), float("inf"), 0.0, -1e300])
+def test_a_latency_that_cannot_be_is_not_noted(
+    notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike, now_s: float
+) -> None:
+    """The clock of gestures and that of the device's calls have two bases, or one of them none."""
+    sound.now_s = lambda: now_s
+    note = strike(pluck_of(bank))
+    seconds_of(sound.mixer, 0.01)
+    notes.poll()
+    assert note.began and note.latency_s is None
+    assert notes.latencies_s == ()
 
 
 def test_a_note_waits_for_its_frame(notes: Notes, sound: Any, bank: Path, pluck_of: PluckOf, strike: Strike) -> None:

@@ -12,7 +12,7 @@ from pytestqt.qtbot import QtBot
 
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.audio.devices import AudioDevice
-from app.audio.problems import AudioProblem, ProblemKind, stalled
+from app.audio.problems import AudioProblem, ProblemKind, internal, stalled
 from app.audio.sound import SoundStatus
 from app.window import audio_control
 from app.window.audio_control import FREQUENT_GAPS, AudioControl
@@ -94,6 +94,14 @@ def test_a_refused_choice_is_reported_and_not_saved(control: AudioControl, outpu
     assert output.opened[-1][:4] == output.opened[-2][:4]
     show(control, SoundStatus(device=SPEAKERS, changes_done=3))
     assert notices.text == ""
+
+
+def test_an_internal_fault_stays_to_be_reported(control: AudioControl, output: FakeSound) -> None:
+    control.report(internal("Traceback"))
+    show(control, SoundStatus(device=SPEAKERS))
+    notices = control._window.notices
+    assert "internal error" in notices.text and "Playback continues." in notices.text
+    assert notices.notices[-1].details == "Traceback"
 
 
 def test_a_stall_is_reported_without_a_word_on_what_plays(control: AudioControl, output: FakeSound) -> None:
