@@ -5,7 +5,8 @@ Typed text counts when it is whole: at Enter, or as the focus leaves. A refused 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QPoint
 from PySide6.QtGui import QKeyEvent, QValidator
@@ -28,14 +29,15 @@ def refusal(text: str, example: str) -> str:
     return f"“{text.strip()[:30]}” is no number here, as {example} is, which is kept"
 
 
-if TYPE_CHECKING:
-    _Box = QSpinBox
-else:
-    _Box = object
-
-
-class _Typed(_Box):
+class _Typed(QAbstractSpinBox if TYPE_CHECKING else object):  # type: ignore[misc]
     """What both kinds of number boxes share, before the widget's class."""
+
+    if TYPE_CHECKING:  # of the widget's class
+        value: Callable[[], Any]
+        minimum: Callable[[], Any]
+        maximum: Callable[[], Any]
+        prefix: Callable[[], str]
+        suffix: Callable[[], str]
 
     def understood(self, text: str) -> float | None:
         """The value that a text of the field means, within its range; None: none."""
