@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import soundfile
 from numpy.typing import NDArray
 
+from app.audio.sound_file import UnreadableSound, open_sound
 from engine.plain_text import one_line
 
 RATES_HZ = (8_000, 384_000)
@@ -36,17 +36,13 @@ class NoteFile:
 
 
 def read_note(path: Path) -> NoteFile:
-    """The sound of a file: WAV, FLAC, AIFF and more, 8 bits to floating point, any number of channels up to 8.
+    """The sound of a file: WAV, FLAC, AIFF or Ogg, 8 bits to floating point, any number of channels up to 8.
 
     Raises:
         NoteFileError: it cannot be read, or is too long, too large or empty.
     """
     try:
-        if not path.is_file():  # opening a pipe would block
-            raise NoteFileError(f"{path}: no file; check the name")
-        if path.stat().st_size > LARGEST_BYTES:
-            raise NoteFileError(f"{path}: larger than {LARGEST_BYTES // 2**20} MiB; cut out one note")
-        with soundfile.SoundFile(path) as file:
+        with open_sound(path, LARGEST_BYTES) as file:
             low, high = RATES_HZ
             if not low <= file.samplerate <= high:
                 raise NoteFileError(
@@ -57,13 +53,14 @@ def read_note(path: Path) -> NoteFile:
             seconds = file.frames / file.samplerate
             if seconds > LONGEST_S:
                 raise NoteFileError(f"{path}: lasts {seconds:.0f} s; cut out one note, at most {LONGEST_S:.0f} s")
-            samples = file.read(dtype="float64", always_2d=True)
+            samples = file.read(file.frames, "float64", always_2d=True)
             rate_hz = file.samplerate
         if len(samples) == 0:
             raise NoteFileError(f"{path}: holds no samples; export it again")
         with path.open("rb") as data:
             digest = hashlib.file_digest(data, "sha256").hexdigest()
-    except (OSError, soundfile.SoundFileError) as error:
-        words = error.strerror if isinstance(error, OSError) else str(error).rpartition(":")[2].strip(" .")
-        raise NoteFileError(f"{path}: no sound file that can be read ({words}); give a WAV or FLAC") from error
+    except UnreadableSound as error:
+        raise NoteFileError(f"{path}: no sound file that can be read ({error}); give a WAV or FLAC") from error
+    except OSError as error:
+        raise NoteFileError(f"{path}: cannot be read ({error.strerror}); check the name") from error
     return NoteFile(path, samples, rate_hz, digest)

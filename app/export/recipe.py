@@ -8,9 +8,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
-import soundfile
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
+from app.audio.sound_file import UnreadableSound, open_sound
 from app.export.sound import LONGEST_S, SoundRequest, Through
 from app.export.struck import StruckKey
 from app.export.wav import RATE_RANGE_HZ, WavSettings
@@ -182,14 +182,11 @@ def read_origin(path: Path) -> Recipe | InstrumentSound:
         RecipeError: the file is missing or no sound file, or what it carries is damaged or of a newer version.
     """
     try:
-        if path.exists() and not path.is_file():  # reading a pipe would block
-            raise RecipeError(f"{path}: not an ordinary file; give a WAV that was exported")
-        with soundfile.SoundFile(path) as file:
+        with open_sound(path) as file:
             text = file.comment
-    except (OSError, soundfile.LibsndfileError) as error:
-        words = error.strerror if isinstance(error, OSError) else error.error_string.strip(" .")
+    except UnreadableSound as error:
         raise RecipeError(
-            f"{path}: no sound file that can be read ({words}); give a WAV that was exported"
+            f"{path}: no sound file that can be read ({error}); give a WAV that was exported"
         ) from error
     if not text.lstrip().startswith("{"):
         raise NoRecipe(

@@ -1,30 +1,25 @@
-"""Which pitch each key has: twelve equal steps, or a Scala scale and keyboard mapping, read by `tuning_library`.
-
-Source: the formats .scl and .kbm of Scala (Manuel Op de Coul), as Surge's tuning library understands them: every key
-is retuned, whichever first and last one a mapping names. It is loaded only where there is a scale or a mapping.
-"""
+"""Which pitch each key has: twelve equal steps, or a Scala scale and keyboard mapping."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Self
 
 from pydantic import model_validator
 
-from app.patches.fields import ScalaText, Value, explained, parameter
-from engine.bounds import brief
+from app.patches.fields import HIGHEST_KEY, ScalaText, Value, explained, parameter
+from app.patches.scala import Keymap, equal_steps, parse_keymap, parse_scale
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
 
 if TYPE_CHECKING:
     import numpy as np
 
-A4_KEY = 69
+A4_KEY, MIDDLE_KEY = 69, 60
 SCALA_FILES = (".scl", ".kbm")
 LARGEST_FILE_BYTES = 2**16
-MOST_NOTES = 1_000  # of a scale
-LARGEST_MAPPED = 20_000.0  # of any number in a keyboard mapping: the library loops up to it
-PITCHES_HZ = (1e-60, 1e60)  # of any key, so that their squares are numbers; what no string plays is refused there
+PITCHES_HZ = (1e-60, 1e60)  # of any key, so that their squares are numbers; farther ones are set to an end
 NOTES = (-128, 255)  # all keys, with any transposition and bend
 
 
@@ -43,15 +38,26 @@ class TuningChoice(Value):
     keymap: ScalaText = ""
     transpose: int = parameter("tuning.transpose")
 
+    @property
+    def has_reference(self) -> bool:
+        """Whether a mapping gives all keys their pitch, so that `a4_hz` changes nothing."""
+        if not self.keymap.strip():
+            return False
+        mapping = parse_keymap(self.keymap)
+        return (mapping.first, mapping.last) == (0, HIGHEST_KEY)
+
     @model_validator(mode="after")
     def _gives_pitches(self) -> Self:
-        if self.scale or self.keymap:  # brings a library that few patches need
-            Tuning(self)
+        Tuning(self)
         return self
 
 
 class Tuning:
-    """The pitch of each key."""
+    """The pitch of each key.
+
+    A mapping names the keys that it retunes. Others keep twelve equal steps, with key 69 at `a4_hz`. Beyond the
+    keyboard, where only transposition and bends reach, pitches continue as at its ends.
+    """
 
     def __init__(self, choice: TuningChoice) -> None:
         """Raises ValueError: the scale or the mapping is damaged, or gives no pitch; the message names the field."""
@@ -96,7 +102,8 @@ def read_scala(path: Path) -> str:
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
-        text = raw.decode("latin-1")  # as Scala itself writes
+        text = raw.decode("cp1252", "replace")  # as Scala and other programs of Windows write
+    text = "".join(" " if c.isspace() and c not in "\r\n\t" else c for c in text.rstrip("\x1a"))  # DOS's end of file
     if not text.strip():
         raise ValueError(one_line(f"{path}: is empty; give a .scl or .kbm file"))
     try:
@@ -108,64 +115,28 @@ def read_scala(path: Path) -> str:
 
 def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
     import numpy as np
-    import tuning_library
 
-    # only comments and descriptions may hold other than ASCII, and they have no effect
-    scale, keymap = (text.encode("ascii", "replace").decode() for text in (choice.scale, choice.keymap))
-    _check_count(scale)
-    field = "scale"
+    remedy = "give the text of a Scala file, or none"
+    scale, mapping = equal_steps(), Keymap(0, HIGHEST_KEY, MIDDLE_KEY, A4_KEY, choice.a4_hz, 0, ())
     try:
-        if scale.strip():
-            tones = tuning_library.parse_scl_data(scale)
-            if tones.count > MOST_NOTES:
-                raise ValueError(f"has {tones.count} notes, at most {MOST_NOTES} may be given")
+        field = "scale"
+        if choice.scale.strip():
+            scale = parse_scale(choice.scale)
+        field = "keymap"
+        if choice.keymap.strip():
+            mapping = parse_keymap(choice.keymap)
+        reference = mapping.degree(mapping.reference, scale)
+        if reference is None:
+            raise ValueError(f"leaves out key {mapping.reference}, whose frequency it gives; map it, or name another")
+    except ValueError as error:
+        raise ValueError(f"{field}: {one_line(str(error), 200)}; {remedy}") from error
+    base = math.log2(mapping.reference_hz) - scale.octaves_of(reference)
+    pitches: dict[int, float] = {}
+    for note in range(NOTES[0], NOTES[1] + 1):
+        if mapping.first <= min(max(note, 0), HIGHEST_KEY) <= mapping.last:
+            degree = mapping.degree(note, scale)
+            if degree is not None:
+                pitches[note] = base + scale.octaves_of(degree)
         else:
-            tones = tuning_library.even_temperament_12_note_scale()
-        if keymap.strip():
-            field = "keymap"
-            _check_numbers(keymap)
-            mapping = tuning_library.parse_kbm_data(keymap)
-        else:
-            mapping = tuning_library.tune_A69_to(choice.a4_hz)
-        tuned = tuning_library.Tuning(tones, mapping)
-    except (RuntimeError, ValueError, OverflowError, MemoryError) as error:
-        remedy = "give the text of a Scala file, or none"
-        raise ValueError(f"{field}: {one_line(str(error), 200).rstrip('.')}; {remedy}") from error
-    mapped = np.array([note for note in range(NOTES[0], NOTES[1] + 1) if tuned.is_midi_note_mapped(note)])
-    pitch_hz = np.array([tuned.frequency_for_midi_note(int(note)) for note in mapped])
-    bad = mapped[~((pitch_hz > PITCHES_HZ[0]) & (pitch_hz < PITCHES_HZ[1]))]  # not a number is neither
-    if not len(mapped) or len(bad):
-        reported = f"key {bad[0]}" if len(bad) else "any key"
-        raise ValueError(
-            f"{field}: gives no pitch to {reported}; its intervals or its reference pitch are impossible"
-        )
-    return mapped, np.log2(pitch_hz)
-
-
-def _check_count(scale: str) -> None:
-    """Raises ValueError where a scale lists other than as many notes as it says, with both counts.
-
-    Notes are the lines below the count that begin with a number; a file that has no count is the library's to refuse.
-    """
-    lines = [line.strip() for line in scale.splitlines() if not line.startswith("!")]
-    words = lines[1].split() if len(lines) > 1 else []
-    said = words[0].lstrip("0") if words else ""
-    if not said.isdecimal():
-        return
-    listed = sum(line.startswith(tuple("+-.0123456789")) for line in lines[2:])
-    if said != str(listed):
-        raise ValueError(f"scale: says {said[:20]} notes and lists {listed}; correct its count or its list of notes")
-
-
-def _check_numbers(keymap: str) -> None:
-    """Raises ValueError where a number of a keyboard mapping would keep the library in a loop."""
-    for line in keymap.splitlines():
-        words = line.split()
-        if not words or words[0].startswith("!") or words[0] == "x":
-            continue
-        try:
-            fits = 0 <= float(words[0]) <= LARGEST_MAPPED
-        except ValueError:
-            fits = False
-        if not fits:
-            raise ValueError(f"{brief(words[0])} is no number of 0 … {LARGEST_MAPPED:g}")
+            pitches[note] = math.log2(choice.a4_hz) + (note - A4_KEY) / 12
+    return np.array(list(pitches)), np.clip(list(pitches.values()), *np.log2(PITCHES_HZ))

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Literal
 
+from app.shared.typed_number import typed_number
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from engine.bounds import AMP_DRIVE_DB, AMP_TONE_DB, BODY_SIZE, ROOM_T60_S
 from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
@@ -125,6 +126,25 @@ class Parameter:
         if self.words:
             return self.words[round(self.clamped(value) - self.limits[0])]
         return self.taper.text.format(value)
+
+    def typed(self, text: str) -> float | None:
+        """The value that a typed text means, in or out of the range; None: it means none."""
+        if text.strip().casefold() in self.words:
+            return self.limits[0] + self.words.index(text.strip().casefold())
+        number = typed_number(text, self.typed_unit, self.prefix)
+        if number is None or (self.whole and not number.is_integer()):
+            return None
+        return number / 100 if self.typed_unit == "%" else number
+
+    @property
+    def typed_unit(self) -> str:
+        """The unit of a typed number: as `unit`, and "%" where a share is shown so."""
+        return "%" if "%}" in self.taper.text else self.unit
+
+    @property
+    def prefix(self) -> str:
+        """As `shown` begins: "×", or ""."""
+        return self.taper.text.partition("{")[0].strip()
 
     @property
     def unit(self) -> str:

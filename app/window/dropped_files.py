@@ -6,10 +6,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import soundfile
-
 from app.audio.impulse_file import ImpulseError, cut_words
 from app.audio.note_file import NOTE_LENGTHS_S
+from app.audio.sound_file import UnreadableSound, open_sound
 from app.export.recipe import NoRecipe, Recipe, RecipeError, changed_notices, preset_of, read_recipe
 from app.instrument.bodies import ENDINGS, install_body
 from app.patches.instrument import SingleString
@@ -54,8 +53,9 @@ def receive(file: Path, library: Library) -> Dropped:
 def _other_sound(file: Path) -> Dropped:
     """A sound as long as a note may be a string; any other is a body."""
     try:
-        seconds = soundfile.info(file).duration
-    except (OSError, soundfile.SoundFileError):
+        with open_sound(file) as sound:
+            seconds = sound.frames / sound.samplerate
+    except UnreadableSound:
         seconds = 0.0
     shortest_s, longest_s = NOTE_LENGTHS_S
     return Dropped(sound=True) if shortest_s <= seconds <= longest_s else receive_body(file)

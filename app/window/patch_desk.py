@@ -331,21 +331,18 @@ class PatchDesk(QObject):
         self._song.load(file.name, song.events)
 
     def _tune(self, file: Path) -> None:
-        """Tunes the patch by a Scala file. Where scale and mapping do not fit each other, the new one stays."""
+        """Tunes the patch by a Scala file: a mapping joins the scale that it has, and a scale its mapping."""
         patch, text = self.patch, read_scala(file)
         if patch is None:
             self.reported.emit(f"{file.name} tunes an instrument, and none is chosen; choose one first.")
             return
-        field, other = ("keymap", "scale") if file.suffix.lower() == ".kbm" else ("scale", "keymap")
-        tuned, left_out = {**dict(patch.tuning), field: text}, ""
-        try:
-            tuning = TuningChoice.model_validate(tuned)
-        except ValueError:  # both are well by themselves
-            tuning = TuningChoice.model_validate({**tuned, other: ""})
-            kind = "scale" if other == "scale" else "keyboard mapping"
-            left_out = f"; the {kind} that it had does not fit and was removed"
+        field, other, kind = "scale", patch.tuning.keymap, "keyboard mapping"
+        if file.suffix.lower() == ".kbm":
+            field, other, kind = "keymap", patch.tuning.scale, "scale"
+        tuning = TuningChoice.model_validate({**dict(patch.tuning), field: text})
         self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
-        self.informed.emit(f"{file.name} tunes {patch.name}{left_out}.")
+        joined = f", with the {kind} that it had" if other else ""
+        self.informed.emit(f"{file.name} tunes {patch.name}{joined}.")
 
     def remove_scala(self) -> None:
         """Tunes the patch in twelve equal steps again."""

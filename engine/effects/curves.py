@@ -28,7 +28,7 @@ def curves_of(body: Body) -> NDArray[np.float64]:
     edges_hz = of.BODY_LOWEST_HZ * 2 ** ((np.arange(of.BODY_POINTS + 1) - 0.5) / of.BODY_STEPS)
     found, strings_alone = np.zeros(of.BODY_SLOTS), np.ones((1, 1))
     found[of.BODY_CROSS] = noise_powers((strings_alone, response), RATE_HZ)[0, 1]
-    found[of.BODY_STEP] = np.abs(np.cumsum(response[:, 0])).max()
+    found[of.BODY_STEP] = np.abs(np.cumsum(response, axis=0)).max()
     for row, values in enumerate(rows):
         areas = np.concatenate([[0.0], np.cumsum((values[1:] + values[:-1]) / 2)]) * hz[1]
         first = of.BODY_HEADER + row * of.BODY_POINTS

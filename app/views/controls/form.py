@@ -7,16 +7,15 @@ from pathlib import Path
 from PySide6.QtCore import QStandardPaths, Qt, Signal
 from PySide6.QtWidgets import (
     QCheckBox,
-    QDoubleSpinBox,
     QFileDialog,
     QHBoxLayout,
     QLabel,
     QLineEdit,
-    QSpinBox,
     QWidget,
 )
 
 from app.views import theme
+from app.views.controls.number_box import CountBox, NumberBox, prepared
 from app.views.controls.parts import filled, tool_button
 from app.views.controls.plain import Label
 
@@ -64,23 +63,17 @@ def spin_box(
     decimals: int = 0,
     step: float = 1,
     prefix: str = "",
-) -> QDoubleSpinBox:
+) -> NumberBox:
     low, high = limits
-    spin = QDoubleSpinBox(minimum=low, maximum=high, singleStep=step, suffix=suffix, prefix=prefix, decimals=decimals)
-    spin.setAccessibleName(name)
-    spin.setToolTip(tip)
-    spin.lineEdit().setTextMargins(6, 0, 0, 0)
-    spin.setMinimumWidth(84)
+    spin = NumberBox(minimum=low, maximum=high, singleStep=step, suffix=suffix, prefix=prefix, decimals=decimals)
+    prepared(spin, name, tip, 84)
     spin.setValue(value)
     return spin
 
 
-def count_box(name: str, most: int, value: int, tip: str) -> QSpinBox:
-    spin = QSpinBox(minimum=1, maximum=most, value=value)
-    spin.setAccessibleName(name)
-    spin.setToolTip(tip)
-    spin.setMinimumWidth(56)
-    spin.lineEdit().setTextMargins(6, 0, 0, 0)
+def count_box(name: str, most: int, value: int, tip: str) -> CountBox:
+    spin = CountBox(minimum=1, maximum=most, value=value)
+    prepared(spin, name, tip, 56)
     return spin
 
 

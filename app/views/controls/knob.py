@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
-from PySide6.QtCore import QEvent, QPoint, QPointF, QRectF, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
+from PySide6.QtCore import QEvent, QPointF, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QFocusEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QPen, QWheelEvent
 from PySide6.QtWidgets import QLineEdit, QSizePolicy, QToolTip, QWidget
 
 from app.shared.parameters import Parameter
+from app.shared.typed_number import SIGNS, begins_number, typed_number
 from app.views import theme
+from app.views.controls.number_box import refusal, say_above
 from app.views.controls.parts import ENTER_KEYS, keeps_keys
 from app.views.controls.plain import plain_tip
 
@@ -19,22 +21,48 @@ HEIGHT, LOW_HEIGHT = 82, 60
 DRAG_PIXELS = 180  # for the whole range
 FINE = 0.1  # with Shift
 COARSE = 10  # of Page up and Page down
-TIP_ABOVE = 44  # pixels: the value while dragging stands above the knob, out of the way of the hand
 
 
 class _Editor(QLineEdit):
-    """Takes a typed number; Enter and Escape, which are shortcuts of the window, are its own."""
+    """Takes a typed number; Enter and Escape, which are shortcuts of the window, are its own.
+
+    A key that no number with this unit has gives it up, and goes to the window: it plays.
+    """
 
     given_up = Signal()
 
+    def __init__(self, start: str, unit: str, prefix: str, parent: QWidget) -> None:
+        super().__init__(start, parent)
+        self._unit, self._prefix = unit, prefix
+
     def event(self, event: QEvent) -> bool:
+        if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and self._is_alien(event):
+            event.ignore()
+            return True
         return keeps_keys(event, *ENTER_KEYS, Qt.Key.Key_Escape) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
         if event.key() == Qt.Key.Key_Escape:
             self.given_up.emit()
+        elif self._is_alien(event):
+            self.given_up.emit()
+            event.ignore()
         else:
             super().keyPressEvent(event)
+
+    def focusOutEvent(self, event: QFocusEvent) -> None:
+        """Ends typing also where only the first digit was typed, which Qt does not count as an edit."""
+        super().focusOutEvent(event)
+        if event.reason() not in (Qt.FocusReason.ActiveWindowFocusReason, Qt.FocusReason.PopupFocusReason):
+            self.editingFinished.emit()
+
+    def _is_alien(self, event: QKeyEvent) -> bool:
+        """Whether a key is a letter, or the like, that makes no number of the text before the cursor."""
+        held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier)
+        if held or not event.text().isprintable() or event.text() in SIGNS:  # "" is in it
+            return False
+        before = self.text()[: self.selectionStart() if self.hasSelectedText() else self.cursorPosition()]
+        return not begins_number(before + event.text(), self._unit, self._prefix)
 
 
 class Knob(QWidget):
@@ -56,6 +84,7 @@ class Knob(QWidget):
         self._width = WIDTH
         self._low = False
         self._figure = self._why_barred = self._tip = ""
+        self._stays = False
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Fixed)
         self.set_name(parameter.label, parameter.tip)
@@ -151,7 +180,7 @@ class Knob(QWidget):
         self._dragged_share += (self._dragged_at.y() - event.position().y()) / DRAG_PIXELS * fine
         self._dragged_at = event.position()
         self.value_asked.emit(self.parameter.value(self._dragged_share))
-        QToolTip.showText(self._tip_place(), self.accessibleDescription(), self)
+        say_above(self, self.accessibleDescription())
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:
         if self._dragged_at is not None and event.button() == Qt.MouseButton.LeftButton:
@@ -190,47 +219,62 @@ class Knob(QWidget):
             self.value_asked.emit(self.parameter.limits[1])
         elif event.key() == Qt.Key.Key_Delete:
             self.value_asked.emit(self.default)
-        elif event.text() and event.text() in "0123456789.-":
+        elif event.text() and event.text() in SIGNS:
             self._type(event.text())
         else:
             super().keyPressEvent(event)
 
+    def focusInEvent(self, event: QFocusEvent) -> None:
+        """Remembers whether keys brought the focus: then it stays here when a number was typed."""
+        reason = Qt.FocusReason
+        if event.reason() in (reason.TabFocusReason, reason.BacktabFocusReason, reason.ShortcutFocusReason):
+            self._stays = True
+        elif event.reason() == reason.MouseFocusReason:
+            self._stays = False
+        super().focusInEvent(event)
+
     def _type(self, start: str) -> None:
-        editor = _Editor(start, self)
+        unit, prefix = self.parameter.typed_unit, self.parameter.prefix
+        if self._figure:
+            unit, prefix = self.parameter.figure_unit or "", ""
+        editor = _Editor(start, unit, prefix, self)
         editor.setGeometry(2, self.height() - theme.px(24) - 2, self.width() - 4, theme.px(24))
         editor.setAccessibleName(f"{self._name}, typed")
         editor.show()
         editor.setFocus()
         editor.editingFinished.connect(self._take_typed)
-        editor.given_up.connect(self._close_editor)
+        editor.given_up.connect(self._give_up)
         self._editor = editor
 
     def _take_typed(self) -> None:
         if self._editor is None:
             return
-        text = self._editor.text().replace(",", ".")
+        text = self._editor.text()
         self._close_editor()
-        try:
-            value = float(text)
-        except ValueError:
-            return
-        if math.isfinite(value) and self._figure:
+        value = typed_number(text, self.parameter.figure_unit or "") if self._figure else self.parameter.typed(text)
+        if value is None:
+            say_above(self, refusal(text, self._figure or self.text))
+        elif self._figure:
             self.figure_asked.emit(value)
-        elif math.isfinite(value):
+        else:
             taken = self.parameter.clamped(value)
             self.value_asked.emit(taken)
             if taken != value:
                 end = "At most" if value > taken else "At least"
-                QToolTip.showText(self._tip_place(), f"{end} {self.parameter.shown(taken)}", self)
+                say_above(self, f"{end} {self.parameter.shown(taken)}")
 
-    def _tip_place(self) -> QPoint:
-        return self.mapToGlobal(QPoint(0, -TIP_ABOVE))
+    def _give_up(self) -> None:
+        if self._editor is not None:
+            say_above(self, f"{self._figure or self.text} is kept")
+            self._close_editor()
 
     def _close_editor(self) -> None:
+        """Ends typing. The focus returns to playing, or to the knob where keys had brought it there."""
         if self._editor is not None:
             editor, self._editor = self._editor, None
+            if editor.hasFocus():
+                (self if self._stays else self.window()).setFocus()
             editor.deleteLater()
-            self.setFocus()
 
     def paintEvent(self, event: QPaintEvent) -> None:
         painter = QPainter(self)

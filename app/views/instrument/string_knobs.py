@@ -183,6 +183,6 @@ def _why_barred(patch: Patch, field: str) -> str:
         return NO_WIDTH
     if field == "damping.release_t60_s" and patch.damping.let_ring:
         return LETS_RING
-    if field == "tuning.a4_hz" and patch.tuning.keymap.strip():
+    if field == "tuning.a4_hz" and patch.tuning.has_reference:
         return NO_A4
     return ""

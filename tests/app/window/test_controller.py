@@ -175,8 +175,11 @@ def test_the_keyboard_is_an_instrument(qtbot: QtBot, controller: Controller) -> 
     knob = window.transport.knobs["seconds"]
     qtbot.keyClicks(knob, "2")
     assert knob._editor is not None
-    qtbot.keyClicks(knob._editor, "as")  # writes
-    assert (knob._editor.text(), len(plucks)) == ("2as", 5)
+    qtbot.keyClicks(knob._editor, ".5s")  # the unit of the knob, and no pluck
+    assert (knob._editor.text(), len(plucks)) == ("2.5s", 5)
+    qtbot.keyClick(knob._editor, Qt.Key.Key_A)  # no number has it
+    assert knob._editor is None and len(notes(controller)) == 6
+    assert session.choices.seconds != 2.5
     assert 7 < session.choices.amplitude_mm < 8
 
 

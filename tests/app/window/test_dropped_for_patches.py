@@ -68,7 +68,6 @@ def test_a_dropped_scale_tunes_the_patch_and_undo_takes_it_back(patched: Control
 
 
 def test_a_scale_and_its_mapping_together_in_either_order(patched: Controller, tmp_path: Path) -> None:
-    """What fitted the scale before does not stand in the way of the new one."""
     scale, keys = written(tmp_path / "five.scl", FIVE), written(tmp_path / "five.kbm", FIVE_KEYS)
     seven = written(tmp_path / "seven.kbm", SEVEN_KEYS)
     for files in ((scale, keys), (keys, scale), (seven, scale, keys)):
@@ -78,6 +77,20 @@ def test_a_scale_and_its_mapping_together_in_either_order(patched: Controller, t
         assert (patch.tuning.scale, patch.tuning.keymap) == (FIVE, FIVE_KEYS)
         assert cents(patched, 60, 65) == pytest.approx(1200)
         patched.patches.revert()
+
+
+def test_a_mapping_joins_the_scale_that_is_loaded(patched: Controller, tmp_path: Path) -> None:
+    """Its degrees go beyond twelve: alone it would name steps that twelve equal ones have in higher octaves."""
+    scale = written(tmp_path / "31.scl", "31\n31\n" + "".join(f" {1200 * n / 31:.6f}\n" for n in range(1, 32)))
+    degrees = "".join(f"{degree}\n" for degree in (0, 3, 5, 8, 10, 13, 16, 18, 21, 23, 26, 28))
+    keys = written(tmp_path / "31.kbm", f"12\n0\n127\n60\n69\n440\n31\n{degrees}")
+    drop(patched, scale, keys)
+    assert "31.kbm tunes Classical guitar, with the scale that it had" in patched.window.notices.text
+    assert cents(patched, 60, 61) == pytest.approx(3 * 1200 / 31, abs=1e-3)
+    assert cents(patched, 60, 72) == pytest.approx(1200)
+    patched.patches.revert()
+    drop(patched, keys, scale)
+    assert cents(patched, 60, 61) == pytest.approx(3 * 1200 / 31, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", ["empty.scl", "words.scl", "words.kbm", "missing.scl"])

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from engine.effects import Body, Effects
 from engine.effects.curves import RATE_HZ, curves_of
-from engine.effects.impulse import convolved
+from engine.effects.impulse import Impulse, convolved
 from engine.kernels import loudness
 from engine.kernels import playing_layout as of
 
@@ -123,3 +123,11 @@ def test_a_peak_that_is_too_high_is_lowered_to_the_highest() -> None:
     assert loudness.limit(0.9 * highest) == 1.0
     assert 3 * highest * loudness.limit(3 * highest) == pytest.approx(highest)
     assert [loudness.looked_at(28, 88, number) for number in range(loudness.LOOKED_AT)] == [28, 43, 58, 73, 88]
+
+
+def test_a_body_on_one_side_is_levelled_as_its_mirror_image() -> None:
+    samples = np.random.default_rng(0).uniform(-1, 1, (2_000, 1)) * np.geomspace(1, 1e-3, 2_000)[:, None]
+    sides = (np.hstack([samples, 0 * samples]), np.hstack([0 * samples, samples]))
+    left, right = (curves_of(Body(impulse=Impulse(side, 48_000))) for side in sides)
+    np.testing.assert_array_equal(left, right)
+    assert left[of.BODY_STEP] > 0.1

@@ -5,11 +5,12 @@ from __future__ import annotations
 import pytest
 from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QKeyEvent, QMouseEvent, QWheelEvent
-from PySide6.QtWidgets import QApplication, QToolTip
+from PySide6.QtWidgets import QApplication, QPushButton, QToolTip, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.shared.parameters import Parameter, Taper
 from app.views.controls.knob import DRAG_PIXELS, Knob
+from app.views.controls.playing_keys import PlayingKeys
 
 LEFT = Qt.MouseButton.LeftButton
 SHIFT, NONE = Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.NoModifier
@@ -104,7 +105,15 @@ def test_page_keys_are_the_knobs_and_not_the_windows(knob: Knob) -> None:
 
 @pytest.mark.parametrize(
     ("typed", "value", "reported"),
-    [("7,5", 7.5, ""), ("99", 20, "At most 20.00 mm"), ("-1", 0, "At least 0.00 mm"), ("3-", 4.0, "")],
+    [
+        ("7,5", 7.5, ""),
+        ("7.5 mm", 7.5, ""),
+        ("1,000.5e-2", 10.005, ""),
+        ("99", 20, "At most 20.00 mm"),
+        ("-1", 0, "At least 0.00 mm"),
+        ("3-", 4.0, "“3-” is no number here, as 4.00 mm is, which is kept"),
+        ("3 m", 4.0, "“3 m” is no number here, as 4.00 mm is, which is kept"),
+    ],
 )
 def test_a_typed_number_is_taken_within_the_range(
     qtbot: QtBot, knob: Knob, typed: str, value: float, reported: str
@@ -167,3 +176,64 @@ def test_a_barred_knob_says_why(knob: Knob) -> None:
     knob.set_barred("")
     assert knob.isEnabled()
     assert "no width" not in knob.toolTip()
+
+
+def test_a_letter_that_no_number_has_gives_typing_up_and_goes_on(qtbot: QtBot) -> None:
+    """Else keys that play would be caught by a digit that was meant for the velocity."""
+    window, heard = QWidget(), []
+    qtbot.addWidget(window)
+    knob = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")), window)
+    PlayingKeys(window).pressed.connect(lambda press: heard.append(press.letter))
+    window.show()
+    window.activateWindow()
+    qtbot.mouseClick(knob, LEFT, pos=QPoint(30, 40))
+    qtbot.keyClicks(knob, "7")
+    editor = knob._editor
+    assert editor is not None
+    qtbot.keyClicks(editor, " m")
+    assert (knob._editor, heard) == (editor, [])
+    qtbot.keyClick(editor, Qt.Key.Key_A, SHIFT)
+    assert (knob._editor, knob.value) == (None, 4.0)
+    assert "4.00 mm is kept" in QToolTip.text()
+
+
+@pytest.mark.parametrize("end", [Qt.Key.Key_Return, Qt.Key.Key_Escape, Qt.Key.Key_A])
+@pytest.mark.parametrize("reason", [Qt.FocusReason.MouseFocusReason, Qt.FocusReason.TabFocusReason])
+def test_the_focus_returns_to_playing_or_where_keys_had_brought_it(
+    qtbot: QtBot, reason: Qt.FocusReason, end: Qt.Key
+) -> None:
+    window, heard = QWidget(), []
+    qtbot.addWidget(window)
+    knob = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")), window)
+    PlayingKeys(window).pressed.connect(lambda press: heard.append(press.letter))
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    window.setFocus()
+    knob.setFocus(reason)
+    qtbot.keyClicks(knob, "7")
+    assert knob._editor is not None and knob._editor.hasFocus()
+    qtbot.keyClick(knob._editor, end)
+    assert knob._editor is None
+    by_keys = reason == Qt.FocusReason.TabFocusReason
+    assert QApplication.focusWidget() is (knob if by_keys else window)
+    assert heard == (["A"] if end == Qt.Key.Key_A else [])
+    qtbot.keyClicks(QApplication.focusWidget(), "8")
+    assert (knob._editor is not None) == by_keys
+    assert heard[-1:] == ([] if by_keys and end != Qt.Key.Key_A else ["A"] if by_keys else ["8"])
+
+
+def test_another_widget_that_is_clicked_keeps_the_focus(qtbot: QtBot) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    knob = Knob(Parameter("a", "amplitude", (0, 20), 4.0, Taper(0.25, "{:.2f} mm")), window)
+    other = QPushButton("other", window)
+    knob.value_asked.connect(knob.set_value)
+    window.show()
+    window.activateWindow()
+    qtbot.waitUntil(window.isActiveWindow)
+    qtbot.keyClicks(knob, "7")
+    assert knob._editor is not None and knob._editor.hasFocus()
+    other.setFocus(Qt.FocusReason.MouseFocusReason)
+    assert (knob.value, knob._editor) == (7.0, None)
+    assert other.hasFocus()

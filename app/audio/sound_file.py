@@ -1,0 +1,194 @@
+"""The reader of all sound files: WAV, FLAC, AIFF and Ogg, known by their first bytes; libsndfile sees no others.
+
+Of a WAV file libsndfile is given a header of our own, and the samples where its chunks say they are. So files are
+read whose sizes were never written (streams), whose odd chunks lack their padding byte, in any order of chunks.
+Sources: Microsoft, "Multimedia Programming Interface and Data Specifications 1.0"; EBU Tech 3306 (RF64).
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+import soundfile
+
+if TYPE_CHECKING:
+    from _typeshed import WriteableBuffer
+
+KINDS = "WAV, FLAC, AIFF or Ogg"
+_PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
+_MOST_CHUNKS = 10_000
+_KEPT, _LARGEST_TEXT = (b"fmt ", b"fact"), 2**16  # chunks that are kept besides a list of texts; bytes of each
+_LARGEST_DATA = 2**32 - 2**20  # bytes that a header can state
+_UNKNOWN = 2**32 - 2**12  # sizes from here on are those of streams
+_KNOWN = frozenset(
+    b"fmt |data|LIST|fact|bext|JUNK|junk|FLLR|PAD |ds64|id3 |ID3 |cue |smpl|inst|iXML|axml|chna|PEAK|acid".split(b"|")
+)
+
+
+class UnreadableSound(Exception):
+    """A file that is no sound file, or a damaged one. The message is the reason, to be put in brackets."""
+
+
+@contextmanager
+def open_sound(path: Path, largest_bytes: int | None = None) -> Iterator[soundfile.SoundFile]:
+    """The sound in a file, to be read within the context.
+
+    Raises:
+        UnreadableSound: it cannot be opened, is of another kind or larger than `largest_bytes`, or reading it fails.
+    """
+    try:
+        if not path.is_file():  # opening a pipe would block
+            raise UnreadableSound("there is no file of this name")
+        with path.open("rb") as file:
+            size = file.seek(0, io.SEEK_END)
+            if largest_bytes is not None and size > largest_bytes:
+                raise UnreadableSound(f"larger than the {largest_bytes // 2**20} MiB that it may have")
+            with soundfile.SoundFile(_recognised(file, size)) as sound:
+                yield sound
+    except soundfile.SoundFileError as error:
+        raise UnreadableSound(str(error).rpartition(":")[2].strip(" .")) from error
+    except OSError as error:
+        raise UnreadableSound(error.strerror or str(error)) from error
+
+
+class _Spliced(io.RawIOBase):
+    """A file: bytes of our own, then a part of another file."""
+
+    def __init__(self, head: bytes, file: BinaryIO, start: int, length: int) -> None:
+        self._head, self._file, self._start = head, file, start
+        self._length, self._at = len(head) + length, 0
+
+    def seekable(self) -> bool:
+        return True
+
+    def readable(self) -> bool:
+        return True
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._at, io.SEEK_END: self._length}[whence]
+        self._at = max(0, base + offset)
+        return self._at
+
+    def tell(self) -> int:
+        return self._at
+
+    def readinto(self, buffer: WriteableBuffer) -> int:
+        view = memoryview(buffer).cast("B")
+        wanted = min(len(view), max(0, self._length - self._at))
+        own = self._head[self._at : self._at + wanted]
+        view[: len(own)] = own
+        self._file.seek(self._start + max(0, self._at - len(self._head)))
+        rest = self._file.read(wanted - len(own))
+        view[len(own) : len(own) + len(rest)] = rest
+        self._at += len(own) + len(rest)
+        return len(own) + len(rest)
+
+
+def _recognised(file: BinaryIO, end: int) -> _Spliced:
+    start = 0
+    head = _bytes_at(file, 0, 12)
+    if head[:3] == b"ID3" and len(head) >= 10:  # tags that players of MP3 put before any file
+        start = 10 + sum((byte & 127) << shift for byte, shift in zip(head[6:10], (21, 14, 7, 0), strict=True))
+        head = _bytes_at(file, start, 12)
+    kind, form = head[:4], head[8:12]
+    if kind in (b"RIFF", b"RIFX", b"RF64", b"BW64") and form == b"WAVE":
+        return _Spliced(*_wave(file, start, end))
+    if kind in (b"fLaC", b"OggS") or (kind == b"FORM" and form in (b"AIFF", b"AIFC")):
+        return _Spliced(b"", file, start, end - start)
+    raise UnreadableSound(f"it is no {KINDS} file" if end else "it is empty")
+
+
+def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, int]:
+    """A header, the file, and place and length of its samples."""
+    byte_order = ">" if _bytes_at(file, start, 4) == b"RIFX" else "<"
+    found: dict[bytes, bytes] = {}
+    samples, stated = (0, 0), 0  # place and length; the length that ds64 states
+    at = start + 12
+    for _ in range(_MOST_CHUNKS):
+        header = _bytes_at(file, at, 8)
+        if len(header) < 8:
+            break
+        name, size = struct.unpack(byte_order + "4sI", header)
+        at += 8
+        if name == b"data":
+            if size >= _UNKNOWN and stated > 0:
+                size = stated
+            if at + size > end or (size == 0 and not _chunks_follow(file, at, end, byte_order)):
+                size = end - at
+            if samples[1] == 0:
+                samples = at, size
+        elif name == b"ds64" and size >= 16:
+            stated = struct.unpack(byte_order + "Q", _bytes_at(file, at + 8, 8).ljust(8, b"\0"))[0]
+        elif size <= _LARGEST_TEXT and (name in _KEPT or (name == b"LIST" and _bytes_at(file, at, 4) == b"INFO")):
+            found.setdefault(name, _bytes_at(file, at, size))
+        at = _next_chunk(file, at + size, size)
+    else:
+        raise UnreadableSound(f"it has more than {_MOST_CHUNKS} chunks")
+    if b"fmt " not in found or samples[0] == 0:
+        raise UnreadableSound("it has no format" if b"fmt " not in found else "it has no samples")
+    found[b"fmt "], frame_bytes, compressed = _format(found[b"fmt "], byte_order)
+    length = min(samples[1], _LARGEST_DATA) // frame_bytes * frame_bytes
+    chunks = b"".join(
+        struct.pack(byte_order + "4sI", name, len(found[name])) + found[name] + b"\0" * (len(found[name]) % 2)
+        for name in (b"fmt ", b"fact", b"LIST")
+        if name in found and (compressed or name != b"fact")
+    )
+    kind = b"RIFX" if byte_order == ">" else b"RIFF"
+    head = struct.pack(byte_order + "4sI4s", kind, 12 + len(chunks) + length, b"WAVE") + chunks
+    return head + struct.pack(byte_order + "4sI", b"data", length), file, samples[0], length
+
+
+def _format(given: bytes, byte_order: str) -> tuple[bytes, int, bool]:
+    """A format chunk as libsndfile reads it, how many bytes a frame has, and whether it is compressed."""
+    if len(given) < 16:
+        raise UnreadableSound("its format is cut off")
+    kind, channels, rate_hz, _, frame_bytes, bits = struct.unpack(byte_order + "HHIIHH", given[:16])
+    if kind == _EXTENSIBLE and len(given) >= 26:
+        kind = struct.unpack(byte_order + "H", given[24:26])[0]
+    if channels == 0 or rate_hz == 0:
+        raise UnreadableSound(f"its format states {channels} channels at {rate_hz} Hz")
+    if kind not in (_PCM, _FLOAT):  # compressed
+        return given, max(frame_bytes, 1), True
+    sample_bytes = -(-bits // 8)
+    if kind == _PCM and frame_bytes % channels == 0 and sample_bytes <= frame_bytes // channels <= 4:
+        sample_bytes = frame_bytes // channels  # fewer bits lie at the upper end of such a sample
+    if sample_bytes not in ((1, 2, 3, 4) if kind == _PCM else (4, 8)):
+        raise UnreadableSound(f"its samples have {bits} bits")
+    frame_bytes = channels * sample_bytes
+    rest = (kind, channels, rate_hz, rate_hz * frame_bytes % 2**32, frame_bytes % 2**16, 8 * sample_bytes)
+    return struct.pack(byte_order + "HHIIHH", *rest), frame_bytes, False
+
+
+def _next_chunk(file: BinaryIO, after: int, size: int) -> int:
+    """The place of the chunk behind one that ends at `after`; an odd one should have a padding byte, and may not."""
+    places = (after + size % 2, after + 1 - size % 2)
+    names = [_bytes_at(file, place, 4) for place in places]
+    for place, name in zip(places, names, strict=True):
+        if name in _KNOWN:
+            return place
+    return places[1] if _is_name(names[1]) and not _is_name(names[0]) else places[0]
+
+
+def _is_name(name: bytes) -> bool:
+    return len(name) == 4 and all(0x20 <= byte < 0x7F for byte in name)
+
+
+def _chunks_follow(file: BinaryIO, at: int, end: int, byte_order: str) -> bool:
+    """Whether the rest of a file is chunks, so that there are no samples."""
+    for _ in range(_MOST_CHUNKS):
+        header = _bytes_at(file, at, 8)
+        if len(header) < 8 or not _is_name(header[:4]):
+            break
+        size = struct.unpack(byte_order + "I", header[4:])[0]
+        at = _next_chunk(file, at + 8 + size, size)
+    return at in (end, end + 1)  # the last padding byte may be missing
+
+
+def _bytes_at(file: BinaryIO, place: int, count: int) -> bytes:
+    file.seek(place)
+    return file.read(count)

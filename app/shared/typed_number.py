@@ -1,0 +1,62 @@
+"""Numbers as people type them: either decimal sign, digits in groups, the unit that is shown. No locale is read.
+
+One separator is the decimal sign, as in 2.5, 2,5 and 1.000. With separators of two kinds the last is: 1.000,5 and
+1,000.5 are the same. Groups alone are taken where nothing else could be meant: 1.000.000, 10 000.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import unicodedata
+
+_MINUS = str.maketrans(dict.fromkeys("\u2010\u2011\u2012\u2013\u2212", "-") | {"\u2019": "'"})
+_PLAIN = r"[0-9]+(?:[.,][0-9]*)?|[.,][0-9]+"
+_GROUPED = r"[1-9][0-9]{0,2}(?:(?P<group>[ '.,])[0-9]{3})(?:(?P=group)[0-9]{3})*"
+_NUMBER = re.compile(
+    rf"(?P<sign>[+-]?) ?(?:(?P<plain>{_PLAIN})|(?P<grouped>{_GROUPED})(?P<rest>(?!(?P=group))[.,][0-9]*)?)"
+    r"(?P<exponent>[eE] ?[+-]?[0-9]+)?"
+)
+_BEGUN = re.compile(r"[+-]? ?[0-9., ']*(?:[eE] ?[+-]?[0-9]*)? ?")
+SIGNS = "0123456789.,+-\u2212"  # with which a number begins
+
+
+def typed_number(text: str, unit: str = "", prefix: str = "") -> float | None:
+    """The number that a text means; None: it means none, or one of another unit.
+
+    Args:
+        unit: as it is shown behind the number; it may be left out.
+        prefix: the same before it.
+    """
+    text, unit, prefix = _plain(text), _plain(unit), _plain(prefix)
+    if prefix and text.startswith(prefix):
+        text = text[len(prefix) :].strip()
+    if unit and text.casefold().endswith(unit.casefold()):
+        text = text[: -len(unit)].strip()
+    found = _NUMBER.fullmatch(text)
+    if found is None:
+        return None
+    if found["plain"] is not None:
+        digits = found["plain"].replace(",", ".")
+    else:
+        digits = found["grouped"].replace(found["group"], "") + (found["rest"] or "").replace(",", ".")
+    number = float(found["sign"] + digits + (found["exponent"] or "").replace(" ", ""))
+    return number if math.isfinite(number) else None
+
+
+def begins_number(text: str, unit: str = "", prefix: str = "") -> bool:
+    """Whether more characters could make a number of a text, or it is one."""
+    text, unit, prefix = _plain(text), _plain(unit).casefold(), _plain(prefix)
+    if prefix.startswith(text):
+        return True
+    text = text.removeprefix(prefix).strip()
+    return any(
+        unit.startswith(text[found:].strip().casefold())
+        for found in range(len(text) + 1)
+        if _BEGUN.fullmatch(text[:found])
+    )
+
+
+def _plain(text: str) -> str:
+    """With one kind of space, minus and apostrophe, and none around it; ³ as 3, µ as μ."""
+    return " ".join(unicodedata.normalize("NFKC", text).translate(_MINUS).split())
