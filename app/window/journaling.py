@@ -16,7 +16,7 @@ WRITE_EVERY_S = 0.25
 
 
 class Journaling(QObject):
-    """Methods belong to the window's thread. Where the disk fails, the recording goes on in memory alone.
+    """Methods belong to the window's thread. Where the disk fails, the recording continues in memory alone.
 
     Args:
         recorder: whose events are written.

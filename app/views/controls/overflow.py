@@ -14,7 +14,7 @@ LINE_LETTERS = 64  # of words in the menu
 class Overflow(QToolButton):
     """A row hides what does not fit and hands it over with `hold`.
 
-    A button's entry presses it; what a label says is told.
+    A button's entry presses it; a label's words are shown.
 
     Attributes:
         parts: what is in the menu.

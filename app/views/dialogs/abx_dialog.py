@@ -37,7 +37,7 @@ TRIVIAL = (
     "Choose a pluck within the model's training, or a better preset."
 )
 DEVICE_CHANGED = "The sound device changed during the test."
-GO_ON, STOP = "Go on", "Stop the test"
+CONTINUE, STOP = "Continue", "Stop the test"
 CLOSED = "The window was closed during the test."
 LARGEST_SEED = 2**32
 
@@ -280,7 +280,7 @@ class AbxDialog(QDialog):
         answered, planned = len(self._run.trials), self._run.planned
         kept = "The test would be recorded as incomplete." if answered else "Nothing would be recorded."
         question = f"{answered} of {planned} trials are answered. {kept}"
-        if ask(self, "Stop the test?", question, GO_ON, STOP) == STOP and self.testing:
+        if ask(self, "Stop the test?", question, CONTINUE, STOP) == STOP and self.testing:
             self._end()
 
     def _leave(self) -> None:

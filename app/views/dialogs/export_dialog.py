@@ -36,7 +36,7 @@ KINDS = tuple(PAGES)
 SETTLE_MS = 150  # after the last change: a knob that is turned changes the patch at each step
 MEANWHILE = "You can play on meanwhile."
 REPLACE = "Replace"  # the button's word where a file of this name is there
-GO_ON, CANCEL = "Go on", "Cancel export"
+CONTINUE, CANCEL = "Continue", "Cancel export"
 
 
 class ExportDialog(QDialog):
@@ -240,7 +240,7 @@ class ExportDialog(QDialog):
         question = "An export is under way; only whole files are kept."
         if self.job is None:
             self.accept()
-        elif ask(self, "Cancel the export?", question, GO_ON, CANCEL) == CANCEL:
+        elif ask(self, "Cancel the export?", question, CONTINUE, CANCEL) == CANCEL:
             self._background.stop()
 
     def _close_or_cancel(self) -> None:

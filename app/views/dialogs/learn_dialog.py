@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 EXPECTED = (NoteFileError, PatchError, PresetError, WriteError, ValueError)
 KINDS = (("Guitar", "guitar"), ("Bass", "bass"), ("Harp", "harp"), ("Piano", "piano"))
-GO_ON, STOP = "Go on", "Stop learning"
+CONTINUE, STOP = "Continue", "Stop learning"
 BACK, DISCARD = "Back", "Discard"
 LONGEST_M, THICKEST_MM = 5.0, 10.0
 ON_KEYS = "Keys will play a plucked string with these partials: close to the learned note, not equal to it."
@@ -275,7 +275,7 @@ class LearnDialog(QDialog):
         """Whether nothing would be lost, or the user agrees to that."""
         if self._background.busy and self._against is not None:
             question = "The string is being learned. A learning that is stopped continues the next time."
-            return ask(self, "Stop learning?", question, GO_ON, STOP) == STOP
+            return ask(self, "Stop learning?", question, CONTINUE, STOP) == STOP
         if self._learned is not None:
             question = "The learned instrument is not kept yet."
             return ask(self, "Discard the instrument?", question, BACK, DISCARD) == DISCARD
