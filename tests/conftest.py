@@ -71,3 +71,4 @@ def small_preset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def no_presets_of_ones_own(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
     """Tests do not see what lies in the developer's own folder."""
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path_factory.getbasetemp() / "no own presets"))
+    monkeypatch.setenv("LEARNED_STRINGS_RECORDINGS", str(tmp_path_factory.getbasetemp() / "unsaved recordings"))

@@ -28,6 +28,7 @@ _FIXED = {  # functions of controllers that no patch changes; those from 120 on 
     **dict.fromkeys((VALUE, FINE_VALUE, REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER), _PARAMETER),
     **dict.fromkeys(range(SOUND_OFF, 128), "stops or resets what is played"),
 }
+LONGEST_RECORDING = 100_000  # events
 KEYS = 16  # what is played on the computer's keys and on the screen: no channel of MIDI's
 
 
@@ -142,3 +143,16 @@ class TimedEvent:
 
     time_s: float
     event: Event
+
+
+def played_from(recorded: Iterable[TimedEvent], end_s: float) -> list[TimedEvent]:
+    """What was played until `end_s`, with times in s from the first note on; empty where there was no note.
+
+    Keys and pedals that are down are released at its end.
+    """
+    events = sorted((each for each in recorded if each.time_s <= end_s), key=lambda each: each.time_s)
+    events += [TimedEvent(end_s, event) for event in releases_for(each.event for each in events)]
+    first = next((each.time_s for each in events if isinstance(each.event, NoteOn)), None)
+    if first is None:
+        return []
+    return [TimedEvent(max(0.0, each.time_s - first), each.event) for each in events]

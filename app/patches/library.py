@@ -167,6 +167,33 @@ def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:
     return PatchEntry(path, patch)
 
 
+def add_patch(file: Path) -> tuple[PatchEntry, bool]:
+    """The patch of a file as one of the library's, and whether it is new there.
+
+    One that is there already, maybe with a number, stays alone. Another is copied to the user's folder, with a number
+    where a patch of its name is there.
+
+    Raises:
+        PatchError: see `read_patch`.
+        WriteError: the folder or the file cannot be written.
+    """
+    patch, entries = read_patch(file), list_patches()[0]
+    numbered = re.compile(rf"{re.escape(patch.name)}( \d+)?")
+    for entry in entries:
+        same = numbered.fullmatch(entry.patch.name) and entry.patch == patch.model_copy(
+            update={"name": entry.patch.name}
+        )
+        if same or (entry.path.exists() and entry.path.samefile(file)):
+            return entry, False
+    names = {entry.patch.name.casefold() for entry in entries}
+    stems = {path.stem for folder in (SHIPPED, own_patches()) for path in folder.glob(f"*{SUFFIX}")}
+    name = _other_than(names, patch.name)
+    while file_stem(name) in stems:
+        names.add(name.casefold())
+        name = _other_than(names, patch.name)
+    return save_patch(patch.model_copy(update={"name": name})), True
+
+
 def rename_patch(entry: PatchEntry, name: str) -> PatchEntry:
     """The user's own patch under another name; its former file is removed after the new one is whole.
 

@@ -6,9 +6,8 @@ import threading
 import time
 from collections.abc import Callable, Iterable
 
-from app.instrument.events import Event, NoteOn, TimedEvent, releases_for
+from app.instrument.events import LONGEST_RECORDING, Event, TimedEvent, played_from
 
-LONGEST_RECORDING = 100_000  # events
 FULL = (
     f"The recording is full ({LONGEST_RECORDING} notes, releases and movements of wheels and knobs): what is played "
     "from now on is not in it. End it and save it, then record again."
@@ -20,13 +19,17 @@ class EventRecorder:
 
     Args:
         report: is called with a message and its details where a recording is full.
+
+    Attributes:
+        ended_s: how long the latest recording lasted.
     """
 
     def __init__(self, report: Callable[[str, str], None]) -> None:
         self._report = report
         self._lock = threading.Lock()
         self._recorded: list[TimedEvent] | None = None
-        self._began_s = 0.0
+        self._unfetched: list[TimedEvent] = []
+        self._began_s = self.ended_s = 0.0
         self._reported_full = False
 
     @property
@@ -36,7 +39,8 @@ class EventRecorder:
     def begin(self, first: Iterable[Event]) -> None:
         """Records from now on, after the events `first`; an earlier recording is discarded."""
         with self._lock:
-            self._recorded, self._began_s, self._reported_full = [], time.monotonic(), False
+            self._recorded, self._unfetched = [], []
+            self._began_s, self._reported_full = time.monotonic(), False
         for event in first:
             self.take(event)
 
@@ -48,7 +52,9 @@ class EventRecorder:
             full = len(self._recorded) >= LONGEST_RECORDING
             if not full:
                 at_s = time.monotonic() if time_s is None else time_s
-                self._recorded.append(TimedEvent(at_s - self._began_s, event))
+                taken = TimedEvent(at_s - self._began_s, event)
+                self._recorded.append(taken)
+                self._unfetched.append(taken)
             reported, self._reported_full = self._reported_full, self._reported_full or full
         if full and not reported:
             self._report(FULL, "")
@@ -58,23 +64,24 @@ class EventRecorder:
         with self._lock:
             if self._recorded is not None:
                 played_s = time.monotonic() - self._began_s
-                self._recorded = [
-                    each
-                    for each in self._recorded
-                    if each.time_s <= played_s or (event is not None and each.event != event)
-                ]
+                self._recorded, self._unfetched = (
+                    [each for each in part if each.time_s <= played_s or (event is not None and each.event != event)]
+                    for part in (self._recorded, self._unfetched)
+                )
 
     def end(self) -> list[TimedEvent]:
-        """The events, with times in s from the first note on; empty where there was no note.
-
-        Keys and pedals that are down are released at its end.
-        """
+        """The events as `played_from` has them. Those that were not fetched yet can be, up to here."""
         with self._lock:
             recorded, self._recorded = self._recorded or [], None
-            end_s = time.monotonic() - self._began_s
-        events = sorted((each for each in recorded if each.time_s <= end_s), key=lambda each: each.time_s)
-        events += [TimedEvent(end_s, event) for event in releases_for(each.event for each in events)]
-        first = next((each.time_s for each in events if isinstance(each.event, NoteOn)), None)
-        if first is None:
-            return []
-        return [TimedEvent(max(0.0, each.time_s - first), each.event) for each in events]
+            self.ended_s = time.monotonic() - self._began_s
+            self._unfetched = [each for each in self._unfetched if each.time_s <= self.ended_s]
+        return played_from(recorded, self.ended_s)
+
+    def fetch(self) -> list[TimedEvent]:
+        """The events whose time has come since the last call, with times in s from the beginning."""
+        with self._lock:
+            now_s = time.monotonic() - self._began_s
+            fetched = [each for each in self._unfetched if each.time_s <= now_s]
+            if fetched:
+                self._unfetched = [each for each in self._unfetched if each.time_s > now_s]
+        return sorted(fetched, key=lambda each: each.time_s)

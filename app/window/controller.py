@@ -48,6 +48,7 @@ from app.window.audio_control import AudioControl
 from app.window.dropped_files import Dropped, receive, receive_body
 from app.window.exports import Exports, all_modes_words, note_of, note_words
 from app.window.instruments import Instruments
+from app.window.leaving import Leaving
 from app.window.main_window import PLAYED_KEYS, MainWindow
 from app.window.panels import Panel, StringPanel
 from app.window.panels.drum import DrumPanel
@@ -160,7 +161,6 @@ class Controller(QObject):
         )
         self.patches.reported.connect(window.notices.report)
         self.patches.informed.connect(window.notices.inform)
-        window.may_close = self.patches.recordings.may_close
         self.instruments.played.connect(self.patches.show_played)
         window.show_keys(settings.instrument.shown)
         self.patches.outside_changed.connect(window.show_outside)
@@ -178,6 +178,7 @@ class Controller(QObject):
             window,
         )
         self.exports.reported.connect(window.notices.report)
+        self.leaving = Leaving(window, self.patches.recordings, self.exports)
         self.instruments.played.connect(self.exports.refresh)
         window.transport.export_asked.connect(window.action["export"].trigger)
         self._connect_actions()
@@ -391,6 +392,9 @@ class Controller(QObject):
     def _ask_what_it_is(self, file: Path) -> None:
         """String or body? One dialog at a time: a further file takes its place."""
         if self._learning is not None:
+            if not self._learning.may_close():
+                self.window.notices.report(f"{file.name}: open it again once the other recording is done with.")
+                return
             self._learning.done(0)
         self.performance.stop()
         dialog = self._learning = LearnDialog(file, self.sound, self.window)

@@ -6,7 +6,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from PySide6.QtCore import QObject, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, Signal
+from PySide6.QtGui import QKeyEvent
 from PySide6.QtWidgets import QWidget
 
 from app.export.choices import ExportChoices
@@ -26,6 +27,7 @@ from app.views.dialogs.export_pages import PAGES, HeardInstrument, HeardPerforma
 from app.window.recordings import Recordings
 
 PLUCK_FIELDS = {"preset", "string", "position", "amplitude_mm", "shape", "width", "patch"}
+ESCAPE = Qt.Key.Key_Escape
 HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", "heard", "difference_gain_db"}
 
 
@@ -37,6 +39,7 @@ class Exports(QObject):
     """
 
     reported = Signal(str)
+    ended = Signal(bool)  # an export, well or not; or its dialog was closed
 
     def __init__(
         self,
@@ -54,6 +57,7 @@ class Exports(QObject):
         self.dialog: ExportDialog | None = None
         recordings.save_asked.connect(lambda: self.open("performance"))
         recordings.unsaved_changed.connect(self.refresh)
+        window.installEventFilter(self)
 
     @property
     def choices(self) -> tuple[ExportChoices, SampledChoices]:
@@ -70,6 +74,7 @@ class Exports(QObject):
             self.dialog = ExportDialog(*self._choices, self._window)
             self.dialog.finished.connect(self._closed)
             self.dialog.exported.connect(self._exported)
+            self.dialog.ended.connect(self.ended)
         self.dialog.show_subjects(subjects)
         self.dialog.open_at(kind)
 
@@ -82,10 +87,28 @@ class Exports(QObject):
         if self.dialog is not None:
             self.dialog.show_subjects(self._subjects())
 
+    @property
+    def busy(self) -> bool:
+        """Whether an export is under way."""
+        return self.dialog is not None and self.dialog.job is not None
+
     def close(self) -> None:
         """Ends an export that has begun; what is whole is kept. May be called again."""
         if self.dialog is not None:
             self.dialog.accept()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """Escape in the window, which has the keyboard since the export began, closes the dialog with its result."""
+        dialog = self.dialog
+        if dialog is None or dialog.job is not None or not isinstance(event, QKeyEvent) or event.key() != ESCAPE:
+            return False
+        if event.type() == QEvent.Type.ShortcutOverride:
+            event.accept()  # or it would play all modes
+            return True
+        if event.type() == QEvent.Type.KeyPress:
+            dialog.accept()
+            return True
+        return False
 
     def _subjects(self) -> dict[Kind, Any]:
         """By kind, what can be exported now; None: nothing."""
@@ -110,6 +133,7 @@ class Exports(QObject):
         self._choices = self.choices
         self.dialog.deleteLater()
         self.dialog = None
+        self.ended.emit(False)
 
 
 def heard_note(choices: Choices, library: Library, struck: Struck | None = None) -> HeardNote | None:

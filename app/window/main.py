@@ -26,6 +26,7 @@ from app.views.theme import apply_theme
 from app.window.display import check_display
 from app.window.main_window import MainWindow
 from app.window.settings import Settings, load_settings, settings_file
+from app.window.signals import asked_to_end
 
 if TYPE_CHECKING:
     from app.window.controller import Controller
@@ -103,6 +104,7 @@ class _Start(QObject):
         if self._notice:
             self._window.notices.report(self._notice)
         self._alive(self._controller)
+        QTimer.singleShot(0, self._controller.patches.recordings.offer_left)
         self._patience_s = time.monotonic() + PATIENCE_S
         self._follow_up()
 
@@ -181,10 +183,23 @@ def run(
     window.show_face(settings.choices.face)
     window.restore_geometry(settings.window_geometry)
     start = _Start(window, settings, path, notice, alive, files)
-    with crashes_written(), faults_logged(partial(window.notices.faulted.emit, UNEXPECTED)):
+
+    def end() -> None:
+        """Ends the app without a question: what is not saved is offered at the next start."""
+        window.may_close = lambda: True
+        window.close()
+        application.quit()  # also loops of dialogs
+
+    with (
+        crashes_written(),
+        faults_logged(partial(window.notices.faulted.emit, UNEXPECTED)),
+        asked_to_end(end),
+    ):
         watch(window)
         window.show()
         status = application.exec()
+        if window.isVisible():  # it was asked about while it was closed
+            window.close()
         start.wait()
     if start.failure is not None:
         raise start.failure

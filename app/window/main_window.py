@@ -42,6 +42,7 @@ from app.views.controls.deck import Deck
 from app.views.controls.drop_sign import DropSign
 from app.views.controls.focus_ring import FocusRing
 from app.views.controls.notice_bar import NoticeBar
+from app.views.controls.overflow import Overflow
 from app.views.controls.parts import tool_button, words_label
 from app.views.controls.plain import Label, plain_tip
 from app.views.controls.preset_bar import PresetBar
@@ -171,7 +172,8 @@ class MainWindow(QMainWindow):
         tip = "Blind listening test: can you tell A and B apart? (Ctrl+T)"
         self._test_button = test = tool_button("ABX …", "Listening test", tip)
         test.clicked.connect(self.action["abx"].trigger)
-        for widget in (self._keys_button, test, self.growth_sign, self.rate_label, self.notices.bell):
+        self._more = Overflow("the Lab")
+        for widget in (self._keys_button, test, self._more, self.growth_sign, self.rate_label, self.notices.bell):
             head.addWidget(widget)
         head.addWidget(self._audio_button)
         self._facts = QWidget()
@@ -247,7 +249,7 @@ class MainWindow(QMainWindow):
 
     def order_tabs(self) -> None:
         """Sets the order of the Tab key: header, notice, string, views, controls. Call it once all parts exist."""
-        header = (self._menu_button, self.faces, self.presets, self._keys_button, self._test_button)
+        header = (self._menu_button, self.faces, self.presets, self._keys_button, self._test_button, self._more)
         aside = (self.notices.bell, self._audio_button)
         chain: list[QWidget] = []
         views = (self._shown, self.left, self.right)
@@ -330,8 +332,15 @@ class MainWindow(QMainWindow):
 
     def _share_width(self) -> None:
         self._brand.setVisible(self._wide >= (WIDE if self.face == "play" else WIDE_LAB))
-        for button in (self._keys_button, self._test_button):  # the menu has them too
+        for button in (self._keys_button, self._test_button):
             button.setVisible(self._wide >= WIDE and self._shows("test"))
+
+    def _hold_rest(self) -> None:
+        """What of the header and of the preset's facts has no room goes to the overflow menu."""
+        buttons = (self._keys_button, self._test_button) if self._shows("test") and self._wide < WIDE else ()
+        hides_facts = self._shows("facts") and self._high < HIGH
+        facts = (self.presets.card, self.outside_label, self.error_label) if hides_facts else ()
+        self._more.hold(*buttons, *facts)
 
     def _share_height(self) -> None:
         """A low window hides the plots while the keys are shown, a lower one also the preset's facts."""
@@ -340,6 +349,7 @@ class MainWindow(QMainWindow):
         views = self._alive and self._shows("views") and (height >= ALL_HIGH or not self.shows_keys)
         self._decks.setVisible(views)
         self._facts.setVisible(height >= HIGH and self._shows("facts"))
+        self._hold_rest()
         home, place = (self._facts_row, 2) if height >= HIGH else (self._head, 4)
         if home.indexOf(self._solo) < 0:
             shown = not self._solo.isHidden()

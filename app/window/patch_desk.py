@@ -34,6 +34,7 @@ from app.patches.library import (
     SUFFIX,
     PatchEntry,
     PatchError,
+    add_patch,
     list_patches,
     own_patches,
     read_patch,
@@ -312,16 +313,30 @@ class PatchDesk(QObject):
         self._panel.bar.show_comparing(entry is not None)
 
     def take_file(self, file: Path) -> None:
-        """One of TAKEN_FILES that was dropped: a patch is chosen, a MIDI file played, a scale tunes."""
+        """One of TAKEN_FILES that was dropped: a patch is added and chosen, a MIDI file played, a scale tunes."""
         try:
             if file.suffix.lower() in MIDI_FILES:
                 self._play_file(file)
             elif file.suffix.lower() in SCALA_FILES:
                 self._tune(file)
             else:
-                self._session.update(instrument=read_patch(file))
+                self._add(file)
         except (MidiFileError, PatchError, OSError, ValueError) as error:
             self.reported.emit(one_line(str(error)))
+
+    def _add(self, file: Path) -> None:
+        """Adds a patch's file to the library, and chooses it; where it cannot be added, it is only chosen."""
+        try:
+            entry, added = add_patch(file)
+        except WriteError as error:
+            self._session.update(instrument=read_patch(file))
+            self.reported.emit(f"{file.name} can be played, but not added to your library: {one_line(str(error))}")
+            return
+        self.reload()
+        self._session.update(instrument=entry.patch)
+        self.browser.reveal(entry.name)
+        if added:
+            self.informed.emit(f"{file.name} was added to your library as {entry.patch.name}.")
 
     def _play_file(self, file: Path) -> None:
         song = read_song(file, self.patch)
@@ -507,9 +522,10 @@ class PatchDesk(QObject):
         self.recordings.tick(now_s)
 
     def close(self) -> None:
-        """Ends the playback; may be called again."""
+        """Ends the playback and a recording, which is kept; may be called again."""
         self._note_timer.stop()
         self.stop()
+        self.recordings.close()
 
     def _show_patch(self) -> None:
         patch, entry, panel = self.patch, self.entry, self._panel

@@ -1,4 +1,4 @@
-"""What is played through the patch is recorded; what is not saved yet is kept."""
+"""What is played through the patch is recorded; what is not saved yet is kept, in memory and on disk."""
 
 from __future__ import annotations
 
@@ -6,20 +6,27 @@ import time
 from datetime import datetime
 
 from PySide6.QtCore import QObject, Signal
-from PySide6.QtWidgets import QMessageBox
 
+from app.export.journal import Journal, left_journals, recordings_folder
 from app.export.played import Played
-from app.instrument.events import PatchTurned
+from app.instrument.events import NoteOn, PatchTurned
 from app.playing.keys import Keys
-from app.session.choices import Session
+from app.session.choices import Choices, Session
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
+from app.views.dialogs.question import ask
 from app.views.instrument.patch_bar import PatchBar
+from app.window.journaling import Journaling
+from engine.plain_text import duration, one_line
+
+LONGEST_NAME = 60  # characters of an instrument
+RECOVER, LATER, DISCARD = "Recover", "Later", "Discard"
 
 
 class Recordings(QObject):
     """Lives in the window's thread, as long as the window. The button of `bar` records, ends, saves and discards.
 
-    A recording is kept until it is written or discarded; while one is, no other begins.
+    A recording is kept until it is written or discarded; while one is, no other begins. Its journal on disk is kept
+    as long, also past the end of the process, and `offer_left` finds it.
     """
 
     reported = Signal(str)  # an error, for the user
@@ -31,7 +38,10 @@ class Recordings(QObject):
         super().__init__(parent)
         self._session, self._keys, self._bar = session, keys, bar
         self._began_s, self._began = 0.0, datetime.now().astimezone()
-        self._unsaved: list[Played] = []
+        self._unsaved: dict[Played, Journal | None] = {}  # in their order
+        self._journaling = Journaling(keys.recorder, self)
+        self._journaling.failed.connect(self.reported)
+        session.changed.connect(self._choices_changed)
         bar.record_asked.connect(self.record)
         bar.recording_save_asked.connect(self.save_asked)
         bar.recording_discard_asked.connect(self.discard)
@@ -39,12 +49,19 @@ class Recordings(QObject):
     @property
     def latest(self) -> Played | None:
         """The latest one that is not saved."""
-        return self._unsaved[-1] if self._unsaved else None
+        return next(reversed(self._unsaved), None)
+
+    @property
+    def unsaved(self) -> bool:
+        """Whether anything was played that is not saved, or is being recorded."""
+        return bool(self._unsaved) or self._keys.recorder.recording
 
     def record(self) -> None:
         """Begins to record; or ends it and has it saved, as a recording that is not saved yet."""
         if self._keys.recorder.recording:
-            self._end()
+            self.end()
+            if self._unsaved:
+                self.save_asked.emit()
         elif self._unsaved:
             self.save_asked.emit()
         else:
@@ -52,48 +69,111 @@ class Recordings(QObject):
             if not self._session.choices.plays_patch:
                 self.informed.emit("Keys of an instrument are recorded; plucks of a single string are not.")
             self._began_s, self._began = time.monotonic(), datetime.now().astimezone()
+            self._journaling.begin(self._began)
+            self._choices_changed(frozenset())
 
     def discard(self) -> None:
         """Forgets the latest recording."""
-        if self._unsaved:
-            self.forget(self._unsaved[-1])
+        if (latest := self.latest) is not None:
+            self.forget(latest)
 
     def forget(self, played: Played) -> None:
         """It is written, or not wanted."""
         if played in self._unsaved:
-            self._unsaved.remove(played)
+            journal = self._unsaved.pop(played)
+            if journal is not None:
+                journal.delete()
             self._show_unsaved()
+
+    def forget_all(self) -> None:
+        """None of what is not saved is wanted, nor what is being recorded."""
+        self.end()
+        for played in list(self._unsaved):
+            self.forget(played)
+
+    def close(self) -> None:
+        """Leaves what is not saved to the next start; may be called again."""
+        self.end()
+        for journal in self._unsaved.values():
+            if journal is not None:
+                journal.close()
+
+    def offer_left(self) -> None:
+        """Asks about what an earlier run has left: recordings that it recovers, keeps for later, or discards."""
+        found: dict[Played, Journal] = {}
+        for journal in left_journals(recordings_folder()):
+            try:
+                played = journal.read()
+            except (OSError, ValueError) as error:
+                self.reported.emit(f"{one_line(str(error))}; it cannot be recovered, and stays where it is.")
+                journal.close()
+                continue
+            if played is None:
+                journal.delete()
+            else:
+                found[played] = journal
+        if not found:
+            return
+        lines = "\n".join(_words(played) for played in found)
+        many = len(found) > 1
+        question = (
+            f"{'These recordings were' if many else 'This recording was'} not saved when the app ended.\n\n{lines}"
+        )
+        answer = ask(self._bar, "Recover what was played?", question, LATER, DISCARD, RECOVER)
+        for played, journal in found.items():
+            if answer == RECOVER:
+                self._unsaved[played] = journal
+            elif answer == DISCARD:
+                journal.delete()
+            else:
+                journal.close()
+        if answer == RECOVER:
+            self._show_unsaved()
+            self.save_asked.emit()
 
     def tick(self, now_s: float) -> None:
         """Shows how long it has been recording. `now_s`: of `time.monotonic`."""
         if self._keys.recorder.recording:
             self._bar.show_recording(now_s - self._began_s)
 
-    def may_close(self) -> bool:
-        """Whether the window may be closed; asks where that would lose what was played."""
-        if not self._unsaved and not self._keys.recorder.recording:
-            return True
-        question = "What was played is not saved. Quit without saving the recording?"
-        answer = QMessageBox.question(self._bar, "Recording not saved", question)
-        return answer == QMessageBox.StandardButton.Yes
-
-    def _end(self) -> None:
+    def end(self) -> None:
+        """Ends the recording that is being made, if any; it is kept, and not saved yet."""
+        if not self._keys.recorder.recording:
+            return
         events = self._keys.recorder.end()
+        journal = self._journaling.end()
         self._bar.show_recording(None)
         patches = [each.event.patch for each in events if isinstance(each.event, PatchTurned)]
         patch = patches[0] if patches else self._session.choices.patch
         if not events or patch is None:
+            if journal is not None:
+                journal.delete()
             self.informed.emit("Nothing was played, so nothing was recorded.")
             return
         choices = self._session.choices
-        heard = choices.source_heard
-        source: PlayedSource = "truth" if heard == "truth" else "difference" if heard == DIFFERENCE else "model"
-        self._unsaved.append(Played(patch, tuple(events), source, choices.difference_gain_db, self._began))
+        self._unsaved[Played(patch, tuple(events), *_heard(choices), self._began)] = journal
         self._show_unsaved()
         if choices.solo:
             self.informed.emit(f"The recording has all modes, although mode {choices.solo} is soloed.")
-        self.save_asked.emit()
+
+    def _choices_changed(self, _: frozenset[str]) -> None:
+        self._journaling.hear(*_heard(self._session.choices))
 
     def _show_unsaved(self) -> None:
         self._bar.show_unsaved(len(self._unsaved))
         self.unsaved_changed.emit()
+
+
+def _heard(choices: Choices) -> tuple[PlayedSource, float]:
+    """The source that is heard, and the gain of the difference."""
+    heard = choices.source_heard
+    source: PlayedSource = "truth" if heard == "truth" else "difference" if heard == DIFFERENCE else "model"
+    return source, choices.difference_gain_db
+
+
+def _words(played: Played) -> str:
+    """A recording in a line: when, through what, how long, how many notes."""
+    notes = sum(isinstance(each.event, NoteOn) and each.event.velocity > 0 for each in played.events)
+    when = "" if played.recorded is None else f"{played.recorded.astimezone():%Y-%m-%d %H:%M}, "
+    name = one_line(played.patch.name, LONGEST_NAME)
+    return f"{when}{name}: {duration(played.events[-1].time_s)}, {notes} note{'' if notes == 1 else 's'}"

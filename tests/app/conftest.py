@@ -111,21 +111,29 @@ def preset_folder(small_preset: Path, tmp_path: Path, monkeypatch: pytest.Monkey
     return folder
 
 
+def _closed_without_a_question(window: QWidget) -> None:
+    """Nobody answers one about what a test leaves."""
+    window.may_close = lambda: True  # type: ignore[attr-defined]
+
+
 @pytest.fixture
-def controller(qtbot: QtBot, preset_folder: Path, tmp_path: Path) -> Iterator[object]:
+def controller(
+    qtbot: QtBot, preset_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Iterator[object]:
     from app.session.choices import Choices
     from app.window.controller import Controller
     from app.window.main_window import MainWindow
     from app.window.settings import InstrumentChoice, Settings
 
+    monkeypatch.setenv("LEARNED_STRINGS_RECORDINGS", str(tmp_path / "unsaved recordings"))
     window = MainWindow()
-    qtbot.addWidget(window)
+    qtbot.addWidget(window, before_close_func=_closed_without_a_question)
     settings = Settings(choices=Choices(seconds=0.5, face="lab"), instrument=InstrumentChoice(shown=True))
     made = Controller(window, settings, tmp_path / "settings.json", make_sound)
     with qtbot.waitExposed(window):
         window.show()
     yield made
-    window.may_close = lambda: True  # nobody answers a question about what a test that has failed leaves
+    _closed_without_a_question(window)
     window.close()
     left = [t.name for t in threading.enumerate() if t.name in OWN_THREADS]
     assert left == []

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QDialog, QFileDialog, QMessageBox, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QDialog, QFileDialog, QStackedWidget, QVBoxLayout, QWidget
 
 from app.analysis.abx.record import AbxRecord, default_folder, save_record
 from app.analysis.abx.sound import Stimuli, make_stimuli
@@ -23,6 +23,7 @@ from app.audio.sound import Sound as SoundOutput
 from app.audio.sound import SoundStatus
 from app.playing.pair import Pair
 from app.views.dialogs.abx_pages import ResultPage, SetupPage, TrialPage
+from app.views.dialogs.question import ask
 from engine.result_file import WriteError
 
 Render = Callable[[int], "Future[Mapping[str, NDArray[np.float32]]]"]
@@ -36,6 +37,7 @@ TRIVIAL = (
     "Choose a pluck within the model's training, or a better preset."
 )
 DEVICE_CHANGED = "The sound device changed during the test."
+CONTINUE, STOP = "Continue", "Stop the test"
 CLOSED = "The window was closed during the test."
 LARGEST_SEED = 2**32
 
@@ -278,7 +280,7 @@ class AbxDialog(QDialog):
         answered, planned = len(self._run.trials), self._run.planned
         kept = "The test would be recorded as incomplete." if answered else "Nothing would be recorded."
         question = f"{answered} of {planned} trials are answered. {kept}"
-        if QMessageBox.question(self, "Stop the test?", question) == QMessageBox.StandardButton.Yes and self.testing:
+        if ask(self, "Stop the test?", question, CONTINUE, STOP) == STOP and self.testing:
             self._end()
 
     def _leave(self) -> None:

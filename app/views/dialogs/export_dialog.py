@@ -17,7 +17,7 @@ from app.export.choices import ExportChoices
 from app.export.job import EXPECTED, ExportJob
 from app.export.sampled.choices import SampledChoices
 from app.views.background import Background
-from app.views.controls.parts import filled, label
+from app.views.controls.parts import filled, label, push_button
 from app.views.dialogs.export_pages import (
     PAGES,
     ExportPage,
@@ -28,12 +28,15 @@ from app.views.dialogs.export_pages import (
     SamplerPage,
     WavForm,
 )
+from app.views.dialogs.question import ask
 from engine.plain_text import duration
 from engine.result_file import WriteError
 
 KINDS = tuple(PAGES)
 SETTLE_MS = 150  # after the last change: a knob that is turned changes the patch at each step
 MEANWHILE = "You can play on meanwhile."
+REPLACE = "Replace"  # the button's word where a file of this name is there
+CONTINUE, CANCEL = "Continue", "Cancel export"
 
 
 class ExportDialog(QDialog):
@@ -45,6 +48,7 @@ class ExportDialog(QDialog):
     """
 
     exported = Signal(object)  # the job that has ended well
+    ended = Signal(bool)  # a job, well or not; the dialog shows its result by then
 
     def __init__(self, export: ExportChoices, sampled: SampledChoices, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -54,7 +58,7 @@ class ExportDialog(QDialog):
         self._background = Background("export", self, expected=EXPECTED)
         self._background.progressed.connect(self._show_progress)
         self._background.finished.connect(self._finished)
-        self._background.failed.connect(lambda message, details: self._end(message, failed=True))
+        self._background.failed.connect(self._failed)
         self._background.cancelled.connect(self._cancelled)
         self._job: ExportJob | None = None  # the latest
         self._subjects: Mapping[Kind, Any] = {}
@@ -82,16 +86,14 @@ class ExportDialog(QDialog):
         self.state.setAlignment(Qt.AlignmentFlag.AlignTop)
         self.bar = QProgressBar(maximum=1000)
         self.bar.setAccessibleName("Progress")
-        self.show_folder = QPushButton("Show in folder")
-        self.show_folder.setToolTip("Open the folder of what was saved")
+        self.show_folder = push_button("Show in folder", "Open the folder of what was saved")
         self.show_folder.clicked.connect(self._open_folder)
-        self.save = QPushButton("Export", default=True)
+        self.save = QPushButton("Export")
         self.save.setObjectName("primary")
         self.save.setToolTip("Render and save")
         self.save.clicked.connect(self._start)
-        self.close_button = QPushButton("Close")
-        self.close_button.setToolTip("Close, or cancel the rendering (Escape)")
-        self.close_button.clicked.connect(self.reject)
+        self.close_button = push_button("Close", "Close (Escape)")
+        self.close_button.clicked.connect(self._close_or_cancel)
         buttons = filled(QHBoxLayout(), self.show_folder, None, self.close_button, self.save)
         self._choosers = (self.tabs, *self.pages.values(), self.wav)
         filled(QVBoxLayout(self), *self._choosers, None, self.bar, self.state, buttons).setSpacing(12)
@@ -157,13 +159,16 @@ class ExportDialog(QDialog):
             return
         self.save.setText(text)
         self.save.setEnabled(True)
+        for set_for_enter in (self.save.setDefault, self.save.setAutoDefault):
+            set_for_enter(text != REPLACE)  # Enter replaces no file
         self._tell(words)
 
     # Work
 
     def _start(self) -> None:
+        words = self.save.text()
         self._update()  # of choices that have not settled
-        if not self.save.isEnabled():
+        if not self.save.isEnabled() or (self.save.text() == REPLACE != words):
             return
         self._job = job = self.page.job()
         self._started_s = time.monotonic()
@@ -191,6 +196,11 @@ class ExportDialog(QDialog):
         self.exported.emit(self._job)
         self._end(words)
         self.show_folder.show()
+        self.ended.emit(True)
+
+    def _failed(self, message: str, _details: str) -> None:
+        self._end(message, failed=True)
+        self.ended.emit(False)
 
     def _cancelled(self) -> None:
         assert self._job is not None
@@ -198,6 +208,7 @@ class ExportDialog(QDialog):
             self._end(f"Cancelled; {self._job.cancelled()}")
         except WriteError as error:
             self._end(str(error), failed=True)
+        self.ended.emit(False)
 
     def _end(self, text: str, failed: bool = False) -> None:
         """The job is over, with this result."""
@@ -225,7 +236,15 @@ class ExportDialog(QDialog):
         super().done(result)
 
     def reject(self) -> None:
-        if self.job is not None:
-            self._background.stop()
-        else:
+        """Escape, or the window's cross: asks before it ends an export."""
+        question = "An export is under way; only whole files are kept."
+        if self.job is None:
             self.accept()
+        elif ask(self, "Cancel the export?", question, CONTINUE, CANCEL) == CANCEL:
+            self._background.stop()
+
+    def _close_or_cancel(self) -> None:
+        if self.job is None:
+            self.accept()
+        else:
+            self._background.stop()

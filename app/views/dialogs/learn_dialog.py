@@ -31,6 +31,7 @@ from app.shared.worker import Job
 from app.views.background import Background
 from app.views.controls.form import form_label, row_of, spin_box
 from app.views.controls.parts import combo_box, filled, label, read_only_text
+from app.views.dialogs.question import ask
 from engine.plain_text import duration
 from engine.presets import PresetError
 from engine.result_file import WriteError
@@ -40,6 +41,8 @@ if TYPE_CHECKING:
 
 EXPECTED = (NoteFileError, PatchError, PresetError, WriteError, ValueError)
 KINDS = (("Guitar", "guitar"), ("Bass", "bass"), ("Harp", "harp"), ("Piano", "piano"))
+CONTINUE, STOP = "Continue", "Stop learning"
+BACK, DISCARD = "Back", "Discard"
 LONGEST_M, THICKEST_MM = 5.0, 10.0
 ON_KEYS = "Keys will play a plucked string with these partials: close to the learned note, not equal to it."
 HEARD: tuple[tuple[Literal["recording", "learned"], str], ...] = (
@@ -268,11 +271,21 @@ class LearnDialog(QDialog):
         self._pages.setEnabled(True)
         self.state.setText(words)
 
+    def may_close(self) -> bool:
+        """Whether nothing would be lost, or the user agrees to that."""
+        if self._background.busy and self._against is not None:
+            question = "The string is being learned. A learning that is stopped continues the next time."
+            return ask(self, "Stop learning?", question, CONTINUE, STOP) == STOP
+        if self._learned is not None:
+            question = "The learned instrument is not kept yet."
+            return ask(self, "Discard the instrument?", question, BACK, DISCARD) == DISCARD
+        return True
+
     def reject(self) -> None:
-        """Escape or Cancel: ends the learning under way, otherwise closes."""
+        """Escape or Cancel: ends the learning under way, which can be continued; otherwise closes."""
         if self._background.busy and self._against is not None:
             self._background.stop()
-        else:
+        elif self.may_close():
             super().reject()
 
     def done(self, result: int) -> None:

@@ -155,6 +155,7 @@ class InstrumentPanel(QFrame):
         self._stack.installEventFilter(self)
         self._hint.installEventFilter(self)
         self.show_keys_play("pitch", possible=True)
+        theme.changes.theme_changed.connect(self._fit)  # with the size of text
 
     def _build_plays(self) -> None:
         """What the computer's keys play: a menu of the two, under what it is."""
@@ -229,6 +230,9 @@ class InstrumentPanel(QFrame):
 
     def resizeEvent(self, event: QResizeEvent) -> None:
         super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
         self.bar.set_compact(self.width() < theme.px(COMPACT_BELOW_PX), self.width() < theme.px(TIGHT))
 
     def _share_room(self) -> None:

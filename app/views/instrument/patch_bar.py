@@ -13,6 +13,7 @@ from PySide6.QtWidgets import (
     QComboBox,
     QFrame,
     QHBoxLayout,
+    QLabel,
     QMenu,
     QSizePolicy,
     QToolButton,
@@ -27,6 +28,7 @@ from app.shared.parameters import MACROS, OF_PATCHES
 from app.views.controls.filter_button import FilterButton
 from app.views.controls.knob import Knob
 from app.views.controls.name_button import NameButton
+from app.views.controls.overflow import Overflow
 from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
 from app.views.controls.plain import Label, plain_tip
 from engine.plain_text import one_line
@@ -122,7 +124,9 @@ class PatchBar(QFrame):
         )
         self.rename = tool_button("Rename …", "Rename the instrument", "Give your instrument another name")
         self.revert = tool_button(
-            "Revert", "Revert the instrument", "Go back to the instrument as it was saved; your changes are lost"
+            "Revert",
+            "Revert the instrument",
+            "Go back to the instrument as it was saved (undo brings your changes back)",
         )
         for button, signal in (
             (self.save, self.save_asked),
@@ -142,7 +146,8 @@ class PatchBar(QFrame):
         for widget in (previous, self.name, following, self.category):
             above.addWidget(widget, 1000 if widget is self.name else 0)
         above.addStretch(1)
-        for button in (self.save, self.rename, self.revert, self.compare):
+        self.more = Overflow("the instrument")
+        for button in (self.save, self.rename, self.revert, self.compare, self.more):
             above.addWidget(button)
         column = QVBoxLayout()
         column.setSpacing(4)
@@ -221,21 +226,28 @@ class PatchBar(QFrame):
     # What is shown
 
     def set_compact(self, compact: bool, tight: bool = False) -> None:
-        """For a window with little room; `tight`: with very little; the browser renames and the menu reverts."""
-        self._tight = tight
-        self.rename.setVisible(not tight)
-        self.revert.setVisible(not tight)
-        self._show_compare()
-        self._make_room()
-        if compact != self._compact:
-            self._compact = compact
-            self._share_width()
+        """For a window with little room; `tight`: with very little."""
+        self._compact, self._tight = compact, tight
+        self._share_width()
 
     def _share_width(self) -> None:
-        self._make_room()
+        """Shows what there is room for; `more` has the rest.
+
+        Where there is very little, a tuning or a sixth macro takes the place of the number of voices.
+        """
         many = len(self._macros) > ROOMY_MACROS
         close = self._compact or many
-        self.category.setVisible(not close and bool(self.category.text()))
+        roomy = self.scala.isHidden() and len(self._macros) < ROOMY_MACROS
+        fits: dict[QToolButton | QLabel, bool] = {
+            self.rename: not self._tight,
+            self.revert: not self._tight,
+            self.compare: not self._tight or self.compare.isChecked(),
+            self.category: not close,
+            self.voices: roomy or not self._tight,
+        }
+        for part, there in fits.items():
+            part.setVisible(there and bool(part.text()))
+        self.more.hold(*(part for part, there in fits.items() if not there and part.text()))
         self.name.setMinimumWidth(NARROWEST_NAME if many else NARROW_NAME)
         for knob in self.macros:
             knob.set_narrow(close)
@@ -276,15 +288,7 @@ class PatchBar(QFrame):
     def show_comparing(self, comparing: bool) -> None:
         """Whether keys play the patch as it was saved."""
         self.compare.setChecked(comparing)
-        self._show_compare()
-
-    def _make_room(self) -> None:
-        """Where there is very little, a tuning or a sixth macro takes the place of the number of voices."""
-        roomy = self.scala.isHidden() and len(self._macros) < ROOMY_MACROS
-        self.voices.setVisible(roomy or not self._tight)
-
-    def _show_compare(self) -> None:
-        self.compare.setVisible(not self._tight or self.compare.isChecked())
+        self._share_width()
 
     def show_macros(self, shown: bool) -> None:
         """Shows the macros; else, with all knobs of the string, what they turn: the mixes of body and room."""
@@ -316,7 +320,7 @@ class PatchBar(QFrame):
         """What of Scala tunes the patch; a click removes it."""
         scale, keymap = bool(tuning.scale.strip()), bool(tuning.keymap.strip())
         self.scala.setVisible(scale or keymap)
-        self._make_room()
+        self._share_width()
         lines = [f"Tuned by the Scala scale: {_scale_name(tuning.scale) or 'without a name'}"] if scale else []
         if keymap:
             lines.append("A Scala keyboard mapping says which key plays which step, and gives the reference pitch")

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soundfile
+from PySide6.QtCore import Qt
 from pytestqt.qtbot import QtBot
 
 from app.instrument.bodies import own_bodies
@@ -14,6 +15,7 @@ from app.patches.library import own_patches
 from app.views.dialogs.learn_dialog import ON_KEYS, LearnDialog
 from app.window.controller import Controller
 from engine.presets import find_preset, read_info
+from tests.app.questions import answered
 from tests.bench.recordings.synthetic import synthetic_note
 
 LEARNED_MS = 90_000
@@ -53,6 +55,12 @@ def test_a_note_is_learned_compared_kept_and_played(qtbot: QtBot, played: Contro
         assert dialog._pair is not None
         assert dialog._pair._heard == heard
         assert dialog.heard[heard].isChecked() and not dialog.heard[other].isChecked()
+    for key in (Qt.Key.Key_Escape, Qt.Key.Key_Return):  # no key discards what took minutes
+        for leave in (dialog.reject, lambda: played.take_file(note)):
+            with answered(key) as asked:
+                leave()
+            assert asked == ["Discard the instrument?"]
+            assert played._learning is dialog
     dialog.start.click()
     qtbot.waitUntil(lambda: played._learning is None, timeout=LEARNED_MS)
     patch = played.session.choices.patch

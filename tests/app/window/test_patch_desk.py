@@ -698,3 +698,37 @@ def test_a_restored_string_stays(qtbot: QtBot, played: Controller) -> None:
     played.session.update(instrument=patch, string=string, position=0.2)
     qtbot.wait(2 * OWN_MS)
     assert (played.session.choices.string, played.session.choices.position) == (string, 0.2)
+
+
+def test_an_opened_instrument_is_in_the_library_and_replaces_none(played: Controller, tmp_path: Path) -> None:
+    harp = read_patch(PATCHES / "concert_harp.json")
+    tuned = harp.model_copy(update={"level_db": harp.level_db - 2})
+    file = tmp_path / "from a friend.json"
+    names = []
+    for patch in (tuned, tuned, harp, tuned.model_copy(update={"description": "Another"})):
+        file.write_text(patch.model_dump_json())
+        played.take_file(file)
+        found = played.session.choices.patch
+        assert found is not None and found.model_copy(update={"name": patch.name}) == patch
+        assert played.patches.entry is not None and played.patches.entry.name in played.patches.browser.listed
+        names.append(found.name)
+    assert names == ["Concert harp 2", "Concert harp 2", "Concert harp", "Concert harp 3"]
+    assert sorted(path.stem for path in own_patches().glob("*.json")) == ["concert_harp_2", "concert_harp_3"]
+    played.take_file(own_patches() / "concert_harp_2.json")  # it is there already
+    file.write_text(tuned.model_copy(update={"name": "Concert-harp 2!"}).model_dump_json())  # the same file's name
+    before = (own_patches() / "concert_harp_2.json").read_bytes()
+    played.take_file(file)
+    assert (own_patches() / "concert_harp_2.json").read_bytes() == before
+    assert len(list(own_patches().glob("*.json"))) == 3
+
+
+def test_an_opened_instrument_is_played_where_it_cannot_be_added(
+    played: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    patch = read_patch(PATCHES / "concert_harp.json").model_copy(update={"name": "Mine"})
+    (tmp_path / "mine.json").write_text(patch.model_dump_json())
+    (tmp_path / "a file").write_text("")
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "a file"))
+    played.take_file(tmp_path / "mine.json")
+    assert played.session.choices.patch == patch
+    assert "not added to your library" in played.window.notices.text

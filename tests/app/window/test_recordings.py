@@ -9,9 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 import soundfile
-from PySide6.QtWidgets import QMessageBox
+from PySide6.QtCore import Qt
+from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
+from app.export.journal import left_journals, recordings_folder
 from app.export.recipe import InstrumentSound, read_origin
 from app.instrument.bodies import own_bodies
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
@@ -19,26 +21,29 @@ from app.instrument.midi_file import read_midi
 from app.shared.version import program_version
 from app.views.dialogs.export_dialog import ExportDialog
 from app.window.controller import Controller
+from tests.app.questions import answered
 
 
 class Reported:
-    """The notices to the user, and the answers to the question for a file: paths, and "" for Cancel."""
+    """The notices to the user."""
 
-    def __init__(self, played: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
+    def __init__(self, played: Controller) -> None:
         self.errors: list[str] = []
         self.good: list[str] = []
-        self.loses = True  # the answer to whether the window may be closed, and lose a recording
         played.patches.reported.connect(self.errors.append)
         played.patches.informed.connect(self.good.append)
-        monkeypatch.setattr(QMessageBox, "question", self._question)
-
-    def _question(self, *_: object) -> QMessageBox.StandardButton:
-        return QMessageBox.StandardButton.Yes if self.loses else QMessageBox.StandardButton.No
 
 
 @pytest.fixture
-def reported(played: Controller, monkeypatch: pytest.MonkeyPatch) -> Reported:
-    return Reported(played, monkeypatch)
+def reported(played: Controller) -> Reported:
+    return Reported(played)
+
+
+def close(played: Controller, *answers: str | Qt.Key) -> list[str]:
+    """Closes the window and answers its questions; their titles."""
+    with answered(*answers) as asked:
+        played.window.close()
+    return asked
 
 
 def dialog_of(played: Controller) -> ExportDialog:
@@ -216,36 +221,137 @@ def test_that_a_soloed_mode_is_not_recorded_alone_is_reported(played: Controller
     assert reported.good == ["The recording has all modes, although mode 3 is soloed."]
 
 
-def test_the_window_is_not_closed_over_a_recording_without_a_question(played: Controller, reported: Reported) -> None:
-    reported.loses = False
+LOST = "Recording not saved"
+BUSY = "Export under way"
+
+
+@pytest.mark.parametrize("answer", [Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Space, "Cancel", "Save"])
+@pytest.mark.parametrize("ended", [False, True])
+def test_no_key_closes_the_window_over_a_recording(
+    played: Controller, reported: Reported, answer: str | Qt.Key, ended: bool
+) -> None:
     record(played)
-    played.window.close()
+    if not ended:
+        played.patches.recordings.discard()
+        played.patches.recordings.record()
+        play(played)
+    assert close(played, answer) == [LOST]
     assert played.window.isVisible()
-    played.patches.recordings.discard()
-    played.patches.recordings.record()
-    played.window.close()  # nor while it is made
-    assert played.window.isVisible()
-    reported.loses = True
-    played.window.close()
+    assert played.patches.recordings.unsaved
+
+
+def test_a_recording_can_be_discarded_to_close(played: Controller, reported: Reported) -> None:
+    record(played)
+    assert close(played, "Discard") == [LOST]
     assert not played.window.isVisible()
+    assert left_journals(recordings_folder()) == []
 
 
-def test_the_window_is_not_closed_over_a_recording_that_is_being_written(
+def test_save_closes_once_it_is_saved_and_not_before(
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
+) -> None:
+    played.patches.recordings.record()
+    play(played)
+    close(played, "Save")
+    save(qtbot, played, tmp_path / "absent" / "take.wav", "absent")  # it cannot be written
+    assert played.window.isVisible()
+    close(played, "Save")
+    dialog_of(played).close_button.click()  # the user thinks better of it
+    record_more = played.patches.recordings
+    record_more.save_asked.emit()
+    save(qtbot, played, tmp_path / "kept.wav")
+    assert played.window.isVisible()
+    record(played)
+    close(played, "Save")
+    dialog = dialog_of(played)
+    dialog.performance.file.edit.setText(str(tmp_path / "take.wav"))
+    dialog.save.click()
+    qtbot.waitUntil(lambda: not played.window.isVisible())
+    assert {path.name for path in tmp_path.glob("take.*")} == {"take.wav", "take.mid"}
+    assert left_journals(recordings_folder()) == []
+
+
+def test_a_window_that_is_ended_keeps_the_recording_on_disk(played: Controller, reported: Reported) -> None:
+    record(played)
+    latest = played.patches.recordings.latest
+    played.window.may_close = lambda: True  # as by a signal
+    played.window.close()
+    (journal,) = left_journals(recordings_folder())
+    found = journal.read()
+    assert latest is not None and found is not None
+    assert (found.events, found.patch, found.source) == (latest.events, latest.patch, latest.source)
+    assert found.recorded == latest.recorded
+    journal.delete()
+
+
+def test_the_window_is_not_closed_over_an_export_without_a_question(
     qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
 ) -> None:
     """An hour of playing takes minutes. Its notes are there at once; its sound is given up if the user says so."""
     record(played)
-    hour = [TimedEvent(float(second), NoteOn(60, 100)) for second in range(3_600)]
-    latest = played.patches.recordings.latest
+    recordings = played.patches.recordings
+    latest = recordings.latest
     assert latest is not None
-    played.patches.recordings._unsaved[-1] = replace(latest, events=(latest.events[0], *hour))
+    hour = [TimedEvent(float(second), NoteOn(60, 100)) for second in range(3_600)]
+    recordings._unsaved = {replace(latest, events=(latest.events[0], *hour)): recordings._unsaved[latest]}
     played.exports.refresh()
-    reported.loses = False
     save(qtbot, played, tmp_path / "take.wav", "Rendering")
     qtbot.waitUntil((tmp_path / "take.mid").is_file)
-    played.window.close()
-    assert played.window.isVisible()
-    reported.loses = True
-    played.window.close()
+    for answer in (Qt.Key.Key_Escape, Qt.Key.Key_Return, "Stay", "Finish first"):
+        assert close(played, answer) == [BUSY]
+        assert played.window.isVisible() and played.exports.busy
+    assert close(played, "Cancel export", "Discard") == [BUSY, LOST]
     assert not played.window.isVisible()
     assert [path.name for path in tmp_path.iterdir() if "take" in path.name] == ["take.mid"]
+
+
+def test_an_export_that_is_finished_first_closes_the_window(
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
+) -> None:
+    record(played)
+    recordings = played.patches.recordings
+    latest = recordings.latest
+    assert latest is not None
+    longer = [TimedEvent(float(second), NoteOn(60, 100)) for second in range(60)]
+    recordings._unsaved = {replace(latest, events=(latest.events[0], *longer)): recordings._unsaved[latest]}
+    played.exports.refresh()
+    save(qtbot, played, tmp_path / "take.wav", "Rendering")
+    assert close(played, "Finish first") == [BUSY]
+    qtbot.waitUntil(lambda: not played.window.isVisible())
+    assert {path.name for path in tmp_path.glob("take.*")} == {"take.wav", "take.mid"}
+
+
+def test_enter_replaces_no_file(qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path) -> None:
+    (tmp_path / "take.wav").write_bytes(b"mine")
+    record(played)
+    dialog = dialog_of(played)
+    edit = dialog.performance.file.edit
+    edit.setFocus()
+    edit.selectAll()
+    QTest.keyClicks(edit, str(tmp_path / "take.wav"))
+    for _ in range(3):  # before the name has settled, and after
+        QTest.keyClick(edit, Qt.Key.Key_Return)
+        qtbot.waitUntil(lambda: dialog.save.text() == "Replace")
+    assert dialog.job is None and dialog.isVisible()
+    assert (tmp_path / "take.wav").read_bytes() == b"mine"
+    dialog.save.click()
+    qtbot.waitUntil(lambda: "Saved" in dialog.state.text())
+
+
+def test_escape_closes_the_result_of_an_export_from_the_window(
+    qtbot: QtBot, played: Controller, reported: Reported, tmp_path: Path
+) -> None:
+    """The window has the keyboard since the export began, so that one plays on."""
+    played.session.update(solo=3)
+    record(played)
+    save(qtbot, played, tmp_path / "take.wav")
+    played.window.activateWindow()
+    view = played.string.view
+    view.setFocus()
+    qtbot.waitUntil(view.hasFocus)
+    qtbot.keyClick(view, Qt.Key.Key_Escape)
+    assert played.exports.dialog is None
+    assert played.session.choices.solo == 3, "Escape does one thing"
+    assert view.hasFocus()
+    qtbot.keyClick(view, Qt.Key.Key_Escape)
+    assert played.session.choices.solo == 0

@@ -21,6 +21,7 @@ from app.views.dialogs.export_dialog import ExportDialog
 from app.window.controller import Controller
 from app.window.settings import load_settings
 from engine.presets.finding import SHIPPED
+from tests.app.questions import answered
 
 PATCH = "Classical guitar"
 
@@ -107,15 +108,19 @@ def test_keys_play_and_shortcuts_work_while_it_runs(
     looped = patched.session.choices.loop
     qtbot.keyClick(focused, Qt.Key.Key_L, Qt.KeyboardModifier.ControlModifier)
     assert patched.session.choices.loop != looped
-    qtbot.keyClick(focused, Qt.Key.Key_Q, Qt.KeyboardModifier.ControlModifier)
+    with answered("Cancel export"):
+        qtbot.keyClick(focused, Qt.Key.Key_Q, Qt.KeyboardModifier.ControlModifier)
     assert not patched.window.isVisible()
 
 
-def test_escape_in_the_dialog_cancels(qtbot: QtBot, patched: Controller, exporting: ExportDialog) -> None:
+def test_escape_in_the_dialog_asks_whether_to_cancel(
+    qtbot: QtBot, patched: Controller, exporting: ExportDialog
+) -> None:
     exporting.activateWindow()
     qtbot.waitUntil(exporting.isActiveWindow)
     patched.session.update(solo=2)
-    qtbot.keyClick(exporting.focusWidget() or exporting, Qt.Key.Key_Escape)
+    with answered("Cancel export"):
+        qtbot.keyClick(exporting.focusWidget() or exporting, Qt.Key.Key_Escape)
     qtbot.waitUntil(lambda: "Cancelled" in exporting.state.text())
     assert patched.session.choices.solo == 2
     looped = patched.session.choices.loop
@@ -135,7 +140,9 @@ def test_what_was_chosen_is_remembered(qtbot: QtBot, patched: Controller, tmp_pa
     assert (remembered.layers, remembered.keys, remembered.folder) == (7, (60, 61), str(tmp_path))
 
 
-def test_closing_the_window_ends_it(qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_closing_the_window_ends_it_where_the_user_says_so(
+    qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
     begun, ended = threading.Event(), threading.Event()
 
     def export(plan, out, render, progress):
@@ -152,7 +159,11 @@ def test_closing_the_window_ends_it(qtbot: QtBot, patched: Controller, monkeypat
     dialog = open_dialog(qtbot, patched)
     dialog.save.click()
     assert begun.wait(60)
-    patched.window.close()
+    with answered(Qt.Key.Key_Return):
+        patched.window.close()
+    assert patched.window.isVisible() and not ended.is_set()
+    with answered("Cancel export"):
+        patched.window.close()
     assert ended.is_set()
     QApplication.processEvents()
     assert not [thread for thread in threading.enumerate() if thread.name == "export"]

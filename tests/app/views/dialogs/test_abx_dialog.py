@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QAbstractButton, QLabel, QMessageBox, QWidget
+from PySide6.QtWidgets import QAbstractButton, QLabel, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.analysis.abx.record import AbxRecord, Candidate
@@ -21,6 +21,7 @@ from app.audio.sound import Sound
 from app.views.dialogs.abx_dialog import DEVICE_CHANGED, NO_DEVICE, SAME, TRIVIAL, AbxDialog
 from engine.kernels import layout as at
 from engine.voices import Mixer
+from tests.app.questions import answered
 
 RATE_HZ = 48_000
 FRAMES = 4800
@@ -168,16 +169,16 @@ def test_nothing_that_is_shown_depends_on_x(qtbot: QtBot, open_dialog: Open) -> 
     assert pictures[0][0] != pictures[0][1]
 
 
-def test_a_test_that_is_stopped_is_incomplete(
-    qtbot: QtBot, open_dialog: Open, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    answers = [QMessageBox.StandardButton.No, QMessageBox.StandardButton.Yes]
-    monkeypatch.setattr(QMessageBox, "question", lambda *_: answers.pop(0))
+def test_a_test_that_is_stopped_is_incomplete(qtbot: QtBot, open_dialog: Open, tmp_path: Path) -> None:
     dialog = open_dialog()
     start(dialog)
-    press(qtbot, dialog, "x", "1", "esc")
-    assert dialog.testing
-    press(qtbot, dialog, "esc")
+    press(qtbot, dialog, "x", "1")
+    for key in (Qt.Key.Key_Escape, Qt.Key.Key_Return, Qt.Key.Key_Space):
+        with answered(key):
+            press(qtbot, dialog, "esc")
+        assert dialog.testing
+    with answered("Stop the test"):
+        press(qtbot, dialog, "esc")
     assert not dialog.testing
     assert dialog.isVisible()
     assert "no p-value can be given" in texts(dialog)

@@ -29,6 +29,7 @@ from app.session.choices import Choices
 from app.views.dialogs.export_dialog import ExportDialog
 from app.window.exports import heard_note
 from engine.presets import SHIPPED
+from tests.app.questions import answered
 
 
 @pytest.fixture
@@ -129,6 +130,10 @@ def test_cancel_leaves_nothing(qtbot: QtBot, dialog: ExportDialog, tmp_path: Pat
     dialog.note.seconds.setValue(600)
     dialog.save.click()
     assert dialog.close_button.text() == "Cancel"
+    for key in (Qt.Key.Key_Escape, Qt.Key.Key_Return):
+        with answered(key):
+            QTest.keyClick(dialog, Qt.Key.Key_Escape)
+        assert dialog.job is not None and dialog.isVisible()
     dialog.close_button.click()
     qtbot.waitUntil(lambda: "Cancelled" in dialog.state.text())
     assert wavs(tmp_path) == []

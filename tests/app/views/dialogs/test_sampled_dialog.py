@@ -24,6 +24,7 @@ from app.patches.patch import Patch
 from app.presets.library import PresetEntry, list_presets
 from app.views.dialogs.export_dialog import ExportDialog
 from app.views.dialogs.export_pages import HeardInstrument
+from tests.app.questions import answered
 
 SMALL = {"keys": (60, 62), "layers": 2, "seconds": 0.2}
 MADE = 3 * 2
@@ -241,7 +242,8 @@ def test_a_cancelled_export_leaves_nothing(qtbot: QtBot, made, notes: Notes, fol
     dialog.save.click()
     qtbot.waitUntil(lambda: len(notes.rendered) == 3)
     assert dialog.close_button.text() == "Cancel"
-    dialog.close()  # as its cross does: it stays, to report what was written
+    with answered("Cancel export"):
+        dialog.close()  # as its cross does: it stays, to report what was written
     assert dialog.isVisible()
     notes.gate.set()
     qtbot.waitUntil(lambda: "Cancelled; nothing was written" in dialog.state.text())

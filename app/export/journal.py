@@ -1,0 +1,266 @@
+"""A recording on disk while it is made and until it is saved: a line of JSON for each event, appended.
+
+A process that is killed leaves its journal. The next start finds it, for the lock beside it is no living process's.
+Lines are short: after the first, an instrument that is turned is the fields that changed. A torn last line is left
+out; of a damaged journal the events before the damage are kept.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass, field
+from datetime import datetime
+from pathlib import Path
+from typing import Any, get_args
+
+from platformdirs import user_state_path
+from pydantic import TypeAdapter
+from PySide6.QtCore import QLockFile
+
+from app.export.played import Played
+from app.instrument.events import (
+    KEYS,
+    LONGEST_RECORDING,
+    Bend,
+    Controller,
+    Event,
+    NoteOff,
+    NoteOn,
+    PatchTurned,
+    TimedEvent,
+    played_from,
+)
+from app.patches.patch import Patch
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PlayedSource
+from engine import bounds
+from engine.plain_text import one_line
+from engine.read_file import read_bounded
+from engine.schema import SchemaError, parse_json
+
+FOLDER_VARIABLE = "LEARNED_STRINGS_RECORDINGS"
+SUFFIX = ".recording"
+VERSION = 1
+LARGEST_BYTES = 256 * 2**20
+LONGEST_S = 7 * 24 * 3600.0
+KINDS: dict[str, type[NoteOn | NoteOff | Bend | Controller]] = {
+    "on": NoteOn,
+    "off": NoteOff,
+    "bend": Bend,
+    "controller": Controller,
+}
+_NAMES = {kind: name for name, kind in KINDS.items()}
+_CHECKED = {name: TypeAdapter(kind) for name, kind in KINDS.items()}
+_LIMITS = {"key": (0, 127), "velocity": (0, 127), "channel": (0, KEYS), "number": (0, 127), "string": (0, 127)}
+_VALUES = {Bend: (-1.0, 1.0), Controller: (0, 127)}
+_LARGEST_PLACE = 2.0  # half-lengths
+_RECORDED = TypeAdapter(datetime)
+
+
+def recordings_folder() -> Path:
+    """The path in LEARNED_STRINGS_RECORDINGS, else `recordings` in the platform's folder for a program's state."""
+    given = os.environ.get(FOLDER_VARIABLE)
+    return Path(given) if given else user_state_path("learned-strings", appauthor=False) / "recordings"
+
+
+class Journal:
+    """The file of one recording, which no other process has while this one does.
+
+    `close` leaves it for the next start; `delete` removes it.
+    """
+
+    def __init__(self, path: Path, lock: QLockFile) -> None:
+        self.path, self._lock = path, lock
+        self._patch: dict[str, Any] | None = None  # as it was written last
+
+    @classmethod
+    def begun(cls, folder: Path, recorded: datetime) -> Journal:
+        """A new one.
+
+        Raises:
+            OSError: the folder cannot be made or written.
+        """
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / f"{recorded:%Y%m%d-%H%M%S-%f}-{os.getpid()}{SUFFIX}"
+        if (lock := _locked(path)) is None:
+            raise PermissionError(None, "its lock cannot be made", str(path))
+        made = cls(path, lock)
+        try:
+            made._append([{"version": VERSION, "recorded": recorded.isoformat()}])
+        except OSError:
+            made.delete()
+            raise
+        return made
+
+    def write(self, events: Iterable[TimedEvent]) -> None:
+        """Appends events, in the order of their times from the beginning of the recording. Raises OSError."""
+        self._append([self._line(each) for each in events])
+
+    def hear(self, source: PlayedSource, difference_gain_db: float) -> None:
+        """Appends the source that is heard from now on. Raises OSError."""
+        self._append([{"source": source, "difference_gain_db": difference_gain_db}])
+
+    def end(self, end_s: float) -> None:
+        """Appends the time at which the recording ended. Raises OSError."""
+        self._append([{"end": end_s}])
+
+    def close(self) -> None:
+        """Leaves it to the next start, or to another process."""
+        self._lock.unlock()
+
+    def delete(self) -> None:
+        """Removes it: the recording is saved, or not wanted. Where that fails, it is offered again."""
+        with suppress(OSError):
+            self.path.unlink(missing_ok=True)
+        self._lock.unlock()
+
+    def read(self) -> Played | None:
+        """The recording as far as it was written; None: there is no note in it.
+
+        Raises:
+            ValueError: nothing of it can be used; the message names the file.
+            OSError: it cannot be read.
+        """
+        raw = read_bounded(self.path, LARGEST_BYTES)
+        read = _Read(str(self.path))
+        for line in raw.split(b"\n")[:-1]:  # behind the last end of a line nothing is whole
+            if not read.take(line):
+                break
+        return read.played()
+
+    def _line(self, each: TimedEvent) -> dict[str, Any]:
+        event, line = each.event, {"t": each.time_s}
+        if isinstance(event, PatchTurned):
+            before, self._patch = self._patch, event.patch.model_dump(mode="json")
+            turned = {"patch": self._patch} if before is None else {"turned": list(_changes(before, self._patch))}
+            return {**line, **turned}
+        return {**line, _NAMES[type(event)]: asdict(event)}  # type: ignore[index]
+
+    def _append(self, lines: list[dict[str, Any]]) -> None:
+        if not lines:
+            return
+        with self.path.open("ab") as file:
+            file.write("".join(json.dumps(line, allow_nan=False) + "\n" for line in lines).encode())
+            file.flush()
+            os.fsync(file.fileno())
+
+
+def left_journals(folder: Path) -> list[Journal]:
+    """Those of processes that are no more, the oldest first; this process has them from now on."""
+    try:
+        paths = sorted(path for path in folder.glob(f"*{SUFFIX}") if path.is_file())
+    except OSError:
+        return []
+    return [Journal(path, lock) for path in paths if (lock := _locked(path)) is not None]
+
+
+def _locked(path: Path) -> QLockFile | None:
+    """The lock of a journal; None: another process has it, or it cannot be made."""
+    lock = QLockFile(str(path.with_suffix(".lock")))
+    lock.setStaleLockTime(0)  # a lock is as old as its process; one of a dead process does not count
+    return lock if lock.tryLock(0) else None
+
+
+def _changes(before: Any, after: Any, *path: str) -> Iterator[tuple[list[str], Any]]:
+    """The innermost values that differ, each with the path of keys to it."""
+    if isinstance(before, dict) and isinstance(after, dict) and before.keys() == after.keys():
+        for key, value in after.items():
+            yield from _changes(before[key], value, *path, key)
+    elif before != after:
+        yield list(path), after
+
+
+@dataclass
+class _Read:
+    """What the lines so far say. Each is checked, as of any file."""
+
+    where: str
+    recorded: datetime | None = None
+    events: list[TimedEvent] = field(default_factory=list)
+    source: PlayedSource = "model"
+    difference_gain_db: float = 0.0
+    end_s: float | None = None
+    _patch: dict[str, Any] | None = None
+
+    def take(self, line: bytes) -> bool:
+        """False: this line is damaged, so that nothing after it counts.
+
+        Raises:
+            ValueError: it is the first, and no journal's.
+        """
+        try:
+            data = parse_json(line, self.where)
+            if not isinstance(data, dict):
+                raise SchemaError(f"{self.where}: a line is no JSON object")
+            self._take(data)
+        except (ValueError, LookupError, TypeError, OverflowError) as error:
+            if self.recorded is None:
+                reason = one_line(str(error), 200)
+                raise ValueError(f"{self.where}: no recording of this program ({reason})") from error
+            return False
+        return len(self.events) < LONGEST_RECORDING
+
+    def _take(self, data: dict[str, Any]) -> None:
+        if self.recorded is None:
+            if data.get("version") != VERSION:
+                raise ValueError("version: made by another version of the program")
+            self.recorded = _RECORDED.validate_python(data["recorded"])
+        elif "end" in data:
+            self.end_s = _within(data["end"], (0.0, LONGEST_S))
+        elif "source" in data:
+            if data["source"] not in get_args(PlayedSource):
+                raise ValueError("source")
+            self.source = data["source"]
+            self.difference_gain_db = _within(data["difference_gain_db"], DIFFERENCE_GAIN_RANGE_DB)
+        else:
+            time_s = _within(data.pop("t"), (-LONGEST_S, LONGEST_S))
+            ((kind, value),) = data.items()
+            self.events.append(TimedEvent(time_s, self._event(kind, value)))
+
+    def _event(self, kind: str, value: Any) -> Event:
+        if kind in ("patch", "turned"):
+            return PatchTurned(Patch.model_validate(self._turned(kind, value)))
+        event = _CHECKED[kind].validate_python(value)
+        for name, limits in _LIMITS.items():
+            if getattr(event, name, None) is not None:
+                _within(getattr(event, name), limits)
+        if isinstance(event, Bend | Controller):
+            _within(event.value, _VALUES[type(event)])
+        if isinstance(event, NoteOn) and event.place is not None:
+            for each in event.place:
+                _within(each, (-_LARGEST_PLACE, _LARGEST_PLACE))
+        return event
+
+    def _turned(self, kind: str, value: Any) -> dict[str, Any]:
+        if kind == "patch":
+            self._patch = dict(value)
+            return self._patch
+        for path, changed in value:
+            part: Any = self._patch
+            for key in path[:-1]:
+                part = part[key]
+            if not isinstance(part, dict) or path[-1] not in part:
+                raise ValueError("turned: no such field")
+            part[path[-1]] = changed
+        assert self._patch is not None
+        return self._patch
+
+    def played(self) -> Played | None:
+        """The recording, with what is down at its end released."""
+        if self.recorded is None:
+            raise ValueError(f"{self.where}: no recording of this program (it is empty)")
+        patch = next((each.event.patch for each in self.events if isinstance(each.event, PatchTurned)), None)
+        last_s = max((each.time_s for each in self.events), default=0.0)
+        events = played_from(self.events, last_s if self.end_s is None else self.end_s)
+        if patch is None or not events:
+            return None
+        return Played(patch, tuple(events), self.source, self.difference_gain_db, self.recorded)
+
+
+def _within(value: Any, limits: tuple[float, float]) -> Any:
+    """The number. Raises ValueError: it is out of its limits, or none."""
+    if isinstance(value, bool) or not isinstance(value, int | float) or not limits[0] <= value <= limits[1]:
+        raise ValueError(f"{bounds.brief(str(value))} is out of range")
+    return value

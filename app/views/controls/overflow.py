@@ -1,0 +1,57 @@
+"""The controls of a row that have no room: a button that is there with them, whose menu has each of them."""
+
+from __future__ import annotations
+
+import textwrap
+
+from PySide6.QtWidgets import QAbstractButton, QLabel, QMenu, QToolButton, QWidget
+
+from app.views.controls.plain import plain_tip
+
+LINE_LETTERS = 64  # of words in the menu
+
+
+class Overflow(QToolButton):
+    """A row hides what does not fit and hands it over with `hold`.
+
+    A button's entry presses it; a label's words are shown.
+
+    Attributes:
+        parts: what is in the menu.
+    """
+
+    def __init__(self, of: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.parts: tuple[QWidget, ...] = ()
+        self.setText("⋯")
+        self.setObjectName("narrow")
+        self.setAccessibleName(f"More of {of}")
+        self.setToolTip(f"What of {of} has no room here")
+        self.setPopupMode(QToolButton.ToolButtonPopupMode.InstantPopup)
+        menu = QMenu(self)
+        menu.setToolTipsVisible(True)
+        menu.aboutToShow.connect(self._fill)
+        self.setMenu(menu)
+        self.hide()
+
+    def hold(self, *parts: QWidget) -> None:
+        """Has these from now on, in place of those before."""
+        self.parts = parts
+        self.setVisible(bool(parts))
+
+    def _fill(self) -> None:
+        menu = self.menu()
+        menu.clear()
+        for part in self.parts:
+            if isinstance(part, QAbstractButton):
+                action = menu.addAction(part.text())
+                action.setCheckable(part.isCheckable())
+                action.setChecked(part.isChecked())
+                action.setEnabled(part.isEnabled())
+                action.setToolTip(plain_tip(part.toolTip()))
+                action.triggered.connect(lambda _=False, part=part: part.click())
+        menu.addSeparator()
+        for part in self.parts:
+            if isinstance(part, QLabel):
+                for line in textwrap.wrap(part.text(), LINE_LETTERS):
+                    menu.addAction(line.replace("&", "&&")).setEnabled(False)

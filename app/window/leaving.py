@@ -1,0 +1,71 @@
+"""Closing the window: first a question about each thing that it would end or lose."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QObject
+
+from app.views.dialogs.question import ask
+from app.window.exports import Exports
+from app.window.main_window import MainWindow
+from app.window.recordings import Recordings
+
+FINISH, STOP, STAY = "Finish first", "Cancel export", "Stay"
+SAVE, DISCARD, CANCEL = "Save", "Discard", "Cancel"
+
+
+class Leaving(QObject):
+    """Answers `MainWindow.may_close`. What the user finishes or saves first closes the window once that is done."""
+
+    def __init__(self, window: MainWindow, recordings: Recordings, exports: Exports) -> None:
+        super().__init__(window)
+        self._window, self._recordings, self._exports = window, recordings, exports
+        self._waits = False  # for an export, to close then
+        self._asking = False
+        window.may_close = self.may_close
+        exports.ended.connect(self._export_ended)
+
+    def may_close(self) -> bool:
+        """Whether the window may be closed now."""
+        if self._asking:  # closed once more under the question
+            return False
+        self._asking = True
+        try:
+            self._waits = False
+            return self._may_end_export() and self._may_lose_recordings()
+        finally:
+            self._asking = False
+
+    def _may_end_export(self) -> bool:
+        if not self._exports.busy:
+            return True
+        question = "An export is under way. Closing the app ends it; only whole files are kept."
+        answer = ask(self._window, "Export under way", question, STAY, STOP, FINISH)
+        if answer == STOP:
+            self._exports.close()
+            return True
+        if answer == STAY:
+            return False
+        self._waits = self._exports.busy
+        return not self._waits  # it has ended well or not while the question was open
+
+    def _may_lose_recordings(self) -> bool:
+        if not self._recordings.unsaved:
+            return True
+        question = "What was played is not saved. Save the recording before the app closes?"
+        answer = ask(self._window, "Recording not saved", question, CANCEL, DISCARD, SAVE)
+        if answer == DISCARD:
+            self._recordings.forget_all()
+            return True
+        if answer == SAVE:
+            self._recordings.end()
+            self._waits = self._recordings.latest is not None  # else nothing was played
+            if self._waits:
+                self._exports.open("performance")
+            return not self._waits
+        return False
+
+    def _export_ended(self, well: bool) -> None:
+        """An export has ended, or its dialog was closed."""
+        waited, self._waits = self._waits, False
+        if waited and well:
+            self._window.close()

@@ -1,0 +1,186 @@
+"""A recording's journal: what was played comes back as it was, also from a torn or damaged file."""
+
+from __future__ import annotations
+
+import json
+import random
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from app.export.journal import Journal, left_journals
+from app.instrument.events import (
+    KEYS,
+    Bend,
+    Controller,
+    Event,
+    NoteOff,
+    NoteOn,
+    PatchTurned,
+    TimedEvent,
+    played_from,
+)
+from app.patches.library import list_patches
+from app.patches.patch import Patch
+from engine.pluck import Pluck
+
+NOW = datetime(2024, 5, 6, 7, 8, 9, 1234, tzinfo=UTC)
+PATCHES = [entry.patch for entry in list_patches()[0]]
+
+
+def drawn(draw: random.Random) -> Event:
+    channel = draw.randrange(KEYS + 1)
+    place = draw.choice([None, (draw.uniform(-1, 1), draw.uniform(-1, 1))])
+    pluck = draw.choice(
+        [None, Pluck(draw.uniform(0.02, 0.98), draw.uniform(0, 20), "rounded", draw.uniform(0.02, 1))]
+    )
+    string = draw.choice([None, draw.randrange(6)])
+    patch = draw.choice(PATCHES)
+    turned = patch.model_copy(update={"level_db": patch.level_db - draw.random()})
+    tuned = turned.model_copy(
+        update={"tuning": patch.tuning.model_copy(update={"transpose": draw.randrange(-12, 13)})}
+    )
+    return draw.choice(
+        [
+            NoteOn(draw.randrange(128), draw.randrange(128), channel, place, string, pluck),
+            NoteOff(draw.randrange(128), channel, string),
+            Bend(draw.uniform(-1, 1), channel),
+            Controller(draw.randrange(128), draw.randrange(128), channel),
+            PatchTurned(draw.choice([patch, turned, tuned])),
+        ]
+    )
+
+
+def recorded(draw: random.Random, events: int) -> list[TimedEvent]:
+    times_s = sorted(draw.uniform(0, 100) for _ in range(events))
+    first = [TimedEvent(0.0, PatchTurned(draw.choice(PATCHES))), TimedEvent(0.0, NoteOn(60, 90))]
+    return first + [TimedEvent(time_s, drawn(draw)) for time_s in times_s]
+
+
+def written(folder: Path, events: list[TimedEvent], end_s: float | None = None) -> Journal:
+    """A journal that its process has left."""
+    journal = Journal.begun(folder, NOW)
+    middle = len(events) // 2
+    for part in (events[:middle], events[middle:]):
+        journal.write(part)
+    if end_s is not None:
+        journal.end(end_s)
+    journal.close()
+    (left,) = left_journals(folder)
+    assert left.path == journal.path
+    return left
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_what_is_written_is_read(tmp_path: Path, seed: int) -> None:
+    events = recorded(random.Random(seed), 120)
+    played = written(tmp_path, events, 101.5).read()
+    assert played is not None
+    assert list(played.events) == played_from(events, 101.5)
+    assert played.patch == events[0].event.patch  # type: ignore[union-attr]
+    assert played.recorded == NOW
+    assert (played.source, played.difference_gain_db) == ("model", 0.0)
+
+
+def test_the_source_that_was_heard_last_is_kept(tmp_path: Path) -> None:
+    journal = Journal.begun(tmp_path, NOW)
+    journal.write(recorded(random.Random(1), 3))
+    journal.hear("truth", 0.0)
+    journal.hear("difference", 40.0)
+    played = journal.read()
+    assert played is not None
+    assert (played.source, played.difference_gain_db) == ("difference", 40.0)
+
+
+def test_a_turned_knob_is_a_short_line(tmp_path: Path) -> None:
+    patch = PATCHES[0]
+    turned = patch.model_copy(update={"level_db": patch.level_db - 1})
+    journal = written(tmp_path, [TimedEvent(0.0, PatchTurned(patch)), TimedEvent(1.0, PatchTurned(turned))])
+    assert len(journal.path.read_bytes().splitlines()[-1]) < 80
+
+
+def test_cut_at_any_byte_it_gives_the_whole_lines_before(tmp_path: Path) -> None:
+    events = recorded(random.Random(3), 12)
+    journal = written(tmp_path, events)
+    raw, draw = journal.path.read_bytes(), random.Random(4)
+    for cut in sorted(draw.randrange(len(raw)) for _ in range(120)):
+        journal.path.write_bytes(raw[:cut])
+        whole = raw[:cut].count(b"\n") - 1  # less the first line
+        if whole < 0:
+            with pytest.raises(ValueError, match="no recording of this program"):
+                journal.read()
+            continue
+        played, kept = journal.read(), events[:whole]
+        wanted = played_from(kept, kept[-1].time_s) if kept else []
+        assert (None if played is None else list(played.events)) == (wanted or None)
+
+
+HEAD = json.dumps({"version": 1, "recorded": NOW.isoformat()})
+FIRST = json.dumps({"t": 0.0, "patch": PATCHES[0].model_dump(mode="json")})
+ON = '{"t": 1.0, "on": {"key": 60, "velocity": 90}}'
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "",
+        "[]",
+        "nonsense",
+        "\x00\xff",
+        "[" * 100_000,
+        '{"t": NaN, "on": {"key": 60, "velocity": 90}}',
+        '{"t": 1e400, "on": {"key": 60, "velocity": 90}}',
+        '{"t": true, "on": {"key": 60, "velocity": 90}}',
+        '{"t": 2, "on": {"key": 128, "velocity": 90}}',
+        '{"t": 2, "on": {"key": -1, "velocity": 90}}',
+        '{"t": 2, "on": {"key": 60, "velocity": 90, "channel": 17}}',
+        '{"t": 2, "on": {"key": 60, "velocity": 90, "place": [NaN, 0]}}',
+        '{"t": 2, "on": {"key": 60, "velocity": 90, "place": [0]}}',
+        '{"t": 2, "on": {"key": 60, "velocity": 90, "string": 1e9}}',
+        '{"t": 2, "on": {"key": 60, "velocity": 90, "pluck": {"position": 7}}}',
+        '{"t": 2, "off": {"key": 1e99}}',
+        '{"t": 2, "bend": {"value": Infinity}}',
+        '{"t": 2, "bend": {"value": 3}}',
+        '{"t": 2, "controller": {"number": 200, "value": 1}}',
+        '{"t": 2, "controller": {"number": 1, "value": 1.5}}',
+        '{"t": 2, "turned": [[["absent"], 1]]}',
+        '{"t": 2, "turned": [[["level_db"], 1e9]]}',
+        '{"t": 2, "turned": [[["preset"], "../../x"]]}',
+        '{"t": 2, "turned": [[[], {}]]}',
+        '{"t": 2, "turned": 3}',
+        '{"t": 2, "patch": {}}',
+        '{"t": 2, "patch": []}',
+        '{"t": 2, "what": {}}',
+        '{"t": 2, "on": {"key": 60, "velocity": 90}, "off": {"key": 60}}',
+        '{"source": "preset:x", "difference_gain_db": 0}',
+        '{"source": "difference", "difference_gain_db": 1e9}',
+        '{"end": -1}',
+        '{"end": "x"}',
+    ],
+)
+def test_of_a_damaged_journal_what_stands_before_is_kept(tmp_path: Path, line: str) -> None:
+    journal = written(tmp_path, [])
+    journal.path.write_bytes("\n".join([HEAD, FIRST, ON, line, ON.replace("60", "61"), ""]).encode("latin-1"))
+    played = journal.read()
+    assert played is not None
+    assert [each.event for each in played.events if isinstance(each.event, NoteOn)] == [NoteOn(60, 90)]
+    assert isinstance(played.patch, Patch)
+
+
+@pytest.mark.parametrize("first", ["", "{}", '{"version": 2}', '{"version": 1, "recorded": "x"}', "RIFF", FIRST])
+def test_what_is_no_journal_is_named(tmp_path: Path, first: str) -> None:
+    journal = written(tmp_path, [])
+    journal.path.write_text(f"{first}\n{FIRST}\n{ON}\n")
+    with pytest.raises(ValueError, match=r"\.recording: no recording of this program"):
+        journal.read()
+
+
+def test_one_process_has_a_journal_at_a_time(tmp_path: Path) -> None:
+    journal = Journal.begun(tmp_path, NOW)
+    assert left_journals(tmp_path) == []
+    journal.close()
+    (first,) = left_journals(tmp_path)
+    assert left_journals(tmp_path) == []
+    first.delete()
+    assert list(tmp_path.iterdir()) == []
