@@ -13,6 +13,8 @@ instruments have in their first 50 ms.
   using a computationally efficient physical model", EURASIP J. Adv. Signal Process. 2004.
 - A piano's key strikes its bed, and the impact rings in key bed and soundboard, mostly below 1 kHz: A. Askenfelt,
   "Observations on the transient components of the piano tone", STL-QPSR 34 (4), 1993. The damper's felt follows.
+- A finger or a damper that lands on a string hits what moves, and so follows its motion: an estimate.
+- A stick's tip and a skin scrape and slap; a soft mallet does so less and lower: an estimate.
 """
 
 from __future__ import annotations
@@ -21,7 +23,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-Exciter = Literal["finger", "nail", "plectrum", "quill", "hammer", "recorded"]
+Exciter = Literal["finger", "nail", "plectrum", "quill", "hammer", "stick", "recorded"]
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class Contact:
         pulse_share: of the energy; the rest is the burst's.
         burst_hz, burst_q: middle of the burst's band, and that over its width.
         attack_s, fall_s: in which the burst rises, and in which its amplitude falls by a factor of e.
-        follows: dB per dB of the stroke; 0: a noise that is alike at every velocity.
+        follows: dB per dB of the stroke, or of the motion on which a release lands; 0: alike for all, as a mechanism.
     """
 
     pulse_s: float
@@ -47,17 +49,17 @@ class Contact:
 
 _FINGER = (
     Contact(0.006, 0.7, 900, 0.6, 0.002, 0.012, 1.0),
-    Contact(0.010, 0.3, 1_200, 0.6, 0.008, 0.020, 0.0),
+    Contact(0.010, 0.3, 1_200, 0.6, 0.008, 0.020, 1.0),
 )
 CONTACTS: Mapping[Exciter, tuple[Contact, Contact]] = {  # of the stroke, of the release
     "finger": _FINGER,
     "nail": (
         Contact(0.004, 0.5, 3_200, 0.7, 0.001, 0.007, 1.0),
-        Contact(0.010, 0.3, 1_600, 0.6, 0.006, 0.018, 0.0),
+        Contact(0.010, 0.3, 1_600, 0.6, 0.006, 0.018, 1.0),
     ),
     "plectrum": (
         Contact(0.004, 0.55, 1_800, 0.5, 0.001, 0.018, 1.0),
-        Contact(0.010, 0.3, 1_800, 0.6, 0.006, 0.020, 0.0),
+        Contact(0.010, 0.3, 1_800, 0.6, 0.006, 0.020, 1.0),
     ),
     "quill": (
         Contact(0.005, 0.6, 2_600, 0.6, 0.0005, 0.008, 0.0),
@@ -65,7 +67,8 @@ CONTACTS: Mapping[Exciter, tuple[Contact, Contact]] = {  # of the stroke, of the
     ),
     "hammer": (
         Contact(0.004, 0.7, 700, 0.6, 0.001, 0.018, 1.0),
-        Contact(0.012, 0.4, 500, 0.6, 0.006, 0.030, 0.0),
+        Contact(0.012, 0.4, 500, 0.6, 0.006, 0.030, 1.0),
     ),
+    "stick": (Contact(0.002, 0.0, 4_500, 0.5, 0.0005, 0.010, 1.0), _FINGER[1]),
     "recorded": _FINGER,  # where a preset has no recorded attack
 }

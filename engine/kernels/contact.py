@@ -4,7 +4,11 @@
 
 w is white noise, h a band-pass of second order, and e rises in a straight line and falls exponentially. P and B give
 pulse and burst their shares of an energy in dB re that of a note. A harder stroke is louder; its pulse is shorter, as
-contact of bodies is by Hertz's law (T ~ v^-1/5), and its band higher (an estimate).
+contact of bodies is by Hertz's law (T ~ v^-1/5), and its band higher (an estimate). What lands on a string that moves
+is as loud as that motion is large.
+
+What strikes a drum has a hardness, see `engine.kernels.drums`: the band is in proportion to it. Its amplitude falls
+by 18 dB an octave of softness, as the spectrum of a raised cosine does; where it is hard it tends to a limit.
 
 A string that was learned from a recording may have the attack of that instead, at the amplitude of the stroke.
 The noise of a stroke is the same for the same strokes: a counter makes it. It is no part of the string's equation, so
@@ -26,6 +30,7 @@ from engine.kernels.memory import pointer
 OFF_DB = -60.0  # from this level down there is no noise
 SHORTENS, BRIGHTENS = -0.2, 0.15  # exponents of strength: of the pulse's length (Hertz), of the band (an estimate)
 LARGEST_CHANGE = 2.0  # of either
+HARDEST = 1.6  # amplitude of what is hard without limit, over that of hardness 1: an estimate
 HIGHEST_SHARE = 0.4  # of the rate: the middle of a band
 # Of a slide: J. Pakarinen, H. Penttinen, B. Bank, "Analysis of handling noises on wound strings", J. Acoust. Soc. Am.
 # 122, 2007. Its pitch is that of the windings that pass; wires of 0.4 mm are an estimate
@@ -50,6 +55,7 @@ def touch(
     which: int,
     level_db: float,
     strength: float,
+    hardness: float,
     stroke: int,
     key: int,
     frame: int,
@@ -60,7 +66,8 @@ def touch(
 
     Args:
         level_db: energy re a note's; `OFF_DB` and below: none.
-        strength: amplitude of the stroke over that at the reference velocity.
+        strength: amplitude of the stroke, or of the motion that it stops, over that at the reference velocity.
+        hardness: of what touches, over that of which the numbers of its contact hold.
         stroke: with the key, it chooses the noise.
         frame: of the mixer, at which it begins; 0: at once.
         slid_m, slides_s: way and time of a finger along the string, whose windings pass by: then that is the band.
@@ -69,7 +76,7 @@ def touch(
         return
     first, rate_hz = of.TABLE_CONTACTS + which * of.CONTACT, player[of.PLAYER_RATE]
     energy = table[of.TABLE_NOISE_LEVEL] * rate_hz * 10.0 ** (level_db / 10)
-    energy *= strength ** (2 * table[first + of.FOLLOWS])
+    energy *= strength ** (2 * table[first + of.FOLLOWS]) * (HARDEST / (1 + (HARDEST - 1) / hardness**3)) ** 2
     noise, longest = of.PLAYER_NOISES, -1
     for number in range(of.MOST_NOISES):
         each = of.PLAYER_NOISES + number * of.NOISE_SLOTS
@@ -80,8 +87,8 @@ def touch(
             noise, longest = each, players[each + of.NOISE_DONE]
     shorter = min(max(strength**SHORTENS, 1 / LARGEST_CHANGE), LARGEST_CHANGE)
     brighter = min(max(strength**BRIGHTENS, 1 / LARGEST_CHANGE), LARGEST_CHANGE)
-    pulse_frames = max(2.0, table[first + of.PULSE_S] * shorter * rate_hz)
-    band_hz, share = table[first + of.BURST_HZ] * brighter, table[first + of.PULSE_SHARE]
+    pulse_frames = max(2.0, table[first + of.PULSE_S] * shorter / hardness * rate_hz)
+    band_hz, share = table[first + of.BURST_HZ] * brighter * hardness, table[first + of.PULSE_SHARE]
     attack_s, fall_s = table[first + of.ATTACK_S], table[first + of.FALL_S]
     if slides_s > 0.0:
         band_hz, share = max(slid_m * WINDINGS_M / slides_s, LOWEST_SLIDE_HZ), 0.0

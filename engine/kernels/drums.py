@@ -17,9 +17,11 @@ from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import pointer
 from engine.kernels.modes import TOO_HIGH
-from engine.pluck import RUNAWAY_FACTOR
+from engine.pluck import MOST_PERIODS, RUNAWAY_FACTOR
 
 HERTZ = -0.2  # power of the speed in the time of contact, as in `engine.strike`
+FIRM_S = 0.004  # in which a stick touches a skin at 1 m/s: what touches for as long has the hardness 1
+MOST_HARDER = 2.0  # the hardness of any other
 UNHEARD = 1e-7  # of the loudest mode, where the loudness of a key and its peak are computed
 
 
@@ -37,12 +39,33 @@ def _speed(table: np.ndarray, drum: int, share: float) -> float:
 
 
 @njit(**COMPILED)
+def _speed_of(player: np.ndarray, table: np.ndarray, drum: int, velocity: float) -> float:
+    """Of a mallet at a velocity, by the instrument's curve, in m/s."""
+    curve = player[of.PLAYER_VALUES + of.CURVE]
+    return _speed(table, drum, min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve))
+
+
+@njit(**COMPILED)
+def contact_of(
+    player: np.ndarray, table: np.ndarray, tables: np.ndarray, key: int, velocity: float
+) -> tuple[float, float]:
+    """Strength and hardness of a blow on a key's drum, for the noise of the contact; see `engine.kernels.contact`."""
+    drum = block_of(tables, key)
+    reference = _speed(table, drum, (of.REFERENCE_VELOCITY - 1) / 126)
+    hardness = min(FIRM_S / table[drum + of.DRUM_CONTACT_S], MOST_HARDER)
+    return _speed_of(player, table, drum, velocity) / reference, hardness
+
+
+@njit(**COMPILED)
 def _blow(
     table: np.ndarray, tables: np.ndarray, drum: int, struck: np.ndarray, speed: float, out: np.ndarray
 ) -> None:
     """The speeds (modes,) that a blow gives; `struck`: those that 1 N s gives. As `engine.strike.Strike.speeds`."""
-    n, energy = tables[drum + of.DRUM_MODES], 0.0
+    n, energy, lowest = tables[drum + of.DRUM_MODES], 0.0, table[drum + of.DRUM_HEADER]
+    for mode in range(n):
+        lowest = min(lowest, table[drum + of.DRUM_HEADER + mode])
     contact_s = table[drum + of.DRUM_CONTACT_S] * max(speed, 1e-3) ** HERTZ
+    contact_s = min(contact_s, MOST_PERIODS * 2 * math.pi / math.sqrt(lowest))
     for mode in range(n):
         turns = math.sqrt(table[drum + of.DRUM_HEADER + mode]) * contact_s / (2 * math.pi)
         pulse = 0.5
@@ -124,8 +147,7 @@ def strike(
     struck = _struck(table, drum, modes)
     if elsewhere != 0 and players[event + of.EVENT_STRUCK_MODES] == modes:
         struck = carray(pointer(elsewhere), (1 << 40,), np.float64)[:modes]
-    curve = player[of.PLAYER_VALUES + of.CURVE]
-    speed = _speed(table, drum, min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve))
+    speed = _speed_of(player, table, drum, velocity)
     for source in range(tables[of.TABLE_SOURCES]):
         slot = first_voice + source * stride
         address = players[of.PLAYER_HERE] + 8 * slot

@@ -53,6 +53,7 @@ DRUM_PARAMETERS = (
     "knobs.modulus",
     "pluck.curve",
     "damping.release_t60_s",
+    "noise.onset_db",
     "pickup.points.0",
     "pickup.points.1",
 )  # that drums follow

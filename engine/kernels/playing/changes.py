@@ -15,6 +15,18 @@ from engine.kernels.memory import reals, wholes
 from engine.kernels.playing import channels, keys, slots, voices
 
 DAMPER_S = 0.012  # of the glide to other modes
+LANDS = 0.03  # strength of what lands on a string at rest: an estimate
+
+
+@njit(**COMPILED)
+def landing(player: np.ndarray, players: np.ndarray, table: np.ndarray, note: int) -> float:
+    """Strength of the noise of what lands on a note's string: its motion, over that of a stroke of the reference.
+
+    A mechanism, whose noise follows nothing, falls alike on every string.
+    """
+    if table[of.TABLE_CONTACTS + of.RELEASE * of.CONTACT + of.FOLLOWS] == 0.0:
+        return 1.0
+    return max(LANDS, voices.swing_m(players, note) / player[note + of.NOTE_SWING_M])
 
 
 @njit(**COMPILED)
@@ -83,7 +95,8 @@ def damp(
             players[note + of.NOTE_AGE] if table[of.TABLE_VARIATION] > 0.0 else 0,
             players[note + of.NOTE_KEY],
         )
-        contact.touch(player, players, table, of.RELEASE, level_db, 1.0, stroke, key, frame, 0.0, 0.0)
+        strength = landing(player, players, table, note)
+        contact.touch(player, players, table, of.RELEASE, level_db, strength, 1.0, stroke, key, frame, 0.0, 0.0)
         return
     t60_s = keys.value_of(player, players, table, tables, of.RELEASE_S)
     for source in range(of.MOST_SOURCES):

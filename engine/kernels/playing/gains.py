@@ -13,6 +13,8 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.playing import keys, plucks, slots, voices
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, LARGEST_AMPLITUDE_MM
 
+LEAST_SWING_M = 1e-9
+
 
 @njit(**COMPILED)
 def forget_gains(player: np.ndarray) -> None:
@@ -20,6 +22,12 @@ def forget_gains(player: np.ndarray) -> None:
     player[of.PLAYER_LIMIT] = 0.0
     for slot in range(of.KEYS * of.GAINS):
         player[of.PLAYER_GAINS + slot] = 0.0
+
+
+@njit(**COMPILED)
+def swing_slot(key: int, string: int) -> int:
+    """Where `gain_of` keeps how far a key's string swings at the reference velocity."""
+    return of.PLAYER_SWINGS_M + key * of.GAINS + 1 + string
 
 
 @njit(**COMPILED)
@@ -121,7 +129,10 @@ def _look_at_peaks(player: np.ndarray, players: np.ndarray, table: np.ndarray, t
 def gain_of(
     player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, key: int, string: int
 ) -> float:
-    """The factor that makes a key as loud as others on a string of a set, -1: the one that it chooses."""
+    """The factor that makes a key as loud as others on a string of a set, -1: the one that it chooses.
+
+    Beside it is kept how far that string swings.
+    """
     slot = of.PLAYER_GAINS + key * of.GAINS + 1 + string
     if player[slot] == 0.0:
         if player[of.PLAYER_LIMIT] == 0.0:
@@ -132,4 +143,8 @@ def gain_of(
         found = loudness.gain(sound, modes, tables[of.TABLE_POINTS], body, mix)
         found /= max(tables[of.TABLE_COURSE], 1)  # of strings that swing together at first
         player[slot] = found * player[of.PLAYER_LIMIT] * table[of.TABLE_LEVEL]
+        swing = 0.0
+        for mode in range(modes):
+            swing += player[of.PLAYER_AMPLITUDES + mode] ** 2
+        player[swing_slot(key, string)] = max(math.sqrt(swing), LEAST_SWING_M)
     return player[slot]

@@ -71,7 +71,10 @@ def _move(
         slid_m = abs(slots.moment(player, 3)[of.LENGTH] - player[note + of.NOTE_STRING_NOW + of.LENGTH])
         slides_s = seconds if seconds > channels.HAMMER_S else 0.0
         stroke = players[note + of.NOTE_AGE] if table[of.TABLE_VARIATION] > 0.0 else 0
-        contact.touch(player, players, table, of.RELEASE, level_db, 1.0, stroke, key, frame, slid_m, slides_s)
+        strength = 1.0 if slides_s > 0.0 else changes.landing(player, players, table, note)
+        contact.touch(
+            player, players, table, of.RELEASE, level_db, strength, 1.0, stroke, key, frame, slid_m, slides_s
+        )
     changes.retune(player, players, table, tables, number, seconds, frame, now)
     return True
 

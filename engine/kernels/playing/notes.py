@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from engine.kernels import contact, recorded, strings
+from engine.kernels import contact, drums, recorded, strings
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
@@ -179,7 +179,7 @@ def note_on(
     octave = member > 0 and octaves
     own, modes, gain, highest_m = slots.moment(player, 3), 0, 1.0, 0.0
     position = amplitude_mm = width = 0.0
-    pairs, strength, stroke, touched = 0, 1.0, 0, 0
+    pairs, strength, hardness, stroke, touched = 0, 1.0, 1.0, 0, 0
     if not drum:
         pitch_hz = keys.pitch_of(table, tables, key)
         shortened = 1.0
@@ -263,6 +263,8 @@ def note_on(
         player[note + of.NOTE_LOSSES + each] = table[of.TABLE_LOSSES + each]
     player[note + of.NOTE_DETUNING] = table[of.TABLE_DETUNING]
     player[note + of.NOTE_APERTURE_M] = table[of.TABLE_APERTURE_M]
+    if not drum:
+        player[note + of.NOTE_SWING_M] = player[gains.swing_slot(key, string)]
     players[note + of.NOTE_MEMBER] = member
     players[note + of.NOTE_OCTAVE] = octave
     if not drum and not octaves and tables[of.TABLE_COURSE] > 1 and table[of.TABLE_CONDUCTANCE] > 0.0:
@@ -338,9 +340,11 @@ def note_on(
         else:
             wholes(address)[at.STATE] = at.OVER
     changes.retune(player, players, table, tables, number, 0.0, 0, mixers[at.M_FRAMES])
-    if not drum and member == 0:
+    if drum:
+        strength, hardness = drums.contact_of(player, table, tables, key, velocity)
+    if member == 0:
         level_db = keys.value_of(player, players, table, tables, of.ONSET_DB)
-        contact.touch(player, players, table, of.STROKE, level_db, strength, stroke, key, frame, 0.0, 0.0)
+        contact.touch(player, players, table, of.STROKE, level_db, strength, hardness, stroke, key, frame, 0.0, 0.0)
     _make_room(player, players)
     report_began(player, players, tables, event, number, player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING])
 

@@ -10,7 +10,7 @@ from numba import njit
 from engine.kernels import playing_layout as of
 from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
-from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
+from engine.pluck import LARGEST_AMPLITUDE_MM, MOST_PERIODS, POSITION_RANGE, WIDTH_RANGE
 
 LEAST_AMPLITUDE_MM = 1e-6  # -200 dB of the largest: silence, and no division by zero
 
@@ -101,7 +101,11 @@ def _round(
 
 @njit(**COMPILED)
 def release_pluck(player: np.ndarray, tables: np.ndarray, own: np.ndarray, partials: int, release_s: float) -> None:
-    """Releases a pluck's partials within a time, or strikes them for so long: as `excitation`."""
+    """Releases a pluck's partials within a time, or strikes them for so long: as `excitation`.
+
+    What touches a string leaves it within a period of its lowest partial. So soft strokes of high keys are heard.
+    """
+    release_s = min(release_s, MOST_PERIODS * 2 * math.pi / math.sqrt(strings.omega_squared(own, 1)))
     for mode in range(partials if tables[of.TABLE_STRIKES] != 0 else 0):
         share = math.sqrt(strings.omega_squared(own, 1) / strings.omega_squared(own, mode + 1))
         player[of.PLAYER_AMPLITUDES + mode] *= 2 / math.pi * share

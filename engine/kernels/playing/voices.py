@@ -7,12 +7,12 @@ import math
 import numpy as np
 from numba import njit
 
-from engine.kernels import drums, javari, recorded, strings
+from engine.kernels import drums, javari, recorded, strings, tension
 from engine.kernels import layout as at
 from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, reals, wholes
-from engine.kernels.modes import TOO_HIGH, run_up
+from engine.kernels.modes import TOO_HIGH, row, run_up
 from engine.kernels.playing import keys, slots
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_N, LEAST_PEAK_M, RUNAWAY_FACTOR
 
@@ -148,6 +148,25 @@ def make_voice(
         for mode in range(n):
             largest += abs(player[of.PLAYER_AMPLITUDES + mode] * voice[at.weights(n, 0, 0, 0) + mode])
         voice[at.LIMIT] = max(voice[at.LIMIT], RUNAWAY_FACTOR * largest)
+
+
+@njit(**COMPILED)
+def swing_m(players: np.ndarray, note: int) -> float:
+    """How far a note's string swings now: the root of its modes' summed squares. 0: it is over."""
+    for source in range(of.MOST_SOURCES):
+        address = players[note + of.NOTE_VOICES + source]
+        if address == 0 or slots.voice_over(address):
+            continue
+        voice, counts, found = reals(address), wholes(address), 0.0
+        n = counts[at.MODES]
+        q, v, squares = row(voice, n, 0), row(voice, n, 1), row(voice, n, at.OMEGA_SQUARED)
+        if counts[at.KIND] == at.TENSION and counts[at.PREPARED] != 0:
+            q, v = row(voice, n, at.PHYSICAL), row(voice, n, at.PHYSICAL + 1)
+            tension.physical(voice, q, v)
+        for mode in range(n):
+            found += q[mode] * q[mode] + v[mode] * v[mode] / squares[mode]
+        return math.sqrt(found)
+    return 0.0
 
 
 @njit(**COMPILED)

@@ -3,7 +3,8 @@
 `frozen/sounds.json` has what an independent player in Python made of the same events, before it was removed: the norm
 of the sound, then its projections on eight random directions, in norms. The compiled player agreed with it to 1e-9.
 They were frozen again when fades lost their corners; with straight fades all agreed until then, to 3e-5, which silent
-modes make that rest from the start.
+modes make that rest from the start. Eight were frozen again when nothing touched a string for longer than a period;
+without that bound all agreed until then.
 Its instruments are there as they were then, so that those of the factory may be voiced otherwise.
 """
 

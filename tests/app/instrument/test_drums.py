@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.lib.stride_tricks import sliding_window_view
+from scipy.signal import butter, sosfilt
 
 from app.instrument import table
 from app.instrument.compiled import InstrumentPlayer
@@ -18,7 +19,7 @@ from app.instrument.offline import render_events, render_note
 from app.patches.drums import Drums, PhysicalMallet
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, read_patch
-from app.patches.patch import Patch, Room
+from app.patches.patch import Noise, Patch, Room
 from engine.kernels import playing_layout as of
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
@@ -26,6 +27,7 @@ from engine.voices import Ear, Mixer
 
 PRESET = load_preset(SHIPPED / "studio_any_string.safetensors")
 KIT, TOM, TIMPANI = (read_patch(PATCHES / f"{name}.json") for name in ("concert_toms", "tuned_toms", "timpani"))
+DRY_KIT = KIT.with_value("room.mix", 0.0)
 PADS = range(36, 52)
 RATE_HZ = 48_000
 CONTACT_FRAMES = 240  # after which a blow has begun
@@ -38,7 +40,7 @@ def rendered(patch: Patch, key: int, velocity: int = 100, source: str = "model",
 
 
 def dry_blow(key: int, source: str = "model") -> np.ndarray:
-    dry = KIT.model_copy(update={"room": Room(mix=0.0)})
+    dry = KIT.model_copy(update={"room": Room(mix=0.0), "noise": Noise()})
     blow = [TimedEvent(0.0, NoteOn(key, 90))]
     blocks = render_events(dry, PRESET, blow, RATE_HZ, source, seconds=0.6, limited=False)
     return np.concatenate(list(blocks)).astype(np.float64)[:, 0]
@@ -277,3 +279,62 @@ def test_a_pluck_by_hand_strikes_a_drum_as_its_velocity_says() -> None:
     plain, by_hand = (np.concatenate(blocks) for blocks in blows)
     assert np.abs(plain).max() > 0.01
     np.testing.assert_array_equal(by_hand, plain)
+
+
+def above_5_khz_db(sound: np.ndarray) -> float:
+    """The first 50 ms above 5 kHz, re all of it."""
+    part = sound[: round(0.05 * RATE_HZ)].astype(np.float64).mean(1)
+    high = sosfilt(butter(8, 5_000, "high", fs=RATE_HZ, output="sos"), part)
+    return float(10 * np.log10(np.square(high).sum() / np.square(part).sum()))
+
+
+def without_noise(patch: Patch) -> Patch:
+    return patch.model_copy(update={"noise": Noise()})
+
+
+@pytest.mark.parametrize("velocity", [30, 100, 127])
+@pytest.mark.parametrize("key", [37, 38, 41, 45, 47, 50, 51])
+def test_a_stick_is_heard_above_5_khz(key: int, velocity: int) -> None:
+    assert -50 < above_5_khz_db(rendered(DRY_KIT, key, velocity, seconds=0.06)) < -30
+
+
+@pytest.mark.parametrize(("patch", "key"), [("concert_toms", 36), ("timpani", 47)])
+def test_felt_is_dull(patch: str, key: int) -> None:
+    drum = read_patch(PATCHES / f"{patch}.json").with_value("room.mix", 0.0)
+    sound = rendered(drum, key, seconds=0.06)
+    assert above_5_khz_db(sound) < -56
+    noise = sound - rendered(without_noise(drum), key, seconds=0.06)
+    assert 0 < np.square(noise).sum() < 1e-4 * np.square(sound).sum()
+
+
+def test_a_harder_mallet_has_more_and_higher_noise() -> None:
+    assert isinstance(TOM.strings, Drums)
+    levels_db, centroids_hz = [], []
+    for contact_s in (0.016, 0.008, 0.004, 0.002, 0.001):
+        mallet = TOM.strings.drums[0].mallet.model_copy(update={"contact_s": contact_s})
+        drum = TOM.strings.drums[0].model_copy(update={"mallet": mallet})
+        patch = TOM.model_copy(update={"strings": TOM.strings.model_copy(update={"drums": (drum,)})})
+        noise = rendered(patch, 47) - rendered(without_noise(patch), 47)
+        power = np.abs(np.fft.rfft(noise[:, 0].astype(np.float64))) ** 2
+        levels_db.append(10 * np.log10(power.sum()))
+        centroids_hz.append(np.average(np.arange(len(power)), weights=power))
+    assert (np.diff(levels_db[:4]) > 2).all() and np.argmax(levels_db) >= 3
+    assert (np.diff(centroids_hz[:4]) > 0).all()
+    assert levels_db[2] - levels_db[1] == pytest.approx(11, abs=1.5)
+
+
+def test_the_noise_of_a_blow_follows_its_speed() -> None:
+    noises = [rendered(TOM, 47, v) - rendered(without_noise(TOM), 47, v) for v in (30, 60, 90, 120)]
+    levels_db = [10 * np.log10(np.square(noise.astype(np.float64)).sum()) for noise in noises]
+    assert isinstance(TOM.strings, Drums)
+    drum = TOM.strings.drums[0]
+    step_db = 20 * np.log10(drum.hardest_m_s / drum.softest_m_s) * 30 / 126
+    np.testing.assert_allclose(np.diff(levels_db), step_db, atol=1.0)
+
+
+def test_comparisons_of_drums_are_without_noise_and_each_source_has_the_same() -> None:
+    loud, quiet = KIT.with_value("noise.onset_db", 0.0), without_noise(KIT)
+    np.testing.assert_array_equal(rendered(loud, 47, source="difference"), rendered(quiet, 47, source="difference"))
+    model, truth = (rendered(loud, 47, source=each) - rendered(quiet, 47, source=each) for each in ("model", "truth"))
+    np.testing.assert_allclose(model, truth, atol=1e-6)
+    assert np.abs(model).max() > 0.01

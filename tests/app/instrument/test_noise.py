@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from app.instrument.compiled import InstrumentPlayer
-from app.instrument.events import KEYS, SOUND_OFF, Controller, NoteOff, NoteOn, TimedEvent
-from app.instrument.offline import render_events
-from app.patches.patch import Damping, Noise, Patch
+from app.instrument.events import KEYS, LEGATO, SOUND_OFF, SUSTAIN, Controller, Event, NoteOff, NoteOn, TimedEvent
+from app.instrument.offline import render_events, render_note
+from app.patches.library import SHIPPED, PatchEntry, list_patches
+from app.patches.patch import Damping, Fretted, Noise, Patch
 from engine.contact import CONTACTS
 from engine.kernels import playing_layout as of
 from engine.kernels.playing_layout import PART_S, WANTED_DB
@@ -90,6 +91,96 @@ def test_the_same_strokes_have_the_same_noise_and_others_another(patch: Patch, p
         first, second = noise[:2_000], noise[4_800:6_800]
         difference = np.square(first - second).sum() / np.square(first).sum()
         assert difference < 1e-6 if alike else difference > 0.3
+
+
+def tick(patch: Patch, preset: Preset, kind: str, *events: tuple[float, Event], level_db: float = -6.0) -> float:
+    """Energy of the noise of releases in these events, re a note's."""
+    sounds = []
+    for each in (noisy(patch, kind=kind, release_db=level_db), patch):
+        timed = [TimedEvent(*event) for event in events]
+        blocks = render_events(each, preset, timed, RATE_HZ, seconds=events[-1][0] + 0.4, limited=False)
+        sounds.append(np.concatenate(list(blocks))[:, 0].astype(np.float64))
+    return energy_db(sounds[0] - sounds[1])
+
+
+def level_db(patch: Patch, preset: Preset, velocity: int, time_s: float) -> float:
+    """Of a key that is held: over 20 ms."""
+    blocks = render_events(patch, preset, [TimedEvent(0.0, NoteOn(KEY, velocity))], RATE_HZ, seconds=time_s + 0.02)
+    part = np.concatenate(list(blocks))[round(time_s * RATE_HZ) :, 0].astype(np.float64)
+    return float(10 * np.log10(np.square(part).mean()))
+
+
+@pytest.mark.parametrize("kind", [kind for kind in CONTACTS if kind != "quill"])
+def test_what_lands_on_a_string_is_as_loud_as_its_motion(patch: Patch, preset: Preset, kind: str) -> None:
+    """By velocity, by time, and by a pedal that keeps the string ringing."""
+    found = {}
+    for velocity in (127, 64, 30, 10):
+        for time_s in (0.1, 0.5, 2.0):
+            on, off = (0.0, NoteOn(KEY, velocity)), (time_s, NoteOff(KEY))
+            found[velocity, time_s] = tick(patch, preset, kind, on, off)
+            expected = level_db(patch, preset, velocity, time_s) - level_db(patch, preset, 127, 0.1)
+            assert found[velocity, time_s] - found[127, 0.1] == pytest.approx(expected, abs=2.0)
+    kept = (
+        (0.0, Controller(SUSTAIN, 127)),
+        (0.0, NoteOn(KEY, 127)),
+        (0.1, NoteOff(KEY)),
+        (2.0, Controller(SUSTAIN, 0)),
+    )
+    assert tick(patch, preset, kind, *kept) == pytest.approx(found[127, 2.0], abs=0.5)
+
+
+def test_a_mechanism_falls_alike_on_every_string(patch: Patch, preset: Preset) -> None:
+    found = [
+        tick(patch, preset, "quill", (0.0, NoteOn(KEY, velocity)), (time_s, NoteOff(KEY)))
+        for velocity, time_s in ((10, 0.1), (127, 0.1), (64, 2.0))
+    ]
+    assert max(found) - min(found) < 0.1
+
+
+def test_what_lands_on_a_string_at_rest_is_hardly_heard(patch: Patch, preset: Preset) -> None:
+    string = patch.strings.string  # type: ignore[union-attr]
+    dull = string.model_copy(update={"damping_d1_kg_m_s": 400 * string.damping_d1_kg_m_s})
+    patch = patch.model_copy(update={"strings": Fretted(string=dull)})
+    at_once, late = (
+        tick(patch, preset, "finger", (0.0, NoteOn(KEY, 127)), (time_s, NoteOff(KEY))) for time_s in (0.01, 0.4)
+    )
+    assert level_db(patch, preset, 127, 0.4) < level_db(patch, preset, 127, 0.01) - 50
+    assert -36 < late - at_once < -28  # there is a floor
+
+
+def test_a_finger_that_moves_along_a_string_lands_on_its_motion(patch: Patch, preset: Preset) -> None:
+    """Legato; a course has one noise."""
+    legato, found = (0.0, Controller(LEGATO, 127)), []
+    for velocity in (30, 110):
+        pulled_on = (legato, (0.0, NoteOn(KEY, velocity)), (0.2, NoteOn(KEY + 2, velocity)))
+        found.append(tick(patch, preset, "finger", *pulled_on))
+    quieter = patch.pluck.pluck(30).amplitude_mm / patch.pluck.pluck(110).amplitude_mm
+    assert found[0] - found[1] == pytest.approx(20 * np.log10(quieter), abs=1.5)
+
+
+def test_a_repeated_key_has_the_release_of_its_latest_stroke(patch: Patch, preset: Preset) -> None:
+    soft, hard = (NoteOn(KEY, velocity) for velocity in (20, 110))
+    off = (0.3, NoteOff(KEY))
+    after = tick(patch, preset, "finger", (0.0, hard), (0.2, soft), off)
+    alone = tick(patch, preset, "finger", (0.2, soft), off)
+    assert after == pytest.approx(alone, abs=0.5)
+
+
+RELEASED = [entry for entry in list_patches(SHIPPED)[0] if entry.patch.noise.release_db > -60]
+
+
+@pytest.mark.parametrize("entry", RELEASED, ids=lambda entry: entry.name)
+def test_no_instrument_releases_louder_than_it_plays(entry: PatchEntry, preset: Preset) -> None:
+    """At any velocity the tick is well below its note."""
+    dry = entry.patch.with_value("room.mix", 0.0)
+    key, frames = sum(dry.range) // 2, round(0.03 * RATE_HZ)
+    for velocity in (10, 30, 127):
+        note, silent = (
+            render_note(each, preset, key, velocity, 0.15, 0.4, RATE_HZ).astype(np.float64).mean(1)
+            for each in (dry, dry.with_value("noise.release_db", -60.0))
+        )
+        loudest = [np.convolve(part**2, np.ones(frames)).max() for part in (note - silent, silent)]
+        assert 10 * np.log10(loudest[0] / loudest[1]) < -5.0
 
 
 def test_strings_that_are_let_ring_have_no_noise_of_release(patch: Patch, preset: Preset) -> None:

@@ -10,9 +10,11 @@ import pytest
 
 from app.instrument.drum_keys import DrumKeys, block_of
 from app.instrument.glide import glides_cents
+from app.instrument.offline import render_note
 from app.instrument.strings import KeyString, Strings, pitch_hz_of
+from app.patches.drums import Drums
 from app.patches.library import SHIPPED, file_stem, list_patches
-from app.patches.patch import CATEGORIES, Patch
+from app.patches.patch import CATEGORIES, Noise, Patch
 from app.patches.tuning import Tuning
 from engine.excitation import blow_factor
 from engine.presets import load_preset
@@ -137,3 +139,18 @@ def test_macros_stand_where_the_fields_are(patch: Patch) -> None:
             assert low.value(target.field) != high.value(target.field)
         if [target.field for target in macro.targets] in (["body.mix"], ["room.mix"]):
             assert macro.value == patch.value(macro.targets[0].field), "one number for one thing"
+
+
+@pytest.mark.parametrize("patch", PATCHES, ids=lambda patch: patch.name)
+def test_soft_strokes_are_heard_on_every_key(patch: Patch) -> None:
+    """Velocity 30 is 3 to 25 dB below velocity 100, on low and high keys alike."""
+    quiet = patch.with_value("room.mix", 0.0).model_copy(update={"noise": Noise()})
+    low, high = patch.range
+    keys = [low, low + (high - low) // 3, high - (high - low) // 3, high]
+    if isinstance(patch.strings, Drums) and patch.strings.keys == "pads":
+        keys = [drum.note for drum in patch.strings.drums]
+    preset, tuning = load_preset(PRESETS / f"{patch.preset}.safetensors"), Tuning(patch.tuning)
+    for key in keys:
+        if tuning.mapped(key):
+            soft, loud = (render_note(quiet, preset, key, velocity, 0.4, 0.4, 48_000) for velocity in (30, 100))
+            assert -25 < 10 * math.log10(np.square(soft).sum() / np.square(loud).sum()) < -3
