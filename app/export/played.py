@@ -134,7 +134,7 @@ class PlayedExport:
         """The MIDI file is there at once; the sound takes a part of the time in which it was played."""
         played, (sound_file, midi_file) = self.played, recorded_files(self.path)
         with whole_file(midi_file) as file:
-            file.write(midi_bytes(played.events))
+            file.write(midi_bytes(played.events, played.patch))
         whole_s = played.events[-1].time_s + TAIL_S
         written = write_played(
             sound_file,

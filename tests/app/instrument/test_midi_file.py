@@ -61,10 +61,16 @@ def test_a_patch_that_was_turned_is_no_midi(patch: Patch) -> None:
 
 
 def test_what_strings_do_not_answer_is_left_out() -> None:
-    assert event_of(mido.Message("clock")) is None
-    assert event_of(mido.Message("program_change", program=3)) is None
-    assert event_of(mido.Message("pitchwheel", pitch=-8192)) == Bend(-1.0)
-    assert event_of(mido.Message("pitchwheel", pitch=8191)) == Bend(1.0)
+    def event(kind: str, **facts: int) -> object:
+        return event_of(mido.Message(kind, **facts).bytes())
+
+    assert event("clock") is None
+    assert event("program_change", program=3) is None
+    assert event("polytouch", note=3, value=4) is None
+    assert event("pitchwheel", pitch=-8192) == Bend(-1.0)
+    assert event("pitchwheel", pitch=8191) == Bend(1.0)
+    assert event("note_on", note=3, velocity=0, channel=4) == NoteOff(3, 4)
+    assert event("control_change", control=121, value=127) == Controller(121, 0)  # other values are the program's own
 
 
 @pytest.mark.parametrize(
@@ -75,7 +81,10 @@ def test_what_strings_do_not_answer_is_left_out() -> None:
         (midi_bytes(PLAYED)[:40], "no MIDI file"),
         (midi_bytes([]), "no note"),
         (b"MThd\0\0\0\6\0\0\0\1\0\0MTrk\0\0\0\4\0\xff\x2f\0", "no"),
-        (midi_bytes(PLAYED)[:12] + b"\xe7\x28" + midi_bytes(PLAYED)[14:], "SMPTE"),  # its times were negative
+        (midi_bytes(PLAYED)[:12] + b"\xd0\x28" + midi_bytes(PLAYED)[14:], "frames at a rate"),
+        (midi_bytes(PLAYED)[:12] + b"\xe7\x00" + midi_bytes(PLAYED)[14:], "frames at a rate"),
+        (midi_bytes(PLAYED)[:12] + b"\0\0" + midi_bytes(PLAYED)[14:], "division of 0"),
+        (b"RIFF\x0c\0\0\0RMIDLIST\0\0\0\0", "no chunk of data"),
         (midi_bytes([TimedEvent(4000.0, NoteOn(1, 1))]), "an hour"),
     ],
 )
@@ -92,7 +101,7 @@ def test_a_huge_file_is_not_read(tmp_path: Path) -> None:
     file = tmp_path / "huge.mid"
     with file.open("wb") as out:
         out.truncate(100 * 2**20)
-    with pytest.raises(MidiFileError, match="1 MiB"):
+    with pytest.raises(MidiFileError, match="4 MiB"):
         read_midi(file)
 
 
