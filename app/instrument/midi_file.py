@@ -67,6 +67,11 @@ class Song:
     events: list[TimedEvent]
     left_out: str
 
+    @property
+    def length_s(self) -> float:
+        """The time of the last note or release."""
+        return max(each.time_s for each in self.events if isinstance(each.event, NoteOn | NoteOff))
+
 
 def event_of(message: Sequence[int]) -> Event | None:
     """The event of a whole message of MIDI, by its bytes; None for kinds that no patch plays."""
@@ -213,7 +218,7 @@ def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes
     """The bytes of a MIDI file of one track; times are rounded to 1/1920 s, and changes of the patch left out.
 
     Args:
-        patch: with which it was played, whose range of bends each channel that is used has; None: no range is written.
+        patch: with which it was played; each channel has its range of bends (RPN 0). None: no range is written.
     """
     import mido
 
