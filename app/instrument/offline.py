@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -146,7 +147,7 @@ def render_events(
         yield from play_until(end, [each for each in events if each.time_s < seconds])
         return
     yield from play_until(0, events[:played])
-    left = events[played:]  # as a pedal that is lifted: what rings follows them, and they keep nothing ringing
+    left = deque(events[played:])  # as a pedal that is lifted: what rings follows them, and they keep nothing ringing
     last = done + round(LONGEST_TAIL_S * rate_hz)
     quiet = 10 ** (SILENT_DB / 20)
     quiet_s = 0.0  # until all effects have died away as well
@@ -154,8 +155,9 @@ def render_events(
     while done < last and quiet_s <= stage.tail_s:
         before = done
         end = min(last, done + BLOCK_FRAMES)
-        now = [each for each in left if round(each.time_s * rate_hz) < end]
-        left = left[len(now) :]
+        now = []
+        while left and round(left[0].time_s * rate_hz) < end:
+            now.append(left.popleft())
         made = list(play_until(end, now))
         loudest = max((float(np.abs(block).max(initial=0.0)) for block in made), default=0.0)
         waiting += made
