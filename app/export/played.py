@@ -17,6 +17,7 @@ from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.shared.worker import Progress
+from engine.plain_text import name_text
 from engine.presets import Preset, load_preset, preset_digest
 from engine.result_file import whole_file
 
@@ -88,7 +89,7 @@ def write_played(
         difference_gain_db=difference_gain_db if source == DIFFERENCE else 0.0,
         rate_hz=rate_hz,
         bits=settings.bits,
-        midi=midi,
+        midi=name_text(midi),
         recorded=None if recorded is None else recorded.isoformat(timespec="seconds"),
     )
     with whole_file(path) as file:
@@ -99,7 +100,7 @@ def write_played(
         for block in blocks:
             sound.append(block)
         tags = {
-            "title": f"{path.stem}: {patch.name}",
+            "title": name_text(f"{path.stem}: {patch.name}"),
             "software": f"{PROGRAM} {program_version()}",
             "comment": origin.model_dump_json(),
         }

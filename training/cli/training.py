@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from engine.plain_text import duration
+from engine.plain_text import duration, name_text
 from training.cli.arguments import Cache, Device, Runs
 from training.cli.console import Failure, number, progress, say
 
@@ -56,7 +56,7 @@ def train(
     from training.cell import Cell, load
     from training.run import default_runs, run_row
 
-    configuration, name = load(config), Path(config).stem
+    configuration, name = load(config), name_text(Path(config).stem)
     if seed is not None and seed != configuration.recipe.seed:
         name += f"_seed{seed}"
         if (cell := Cell.parse(config)) is None:
