@@ -69,7 +69,7 @@ def other_message(draw: random.Random) -> bytes:
 
 
 def written(draw: random.Random, loose: bool = False) -> Written:
-    """A file's tracks. `loose`: running status goes on across other messages, which the standard forbids."""
+    """A file's tracks. `loose`: running status continues across other messages, which the standard forbids."""
     rate = draw.choice((24, 25, 29, 30))
     found = Written(
         draw.choice((1, 24, 96, 480, 960, 32_767, 0x8000 | (256 - rate) << 8 | draw.choice((1, 40, 100))))
