@@ -54,7 +54,7 @@ COMMANDS: dict[str, tuple[str, ...]] = {
     ),
     "sampled": ("sampled", "{}.json", "{} out.sfz", "--keys", "57-57", "--layers", "1", "--seconds", "0.2"),
     "simulate": ("simulate", "{}.npy", "{} out.npy", "--string", "linear", "--steps", "10", "--rate", "4000"),
-    "compare": ("compare", "{}.safetensors", "--steps", "20", "--position", "0.3", "--amplitude-mm", "2"),
+    "compare": ("compare", "{}.safetensors", "--seconds", "0.1", "--position", "0.3", "--amplitude-mm", "2"),
     "plugin": ("plugin", "{}.json", "--dry-run"),
     "instruments": ("instruments", "{}.json"),
 }
