@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from engine.plain_text import name_text
+
 FOLDER_VARIABLE = "LEARNED_STRINGS_PRESETS"
 
 
@@ -25,5 +27,5 @@ def usable_files() -> list[Path]:
     from engine.presets import finding
 
     folders = (user_folder(), finding.SHIPPED)
-    files = {path.stem: path for folder in folders for path in finding.preset_files(folder)}
+    files = {name_text(path.stem): path for folder in folders for path in finding.preset_files(folder)}
     return [files[name] for name in sorted(files)]

@@ -26,6 +26,11 @@ def one_line(text: str, most: int = LONGEST_MESSAGE) -> str:
     return f"{line[: most - end - 3].rstrip()} … {line[-end:].lstrip()}"
 
 
+def name_text(name: str) -> str:
+    """A file's name as text that can be written anywhere: bytes of it that are no characters become "�"."""
+    return "".join("\ufffd" if "\ud800" <= c <= "\udfff" else c for c in name)
+
+
 def duration(seconds: float) -> str:
     """A duration in words, such as "25 ms", "0.25 s", "8.24 s", "32 s", "3 min 20 s", "2 h 5 min"."""
     if seconds < 59.5:

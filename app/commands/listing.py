@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from engine.plain_text import name_text
 from training.cli.arguments import Json
 from training.cli.console import print_json, print_table, say
 
@@ -108,7 +109,7 @@ def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
 
     info = read_info(path)
     return {
-        "name": path.stem,
+        "name": name_text(path.stem),
         "model": info.model,
         "string": info.string_kind,
         "initial": info.initial,

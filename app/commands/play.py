@@ -60,7 +60,7 @@ def play(
     from app.instrument.offline import LONGEST_TAIL_S
 
     began_s = time.monotonic()
-    whole_s = seconds if seconds is not None else song.events[-1].time_s + LONGEST_TAIL_S / 10
+    whole_s = seconds if seconds is not None else song.length_s + LONGEST_TAIL_S / 10
     with progress(f"{midi.name} by {chosen.name}") as report:
         written = write_played(
             out,

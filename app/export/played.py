@@ -17,6 +17,7 @@ from app.patches.patch import Patch
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
 from app.shared.worker import Progress
+from engine.plain_text import name_text
 from engine.presets import Preset, load_preset, preset_digest
 from engine.result_file import whole_file
 
@@ -88,7 +89,7 @@ def write_played(
         difference_gain_db=difference_gain_db if source == DIFFERENCE else 0.0,
         rate_hz=rate_hz,
         bits=settings.bits,
-        midi=midi,
+        midi=name_text(midi),
         recorded=None if recorded is None else recorded.isoformat(timespec="seconds"),
     )
     with whole_file(path) as file:
@@ -99,7 +100,7 @@ def write_played(
         for block in blocks:
             sound.append(block)
         tags = {
-            "title": f"{path.stem}: {patch.name}",
+            "title": name_text(f"{path.stem}: {patch.name}"),
             "software": f"{PROGRAM} {program_version()}",
             "comment": origin.model_dump_json(),
         }
@@ -134,7 +135,7 @@ class PlayedExport:
         """The MIDI file is there at once; the sound takes a part of the time in which it was played."""
         played, (sound_file, midi_file) = self.played, recorded_files(self.path)
         with whole_file(midi_file) as file:
-            file.write(midi_bytes(played.events))
+            file.write(midi_bytes(played.events, played.patch))
         whole_s = played.events[-1].time_s + TAIL_S
         written = write_played(
             sound_file,

@@ -17,7 +17,7 @@ from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, Bits, Pickup, PlayedSource, Source
 from engine.bounds import HIGHEST_RATE_HZ, SIZES
-from engine.plain_text import one_line
+from engine.plain_text import name_text, one_line
 from engine.pluck import FULL_SCALE_M, Pluck
 from engine.presets import Preset, PresetError, of_string, preset_digest
 from engine.resonators.string import StringParameters
@@ -248,7 +248,7 @@ def preset_of(recipe: Recipe | InstrumentSound, presets: Iterable[Path]) -> tupl
         except PresetError:
             continue  # the list of presets reports those that cannot be read
     for path in paths:
-        if path.stem == recipe.preset:
+        if name_text(path.stem) == recipe.preset:
             return path, False
     raise RecipeError(
         f"the preset {recipe.preset} of this recipe is not here; get its file and add it, then try again"

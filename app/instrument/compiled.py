@@ -14,7 +14,19 @@ from numpy.typing import NDArray
 
 from app.instrument import events
 from app.instrument.drum_keys import DrumKeys
-from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
+from app.instrument.events import (
+    COARSE_TUNING,
+    FINE_TUNING,
+    Bend,
+    Controller,
+    Event,
+    NoteOff,
+    NoteOn,
+    PatchTurned,
+    PluckAt,
+    bend_range,
+    parameter_set,
+)
 from app.instrument.string_keys import StringKeys
 from app.instrument.table import programs_of, strings_of, table_of, wheeled
 from app.patches.drums import Drums
@@ -132,16 +144,16 @@ class InstrumentPlayer:
         for number in range(of.CHANNELS):
             channel = self.compiled.channel(number)
             if channel.range_semitones is not None:
-                semitones, cents = divmod(round(100 * channel.range_semitones), 100)
-                for controller, value in (
-                    (events.REGISTERED, 0),
-                    (events.FINE_REGISTERED, 0),
-                    (events.VALUE, semitones),
-                    (events.FINE_VALUE, cents),
-                    (events.REGISTERED, 127),
-                    (events.FINE_REGISTERED, 127),
-                ):
-                    found.append(Controller(controller, value, number))
+                found += bend_range(channel.range_semitones, number)
+            if channel.fine_tuning:
+                steps = channel.fine_tuning + of.TUNING_STEPS
+                found += parameter_set(FINE_TUNING, steps // 128, steps % 128, number)
+            if channel.coarse_tuning:
+                found += parameter_set(COARSE_TUNING, channel.coarse_tuning + 64, 0, number)
+            if channel.volume != of.USUAL_VOLUME:
+                found.append(Controller(events.VOLUME, channel.volume, number))
+            if channel.expression != 127:
+                found.append(Controller(events.EXPRESSION, channel.expression, number))
             if channel.bend:
                 found.append(Bend(channel.bend, number))
             if channel.pedal:

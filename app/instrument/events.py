@@ -8,12 +8,20 @@ from dataclasses import dataclass
 from app.patches.patch import Patch
 from engine.pluck import Pluck
 
-SLIDE_TIME, PORTAMENTO, SOFT, LEGATO = 5, 65, 67, 68
+SLIDE_TIME, VOLUME, EXPRESSION, PORTAMENTO, SOFT, LEGATO = 5, 7, 11, 65, 67, 68
 HARMONICS, TREMOLO, STRUM = 80, 81, 82  # MIDI's general-purpose buttons
 SUSTAIN, MOD_WHEEL, SLIDE, SOUND_OFF, RESET, NOTES_OFF = 64, 1, 74, 120, 121, 123  # numbers of MIDI controllers
 SWITCHES = (LEGATO, PORTAMENTO, SLIDE_TIME, HARMONICS, TREMOLO, STRUM)  # how keys are played
-VALUE, FINE_VALUE = 6, 38  # of the parameter that these choose: registered ones (RPN), and others
+VALUE, FINE_VALUE, INCREMENT, DECREMENT = (
+    6,
+    38,
+    96,
+    97,
+)  # of the parameter that these choose: registered ones (RPN), and others
 REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER = 101, 100, 99, 98
+BEND_RANGE, FINE_TUNING, COARSE_TUNING, NO_PARAMETER = 0, 1, 2, 127  # registered ones
+SETS_PARAMETER = (VALUE, FINE_VALUE, INCREMENT, DECREMENT)
+AT_REST = 127  # value of `RESET` with which nothing stays, of what MIDI's own, 0, leaves: ranges, tuning, volume
 PEDAL_DOWN = 64  # from this value on
 _PARAMETER = "chooses or sets a parameter, as the bend range"
 _FIXED = {  # functions of controllers that no patch changes; those from 120 on are MIDI's channel mode messages
@@ -25,7 +33,8 @@ _FIXED = {  # functions of controllers that no patch changes; those from 120 on 
     HARMONICS: "is the footswitch of harmonics",
     TREMOLO: "is the footswitch of tremolo",
     STRUM: "is the footswitch of strums",
-    **dict.fromkeys((VALUE, FINE_VALUE, REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER), _PARAMETER),
+    **dict.fromkeys(SETS_PARAMETER, _PARAMETER),
+    **dict.fromkeys((REGISTERED, FINE_REGISTERED, OTHER, FINE_OTHER), _PARAMETER),
     **dict.fromkeys(range(SOUND_OFF, 128), "stops or resets what is played"),
 }
 LONGEST_RECORDING = 100_000  # events
@@ -96,6 +105,11 @@ def fixed_function(number: int) -> str:
     return _FIXED.get(number, "")
 
 
+def is_obeyed(number: int) -> bool:
+    """Whether a controller does anything without being assigned."""
+    return bool(fixed_function(number)) or number in (MOD_WHEEL, VOLUME, EXPRESSION, SLIDE)
+
+
 def moves_effects(event: object, patch: Patch) -> bool:
     """Whether it changes a patch's body or room."""
     if isinstance(event, Controller):
@@ -116,25 +130,45 @@ def release_all(channels: Iterable[int]) -> list[Event]:
     events: list[Event] = []
     for channel in sorted(channels):
         events += [Controller(SUSTAIN, 0, channel), Bend(0.0, channel)]
-        events += [Controller(RESET, 0, channel), Controller(NOTES_OFF, 0, channel)]
+        events += [Controller(RESET, AT_REST, channel), Controller(NOTES_OFF, 0, channel)]
     return events
 
 
+def parameter_set(number: int, value: int, fine_value: int, channel: int) -> list[Event]:
+    """The events that set a registered parameter of a channel, and then choose none."""
+    messages = (
+        (REGISTERED, 0),
+        (FINE_REGISTERED, number),
+        (VALUE, value),
+        (FINE_VALUE, fine_value),
+        (REGISTERED, NO_PARAMETER),
+        (FINE_REGISTERED, NO_PARAMETER),
+    )
+    return [Controller(controller, each, channel) for controller, each in messages]
+
+
+def bend_range(semitones: float, channel: int) -> list[Event]:
+    """The events that set the range of a channel's bends."""
+    return parameter_set(BEND_RANGE, *divmod(round(100 * semitones), 100), channel)
+
+
 def releases_for(events: Iterable[Event]) -> list[Event]:
-    """The events that release the keys and pedals that are down after these events."""
-    down: dict[NoteOff | Controller, None] = {}  # in their order
+    """The events that release the keys and pedals that are down after these events: one for each stroke of a key."""
+    down: dict[NoteOff | Controller, int] = {}  # strokes without a release, in the order of the latest
     for event in events:
         if isinstance(event, NoteOn | NoteOff):
             off = NoteOff(event.key, event.channel, event.string)
-            down.pop(off, None)
-            if isinstance(event, NoteOn) and event.velocity > 0:
-                down[off] = None
+            strokes = down.pop(off, 0)
+            struck = isinstance(event, NoteOn) and event.velocity > 0
+            strokes = (1 if event.string is not None else strokes + 1) if struck else strokes - 1
+            if strokes > 0:
+                down[off] = strokes
         elif isinstance(event, Controller) and event.number == SUSTAIN:
             up = Controller(SUSTAIN, 0, event.channel)
             down.pop(up, None)
             if event.value >= PEDAL_DOWN:
-                down[up] = None
-    return list(down)
+                down[up] = 1
+    return [event for event, count in down.items() for _ in range(count)]
 
 
 @dataclass(frozen=True)

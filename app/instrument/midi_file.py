@@ -1,16 +1,22 @@
-"""MIDI files, through mido: read as events, and written from events."""
+"""MIDI files: read as events, and written from events, through mido."""
 
 from __future__ import annotations
 
 import contextlib
 import io
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from app.instrument.compiled import is_another
 from app.instrument.events import (
+    AT_REST,
     KEYS,
+    RESET,
+    SETS_PARAMETER,
+    VOLUME,
     Bend,
     Controller,
     Event,
@@ -19,21 +25,27 @@ from app.instrument.events import (
     PatchTurned,
     PluckAt,
     TimedEvent,
+    bend_range,
     channels_in,
+    is_obeyed,
 )
-from app.instrument.midi_chunks import checked_chunks
+from app.instrument.midi_messages import MidiMessages, NotMidi, read_messages
 from app.instrument.strings import Strings
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
+from engine.kernels.playing_layout import USUAL_VOLUME
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
 
-LARGEST_BYTES = 2**20
-MOST_EVENTS = 80_000
+LARGEST_BYTES = 4 * 2**20
+MOST_EVENTS = 400_000  # an hour of 50 notes a second, with releases
 LONGEST_S = 3_600.0
+AFTER_LAST_NOTE_S = 60.0  # later than a song's last note by more, no event counts
 TICKS, TEMPO = 960, 500_000  # of a quarter note; µs
 BEND_STEPS = 8_192
+NOTE_OFF, NOTE_ON, CONTROLLER, PROGRAM, BEND = 0x80, 0x90, 0xB0, 0xC0, 0xE0  # kinds of messages
+MEMBER_SEMITONES = 48.0  # range of bends of MPE's members
 DRUMS = 9  # General MIDI's channel 10
 
 
@@ -55,84 +67,91 @@ class Song:
     events: list[TimedEvent]
     left_out: str
 
+    @property
+    def length_s(self) -> float:
+        """The time of the last note or release."""
+        return max(each.time_s for each in self.events if isinstance(each.event, NoteOn | NoteOff))
 
-def event_of(message: Any) -> Event | None:
-    """The event of a message of mido's; None for kinds that no patch plays."""
-    if message.type == "note_on":
-        if message.velocity == 0:
-            return NoteOff(message.note, message.channel)
-        return NoteOn(message.note, message.velocity, message.channel)
-    if message.type == "note_off":
-        return NoteOff(message.note, message.channel)
-    if message.type == "pitchwheel":
-        return Bend(
-            message.pitch / BEND_STEPS if message.pitch < 0 else message.pitch / (BEND_STEPS - 1), message.channel
-        )
-    if message.type == "control_change":
-        return Controller(message.control, message.value, message.channel)
+
+def event_of(message: Sequence[int]) -> Event | None:
+    """The event of a whole message of MIDI, by its bytes; None for kinds that no patch plays."""
+    if len(message) < 3:
+        return None
+    kind, channel = message[0] & 0xF0, message[0] & 0x0F
+    one, two = message[1] & 0x7F, message[2] & 0x7F
+    if kind == NOTE_ON and two > 0:
+        return NoteOn(one, two, channel)
+    if kind in (NOTE_ON, NOTE_OFF):
+        return NoteOff(one, channel)
+    if kind == BEND:
+        steps = one + 128 * two - BEND_STEPS
+        return Bend(steps / BEND_STEPS if steps < 0 else steps / (BEND_STEPS - 1), channel)
+    if kind == CONTROLLER:
+        return Controller(one, 0 if one == RESET else two, channel)
     return None
 
 
 def read_midi(path: Path) -> list[TimedEvent]:
-    """The events of all tracks, in the order of their times in s.
+    """The events of all tracks, in the order of their times in s, until a minute after the last note.
 
     Raises:
         MidiFileError: it is missing, damaged, too large or too long, or holds no note.
     """
-    import mido
+    return _events_of(path, _messages_in(path))
 
+
+def _messages_in(path: Path) -> MidiMessages:
     try:
-        raw = checked_chunks(read_bounded(path, LARGEST_BYTES), MOST_EVENTS)
+        return read_messages(read_bounded(path, LARGEST_BYTES), MOST_EVENTS)
     except UnusableFile as error:
         raise MidiFileError(f"{path}: {error.strerror}; give a smaller MIDI file") from error
     except OSError as error:
         raise MidiFileError(f"{path}: cannot be read ({error.strerror}); check the name") from error
-    except ValueError as error:
+    except NotMidi as error:
         raise MidiFileError(f"{path}: {error}; save it again as .mid, or give a shorter one") from error
+
+
+def _events_of(path: Path, messages: MidiMessages) -> list[TimedEvent]:
     found: list[TimedEvent] = []
-    try:
-        song = mido.MidiFile(file=io.BytesIO(raw))
-        if song.ticks_per_beat < 1:  # mido reads a count of frames as a negative number
-            raise MidiFileError(f"{path}: counts frames, not beats (SMPTE); save it with ticks a beat")
-        for time_s, message in _in_time(song):
-            if not time_s <= LONGEST_S:
-                raise MidiFileError(f"{path}: more than an hour of music; give a shorter MIDI file")
-            if (event := event_of(message)) is not None:
-                found.append(TimedEvent(time_s, event))
-    except MidiFileError:
-        raise
-    except Exception as error:  # mido raises many kinds for damaged files
-        raise MidiFileError(
-            f"{path}: is no MIDI file that can be read ({type(error).__name__}: {error}); save it again as .mid"
-        ) from error
-    if not any(isinstance(each.event, NoteOn) for each in found):
+    notes, last_note_s = False, 0.0
+    for time_s, message in messages.timed:
+        if (event := event_of(message)) is None:
+            continue
+        found.append(TimedEvent(time_s, event))
+        if isinstance(event, NoteOn | NoteOff):
+            notes, last_note_s = notes or isinstance(event, NoteOn), time_s
+    if not notes:
         raise MidiFileError(f"{path}: holds no note; give a MIDI file with notes")
+    if not last_note_s <= LONGEST_S:
+        raise MidiFileError(f"{path}: more than an hour of music; give a shorter MIDI file")
+    while found[-1].time_s > min(last_note_s + AFTER_LAST_NOTE_S, LONGEST_S):
+        found.pop()
     return found
 
 
-def _in_time(song: Any) -> Iterator[tuple[float, Any]]:
-    """The messages of all tracks in the order of their times, which are in s.
+def _ignored(messages: MidiMessages) -> list[str]:
+    """In words, which messages change nothing here."""
+    found = []
+    if messages.missing_tracks:
+        found.append(f"{_count(messages.missing_tracks, 'track')} that its header counts")
+    if messages.skipped:
+        found.append(f"{_count(messages.skipped, 'message')} of a key or a controller above 127")
+    if messages.clipped:
+        found.append(f"what exceeds 127 in {_count(messages.clipped, 'message')}")
+    sent = Counter(
+        message[1] if message[0] & 0xF0 == CONTROLLER else -1
+        for _, message in messages.timed
+        if message[0] & 0xF0 in (CONTROLLER, PROGRAM)
+    )
+    if sent.pop(-1, 0):
+        found.append("its program changes")
+    if unknown := [str(number) for number in sorted(sent) if not is_obeyed(number)]:
+        found.append(f"its controller{'s' if len(unknown) > 1 else ''} {', '.join(unknown)}")
+    return found
 
-    mido's own way through a song copies each message three times, and takes twice as long.
-    """
-    import mido
 
-    if song.type == 2:
-        raise ValueError("its tracks are songs of their own (type 2)")
-    ticked: list[tuple[int, Any]] = []
-    for track in song.tracks:
-        tick = 0
-        for message in track:
-            tick += message.time
-            ticked.append((tick, message))
-    ticked.sort(key=lambda each: each[0])  # of one time: in the order of the tracks
-    time_s, before, tempo = 0.0, 0, TEMPO
-    for tick, message in ticked:
-        time_s += mido.tick2second(tick - before, song.ticks_per_beat, tempo)
-        before = tick
-        if message.type == "set_tempo":
-            tempo = message.tempo
-        yield time_s, message
+def _count(count: int, noun: str) -> str:
+    return f"{count} {noun}{'' if count == 1 else 's'}"
 
 
 def read_song(path: Path, patch: Patch | None) -> Song:
@@ -144,13 +163,16 @@ def read_song(path: Path, patch: Patch | None) -> Song:
     Raises:
         MidiFileError: as `read_midi`; or it holds only drums.
     """
-    timed, mode = read_midi(path), patch.mode if patch is not None else "poly"
+    messages = _messages_in(path)
+    timed, mode = _events_of(path, messages), patch.mode if patch is not None else "poly"
+    ignored = _ignored(messages)
     notes_on = {each.event.channel for each in timed if isinstance(each.event, NoteOn)}
     pads = patch is not None and isinstance(patch.strings, Drums) and patch.strings.keys == "pads"
     drums = set() if mode == "mpe" else notes_on & {DRUMS}
     if pads and drums:
         timed = [each for each in timed if channels_in([each.event]) in (drums, set())]
-        return _song(path, patch, timed, [f"its other channels ({len(notes_on) - 1})"] if len(notes_on) > 1 else [])
+        others = [f"its other channels ({len(notes_on) - 1})"] if len(notes_on) > 1 else []
+        return _song(path, patch, timed, others + ignored)
     if pads:
         drums = set()
     channels = notes_on - drums
@@ -160,7 +182,7 @@ def read_song(path: Path, patch: Patch | None) -> Song:
         timed = [each for each in timed if channels_in([each.event]) != drums]
     if mode == "guitar" and len(channels) == 1:
         timed = [replace(each, event=_on_keys(each.event)) for each in timed if channels_in([each.event]) == channels]
-    return _song(path, patch, timed, ["its drums (channel 10)"] if drums else [])
+    return _song(path, patch, timed, (["its drums (channel 10)"] if drums else []) + ignored)
 
 
 def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: list[str]) -> Song:
@@ -172,7 +194,11 @@ def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: li
         left_out.append(
             f"{silent} of its {len(keys)} notes, for which {patch.name} has no {sounding} ({low} to {high})"
         )
-    return Song(timed, f"{path.name} is played without {' and '.join(left_out)}" if left_out else "")
+    return Song(timed, f"{path.name} is played without {_listed(left_out)}" if left_out else "")
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join(filter(None, ("; ".join(words[:-1]), words[-1])))
 
 
 def _silent(patch: Patch, keys: Sequence[int]) -> int:
@@ -188,9 +214,16 @@ def _on_keys(event: Event) -> Event:
     return event if isinstance(event, PatchTurned | PluckAt) else replace(event, channel=KEYS)
 
 
-def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
-    """The bytes of a MIDI file of one track; times are rounded to 1/1920 s, and changes of the patch left out."""
+def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes:
+    """The bytes of a MIDI file of one track; times are rounded to 1/1920 s, and changes of the patch left out.
+
+    Args:
+        patch: with which it was played; each channel has its range of bends (RPN 0). None: no range is written.
+    """
     import mido
+
+    if patch is not None:
+        timed = _with_ranges(timed, patch)
 
     track = mido.MidiTrack([mido.MetaMessage("set_tempo", tempo=TEMPO)])
     tick = 0
@@ -204,6 +237,38 @@ def midi_bytes(timed: Sequence[TimedEvent]) -> bytes:
     buffer = io.BytesIO()
     file.save(file=buffer)
     return buffer.getvalue()
+
+
+def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
+    """The events with messages for the range of bends, where a channel has the patch's and not one of its own."""
+    channels, own, found = sorted(channels_in(each.event for each in timed)), set[int](), list[TimedEvent]()
+
+    def set_ranges(time_s: float, of: Iterable[int]) -> None:
+        for channel in of:
+            found.extend(TimedEvent(time_s, event) for event in bend_range(_bend_semitones(patch, channel), channel))
+
+    set_ranges(0.0, channels)
+    for each in sorted(timed, key=lambda one: one.time_s):
+        event, time_s = each.event, each.time_s
+        found.append(each)
+        if isinstance(event, PatchTurned):
+            if is_another(event.patch, patch):
+                own.clear()
+            moved = (event.patch.bend_semitones, event.patch.mode) != (patch.bend_semitones, patch.mode)
+            patch = event.patch
+            set_ranges(time_s, [channel for channel in channels if moved and channel not in own])
+        elif isinstance(event, Controller) and event.number in SETS_PARAMETER:
+            own.add(event.channel)
+        elif isinstance(event, Controller) and (event.number, event.value) == (RESET, AT_REST):
+            own.discard(event.channel)
+            set_ranges(time_s, [event.channel])
+            found.append(TimedEvent(time_s, Controller(VOLUME, USUAL_VOLUME, event.channel)))
+    return found
+
+
+def _bend_semitones(patch: Patch, channel: int) -> float:
+    member = patch.mode == "mpe" and channel not in (0, KEYS)
+    return MEMBER_SEMITONES if member else patch.bend_semitones
 
 
 def messages_of(event: Event) -> Iterable[Any]:
@@ -221,4 +286,5 @@ def messages_of(event: Event) -> Iterable[Any]:
         steps = BEND_STEPS if event.value < 0 else BEND_STEPS - 1
         yield mido.Message("pitchwheel", pitch=round(event.value * steps), channel=channel)
     elif isinstance(event, Controller):
-        yield mido.Message("control_change", control=event.number, value=event.value, channel=channel)
+        value = 0 if event.number == RESET else event.value
+        yield mido.Message("control_change", control=event.number, value=value, channel=channel)

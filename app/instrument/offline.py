@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
@@ -108,7 +109,8 @@ def render_events(
 
     Args:
         source: "model", "truth", or "difference": model minus truth with its gain, without body and room.
-        seconds: its length; None: until all has fallen below SILENT_DB, a minute after the last event at most.
+        seconds: its length; None: until all has fallen below SILENT_DB, a minute after the last note or release at
+            most, whatever controllers follow.
         limited: through the limiter, as it is heard; without it, samples may pass full scale.
         advanced: is called with the seconds rendered so far; may raise, to end it.
         varied: whether plucks vary from stroke to stroke, as the patch says; in a difference they never do.
@@ -121,6 +123,7 @@ def render_events(
     channels = channels_played(patch, timed)
     skipped = AHEAD if limited else 0  # the delay of the limiter
     done, events = 0, sorted(timed, key=lambda each: each.time_s)
+    played = max((place for place, each in enumerate(events) if _sounds(each.event)), default=-1) + 1
 
     def blocks_until(frame: int) -> Iterator[NDArray[np.float32]]:
         nonlocal done, skipped
@@ -132,22 +135,30 @@ def render_events(
                 yield cut
             advanced(done / rate_hz)
 
-    for each in events:
-        if seconds is not None and each.time_s >= seconds:
-            break
-        frame = round(each.time_s * rate_hz)
-        yield from blocks_until(frame // QUANTUM * QUANTUM)
-        stage.handle(each.event, frame)
+    def play_until(frame: int, few: Sequence[TimedEvent]) -> Iterator[NDArray[np.float32]]:
+        for each in few:
+            at = round(each.time_s * rate_hz)
+            yield from blocks_until(at // QUANTUM * QUANTUM)
+            stage.handle(each.event, at)
+        yield from blocks_until(frame)
+
     if seconds is not None:
-        yield from blocks_until(round(seconds * rate_hz) + (AHEAD if limited else 0))
+        end = round(seconds * rate_hz) + (AHEAD if limited else 0)
+        yield from play_until(end, [each for each in events if each.time_s < seconds])
         return
+    yield from play_until(0, events[:played])
+    left = deque(events[played:])  # as a pedal that is lifted: what rings follows them, and they keep nothing ringing
     last = done + round(LONGEST_TAIL_S * rate_hz)
     quiet = 10 ** (SILENT_DB / 20)
     quiet_s = 0.0  # until all effects have died away as well
     waiting: list[NDArray[np.float32]] = []  # silence, which ends the file unless a sound follows
     while done < last and quiet_s <= stage.tail_s:
         before = done
-        made = list(blocks_until(min(last, done + BLOCK_FRAMES)))
+        end = min(last, done + BLOCK_FRAMES)
+        now = []
+        while left and round(left[0].time_s * rate_hz) < end:
+            now.append(left.popleft())
+        made = list(play_until(end, now))
         loudest = max((float(np.abs(block).max(initial=0.0)) for block in made), default=0.0)
         waiting += made
         if loudest >= quiet:
@@ -155,6 +166,10 @@ def render_events(
             waiting = []
         quiet_s = quiet_s + (done - before) / rate_hz if stage.silent or loudest < quiet else 0.0
     yield from waiting[:1]
+
+
+def _sounds(event: Event) -> bool:
+    return isinstance(event, NoteOn | NoteOff)
 
 
 def channels_played(patch: Patch, timed: Iterable[TimedEvent]) -> int:

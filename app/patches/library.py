@@ -15,7 +15,7 @@ from app.patches.fields import LONGEST_NAME, explained
 from app.patches.patch import CATEGORIES, Patch
 from engine import bounds
 from engine.folders import user_folder
-from engine.plain_text import one_line
+from engine.plain_text import name_text, one_line
 from engine.read_file import read_bounded
 from engine.result_file import WriteError, explain, whole_file
 from engine.schema import SchemaError, parse_json
@@ -42,7 +42,7 @@ class PatchEntry:
     @property
     def name(self) -> str:
         """The name of its file without `.json`."""
-        return self.path.stem
+        return name_text(self.path.stem)
 
     @property
     def own(self) -> bool:
@@ -101,11 +101,11 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
         for path in paths:
             try:
                 patch = read_patch(path)
-                if path.stem in entries:
+                if name_text(path.stem) in entries:
                     raise PatchError(f"{path}: an instrument of this name exists already; rename the file to use it")
                 name = _other_than(names, patch.name)
                 names.add(name.casefold())
-                entries[path.stem] = PatchEntry(path, patch.model_copy(update={"name": name}))
+                entries[name_text(path.stem)] = PatchEntry(path, patch.model_copy(update={"name": name}))
             except PatchError as error:
                 problems.append(str(error))
             except Exception as error:  # so that the other files are listed

@@ -8,7 +8,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, Protocol
 
 VARIABLE = "LEARNED_STRINGS_MIDI"
@@ -24,13 +24,16 @@ class MidiUnavailable(Exception):
 class OpenPort(Protocol):
     def close(self) -> None: ...
 
+    def connected(self) -> bool:
+        """Whether its device is still there."""
+
 
 class Backend(Protocol):
     """A system for MIDI. Both raise OSError where it does not answer."""
 
     def get_input_names(self) -> list[str]: ...
 
-    def open_input(self, name: str, *, callback: Callable[[Any], None]) -> OpenPort: ...
+    def open_input(self, name: str, *, callback: Callable[[Sequence[int]], None]) -> OpenPort: ...
 
 
 def load_backend() -> RtMidi:
@@ -69,24 +72,24 @@ class RtMidi:
         self._library, self._api = library, api
 
     def get_input_names(self) -> list[str]:
-        """The inputs that are connected now. Raises OSError."""
+        """The inputs that are connected now, no two of one name. Raises OSError."""
         with self._faults():
             client = self._client()
             try:
-                return list(client.get_ports())
+                return _distinct(client.get_ports())
             finally:
                 client.delete()
 
-    def open_input(self, name: str, *, callback: Callable[[Any], None]) -> RtMidiInput:
-        """Opens an input; its messages go to `callback` as mido's, in a thread of its own. Raises OSError."""
+    def open_input(self, name: str, *, callback: Callable[[Sequence[int]], None]) -> RtMidiInput:
+        """Opens an input; the bytes of its messages go to `callback`, in a thread of its own. Raises OSError."""
         with self._faults():
             client = self._client()
             try:
-                client.open_port(client.get_ports().index(name))
+                client.open_port(_distinct(client.get_ports()).index(name))
             except BaseException:
                 client.delete()
                 raise
-            return RtMidiInput(client, callback)
+            return RtMidiInput(client, name, callback)
 
     def virtual_output(self, name: str) -> Any:
         """An output that other programs find as an input: the library's `MidiOut`. Raises OSError."""
@@ -110,6 +113,18 @@ class RtMidi:
             raise OSError(str(error).strip()) from error
 
 
+def _distinct(names: Iterable[str]) -> list[str]:
+    """Names of ports; further ones of the same name are numbered, as some systems do not."""
+    found: list[str] = []
+    for name in names:
+        number, distinct = 1, name
+        while distinct in found:
+            number += 1
+            distinct = f"{name} #{number}"
+        found.append(distinct)
+    return found
+
+
 class RtMidiInput:
     """An open input. Its thread fetches messages from RtMidi's queue, within a millisecond.
 
@@ -117,8 +132,8 @@ class RtMidiInput:
     interpreter, which waits for the driver's thread.
     """
 
-    def __init__(self, client: Any, callback: Callable[[Any], None]) -> None:
-        self._client, self._callback = client, callback
+    def __init__(self, client: Any, name: str, callback: Callable[[Sequence[int]], None]) -> None:
+        self._client, self._name, self._callback = client, name, callback
         self._open = True
         self._thread = threading.Thread(target=self._fetch, name="midi-input", daemon=True)
         self._thread.start()
@@ -131,18 +146,19 @@ class RtMidiInput:
             self._client.close_port()
         self._client.delete()
 
-    def _fetch(self) -> None:
-        from mido import Message
+    def connected(self) -> bool:
+        """Whether its device is still there, asked without another client of the system."""
+        try:
+            return self._name in _distinct(self._client.get_ports())
+        except Exception:  # the system itself is gone
+            return False
 
+    def _fetch(self) -> None:
         while self._open:
             time.sleep(PERIOD_S)
             while self._open and (found := self._client.get_message()) is not None:
                 try:
-                    message = Message.from_bytes(found[0])
-                except ValueError:  # no message of MIDI's, as a driver's noise
-                    continue
-                try:
-                    self._callback(message)
+                    self._callback(found[0])
                 except Exception as error:  # is reported, and costs this message only
                     threading.excepthook(
                         threading.ExceptHookArgs((type(error), error, error.__traceback__, self._thread))

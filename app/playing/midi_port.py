@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
 
 from app.instrument.events import Event, channels_in, release_all
 from app.instrument.midi_file import event_of
@@ -33,6 +32,7 @@ class MidiInput:
         self._port: OpenPort | None = None
         self._channels: set[int] = set()  # on which something came
         self.name = ""  # of the open input
+        self._awaited = ""  # of one that was open, or was to be, and is not connected
 
     def names(self) -> list[str]:
         """The inputs that are connected now.
@@ -41,18 +41,22 @@ class MidiInput:
             MidiUnavailable: no backend, or the system's MIDI does not answer.
         """
         try:
-            return list(dict.fromkeys(self._loaded().get_input_names()))
+            return self._loaded().get_input_names()
         except OSError as error:
             raise MidiUnavailable(f"The system's MIDI does not answer ({error}).") from error
 
     def open(self, name: str) -> None:
-        """Opens the input of that name, and closes any other, whose keys are released.
+        """Opens the input of that name, else one of the same device, and closes any other, whose keys are released.
+
+        One that cannot be opened is tried again by `look`, until `close`.
 
         Raises:
             MidiUnavailable: no backend, no such input, or another program has it.
         """
         self.close()
-        found = next((present for present in self.names() if same_device(present, name)), None)
+        self._awaited = name
+        names = self.names()
+        found = name if name in names else next((each for each in names if same_device(each, name)), None)
         if found is None:
             raise MidiUnavailable(f"The MIDI input {name} is not connected. Connect it, or choose another.")
         try:
@@ -61,11 +65,30 @@ class MidiInput:
             raise MidiUnavailable(
                 f"The MIDI input {found} cannot be opened ({error}). Another program may be using it."
             ) from error
-        self.name = found
+        self.name, self._awaited = found, ""
+
+    def look(self) -> str:
+        """Releases the keys of an input that was disconnected, and opens it when it is back; to be called often.
+
+        Returns: what happened, for the player; "" for nothing.
+        """
+        if self._port is not None and not self._port.connected():
+            name = self.name
+            self.close()
+            self._awaited = name
+            return f"The MIDI input {name} was disconnected. It is played again as soon as it is connected."
+        if not self._awaited:
+            return ""
+        name = self._awaited
+        try:
+            self.open(name)
+        except MidiUnavailable:
+            return ""
+        return f"The MIDI input {self.name} is connected again."
 
     def close(self) -> None:
         """Closes the input, if one is open, and lets its keys go; may be called again."""
-        port, self._port, self.name = self._port, None, ""
+        port, self._port, self.name, self._awaited = self._port, None, "", ""
         if port is not None:
             port.close()
         self.release_all()
@@ -81,7 +104,7 @@ class MidiInput:
             self._backend = self._load()
         return self._backend
 
-    def _receive(self, message: Any) -> None:
+    def _receive(self, message: Sequence[int]) -> None:
         event = event_of(message)
         if event is not None:
             self._channels |= channels_in([event])

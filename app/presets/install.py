@@ -8,6 +8,7 @@ from itertools import count
 from pathlib import Path
 
 from engine.bounds import LARGEST_PRESET_BYTES
+from engine.plain_text import name_text
 from engine.presets import PresetError, load_preset, preset_digest
 from engine.read_file import read_bounded
 from engine.result_file import WriteError, explain, whole_file
@@ -46,9 +47,10 @@ def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> Install
     present = list(present)
     for path in present:
         if _same(path, digest):
-            return Installed(path.stem, path, was_there=True)
+            return Installed(name_text(path.stem), path, was_there=True)
     taken = {path.stem for path in present}
-    names = (file.stem if number == 1 else f"{file.stem}_{number}" for number in count(1))
+    stem = name_text(file.stem)
+    names = (stem if number == 1 else f"{stem}_{number}" for number in count(1))
     target = next(path for name in names if name not in taken and not (path := folder / f"{name}{SUFFIX}").exists())
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -12,7 +12,7 @@ from psygnal import Signal
 
 from app.presets.words import model_word
 from engine.folders import user_folder
-from engine.plain_text import one_line
+from engine.plain_text import name_text, one_line
 from engine.presets import (
     SHIPPED,
     PresetError,
@@ -120,12 +120,13 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
         problems += [problem] if (problem := unreadable(folder)) else []
         for path in preset_files(folder):
             try:
-                if path.stem in entries:
+                name = name_text(path.stem)
+                if name in entries:
                     problems.append(f"{path}: a preset of this name exists already; rename the file to use it")
                     continue
                 state = path.stat()
                 entry = _read_entry(path, state.st_mtime_ns, state.st_size)
-                entries[path.stem] = replace(entry, heard=heard.get(preset_digest(path))) if heard else entry
+                entries[name] = replace(entry, heard=heard.get(preset_digest(path))) if heard else entry
             except PresetError as error:
                 problems.append(str(error))
             except OSError as error:  # such as a file that was deleted meanwhile
@@ -144,8 +145,8 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
 def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
     """Cached by time and size of the file, because the browser lists all presets whenever it opens."""
     info = read_info(path)
-    listed = replace(info, title=display_title(path.stem, info))
-    return PresetEntry(path.stem, path, listed, size_bytes)
+    listed = replace(info, title=display_title(name_text(path.stem), info))
+    return PresetEntry(name_text(path.stem), path, listed, size_bytes)
 
 
 def display_title(name: str, info: PresetInfo) -> str:

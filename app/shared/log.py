@@ -124,7 +124,9 @@ def faultless(work: Callable[P, object], where: str) -> Callable[P, None]:
 def _open(path: Path) -> logging.Handler | None:
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handler = RotatingFileHandler(path, maxBytes=LARGEST_BYTES, backupCount=OLDER_KEPT, encoding="utf-8")
+        handler = RotatingFileHandler(
+            path, maxBytes=LARGEST_BYTES, backupCount=OLDER_KEPT, encoding="utf-8", errors="backslashreplace"
+        )
     except OSError:
         return None
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))

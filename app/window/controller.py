@@ -148,6 +148,7 @@ class Controller(QObject):
         self.instruments.played.connect(self.performance.follow)
         self.instruments.played.connect(self._show_struck)
         self.instruments.reported.connect(window.notices.report)
+        self.instruments.informed.connect(window.notices.inform)
         self.instruments.start()
         self.patches = PatchDesk(
             self.session,

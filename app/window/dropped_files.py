@@ -16,6 +16,7 @@ from app.presets.install import SUFFIX, InstallError, install_preset
 from app.presets.library import Library
 from app.shared.parameters import OF_CHOICES
 from engine.folders import user_folder
+from engine.plain_text import name_text
 from engine.result_file import WriteError
 
 
@@ -84,7 +85,9 @@ def _recipe(file: Path, library: Library) -> Dropped:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     try:
-        played = SingleString(preset=path.stem) if recipe.struck is None else recipe.struck.found()[0].patch
+        played = (
+            SingleString(preset=name_text(path.stem)) if recipe.struck is None else recipe.struck.found()[0].patch
+        )
         notices = changed_notices(recipe, exact)
     except ValueError as error:
         return Dropped(notice=f"{file}: {error}.")

@@ -56,6 +56,7 @@ class Instruments(QObject):
 
     played = Signal()  # a note has begun, and the session has its values
     reported = Signal(str)  # an error, for the user
+    informed = Signal(str)  # what went well
 
     _begun = Signal()  # emitted in any thread
 
@@ -93,6 +94,7 @@ class Instruments(QObject):
         self.midi = MidiControl(midi, self.play, self._play_note, self)
         self.midi.performed.connect(lambda changes: session.update(**changes))
         self.midi.reported.connect(self.reported)
+        self.midi.informed.connect(self.informed)
 
     def start(self) -> None:
         """Opens the remembered MIDI input, if any."""

@@ -72,7 +72,8 @@ FACTS_HEIGHT = 20
 BRIEFLY_MS = 1_800  # a text over the window
 LONGEST_NAME = 60  # characters of a file
 FILE_FILTER = (
-    "Files that can be opened (*.mid *.midi *.json *.scl *.kbm *.safetensors *.wav *.flac *.aif *.aiff)"
+    "Files that can be opened (*.mid *.midi *.kar *.rmi *.smf *.json *.scl *.kbm *.safetensors"
+    " *.wav *.flac *.aif *.aiff)"
     ";;All files (*)"
 )
 TITLE_BAR = 40  # pixels, at most; its height is known only once the window is shown

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QObject, Qt, Signal
+from PySide6.QtCore import QObject, Qt, QTimer, Signal
 from PySide6.QtWidgets import QWidget
 
 from app.instrument.events import Controller, Event, NoteOn, fixed_function
@@ -18,6 +18,8 @@ from app.playing.midi_backend import Backend, MidiUnavailable, load_backend
 from app.playing.midi_port import MidiInput
 from app.shared.parameters import LEARNABLE, OF_PATCHES, modulated_by
 from app.views.dialogs.midi_dialog import MidiDialog
+
+LOOK_MS = 1_000  # between two looks at the input
 
 
 class MidiControl(QObject):
@@ -33,6 +35,7 @@ class MidiControl(QObject):
 
     performed = Signal(dict)  # new values for `Choices.changed`, by a controller or the dialog
     reported = Signal(str)  # an error, for the user
+    informed = Signal(str)  # what went well
     _received = Signal(object)  # emitted in the input's thread
 
     def __init__(
@@ -51,9 +54,12 @@ class MidiControl(QObject):
         self._patch: Patch | None = None
         self._received.connect(self._answer, Qt.ConnectionType.QueuedConnection)
         self.input = MidiInput(self._receive, load, handle)
+        self._look_timer = QTimer(self, interval=LOOK_MS)
+        self._look_timer.timeout.connect(self._look)
 
     def start(self) -> None:
-        """Opens the remembered input, if any; emits `reported` where it cannot."""
+        """Opens the remembered input, if any, now or when it is connected; emits `reported` where it cannot."""
+        self._look_timer.start()
         if self.choices.port:
             try:
                 self.input.open(self.choices.port)
@@ -61,7 +67,16 @@ class MidiControl(QObject):
                 self.reported.emit(str(error))
 
     def close(self) -> None:
+        self._look_timer.stop()
         self.input.close()
+
+    def _look(self) -> None:
+        """Follows an input that was disconnected, or is connected again."""
+        if not (happened := self.input.look()):
+            return
+        (self.informed if self.input.name else self.reported).emit(happened)
+        if self._dialog is not None and self._dialog.isVisible():
+            self._show_inputs()
 
     # The dialog
 
@@ -121,6 +136,7 @@ class MidiControl(QObject):
                 self.input.close()
         except MidiUnavailable as error:
             problem = str(error)
+            self.input.close()  # it is not waited for
         self._remember(self.choices.model_copy(update={"port": self.input.name}))
         if problem:
             self._dialog.show_problem(problem)

@@ -69,7 +69,7 @@ NOTE_REPORTED_AFTER_MS = 150
 SCREEN_SLIDE = 90  # of the time of slides, 0 … 127: 0.3 s
 C_OF_OCTAVE_0 = LOWEST_C // 12 - 1  # C3 is the lowest of the computer's keys at octave 0
 NO_PATCH = "The computer's keys pluck the chosen preset at ten places; choose an instrument to play pitches"
-MIDI_FILES = (".mid", ".midi")
+MIDI_FILES = (".mid", ".midi", ".kar", ".rmi", ".smf")
 TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES)
 
 

@@ -36,6 +36,7 @@ from app.window.main_window import MainWindow
 from app.window.panels import Moment, Panel
 from app.window.playhead import Playhead
 from app.window.render_signals import RenderSignals
+from engine.plain_text import name_text
 
 GROWN = 3.0  # times the preset's own error, from which an error has grown
 PLACED = {"instrument", *PluckedString.model_fields} - {"position"}  # what plucks at ten places depend on
@@ -254,7 +255,7 @@ class Performance(QObject):
         latest = self.notes.latest
         if not isinstance(latest, Note) or not latest.waits_s:
             return ""
-        entry = self._library.find(path_of(latest.request.preset).stem)
+        entry = self._library.find(name_text(path_of(latest.request.preset).stem))
         name = model_word(entry.info.model) if entry else "model"
         return f"{name}: buffering, starts in {latest.waits_s:.1f} s"
 

@@ -17,6 +17,7 @@ from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import pointer
 from engine.kernels.modes import TOO_HIGH
+from engine.kernels.playing import channels
 from engine.pluck import MOST_PERIODS, RUNAWAY_FACTOR
 
 HERTZ = -0.2  # power of the speed in the time of contact, as in `engine.strike`
@@ -153,6 +154,7 @@ def strike(
         address = players[of.PLAYER_HERE] + 8 * slot
         voice = carray(pointer(address), (stride,), np.float64)
         begun = gain * player[of.PLAYER_SOURCE_GAINS + source]
+        begun *= channels.loudness(players, tables[of.TABLE_MODE], players[event + of.EVENT_CHANNEL])
         _make(player, table, tables, voice, drum, struck, speed, tables[of.TABLE_KINDS + source])
         voice.view(np.int64)[at.PROGRAM] = tables[of.TABLE_PROGRAMS + source]
         voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
@@ -219,6 +221,7 @@ def hear(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.
     if drum == 0:
         return
     gain, points = player[note + of.NOTE_GAIN], of.PLAYER_VALUES + of.POINT
+    gain *= channels.loudness(players, tables[of.TABLE_MODE], players[note + of.NOTE_CHANNEL])
     moved = False
     for point in range(2):
         moved = moved or player[note + of.NOTE_POINT + point] != player[points + point]

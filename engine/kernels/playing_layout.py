@@ -182,6 +182,8 @@ def table_slots(grid_points: int) -> int:
 # Slots of a channel
 CHANNELS = 17  # of MIDI, then the keys of the computer and the screen
 FIRST, ON_SCREEN = 0, 16
+TUNING_STEPS = 8192  # of fine tuning, of a semitone
+USUAL_VOLUME = 100  # General MIDI's: at this volume an instrument is as loud as it is without one
 CHANNEL_BEND = 0  # R
 CHANNEL_PEDAL = 1  # W
 CHANNEL_SLIDE = 2  # W 0 … 127; -1: never moved
@@ -197,7 +199,12 @@ CHANNEL_HARMONICS = 11  # W whether its footswitch is down, as the next two
 CHANNEL_HELD = 12  # W two: keys that are down, a bit each
 CHANNEL_TREMOLO = 14  # W
 CHANNEL_STRUMS = 15  # W
-CHANNEL_SLOTS = 16
+CHANNEL_VOLUME = 16  # W 0 … 127
+CHANNEL_EXPRESSION = 17  # W 0 … 127
+CHANNEL_COARSE_TUNING = 18  # W semitones
+CHANNEL_FINE_TUNING = 19  # W steps of a semitone over TUNING_STEPS
+CHANNEL_STRUCK = 20  # W (KEYS,) strokes of each key whose release is to come, of those that give no string
+CHANNEL_SLOTS = CHANNEL_STRUCK + KEYS
 
 # Slots of a note
 FREE, RINGS = 0, 1

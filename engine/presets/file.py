@@ -26,7 +26,7 @@ from safetensors import SafetensorError, safe_open
 from engine import bounds
 from engine.models import build_model, read_model_configuration
 from engine.models._tension_arrays import CURVES, check_resonator, resonator_arrays, shapes_of_arrays
-from engine.plain_text import one_line
+from engine.plain_text import name_text, one_line
 from engine.presets.info import PresetInfo
 from engine.presets.migrations import UnknownVersion, migrated
 from engine.schema import SchemaError, parse_json, read, write
@@ -130,7 +130,7 @@ def load_preset(path: Path) -> Preset:
         weights = {name: np.array(file.get_tensor(name)) for name in expected}
     for name, array in weights.items():
         _check_finite(path, name, array)
-    preset = Preset(path.stem, path, info, weights)
+    preset = Preset(name_text(path.stem), path, info, weights)
     if info.of_many_strings:
         _check_resonator(preset)
     return preset

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from pathlib import Path
 
-from engine.plain_text import one_line
+from engine.plain_text import name_text, one_line
 from engine.presets.file import PresetError
 
 SHIPPED = Path(__file__).parents[2] / "presets"
@@ -43,7 +43,7 @@ def find_preset(name_or_path: str, files: Iterable[Path] | None = None) -> Path:
     Raises:
         PresetError: there is none; the message has names like it.
     """
-    by_name = {path.stem: path for path in (preset_files() if files is None else files)}
+    by_name = {name_text(path.stem): path for path in (preset_files() if files is None else files)}
     if name_or_path in by_name:
         return by_name[name_or_path]
     path = Path(name_or_path)

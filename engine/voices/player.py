@@ -152,7 +152,10 @@ class Playing:
 
 @dataclass(frozen=True)
 class Channel:
-    """Where the wheels and pedals of a channel stand; `slide` and `range_semitones`: None where never moved."""
+    """Where the wheels and pedals of a channel stand; `slide` and `range_semitones`: None where never moved.
+
+    Tuning is in semitones and in 1/8192 of one.
+    """
 
     bend: float
     pedal: bool
@@ -165,6 +168,10 @@ class Channel:
     harmonics: bool
     tremolo: bool
     strums: bool
+    volume: int
+    expression: int
+    coarse_tuning: int
+    fine_tuning: int
 
 
 class CompiledPlayer:
@@ -426,6 +433,10 @@ class CompiledPlayer:
             bool(counts[of.CHANNEL_HARMONICS]),
             bool(counts[of.CHANNEL_TREMOLO]),
             bool(counts[of.CHANNEL_STRUMS]),
+            int(counts[of.CHANNEL_VOLUME]),
+            int(counts[of.CHANNEL_EXPRESSION]),
+            int(counts[of.CHANNEL_COARSE_TUNING]),
+            int(counts[of.CHANNEL_FINE_TUNING]),
         )
 
 

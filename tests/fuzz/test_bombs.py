@@ -86,7 +86,7 @@ MIDI = {
     "a time without end": midi(b"\xff" * (2**20 - 40)),
     "a length without end": midi(b"\x00\xff\x01" + b"\xff" * (2**20 - 40)),
     "a time within a chunk of another name": midi(b"\x00\x90\x3c\x40" + b"\x80" * 9),
-    "too many messages": midi(b"\x00\x90\x3c\x40" + b"\x00\x3c\x40" * 340_000),
+    "too many messages": midi(b"\x00\x90\x3c\x40" + b"\x00\x3c\x40" * MOST_EVENTS),
     "a system message that never ends": midi(b"\x00\xf0\x01\xf7\x00\x05" + b"\xff" * 1000),
 }
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from engine.bounds import LARGEST_SEED, MOST_SEEDS, MOST_WORKERS
-from engine.plain_text import duration
+from engine.plain_text import duration, name_text
 from training.cli.arguments import Cache, Device, Runs
 from training.cli.console import Failure, number, progress, say
 
@@ -118,7 +118,7 @@ def _with_seed(config: str, seed: int | None, number: int) -> tuple[str, Trainin
     """
     from training.cell import Cell, load
 
-    configuration, name = load(config), Path(config).stem
+    configuration, name = load(config), name_text(Path(config).stem)
     wanted = (configuration.recipe.seed if seed is None else seed) + number
     if wanted == configuration.recipe.seed:
         return name, configuration

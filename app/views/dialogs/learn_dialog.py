@@ -32,7 +32,7 @@ from app.views.background import Background
 from app.views.controls.form import form_label, row_of, spin_box
 from app.views.controls.parts import combo_box, filled, label, read_only_text
 from app.views.dialogs.question import ask
-from engine.plain_text import duration
+from engine.plain_text import duration, name_text
 from engine.presets import PresetError
 from engine.result_file import WriteError
 
@@ -79,7 +79,7 @@ class LearnDialog(QDialog):
         self.string, self.body = QRadioButton("A string: learn it from this note"), QRadioButton("A body")
         self.body.setToolTip("The sound becomes an impulse response: instruments are played through it")
         self.string.setToolTip("The note becomes a preset and an instrument over two octaves")
-        self.name = QLineEdit(file.stem[:60])
+        self.name = QLineEdit(name_text(file.stem[:60]))
         self.name.setAccessibleName("Name of the instrument")
         self.kind = combo_box("Instrument", KINDS, "guitar")
         self.kind.setToolTip("For what a sound does not give: density and length")

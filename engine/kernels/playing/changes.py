@@ -91,6 +91,7 @@ def damp(
         if players[note + of.NOTE_MEMBER] != 0:
             return
         level_db = keys.value_of(player, players, table, tables, of.DAMPER_DB)
+        level_db += channels.loudness_db(players, tables[of.TABLE_MODE], players[note + of.NOTE_CHANNEL])
         stroke, key = (
             players[note + of.NOTE_AGE] if table[of.TABLE_VARIATION] > 0.0 else 0,
             players[note + of.NOTE_KEY],

@@ -6,6 +6,9 @@ chooses. So do all further channels, and the keys of the computer and the screen
 
 A channel's own wheel and pedal hold for what was struck on it. Those of the first channel hold for the keys of the
 computer and the screen too, which have none, and in MPE, as the master's, for every channel.
+
+A release belongs to the earliest stroke of its key that has none: a key that is struck again before it was released
+is held until the last of its releases.
 """
 
 from __future__ import annotations
@@ -22,8 +25,25 @@ from engine.kernels.playing import slots
 MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
 WIDEST_SEMITONES = 96.0  # that messages may ask for
 HAMMER_S, SLIDE_S = 0.006, (0.02, 1.0)  # of the glide to the length of another key; of a slide, at times of 0 and 127
-DATA, FINE_DATA, FINE_OTHER, OTHER, FINE_REGISTERED, REGISTERED = 6, 38, 98, 99, 100, 101  # controllers of MIDI
-NO_PARAMETER, BEND_RANGE = 127, 0
+# Controllers of MIDI
+DATA, FINE_DATA, INCREMENT, DECREMENT, FINE_OTHER, OTHER, FINE_REGISTERED, REGISTERED = (
+    6,
+    38,
+    96,
+    97,
+    98,
+    99,
+    100,
+    101,
+)
+NO_PARAMETER, BEND_RANGE, FINE_TUNING, COARSE_TUNING = 127, 0, 1, 2  # registered parameters
+SWITCHES = (
+    of.CHANNEL_LEGATO,
+    of.CHANNEL_SLIDES,
+    of.CHANNEL_HARMONICS,
+    of.CHANNEL_TREMOLO,
+    of.CHANNEL_STRUMS,
+)
 
 
 @njit(**COMPILED)
@@ -37,6 +57,46 @@ def rest(player: np.ndarray, players: np.ndarray, number: int, pedal: int, plays
     players[channel + of.CHANNEL_PLAYS] = plays
     players[channel + of.CHANNEL_COARSE] = NO_PARAMETER
     players[channel + of.CHANNEL_FINE] = NO_PARAMETER
+    players[channel + of.CHANNEL_COARSE_TUNING] = 0
+    players[channel + of.CHANNEL_FINE_TUNING] = 0
+
+
+@njit(**COMPILED)
+def reset(player: np.ndarray, players: np.ndarray, number: int) -> None:
+    """Resets wheel, pedals, expression and the choice of a parameter, as MIDI's RP-015 has it; all else stays."""
+    channel = slots.channel(number)
+    player[channel + of.CHANNEL_BEND] = player[channel + of.CHANNEL_MUTE] = 0.0
+    players[channel + of.CHANNEL_PEDAL] = 0
+    players[channel + of.CHANNEL_COARSE] = NO_PARAMETER
+    players[channel + of.CHANNEL_FINE] = NO_PARAMETER
+    players[channel + of.CHANNEL_EXPRESSION] = 127
+    for switch in SWITCHES:
+        players[channel + switch] = 0
+
+
+@njit(**COMPILED)
+def begin(player: np.ndarray, players: np.ndarray, number: int) -> None:
+    """Puts a channel in the state in which nobody has played on it."""
+    reset(player, players, number)
+    rest(player, players, number, 0, 0)
+    players[slots.channel(number) + of.CHANNEL_VOLUME] = of.USUAL_VOLUME
+
+
+@njit(**COMPILED)
+def loudness(players: np.ndarray, mode: int, channel: int) -> float:
+    """The factor of what was struck on a channel, by its volume and expression: General MIDI's squares."""
+    share = 1.0
+    for each in range(of.CHANNELS):
+        if acts_on(mode, each, channel):
+            share *= players[slots.channel(each) + of.CHANNEL_VOLUME] / of.USUAL_VOLUME
+            share *= players[slots.channel(each) + of.CHANNEL_EXPRESSION] / 127
+    return share * share
+
+
+@njit(**COMPILED)
+def loudness_db(players: np.ndarray, mode: int, channel: int) -> float:
+    """The same in dB."""
+    return 20 * math.log10(max(loudness(players, mode, channel), 1e-9))
 
 
 @njit(**COMPILED)
@@ -61,38 +121,77 @@ def pedal_down(players: np.ndarray, mode: int, channel: int) -> bool:
 
 
 @njit(**COMPILED)
-def semitones(player: np.ndarray, mode: int, channel: int) -> float:
-    """How far pitch wheels bend what was struck on a channel."""
+def semitones(player: np.ndarray, players: np.ndarray, mode: int, channel: int) -> float:
+    """How far pitch wheels bend what was struck on a channel, and how far it is tuned."""
     total = 0.0
     for each in range(of.CHANNELS):
-        bend, wide = player[slots.channel(each) + of.CHANNEL_BEND], player[slots.channel(each) + of.CHANNEL_RANGE]
-        if bend != 0.0 and acts_on(mode, each, channel):
-            if wide < 0.0:
-                member = mode == of.MPE and each != of.FIRST and each != of.ON_SCREEN
-                wide = MPE_BEND_SEMITONES if member else player[of.PLAYER_VALUES + of.BEND_SEMITONES]
-            total += bend * wide
+        if acts_on(mode, each, channel):
+            own = slots.channel(each)
+            total += players[own + of.CHANNEL_COARSE_TUNING] + players[own + of.CHANNEL_FINE_TUNING] / of.TUNING_STEPS
+            if player[own + of.CHANNEL_BEND] != 0.0:
+                total += player[own + of.CHANNEL_BEND] * _bend_range(player, mode, each)
     return total
 
 
 @njit(**COMPILED)
-def set_range(player: np.ndarray, players: np.ndarray, channel: int, number: int, value: int) -> bool:
-    """Follows the controllers that choose a parameter and set it; whether they set the range of bends."""
-    coarse, fine, wide = channel + of.CHANNEL_COARSE, channel + of.CHANNEL_FINE, channel + of.CHANNEL_RANGE
-    chosen = players[coarse] == BEND_RANGE and players[fine] == BEND_RANGE
-    if number in (OTHER, FINE_OTHER):
-        players[coarse] = NO_PARAMETER
-        players[fine] = NO_PARAMETER
-    elif number == REGISTERED:
-        players[coarse] = value
-    elif number == FINE_REGISTERED:
-        players[fine] = value
-    elif chosen and number == DATA:
-        player[wide] = min(float(value), WIDEST_SEMITONES)
-        return True
-    elif chosen and number == FINE_DATA and player[wide] >= 0.0:
-        player[wide] = min(math.floor(player[wide]) + value / 100, WIDEST_SEMITONES)
-        return True
-    return False
+def _is_member(mode: int, number: int) -> bool:
+    return mode == of.MPE and number != of.FIRST and number != of.ON_SCREEN
+
+
+@njit(**COMPILED)
+def _bend_range(player: np.ndarray, mode: int, number: int) -> float:
+    """Semitones of a whole bend of a channel."""
+    wide = player[slots.channel(number) + of.CHANNEL_RANGE]
+    if wide >= 0.0:
+        return wide
+    return MPE_BEND_SEMITONES if _is_member(mode, number) else player[of.PLAYER_VALUES + of.BEND_SEMITONES]
+
+
+@njit(**COMPILED)
+def set_parameter(
+    player: np.ndarray, players: np.ndarray, mode: int, number: int, controller: int, value: int
+) -> bool:
+    """Follows the controllers that choose a registered parameter and set it; whether they set one that counts here.
+
+    Increments are of the least step, as MIDI's RP-018 has it. A member's range of bends is that of all members.
+    """
+    own = slots.channel(number)
+    if controller in (OTHER, FINE_OTHER):
+        players[own + of.CHANNEL_COARSE] = NO_PARAMETER
+        players[own + of.CHANNEL_FINE] = NO_PARAMETER
+    elif controller == REGISTERED:
+        players[own + of.CHANNEL_COARSE] = value
+    elif controller == FINE_REGISTERED:
+        players[own + of.CHANNEL_FINE] = value
+    if controller not in (DATA, FINE_DATA, INCREMENT, DECREMENT) or players[own + of.CHANNEL_COARSE] != 0:
+        return False
+    chosen, step = players[own + of.CHANNEL_FINE], 1 if controller == INCREMENT else -1
+    if chosen == BEND_RANGE:
+        wide = _bend_range(player, mode, number)
+        if controller == DATA:
+            wide = float(value)
+        elif controller == FINE_DATA:
+            wide = math.floor(wide) + value / 100
+        else:
+            wide += step / 100
+        for each in range(of.CHANNELS):
+            if each == number or (_is_member(mode, number) and _is_member(mode, each)):
+                player[slots.channel(each) + of.CHANNEL_RANGE] = min(max(wide, 0.0), WIDEST_SEMITONES)
+    elif chosen == FINE_TUNING:
+        steps = players[own + of.CHANNEL_FINE_TUNING] + of.TUNING_STEPS
+        if controller == DATA:
+            steps = 128 * value
+        elif controller == FINE_DATA:
+            steps = steps // 128 * 128 + value
+        else:
+            steps += step
+        players[own + of.CHANNEL_FINE_TUNING] = min(max(steps, 0), 2 * of.TUNING_STEPS - 1) - of.TUNING_STEPS
+    elif chosen == COARSE_TUNING and controller != FINE_DATA:
+        semitone = value - 64 if controller == DATA else players[own + of.CHANNEL_COARSE_TUNING] + step
+        players[own + of.CHANNEL_COARSE_TUNING] = min(max(semitone, -64), 63)
+    else:
+        return False
+    return True
 
 
 @njit(**COMPILED)
@@ -129,6 +228,20 @@ def hold(players: np.ndarray, channel: int, key: int, down: bool) -> None:
 
 
 @njit(**COMPILED)
+def strike(players: np.ndarray, channel: int, key: int) -> None:
+    """Counts a stroke of a key."""
+    players[slots.channel(channel) + of.CHANNEL_STRUCK + key] += 1
+
+
+@njit(**COMPILED)
+def release_latest(players: np.ndarray, channel: int, key: int) -> bool:
+    """Takes a release of a key for its earliest stroke that has none; whether that is the latest."""
+    slot = slots.channel(channel) + of.CHANNEL_STRUCK + key
+    players[slot] = max(players[slot] - 1, 0)
+    return players[slot] == 0
+
+
+@njit(**COMPILED)
 def is_down(players: np.ndarray, channel: int, key: int) -> bool:
     slot = slots.channel(channel) + of.CHANNEL_HELD + key // 64
     return (players[slot] >> np.int64(key % 64)) & 1 != 0
@@ -139,6 +252,8 @@ def release_keys(players: np.ndarray, channel: int) -> None:
     """No key of a channel is down."""
     players[slots.channel(channel) + of.CHANNEL_HELD] = 0
     players[slots.channel(channel) + of.CHANNEL_HELD + 1] = 0
+    for key in range(of.KEYS):
+        players[slots.channel(channel) + of.CHANNEL_STRUCK + key] = 0
 
 
 @njit(**COMPILED)

@@ -11,10 +11,10 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.playing import changes, channels, chords, hands, slots, voices
 
 KNOB_S = 0.04  # of the glide to other modes
-MOD_WHEEL, SLIDE_TIME, SUSTAIN, PORTAMENTO, SOFT, LEGATO, SLIDE = 1, 5, 64, 65, 67, 68, 74
+MOD_WHEEL, SLIDE_TIME, VOLUME, EXPRESSION, SUSTAIN, PORTAMENTO, SOFT, LEGATO, SLIDE = 1, 5, 7, 11, 64, 65, 67, 68, 74
 HARMONICS, TREMOLO, STRUM, SOUND_OFF, RESET, NOTES_OFF = 80, 81, 82, 120, 121, 123
 PEDAL_DOWN = 64  # from this value on
-SWITCHES = (of.CHANNEL_LEGATO, of.CHANNEL_SLIDES, of.CHANNEL_HARMONICS, of.CHANNEL_TREMOLO, of.CHANNEL_STRUMS)
+LAST_MODE = 127  # messages from NOTES_OFF on choose a mode, and release all keys as well
 
 
 @njit(**COMPILED)
@@ -72,9 +72,13 @@ def controller(
         players[of.PLAYER_WHEEL_BY] = channel
         if turns:
             changes.glide(player, players, table, tables, -1, KNOB_S, frame, now)
+    elif number == VOLUME:
+        players[own + of.CHANNEL_VOLUME] = min(max(value, 0), 127)
+    elif number == EXPRESSION:
+        players[own + of.CHANNEL_EXPRESSION] = min(max(value, 0), 127)
     elif number == SOUND_OFF:
         stop(player, players, hands.STOP_S, frame)
-    elif number == NOTES_OFF:
+    elif NOTES_OFF <= number <= LAST_MODE:
         for each in range(of.CHANNELS):
             if channels.is_master(mode, channel, each):
                 channels.release_keys(players, each)
@@ -87,16 +91,15 @@ def controller(
                 changes.damp(player, players, table, tables, each, frame, now)
     elif number == RESET:
         for each in range(of.CHANNELS):
-            if channels.is_master(mode, channel, each):
-                channels.rest(player, players, each, 0, 0)
-                player[slots.channel(each) + of.CHANNEL_MUTE] = 0.0
-                for switch in SWITCHES:
-                    players[slots.channel(each) + switch] = 0
+            if channels.is_master(mode, channel, each) and value == 0:
+                channels.reset(player, players, each)
+            elif channels.is_master(mode, channel, each):  # by this program: MIDI's own has no other value
+                channels.begin(player, players, each)
         if channels.is_master(mode, channel, players[of.PLAYER_WHEEL_BY]):
             players[of.PLAYER_WHEEL] = 0
         changes.damp_unkept(player, players, table, tables, frame, now)
         changes.glide(player, players, table, tables, channel, hands.BEND_S, frame, now)
         if turns:
             changes.glide(player, players, table, tables, -1, KNOB_S, frame, now)
-    elif channels.set_range(player, players, own, number, value):
-        changes.glide(player, players, table, tables, channel, hands.BEND_S, frame, now)
+    elif channels.set_parameter(player, players, mode, channel, number, value):
+        changes.glide(player, players, table, tables, -1, hands.BEND_S, frame, now)

@@ -95,6 +95,8 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
             notes.strike(player, players, table, tables, mixers, event)
             return
         channels.hold(players, channel, key, True)
+        if players[event + of.EVENT_STRING] == 0:
+            channels.strike(players, channel, key)
         if tables[of.TABLE_DRUMS] == 0 and hands.hammer_on(player, players, table, tables, event, frame, now):
             return
         if tables[of.TABLE_DRUMS] != 0:
@@ -111,6 +113,8 @@ def _handle(player: np.ndarray, players: np.ndarray, mixers: np.ndarray, event: 
         notes.strike(player, players, table, tables, mixers, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
         if chords.waits(players, event, now):
+            return
+        if players[event + of.EVENT_STRING] == 0 and not channels.release_latest(players, channel, key):
             return
         channels.hold(players, channel, key, False)
         hands.note_off(player, players, table, tables, event, frame, now)
@@ -185,4 +189,4 @@ def begin(player_address: int) -> None:
     player, players = reals(player_address), wholes(player_address)
     players[of.PLAYER_HERE] = player_address
     for each in range(of.CHANNELS):
-        channels.rest(player, players, each, 0, 0)
+        channels.begin(player, players, each)

@@ -66,6 +66,7 @@ def _move(
     seconds = channels.moves_in_s(players, mode, players[note + of.NOTE_CHANNEL])
     if players[note + of.NOTE_MEMBER] == 0:
         level_db = keys.value_of(player, players, table, tables, of.DAMPER_DB)
+        level_db += channels.loudness_db(players, mode, players[note + of.NOTE_CHANNEL])
         if not strings.is_wound(player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING]):
             level_db -= PLAIN_DB
         slid_m = abs(slots.moment(player, 3)[of.LENGTH] - player[note + of.NOTE_STRING_NOW + of.LENGTH])

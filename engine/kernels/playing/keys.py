@@ -147,8 +147,8 @@ def string_now(
     else:
         for place in range(of.STRING):
             out[place] = player[note + of.NOTE_OWN + place]
-    semitones = channels.semitones(player, mode, players[note + of.NOTE_CHANNEL]) + player[note + of.NOTE_TUNED]
-    semitones += player[note + of.NOTE_APART] + player[note + of.NOTE_VIBRATO]
+    semitones = channels.semitones(player, players, mode, players[note + of.NOTE_CHANNEL])
+    semitones += player[note + of.NOTE_TUNED] + player[note + of.NOTE_APART] + player[note + of.NOTE_VIBRATO]
     ratio = 2.0 ** (semitones / 12)
     if fits and ratio != 1.0:
         if tables[of.TABLE_BEND_BY] == of.BY_LENGTH:

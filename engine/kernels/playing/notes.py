@@ -314,6 +314,7 @@ def note_on(
                 highest_m,
             )
             voice, begun = reals(address), gain * player[of.PLAYER_SOURCE_GAINS + source]
+            begun *= channels.loudness(players, mode, channel)
             if player[note + of.NOTE_BRIDGE] > 0.0:
                 first = players[of.PLAYER_AGE] - member  # of this player, for another may ring as well
                 wholes(address)[at.COURSE] = players[of.PLAYER_HERE] + of.MOST_SOURCES * first + source
@@ -344,6 +345,7 @@ def note_on(
         strength, hardness = drums.contact_of(player, table, tables, key, velocity)
     if member == 0:
         level_db = keys.value_of(player, players, table, tables, of.ONSET_DB)
+        level_db += channels.loudness_db(players, mode, channel)
         contact.touch(player, players, table, of.STROKE, level_db, strength, hardness, stroke, key, frame, 0.0, 0.0)
     _make_room(player, players)
     report_began(player, players, tables, event, number, player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING])

@@ -13,7 +13,7 @@ from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, reals, wholes
 from engine.kernels.modes import TOO_HIGH, row, run_up
-from engine.kernels.playing import keys, slots
+from engine.kernels.playing import channels, keys, slots
 from engine.pluck import FULL_SCALE_M, FULL_SCALE_N, LEAST_PEAK_M, RUNAWAY_FACTOR
 
 
@@ -277,11 +277,12 @@ def hear(player: np.ndarray, players: np.ndarray) -> None:
     for number in range(of.MOST_NOTES):
         note = slots.note(number)
         if players[note + of.NOTE_STATE] == of.RINGS and players[note + of.NOTE_DRUM] == 0:
+            mode = wholes(players[of.PLAYER_TABLE])[of.TABLE_MODE]
+            gain = player[note + of.NOTE_GAIN] * channels.loudness(players, mode, players[note + of.NOTE_CHANNEL])
             for source in range(of.MOST_SOURCES):
                 address = players[note + of.NOTE_VOICES + source]
                 if address != 0:
-                    wanted = player[note + of.NOTE_GAIN] * player[of.PLAYER_SOURCE_GAINS + source]
-                    reals(address)[at.WANTED_GAIN] = wanted
+                    reals(address)[at.WANTED_GAIN] = gain * player[of.PLAYER_SOURCE_GAINS + source]
                     if wholes(address)[at.JAVARI_STEPS] != 0:
                         table, tables = reals(players[of.PLAYER_TABLE]), wholes(players[of.PLAYER_TABLE])
                         gap_um = keys.value_of(player, players, table, tables, of.JAVARI_UM)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import threading
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import astuple, replace
 from pathlib import Path
@@ -145,6 +146,20 @@ def drawn(patch: Patch, other: Patch, seed: int, seconds: float, count: int = 60
             turned = present.with_value(name, present.value(name) * float(draw.uniform(0.8, 1.2)))
             present = turned if draw.random() < 0.8 else other
             found.append((frame, PatchTurned(present)))
+    return released_once(found)
+
+
+def released_once(played: list[tuple[int, Event]]) -> list[tuple[int, Event]]:
+    """With a release for each stroke, and resets of all that a channel has, as the frozen sounds know them."""
+    strokes, found = Counter[tuple[int, int]](), list[tuple[int, Event]]()
+    for frame, event in played:
+        if isinstance(event, NoteOn):
+            strokes[event.key, event.channel] += 1
+        elif isinstance(event, NoteOff):
+            found += [(frame, event)] * (strokes.pop((event.key, event.channel), 1) - 1)
+        elif isinstance(event, Controller) and event.number == events.RESET:
+            event = replace(event, value=events.AT_REST)
+        found.append((frame, event))
     return found
 
 
@@ -243,7 +258,7 @@ def test_a_burst_of_500_events_in_a_block_is_played_in_its_order(shipped: dict[s
         else:
             burst.append((frame, Controller(int(draw.choice([events.MOD_WHEEL, events.SUSTAIN])), number % 128)))
     assert burst[0][0] // QUANTUM == burst[-1][0] // QUANTUM
-    assert compared("burst", patch, preset, burst, 100) < CLOSE
+    assert compared("burst", patch, preset, released_once(burst), 100) < CLOSE
 
 
 def test_more_notes_than_there_are_places_all_begin(shipped: dict[str, Patch], preset: Preset) -> None:

@@ -10,9 +10,14 @@ import pytest
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import (
+    COARSE_TUNING,
+    DECREMENT,
+    EXPRESSION,
     FINE_OTHER,
     FINE_REGISTERED,
+    FINE_TUNING,
     FINE_VALUE,
+    INCREMENT,
     KEYS,
     LEGATO,
     MOD_WHEEL,
@@ -23,13 +28,17 @@ from app.instrument.events import (
     SLIDE,
     SUSTAIN,
     VALUE,
+    VOLUME,
     Bend,
     Controller,
     Event,
     NoteOff,
     NoteOn,
+    TimedEvent,
+    parameter_set,
     release_all,
 )
+from app.instrument.offline import render_events
 from app.instrument.strings import pitch_hz_of
 from app.patches.patch import Knobs, OpenString, Patch, StringSet
 from engine.kernels.playing.channels import WIDEST_SEMITONES
@@ -182,8 +191,62 @@ def test_slide_is_forgotten(patch: Patch, preset: Preset) -> None:
     hand.play(Controller(SLIDE, 127, 1), NoteOn(57, 60, 1))
     assert hand.reports[-1].position == pytest.approx(0.5)
     hand.play(Controller(RESET, 0, 1), NoteOn(57, 60, 1))
+    assert hand.reports[-1].position == pytest.approx(0.5)  # RP-015: it is a sound controller
+    hand.play(*release_all([1]), NoteOn(57, 60, 1))
     positions = [each.position for each in hand.reports if each.kind == BEGAN]
     assert positions[-1] == patch.pluck.position
+
+
+# Releases
+
+
+@pytest.mark.parametrize("mode", ["poly", "guitar", "mpe"])
+@pytest.mark.parametrize("channel", [1, KEYS])
+def test_a_release_belongs_to_the_stroke_before_it(strung: Patch, preset: Preset, mode: str, channel: int) -> None:
+    hand = Hand(changed(strung, mode=mode), preset)
+    on, off = NoteOn(64, 90, channel), NoteOff(64, channel)
+    again = hand.play(on, on, off)  # of the first
+    assert (again.now.held, again.now.damped) == (True, False)
+    hand.play(off)
+    assert (again.now.held, again.now.damped) == (False, True)
+    third = hand.play(on, off, off, on)  # one that came too often counts for nothing
+    assert third.now.held
+    hand.play(off)
+    assert third.now.damped
+    assert hand.play(on, on, *release_all([channel]), on, off).now.damped
+
+
+def test_the_pedal_keeps_the_latest_stroke_of_a_key(hand: Hand) -> None:
+    again = hand.play(Controller(SUSTAIN, 127), NoteOn(57, 90), NoteOn(57, 90), NoteOff(57))
+    assert (again.now.held, again.now.kept) == (True, False)
+    hand.play(NoteOff(57))
+    assert (again.now.held, again.now.kept) == (False, True)
+    hand.play(Controller(SUSTAIN, 0))
+    assert again.now.damped
+
+
+def test_channels_release_their_own_strokes(hand: Hand) -> None:
+    first = hand.play(NoteOn(57, 90, 0))
+    other = hand.play(NoteOn(57, 90, 1), NoteOff(57, 0))  # its string is the same
+    assert (first.now.has_place, other.now.held) == (False, True)
+    hand.play(NoteOff(57, 1))
+    assert other.now.damped
+
+
+def test_a_key_struck_twice_under_legato_is_pulled_off_after_its_last_release(hand: Hand) -> None:
+    moved = hand.play(Controller(LEGATO, 127), NoteOn(57, 90), NoteOn(60, 90), NoteOn(57, 90), NoteOff(57))
+    assert (hand.sounding, moved.now.held) == ([57], True)
+    hand.play(NoteOff(57))  # back to the key that is still down
+    assert (hand.sounding, moved.now.held) == ([60], True)
+    hand.play(NoteOff(60))
+    assert moved.now.damped
+
+
+@pytest.mark.parametrize("number", range(NOTES_OFF, 128))
+def test_messages_of_modes_release_all_keys(hand: Hand, number: int) -> None:
+    struck = hand.play(NoteOn(57, 90), NoteOn(57, 90), Controller(number, 0))
+    assert struck.now.damped
+    assert hand.play(NoteOn(57, 90), NoteOff(57)).now.damped
 
 
 # The range of bends
@@ -194,15 +257,16 @@ def test_messages_set_the_range_of_bends_of_their_channel(hand: Hand) -> None:
     assert hand.play(Bend(0.5, 1), NoteOn(57, 60, 1)).semitones == pytest.approx(1)
     assert hand.play(*range_of_bends(1, 50)).semitones == pytest.approx(1)  # that of the string of channel 1
     assert hand.struck[0].semitones == pytest.approx(0.75)  # it follows while it rings
-    assert hand.play(Controller(RESET, 0), Bend(0.5), NoteOn(52, 60)).semitones == pytest.approx(1)
+    assert hand.play(Controller(RESET, 0), Bend(0.5), NoteOn(52, 60)).semitones == pytest.approx(0.75)
+    assert hand.play(*release_all([0]), Bend(0.5), NoteOn(55, 60)).semitones == pytest.approx(1)
 
 
 def test_another_parameter_sets_no_range_and_none_is_beyond_its_bound(hand: Hand) -> None:
     other = [Controller(OTHER, 0), Controller(FINE_OTHER, 0), Controller(VALUE, 24)]
-    tuning = [Controller(REGISTERED, 0), Controller(FINE_REGISTERED, 2), Controller(VALUE, 24)]
+    program = [Controller(REGISTERED, 0), Controller(FINE_REGISTERED, 3), Controller(VALUE, 24)]
     none = [Controller(REGISTERED, 127), Controller(FINE_REGISTERED, 127), Controller(VALUE, 24)]
     assert hand.play(Controller(VALUE, 24), Bend(1.0), NoteOn(45, 60)).semitones == pytest.approx(2)
-    for messages in (other, tuning, none):
+    for messages in (other, program, none):
         assert hand.play(*range_of_bends(3), *messages, Bend(1.0), NoteOn(45, 60)).semitones == pytest.approx(3)
     hand.play(*range_of_bends(127, 127))
     assert hand.player.compiled.channel(0).range_semitones == WIDEST_SEMITONES
@@ -215,6 +279,63 @@ def test_in_mpe_members_bend_by_48_semitones_unless_messages_say_other(patch: Pa
     assert hand.play(Bend(0.5, 0)).semitones == pytest.approx(4)
     assert hand.play(*range_of_bends(4, 0, 0)).semitones == pytest.approx(5)
     assert hand.play(NoteOn(57, 60, KEYS)).semitones == pytest.approx(2)
+
+
+def test_a_members_range_of_bends_is_that_of_all_members(patch: Patch, preset: Preset) -> None:
+    hand = Hand(changed(patch, mode="mpe"), preset)
+    assert hand.play(*range_of_bends(12, 0, 1), Bend(1.0, 2), NoteOn(45, 60, 2)).semitones == pytest.approx(12)
+    assert hand.play(Bend(1.0, 0)).semitones == pytest.approx(14)  # the master's is its own
+
+
+def test_the_range_of_bends_is_set_in_cents_and_by_steps(hand: Hand) -> None:
+    chosen = [Controller(REGISTERED, 0), Controller(FINE_REGISTERED, 0)]
+    bent = hand.play(*chosen, Controller(FINE_VALUE, 50), Bend(1.0), NoteOn(45, 60))
+    assert bent.semitones == pytest.approx(2.5)  # the instrument's 2, and 50 cents
+    hand.play(Controller(INCREMENT, 0))
+    assert bent.semitones == pytest.approx(2.51)
+    hand.play(*[Controller(DECREMENT, 0)] * 2)
+    assert bent.semitones == pytest.approx(2.49)
+    hand.play(Controller(RESET, 0), Bend(1.0), Controller(INCREMENT, 0), Controller(VALUE, 9))  # none is chosen
+    assert bent.semitones == pytest.approx(2.49)
+
+
+def test_registered_parameters_tune_a_channel(hand: Hand) -> None:
+    one, other = hand.play(NoteOn(45, 60, 1)), hand.play(NoteOn(52, 60, 2))
+    hand.play(*parameter_set(FINE_TUNING, 96, 0, 1))
+    assert one.semitones == pytest.approx(0.5)
+    hand.play(*parameter_set(COARSE_TUNING, 61, 0, 1))
+    assert (one.semitones, other.semitones) == (pytest.approx(-2.5), 0.0)
+    hand.play(Controller(RESET, 0, 1))
+    assert hand.play(NoteOn(57, 60, 1)).semitones == pytest.approx(-2.5)
+    hand.play(*release_all([1]))
+    assert hand.play(NoteOn(55, 60, 1)).semitones == 0.0
+
+
+# Volume and expression
+
+
+def test_volume_and_expression_are_squares_of_which_a_reset_leaves_the_volume(patch: Patch, preset: Preset) -> None:
+    def level(*events: Event, channel: int = 1) -> float:
+        timed = [TimedEvent(0.0, event) for event in (*events, NoteOn(57, 90, channel))]
+        return float(np.abs(np.concatenate(list(render_events(patch, preset, timed, RATE_HZ, seconds=0.2)))).max())
+
+    volume, expression = Controller(VOLUME, 50, 1), Controller(EXPRESSION, 64, 1)
+    plain = level()
+    assert level(Controller(VOLUME, 100, 1), Controller(EXPRESSION, 127, 1)) == plain
+    assert level(volume) == pytest.approx(plain / 4, rel=1e-3)
+    assert level(expression) == pytest.approx(plain * (64 / 127) ** 2, rel=1e-3)
+    assert level(volume, expression, Controller(RESET, 0, 1)) == pytest.approx(plain / 4, rel=1e-3)
+    assert level(volume, expression, *release_all([1])) == plain
+    assert level(volume, channel=2) == plain
+    assert level(Controller(VOLUME, 0, 1)) == 0.0
+
+
+def test_a_crescendo_of_expression_is_heard_while_a_string_rings(patch: Patch, preset: Preset) -> None:
+    timed = [TimedEvent(0.0, NoteOn(45, 90)), TimedEvent(0.5, Controller(EXPRESSION, 40))]
+    sound = np.concatenate(list(render_events(patch, preset, timed, RATE_HZ, seconds=0.7)))
+    plain = np.concatenate(list(render_events(patch, preset, timed[:1], RATE_HZ, seconds=0.7)))
+    ratio = np.abs(sound[28_000:]).max() / np.abs(plain[28_000:]).max()
+    assert ratio == pytest.approx((40 / 127) ** 2, rel=0.01)
 
 
 # A guitar

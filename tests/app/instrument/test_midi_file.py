@@ -5,7 +5,19 @@ from pathlib import Path
 import mido
 import pytest
 
-from app.instrument.events import KEYS, Bend, Controller, NoteOff, NoteOn, PatchTurned, TimedEvent, channels_in
+from app.instrument.events import (
+    KEYS,
+    Bend,
+    Controller,
+    Event,
+    NoteOff,
+    NoteOn,
+    PatchTurned,
+    TimedEvent,
+    bend_range,
+    channels_in,
+    release_all,
+)
 from app.instrument.midi_file import MidiFileError, Song, event_of, midi_bytes, read_midi, read_song
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Patch
@@ -61,10 +73,16 @@ def test_a_patch_that_was_turned_is_no_midi(patch: Patch) -> None:
 
 
 def test_what_strings_do_not_answer_is_left_out() -> None:
-    assert event_of(mido.Message("clock")) is None
-    assert event_of(mido.Message("program_change", program=3)) is None
-    assert event_of(mido.Message("pitchwheel", pitch=-8192)) == Bend(-1.0)
-    assert event_of(mido.Message("pitchwheel", pitch=8191)) == Bend(1.0)
+    def event(kind: str, **facts: int) -> object:
+        return event_of(mido.Message(kind, **facts).bytes())
+
+    assert event("clock") is None
+    assert event("program_change", program=3) is None
+    assert event("polytouch", note=3, value=4) is None
+    assert event("pitchwheel", pitch=-8192) == Bend(-1.0)
+    assert event("pitchwheel", pitch=8191) == Bend(1.0)
+    assert event("note_on", note=3, velocity=0, channel=4) == NoteOff(3, 4)
+    assert event("control_change", control=121, value=127) == Controller(121, 0)  # other values are the program's own
 
 
 @pytest.mark.parametrize(
@@ -75,7 +93,10 @@ def test_what_strings_do_not_answer_is_left_out() -> None:
         (midi_bytes(PLAYED)[:40], "no MIDI file"),
         (midi_bytes([]), "no note"),
         (b"MThd\0\0\0\6\0\0\0\1\0\0MTrk\0\0\0\4\0\xff\x2f\0", "no"),
-        (midi_bytes(PLAYED)[:12] + b"\xe7\x28" + midi_bytes(PLAYED)[14:], "SMPTE"),  # its times were negative
+        (midi_bytes(PLAYED)[:12] + b"\xd0\x28" + midi_bytes(PLAYED)[14:], "frames at a rate"),
+        (midi_bytes(PLAYED)[:12] + b"\xe7\x00" + midi_bytes(PLAYED)[14:], "frames at a rate"),
+        (midi_bytes(PLAYED)[:12] + b"\0\0" + midi_bytes(PLAYED)[14:], "division of 0"),
+        (b"RIFF\x0c\0\0\0RMIDLIST\0\0\0\0", "no chunk of data"),
         (midi_bytes([TimedEvent(4000.0, NoteOn(1, 1))]), "an hour"),
     ],
 )
@@ -92,13 +113,64 @@ def test_a_huge_file_is_not_read(tmp_path: Path) -> None:
     file = tmp_path / "huge.mid"
     with file.open("wb") as out:
         out.truncate(100 * 2**20)
-    with pytest.raises(MidiFileError, match="1 MiB"):
+    with pytest.raises(MidiFileError, match="4 MiB"):
         read_midi(file)
 
 
 def test_no_file_says_so(tmp_path: Path) -> None:
     with pytest.raises(MidiFileError, match="cannot be read"):
         read_midi(tmp_path / "none.mid")
+
+
+# The range of bends
+
+
+def written(folder: Path, timed: list[TimedEvent], patch: Patch) -> list[Event]:
+    file = folder / "ranges.mid"
+    file.write_bytes(midi_bytes(timed, patch))
+    return [each.event for each in read_midi(file)]
+
+
+def test_a_recording_has_the_range_of_bends_of_each_channel(tmp_path: Path) -> None:
+    patch = PATCHES["guitar"].model_copy(update={"mode": "poly", "bend_semitones": 12.5})
+    played = [TimedEvent(0.0, NoteOn(50, 90, KEYS)), TimedEvent(0.1, NoteOn(52, 90, 3))]
+    found = written(tmp_path, played, patch)
+    assert found == [*bend_range(12.5, 3), *bend_range(12.5, 0), NoteOn(50, 90), NoteOn(52, 90, 3)]
+    mpe = written(tmp_path, [*played, TimedEvent(0.2, NoteOn(40, 9, 0))], patch.model_copy(update={"mode": "mpe"}))
+    assert mpe[:12] == [*bend_range(12.5, 0), *bend_range(48, 3)]  # the master's, and a member's
+
+
+def test_a_range_that_messages_set_stays_until_another_instrument(tmp_path: Path) -> None:
+    patch = PATCHES["guitar"].model_copy(update={"mode": "poly", "bend_semitones": 2.0})
+    wide = patch.model_copy(update={"bend_semitones": 7.0})
+    other = wide.model_copy(update={"name": "another", "bend_semitones": 5.0})
+    own = [TimedEvent(0.1, event) for event in bend_range(24, 1)]
+    played = [TimedEvent(0.0, NoteOn(50, 90, 0)), *own, TimedEvent(0.2, PatchTurned(wide))]
+    found = written(tmp_path, played, patch)
+    assert found == [*bend_range(2, 0), *bend_range(2, 1), NoteOn(50, 90), *bend_range(24, 1), *bend_range(7, 0)]
+    found = written(tmp_path, [*played, TimedEvent(0.3, PatchTurned(other))], patch)
+    assert found[-12:] == [*bend_range(5, 0), *bend_range(5, 1)]
+    found = written(tmp_path, [*played, *(TimedEvent(0.3, event) for event in release_all([1]))], patch)
+    assert found[-8:] == [Controller(121, 0, 1), *bend_range(7, 1), Controller(7, 100, 1), Controller(123, 0, 1)][-8:]
+
+
+def test_what_a_song_is_played_without_is_reported_once(tmp_path: Path) -> None:
+    file = tmp_path / "song.mid"
+    track = b"\0\xc0\x05" * 3 + b"\0\xb0\x0a\x40" * 2 + b"\0\xb0\x40\x00" + b"\0\xb0\x5b\x40" + b"\0\x90\x3c\xff"
+    track += b"\0\xb0\xff\x40"
+    file.write_bytes(b"MThd\0\0\0\6\0\1\0\2\0\x60MTrk" + len(track).to_bytes(4, "big") + track)
+    assert read_song(file, None).left_out == (
+        "song.mid is played without 1 track that its header counts; 1 message of a key or a controller above 127; "
+        "what exceeds 127 in 1 message; its program changes and its controllers 10, 91"
+    )
+
+
+def test_controllers_long_after_the_last_note_are_no_music(tmp_path: Path) -> None:
+    file = tmp_path / "long.mid"
+    timed = [TimedEvent(0.0, NoteOn(50, 90)), TimedEvent(0.5, NoteOff(50)), TimedEvent(1.0, Controller(64, 0))]
+    file.write_bytes(midi_bytes([*timed, TimedEvent(600.0, Controller(64, 0)), TimedEvent(5_000.0, Bend(0.0))]))
+    assert [each.time_s for each in read_midi(file)] == [0.0, 0.5, 1.0]
+    assert read_song(file, None).length_s == 0.5
 
 
 def song(folder: Path, *notes: tuple[int, int]) -> Path:

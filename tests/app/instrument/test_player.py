@@ -345,6 +345,19 @@ def test_a_file_ends_when_nothing_is_heard(patch: Patch, preset: Preset) -> None
     assert heard > 0.2 * 48_000 and len(sound) - heard <= 2 * BLOCK_FRAMES
 
 
+def test_a_file_ends_with_its_last_note_whatever_controllers_follow(patch: Patch, preset: Preset) -> None:
+    timed = [TimedEvent(0.0, NoteOn(57, 90)), TimedEvent(0.1, NoteOff(57))]
+    late = [TimedEvent(time_s, Controller(11, 90)) for time_s in (30.0, 50.0)]
+    alone, followed = (
+        sum(len(block) for block in render_events(patch, preset, events, RATE_HZ)) for events in (timed, timed + late)
+    )
+    assert followed == alone < 20 * RATE_HZ
+    pedal = [TimedEvent(0.05, Controller(SUSTAIN, 127)), TimedEvent(1.0, Controller(SUSTAIN, 0))]
+    sound = np.concatenate(list(render_events(patch, preset, timed + pedal, RATE_HZ)))
+    assert RATE_HZ < len(sound) < 2 * RATE_HZ  # the pedal after it is followed
+    assert level_db(sound[:, 0], 0.8, 0.95) > -60
+
+
 def test_events_give_the_same_samples_for_ever(patch: Patch, preset: Preset) -> None:
     np.testing.assert_array_equal(play(patch, preset, 1.5, *BUSY), play(patch, preset, 1.5, *BUSY))
 

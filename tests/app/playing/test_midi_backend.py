@@ -8,12 +8,13 @@ import subprocess
 import sys
 import threading
 import types
+from collections.abc import Sequence
 from pathlib import Path
 
-import mido
 import pytest
 
 from app.instrument.events import Bend, Controller, NoteOff, NoteOn
+from app.instrument.midi_file import event_of
 from app.playing.midi_backend import VARIABLE, MidiUnavailable, RtMidiInput, load_backend
 from app.playing.midi_port import MidiInput
 
@@ -68,6 +69,22 @@ try:
             ended.set()
             streaming.join()
         found["streamed"] = bool(came)
+        plugged = line.plug("other")
+        name = next(each for each in midi.names() if each.endswith("other"))
+        opened(name)
+        found["looks"] = [midi.look()]
+        plugged.delete()
+        time.sleep(0.2)
+        found["looks"] += [midi.look(), midi.look()]
+        plugged = line.plug("other")
+        time.sleep(0.2)
+        came.clear()
+        found["looks"].append(midi.look())
+        time.sleep(0.2)
+        plugged.send_message([0x90, 60, 100])
+        time.sleep(0.2)
+        found["came again"] = [repr(event) for event in came]
+        plugged.delete()
         try:
             midi.open("Nobody:nothing")
         except MidiUnavailable as error:
@@ -94,6 +111,9 @@ def test_messages_come_through_jack_and_an_input_closes_while_they_stream(tmp_pa
     came = [NoteOn(60, 100, 2), Bend(-1.0), Controller(64, 127), NoteOff(60, 2)]
     assert found["came"] == [repr(each) for each in came]
     assert found["closed"] == 20 and found["streamed"]
+    before, gone, waiting, back = found["looks"]
+    assert (before, waiting) == ("", "") and "was disconnected" in gone and "is connected again" in back
+    assert found["came again"] == [repr(NoteOn(60, 100))]
     assert "Nobody:nothing is not connected" in found["absent"]
     assert "does not answer" in found["no server"]
     assert "leaked" not in done.stderr
@@ -150,6 +170,21 @@ def test_a_busy_input_is_a_message_and_leaves_no_client(library: types.SimpleNam
     assert library.MidiIn.deleted == 2  # of the list of names, and of the try
 
 
+def test_inputs_of_one_name_can_be_chosen_and_seen_to_be_gone(library: types.SimpleNamespace) -> None:
+    opened, ports = list[int](), ["Keys", "Pads", "Keys", "Keys"]
+    library.MidiIn.get_ports = lambda self: list(ports)
+    library.MidiIn.open_port = lambda self, number: opened.append(number)
+    library.MidiIn.get_message = lambda self: None
+    library.MidiIn.close_port = lambda self: None
+    midi = MidiInput(lambda event: None)
+    assert midi.names() == ["Keys", "Pads", "Keys #2", "Keys #3"]
+    midi.open("Keys #2")
+    assert (opened, midi.name, midi.look()) == ([2], "Keys #2", "")
+    ports[2:] = []
+    assert "Keys #2 was disconnected" in midi.look()
+    midi.close()
+
+
 def test_a_variable_names_the_system(library: types.SimpleNamespace, monkeypatch: pytest.MonkeyPatch) -> None:
     assert load_backend()._api == 1
     monkeypatch.setenv(VARIABLE, "jack")
@@ -165,17 +200,18 @@ def test_noise_and_a_fault_cost_one_message_and_not_the_input(monkeypatch: pytes
     client.close_port, client.delete = lambda: None, lambda: None
     faults: list[threading.ExceptHookArgs] = []
     monkeypatch.setattr(threading, "excepthook", faults.append)
-    came: list[int] = []
+    came: list[Sequence[int]] = []
     arrived = threading.Event()
 
-    def play(message: mido.Message) -> None:
-        if message.note == 60:
+    def play(message: Sequence[int]) -> None:
+        if message == [0x90, 60, 1]:
             raise ValueError("no such string")
-        came.append(message.note)
-        arrived.set()
+        came.append(message)
+        if message == [0x90, 61, 1]:
+            arrived.set()
 
-    port = RtMidiInput(client, play)
+    port = RtMidiInput(client, "Keys", play)
     assert arrived.wait(10)
     port.close()
-    assert came == [61]
+    assert came == [[0xF4], [0x90, 61, 1]] and event_of(came[0]) is None
     assert [str(each.exc_value) for each in faults] == ["no such string"]

@@ -57,12 +57,15 @@ class OwnBackend:
     def close(self) -> None:
         self._callback = None
 
+    def connected(self) -> bool:
+        return True
+
     def send(self, *data: int) -> None:
         def deliver() -> None:
             self._parser.feed(bytes(data))
             for message in self._parser:
                 if self._callback is not None:
-                    self._callback(message)
+                    self._callback(message.bytes())
 
         thread = threading.Thread(target=deliver)
         thread.start()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator
-from types import SimpleNamespace
 from typing import Any
 
+import mido
 import pytest
 from PySide6.QtCore import QCoreApplication, Qt
 from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
@@ -43,10 +43,13 @@ class FakeBackend:
     def close(self) -> None:
         self.open_name, self._callback = "", None
 
+    def connected(self) -> bool:
+        return self.open_name in self.names
+
     def send(self, kind: str, **facts: int) -> None:
         callback = self._callback
         assert callback is not None
-        thread = threading.Thread(target=callback, args=(SimpleNamespace(type=kind, **facts),))
+        thread = threading.Thread(target=callback, args=(mido.Message(kind, **facts).bytes(),))
         thread.start()
         thread.join()
 
@@ -63,6 +66,37 @@ def test_an_input_is_found_again_under_new_numbers() -> None:
     midi.close()
     assert (midi.name, backend.open_name) == ("", "")
     assert not same_device("Keys 1", "Keys 2")
+
+
+def test_of_two_inputs_of_one_make_the_one_that_was_chosen_opens() -> None:
+    backend = FakeBackend()
+    backend.names = ["Keys:Keys MIDI 1 20:0", "Keys:Keys MIDI 1 24:0", "Keys:Keys MIDI 1 28:0"]
+    midi = MidiInput(lambda event: None, lambda: backend)
+    for name in backend.names:
+        midi.open(name)
+        assert (midi.name, backend.open_name) == (name, name)
+
+
+def test_an_input_that_is_unplugged_releases_its_keys_and_comes_back_by_itself() -> None:
+    backend, heard, released = FakeBackend(), list[Event](), list[Event]()
+    midi = MidiInput(heard.append, lambda: backend, released.append)
+    midi.open("Keys:Keys 20:0")
+    backend.send("note_on", note=60, velocity=90, channel=2)
+    assert midi.look() == ""
+    backend.names = ["Pads:Pads 24:0"]
+    assert "Keys:Keys 20:0 was disconnected" in midi.look()
+    assert released == release_all([2])
+    assert (midi.name, backend.open_name, midi.look()) == ("", "", "")
+    backend.names = ["Pads:Pads 24:0", "Keys:Keys 31:0"]  # another number, as ALSA gives
+    backend.busy = True
+    assert midi.look() == ""
+    backend.busy = False
+    assert "Keys:Keys 31:0 is connected again" in midi.look()
+    backend.send("note_on", note=62, velocity=90, channel=2)
+    assert heard[-1] == NoteOn(62, 90, 2)
+    midi.close()
+    backend.names = []
+    assert midi.look() == ""  # none is wanted
 
 
 def test_faults_are_reported_in_plain_words() -> None:
@@ -331,6 +365,35 @@ def test_the_patch_says_what_channels_and_wheels_do(qtbot: QtBot, midi: MidiCont
     assert found == (["mpe", "guitar", "guitar", "guitar"], 12.0, "tension", "pluck.position")
     boxes, buttons = dialog.findChildren(QComboBox), dialog.findChildren(QPushButton)
     assert [each.accessibleName() for each in (*boxes, *buttons) if not each.toolTip()] == []
+
+
+def test_an_input_that_comes_and_goes_is_reported_and_shown(
+    qtbot: QtBot, midi: MidiControl, backend: FakeBackend, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(midi._look_timer, "start", lambda: None)
+    present, backend.names = backend.names, []
+    with qtbot.waitSignal(midi.reported):
+        midi.start()
+    window = QWidget()
+    qtbot.addWidget(window)
+    midi.show_dialog(window)
+    assert midi._dialog is not None
+    backend.names = present
+    with qtbot.waitSignal(midi.informed) as informed:
+        midi._look()
+    assert "Keys:Keys 20:0 is connected again" in informed.args[0]
+    assert midi._dialog._inputs.currentText() == "Keys:Keys 20:0"
+    backend.names = ["Pads:Pads 24:0"]
+    with qtbot.waitSignal(midi.reported) as reported:
+        midi._look()
+    assert "disconnected" in reported.args[0]
+    assert midi._dialog._inputs.currentText() == "None"
+    assert midi.choices.port == "Keys:Keys 9:0"  # still remembered
+    midi._dialog.port_chosen.emit("Strings")  # a wrong choice is not waited for
+    backend.names = ["Strings"]
+    with qtbot.assertNotEmitted(midi.informed, wait=10):
+        midi._look()
+    midi.close()
 
 
 def test_an_input_that_is_gone_is_reported_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:

@@ -16,7 +16,7 @@ from pytestqt.qtbot import QtBot
 from app.export.journal import left_journals, recordings_folder
 from app.export.recipe import InstrumentSound, read_origin
 from app.instrument.bodies import own_bodies
-from app.instrument.events import NoteOff, NoteOn, TimedEvent
+from app.instrument.events import NoteOff, NoteOn, TimedEvent, bend_range
 from app.instrument.midi_file import read_midi
 from app.shared.version import program_version
 from app.views.dialogs.export_dialog import ExportDialog
@@ -91,7 +91,10 @@ def test_what_is_played_is_recorded_as_wav_and_midi(
     sound, rate_hz = soundfile.read(out)
     assert rate_hz == 48_000
     assert 0.001 < abs(sound).max() < 1
-    assert [type(each.event) for each in read_midi(out.with_suffix(".mid"))] == [NoteOn, NoteOff]
+    events = [each.event for each in read_midi(out.with_suffix(".mid"))]
+    patch = played.session.choices.patch
+    assert patch is not None and events[:6] == bend_range(patch.bend_semitones, 0)
+    assert [type(event) for event in events[6:]] == [NoteOn, NoteOff]
     assert recordings.latest is None
 
 

@@ -51,6 +51,10 @@ class Cable:
             self._output.send_message(message.bytes())
         return sent_s
 
+    def plug(self, name: str) -> Any:
+        """A further port, which `delete` unplugs."""
+        return load_backend().virtual_output(name)
+
     def hear(self, _message: Any) -> None:
         """Receives a message at the other end, in the port's thread."""
         self._arrived_s.append(time.monotonic())

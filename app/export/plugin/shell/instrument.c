@@ -229,6 +229,7 @@ void instrument_bend(instrument *own, uint32_t at, int32_t channel, double value
 }
 
 void instrument_controller(instrument *own, uint32_t at, int32_t channel, int32_t number, int32_t value) {
+  if (number == 121) value = 0; /* other values are of the app alone */
   if (plausible(channel, number)) pushed(own, frame_of(own, at), CONTROLLER, channel, number, value);
 }
 

@@ -18,9 +18,13 @@ enum { FACE_COMPONENT, FACE_PROCESSOR, FACE_CONTROLLER, FACE_MIDI_MAPPING, FACE_
 enum { MOST_EVENTS = 1024, MOST_CHANGED = 768, MOST_NOTES_KNOWN = 256 };
 
 /* Controllers that messages of a host reach by hidden parameters, for each channel of MIDI. */
-static const int16_t CONTROLLERS[] = {1, 6, 38, 64, 74, 98, 99, 100, 101, 120, 121, 123, VST_PITCH_BEND};
+static const int16_t CONTROLLERS[] = {1, 6, 7, 11, 38, 64, 74, 96, 97, 98, 99, 100, 101, 120, 121, 123, VST_PITCH_BEND};
 enum { CONTROLLER_COUNT = sizeof CONTROLLERS / sizeof *CONTROLLERS, MIDI_CHANNELS = 16 };
 static const uint32_t FIRST_CONTROLLER = 0x7FFF0000;
+
+static double standard_of(int16_t number) {
+  return number == VST_PITCH_BEND ? 0.5 : number == 7 ? 100.0 / 127 : number == 11 ? 1 : 0; /* as a channel begins */
+}
 
 typedef struct shell shell;
 typedef struct { const void *table; shell *own; } face; /* what a host holds of one interface */
@@ -405,7 +409,7 @@ static int32_t parameter_info(void *interface, int32_t index, vst_parameter *inf
     name[28] = (char)('0' + number / 10 % 10);
     name[29] = (char)('0' + number % 10);
     info->id = FIRST_CONTROLLER + (uint32_t)place;
-    info->standard = number == VST_PITCH_BEND ? 0.5 : 0;
+    info->standard = standard_of((int16_t)number);
     info->flags = VST_CAN_AUTOMATE | VST_HIDDEN;
     write_text(info->title, 128, name);
     return VST_OK;
@@ -648,7 +652,8 @@ static int32_t create(void *, const char *id, const char *wanted, void **found) 
     own->references = 1;
     const void *tables[FACES] = {&component, &processor, &controller, &midi_mapping, &expressions, &required};
     for (int32_t face_number = 0; face_number < FACES; face_number++) own->faces[face_number] = (face){tables[face_number], own};
-    for (int32_t channel = 0; channel < MIDI_CHANNELS; channel++) own->controllers[channel][CONTROLLER_COUNT - 1] = 0.5;
+    for (int32_t channel = 0; channel < MIDI_CHANNELS; channel++)
+      for (int32_t number = 0; number < CONTROLLER_COUNT; number++) own->controllers[channel][number] = standard_of(CONTROLLERS[number]);
     show(own);
     int32_t result = query(own->faces, (const uint8_t *)wanted, found);
     release(own->faces); /* the host's reference keeps it */
