@@ -174,7 +174,7 @@ def looped(note: Note) -> Finding | None:
     # of a note that has died away only noise is left, or a converter's last bit
     loud = np.flatnonzero(energies > LOUD_LOOP * float(energies.max(initial=0.0)))
     last = int(loud[-1]) * block if len(loud) else 0
-    earlier = sound[: last + block - round(LOOP_LAG_S * note.rate_hz)]
+    earlier = sound[: max(0, last + block - round(LOOP_LAG_S * note.rate_hz))]
     if last == 0 or len(earlier) < block:
         return None
     found, energy = sound[last : last + block], float(energies[loud[-1]])

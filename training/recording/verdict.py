@@ -18,11 +18,12 @@ from training.recording.report import Report
 MOST_ESR = 0.15  # besides the recording's noise
 MOST_NOISE_ESR = 0.15
 GOOD_ESR = 0.05  # up to it the linear poles may be as near
-LOUD_DB = -30.0  # below the loudest partial
-NEAR_CENTS = 40.0  # a body pulls a partial so far from its law
+LOUD_DB = -40.0  # below the loudest partial
+NEAR_CENTS = 25.0
+PULLED_CENTS = 75.0  # so far a body pulls a partial from the law, often the loudest one
 LEAST_LOUD = 2
-LEAST_NEAR = 0.8  # of the loud partials
-LEAST_ENERGY = 0.3  # of the recording's, in the partials near the law
+LEAST_NEAR = 0.7  # of the loud partials
+LEAST_ENERGY = 0.3  # of the recording's, in partials that belong to the law, pulled or not
 
 
 @dataclass(frozen=True)
@@ -33,7 +34,7 @@ class Verdict:
         reasons: why no string was found, in words; empty: one was.
         esr, linear_esr: of the note, and of two linear poles a partial without glide and body.
         near: share of the loud partials that lie near the law.
-        energy: in the partials near the law, over the recording's.
+        energy: in partials that belong to the law, pulled or not, over the recording's.
     """
 
     reasons: tuple[str, ...]
@@ -63,12 +64,12 @@ def verdict_of(note: Note, series: Series, learned: LearnedNote, report: Report)
     whole = max(float(truth @ truth), 1e-30)
     wrong = truth - fit_note(note, series, free=0, glides=False).render(t)
     linear_esr = float(wrong @ wrong) / whole
-    on_law = {each.number for each in report.partials if abs(each.cents) < NEAR_CENTS}
-    loud = [each.number in on_law for each in report.partials if each.level_db > LOUD_DB]
+    loud = [abs(each.cents) < NEAR_CENTS for each in report.partials if each.level_db > LOUD_DB]
+    of_law = {each.number for each in report.partials if abs(each.cents) < PULLED_CENTS}
     tau = learned.glide.tau(t)
     sound = np.zeros(len(t))
     for pole in learned.poles:
-        if pole.partial in on_law:
+        if pole.partial in of_law:
             sound += (pole.a * np.exp(pole.s * tau)).real
     esr = report.errors.esr
     near, energy = float(np.mean(loud)) if loud else 0.0, float(sound @ sound) / whole

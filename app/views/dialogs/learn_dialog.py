@@ -164,7 +164,7 @@ class LearnDialog(QDialog):
         elif refusals:
             words = "Learned all the same, although:"
         else:
-            words = "Learning takes about five seconds, and tells whether a string was found."
+            words = "Learning takes about five seconds, and shows whether a string was found."
         self.state.setText("\n".join([words, *(f"• {each}" for each in (*refusals, *warnings))]))
         self.start.setText("Use as body" if self.body.isChecked() else "Learn")
         self.start.setEnabled(self.body.isChecked() or self.string.isChecked())

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from scipy import signal
 
 from tests.bench.recordings.synthetic import synthetic_note
-from training.recording.note import onset_of
+from training.recording.note import note_of, onset_of
+from training.recording.numbering import number_note
 
 Array = NDArray[np.float64]
 Sound = tuple[Array, int]  # samples (frames,) or (frames, channels), and their rate
@@ -281,13 +282,10 @@ def _percussion(random: Random, number: int) -> tuple[str, bool, Sound]:
 
 def chord(first: Sound, second: Sound, level_db: float) -> Sound | None:
     """Two notes at once, the second at a level of the first; None where they are octaves, or one pitch."""
-    from training.recording.note import note_of
-    from training.recording.numbering import number_note
-
-    heard = [number_note(note_of(*each))[0] for each in (first, second)]
-    if None in heard:
+    one, other = (number_note(note_of(*each))[0] for each in (first, second))
+    if one is None or other is None:
         return None
-    cents = 1200 * math.log2(heard[0].f0_hz / heard[1].f0_hz)
+    cents = 1200 * math.log2(one.f0_hz / other.f0_hz)
     if abs((cents + 600) % 1200 - 600) < OCTAVE_CENTS:
         return None
     (a, rate_hz), (b, other_hz) = first, second
