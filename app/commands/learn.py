@@ -13,7 +13,10 @@ from training.cli.console import print_json, progress, say
 
 Instrument = Literal["guitar", "bass", "harp", "piano"]
 InstrumentOption = Annotated[Instrument, typer.Option(help="What it was: for what a sound does not give.")]
-Anyway = Annotated[bool, typer.Option("--anyway", help="Continue where the recording does not look like one note.")]
+Anyway = Annotated[
+    bool,
+    typer.Option("--anyway", help="Continue where a recording is refused, and keep it where no string is found."),
+]
 
 
 def learn(
@@ -33,6 +36,7 @@ def learn(
     the same command continues there. Preset and instrument are written at the end.
     """
     from app.instrument.learned import check_name, keep, learn_files
+    from training.recording.learn import require_found
     from training.recording.table import as_data, as_text
 
     if scale_length is not None:
@@ -48,6 +52,8 @@ def learn(
     except KeyboardInterrupt:
         say("stopped; the same command continues there")
         raise
+    if not anyway:
+        require_found(learned)
     kept = keep(name, learned, instrument)
     if json:
         files = {

@@ -97,14 +97,25 @@ def unfinished_folder() -> Path:
     return user_folder() / "unfinished"
 
 
-def reasons_against(path: Path) -> list[str]:
-    """Why a file is not one note of a string, in words with the remedy; empty: it is one.
+@dataclass(frozen=True)
+class Reasons:
+    """Against a recording, in words with the remedy; a refusal says that no string can be fitted to it."""
+
+    refusals: list[str]
+    warnings: list[str]
+
+
+def reasons_against(path: Path) -> Reasons:
+    """What speaks against a file as a note of a string; empty lists: nothing does.
 
     Raises:
         NoteFileError, RecordingError: nothing can be learned from it in any case.
     """
     file = read_note(path)
-    return [f"{each.reason}: {each.remedy}" for each in examined(file.samples, file.rate_hz).findings]
+    words: dict[bool, list[str]] = {True: [], False: []}
+    for each in examined(file.samples, file.rate_hz).findings:
+        words[each.refused].append(f"{each.reason}: {each.remedy}")
+    return Reasons(words[True], words[False])
 
 
 def both_sounds(learned: Learned, rate_hz: int) -> dict[str, NDArray[np.float32]]:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tests.bench.recordings.evaluate import at_level, below, held_out, table, with_level
+from tests.bench.recordings.gate import as_data, outcomes, rows
 from tests.bench.recordings.instrument import attacks, neighbours
 from tests.bench.recordings.pitch import pitches, pitches_of
 from tests.bench.recordings.synthetic import synthetic_note
@@ -22,6 +23,15 @@ def test_pitch_is_found_blind_and_named() -> None:
     made = synthetic_note(1, 1.0, f0_range_hz=(109.9, 110.1))
     named = {f"bass_{name}_fa": (made.samples, made.rate_hz) for name in ("a2", "b2", "take")}
     assert pitches_of(named) == {"recordings, f0 within 50 cents": [1.0, 0.0]}
+
+
+def test_shares_of_the_gate_are_of_one_half() -> None:
+    found = outcomes({}, 6, 0)
+    assert 0 < len(found) < 15 and all(each.case.judging for each in found)
+    table = {row[0]: row[1:] for row in rows(found)}
+    assert table["all notes"][1] == 0
+    assert table["all others"][1] > 0
+    assert table["all notes"][0] + table["all others"][0] == len(found) == len(as_data(found))
 
 
 def test_a_key_of_neighbouring_pitch_is_compared_with_its_recording() -> None:

@@ -2,7 +2,7 @@
 
     samples ─► Note (note) ─► reasons (gate) ─► Series (numbering) ─► Glide (glide)
             ─► LearnedNote (fit: poles, refine) ─► string and preset (physics, preset)
-            ─► errors (report)
+            ─► errors (report) ─► string found or not (verdict)
 
 A note is a sum of decaying partials that share one glide of pitch, and of a few poles that do not glide:
 

@@ -1,6 +1,7 @@
-"""Whether a recording is one note of a string, with reasons in words and what to do.
+"""The findings on a recording before it is fitted, with reasons in words and what to do.
 
-Each check is one function of the sound; all are made, so that a musician reads every reason at once.
+Only what cannot be fitted is refused. All else is a warning, and `verdict` judges the fit. Each check is one function
+of the sound; all are made, so that a musician reads every reason at once.
 """
 
 from __future__ import annotations
@@ -19,63 +20,84 @@ Array = NDArray[np.float64]
 
 CLIPPED_RUNS = 3  # of so many equal samples at the peak
 CLIPPED_SAMPLES = 4
+MOST_CLIPPED = 0.02  # of the samples of the first half second: more is no string's waveform
 SHORTEST_RINGING_S = 0.4
+LEAST_PERIODS = 10
 LEAST_SNR_DB = 18.0
 ONSET_RISE_DB = 6.0
+LOUD_ONSET_DB = -20.0  # of the loudest attack: below it a sound is no second note
 LEAST_PARTIALS = 4
 LEAST_EXPLAINED = 0.3
+LEAST_FITTED = 0.12  # the same: less is not even tried
 MOST_MISSING = 0.45
-SECOND_SERIES = 0.28  # see `second_series`
+SECOND_SERIES = 0.36  # see `second_series`
+LEAST_SECOND = 4  # of its partials
 LOUD_DB = -30.0  # of a second note's three loudest partials, below the loudest peak
+LEAST_LOUD_DB = -23.0  # fainter, they are the body's, or neighbours'
 SLOWEST_ATTACK_S = 0.12
+MOST_BEFORE_PEAK = 0.5  # of the energy: more is a note reversed
+LOOP_S = 0.08  # a stretch that is looked for
+LOOP_LAG_S = 0.5  # at least so far before: beats of a pure tone come back sooner
+LOUD_LOOP = 1e-4  # of the loudest stretch's energy
 LEAST_FILLED_DB = 20.0  # between partials, below them, half a second after the attack
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One reason against a recording, and the remedy; `kind` is a short name for tables."""
+    """One thing that speaks against a recording, and the remedy.
+
+    Attributes:
+        kind: a short name for tables.
+        refused: it cannot be fitted; otherwise it is a warning.
+    """
 
     kind: str
     reason: str
     remedy: str
+    refused: bool = False
 
 
 def examine(samples: Array, note: Note, series: Series | None, peaks: Peaks) -> tuple[Finding, ...]:
-    """All reasons against a recording; empty: it is one note of a string."""
+    """All that speaks against a recording; empty: nothing does."""
     found = [
-        clipped(samples),
+        clipped(samples, note),
         already_playing(note),
         slow_attack(note),
         reverberant(note, series),
-        too_short(note),
+        too_short(note, series),
         looped(note),
         more_onsets(note, series),
-        no_series(series, peaks),
+        no_series(series),
     ]
-    if not any(found) and series is not None:
-        found.append(second_series(note, series, peaks))
+    if series is not None:
+        found.append(second_series(series, peaks))
     return tuple(each for each in found if each is not None)
 
 
-def clipped(samples: Array) -> Finding | None:
+def clipped(samples: Array, note: Note) -> Finding | None:
     """Runs of equal samples at the peak, as of a converter that is full."""
     sound = np.asarray(samples, float)
     sound = sound if sound.ndim == 1 else sound[:, int(np.argmax(np.nanmax(np.abs(sound), axis=0)))]
     peak = float(np.nanmax(np.abs(sound)))
-    runs = 0
+    count = 0
     for sign in (1, -1):
         full = sign * sound >= peak * (1 - 1e-4)
         lengths = np.diff(np.flatnonzero(np.diff(np.concatenate([[0], full.astype(int), [0]]))))[::2]
-        runs += int(np.sum(lengths[lengths >= CLIPPED_RUNS]))
-    if runs < CLIPPED_SAMPLES:
+        count += int(np.sum(lengths[lengths >= CLIPPED_RUNS]))
+    if count < CLIPPED_SAMPLES:
         return None
+    # the recording may have a higher rate than its note
+    first_half_second = min(len(note.part(0, 0.5)) / len(note.samples), 1.0) * len(sound)
     return Finding(
-        "clipped", f"it is clipped ({runs} samples at the limit)", "lower the input gain and record it again"
+        "clipped",
+        f"it is clipped ({count} samples at the limit)",
+        "lower the input gain and record it again",
+        refused=count > MOST_CLIPPED * first_half_second,
     )
 
 
 def already_playing(note: Note) -> Finding | None:
-    """Whether the waveform does not start from rest."""
+    """A waveform that does not start from rest."""
     if note.onset > round(0.01 * note.rate_hz):
         return None
     loudest = float(np.abs(note.samples[: round(0.3 * note.rate_hz)]).max())
@@ -87,17 +109,20 @@ def already_playing(note: Note) -> Finding | None:
 
 
 def slow_attack(note: Note) -> Finding | None:
-    """A level that rises for longer than any pluck: reversed, faded in, or bowed."""
-    level = envelope(note.samples, note.rate_hz, 0.02)
+    """A level that rises for longer than any pluck, as in a room; most of the energy before the peak: reversed."""
+    level = envelope(note.samples, note.rate_hz, 0.05)
     peak = int(np.argmax(level))
     quiet = np.flatnonzero(level[:peak] < 0.3 * level[peak])
     rise_s = (peak - (int(quiet[-1]) if len(quiet) else 0)) / note.rate_hz
-    if rise_s < SLOWEST_ATTACK_S:
+    before = float(np.sum(level[:peak] ** 2) / np.sum(level**2))
+    is_reversed = peak / note.rate_hz > SLOWEST_ATTACK_S and before > MOST_BEFORE_PEAK
+    if rise_s < SLOWEST_ATTACK_S and not is_reversed:
         return None
     return Finding(
         "edited",
-        f"its level rises for {rise_s:.2f} s: reversed, faded in or bowed",
+        f"its level rises for {rise_s:.2f} s: reversed, faded in, bowed, or in a large room",
         "give a plucked note as it was recorded",
+        refused=is_reversed,
     )
 
 
@@ -122,43 +147,48 @@ def reverberant(note: Note, series: Series | None) -> Finding | None:
     return Finding("reverberant", "a room rings between its partials", "record closer, or in a drier room")
 
 
-def too_short(note: Note) -> Finding | None:
+def too_short(note: Note, series: Series | None) -> Finding | None:
     """How long it stands out of its noise, and by how much."""
-    if note.seconds < SHORTEST_RINGING_S:
-        return Finding("short", f"it lasts only {note.seconds:.2f} s", "let the note ring for two seconds or more")
+    remedy = "let the note ring for two seconds or more"
     level = envelope(note.samples[note.onset :], note.rate_hz, 0.03)
     noise = np.sqrt(note.noise_power)
+    above = np.flatnonzero(level > max(2 * noise, 1e-3 * float(level.max())))
+    seconds = min(note.seconds, float(above[-1]) / note.rate_hz if len(above) else 0.0)
+    if series is not None and note.seconds * series.f0_hz < LEAST_PERIODS:
+        return Finding(
+            "short", f"it lasts {note.seconds:.2f} s, fewer than {LEAST_PERIODS} periods", remedy, refused=True
+        )
     snr_db = 20 * np.log10(float(level.max()) / max(noise, 1e-12))
     if snr_db < LEAST_SNR_DB:
         return Finding("noisy", f"it stands only {snr_db:.0f} dB above its noise", "record it closer, or louder")
-    above = np.flatnonzero(level > max(2 * noise, 1e-3 * float(level.max())))
-    seconds = float(above[-1]) / note.rate_hz if len(above) else 0.0
     if seconds < SHORTEST_RINGING_S:
-        return Finding("short", f"it rings for only {seconds:.2f} s", "let the note ring for two seconds or more")
+        return Finding("short", f"it rings for only {seconds:.2f} s", remedy)
     return None
 
 
 def looped(note: Note) -> Finding | None:
     """Stretches that come back sample by sample, as a sampler's loop does."""
     sound = note.samples[note.onset :]
-    block = round(0.08 * note.rate_hz)
-    if len(sound) < 6 * block:
+    block = round(LOOP_S * note.rate_hz)
+    energies = np.sum(sound[: len(sound) // block * block].reshape(-1, block) ** 2, axis=1)
+    # of a note that has died away only noise is left, or a converter's last bit
+    loud = np.flatnonzero(energies > LOUD_LOOP * float(energies.max(initial=0.0)))
+    last = int(loud[-1]) * block if len(loud) else 0
+    earlier = sound[: max(0, last + block - round(LOOP_LAG_S * note.rate_hz))]
+    if last == 0 or len(earlier) < block:
         return None
-    last = sound[-2 * block : -block] if not np.any(sound[-block:]) else sound[-block:]
-    energy = float(last @ last)
-    if energy <= 1e-12 * len(last):
-        return None
-    earlier = sound[: len(sound) - 2 * block]
-    if len(earlier) < block:
-        return None
-    products = signal.fftconvolve(earlier, last[::-1], mode="valid")
+    found, energy = sound[last : last + block], float(energies[loud[-1]])
+    products = signal.fftconvolve(earlier, found[::-1], mode="valid")
     squares = signal.fftconvolve(earlier**2, np.ones(block), mode="valid")
     # of a loop, the level is the same too; a decaying note's is lower by then
     equal = 1 - (squares + energy - 2 * products) / energy
     if float(equal.max()) < 0.999:
         return None
     return Finding(
-        "looped", "a stretch of it comes back sample by sample", "give the recording itself, not a sample loop"
+        "looped",
+        "a stretch of it comes back sample by sample",
+        "give the recording itself, not a sample loop",
+        refused=True,
     )
 
 
@@ -169,7 +199,7 @@ def more_onsets(note: Note, series: Series | None) -> Finding | None:
     period = 1 / series.f0_hz if series is not None else 0.02
     window = max(0.02, 2.5 * period)
     noise = np.sqrt(note.noise_power)
-    rises = []
+    rises, levels = [], []
     for low, high in ((60.0, 500.0), (500.0, 2_000.0), (2_000.0, 8_000.0)):
         if high > 0.45 * rate:
             continue
@@ -180,44 +210,48 @@ def more_onsets(note: Note, series: Series | None) -> Finding | None:
         apart = max(1, round(0.04 / 0.005))
         rise = db[apart:] - db[:-apart]
         begin = round(0.09 / 0.005)
-        before = ndimage.maximum_filter1d(rise[begin:], 3) if len(rise) > begin else np.zeros(1)
-        rises.append(before)
+        if len(rise) > begin:
+            rises.append(ndimage.maximum_filter1d(rise[begin:], 3))
+            levels.append(ndimage.maximum_filter1d(db[apart:][begin:], 3) - float(db.max()))
     if not rises:
         return None
-    shortest = min(map(len, rises))
     # an attack is heard in two bands at once; beats of partials are not
-    together = np.sort(np.stack([each[:shortest] for each in rises]), axis=0)[-2]
-    if float(together.max()) < ONSET_RISE_DB:
-        return None
-    at = 0.09 + 0.005 * int(np.argmax(together))
-    return Finding("onsets", f"another attack begins {at:.2f} s after the first", "cut out a single note")
-
-
-def no_series(series: Series | None, peaks: Peaks) -> Finding | None:
-    """Whether its peaks are the partials of one stiff string."""
-    words = "its peaks are not the partials of one string"
-    remedy = "give one plucked note; drums, slaps and strums are no strings"
-    if series is None or len(series.present) < LEAST_PARTIALS:
-        return Finding("no_series", words, remedy)
-    if series.explained < LEAST_EXPLAINED or series.missing > MOST_MISSING:
-        return Finding(
-            "no_series", f"{words} ({series.explained:.0%} belong to a series at {series.f0_hz:.1f} Hz)", remedy
-        )
+    loud = [np.where(level > LOUD_ONSET_DB, rise, 0.0) for rise, level in zip(rises, levels, strict=True)]
+    for rising, refused in ((loud, True), (rises, False)):
+        together = np.sort(np.stack(rising), axis=0)[max(-2, -len(rising))]
+        if float(together.max()) >= ONSET_RISE_DB:
+            at = 0.09 + 0.005 * int(np.argmax(together))
+            words = f"another attack begins {at:.2f} s after the first"
+            return Finding("onsets", words, "cut out a single note", refused)
     return None
 
 
-def second_series(note: Note, series: Series, peaks: Peaks) -> Finding | None:
-    """Whether what the first series leaves is a second one, or the series is the common sub-octave of two."""
+def no_series(series: Series | None) -> Finding | None:
+    """Peaks that are not the partials of one stiff string."""
+    words = "its peaks are not the partials of one string"
+    remedy = "give one plucked note; drums, slaps and strums are no strings"
+    if series is None or not series.present:
+        return Finding("no_series", words, remedy, refused=True)
+    if series.explained < LEAST_EXPLAINED or series.missing > MOST_MISSING:
+        words = f"{words} ({series.explained:.0%} belong to a series at {series.f0_hz:.1f} Hz)"
+        return Finding("no_series", words, remedy, refused=series.explained < LEAST_FITTED)
+    if len(series.present) < LEAST_PARTIALS:
+        return Finding("no_series", f"only {len(series.present)} partials stand out", "record it closer, or louder")
+    return None
+
+
+def second_series(series: Series, peaks: Peaks) -> Finding | None:
+    """A second series in what the first leaves, or the series is the common sub-octave of two."""
     rest = peaks.without(series)
     other = number(rest) if len(rest.hz) >= 4 else None
     if other is None:
         return None
     near = np.abs(distances(rest.hz, other.f0_hz, other.stiffness)) < tolerance(rest.hz, other.f0_hz, rest.width_hz)
-    if near.sum() < 3:
+    if near.sum() < LEAST_SECOND:
         return None
     loud_db = float(np.sort(rest.level_db[near])[-3:].mean() - peaks.level_db.max())
     # what it explains more than any series of its spacing would, and how loud it is
-    if other.explained - chance(rest, other) + 0.02 * (loud_db - LOUD_DB) < SECOND_SERIES:
+    if loud_db < LEAST_LOUD_DB or other.explained - chance(rest, other) + 0.02 * (loud_db - LOUD_DB) < SECOND_SERIES:
         return None
     words = f"a second note sounds at {other.f0_hz:.1f} Hz beside {series.f0_hz:.1f} Hz"
-    return Finding("chord", words, "record one note alone")
+    return Finding("chord", words, "record one note alone", refused=True)

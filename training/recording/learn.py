@@ -20,6 +20,7 @@ from training.recording.numbering import Series, number_note
 from training.recording.physics import Kind, Physics, Strung, physics_of, strung
 from training.recording.preset import Source
 from training.recording.report import Report, report_of
+from training.recording.verdict import Verdict, verdict_of
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -32,7 +33,13 @@ class Refused(RecordingError):
 
     def __init__(self, name: str, findings: tuple[Finding, ...]) -> None:
         super().__init__(f"{name}: " + "; ".join(f"{each.reason}: {each.remedy}" for each in findings))
-        self.findings = findings
+
+
+class NotFound(RecordingError):
+    """A fit in which no string was found."""
+
+    def __init__(self, name: str, verdict: Verdict) -> None:
+        super().__init__(f"{name}: {verdict.words}; record one plucked note alone")
 
 
 @dataclass(frozen=True)
@@ -40,7 +47,7 @@ class Learned:
     """All that is learned of one recording.
 
     Attributes:
-        findings: what the gate found, and was overruled on.
+        findings: what speaks against the recording: warnings, and refusals that were overruled.
     """
 
     source: Source
@@ -50,6 +57,7 @@ class Learned:
     physics: Physics
     strung: Strung
     report: Report
+    verdict: Verdict
     findings: tuple[Finding, ...]
     seconds: float
 
@@ -61,6 +69,11 @@ class Examined:
     note: Note
     series: Series | None
     findings: tuple[Finding, ...]
+
+    @property
+    def refusals(self) -> tuple[Finding, ...]:
+        """The findings of which one is enough: it cannot be fitted."""
+        return tuple(each for each in self.findings if each.refused)
 
 
 def examined(samples: Array, rate_hz: int) -> Examined:
@@ -94,7 +107,7 @@ def learn(
 
     Raises:
         RecordingError: nothing can be learned from one; the message names its file.
-        Refused: the gate says that it is not one note of a string.
+        Refused: the gate says that one cannot be fitted.
         SchemaError: a checkpoint is damaged; the message names it.
         WriteError, OSError: a checkpoint cannot be written or read.
     """
@@ -118,8 +131,11 @@ def learn(
         physics = physics_of(fitted[place])
         own = strung(physics, kind, length_m, gauge_mm)
         report = report_of(note, fitted[place], physics)
+        verdict = verdict_of(note, series, fitted[place], report)
         seconds = time.monotonic() - started
-        learned.append(Learned(source, note, series, fitted[place], physics, own, report, found.findings, seconds))
+        learned.append(
+            Learned(source, note, series, fitted[place], physics, own, report, verdict, found.findings, seconds)
+        )
     progress(1.0)
     for path in unfinished:
         path.unlink(missing_ok=True)
@@ -132,11 +148,18 @@ def _part(progress: Progress, done: float, share: float, of_part: float) -> None
 
 def usable(found: Examined, anyway: bool, name: str) -> tuple[Note, Series]:
     """Its note and series. Raises Refused or RecordingError, which name its file."""
-    if found.findings and not anyway:
-        raise Refused(name, found.findings)
+    if found.refusals and not anyway:
+        raise Refused(name, found.refusals)
     if found.series is None or not found.series.present:
         raise RecordingError(f"{name}: it has no partials; record one plucked note")
     return found.note, found.series
+
+
+def require_found(learned: Sequence[Learned]) -> None:
+    """Raises NotFound, which names the file, where a fit is of no string."""
+    for each in learned:
+        if not each.verdict.found:
+            raise NotFound(each.source.name, each.verdict)
 
 
 def _apart_cents(first: Series, other: Series) -> float:

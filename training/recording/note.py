@@ -30,7 +30,7 @@ class Note:
     """A recording, mono.
 
     Attributes:
-        samples: float64 (frames,).
+        samples: float64 (frames,), without the digital silence behind the note.
         onset: the frame in which the note begins.
         noise_power: mean square of what the recording holds before the note or at its end, whichever is lower.
     """
@@ -71,7 +71,7 @@ def note_of(samples: Array, rate_hz: int) -> Note:
         raise RecordingError(f"it lasts {seconds:.0f} s; cut out one note, at most {LONGEST_S:.0f} s")
     if seconds < SHORTEST_S:
         raise RecordingError(f"it lasts {seconds:.2f} s; let the note ring for two seconds or more")
-    mono = mono - mono.mean()
+    mono = _without_silence(mono)
     if float(np.abs(mono).max()) < SILENT:
         raise RecordingError("it is silent; check the cable and the level, and record it again")
     if rate_hz > HIGHEST_RATE_HZ:
@@ -107,6 +107,21 @@ def _mono(samples: Array) -> Array:
         return sound.mean(1)
     loudest = int(np.argmax(np.nansum(np.where(np.isfinite(sound), sound, 0.0) ** 2, axis=0)))
     return sound[:, loudest]
+
+
+def _without_silence(sound: Array) -> Array:
+    """The sound around zero, up to where it stops: one value, again and again, is silence, whatever the value.
+
+    Its beginning stays in its place, for times count from there.
+    """
+    moves = np.flatnonzero(np.diff(sound))
+    if len(moves) == 0:
+        return np.zeros(len(sound))
+    # of two equal samples or more, none belongs to the note
+    first = int(moves[0]) + 1 if moves[0] > 0 else 0
+    end = int(moves[-1]) + 1 if moves[-1] < len(sound) - 2 else len(sound)
+    heard = sound[first:end]
+    return np.concatenate([np.zeros(first), heard - heard.mean()])
 
 
 def _noise_power(samples: Array, rate_hz: int, onset: int) -> float:

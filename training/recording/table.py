@@ -16,6 +16,9 @@ def as_data(learned: Learned) -> dict[str, Any]:
         "file": learned.source.name,
         "digest": learned.source.digest,
         "gate": [{"kind": each.kind, "reason": each.reason, "remedy": each.remedy} for each in learned.findings],
+        "found": learned.verdict.found,
+        "linear_esr": _finite(learned.verdict.linear_esr),
+        "loud_partials_on_law": learned.verdict.near,
         "seconds": learned.seconds,
         "f0_hz": _finite(physics.f0_hz),
         "f0_error_hz": _finite(physics.f0_error_hz),
@@ -53,12 +56,15 @@ def as_text(learned: Learned) -> list[str]:
         f"{len(physics.partials)} partials, glide {1200 * math.log2(1 + physics.rise):.0f} cents",
         f"  error-to-signal ratio {errors.esr:.4f} (from 50 ms {errors.late_esr:.4f}), "
         f"noise {learned.report.noise_esr:.1e}",
+        f"  {learned.verdict.words}",
         f"  log spectral distance {errors.distance_db:.1f} dB, STFT {errors.stft:.2f}",
     ]
     bands = [f"{band.hz:g} Hz {band.recorded_s:.2f}/{band.learned_s:.2f}" for band in learned.report.bands]
     lines.append(f"  decay by 60 dB in s, recorded/learned: {', '.join(bands) or 'no octave decays by 12 dB'}")
     lines += [f"  assumed: {words}" for words in learned.strung.assumed]
-    lines += [f"  gate overruled: {each.reason}" for each in learned.findings]
+    lines += [
+        f"  {'overruled' if each.refused else 'warning'}: {each.reason}: {each.remedy}" for each in learned.findings
+    ]
     return lines
 
 

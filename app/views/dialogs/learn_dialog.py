@@ -37,6 +37,7 @@ from engine.presets import PresetError
 from engine.result_file import WriteError
 
 if TYPE_CHECKING:
+    from app.instrument.learned import Reasons
     from training.recording.learn import Learned
 
 EXPECTED = (NoteFileError, PatchError, PresetError, WriteError, ValueError)
@@ -45,6 +46,7 @@ CONTINUE, STOP = "Continue", "Stop learning"
 BACK, DISCARD = "Back", "Discard"
 LONGEST_M, THICKEST_MM = 5.0, 10.0
 ON_KEYS = "Keys will play a plucked string with these partials: close to the learned note, not equal to it."
+NOT_FOUND = "No string was found: keys will not sound like the recording. Record one plucked note alone."
 HEARD: tuple[tuple[Literal["recording", "learned"], str], ...] = (
     ("recording", "▶  Recording"),
     ("learned", "▶  Learned note"),
@@ -68,7 +70,7 @@ class LearnDialog(QDialog):
         self._file, self._output = file, output
         self._learned: Learned | None = None
         self._pair: Pair | None = None
-        self._against: list[str] | None = None  # None: not examined yet
+        self._against: Reasons | None = None  # None: not examined yet
         self._then: Callable[[Any], None] = self._show_examined
         self._began_s = 0.0
         self._background = Background("learn", self, expected=EXPECTED)
@@ -140,7 +142,7 @@ class LearnDialog(QDialog):
         self.state.setText("Is this one note of a string? …")
         self.start.setEnabled(False)
 
-        def work(job: Job) -> list[str]:
+        def work(job: Job) -> Reasons:
             from app.instrument.learned import reasons_against
 
             return reasons_against(self._file)
@@ -148,9 +150,9 @@ class LearnDialog(QDialog):
         self._then = self._show_examined
         self._background.start(work)
 
-    def _show_examined(self, against: list[str]) -> None:
+    def _show_examined(self, against: Reasons) -> None:
         self._against = against
-        (self.body if against else self.string).setChecked(True)
+        (self.body if against.refusals else self.string).setChecked(True)
         self._show_choice()
 
     def _show_choice(self) -> None:
@@ -158,12 +160,15 @@ class LearnDialog(QDialog):
             return
         for part in (self.name, self.kind, self.length_m, self.gauge_mm):
             part.setEnabled(self.string.isChecked())
-        against = self._against or []
+        against = self._against
+        refusals, warnings = (against.refusals, against.warnings) if against is not None else ([], [])
         if self.body.isChecked():
-            words = "Not one note of a string:" if against else "This sounds like one note of a string."
+            words = "Not one note of a string:" if refusals else "This may be one note of a string."
+        elif refusals:
+            words = "Learned all the same, although:"
         else:
-            words = "Learned all the same, although:" if against else "One note of a string: about five seconds."
-        self.state.setText("\n".join([words, *(f"• {each}" for each in against)]))
+            words = "Learning takes about five seconds, and shows whether a string was found."
+        self.state.setText("\n".join([words, *(f"• {each}" for each in (*refusals, *warnings))]))
         self.start.setText("Use as body" if self.body.isChecked() else "Learn")
         self.start.setEnabled(self.body.isChecked() or self.string.isChecked())
 
@@ -183,7 +188,7 @@ class LearnDialog(QDialog):
             "kind": self.kind.currentData(),
             "length_m": self.length_m.value() or None,
             "gauge_mm": self.gauge_mm.value() or None,
-            "anyway": bool(self._against),
+            "anyway": self._against is not None and bool(self._against.refusals),
         }
         name, rate_hz = self.name.text(), self._output.rate_hz
 
@@ -216,8 +221,11 @@ class LearnDialog(QDialog):
         self._pair = Pair(self._output.mixer, sounds)
         self.report.setPlainText("\n".join(as_text(self._learned)))
         self._pages.setCurrentIndex(1)
-        self._ready(f"Nothing is written yet. {ON_KEYS}")
-        self.start.setText("Keep and play")
+        found = self._learned.verdict.found
+        self._ready(f"Nothing is written yet. {ON_KEYS if found else NOT_FOUND}")
+        self.start.setText("Keep and play" if found else "Keep all the same")
+        self.start.setDefault(found)
+        self.start.setAutoDefault(found)
         self.start.setEnabled(True)
         self.heard["learned"].setFocus()
 
@@ -253,9 +261,11 @@ class LearnDialog(QDialog):
         self.accept()
 
     def _failed(self, message: str, _details: str) -> None:
+        from app.instrument.learned import Reasons
+
         if self._against is None:  # not even examined: it can only be a body
             self.string.setEnabled(False)
-            self._against = [message]
+            self._against = Reasons([message], [])
             self.body.setChecked(True)
             self._show_choice()
             return

@@ -14,6 +14,7 @@ import pytest
 import soundfile
 
 from app.shared.parameters import NOISE_DB
+from tests.bench.recordings.sounds import membrane
 from tests.bench.recordings.synthetic import synthetic_note
 from training.recording.checkpoint import restore, save
 
@@ -129,6 +130,22 @@ def test_what_cannot_be_learned_is_reported_and_leaves_nothing(
     soundfile.write(noise, 0.1 * np.random.default_rng(0).standard_normal(88_200), 44_100)
     assert "give one plucked note" in run("learn", noise, "--name", "Noise").err
     assert not (folder / "own").exists()
+
+
+def test_where_no_string_is_found_only_the_option_keeps_it(
+    run, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    own = folder / "own"
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(own))
+    samples, rate_hz = membrane(np.random.default_rng(2))
+    soundfile.write(folder / "drum.wav", samples, rate_hz, subtype="FLOAT")
+    assert "drum.wav: no string found" in run("learn", folder / "drum.wav", "--name", "Drum").failure
+    assert [path for path in own.rglob("*") if path.is_file()] == []
+    kept = run("learn", folder / "drum.wav", "--name", "Drum", "--anyway", "--json")
+    assert kept.status == 0, kept.err
+    (found,) = json.loads(kept.out)["recordings"]
+    assert found["found"] is False and found["linear_esr"] > 0
+    assert (own / "drum.safetensors").is_file()
 
 
 def test_only_a_learned_preset_has_a_recording(run, small_preset: Path, folder: Path) -> None:

@@ -12,10 +12,11 @@ from pytestqt.qtbot import QtBot
 
 from app.instrument.bodies import own_bodies
 from app.patches.library import own_patches
-from app.views.dialogs.learn_dialog import ON_KEYS, LearnDialog
+from app.views.dialogs.learn_dialog import NOT_FOUND, ON_KEYS, LearnDialog
 from app.window.controller import Controller
 from engine.presets import find_preset, read_info
 from tests.app.questions import answered
+from tests.bench.recordings.sounds import membrane
 from tests.bench.recordings.synthetic import synthetic_note
 
 LEARNED_MS = 90_000
@@ -93,6 +94,29 @@ def test_what_is_no_note_is_a_body_or_learned_all_the_same(qtbot: QtBot, played:
     assert played._learning is None
     assert (own_bodies() / "room.wav").exists()
     assert "now has the body room" in played.window.notices.text
+
+
+def test_where_no_string_is_found_keeping_is_no_default(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
+    samples, rate_hz = membrane(np.random.default_rng(2))
+    soundfile.write(tmp_path / "drum.wav", samples, rate_hz, "FLOAT")
+    dialog = dialog_of(qtbot, played, tmp_path / "drum.wav")
+    dialog.string.setChecked(True)
+    dialog.start.click()
+    qtbot.waitUntil(lambda: dialog._learned is not None, timeout=LEARNED_MS)
+    assert "no string found: " in dialog.report.toPlainText()
+    assert dialog.state.text() == f"Nothing is written yet. {NOT_FOUND}"
+    assert dialog.start.text() == "Keep all the same" and not dialog.start.isDefault()
+    dialog.reject()
+    assert not own_patches().exists()
+
+
+def test_what_is_only_unusual_is_a_warning(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
+    made = synthetic_note(2, seconds=1.5)
+    limit = np.sort(np.abs(made.samples))[-8]
+    soundfile.write(tmp_path / "hot.wav", np.clip(made.samples, -limit, limit), made.rate_hz, "FLOAT")
+    dialog = dialog_of(qtbot, played, tmp_path / "hot.wav")
+    assert dialog.string.isChecked()
+    assert "• it is clipped" in dialog.state.text() and "shows whether a string was found" in dialog.state.text()
 
 
 def test_a_silent_recording_can_only_be_a_body(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:

@@ -11,6 +11,8 @@ from training.cli.arguments import Json
 from training.cli.console import Failure, print_json, print_table, progress, say
 
 COLUMNS = ("figure", "median", "90 %", "N")
+GATE_COLUMNS = ("kind", "N", "refused", "fitted", "no string found", "kept")
+FITTED_EVERY = 10
 
 
 def recordings(
@@ -28,6 +30,12 @@ def recordings(
             "--pitches", min=0, metavar="N", help="Only blind pitch: of N synthetic notes, and of the folder's."
         ),
     ] = None,
+    gate: Annotated[
+        int | None,
+        typer.Option(
+            min=0, metavar="N", help="Only which of N synthetic notes, and the folder's, are kept; --quick: no fit."
+        ),
+    ] = None,
     synthetic: Annotated[
         int | None,
         typer.Option(min=1, metavar="N", help="Instead: N synthetic notes, how intervals hold them, or neighbours."),
@@ -41,6 +49,7 @@ def recordings(
     from app.audio.note_file import NoteFileError, read_note
     from tests.bench.recordings.coverage import FIRST_SEED, coverage
     from tests.bench.recordings.evaluate import dynamics, evaluate, table
+    from tests.bench.recordings.gate import as_data, outcomes, rows
     from tests.bench.recordings.instrument import attacks, neighbours, synthetic_neighbours
     from tests.bench.recordings.pitch import pitches, pitches_of
 
@@ -57,19 +66,26 @@ def recordings(
         with progress("bench recordings") as report:
             _print_values(pitches(blind, report), json)
         return
-    if folder is None or not folder.is_dir():
-        raise typer.BadParameter("give a folder of recordings, or --synthetic or --pitches", param_hint="FOLDER")
-    files = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".wav", ".flac", ".aif", ".aiff"))
-    if not files:
-        raise Failure(f"{folder}: no WAV, FLAC or AIFF file; give a folder of recordings")
     found = {}
-    for path in files[:most]:
-        try:
-            read = read_note(path)
-        except NoteFileError as error:
-            say(f"note: {error}")
-            continue
-        found[path.stem] = (read.samples, read.rate_hz)
+    if folder is not None or not gate:
+        if folder is None or not folder.is_dir():
+            words = "give a folder of recordings, or --synthetic, --pitches or --gate"
+            raise typer.BadParameter(words, param_hint="FOLDER")
+        files = sorted(path for path in folder.iterdir() if path.suffix.lower() in (".wav", ".flac", ".aif", ".aiff"))
+        if not files:
+            raise Failure(f"{folder}: no WAV, FLAC or AIFF file; give a folder of recordings")
+        for path in files[:most]:
+            try:
+                read = read_note(path)
+            except NoteFileError as error:
+                say(f"note: {error}")
+                continue
+            found[path.stem] = (read.samples, read.rate_hz)
+    if gate is not None:
+        with progress("bench recordings") as report:
+            ends = outcomes(found, gate, 0 if quick else FITTED_EVERY, progress=report)
+        print_json(as_data(ends)) if json else print_table(GATE_COLUMNS, rows(ends))
+        return
     with progress("bench recordings") as report:
         if blind is not None:
             _print_values({**pitches(blind, report), **pitches_of(found)}, json)

@@ -97,7 +97,7 @@ def _row(
     series, peaks = number_note(note)
     findings = examine(samples, note, series, peaks)
     kinds = ", ".join(each.kind for each in findings) or "one note"
-    if series is None or not series.present or (findings and findings[-1].kind == "no_series"):
+    if series is None or not series.present or any(each.refused for each in findings):
         raise RecordingError(f"refused: {kinds}")
     truth = note.fitted()
     t = np.arange(len(truth)) / note.rate_hz

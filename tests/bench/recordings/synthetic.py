@@ -51,10 +51,14 @@ def synthetic_note(
     f0_range_hz: tuple[float, float] = (60.0, 350.0),
     highest_hz: float = HIGHEST_HZ,
     fretted: float = 0.0,
+    damping: tuple[float, float] = (0.6, 2.0),
+    body_db: tuple[float, float] = (-36.0, -20.0),
 ) -> SyntheticNote:
     """A note drawn by its seed: a string, plucked anywhere, two polarisations, six body modes.
 
     Args:
+        damping: range of the first polarisation's loss at low frequencies, in 1/s.
+        body_db: range of the body's modes, below the string's peak.
         fretted: semitones of the string's shortening; all else of a seed stays.
     """
     random = np.random.default_rng(seed)
@@ -64,7 +68,7 @@ def synthetic_note(
     count = max(3, min(30, int(highest_hz / f0)))
     length, mass, modulus, area = 0.65, 1e-3, 2e11, 1e-7
     tension = mass * (2 * length * f0) ** 2
-    d1 = 2 * mass * random.uniform(0.6, 2.0)
+    d1 = 2 * mass * random.uniform(*damping)
     d3 = 2 * mass * random.uniform(1.0, 4.0) / (math.pi * 1_000 / (f0 * length)) ** 2
     second = stiffness * tension * length**2 / (math.pi**2 * modulus)
     ratio = 2 ** (fretted / 12)
@@ -101,7 +105,7 @@ def synthetic_note(
     t = np.arange(len(sound)) / RATE_HZ
     for _ in range(6):
         hz, quality = math.exp(random.uniform(math.log(90), math.log(900))), random.uniform(10, 40)
-        phase, level = random.uniform(0, 2 * math.pi), 0.3 * 10 ** (random.uniform(-36, -20) / 20)
+        phase, level = random.uniform(0, 2 * math.pi), 0.3 * 10 ** (random.uniform(*body_db) / 20)
         sound += level * np.exp(-math.pi * hz / quality * t) * np.sin(2 * math.pi * hz * t + phase)
     noise = float(np.sqrt(np.mean(sound[:RATE_HZ] ** 2))) * 10 ** (-snr_db / 20)
     sound = np.concatenate([np.zeros(round(LEAD_S * RATE_HZ)), sound]) + noise * random.standard_normal(

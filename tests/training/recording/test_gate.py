@@ -1,4 +1,4 @@
-"""The gate keeps one note of a string, and refuses all else with its kind of reason."""
+"""The gate refuses what cannot be fitted, warns of what is unusual, and the verdict judges the fit."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
+from tests.bench.recordings.sounds import CHANGES
 from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
-from training.recording.gate import examine
-from training.recording.learn import Refused, examined, learn
-from training.recording.note import note_of
-from training.recording.numbering import number_note
+from training.recording.learn import Learned, NotFound, Refused, examined, learn, require_found
 from training.recording.preset import Source
 
 RATE_HZ = 44_100
 Change = Callable[[np.ndarray], np.ndarray]
 
 
-def kinds(samples: np.ndarray) -> set[str]:
-    note = note_of(samples, RATE_HZ)
-    series, peaks = number_note(note)
-    return {each.kind for each in examine(samples, note, series, peaks)}
+def kinds(samples: np.ndarray, rate_hz: int = RATE_HZ) -> set[str]:
+    return {each.kind for each in examined(samples, rate_hz).findings}
+
+
+def refused(samples: np.ndarray, rate_hz: int = RATE_HZ) -> set[str]:
+    return {each.kind for each in examined(samples, rate_hz).refusals}
 
 
 def looped(x: np.ndarray) -> np.ndarray:
@@ -57,21 +57,55 @@ def test_reasons(synthetic: SyntheticNote, change: Change, kind: str) -> None:
     assert kind in kinds(change(synthetic.samples))
 
 
+@pytest.mark.parametrize("kind", [kind for kind in CHANGES if kind != "three changes"])
+def test_a_note_is_kept_as_users_record_it(synthetic: SyntheticNote, kind: str) -> None:
+    assert refused(*CHANGES[kind](np.random.default_rng(1), (synthetic.samples, RATE_HZ))) == set()
+
+
+@pytest.mark.parametrize("value", [0.0, -2e-4])
+def test_silence_behind_a_note_changes_nothing(synthetic: SyntheticNote, value: float) -> None:
+    samples = synthetic.samples[:90_000]
+    control, behind = (examined(each, RATE_HZ) for each in (samples, np.append(samples, np.full(33_000, value))))
+    assert behind.series == control.series and behind.findings == control.findings == ()
+    assert np.array_equal(behind.note.samples, control.note.samples)
+
+
+def test_a_few_clipped_samples_are_a_warning_and_many_are_refused(synthetic: SyntheticNote) -> None:
+    limit = np.sort(np.abs(synthetic.samples))[-8]
+    few = np.clip(synthetic.samples, -limit, limit)
+    assert kinds(few) == {"clipped"} and refused(few) == set()
+    assert refused(np.clip(4 * synthetic.samples, -0.5, 0.5)) == {"clipped"}
+
+
+def test_a_faint_second_attack_is_a_warning(synthetic: SyntheticNote) -> None:
+    knock = np.zeros(len(synthetic.samples))
+    knock[40_000:44_000] = np.random.default_rng(0).standard_normal(4_000) * np.geomspace(1, 1e-3, 4_000)
+    assert "onsets" in refused(synthetic.samples + 0.3 * knock)
+    assert "onsets" not in refused(synthetic.samples + 0.004 * knock)
+
+
+@pytest.mark.parametrize("change", [lambda x: x[::-1].copy(), looped, lambda x: np.concatenate([x[:40_000], x])])
+def test_what_is_edited_is_refused(synthetic: SyntheticNote, change: Change) -> None:
+    assert refused(change(synthetic.samples))
+    assert refused(np.append(change(synthetic.samples), np.zeros(30_000)))
+
+
 @pytest.mark.parametrize("level_db", [0, -5, -10])
 def test_a_second_note_is_heard(synthetic: SyntheticNote, level_db: float) -> None:
     other = synthetic_note(1).samples  # 148 Hz
-    assert kinds(synthetic.samples + 10 ** (level_db / 20) * other) & {"chord", "no_series"}
+    assert refused(synthetic.samples + 10 ** (level_db / 20) * other) == {"chord"}
 
 
-def test_drums_and_noise_are_no_strings() -> None:
-    random = np.random.default_rng(0)
+def burst() -> np.ndarray:
     t = np.arange(2 * RATE_HZ) / RATE_HZ
-    lead = np.zeros(4_000)
-    burst = np.concatenate([lead, 0.3 * random.standard_normal(len(t)) * np.exp(-6 * t)])
-    drum = sum(np.sin(2 * np.pi * 110 * m * t) * np.exp(-(6 + m) * t) for m in (1, 1.59, 2.14, 2.30, 2.65, 2.92))
-    drum = np.concatenate([lead, 0.1 * drum]) + 1e-4 * random.standard_normal(len(t) + len(lead))
-    assert "no_series" in kinds(burst)
-    assert kinds(drum)
+    return np.concatenate([np.zeros(4_000), 0.3 * np.random.default_rng(0).standard_normal(len(t)) * np.exp(-6 * t)])
+
+
+def drum() -> np.ndarray:
+    t = np.arange(2 * RATE_HZ) / RATE_HZ
+    modes = sum(np.sin(2 * np.pi * 110 * m * t) * np.exp(-(6 + m) * t) for m in (1, 1.59, 2.14, 2.30, 2.65, 2.92))
+    sound = np.concatenate([np.zeros(4_000), 0.1 * modes])
+    return sound + 1e-4 * np.random.default_rng(0).standard_normal(len(sound))
 
 
 def test_a_refusal_says_what_to_do_and_can_be_overruled(synthetic: SyntheticNote) -> None:
@@ -79,3 +113,25 @@ def test_a_refusal_says_what_to_do_and_can_be_overruled(synthetic: SyntheticNote
     source = Source("clipped.wav", "0" * 64, RATE_HZ, len(clipped))
     with pytest.raises(Refused, match="lower the input gain"):
         learn([(examined(clipped, RATE_HZ), source)])
+
+
+def test_the_verdict_is_of_the_fit(learned: Learned) -> None:
+    require_found([learned])
+    assert learned.verdict.found and learned.verdict.words.startswith("string found: error 0.0")
+    assert learned.verdict.esr < learned.verdict.linear_esr
+
+
+@pytest.mark.parametrize("made", [burst, drum])
+def test_in_drums_and_noise_no_string_is_found(made: Callable[[], np.ndarray]) -> None:
+    sound = made()
+    source = Source("drum.wav", "0" * 64, RATE_HZ, len(sound))
+    learned = learn([(examined(sound, RATE_HZ), source)], anyway=True)
+    assert not learned[0].verdict.found
+    with pytest.raises(NotFound, match=r"drum\.wav: no string found: .*; record one plucked note alone"):
+        require_found(learned)
+
+
+def test_a_short_note_is_no_loop(synthetic: SyntheticNote) -> None:
+    short = synthetic.samples[: round(0.45 * RATE_HZ)]  # 0.35 s of it
+    assert refused(short) == set()
+    assert "looped" not in kinds(short)

@@ -1,0 +1,418 @@
+"""Sounds for the gate of recordings: notes as users record them, and sounds that are no single note of a string.
+
+All are drawn by a seed. Each has a base, a recording or a seed, so that halves of the bases share nothing.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import soundfile
+from numpy.typing import NDArray
+from scipy import signal
+
+from tests.bench.recordings.synthetic import synthetic_note
+from training.recording.note import note_of, onset_of
+from training.recording.numbering import number_note
+
+Array = NDArray[np.float64]
+Sound = tuple[Array, int]  # samples (frames,) or (frames, channels), and their rate
+Random = np.random.Generator
+Recordings = Mapping[str, Sound]
+
+F0_RANGE_HZ = (30.0, 1_000.0)
+HIGHEST_HZ = 9_000.0
+DAMPING = (0.4, 6.0)
+BODY_DB = (-40.0, -12.0)
+RATES_HZ = (22_050, 44_100, 48_000, 88_200, 96_000)
+NOISE_DB = (-60.0, -50.0, -40.0)
+CHORD_DB = (0.0, -5.0, -10.0)
+OCTAVE_CENTS = 60.0  # two notes so near to octaves are one series of partials
+NO_STRING = "not_a_string"  # of a file's name: a slap, a thump, a strum
+DRUMS = (("concert_toms", 41), ("concert_toms", 47), ("conga", 55), ("frame_drum", 55), ("tuned_toms", 50))
+
+
+@dataclass(frozen=True)
+class Case:
+    """A sound to be judged.
+
+    Attributes:
+        base: that it was made from; cases of one base are never on two sides of a split.
+        is_note: it is one note of a string, and to be kept.
+    """
+
+    base: str
+    kind: str
+    is_note: bool
+    sound: Sound
+
+    @property
+    def judging(self) -> bool:
+        """Its half: thresholds are set on the other."""
+        return sum(self.base.encode()) % 2 == 1
+
+
+def cases(recordings: Recordings, count: int, seed: int = 0) -> Iterator[Case]:
+    """The cases of recordings, each in each change, and of so many synthetic notes; and as many that are no notes."""
+    for name, sound in recordings.items():
+        if NO_STRING in name:
+            yield from _changed(name, sound, False, seed)
+        else:
+            yield Case(name, "as recorded", True, sound)
+            yield from _changed(name, sound, True, seed)
+    for number in range(count):
+        base = f"synthetic {number}"
+        sound = random_pluck(seed + number)
+        yield Case(base, "synthetic", True, sound)
+        random = np.random.default_rng([seed, number])
+        kind = list(CHANGES)[number % len(CHANGES)]
+        yield Case(base, f"synthetic, {kind}", True, CHANGES[kind](random, sound))
+    yield from _no_notes(recordings, count, seed)
+
+
+def random_pluck(seed: int) -> Sound:
+    """A string of any pitch from 30 Hz to 1 kHz with a body, as the project's solver plays it."""
+    random = np.random.default_rng([seed, 1])
+    made = synthetic_note(
+        20_000 + seed,
+        seconds=float(random.uniform(1.0, 4.0)),
+        snr_db=float(random.uniform(35, 65)),
+        rise_cents=float(random.choice([0.5, 5.0, 20.0, 40.0])),
+        f0_range_hz=F0_RANGE_HZ,
+        highest_hz=HIGHEST_HZ,
+        damping=DAMPING,
+        body_db=BODY_DB,
+    )
+    return made.samples, made.rate_hz
+
+
+# One note of a string
+
+
+def quieter(random: Random, sound: Sound) -> Sound:
+    """At -40 to 0 dBFS, in 16 bits."""
+    samples, rate_hz = sound
+    peak = 10 ** (random.uniform(-40, 0) / 20)
+    return np.round(samples / np.abs(samples).max() * peak * 32767) / 32768, rate_hz
+
+
+def slightly_clipped(random: Random, sound: Sound) -> Sound:
+    """At most twelve samples at the limit, some of them in a row."""
+    samples, rate_hz = sound
+    limit = np.sort(np.abs(samples))[-int(random.integers(4, 13))]
+    return np.clip(samples, -limit, limit) / limit, rate_hz
+
+
+def resampled(random: Random, sound: Sound) -> Sound:
+    samples, rate_hz = sound
+    target = int(random.choice([rate for rate in RATES_HZ if rate != rate_hz]))
+    return _at_rate(samples, rate_hz, target), target
+
+
+def noisier(random: Random, sound: Sound) -> Sound:
+    """White or brown noise, below the peak."""
+    samples, rate_hz = sound
+    level = 10 ** (float(random.choice(NOISE_DB)) / 20) * float(np.abs(samples).max())
+    exponent = float(random.choice([0.0, 1.0]))
+    return samples + level * _noise(random, len(samples), exponent), rate_hz
+
+
+def cut_before(random: Random, sound: Sound) -> Sound:
+    """0 to 20 ms are left of the lead."""
+    samples, rate_hz = sound
+    left = round(random.uniform(0, 0.02) * rate_hz)
+    return samples[max(0, onset_of(samples, rate_hz) - left) :], rate_hz
+
+
+def cut_after(random: Random, sound: Sound) -> Sound:
+    """0.5 to 3 s after its beginning, with a fade of 10 ms or without."""
+    samples, rate_hz = sound
+    end = onset_of(samples, rate_hz) + round(random.uniform(0.5, 3) * rate_hz)
+    part = samples[:end].copy()
+    if random.random() < 0.5:
+        fade = min(len(part), rate_hz // 100)
+        part[-fade:] *= np.linspace(1, 0, fade)
+    return part, rate_hz
+
+
+def silence_after(random: Random, sound: Sound) -> Sound:
+    """Digital silence, one constant, or faint noise, for 0.2 to 3 s."""
+    samples, rate_hz = cut_after(random, sound) if random.random() < 0.5 else sound
+    return np.concatenate([samples, _silence(random, rate_hz)]), rate_hz
+
+
+def silence_before(random: Random, sound: Sound) -> Sound:
+    samples, rate_hz = sound
+    return np.concatenate([_silence(random, rate_hz), samples]), rate_hz
+
+
+def silence_around(random: Random, sound: Sound) -> Sound:
+    """With an offset over all."""
+    samples, rate_hz = sound
+    quiet = np.zeros(round(random.uniform(0.2, 3) * rate_hz))
+    return np.concatenate([quiet, samples, quiet]) + random.uniform(-0.05, 0.05), rate_hz
+
+
+def in_a_room(random: Random, sound: Sound) -> Sound:
+    """A small room, T60 of 0.15 to 0.5 s, 12 to 24 dB below the direct sound's energy."""
+    samples, rate_hz = sound
+    t = np.arange(round(0.6 * rate_hz)) / rate_hz
+    tail = random.standard_normal(len(t)) * 10 ** (-3 * t / random.uniform(0.15, 0.5))
+    tail[: round(random.uniform(0.002, 0.01) * rate_hz)] = 0
+    tail *= 10 ** (random.uniform(-24, -12) / 20) / math.sqrt(float(tail @ tail))
+    return samples + signal.fftconvolve(samples, tail)[: len(samples)], rate_hz
+
+
+def coded(container: str, subtype: str, random: Random, sound: Sound) -> Sound:
+    """Through a lossy coder and back."""
+    samples, rate_hz = sound
+    if subtype == "OPUS" and rate_hz != 48_000:
+        samples, rate_hz = _at_rate(samples, rate_hz, 48_000), 48_000
+    file = io.BytesIO()
+    level = float(random.uniform(0.2, 0.9))
+    samples = level * samples / np.abs(samples).max()
+    quality = float(random.uniform(0.2, 0.8))
+    soundfile.write(file, samples, rate_hz, format=container, subtype=subtype, compression_level=quality)
+    file.seek(0)
+    return soundfile.read(file)
+
+
+def on_two_channels(random: Random, sound: Sound) -> Sound:
+    """The same on both, one louder or later by less than a millisecond, or one of them silent."""
+    samples, rate_hz = sound
+    other = samples * random.uniform(0.2, 1)
+    if random.random() < 0.3:
+        other = np.zeros(len(samples))
+    elif random.random() < 0.5:
+        other = np.roll(other, round(random.uniform(0, 1e-3) * rate_hz))
+    return np.stack([samples, other], 1), rate_hz
+
+
+def changed_thrice(random: Random, sound: Sound) -> Sound:
+    """Three changes, one after another, that leave one channel."""
+    names = [name for name in CHANGES if name not in ("two channels", "three changes")]
+    for name in random.choice(names, 3, replace=False):
+        sound = CHANGES[name](random, sound)
+    return sound
+
+
+def _mp3(random: Random, sound: Sound) -> Sound:
+    samples, rate_hz = sound
+    if rate_hz > 48_000:
+        samples, rate_hz = _at_rate(samples, rate_hz, 48_000), 48_000
+    return coded("MP3", "MPEG_LAYER_III", random, (samples, rate_hz))
+
+
+CHANGES: dict[str, Callable[[Random, Sound], Sound]] = {
+    "gain": quieter,
+    "few samples clipped": slightly_clipped,
+    "sample rate": resampled,
+    "noise": noisier,
+    "cut before": cut_before,
+    "cut after": cut_after,
+    "silence after": silence_after,
+    "silence before": silence_before,
+    "silence around, offset": silence_around,
+    "room": in_a_room,
+    "MP3": _mp3,
+    "Vorbis": lambda random, sound: coded("OGG", "VORBIS", random, sound),
+    "Opus": lambda random, sound: coded("OGG", "OPUS", random, sound),
+    "two channels": on_two_channels,
+    "three changes": changed_thrice,
+}
+
+
+def _changed(base: str, sound: Sound, is_note: bool, seed: int) -> Iterator[Case]:
+    for number, (kind, change) in enumerate(CHANGES.items()):
+        random = np.random.default_rng([seed, number, sum(base.encode())])
+        yield Case(base, kind if is_note else f"no string, {kind}", is_note, change(random, sound))
+
+
+# No single note of a string
+
+
+def _no_notes(recordings: Recordings, count: int, seed: int) -> Iterator[Case]:
+    notes = [(name, sound) for name, sound in recordings.items() if NO_STRING not in name]
+    random = np.random.default_rng([seed, 2])
+    for number in range(count):
+        base = f"none {number}"
+        real = number % 2 == 0 and len(notes) > 3
+        # both notes of one half
+        name, first = notes[int(random.integers(len(notes)))] if real else (base, random_pluck(seed + 5_000 + number))
+        halves = [
+            each for each in notes if Case(each[0], "", True, first).judging == Case(name, "", True, first).judging
+        ]
+        second = halves[int(random.integers(len(halves)))][1] if real else random_pluck(seed + 7_000 + number)
+        made = number // 2 % 8
+        if made < 3:
+            for level_db in CHORD_DB if made == 0 else (float(random.choice(CHORD_DB)),):
+                if (sound := chord(first, second, level_db)) is not None:
+                    yield Case(name, f"chord, {level_db:.0f} dB", False, sound)
+        elif made == 3:
+            yield Case(name, "two onsets", False, two_onsets(random, first, second))
+        elif made == 4:
+            yield Case(name, "reversed", False, (first[0][::-1].copy(), first[1]))
+        elif made == 5:
+            yield Case(name, "loop", False, loop(random, first))
+        elif made == 6:
+            yield Case(name, "clipped", False, clipped(random, first))
+        else:
+            yield Case(base, "noise", False, noise(random, number))
+        yield Case(base, *_percussion(random, number))
+
+
+def _percussion(random: Random, number: int) -> tuple[str, bool, Sound]:
+    made = number % 5
+    if made == 0:
+        return "noise", False, noise(random, number)
+    if made == 1:
+        return "sweep", False, sweep(random)
+    if made == 2:
+        return "speech", False, speech(random)
+    if made == 3:
+        return "membrane", False, membrane(random)
+    return "drum", False, drum(random, number // 5)
+
+
+def chord(first: Sound, second: Sound, level_db: float) -> Sound | None:
+    """Two notes at once, the second at a level of the first; None where they are octaves, or one pitch."""
+    one, other = (number_note(note_of(*each))[0] for each in (first, second))
+    if one is None or other is None:
+        return None
+    cents = 1200 * math.log2(one.f0_hz / other.f0_hz)
+    if abs((cents + 600) % 1200 - 600) < OCTAVE_CENTS:
+        return None
+    (a, rate_hz), (b, other_hz) = first, second
+    b = _at_rate(b, other_hz, rate_hz)
+    a, b = (each[onset_of(each, rate_hz) :] for each in (a, b))
+    frames = min(len(a), len(b))
+    a, b = a[:frames], b[:frames]
+    b = b * 10 ** (level_db / 20) * math.sqrt(float(a @ a) / float(b @ b))
+    return np.concatenate([np.zeros(rate_hz // 10), a + b]), rate_hz
+
+
+def two_onsets(random: Random, first: Sound, second: Sound) -> Sound:
+    """A second note, or the same again, 0.15 to 0.8 s after the first."""
+    samples, rate_hz = first
+    other = _at_rate(*second, rate_hz) if random.random() < 0.6 else samples
+    other = other[onset_of(other, rate_hz) :]
+    peak = float(np.abs(samples).max())
+    begin = onset_of(samples, rate_hz) + round(random.uniform(0.15, 0.8) * rate_hz)
+    both = np.zeros(max(len(samples), begin + len(other)))
+    both[: len(samples)] = samples
+    both[begin : begin + len(other)] += other / np.abs(other).max() * peak
+    return both, rate_hz
+
+
+def loop(random: Random, sound: Sound) -> Sound:
+    """A sampler's: a stretch of 0.1 to 0.8 s again and again, with silence behind it or not."""
+    samples, rate_hz = sound
+    begin = onset_of(samples, rate_hz) + round(random.uniform(0.1, 0.3) * rate_hz)
+    part = samples[begin : begin + round(random.uniform(0.1, 0.6) * rate_hz)]
+    times = math.ceil(2 * rate_hz / len(part)) + 1
+    behind = np.zeros(rate_hz // 2 if random.random() < 0.3 else 0)
+    return np.concatenate([samples[:begin], *[part] * times, behind]), rate_hz
+
+
+def clipped(random: Random, sound: Sound) -> Sound:
+    """By 8 to 20 dB."""
+    samples, rate_hz = sound
+    gain = 10 ** (random.uniform(8, 20) / 20) / float(np.abs(samples).max())
+    return np.clip(gain * samples, -1, 1), rate_hz
+
+
+def noise(random: Random, number: int) -> Sound:
+    """Of any colour, that decays or stays."""
+    rate_hz = 44_100
+    t = np.arange(round(random.uniform(0.6, 3) * rate_hz)) / rate_hz
+    sound = _noise(random, len(t), float(random.uniform(0, 2)))
+    if number % 3:
+        sound = sound * np.exp(-random.uniform(1, 12) * t)
+    return np.concatenate([np.zeros(2_000), 0.1 * sound]), rate_hz
+
+
+def sweep(random: Random) -> Sound:
+    rate_hz = 44_100
+    t = np.arange(2 * rate_hz) / rate_hz
+    low, high = np.exp(random.uniform(math.log(50), math.log(8_000), 2))
+    tone = signal.chirp(t, low, t[-1], high * 1.5, "logarithmic") * np.exp(-random.uniform(0, 2) * t)
+    return np.concatenate([np.zeros(2_000), 0.3 * tone]), rate_hz
+
+
+def speech(random: Random) -> Sound:
+    """Syllables: pulses of a gliding pitch, or breath, through formants."""
+    rate_hz = 22_050
+    frames = round(random.uniform(1.2, 2.5) * rate_hz)
+    t = np.arange(frames) / rate_hz
+    pitch = random.uniform(90, 220) * 2 ** (0.3 * np.sin(2 * np.pi * random.uniform(0.4, 1.5) * t))
+    pulses = np.diff(np.floor(np.cumsum(pitch) / rate_hz), prepend=0.0) + 0.05 * random.standard_normal(frames)
+    edges = np.linspace(0, frames, int(random.integers(3, 8)), dtype=int)
+    sound = np.zeros(frames)
+    for first, last in pairwise(edges):
+        part = pulses[first:last] * np.hanning(last - first)
+        for hz in (random.uniform(300, 800), random.uniform(900, 2_200), random.uniform(2_300, 3_200)):
+            b, a = signal.iirpeak(hz, hz / 90, fs=rate_hz)
+            sound[first:last] += signal.lfilter(b, a, part)
+    return 0.3 * sound / np.abs(sound).max() + 1e-4 * random.standard_normal(frames), rate_hz
+
+
+def membrane(random: Random) -> Sound:
+    """A drum's head: ratios of Bessel zeros, moved by some percent."""
+    rate_hz = 44_100
+    t = np.arange(round(1.5 * rate_hz)) / rate_hz
+    ratios = np.array([1, 1.593, 2.136, 2.296, 2.653, 2.918, 3.156, 3.501, 3.6, 4.06, 4.15, 4.6])
+    lowest = random.uniform(60, 300)
+    sound = np.zeros(len(t))
+    for ratio in ratios * (1 + 0.02 * random.standard_normal(len(ratios))):
+        decay = random.uniform(4, 12) * ratio**0.5
+        sound += random.uniform(0.2, 1) / ratio * np.sin(2 * np.pi * lowest * ratio * t) * np.exp(-decay * t)
+    sound += 0.2 * random.standard_normal(len(t)) * np.exp(-60 * t)
+    return np.concatenate([np.zeros(2_000), 0.2 * sound]) + 1e-5 * random.standard_normal(len(t) + 2_000), rate_hz
+
+
+def drum(random: Random, number: int) -> Sound:
+    """A blow on one of the project's drums."""
+    from app.instrument.offline import render_note
+    from app.patches.library import SHIPPED, read_patch
+    from engine.presets import SHIPPED as PRESETS
+    from engine.presets import load_preset
+
+    name, key = DRUMS[number % len(DRUMS)]
+    patch = read_patch(Path(SHIPPED) / f"{name}.json")
+    preset = load_preset(PRESETS / "studio_any_string.safetensors")
+    low, high = patch.range
+    key = min(max(key + int(random.integers(-3, 4)), low), high)
+    sound = render_note(patch, preset, key, int(random.integers(60, 127)), 1.5, 1.5, 44_100)[:, 0]
+    return np.concatenate([np.zeros(2_000), sound.astype(float)]) + 1e-6 * random.standard_normal(
+        len(sound) + 2_000
+    ), 44_100
+
+
+def _at_rate(samples: Array, rate_hz: int, target_hz: int) -> Array:
+    shared = math.gcd(rate_hz, target_hz)
+    return samples if rate_hz == target_hz else signal.resample_poly(samples, target_hz // shared, rate_hz // shared)
+
+
+def _noise(random: Random, frames: int, exponent: float) -> Array:
+    """Of unit power, falling with frequency to an exponent of its amplitude."""
+    spectrum = np.fft.rfft(random.standard_normal(frames))
+    spectrum[1:] *= np.maximum(np.arange(1, len(spectrum)) / frames, 5e-4) ** -exponent
+    spectrum[0] = 0
+    sound = np.fft.irfft(spectrum, frames)
+    return sound / math.sqrt(float(np.mean(sound**2)))
+
+
+def _silence(random: Random, rate_hz: int) -> Array:
+    frames = round(random.uniform(0.2, 3) * rate_hz)
+    made = int(random.integers(3))
+    if made == 0:
+        return np.zeros(frames)
+    if made == 1:
+        return np.full(frames, float(random.uniform(-1e-3, 1e-3)))
+    return 1e-4 * random.standard_normal(frames)
