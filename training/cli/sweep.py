@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -11,7 +12,7 @@ import typer
 
 from engine.bounds import MOST_RETRIES, MOST_WORKERS
 from engine.plain_text import duration, one_line
-from training.cli.arguments import Cache, Device, Json, Runs
+from training.cli.arguments import Cache, Device, Json, Runs, check_range
 from training.cli.console import Failure, Report, bars, number, print_json, print_table, say
 from training.cli.training import training_report
 
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
     from training.sweeping.workers.base import Noted, Progressed
 
 LINE_EVERY_S = 60.0  # between two lines of a run's progress
+MOST_MINUTES = 10_000.0
+PIECE_CHECKPOINT_S = 10.0  # between checkpoints of a sweep that ends in time: what a stop costs at most
 NAMED = 3  # failed runs that a message names at most
 
 results = typer.Typer(no_args_is_help=True, help="The results file: one row per run.", rich_markup_mode=None)
@@ -52,6 +55,10 @@ def sweep(
             min=1, max=MOST_WORKERS, help="Runs at once on each GPU: several small models fill it better than one."
         ),
     ] = 1,
+    minutes: Annotated[
+        float | None,
+        typer.Option(metavar="M", help="End after M minutes; the same command continues, here or elsewhere."),
+    ] = None,
     results: Annotated[
         Path | None,
         typer.Option(help="The results file; default training/results.csv, or, for a trial, one in --runs."),
@@ -73,6 +80,10 @@ def sweep(
     from training.sweeping.sweep import sweep as run  # this command has the name
     from training.sweeping.workers import cluster_workers, fitted, local_workers, open_to_anybody
 
+    ends_s = None
+    if minutes is not None:
+        check_range("--minutes", minutes, 0.1, MOST_MINUTES, "min")
+        ends_s = time.monotonic() + 60 * minutes
     chosen = load_plan(plan)
     file = results or results_of(chosen, runs)
     known = read_results(file)
@@ -80,12 +91,13 @@ def sweep(
         _list(chosen, known, json)
         return
     left = len(unfinished(chosen, known))
+    every_s = None if minutes is None else PIECE_CHECKPOINT_S
     if scheduler is None:
         layout = fitted(max(left, 1), device=device, workers=workers, threads=threads, per_device=per_device)
-        options = Options(file, runs, cache, layout.device, layout.threads, retries)
+        options = Options(file, runs, cache, layout.device, layout.threads, retries, every_s, ends_s)
         opened = local_workers(layout)
     else:
-        options = Options(file, runs, cache, device, threads, retries)
+        options = Options(file, runs, cache, device, threads, retries, every_s, ends_s)
         if open_to_anybody(scheduler):
             say(
                 f"warning: {scheduler} neither authenticates nor encrypts: anyone who can connect to it can run code"

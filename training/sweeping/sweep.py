@@ -6,6 +6,8 @@ finished runs are skipped, failed ones tried again, unfinished ones continued fr
 
 from __future__ import annotations
 
+import math
+import time
 from collections import Counter, deque
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -30,6 +32,7 @@ class Options:
         results: the file; None: the plan's own, see `results_of`.
         runs, cache: folders, as the workers see them; None: their defaults.
         retries: further tries after a run has failed.
+        ends_s: on the clock of `time.monotonic`, when the sweep ends with what is done by then; None: when all is.
     """
 
     results: Path | None = None
@@ -39,6 +42,11 @@ class Options:
     threads: int | None = None
     retries: int = 1
     checkpoint_every_s: float | None = None
+    ends_s: float | None = None
+
+    @property
+    def left_s(self) -> float:
+        return math.inf if self.ends_s is None else self.ends_s - time.monotonic()
 
     def task(self, plan: Plan, run: Run) -> Task:
         return Task(
@@ -95,8 +103,10 @@ def unfinished(plan: Plan, rows: Iterable[Row]) -> list[Run]:
 def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[Row]:
     """Does what is unfinished of a plan, the most valuable first.
 
+    Where it ends in time, runs under way are left with their checkpoints.
+
     Returns:
-        The rows of the plan's runs, in its order.
+        The rows of the plan's runs, in its order; of those alone that have ended.
 
     Raises:
         SchemaError, OSError: the results file cannot be read or written. No run is lost for that: rows lie in the
@@ -108,14 +118,14 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[
     waiting = deque(unfinished(plan, rows.values()))
     running: dict[str, Run] = {}
     failures: Counter[str] = Counter()
-    while waiting or running:
+    while (waiting or running) and options.left_s > 0:
         while waiting and len(running) < workers.capacity():
             run = waiting.popleft()
             if not is_finished(rows.get(run.digest)):  # another machine's row may have come in meanwhile
                 running[run.name] = run
                 workers.start(options.task(plan, run))
                 watch.started(run)
-        event = workers.next(POLL_S) if running else None
+        event = workers.next(min(POLL_S, max(options.left_s, 0.0))) if running else None
         if isinstance(event, Progressed):
             watch.progressed(event)
         elif isinstance(event, Noted):
@@ -130,7 +140,7 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[
             row = event.row or _failed(run, event.error)
             rows.update((other.digest, other) for other in add_rows(file, [row]))
             watch.finished(row)
-    return [rows[run.digest] for run in plan.runs]
+    return [rows[run.digest] for run in plan.runs if run.digest in rows]
 
 
 def _failed(run: Run, error: str) -> Row:

@@ -152,6 +152,7 @@ BASES = {
     "play": CHECKED_WITH_THEIR_VALUE["play --rate"],
     "sampled": CHECKED_WITH_THEIR_VALUE["sampled --rate"],
     "evaluate": CHECKED_WITH_THEIR_VALUE["evaluate --rate"],
+    "sweep": ("sweep", "tiny", "--runs", "{out}"),
     "drums simulate": ("drums", "simulate", "thin_bars", "{out}.npy", "--key", 72, "--steps", 5),
     "drums predict": ("drums", "predict", "thin_bars", "{out}.npy", "--key", 72, "--steps", 5),
     "drums render": ("drums", "render", "thin_bars", "{out}.wav", "--key", 72),

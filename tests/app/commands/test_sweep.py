@@ -110,7 +110,7 @@ def test_a_sweep_ends_with_its_rows(run, words: list[Any], tmp_path: Path, scrip
     assert lines[0] == f"learned-strings: trial: 2 of 2 runs to do; rows go to {file}"
     assert lines[1] == "learned-strings: on a script"
     assert lines[2] == f"learned-strings: {NAMES[0]}: waits"
-    assert f"{NAMES[0]}: done, rel. MAE 0.5, 8.0 s (1 done, 0 running, 1 waiting; about 8.0 s left)" in lines[3]
+    assert f"{NAMES[0]}: done, rel. MAE 0.5, 8 s (1 done, 0 running, 1 waiting; about 8 s left)" in lines[3]
     assert [name in found.out for name in NAMES] == [True, True]
 
     again = run(*words, "--json")
@@ -266,5 +266,5 @@ def test_a_log_reports_of_a_long_run_now_and_then(capsys) -> None:
             shown = Shown(begin, 1, 1)
             shown.started(SimpleNamespace(name="a"))
             shown.progressed(progress_of("a", 1, 3, RelativeError(0.25, 0.125)))
-    reported = "learned-strings: a: 25%, 3.0 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125\n"
+    reported = "learned-strings: a: 25%, 3 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125\n"
     assert capsys.readouterr().err == reported

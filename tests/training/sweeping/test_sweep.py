@@ -74,6 +74,26 @@ def row_of(task: Task, **changes: Any) -> Row:
 # --- the queue
 
 
+def test_a_sweep_that_ends_in_time_leaves_the_rest_to_the_same_call(plan, options: Options) -> None:
+    """A run that is under way then has no row: it continues from its checkpoint."""
+    made, begun = plan(), time.monotonic()
+    ends = replace(options, ends_s=begun + 0.2)
+
+    def outcome(task: Task, tries: int) -> Row:
+        if task.name == made.runs[1].name:
+            time.sleep(max(0.0, begun + 0.3 - time.monotonic()))
+        return row_of(task)
+
+    first = sweep(made, Script(outcome, capacity=1), ends, Record())
+    assert [row.name for row in first] == [run.name for run in made.runs[:2]]
+    watch = Record()
+    rows = sweep(made, Script(lambda task, tries: row_of(task)), options, watch)
+    assert watch.names == [run.name for run in made.runs[2:]]
+    assert [row.name for row in rows] == [run.name for run in made.runs]
+    over = sweep(made, Script(lambda task, tries: pytest.fail("begun")), replace(options, ends_s=begun), Record())
+    assert over == rows
+
+
 def test_runs_begin_in_the_plans_order_and_no_more_than_there_are_workers(plan, options: Options) -> None:
     made = plan()
     workers, watch = Script(lambda task, tries: row_of(task)), Record()
