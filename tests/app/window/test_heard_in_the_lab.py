@@ -211,6 +211,21 @@ def test_what_is_heard_and_exported_is_what_is_rendered_whatever_was_played_befo
             assert_same(sound, expected[slot], f"{preset}, {slot} of the blind test, after {name}", False)
 
 
+def test_a_key_that_is_reported_after_a_preset_was_chosen_is_not_what_is_plucked(qtbot: QtBot, lab: Controller) -> None:
+    """As in the milliseconds between the stroke and the window's next look, or while a song plays."""
+    play_instrument(qtbot, lab, PLAYED["brass_strung_harp"])
+    lab.instruments.play(NoteOn(60, 100))
+    late = lab.instruments.latest
+    lab.session.update(preset=KINDS["koopman_var"], amplitude_mm=2.0, position=0.3)
+    take(lab, 0.1)
+    lab.instruments._tell_session()
+    qtbot.waitUntil(lambda: isinstance(late, KeyNote) and late.known and not lab.instruments._look_timer.isActive())
+    assert lab.session.choices.string is None and lab.session.choices.position == 0.3
+    choose(qtbot, lab, KINDS["koopman_var"])
+    for slot, source in SOURCES.items():
+        assert_same(heard(qtbot, lab, slot), rendered(lab, source), f"{slot} after a late key")
+
+
 def test_a_string_of_the_instrument_that_is_plucked_by_itself_has_no_level_of_it(
     qtbot: QtBot, lab: Controller
 ) -> None:
