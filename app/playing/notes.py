@@ -479,7 +479,7 @@ class Notes:
                     model,
                     initial_m,
                     program.grid_weights(asked.ear),
-                    (subject, asked.pluck, asked.ear.points, asked.ear.solo, asked.seconds),
+                    (subject, asked.pluck, asked.ear, asked.seconds),
                     lambda: self._rendered_enough(note, ahead, struck_s),
                     lambda error: self._cannot_render(note, error),
                     lambda: note.over,

@@ -26,7 +26,7 @@ from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
 from app.playing.note import Note
 from app.session.choices import Choices
-from app.shared.vocabulary import Source
+from app.shared.vocabulary import PICKUPS, Source
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings
@@ -209,6 +209,16 @@ def test_what_is_heard_and_exported_is_what_is_rendered_whatever_was_played_befo
                 assert_same(exported(lab), expected[slot], f"{preset}, {slot}, exported after {name}")
         for slot, sound in blind(qtbot, lab).items():
             assert_same(sound, expected[slot], f"{preset}, {slot} of the blind test, after {name}", False)
+
+
+@pytest.mark.parametrize("kind", ["lru", "koopman_var"])
+def test_each_pick_up_is_heard_as_it_is_rendered(qtbot: QtBot, lab: Controller, kind: str) -> None:
+    """Also from the same points, where a model that is rendered ahead was heard through another pick-up before."""
+    lab.session.update(preset=KINDS[kind], amplitude_mm=2.0, position=0.3)
+    qtbot.waitUntil(lambda: lab.performance.at_hand)
+    for pickup in (*PICKUPS, *PICKUPS[::-1]):
+        lab.session.update(pickup=pickup)
+        assert_same(heard(qtbot, lab, "a"), rendered(lab, "model"), f"{kind}, {pickup}")
 
 
 def test_a_key_that_is_reported_after_a_preset_was_chosen_is_not_what_is_plucked(qtbot: QtBot, lab: Controller) -> None:
