@@ -221,7 +221,9 @@ def test_each_pick_up_is_heard_as_it_is_rendered(qtbot: QtBot, lab: Controller, 
         assert_same(heard(qtbot, lab, "a"), rendered(lab, "model"), f"{kind}, {pickup}")
 
 
-def test_a_key_that_is_reported_after_a_preset_was_chosen_is_not_what_is_plucked(qtbot: QtBot, lab: Controller) -> None:
+def test_a_key_that_is_reported_after_a_preset_was_chosen_is_not_what_is_plucked(
+    qtbot: QtBot, lab: Controller
+) -> None:
     """As in the milliseconds between the stroke and the window's next look, or while a song plays."""
     play_instrument(qtbot, lab, PLAYED["brass_strung_harp"])
     lab.instruments.play(NoteOn(60, 100))
