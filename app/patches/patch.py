@@ -6,6 +6,7 @@ All values are checked against bounds here. The pitch of keys is in `tuning`, th
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
@@ -496,13 +497,19 @@ class Patch(Value):
         return patch.model_copy(update={"macros": macros})
 
     def turned(self, macro: int, value: float) -> Patch:
-        """The patch with a macro (by number, from 0) turned to `value`, 0 … 1, and the fields of its targets set."""
+        """The patch with a macro (by number, from 0) turned to `value`, 0 … 1, and the fields of its targets set.
+
+        A target stays where the others forbid its value: the softest pluck does not pass the hardest.
+        """
         share = min(1.0, max(0.0, value))
         chosen = self.macros[macro]
         moved = chosen.model_copy(update={"value": share})
         macros = (*self.macros[:macro], moved, *self.macros[macro + 1 :])
-        targets = {t.field: t.low + share * (t.high - t.low) for t in chosen.targets}
-        return self.model_copy(update={"macros": macros}).with_values(targets)
+        patch = self.model_copy(update={"macros": macros})
+        for target in chosen.targets:
+            with contextlib.suppress(ValueError):
+                patch = patch.with_value(target.field, target.low + share * (target.high - target.low))
+        return patch
 
     def _check_assignable(self, where: str, field: str) -> None:
         if field not in ASSIGNABLE or not self.has(field):

@@ -375,12 +375,16 @@ class Notes:
         return [note for note in self._notes if isinstance(note, Note)]
 
     def look(self) -> None:
-        """Follows what the player reports of notes of keys: the latest that began is the string that is shown."""
+        """Follows what the player reports of notes of keys: the latest that began is the string that is shown.
+
+        One that is reported after a single string was chosen, which its instrument is not, changes nothing.
+        """
         for note in self.keys.look():
             with self._lock:
-                if note.request is not None and note is self.latest and self._chosen is not None:
-                    request = note.request
-                    self._chosen = replace(self._chosen, preset=request.preset, pluck=request.pluck)
+                request, chosen = note.request, self._chosen
+                if request is None or chosen is None or note is not self.latest or self._reach is not None:
+                    continue
+                self._chosen = replace(chosen, preset=request.preset, pluck=request.pluck)
 
     def _path_of(self, preset: str) -> Path | None:
         entry = self._find(preset)
@@ -475,7 +479,7 @@ class Notes:
                     model,
                     initial_m,
                     program.grid_weights(asked.ear),
-                    (subject, asked.pluck, asked.ear.points, asked.ear.solo, asked.seconds),
+                    (subject, asked.pluck, asked.ear, asked.seconds),
                     lambda: self._rendered_enough(note, ahead, struck_s),
                     lambda error: self._cannot_render(note, error),
                     lambda: note.over,

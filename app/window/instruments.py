@@ -270,8 +270,8 @@ class Instruments(QObject):
                 return
             self._unknown = None
         self._look_timer.stop()
-        if note is None or note is not self.latest:  # another pluck was begun meanwhile
-            return
+        if note is None or note is not self.latest or not self._session.choices.plays_patch:
+            return  # another pluck was begun, or a single string chosen, meanwhile
         self.latest_key = note.event.key, note.string
         if note.request is not None:
             self._tell(note.request, self._drawn)

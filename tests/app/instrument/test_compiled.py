@@ -4,7 +4,8 @@
 of the sound, then its projections on eight random directions, in norms. The compiled player agreed with it to 1e-9.
 They were frozen again when fades lost their corners; with straight fades all agreed until then, to 3e-5, which silent
 modes make that rest from the start. Eight were frozen again when nothing touched a string for longer than a period;
-without that bound all agreed until then.
+without that bound all agreed until then. Four were frozen again when both sides of a body came to bound the level of
+keys; with the left side alone all agreed until then.
 Its instruments are there as they were then, so that those of the factory may be voiced otherwise.
 """
 

@@ -161,7 +161,7 @@ def test_a_finger_that_moves_along_a_string_lands_on_its_motion(patch: Patch, pr
 def test_a_repeated_key_has_the_release_of_its_latest_stroke(patch: Patch, preset: Preset) -> None:
     soft, hard = (NoteOn(KEY, velocity) for velocity in (20, 110))
     off = (0.3, NoteOff(KEY))
-    after = tick(patch, preset, "finger", (0.0, hard), (0.2, soft), off)
+    after = tick(patch, preset, "finger", (0.0, hard), (0.2, soft), off, off)  # a release for each stroke
     alone = tick(patch, preset, "finger", (0.2, soft), off)
     assert after == pytest.approx(alone, abs=0.5)
 

@@ -128,6 +128,20 @@ def test_a_macro_writes_its_targets(make_patch: Make) -> None:
     assert first.turned(0, 7).knobs.decay == pytest.approx(2.5)
 
 
+def test_a_macro_whose_targets_would_cross_turns_as_far_as_it_can(make_patch: Make) -> None:
+    """Each end is possible with the other value as it stands, but not both together."""
+    targets = [
+        {"field": "pluck.softest_mm", "low": 0.1, "high": 2.5},
+        {"field": "pluck.hardest_mm", "low": 3.0, "high": 1.0},
+    ]
+    pluck = {"softest_mm": 0.1, "hardest_mm": 3.0}
+    patch = make_patch(pluck=pluck, macros=[{"name": "Even", "targets": targets}])
+    for value in (0.0, 0.4, 0.7, 1.0, 0.2):
+        patch = patch.turned(0, value)
+        assert patch.macros[0].value == value
+        assert patch.pluck.softest_mm <= patch.pluck.hardest_mm
+
+
 def test_a_macro_follows_a_knob_that_it_turns() -> None:
     """To the position that would give its value; with several targets to their mean."""
     guitar = find_patch("Steel-string acoustic").patch

@@ -26,7 +26,7 @@ from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
 from app.playing.note import Note
 from app.session.choices import Choices
-from app.shared.vocabulary import Source
+from app.shared.vocabulary import PICKUPS, Source
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings
@@ -209,6 +209,33 @@ def test_what_is_heard_and_exported_is_what_is_rendered_whatever_was_played_befo
                 assert_same(exported(lab), expected[slot], f"{preset}, {slot}, exported after {name}")
         for slot, sound in blind(qtbot, lab).items():
             assert_same(sound, expected[slot], f"{preset}, {slot} of the blind test, after {name}", False)
+
+
+@pytest.mark.parametrize("kind", ["lru", "koopman_var"])
+def test_each_pick_up_is_heard_as_it_is_rendered(qtbot: QtBot, lab: Controller, kind: str) -> None:
+    """Also from the same points, where a model that is rendered ahead was heard through another pick-up before."""
+    lab.session.update(preset=KINDS[kind], amplitude_mm=2.0, position=0.3)
+    qtbot.waitUntil(lambda: lab.performance.at_hand)
+    for pickup in (*PICKUPS, *PICKUPS[::-1]):
+        lab.session.update(pickup=pickup)
+        assert_same(heard(qtbot, lab, "a"), rendered(lab, "model"), f"{kind}, {pickup}")
+
+
+def test_a_key_that_is_reported_after_a_preset_was_chosen_is_not_what_is_plucked(
+    qtbot: QtBot, lab: Controller
+) -> None:
+    """As in the milliseconds between the stroke and the window's next look, or while a song plays."""
+    play_instrument(qtbot, lab, PLAYED["brass_strung_harp"])
+    lab.instruments.play(NoteOn(60, 100))
+    late = lab.instruments.latest
+    lab.session.update(preset=KINDS["koopman_var"], amplitude_mm=2.0, position=0.3)
+    take(lab, 0.1)
+    lab.instruments._tell_session()
+    qtbot.waitUntil(lambda: isinstance(late, KeyNote) and late.known and not lab.instruments._look_timer.isActive())
+    assert lab.session.choices.string is None and lab.session.choices.position == 0.3
+    choose(qtbot, lab, KINDS["koopman_var"])
+    for slot, source in SOURCES.items():
+        assert_same(heard(qtbot, lab, slot), rendered(lab, source), f"{slot} after a late key")
 
 
 def test_a_string_of_the_instrument_that_is_plucked_by_itself_has_no_level_of_it(
