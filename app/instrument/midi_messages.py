@@ -124,7 +124,7 @@ class _Reader:
     """
 
     def __init__(self, raw: bytes, most: int) -> None:
-        self._raw, self._left = raw, most
+        self._raw, self._most, self._left = raw, most, most
         self.ticked: list[tuple[int, int | Message]] = []
         self.tracks = self.clipped = self.skipped = 0
 
@@ -159,7 +159,7 @@ class _Reader:
                     up_to_end = len(self.ticked), place
                 self._left -= 1
                 if self._left < 0:
-                    raise NotMidi("has too many messages")
+                    raise NotMidi(f"has more than {self._most:,} messages")
                 later, place = self._number(place, limit)
                 tick += later
                 running, place, ended = self._read_message(tick, running, place, limit)

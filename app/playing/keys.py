@@ -15,7 +15,19 @@ from pathlib import Path
 from app.instrument.compiled import InstrumentPlayer, is_another
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.effects import body_problem, effects_of
-from app.instrument.events import RESET, SWITCHES, Controller, Event, NoteOn, PatchTurned, moves_effects
+from app.instrument.events import (
+    NOTES_OFF,
+    RESET,
+    SOUND_OFF,
+    SUSTAIN,
+    SWITCHES,
+    Controller,
+    Event,
+    NoteOff,
+    NoteOn,
+    PatchTurned,
+    moves_effects,
+)
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.playing.dropping import drop
@@ -28,6 +40,7 @@ from engine.kernels.playing_layout import BEGAN
 from engine.presets import PresetError
 from engine.voices import Ear, Mixer
 
+RELEASES = (SUSTAIN, SOUND_OFF, NOTES_OFF)  # controllers that may end what rings
 SEEN_DB = 70.0  # below full scale: softer strings do not light their keys
 STANDS_S = 0.5  # the output stands if it takes no frame for so long, which is longer than any of its buffers
 
@@ -149,6 +162,7 @@ class Keys:
             if isinstance(event, Controller):
                 self._note_switch(event)
             player, mixer = self._present(), self._mixer()
+            self._release_before(event, 0 if due is None else due.frame_in(mixer))
             if player is None:
                 return None
             self.recorder.take(event, None if due is None else due.time_s)
@@ -166,6 +180,13 @@ class Keys:
             note = self._notes[player, id] = KeyNote(player, mixer, id, struck, self._path, frame)
             begun(note)
             return note
+
+    def _release_before(self, event: Event, frame: int) -> None:
+        """Releases of keys and pedals damp what players before have struck, too. Under the lock."""
+        released = isinstance(event, NoteOff) or (isinstance(event, Controller) and event.number in RELEASES)
+        for player in self._playing if released else []:
+            if player is not self._player:
+                player.handle(event, frame)
 
     def _note_switch(self, event: Controller) -> None:
         if event.number in SWITCHES:

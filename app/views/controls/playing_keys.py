@@ -88,7 +88,7 @@ class PlayingKeys(QObject):
             event.accept()
             return notes
         if not event.isAutoRepeat():
-            self._let_go(*self._leaving)
+            self._let_go(number, *self._leaving)  # the release of this one may have been lost
             self._down[number] = press
             self.pressed.emit(press)
         event.accept()

@@ -308,8 +308,11 @@ class Playable(QWidget):
             self._press(spot, velocity)
 
     def _release_left(self, spot: Spot) -> None:
-        """Releases what the mouse has left, unless it stays down by itself."""
-        if spot not in self._held:
+        """Releases what the mouse has left. On a string that was given one release is enough, when no finger is left.
+
+        Where the key chooses the string, each stroke of the key has a release of its own.
+        """
+        if spot not in self._held or spot.string is None:
             self._release(spot)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:

@@ -248,6 +248,13 @@ def is_down(players: np.ndarray, channel: int, key: int) -> bool:
 
 
 @njit(**COMPILED)
+def release_key(players: np.ndarray, channel: int, key: int) -> None:
+    """A key is not down, and none of its strokes awaits a release."""
+    hold(players, channel, key, False)
+    players[slots.channel(channel) + of.CHANNEL_STRUCK + key] = 0
+
+
+@njit(**COMPILED)
 def release_keys(players: np.ndarray, channel: int) -> None:
     """No key of a channel is down."""
     players[slots.channel(channel) + of.CHANNEL_HELD] = 0

@@ -221,13 +221,21 @@ def tune(
 
 @njit(**COMPILED)
 def choke(player: np.ndarray, players: np.ndarray, event: int, frame: int) -> None:
-    """Lets single notes fade out fast, though their instrument lets them ring."""
+    """Lets single notes fade out fast, though their instrument lets them ring; no release of their keys follows."""
+    id, channel, key = players[event + of.EVENT_ID], players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
     seconds = player[event + of.EVENT_VALUE] if player[event + of.EVENT_VALUE] > 0.0 else STOP_S
     for number in range(of.MOST_NOTES):
         note = slots.note(number)
         if _is_meant(players, event, note):
+            if players[note + of.NOTE_HAS_PLACE] != 0:
+                channels.release_key(players, players[note + of.NOTE_CHANNEL], players[note + of.NOTE_KEY])
             voices.release_note(player, players, note, seconds, frame)
             players[note + of.NOTE_HAS_PLACE] = 0
+    if id != 0 and key == of.ANY:
+        return
+    for each in range(of.CHANNELS * of.KEYS):  # whose notes may have ended
+        if channel in (of.ANY, each // of.KEYS) and key in (of.ANY, each % of.KEYS):
+            channels.release_key(players, each // of.KEYS, each % of.KEYS)
 
 
 @njit(**COMPILED)

@@ -199,7 +199,7 @@ def test_a_tempo_of_0_is_none_and_of_several_at_a_tick_the_last_counts() -> None
         (chunk(b"MThd", b"\0\0\0\1\0\x60") + chunk(b"MTrk", b"\0\x3c\x40"), "the kind of a message"),
         (chunk(b"MThd", b"\0\0\0\1\0\x60") + chunk(b"MTrk", b"\0\x90\x3c"), "within a message"),
         (chunk(b"MThd", b"\0\0\0\1\0\x60") + chunk(b"MTrk", b"\xff\xff\xff\xff\x7f\x90\x3c\x40"), "has no end"),
-        (chunk(b"MThd", b"\0\0\0\1\0\x60") + chunk(b"MTrk", b"\0\x90\x3c\x40" * (MOST + 1)), "too many"),
+        (chunk(b"MThd", b"\0\0\0\1\0\x60") + chunk(b"MTrk", b"\0\x90\x3c\x40" * (MOST + 1)), "more than [0-9,]+ m"),
         (b"RIFF\x24\0\0\0WAVEfmt ", "another kind of RIFF"),
     ],
 )

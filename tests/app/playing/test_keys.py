@@ -640,6 +640,24 @@ def test_drums_that_are_left_before_they_are_computed_keep_nobody_waiting(
     strike(played, NoteOn(45, 60))
 
 
+@pytest.mark.parametrize("loaded", [True, False])
+@pytest.mark.parametrize(
+    ("down", "up"), [((), NoteOff(45)), ((Controller(SUSTAIN, 127), NoteOff(45)), Controller(SUSTAIN, 0))]
+)
+def test_what_is_let_go_after_another_instrument_was_chosen_is_damped(
+    played: Notes, wait: Wait, down: tuple[NoteOff | Controller, ...], up: NoteOff | Controller, loaded: bool
+) -> None:
+    held = strike(played, NoteOn(45, 60))
+    for event in down:
+        played.handle(event)
+    assert not now(played, held).damped
+    played.set_instrument(read_patch(PATCHES / "frame_drum.json"), EAR)
+    if loaded:
+        wait(lambda: played.keys.player is not None)
+    played.handle(up)
+    assert now(played, held).damped
+
+
 def test_switches_hold_for_another_instruments_player_too(played: Notes, patch: Patch, wait: Wait) -> None:
     switches = [Controller(number, 127, KEYS) for number in (LEGATO, TREMOLO)]
     for event in (*switches, Controller(STRUM, 127), Controller(RESET, 0)):

@@ -8,6 +8,7 @@ import shutil
 import signal
 import subprocess
 import zlib
+from collections.abc import Callable
 from contextlib import suppress
 from ctypes import c_double
 from importlib.util import find_spec
@@ -501,6 +502,34 @@ def test_a_choked_note_is_silent_at_once_and_others_ring_on(bank: Library) -> No
     assert ringing(choke(4_800, note_id=1), choke(4_800, key=47)) < 0.01 * rest
     assert 0.05 * rest < one < 0.99 * rest
     assert ringing(choke(4_800)) < 0.01 * rest
+
+
+def by_midi(event: Event) -> Event:
+    """The same note as a message of MIDI."""
+    note = event.content
+    kind, velocity = (0x90, round(127 * note.velocity)) if note.header.type == host.NOTE_ON else (0x80, 64)
+    return midi(event.frame, kind | note.channel, note.key, velocity)
+
+
+@pytest.mark.parametrize("sent", [lambda event: event, by_midi])
+def test_a_release_belongs_to_the_stroke_before_it(bank: Library, sent: Callable[[Event], Event]) -> None:
+    def ringing(*events: Event) -> float:
+        struck = [note_on(0, 40, 120), note_on(4_800, 40, 120), *events]
+        sound = instance_of(bank, "electric_bass").render(48_000, [sent(each) for each in struck])
+        return float(np.abs(sound[-4_800:]).max())
+
+    held = ringing()
+    assert ringing(note_off(4_900, 40)) == held  # of the first
+    assert ringing(note_off(4_900, 40), note_off(6_000, 40)) < 0.01 * held
+
+
+@pytest.mark.parametrize("choked", [choke(4_800), choke(4_800, key=40), choke(4_800, note_id=1)])
+def test_a_key_that_was_choked_is_damped_when_it_is_struck_and_released_again(bank: Library, choked: Event) -> None:
+    def ringing(*before: Event) -> float:
+        events = [*before, note_on(9_600, 40, 120, note_id=2), note_off(12_000, 40)]
+        return float(np.abs(instance_of(bank, "electric_bass").render(48_000, events)[-4_800:]).max())
+
+    assert ringing(note_on(0, 40, 120, note_id=1), choked) < 2 * ringing()
 
 
 def test_tuning_one_note_leaves_the_others(bank: Library) -> None:

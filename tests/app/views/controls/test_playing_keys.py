@@ -107,6 +107,16 @@ def test_a_key_struck_fast_again_is_let_go_first(window: QWidget, platform: str)
     assert reported == ["down", "up", "down"]
 
 
+@pytest.mark.parametrize("platform", [X11, "windows"])
+def test_a_key_whose_release_was_lost_is_let_go_before_it_is_pressed_again(window: QWidget, platform: str) -> None:
+    keys, reported = PlayingKeys(window, platform), list[str]()
+    keys.pressed.connect(lambda press: reported.append("down"))
+    keys.released.connect(lambda press: reported.append("up"))
+    for time_ms in (1_000, 3_000):  # a menu has taken the release between them
+        QApplication.sendEvent(window, native(QEvent.Type.KeyPress, time_ms))
+    assert reported == ["down", "up", "down"]
+
+
 @pytest.mark.parametrize("platform", ["windows", "cocoa", "wayland"])
 def test_a_release_is_not_held_back_where_qt_marks_repetitions(window: QWidget, platform: str) -> None:
     keys, reported = PlayingKeys(window, platform), list[str]()

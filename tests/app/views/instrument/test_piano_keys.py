@@ -107,10 +107,21 @@ def test_a_key_that_is_held_stays_until_it_is_clicked_so_again(
     assert heard.notes == [("on", 60)]
     assert keys.held == {60}
     qtbot.mouseClick(keys, LEFT, pos=spot(keys, 60))  # plucks it again, and it stays
-    assert heard.notes == [("on", 60), ("on", 60)]
+    assert heard.notes == [("on", 60), ("on", 60), ("off", 60)]  # the release of the first stroke
     qtbot.mouseClick(keys, button, modifier, spot(keys, 60))
-    assert heard.notes[-1] == ("off", 60)
+    assert heard.notes[3:] == [("off", 60)]
     assert not keys.held
+
+
+def test_each_stroke_of_a_key_is_released_however_it_was_struck(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
+    qtbot.mouseClick(keys, RIGHT, pos=spot(keys, 60))
+    qtbot.mousePress(keys, LEFT, pos=spot(keys, 59))
+    for key in (60, 62, 60):  # a glissando over the key that is held
+        qtbot.mouseMove(keys, spot(keys, key))
+    qtbot.keyPress(keys, Qt.Key.Key_Return)
+    keys.release_all()
+    for key in (59, 60, 62):
+        assert heard.notes.count(("on", key)) == heard.notes.count(("off", key)) > 0
 
 
 def test_a_key_without_a_string_is_grey_and_silent(qtbot: QtBot, keys: PianoKeys, heard: Heard) -> None:
