@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
 from datetime import datetime
@@ -116,8 +116,11 @@ class Journal:
             self.path.unlink(missing_ok=True)
         self._lock.unlock()
 
-    def read(self) -> Played | None:
+    def read(self, check: Callable[[], None] = lambda: None) -> Played | None:
         """The recording as far as it was written; None: there is no note in it.
+
+        Args:
+            check: is called at each line; may raise, which ends the reading.
 
         Raises:
             ValueError: nothing of it can be used; the message names the file.
@@ -126,6 +129,7 @@ class Journal:
         raw = read_bounded(self.path, LARGEST_BYTES)
         read = _Read(str(self.path))
         for line in raw.split(b"\n")[:-1]:  # behind the last end of a line nothing is whole
+            check()
             if not read.take(line):
                 break
         return read.played()

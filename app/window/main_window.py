@@ -7,7 +7,7 @@ from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 
-from PySide6.QtCore import QByteArray, QMargins, QPoint, QRect, Qt, QTimer, Signal
+from PySide6.QtCore import QByteArray, QEvent, QMargins, QObject, QPoint, QRect, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QCloseEvent,
     QDragEnterEvent,
@@ -219,6 +219,7 @@ class MainWindow(QMainWindow):
         middle = QWidget()
         middle.setLayout(column)
         self.setCentralWidget(middle)
+        middle.installEventFilter(self)
         self.notices.setParent(middle)
         FocusRing(middle)
         self._drop_sign = DropSign(self)
@@ -446,8 +447,18 @@ class MainWindow(QMainWindow):
         aside, above = 8 if narrow else 14, 6 if low else 12
         self._column.setContentsMargins(aside, above, aside, above)
         self._column.setSpacing(6 if low else 10)
-        under_head = QPoint(aside, above + self._head.sizeHint().height() + 2)
-        self.notices.place(under_head, self.width() - 2 * aside)
+        self._place_notices()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:
+        """The header has another height, as text of another size has reached it."""
+        if watched is self.centralWidget() and event.type() == QEvent.Type.LayoutRequest:
+            self._place_notices()
+        return super().eventFilter(watched, event)
+
+    def _place_notices(self) -> None:
+        margins = self._column.contentsMargins()
+        under_head = QPoint(margins.left(), margins.top() + self._head.sizeHint().height() + 2)
+        self.notices.place(under_head, self.width() - 2 * margins.left())
 
     def paintEvent(self, event: QPaintEvent) -> None:
         super().paintEvent(event)

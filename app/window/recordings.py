@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from datetime import datetime
 
 from PySide6.QtCore import QObject, Signal
@@ -13,6 +14,7 @@ from app.instrument.events import NoteOn, PatchTurned
 from app.playing.keys import Keys
 from app.session.choices import Choices, Session
 from app.shared.vocabulary import DIFFERENCE, PlayedSource
+from app.views.background import Background
 from app.views.dialogs.question import ask
 from app.views.instrument.patch_bar import PatchBar
 from app.window.journaling import Journaling
@@ -41,6 +43,9 @@ class Recordings(QObject):
         self._unsaved: dict[Played, Journal | None] = {}  # in their order
         self._journaling = Journaling(keys.recorder, self)
         self._journaling.failed.connect(self.reported)
+        self._reading = Background("journals", self)
+        self._reading.finished.connect(lambda read: self._ask_about(*read))
+        self._reading.failed.connect(self.reported)
         session.changed.connect(self._choices_changed)
         bar.record_asked.connect(self.record)
         bar.recording_save_asked.connect(self.save_asked)
@@ -93,33 +98,30 @@ class Recordings(QObject):
 
     def close(self) -> None:
         """Leaves what is not saved to the next start; may be called again."""
+        self._reading.close()
         self.end()
         for journal in self._unsaved.values():
             if journal is not None:
                 journal.close()
 
     def offer_left(self) -> None:
-        """Asks about what an earlier run has left: recordings that it recovers, keeps for later, or discards."""
-        found: dict[Played, Journal] = {}
-        for journal in left_journals(recordings_folder()):
-            try:
-                played = journal.read()
-            except (OSError, ValueError) as error:
-                self.reported.emit(f"{one_line(str(error))}; it cannot be recovered, and stays where it is.")
-                journal.close()
-                continue
-            if played is None:
-                journal.delete()
-            else:
-                found[played] = journal
+        """Reads what an earlier run has left, in the background, then asks whether to recover or discard it."""
+        self._reading.start(lambda job: _read_left(job.check))
+
+    def _ask_about(self, found: dict[Played, Journal], problems: list[str]) -> None:
+        """`found`: was left; `problems`: why other journals cannot be read."""
+        for problem in problems:
+            self.reported.emit(problem)
         if not found:
             return
-        lines = "\n".join(_words(played) for played in found)
-        many = len(found) > 1
-        question = (
-            f"{'These recordings were' if many else 'This recording was'} not saved when the app ended.\n\n{lines}"
-        )
-        answer = ask(self._bar, "Recover what was played?", question, LATER, DISCARD, RECOVER)
+        if self._keys.recorder.recording:  # no question comes between a musician and the keys
+            self.informed.emit("An earlier recording is not saved yet; the next start offers it.")
+            answer = LATER
+        else:
+            lines = "\n".join(_words(played) for played in found)
+            were = "These recordings were" if len(found) > 1 else "This recording was"
+            question = f"{were} not saved when the app ended.\n\n{lines}"
+            answer = ask(self._bar, "Recover what was played?", question, LATER, DISCARD, RECOVER)
         for played, journal in found.items():
             if answer == RECOVER:
                 self._unsaved[played] = journal
@@ -162,6 +164,24 @@ class Recordings(QObject):
     def _show_unsaved(self) -> None:
         self._bar.show_unsaved(len(self._unsaved))
         self.unsaved_changed.emit()
+
+
+def _read_left(check: Callable[[], None]) -> tuple[dict[Played, Journal], list[str]]:
+    """The recordings that an earlier run has left, and why others cannot be read. `check`: see `Journal.read`."""
+    found: dict[Played, Journal] = {}
+    problems: list[str] = []
+    for journal in left_journals(recordings_folder()):
+        try:
+            played = journal.read(check)
+        except (OSError, ValueError) as error:
+            problems.append(f"{one_line(str(error))}; it cannot be recovered, and stays where it is.")
+            journal.close()
+            continue
+        if played is None:
+            journal.delete()
+        else:
+            found[played] = journal
+    return found, problems
 
 
 def _heard(choices: Choices) -> tuple[PlayedSource, float]:

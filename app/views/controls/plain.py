@@ -8,7 +8,7 @@ from __future__ import annotations
 from html import escape
 from typing import Any
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtGui import Qt as GuiQt
 from PySide6.QtWidgets import QLabel
 
@@ -20,6 +20,22 @@ class Label(QLabel):
         super().__init__(*arguments, **properties)
         if self.textFormat() == Qt.TextFormat.AutoText:
             self.setTextFormat(Qt.TextFormat.PlainText)
+
+
+class SteadyLabel(Label):
+    """A label with room for `widest`, so that what stands beside it stays where it is; a longer text has its room."""
+
+    def __init__(self, widest: str) -> None:
+        super().__init__(widest)
+        self._widest = widest
+
+    def sizeHint(self) -> QSize:
+        hint, letters = super().sizeHint(), self.fontMetrics()
+        spare = letters.horizontalAdvance(self._widest) - letters.horizontalAdvance(self.text())
+        return QSize(hint.width() + max(0, spare), hint.height())
+
+    def minimumSizeHint(self) -> QSize:
+        return self.sizeHint()
 
 
 def plain_tip(text: str) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 from PySide6.QtCore import Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import QDesktopServices
-from PySide6.QtWidgets import QDialog, QHBoxLayout, QProgressBar, QPushButton, QTabBar, QVBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QProgressBar, QPushButton, QTabBar, QVBoxLayout, QWidget
 
 from app.export.choices import ExportChoices
 from app.export.job import EXPECTED, ExportJob
@@ -28,6 +28,7 @@ from app.views.dialogs.export_pages import (
     SamplerPage,
     WavForm,
 )
+from app.views.dialogs.growing import GrowingDialog
 from app.views.dialogs.question import ask
 from engine.plain_text import duration
 from engine.result_file import WriteError
@@ -39,7 +40,7 @@ REPLACE = "Replace"  # the button's word where a file of this name is there
 CONTINUE, CANCEL = "Continue", "Cancel export"
 
 
-class ExportDialog(QDialog):
+class ExportDialog(GrowingDialog):
     """Follows what the window plays (`show_subjects`) until an export begins.
 
     Attributes:

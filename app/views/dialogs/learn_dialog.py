@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from PySide6.QtCore import Signal
 from PySide6.QtWidgets import (
-    QDialog,
     QFormLayout,
     QHBoxLayout,
     QLayout,
@@ -31,6 +30,7 @@ from app.shared.worker import Job
 from app.views.background import Background
 from app.views.controls.form import form_label, row_of, spin_box
 from app.views.controls.parts import combo_box, filled, label, read_only_text
+from app.views.dialogs.growing import GrowingDialog
 from app.views.dialogs.question import ask
 from engine.plain_text import duration, name_text
 from engine.presets import PresetError
@@ -53,7 +53,7 @@ HEARD: tuple[tuple[Literal["recording", "learned"], str], ...] = (
 )
 
 
-class LearnDialog(QDialog):
+class LearnDialog(GrowingDialog):
     """Nothing is written before "Keep and play". Errors are stated without anything copied from the recording.
 
     Attributes:

@@ -30,7 +30,7 @@ from app.views.controls.knob import Knob
 from app.views.controls.name_button import NameButton
 from app.views.controls.overflow import Overflow
 from app.views.controls.parts import combo_box, faint, tool_button, vertical_rule, words_label
-from app.views.controls.plain import Label, plain_tip
+from app.views.controls.plain import Label, SteadyLabel, plain_tip
 from engine.plain_text import one_line
 
 BODY_LETTERS = 8  # of the widest title of a body, in the width of an X
@@ -170,13 +170,13 @@ class PatchBar(QFrame):
         self.octave = faint()
         self.octave.setToolTip("The lowest C on the computer's keys; C4 is middle C (Z, X)")
         self.octave.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.velocity = faint()
+        self.velocity = SteadyLabel("velocity 127")
+        self.velocity.setObjectName("faint")
         self.velocity.setToolTip("How hard the computer's keys strike, 1 … 127 (1 … 9; C softer, V harder)")
-        self.velocity.setMinimumWidth(72)
         self.velocity.setAlignment(Qt.AlignmentFlag.AlignCenter)
-        self.voices = faint("0 voices")
+        self.voices = SteadyLabel("0 voices")
+        self.voices.setObjectName("faint")
         self.voices.setToolTip("Number of strings that ring")
-        self.voices.setMinimumWidth(62)
         self.voices.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.record = QToolButton()
         self.record.setCheckable(True)

@@ -63,12 +63,14 @@ from app.window import main
 
 def watch(controller):
     recordings = controller.patches.recordings
+    asked = []
 
     def look():
         box = QApplication.activeModalWidget()
         if isinstance(box, QMessageBox):
+            asked.append(box.text())
             QTest.keyClick(box, Qt.Key[sys.argv[1]])
-        elif controller.exports.dialog is not None or sys.argv[1] == "Key_Escape":
+        elif asked and (controller.exports.dialog is not None or sys.argv[1] == "Key_Escape"):
             timer.stop()
             latest = recordings.latest
             print(json.dumps([each.time_s for each in latest.events] if latest else None), flush=True)

@@ -116,3 +116,24 @@ def test_the_overflow_menu_does_what_its_buttons_do(qtbot: QtBot, qapp: QApplica
     played.session.update(face="play")
     qtbot.waitUntil(bar.rename.isVisible)
     assert not {bar.rename, bar.revert, bar.compare} & set(bar.more.parts)
+
+
+@pytest.mark.usefixtures("sized")
+@pytest.mark.parametrize("face", ["play", "lab"])
+def test_larger_text_covers_nothing(qtbot: QtBot, qapp: QApplication, played: Controller, face: Face) -> None:
+    """Neither does a notice cover the header, nor does a neighbour cut the words beside the octave."""
+    window, bar = played.window, played.window.instrument.bar
+    window.resize(1024, 640)
+    theme.apply_theme(qapp, "dark", 100)
+    played.session.update(face=face)
+    window.notices.report("A notice")
+    qtbot.waitUntil(window.notices.isVisible)
+    for percent in (150, 100, 125):
+        theme.apply_theme(qapp, "dark", percent)
+        head, notice = window._head, window.notices
+        qtbot.waitUntil(lambda head=head, notice=notice: head.geometry().bottom() < notice.y())
+        if face == "play":
+            bar.show_velocity(127)
+            for label in (bar.velocity, bar.octave, bar.voices):
+                needed = label.fontMetrics().horizontalAdvance(label.text())
+                qtbot.waitUntil(lambda label=label, needed=needed: not label.isVisible() or label.width() >= needed)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -13,10 +15,11 @@ from PySide6.QtCore import Qt
 from PySide6.QtTest import QTest
 from pytestqt.qtbot import QtBot
 
-from app.export.journal import left_journals, recordings_folder
+from app.export.journal import Journal, left_journals, recordings_folder
+from app.export.played import Played
 from app.export.recipe import InstrumentSound, read_origin
 from app.instrument.bodies import own_bodies
-from app.instrument.events import NoteOff, NoteOn, TimedEvent, bend_range
+from app.instrument.events import NoteOff, NoteOn, PatchTurned, TimedEvent, bend_range
 from app.instrument.midi_file import read_midi
 from app.shared.version import program_version
 from app.views.dialogs.export_dialog import ExportDialog
@@ -285,6 +288,38 @@ def test_a_window_that_is_ended_keeps_the_recording_on_disk(played: Controller, 
     assert (found.events, found.patch, found.source) == (latest.events, latest.patch, latest.source)
     assert found.recorded == latest.recorded
     journal.delete()
+
+
+@pytest.mark.parametrize("recording", [False, True])
+def test_what_was_left_is_read_in_the_background_and_asked_about_where_nobody_records(
+    qtbot: QtBot, played: Controller, reported: Reported, monkeypatch: pytest.MonkeyPatch, recording: bool
+) -> None:
+    """An hour of notes and turned knobs takes seconds to read."""
+    recordings, read, readers = played.patches.recordings, Journal.read, []
+    patch = played.patches.patch
+    assert patch is not None
+    journal = Journal.begun(recordings_folder(), datetime.now(UTC))
+    journal.write([TimedEvent(0.0, PatchTurned(patch)), TimedEvent(0.0, NoteOn(60, 100))])
+    journal.close()
+
+    def noted(journal: Journal, check: Callable[[], None] = lambda: None) -> Played | None:
+        readers.append(threading.current_thread())
+        return read(journal, check)
+
+    monkeypatch.setattr(Journal, "read", noted)
+    if recording:
+        recordings.record()
+    with answered(*([] if recording else [Qt.Key.Key_Return])) as asked:
+        recordings.offer_left()
+        qtbot.waitUntil(lambda: bool(reported.good if recording else asked))
+        qtbot.waitUntil(lambda: recording or recordings.latest is not None)
+    assert asked == ([] if recording else ["Recover what was played?"])
+    assert readers and threading.main_thread() not in readers
+    if recording:
+        assert "next start" in reported.good[-1]
+        recordings.discard()
+        (left,) = left_journals(recordings_folder())  # that of the recording under way has its own lock
+        left.delete()
 
 
 def test_the_window_is_not_closed_over_an_export_without_a_question(

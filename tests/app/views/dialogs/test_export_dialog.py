@@ -11,7 +11,7 @@ import soundfile
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QDesktopServices
 from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QAbstractButton, QComboBox, QDoubleSpinBox, QTabBar
+from PySide6.QtWidgets import QAbstractButton, QApplication, QComboBox, QDoubleSpinBox, QTabBar
 from pytestqt.qtbot import QtBot
 
 from app.export.choices import ExportChoices
@@ -26,6 +26,7 @@ from app.patches.library import read_patch
 from app.patches.patch import Patch
 from app.presets.library import Library, list_presets
 from app.session.choices import Choices
+from app.views import theme
 from app.views.dialogs.export_dialog import ExportDialog
 from app.window.exports import heard_note
 from engine.presets import SHIPPED
@@ -214,14 +215,18 @@ def test_what_the_instrument_adds_is_in_the_file_unless_the_string_alone_is_want
 def test_a_preset_has_no_instrument_whatever_was_played_before(made) -> None:
     guitar = read_patch(PATCHES / "classical_guitar.json")
     choices = {"instrument": SingleString(preset="small"), "kept": guitar}
-    page = made({}, choices).note
+    dialog = made({}, choices)  # kept, as is its page then
+    page = dialog.note
     assert not page.through.isVisible()
     assert page.through_words.text() == "None: the string alone, as it is heard"
     assert page.job().note.struck is None
 
 
 def test_a_difference_says_what_it_is_heard_without(made) -> None:
-    page = made({}, {"instrument": read_patch(PATCHES / "classical_guitar.json"), "a": "difference"}).note
+    dialog = made(
+        {}, {"instrument": read_patch(PATCHES / "classical_guitar.json"), "a": "difference"}
+    )  # kept, as is its page then
+    page = dialog.note
     assert "without amplifier, body and room, as a difference is heard" in page.through_words.text()
 
 
@@ -254,3 +259,21 @@ def test_every_control_of_the_dialog_has_a_name_and_a_tip(dialog: ExportDialog) 
                 assert control.accessibleName() or getattr(control, "text", lambda: "")(), control
                 assert control.toolTip(), control.accessibleName()
     assert dialog.note.file.edit.accessibleName() and dialog.note.file.edit.toolTip()
+
+
+def test_texts_that_wrap_are_seen_whole_at_any_size(qtbot: QtBot, qapp: QApplication, made) -> None:
+    sheet, font = qapp.styleSheet(), qapp.font()
+    try:
+        theme.apply_theme(qapp, "dark", 150)
+        dialog = made(None, {"instrument": read_patch(PATCHES / "concert_harp.json"), "preset": "studio_any_string"})
+        texts = [dialog.note.what, dialog.note.through_words]
+        for long in (False, True):  # as it opens, and as a text changes
+            if long:
+                texts[0].setText("A pluck of a string, heard at two places. " * 3)
+            for text in texts:
+                qtbot.waitUntil(lambda text=text: text.height() >= text.heightForWidth(text.width()))
+        assert dialog.height() <= dialog.screen().availableSize().height()
+    finally:
+        theme.apply_theme(qapp, "dark")
+        qapp.setStyleSheet(sheet)
+        qapp.setFont(font)
