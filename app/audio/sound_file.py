@@ -141,12 +141,12 @@ def _end_of_flac_block(data: bytes, block_frames: int) -> int:
     for byte in data[5 : 4 + max(more, 1)]:
         number = (number << 6) | (byte & 63)
     at, code = 4 + max(more, 1), data[2] >> 4
-    told = {6: 1, 7: 2}.get(code, 0)
-    if told:
-        frames = int.from_bytes(data[at : at + told]) + 1
+    field_bytes = {6: 1, 7: 2}.get(code, 0)
+    if field_bytes:
+        frames = int.from_bytes(data[at : at + field_bytes]) + 1
     else:
         frames = 192 if code <= 1 else 576 << (code - 2) if code < 6 else 256 << (code - 8)
-    at += told + {12: 1, 13: 2, 14: 2}.get(data[2] & 15, 0)
+    at += field_bytes + {12: 1, 13: 2, 14: 2}.get(data[2] & 15, 0)
     check = 0
     for byte in data[:at]:
         check ^= byte
