@@ -2,7 +2,9 @@
 
 Of a WAV file libsndfile is given a header of our own, and the samples where its chunks say they are. So files are
 read whose sizes were never written (streams), whose odd chunks lack their padding byte, in any order of chunks.
-Sources: Microsoft, "Multimedia Programming Interface and Data Specifications 1.0"; EBU Tech 3306 (RF64).
+A FLAC stream, which states no length, is given the counted one.
+Sources: Microsoft, "Multimedia Programming Interface and Data Specifications 1.0"; EBU Tech 3306 (RF64);
+RFC 9639 (FLAC).
 """
 
 from __future__ import annotations
@@ -25,6 +27,9 @@ _MOST_CHUNKS = 10_000
 _KEPT, _LARGEST_TEXT = (b"fmt ", b"fact"), 2**16  # chunks that are kept besides a list of texts; bytes of each
 _LARGEST_DATA = 2**32 - 2**20  # bytes that a header can state
 _UNKNOWN = 2**32 - 2**12  # sizes from here on are those of streams
+_FLAC_HEAD = 42  # bytes up to the end of its first block, which states its length
+_FLAC_FRAMES = 2**36 - 1
+_LARGEST_FLAC_BLOCK = 2**22  # bytes
 _KNOWN = frozenset(
     b"fmt |data|LIST|fact|bext|JUNK|junk|FLLR|PAD |ds64|id3 |ID3 |cue |smpl|inst|iXML|axml|chna|PEAK|acid".split(b"|")
 )
@@ -98,9 +103,58 @@ def _recognised(file: BinaryIO, end: int) -> _Spliced:
     kind, form = head[:4], head[8:12]
     if kind in (b"RIFF", b"RIFX", b"RF64", b"BW64") and form == b"WAVE":
         return _Spliced(*_wave(file, start, end))
+    if kind == b"fLaC" and not _flac_frames(head := _bytes_at(file, start, _FLAC_HEAD)):
+        return _Spliced(_counted(head, file, start, end), file, start + len(head), end - start - len(head))
     if kind in (b"fLaC", b"OggS") or (kind == b"FORM" and form in (b"AIFF", b"AIFC")):
         return _Spliced(b"", file, start, end - start)
     raise UnreadableSound(f"it is no {KINDS} file" if end else "it is empty")
+
+
+def _flac_frames(head: bytes) -> int:
+    """The number of frames that a FLAC file states; 0: none, as where it was written to a pipe."""
+    return int.from_bytes(head[21:26]) & _FLAC_FRAMES
+
+
+def _counted(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
+    """The beginning of a FLAC file that states no length, with the number of frames that it has."""
+    at, last = start + 4, False
+    while not last:  # what stands before the sound
+        block = _bytes_at(file, at, 4)
+        at, last = at + 4 + int.from_bytes(block[1:]), not block or block[0] >= 128
+    first = _bytes_at(file, at, 4)
+    place = max(at, end - _LARGEST_FLAC_BLOCK)
+    rest = _bytes_at(file, place, max(0, end - place)) + bytes(16)
+    found, length = len(rest) - 16, 0
+    for _ in range(_MOST_CHUNKS):
+        found = rest.rfind(first[:2], 0, max(found, 0)) if len(first) == 4 else -1
+        if found < 0 or length:
+            break
+        if (rest[found + 2] ^ first[2]) & 15 == 0 and (rest[found + 3] ^ first[3]) & 15 == 0:  # rate and bits
+            length = _end_of_flac_block(rest[found : found + 16], int.from_bytes(head[8:10]))
+    return head[:21] + (int.from_bytes(head[21:26]) | min(length, _FLAC_FRAMES)).to_bytes(5) + head[26:]
+
+
+def _end_of_flac_block(data: bytes, block_frames: int) -> int:
+    """The number of frames up to the end of a block, by its header; 0: it is none."""
+    more = 8 - (~data[4] & 255).bit_length()  # bytes of its number, written as those of UTF-8
+    number = data[4] & (127 >> more)
+    for byte in data[5 : 4 + max(more, 1)]:
+        number = (number << 6) | (byte & 63)
+    at, code = 4 + max(more, 1), data[2] >> 4
+    field_bytes = {6: 1, 7: 2}.get(code, 0)
+    if field_bytes:
+        frames = int.from_bytes(data[at : at + field_bytes]) + 1
+    else:
+        frames = 192 if code <= 1 else 576 << (code - 2) if code < 6 else 256 << (code - 8)
+    at += field_bytes + {12: 1, 13: 2, 14: 2}.get(data[2] & 15, 0)
+    check = 0
+    for byte in data[:at]:
+        check ^= byte
+        for _ in range(8):
+            check = ((check << 1) ^ (7 if check & 128 else 0)) & 255
+    if code == 0 or at >= len(data) or check != data[at]:
+        return 0
+    return (number if data[1] & 1 else number * block_frames) + frames
 
 
 def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, int]:
@@ -126,11 +180,13 @@ def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, i
             stated = struct.unpack(byte_order + "Q", _bytes_at(file, at + 8, 8).ljust(8, b"\0"))[0]
         elif size <= _LARGEST_TEXT and (name in _KEPT or (name == b"LIST" and _bytes_at(file, at, 4) == b"INFO")):
             found.setdefault(name, _bytes_at(file, at, size))
-        at = _next_chunk(file, at + size, size)
+        at = _next_chunk(file, at + size, size, byte_order)
     else:
         raise UnreadableSound(f"it has more than {_MOST_CHUNKS} chunks")
     if b"fmt " not in found or samples[0] == 0:
         raise UnreadableSound("it has no format" if b"fmt " not in found else "it has no samples")
+    if b"LIST" in found:
+        found[b"LIST"] = _whole_texts(found[b"LIST"], byte_order)
     found[b"fmt "], frame_bytes, compressed = _format(found[b"fmt "], byte_order)
     length = min(samples[1], _LARGEST_DATA) // frame_bytes * frame_bytes
     chunks = b"".join(
@@ -164,14 +220,36 @@ def _format(given: bytes, byte_order: str) -> tuple[bytes, int, bool]:
     return struct.pack(byte_order + "HHIIHH", *rest), frame_bytes, False
 
 
-def _next_chunk(file: BinaryIO, after: int, size: int) -> int:
+def _whole_texts(given: bytes, byte_order: str) -> bytes:
+    """A list of texts up to the first that is cut off, from which libsndfile would read on into the samples."""
+    end = 4  # of "INFO"
+    while len(given) >= end + 8:
+        size = struct.unpack(byte_order + "I", given[end + 4 : end + 8])[0]
+        if end + 8 + size > len(given):
+            break
+        end = min(end + 8 + size + size % 2, len(given))
+    return given[:end]
+
+
+def _next_chunk(file: BinaryIO, after: int, size: int, byte_order: str) -> int:
     """The place of the chunk behind one that ends at `after`; an odd one should have a padding byte, and may not."""
     places = (after + size % 2, after + 1 - size % 2)
-    names = [_bytes_at(file, place, 4) for place in places]
-    for place, name in zip(places, names, strict=True):
-        if name in _KNOWN:
-            return place
-    return places[1] if _is_name(names[1]) and not _is_name(names[0]) else places[0]
+    likely = [_likelihood(file, place, byte_order) for place in places]
+    return places[1] if likely[1] > likely[0] else places[0]
+
+
+def _likelihood(file: BinaryIO, place: int, byte_order: str) -> int:
+    """How likely a chunk begins at a place: 0, without a name; by its size and what follows; 4, of a known name."""
+    header = _bytes_at(file, place, 8)
+    if len(header) < 8 or not _is_name(header[:4]):
+        return 0
+    if header[:4] in _KNOWN:
+        return 4
+    end = file.seek(0, io.SEEK_END)
+    after = place + 8 + struct.unpack(byte_order + "I", header[4:])[0]
+    if after > end:
+        return 1
+    return 3 if after == end or any(_is_name(_bytes_at(file, after + odd, 4)) for odd in (0, 1)) else 2
 
 
 def _is_name(name: bytes) -> bool:
@@ -185,7 +263,7 @@ def _chunks_follow(file: BinaryIO, at: int, end: int, byte_order: str) -> bool:
         if len(header) < 8 or not _is_name(header[:4]):
             break
         size = struct.unpack(byte_order + "I", header[4:])[0]
-        at = _next_chunk(file, at + 8 + size, size)
+        at = _next_chunk(file, at + 8 + size, size, byte_order)
     return at in (end, end + 1)  # the last padding byte may be missing
 
 

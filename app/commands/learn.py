@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
+from engine.plain_text import name_text
 from training.cli import arguments
 from training.cli.arguments import Json
 from training.cli.console import print_json, progress, say
@@ -43,6 +44,7 @@ def learn(
         arguments.check_range("--scale-length", scale_length, 0.05, 5.0, "m")
     if gauge is not None:
         arguments.check_range("--gauge", gauge, 0.05, 10.0, "mm")
+    name = name_text(name)
     check_name(name)
     try:
         with progress("learn") as report:

@@ -204,7 +204,7 @@ class Controller(QObject):
             self._connect_panel(panel)
         self.presets.browser.played.connect(lambda name: self.pluck())
         self.presets.reported.connect(window.notices.report)
-        window.file_dropped.connect(lambda path: self.take_file(Path(path)))
+        window.file_dropped.connect(self.take_file)
         window.transport.slots.set_entries(self.library.entries)
         self.library.changed.connect(lambda: window.transport.slots.set_entries(self.library.entries))
         window.transport.change_asked.connect(self._change)

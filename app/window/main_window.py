@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+import os
+import sys
 from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
+from urllib.parse import unquote_to_bytes
 
-from PySide6.QtCore import QByteArray, QEvent, QMargins, QObject, QPoint, QRect, Qt, QTimer, Signal
+from PySide6.QtCore import QByteArray, QEvent, QMargins, QObject, QPoint, QRect, Qt, QTimer, QUrl, Signal
 from PySide6.QtGui import (
     QCloseEvent,
     QDragEnterEvent,
@@ -95,7 +98,7 @@ class MainWindow(QMainWindow):
 
     pluck_asked = Signal()
     face_asked = Signal(str)
-    file_dropped = Signal(str)  # a path
+    file_dropped = Signal(object)  # a Path, whose name may have bytes that are no UTF-8
     closing = Signal()
     first_painted = Signal()  # once, after the first paint
 
@@ -478,7 +481,7 @@ class MainWindow(QMainWindow):
         paths, _ = QFileDialog.getOpenFileNames(self, "Open", self._folder, FILE_FILTER)
         for path in paths:
             self._folder = str(Path(path).parent)
-            self.file_dropped.emit(path)
+            self.file_dropped.emit(Path(path))
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:
         ours = event.source() is not None  # dragged out of this window
@@ -496,7 +499,7 @@ class MainWindow(QMainWindow):
         _copy(event)
         for url in event.mimeData().urls():
             if url.isLocalFile():
-                self.file_dropped.emit(url.toLocalFile())
+                self.file_dropped.emit(_local_file(url))
 
     def closeEvent(self, event: QCloseEvent) -> None:
         if not self.may_close():
@@ -504,6 +507,14 @@ class MainWindow(QMainWindow):
             return
         self.closing.emit()
         super().closeEvent(event)
+
+
+def _local_file(url: QUrl) -> Path:
+    """The file of a URL; Qt would replace bytes of its name that are no UTF-8."""
+    if sys.platform in ("win32", "darwin"):
+        return Path(url.toLocalFile())
+    path = url.path(QUrl.ComponentFormattingOption.FullyEncoded)
+    return Path(os.fsdecode(unquote_to_bytes(path)))
 
 
 def _copy(event: QDropEvent) -> None:

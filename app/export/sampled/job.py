@@ -11,8 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import soundfile
-
+from app.audio.sound_file import UnreadableSound
 from app.export.sampled.levels import headroom_db
 from app.export.sampled.plan import NoteRenderer, SampledPlan, SampledSource, Zone
 from app.export.sampled.sample import StoredSample, encoded, sample_of
@@ -115,8 +114,8 @@ def export_sampled(
                 gain_db = sfz_gain_db(plan.patch, samples)
     except OSError as error:
         raise WriteError(explain(out, error)) from error
-    except soundfile.LibsndfileError as error:
-        raise WriteError(f"{out}: a sample cannot be read ({error.error_string}); try again") from error
+    except UnreadableSound as error:
+        raise WriteError(f"{out}: a sample cannot be read ({error}); try again") from error
     cut = sum(sample.cut for sample in samples.values())
     headrooms_db = headroom_db(plan.patch, samples)
     loudest_db = max(sample.peak_db + headrooms_db[zone] for zone, sample in samples.items())

@@ -14,8 +14,8 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-import soundfile
 
+from app.audio.sound_file import open_sound
 from app.export.sampled.levels import by_key, headroom_db, velocity_levels
 from app.export.sampled.plan import SampledPlan, Zone
 from app.export.sampled.sample import StoredSample
@@ -89,7 +89,7 @@ def write_sf2(
 
     Raises:
         Cancelled: `progress`, called before each sample, raised it; the file is not whole.
-        OSError, soundfile.LibsndfileError: a sample cannot be read, or the file not written.
+        OSError, UnreadableSound: the file cannot be written, or a sample not read.
     """
     channels = _channels(samples)
     attenuations_cb = _attenuations_cb(plan.patch, samples)
@@ -107,7 +107,8 @@ def write_sf2(
     gain_db = -max(levels_db.values())
     for zone in samples:
         progress(1.0, "writing the SoundFont")
-        sound, _ = soundfile.read(folder / plan.file_name(zone), dtype="float64", always_2d=True)
+        with open_sound(folder / plan.file_name(zone)) as stored:
+            sound = stored.read(dtype="float64", always_2d=True)
         steps, _ = quantised(sound * 10 ** ((levels_db[zone] + gain_db) / 20), "16")
         silence = bytes(2 * ZEROS_BEHIND)
         for column in steps.T:

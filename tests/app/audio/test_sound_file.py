@@ -97,6 +97,30 @@ def test_random_files(seed: int, tmp_path: Path) -> None:
         np.testing.assert_allclose(read.samples, samples, rtol=0, atol=TOLERANCES[kind] + 1e-16, err_msg=str(number))
 
 
+@pytest.mark.parametrize("name", [b"DISP", b"_PMX", b"umid", b"levl", b"LIST"])
+@pytest.mark.parametrize("length", [1, 3, 17, 603])
+@pytest.mark.parametrize("filled", [0, 33, 100])
+def test_odd_chunks_without_padding_before_chunks_of_any_name(
+    name: bytes, length: int, filled: int, tmp_path: Path
+) -> None:
+    """A name less its first letter, and a size of 100, look like a name too."""
+    odd = chunk(b"strc", bytes([filled]) * length, padded=False)
+    text = chunk(name, (b"INFO" if name == b"LIST" else b"") + bytes([filled]) * 100)
+    samples = np.arange(-50, 50, dtype="<i2")
+    head = chunk(b"fmt ", struct.pack("<HHIIHH", 1, 1, 8_000, 16_000, 2, 16))
+    (tmp_path / "a.wav").write_bytes(chunk(b"RIFF", b"WAVE" + odd + text + head + chunk(b"data", samples.tobytes())))
+    assert list(read_note(tmp_path / "a.wav").samples[:, 0] * 32768) == list(samples)
+
+
+@pytest.mark.parametrize("rest", range(12))
+def test_a_list_of_texts_that_is_cut_off_costs_no_samples(rest: int, tmp_path: Path) -> None:
+    texts = b"INFO" + chunk(b"ISFT", b"five5") + (b"ICMT\x20\0\0\0" + b"abcd")[:rest]
+    head = chunk(b"fmt ", struct.pack("<HHIIHH", 1, 1, 8_000, 16_000, 2, 16))
+    data = chunk(b"data", struct.pack("<3h", 1, 2, 3))
+    (tmp_path / "a.wav").write_bytes(chunk(b"RIFF", b"WAVE" + chunk(b"LIST", texts) + head + data))
+    assert list(read_note(tmp_path / "a.wav").samples[:, 0] * 32768) == [1, 2, 3]
+
+
 @pytest.mark.parametrize("subtype", ["ULAW", "ALAW", "IMA_ADPCM", "MS_ADPCM", "GSM610"])
 def test_compressed_files_are_read_as_before(subtype: str, tmp_path: Path) -> None:
     sound = 0.5 * np.sin(np.arange(8_000) / 20)
@@ -128,6 +152,22 @@ def test_flac_behind_a_tag_of_mp3_players(tmp_path: Path) -> None:
     plain = (tmp_path / "a.flac").read_bytes()
     (tmp_path / "b.flac").write_bytes(b"ID3\4\0\0\0\0\1\1" + bytes(129) + plain)
     np.testing.assert_array_equal(read_note(tmp_path / "b.flac").samples, read_note(tmp_path / "a.flac").samples)
+
+
+@pytest.mark.parametrize("frames", [1, 192, 4_096, 70_001, 600_000])
+def test_a_flac_stream_that_states_no_length(frames: int, tmp_path: Path) -> None:
+    path, samples = tmp_path / "a.flac", np.random.default_rng(0).uniform(-0.5, 0.5, (frames, 2))
+    soundfile.write(path, samples, 44_100, "PCM_24")
+    data = bytearray(path.read_bytes())
+    data[21:26] = bytes([data[21] & 0xF0, 0, 0, 0, 0])
+    path.write_bytes(data)
+    np.testing.assert_allclose(read_note(path).samples, samples, atol=1e-6)
+    for length in (30, 42, 46, 60, len(data) - 1, len(data) - 3):
+        path.write_bytes(data[:length])
+        try:
+            assert len(read_note(path).samples) <= frames
+        except NoteFileError as error:
+            assert str(error).startswith(f"{path}: ") and len(str(error)) < 400
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import soundfile
 
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
 from app.instrument.midi_file import midi_bytes
 from app.patches.library import SHIPPED as PATCHES
 from engine.plain_text import name_text
 from engine.presets import SHIPPED as PRESETS
+from tests.bench.recordings.synthetic import synthetic_note
 
 PRESET = PRESETS / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 CAFE = os.fsdecode(b"caf\xe9")
@@ -32,6 +34,28 @@ def folder(tmp_path: Path) -> Path:
     shutil.copy(PRESET, folder / f"{CAFE}.safetensors")
     np.save(folder / f"{CAFE}.npy", 1e-3 * np.sin(np.pi * np.linspace(0, 1, 101))[None])
     return folder
+
+
+def test_a_rendered_file_is_shown_and_rendered_again(run, folder: Path) -> None:
+    preset, wav, again = (str(folder / f"{CAFE}{ending}") for ending in (".safetensors", ".wav", " 2.wav"))
+    words = ("--position", "0.3", "--amplitude-mm", "2", "--seconds", "0.5", "--normalise")
+    assert run("render", preset, wav, *words).status == 0
+    found = run("info", wav)
+    assert found.status == 0, found.err
+    found.out.encode()
+    assert run("render", "--recipe", wav, again).status == 0
+    assert Path(again).stat().st_size > 0
+
+
+def test_a_note_is_learned(run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder / "own"))
+    made, note = synthetic_note(4), folder / f"{CAFE}.wav"
+    with note.open("wb") as file:
+        soundfile.write(file, made.samples, made.rate_hz, subtype="PCM_24", format="WAV")
+    found = run("learn", note, "--name", CAFE)
+    assert found.status == 0, found.err
+    found.out.encode()
+    assert len(list((folder / "own").glob("*.safetensors"))) == 1
 
 
 def test_a_name_is_text_that_can_be_written() -> None:
@@ -53,6 +77,8 @@ COMMANDS: dict[str, tuple[str, ...]] = {
         "0.1",
     ),
     "sampled": ("sampled", "{}.json", "{} out.sfz", "--keys", "57-57", "--layers", "1", "--seconds", "0.2"),
+    "soundfont": ("sampled", "{}.json", "{} out.sf2", "--keys", "57-57", "--layers", "1", "--seconds", "0.2"),
+    "predict": ("predict", "{}.safetensors", "{}.npy", "{} out.npy", "--steps", "5"),
     "simulate": ("simulate", "{}.npy", "{} out.npy", "--string", "linear", "--steps", "10", "--rate", "4000"),
     "compare": ("compare", "{}.safetensors", "--seconds", "0.1", "--position", "0.3", "--amplitude-mm", "2"),
     "plugin": ("plugin", "{}.json", "--dry-run"),

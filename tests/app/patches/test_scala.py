@@ -26,6 +26,9 @@ REMARKS = (
     "  by ear, 1998",
     " 3/2.",
     "C#",
+    ", a fifth",
+    ": 3/2, or so",
+    "; 9",
 )
 JUST = "! just.scl\njust\n 7\n 9/8\n 5/4\n 4/3\n 3/2\n 5/3\n 15/8\n 2/1\n"
 TWELVE = "\n".join(["twelve", "12", *(f"{100 * n}." for n in range(1, 13))])
@@ -197,8 +200,9 @@ def test_lines_of_the_formats_text(line: str, cents: float) -> None:
 
 @pytest.mark.parametrize(
     "line",
-    ["100,0", "2\\12", "3/2/1", "3 / 2/1", "-3/2", "3/-2", "-2", "0", "0/1", "3/0", "2:1", "2^3", "1.2.3", "1e3.",
-     "3/2.5", "1.5/2", "nan", "inf.", "fifth", "/2", ".", "\u0663/2", "9" * 500 + "/2", "9" * 300 + "."],
+    ["100,0", "2\\12", "2^(7/12)", "3/x", "100,0,", "3/2/1", "3 / 2/1", "-3/2", "3/-2", "-2", "0", "0/1",
+     "3/0", "2:1", "2^3", "1.2.3", "1e3.", "3/2.5", "1.5/2", "nan", "inf.", "fifth", "/2", ".", "\u0663/2",
+     "9" * 500 + "/2", "9" * 300 + "."],
 )  # fmt: skip
 def test_lines_that_are_no_pitch(line: str, tmp_path: Path) -> None:
     path = tmp_path / "a.scl"

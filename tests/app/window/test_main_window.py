@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -414,19 +415,30 @@ def test_a_sign_shows_while_files_hover_over_the_window(alive: MainWindow) -> No
     QApplication.sendEvent(alive, QDragLeaveEvent())
     assert not alive._drop_sign.isVisible()
     QApplication.sendEvent(alive, QDragEnterEvent(QPoint(50, 50), copy, data, buttons, mods))
-    dropped: list[str] = []
+    dropped: list[Path] = []
     alive.file_dropped.connect(dropped.append)
     QApplication.sendEvent(alive, QDropEvent(QPointF(50, 50), copy, data, buttons, mods))
     assert not alive._drop_sign.isVisible()
-    assert len(dropped) == 2
+    assert dropped == [Path("/tmp/song.mid"), Path("/tmp/other.wav")]
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="this system has no such names")
+def test_a_dropped_file_keeps_the_bytes_of_its_name(alive: MainWindow) -> None:
+    data = QMimeData()
+    data.setData("text/uri-list", b"file:///tmp/caf%E9/100%25%20caf%E9%20%C3%A9.mid\r\n")
+    dropped: list[Path] = []
+    alive.file_dropped.connect(dropped.append)
+    copy, left, none = Qt.DropAction.CopyAction, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
+    alive.dropEvent(QDropEvent(QPointF(50, 50), copy, data, left, none))
+    assert [os.fsencode(path) for path in dropped] == [b"/tmp/caf\xe9/100% caf\xe9 \xc3\xa9.mid"]
 
 
 def test_files_are_opened_from_the_menu(alive: MainWindow, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(QFileDialog, "getOpenFileNames", lambda *_: (["/tmp/a.mid", "/tmp/b.scl"], ""))
-    opened: list[str] = []
+    opened: list[Path] = []
     alive.file_dropped.connect(opened.append)
     alive.action["open"].trigger()
-    assert opened == ["/tmp/a.mid", "/tmp/b.scl"]
+    assert opened == [Path("/tmp/a.mid"), Path("/tmp/b.scl")]
 
 
 @pytest.fixture
