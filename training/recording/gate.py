@@ -39,6 +39,7 @@ UNISON_CENTS = 60.0  # nearer, it is made of partials that the body pulls
 LOUD_DB = -30.0  # of a second note's three loudest partials, below the loudest peak
 LEAST_LOUD_DB = -34.0  # fainter, they are other strings' that ring along
 SLOWEST_ATTACK_S = 0.12
+PLUCKED_S = 0.06  # as long rises the level of a pluck, in a window of 0.05 s
 MOST_BEFORE_PEAK = 0.5  # of the energy: more is a note reversed
 LOOP_S = 0.08  # a stretch that is looked for
 LOOP_LAG_S = 0.5  # at least so far before: beats of a pure tone come back sooner
@@ -119,7 +120,7 @@ def slow_attack(note: Note) -> Finding | None:
     quiet = np.flatnonzero(level[:peak] < 0.3 * level[peak])
     rise_s = (peak - (int(quiet[-1]) if len(quiet) else 0)) / note.rate_hz
     before = float(np.sum(level[:peak] ** 2) / np.sum(level**2))
-    is_reversed = peak / note.rate_hz > SLOWEST_ATTACK_S and before > MOST_BEFORE_PEAK
+    is_reversed = rise_s > PLUCKED_S and before > MOST_BEFORE_PEAK
     if rise_s < SLOWEST_ATTACK_S and not is_reversed:
         return None
     return Finding(
@@ -251,6 +252,8 @@ def second_series(note: Note, series: Series) -> Finding | None:
     if len(part) * series.f0_hz < LEAST_PERIODS * note.rate_hz:
         return None
     peaks = peaks_of(part, note.rate_hz, note.noise_power)
+    if len(peaks.hz) == 0:
+        return None
     own = followed(peaks, series)
     rest = peaks.without(own, CLEAR_DB, _hum_db(note, part))
     if len(rest.hz) == 0:

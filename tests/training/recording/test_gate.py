@@ -62,6 +62,14 @@ def test_a_note_is_kept_as_users_record_it(synthetic: SyntheticNote, kind: str) 
     assert refused(*CHANGES[kind](np.random.default_rng(1), (synthetic.samples, RATE_HZ))) == set()
 
 
+def test_a_note_that_soon_dies_away_is_not_reversed() -> None:
+    t = np.arange(RATE_HZ) / RATE_HZ
+    sound = sum(np.sin(2 * np.pi * 700 * k * t) * np.exp(-30 * t) / k for k in range(1, 7))
+    note = np.concatenate([np.zeros(RATE_HZ // 5), 0.3 * sound])
+    assert "edited" not in kinds(note)
+    assert refused(note[::-1].copy())
+
+
 @pytest.mark.parametrize("value", [0.0, -2e-4])
 def test_silence_behind_a_note_changes_nothing(synthetic: SyntheticNote, value: float) -> None:
     samples = synthetic.samples[:90_000]
@@ -112,6 +120,14 @@ def test_what_is_off_the_law_is_refused_once_the_body_is_silent(synthetic: Synth
     for hz, decay, is_refused in ((216.0, 40.0, False), (216.0, 2.0, True)):  # of the body, and of something else
         mode = np.concatenate([np.zeros(5_000), 0.1 * np.sin(2 * np.pi * hz * t) * np.exp(-decay * t)])
         assert ("off the law" in refused(synthetic.samples + mode)) == is_refused
+
+
+def test_a_note_without_peaks_in_the_end_is_examined() -> None:
+    t = np.arange(RATE_HZ) / RATE_HZ
+    sound = np.concatenate([np.zeros(4_000), 0.3 * np.sin(2 * np.pi * 300 * t) * np.exp(-60 * t)])
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(len(sound))
+    for each in (sound, sound + noise):
+        assert "chord" not in refused(each)
 
 
 def test_a_hum_is_no_second_note(synthetic: SyntheticNote) -> None:
