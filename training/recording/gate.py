@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, signal
 
 from training.recording.note import Note, envelope
-from training.recording.numbering import Peaks, Series, chance, distances, number, tolerance
+from training.recording.numbering import SPECTRUM_S, Series, apart_cents, chance, followed, number, peaks_of
 
 Array = NDArray[np.float64]
 
@@ -30,11 +30,16 @@ LEAST_PARTIALS = 4
 LEAST_EXPLAINED = 0.3
 LEAST_FITTED = 0.12  # the same: less is not even tried
 MOST_MISSING = 0.45
-SECOND_SERIES = 0.36  # see `second_series`
-LEAST_SECOND = 4  # of its partials
+BODY_SILENT_S = 0.25  # after the attack
+CLEAR_DB = 15.0  # above the floor: less may be noise
+MOST_OFF = 0.02  # of the energy then: more is not one string's
+SECOND_SERIES = 0.82  # see `second_series`
+LEAST_SECOND = 2  # of its partials
+UNISON_CENTS = 60.0  # nearer, it is made of partials that the body pulls
 LOUD_DB = -30.0  # of a second note's three loudest partials, below the loudest peak
-LEAST_LOUD_DB = -23.0  # fainter, they are the body's, or neighbours'
+LEAST_LOUD_DB = -34.0  # fainter, they are other strings' that ring along
 SLOWEST_ATTACK_S = 0.12
+PLUCKED_S = 0.06  # as long rises the level of a pluck, in a window of 0.05 s
 MOST_BEFORE_PEAK = 0.5  # of the energy: more is a note reversed
 LOOP_S = 0.08  # a stretch that is looked for
 LOOP_LAG_S = 0.5  # at least so far before: beats of a pure tone come back sooner
@@ -57,7 +62,7 @@ class Finding:
     refused: bool = False
 
 
-def examine(samples: Array, note: Note, series: Series | None, peaks: Peaks) -> tuple[Finding, ...]:
+def examine(samples: Array, note: Note, series: Series | None) -> tuple[Finding, ...]:
     """All that speaks against a recording; empty: nothing does."""
     found = [
         clipped(samples, note),
@@ -70,7 +75,7 @@ def examine(samples: Array, note: Note, series: Series | None, peaks: Peaks) -> 
         no_series(series),
     ]
     if series is not None:
-        found.append(second_series(series, peaks))
+        found.append(second_series(note, series))
     return tuple(each for each in found if each is not None)
 
 
@@ -115,7 +120,7 @@ def slow_attack(note: Note) -> Finding | None:
     quiet = np.flatnonzero(level[:peak] < 0.3 * level[peak])
     rise_s = (peak - (int(quiet[-1]) if len(quiet) else 0)) / note.rate_hz
     before = float(np.sum(level[:peak] ** 2) / np.sum(level**2))
-    is_reversed = peak / note.rate_hz > SLOWEST_ATTACK_S and before > MOST_BEFORE_PEAK
+    is_reversed = rise_s > PLUCKED_S and before > MOST_BEFORE_PEAK
     if rise_s < SLOWEST_ATTACK_S and not is_reversed:
         return None
     return Finding(
@@ -240,18 +245,37 @@ def no_series(series: Series | None) -> Finding | None:
     return None
 
 
-def second_series(series: Series, peaks: Peaks) -> Finding | None:
-    """A second series in what the first leaves, or the series is the common sub-octave of two."""
-    rest = peaks.without(series)
-    other = number(rest) if len(rest.hz) >= 4 else None
-    if other is None:
+def second_series(note: Note, series: Series) -> Finding | None:
+    """Sound off the law of one string, once the body is silent: another note's, or a drum's."""
+    begin_s = BODY_SILENT_S if note.seconds > 2 * BODY_SILENT_S else 0.4 * note.seconds
+    part = note.part(begin_s, min(begin_s + SPECTRUM_S, 0.9 * note.seconds))
+    if len(part) * series.f0_hz < LEAST_PERIODS * note.rate_hz:
         return None
-    near = np.abs(distances(rest.hz, other.f0_hz, other.stiffness)) < tolerance(rest.hz, other.f0_hz, rest.width_hz)
-    if near.sum() < LEAST_SECOND:
+    peaks = peaks_of(part, note.rate_hz, note.noise_power)
+    if len(peaks.hz) == 0:
         return None
-    loud_db = float(np.sort(rest.level_db[near])[-3:].mean() - peaks.level_db.max())
-    # what it explains more than any series of its spacing would, and how loud it is
-    if loud_db < LEAST_LOUD_DB or other.explained - chance(rest, other) + 0.02 * (loud_db - LOUD_DB) < SECOND_SERIES:
+    own = followed(peaks, series)
+    rest = peaks.without(own, CLEAR_DB, _hum_db(note, part))
+    if len(rest.hz) == 0:
         return None
-    words = f"a second note sounds at {other.f0_hz:.1f} Hz beside {series.f0_hz:.1f} Hz"
-    return Finding("chord", words, "record one note alone", refused=True)
+    remedy = "record one note alone; drums, slaps and strums are no strings"
+    other = number(rest)
+    if other is not None and rest.near(other).sum() >= LEAST_SECOND and apart_cents(own, other) > UNISON_CENTS:
+        loud_db = float(np.sort(rest.level_db[rest.near(other)])[-3:].mean() - peaks.level_db.max())
+        # what it explains more than any series of its spacing would, and how loud it is
+        clear = other.explained - chance(rest, other) + 0.02 * (loud_db - LOUD_DB)
+        if loud_db > LEAST_LOUD_DB and clear > SECOND_SERIES:
+            words = f"a second note sounds at {other.f0_hz:.1f} Hz beside {series.f0_hz:.1f} Hz"
+            return Finding("chord", words, remedy, refused=True)
+    off = float(np.sum(10 ** (rest.level_db / 10)) / np.sum(10 ** (peaks.level_db / 10)))
+    if off < MOST_OFF:
+        return None
+    words = f"{off:.0%} of it sounds off the partials of one string, {begin_s:.2f} s after the attack"
+    return Finding("off the law", words, remedy, refused=True)
+
+
+def _hum_db(note: Note, part: Array) -> float:
+    """The level of a peak that holds all that sounds before the attack, as a hum may."""
+    before = note.samples[: max(0, note.onset - round(0.02 * note.rate_hz))]
+    power = float(np.mean(before**2)) if len(before) > 0.03 * note.rate_hz else 0.0
+    return float(10 * np.log10(power / 2 * np.sum(np.hanning(len(part) + 2)) ** 2 + 1e-30))

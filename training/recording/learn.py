@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from training.recording.checkpoint import checkpoint_of
 from training.recording.fit import LearnedNote, fit_takes
 from training.recording.gate import Finding, examine
 from training.recording.note import Note, RecordingError, note_of
-from training.recording.numbering import Series, number_note
+from training.recording.numbering import Series, apart_cents, number_note
 from training.recording.physics import Kind, Physics, Strung, physics_of, strung
 from training.recording.preset import Source
 from training.recording.report import Report, report_of
@@ -83,8 +82,8 @@ def examined(samples: Array, rate_hz: int) -> Examined:
         RecordingError: it is no recording of one note in any case.
     """
     note = note_of(samples, rate_hz)
-    series, peaks = number_note(note)
-    return Examined(note, series, examine(samples, note, series, peaks))
+    series = number_note(note)
+    return Examined(note, series, examine(samples, note, series))
 
 
 def learn(
@@ -114,7 +113,7 @@ def learn(
     started = time.monotonic()
     notes = [usable(found, anyway, source.name) for found, source in recordings]
     lead = notes[0][1]
-    takes = [place for place, (_, series) in enumerate(notes) if _apart_cents(lead, series) < SAME_PITCH_CENTS]
+    takes = [place for place, (_, series) in enumerate(notes) if apart_cents(lead, series) < SAME_PITCH_CENTS]
     others = [place for place in range(len(notes)) if place not in takes]
     jobs = [takes, *([place] for place in others)]
     fitted: dict[int, LearnedNote] = {}
@@ -160,7 +159,3 @@ def require_found(learned: Sequence[Learned]) -> None:
     for each in learned:
         if not each.verdict.found:
             raise NotFound(each.source.name, each.verdict)
-
-
-def _apart_cents(first: Series, other: Series) -> float:
-    return abs(1200 * math.log2(other.f0_hz / first.f0_hz))

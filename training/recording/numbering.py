@@ -6,6 +6,7 @@ and pays for partials that it predicts and the spectrum lacks; so neither an oct
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -53,6 +54,11 @@ class Series:
         return partials_hz(self.f0_hz, self.stiffness, count)
 
 
+def apart_cents(first: Series, other: Series) -> float:
+    """The interval of two series."""
+    return abs(1200 * math.log2(other.f0_hz / first.f0_hz))
+
+
 def partials_hz(f0_hz: float, stiffness: float, count: int) -> Array:
     k = np.arange(1, count + 1)
     return k * f0_hz * np.sqrt(1 + stiffness * k**2)
@@ -74,10 +80,14 @@ class Peaks:
         """From 0 for one that barely stands out to 1."""
         return np.clip((self.above_db - PRESENT_DB / 2) / (FULL_DB - PRESENT_DB / 2), 0.0, 1.0)
 
-    def without(self, series: Series) -> Peaks:
-        """The peaks that a series does not explain."""
+    def near(self, series: Series) -> NDArray[np.bool_]:
+        """The peaks that a series explains, as a mask."""
         distance = distances(self.hz, series.f0_hz, series.stiffness)
-        kept = np.abs(distance) > tolerance(self.hz, series.f0_hz, self.width_hz)
+        return np.abs(distance) <= tolerance(self.hz, series.f0_hz, self.width_hz)
+
+    def without(self, series: Series, least_above_db: float = 0.0, least_level_db: float = -np.inf) -> Peaks:
+        """The peaks that a series does not explain, of those so clear and so loud."""
+        kept = ~self.near(series) & (self.above_db >= least_above_db) & (self.level_db >= least_level_db)
         hidden = series.partials_hz(MOST_PARTIALS)
         return Peaks(self.hz[kept], self.above_db[kept], self.level_db[kept], self.width_hz, self.highest_hz, hidden)
 
@@ -152,6 +162,12 @@ def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> Series:
     """A series of given f0 and B with its score."""
     score, explained, missing, present = _score(peaks, f0_hz, stiffness)
     return Series(f0_hz, stiffness, present, explained, missing, score)
+
+
+def followed(peaks: Peaks, series: Series) -> Series:
+    """The same string's series in other peaks of its note, refined where that explains more."""
+    same = series_at(peaks, series.f0_hz, series.stiffness)
+    return max((_refined(peaks, same), same), key=lambda each: each.score)
 
 
 def _candidates(peaks: Peaks, f0_range_hz: tuple[float, float]) -> Array:
@@ -231,16 +247,15 @@ def chance(peaks: Peaks, series: Series) -> float:
     )
 
 
-def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> tuple[Series | None, Peaks]:
+def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Series | None:
     """The series of a note, from spectra of two lengths; the shorter serves notes that end soon or glide."""
-    best: tuple[Series | None, Peaks] | None = None
+    best: Series | None = None
     for begin, length in ((0.06, SPECTRUM_S), (0.03, 0.25)):
         length = min(length, 0.9 * (note.seconds - begin))
         if length < 0.05:
             continue
-        peaks = peaks_of(note.part(begin, begin + length), note.rate_hz, note.noise_power)
-        series = number(peaks, f0_range_hz)
-        better = series is not None and best is not None and (best[0] is None or series.score > best[0].score + 0.1)
-        if best is None or better:
-            best = series, peaks
-    return best if best is not None else (None, peaks_of(note.samples, note.rate_hz, note.noise_power))
+        part = note.part(begin, begin + length)
+        series = number(peaks_of(part, note.rate_hz, note.noise_power), f0_range_hz)
+        if series is not None and (best is None or series.score > best.score + 0.1):
+            best = series
+    return best

@@ -32,7 +32,7 @@ def coverage(seeds: Iterable[int], progress: Callable[[int], None] = lambda done
         progress(done)
         made = synthetic_note(seed)
         note = note_of(made.samples, made.rate_hz)
-        series, _ = number_note(note)
+        series = number_note(note)
         if series is None or abs(1200 * math.log2(series.f0_hz / made.f0_hz)) > NUMBERED_CENTS:
             missed += 1
             continue

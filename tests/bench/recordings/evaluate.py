@@ -79,7 +79,7 @@ def dynamics(
     values: dict[str, list[float]] = {}
     for name, (samples, rate) in recordings.items():
         note = note_of(samples, rate)
-        series, _ = number_note(note)
+        series = number_note(note)
         if series is not None and series.present:
             notes[name] = note, series
     stems = sorted({name[:-2] for name in notes if DYNAMIC.search(name)})
@@ -94,8 +94,8 @@ def _row(
     name: str, samples: Array, rate: int, values: dict[str, list[float]], quick: bool
 ) -> tuple[list[Any], Note, Series, LearnedNote]:
     note = note_of(samples, rate)
-    series, peaks = number_note(note)
-    findings = examine(samples, note, series, peaks)
+    series = number_note(note)
+    findings = examine(samples, note, series)
     kinds = ", ".join(each.kind for each in findings) or "one note"
     if series is None or not series.present or any(each.refused for each in findings):
         raise RecordingError(f"refused: {kinds}")

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from tests.bench.recordings.sounds import Case, Recordings, cases
+from tests.bench.recordings.sounds import Case, Recordings, cases, is_judged
 from training.recording.fit import fit_note
 from training.recording.learn import examined
 from training.recording.note import RecordingError
@@ -16,6 +16,7 @@ from training.recording.physics import physics_of
 from training.recording.report import report_of
 from training.recording.verdict import verdict_of
 
+JUDGED_SEED = 60_000  # of sounds that no threshold was set on
 KEPT, REFUSED, NOT_FOUND, PASSED = "kept", "refused", "not found", "passed, not fitted"
 
 
@@ -50,15 +51,14 @@ def outcomes(
     count: int,
     every: int,
     *,
-    judging: bool = True,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[Outcome]:
-    """Of one half of the cases; of those that pass the gate, each of so many is fitted (0: none)."""
+    """Of judged recordings and seeds; of those that pass the gate, each of so many is fitted (0: none)."""
+    judged = {name: sound for name, sound in recordings.items() if is_judged(name)}
     found: list[Outcome] = []
-    for case in cases(recordings, count):
-        if case.judging == judging:
-            found.append(outcome(case, every > 0 and len(found) % every == 0))
-            progress(min(0.99, len(found) / (15 * len(recordings) + 4 * count)))
+    for case in cases(judged, count, JUDGED_SEED):
+        found.append(outcome(case, every > 0 and len(found) % every == 0))
+        progress(min(0.99, len(found) / (16 * len(judged) + 5 * count)))
     return found
 
 

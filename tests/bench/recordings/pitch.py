@@ -47,7 +47,7 @@ def pitches_of(recordings: Recordings) -> dict[str, list[float]]:
 def _note(
     values: dict[str, list[float]], part: str, samples: NDArray[np.float64], rate_hz: int, f0_hz: float
 ) -> None:
-    series, _ = number_note(note_of(samples, rate_hz))
+    series = number_note(note_of(samples, rate_hz))
     off = math.inf if series is None else abs(1200 * math.log2(series.f0_hz / f0_hz))
     values.setdefault(f"{part}, f0 within 50 cents", []).append(float(off <= MOST_CENTS))
 

@@ -1,6 +1,6 @@
 """Sounds for the gate of recordings: notes as users record them, and sounds that are no single note of a string.
 
-All are drawn by a seed. Each has a base, a recording or a seed, so that halves of the bases share nothing.
+All are drawn by a seed. Thresholds are set on half of the recordings and on other seeds than judge them.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Case:
     """A sound to be judged.
 
     Attributes:
-        base: that it was made from; cases of one base are never on two sides of a split.
+        base: that it was made from: a recording's name, or a number.
         is_note: it is one note of a string, and to be kept.
     """
 
@@ -52,14 +52,15 @@ class Case:
     is_note: bool
     sound: Sound
 
-    @property
-    def judging(self) -> bool:
-        """Its half: thresholds are set on the other."""
-        return sum(self.base.encode()) % 2 == 1
+
+def is_judged(name: str) -> bool:
+    """The half of a recording: thresholds are set on the other."""
+    return sum(name.encode()) % 2 == 1
 
 
-def cases(recordings: Recordings, count: int, seed: int = 0) -> Iterator[Case]:
+def cases(recordings: Recordings, count: int, seed: int) -> Iterator[Case]:
     """The cases of recordings, each in each change, and of so many synthetic notes; and as many that are no notes."""
+    recordings = {name: (_of_one_channel(samples), rate_hz) for name, (samples, rate_hz) in recordings.items()}
     for name, sound in recordings.items():
         if NO_STRING in name:
             yield from _changed(name, sound, False, seed)
@@ -243,12 +244,8 @@ def _no_notes(recordings: Recordings, count: int, seed: int) -> Iterator[Case]:
     for number in range(count):
         base = f"none {number}"
         real = number % 2 == 0 and len(notes) > 3
-        # both notes of one half
         name, first = notes[int(random.integers(len(notes)))] if real else (base, random_pluck(seed + 5_000 + number))
-        halves = [
-            each for each in notes if Case(each[0], "", True, first).judging == Case(name, "", True, first).judging
-        ]
-        second = halves[int(random.integers(len(halves)))][1] if real else random_pluck(seed + 7_000 + number)
+        second = notes[int(random.integers(len(notes)))][1] if real else random_pluck(seed + 7_000 + number)
         made = number // 2 % 8
         if made < 3:
             for level_db in CHORD_DB if made == 0 else (float(random.choice(CHORD_DB)),):
@@ -282,7 +279,7 @@ def _percussion(random: Random, number: int) -> tuple[str, bool, Sound]:
 
 def chord(first: Sound, second: Sound, level_db: float) -> Sound | None:
     """Two notes at once, the second at a level of the first; None where they are octaves, or one pitch."""
-    one, other = (number_note(note_of(*each))[0] for each in (first, second))
+    one, other = (number_note(note_of(*each)) for each in (first, second))
     if one is None or other is None:
         return None
     cents = 1200 * math.log2(one.f0_hz / other.f0_hz)
@@ -392,6 +389,10 @@ def drum(random: Random, number: int) -> Sound:
     return np.concatenate([np.zeros(2_000), sound.astype(float)]) + 1e-6 * random.standard_normal(
         len(sound) + 2_000
     ), 44_100
+
+
+def _of_one_channel(samples: Array) -> Array:
+    return samples if samples.ndim == 1 else samples.mean(1)
 
 
 def _at_rate(samples: Array, rate_hz: int, target_hz: int) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
-from tests.bench.recordings.sounds import CHANGES
+from tests.bench.recordings.sounds import CHANGES, membrane
 from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
 from training.recording.learn import Learned, NotFound, Refused, examined, learn, require_found
 from training.recording.preset import Source
@@ -62,6 +62,14 @@ def test_a_note_is_kept_as_users_record_it(synthetic: SyntheticNote, kind: str) 
     assert refused(*CHANGES[kind](np.random.default_rng(1), (synthetic.samples, RATE_HZ))) == set()
 
 
+def test_a_note_that_soon_dies_away_is_not_reversed() -> None:
+    t = np.arange(RATE_HZ) / RATE_HZ
+    sound = sum(np.sin(2 * np.pi * 700 * k * t) * np.exp(-30 * t) / k for k in range(1, 7))
+    note = np.concatenate([np.zeros(RATE_HZ // 5), 0.3 * sound])
+    assert "edited" not in kinds(note)
+    assert refused(note[::-1].copy())
+
+
 @pytest.mark.parametrize("value", [0.0, -2e-4])
 def test_silence_behind_a_note_changes_nothing(synthetic: SyntheticNote, value: float) -> None:
     samples = synthetic.samples[:90_000]
@@ -94,6 +102,38 @@ def test_what_is_edited_is_refused(synthetic: SyntheticNote, change: Change) -> 
 def test_a_second_note_is_heard(synthetic: SyntheticNote, level_db: float) -> None:
     other = synthetic_note(1).samples  # 148 Hz
     assert refused(synthetic.samples + 10 ** (level_db / 20) * other) == {"chord"}
+
+
+@pytest.mark.parametrize("hz", [500.0, 640.0, 810.0])
+def test_a_second_note_of_few_partials_is_heard(synthetic: SyntheticNote, hz: float) -> None:
+    other = synthetic_note(3, f0_range_hz=(hz, 1.001 * hz), highest_hz=2_500.0).samples
+    assert refused(synthetic.samples + 10 ** (-10 / 20) * other) & {"chord", "off the law"}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_drum_is_refused(seed: int) -> None:
+    assert refused(*membrane(np.random.default_rng(seed)))
+
+
+def test_what_is_off_the_law_is_refused_once_the_body_is_silent(synthetic: SyntheticNote) -> None:
+    t = np.arange(len(synthetic.samples) - 5_000) / RATE_HZ
+    for hz, decay, is_refused in ((216.0, 40.0, False), (216.0, 2.0, True)):  # of the body, and of something else
+        mode = np.concatenate([np.zeros(5_000), 0.1 * np.sin(2 * np.pi * hz * t) * np.exp(-decay * t)])
+        assert ("off the law" in refused(synthetic.samples + mode)) == is_refused
+
+
+def test_a_note_without_peaks_in_the_end_is_examined() -> None:
+    t = np.arange(RATE_HZ) / RATE_HZ
+    sound = np.concatenate([np.zeros(4_000), 0.3 * np.sin(2 * np.pi * 300 * t) * np.exp(-60 * t)])
+    noise = 1e-3 * np.random.default_rng(0).standard_normal(len(sound))
+    for each in (sound, sound + noise):
+        assert "chord" not in refused(each)
+
+
+def test_a_hum_is_no_second_note(synthetic: SyntheticNote) -> None:
+    t = np.arange(len(synthetic.samples)) / RATE_HZ
+    hum = sum(np.sin(2 * np.pi * 50 * k * t + k) / k for k in (1, 2, 3, 4))
+    assert refused(synthetic.samples + 3e-3 * hum) == set()
 
 
 def burst() -> np.ndarray:

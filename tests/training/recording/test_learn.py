@@ -36,7 +36,7 @@ def test_the_own_note_is_met_far_better_than_by_linear_poles(learned: Learned) -
     note, errors = learned.note, learned.report.errors
     assert errors.esr < 2e-3
     assert errors.distance_db < 4
-    series, _ = number_note(note)
+    series = number_note(note)
     linear = fit_note(note, series, free=0, glides=False)
     truth = note.fitted()
     found = linear.render(np.arange(len(truth)) / note.rate_hz)
@@ -50,7 +50,7 @@ def test_soft_and_loud_takes_share_their_poles(synthetic: SyntheticNote) -> None
     at = np.arange(len(soft)) * higher
     soft = 0.2 * CubicSpline(np.arange(len(soft)), soft)(at[at < len(soft)])
     takes = [note_of(samples, synthetic.rate_hz) for samples in (synthetic.samples, soft)]
-    notes = [(note, number_note(note)[0]) for note in takes]
+    notes = [(note, number_note(note)) for note in takes]
     first, second = fit_takes(notes)
     assert [pole.partial for pole in first.poles] == [pole.partial for pole in second.poles]
     apart = [b.s / a.s for a, b in zip(first.poles, second.poles, strict=True) if a.partial]
