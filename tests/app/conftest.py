@@ -23,6 +23,7 @@ from app.audio.sound import Sound
 from app.rendering import Take
 from app.rendering.take import Listened, Signal
 from engine.voices import Ear, Mixer
+from tests.app.questions import none_unanswered
 
 OWN_THREADS = (
     *("render-worker", "render-ahead", "notes-helper_0", "sound-caretaker", "sound-clock"),
@@ -53,6 +54,12 @@ def hear(derivative: Callable[[np.ndarray, int], np.ndarray]) -> Hear:
 
 
 COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a second
+
+
+@pytest.fixture(autouse=True)
+def every_question_is_answered() -> Iterator[None]:
+    with none_unanswered():
+        yield
 
 
 @pytest.fixture(autouse=True)

@@ -9,6 +9,8 @@ from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QAbstractButton, QApplication, QMessageBox
 
+_expected = 0  # blocks of `answered` that are open
+
 
 @contextmanager
 def answered(*answers: str | Qt.Key) -> Iterator[list[str]]:
@@ -27,9 +29,31 @@ def answered(*answers: str | Qt.Key) -> Iterator[list[str]]:
         else:
             next(each for each in box.findChildren(QAbstractButton) if each.text() == answer).click()
 
+    global _expected
     timer = QTimer(interval=20)
     timer.timeout.connect(look)
     timer.start()
-    yield asked
-    timer.stop()
+    _expected += 1
+    try:
+        yield asked
+    finally:
+        _expected -= 1
+        timer.stop()
     assert left == []
+
+
+@contextmanager
+def none_unanswered() -> Iterator[None]:
+    """Within, a question outside of `answered` is an error, not a test that waits for ever."""
+    show = QMessageBox.exec
+
+    def shown(box: QMessageBox) -> int:
+        if not _expected:
+            raise AssertionError(f"a question that nobody answers: {box.windowTitle()}: {box.text()}")
+        return show(box)
+
+    QMessageBox.exec = shown  # type: ignore[method-assign, assignment]
+    try:
+        yield
+    finally:
+        QMessageBox.exec = show  # type: ignore[method-assign]
