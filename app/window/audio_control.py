@@ -146,7 +146,7 @@ class AudioControl(QObject):
     def _show_badge(self, status: SoundStatus, model_rate_hz: int) -> None:
         rate, fault = rate_word(model_rate_hz), status.device is None
         converted = "" if status.rate_hz == model_rate_hz else f" → {rate_word(status.rate_hz)}"
-        text = f"{rate}  ·  no sound" if fault else f"{rate}{converted}"
+        text = "no sound" if fault else f"{rate}{converted}"
         tip = "The model's rate, converted to the sound device's rate" if converted else "The sample rate"
         if fault:
             tip = f"{status.problem or 'No audio output'}\nAudio settings: Ctrl+,"

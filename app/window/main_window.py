@@ -344,7 +344,7 @@ class MainWindow(QMainWindow):
         """What of the header and of the preset's facts has no room goes to the overflow menu."""
         buttons = (self._keys_button, self._test_button) if self._shows("test") and self._wide < WIDE else ()
         hides_facts = self._shows("facts") and self._high < HIGH
-        facts = (self.presets.card, self.outside_label, self.error_label) if hides_facts else ()
+        facts = (self.presets.card, self.through_label, self.outside_label, self.error_label) if hides_facts else ()
         self._more.hold(*buttons, *facts)
 
     def _share_height(self) -> None:

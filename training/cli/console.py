@@ -137,7 +137,7 @@ def _left(started: float, share: float, left_s: float | None) -> str:
         if share <= 0:
             return ""
         left_s = (time.monotonic() - started) * (1 - share) / share
-    return f"{duration(left_s)} left"
+    return f"{duration(max(left_s, 1.0))} left"
 
 
 def number(value: float | None) -> str:

@@ -187,7 +187,7 @@ class ExportDialog(GrowingDialog):
         self.bar.setValue(round(1000 * share))
         if left_s is None and share > 0:
             left_s = (time.monotonic() - self._started_s) * (1 - share) / share
-        left = f", about {duration(left_s)} left" if left_s else ""
+        left = f", about {duration(max(left_s, 1.0))} left" if left_s else ""
         self._tell(f"{text or 'Rendering'}{left}. {MEANWHILE}")
 
     def _finished(self, words: str) -> None:

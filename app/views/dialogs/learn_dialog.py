@@ -210,7 +210,7 @@ class LearnDialog(GrowingDialog):
     def _show_progress(self, share: float, *_: object) -> None:
         self.bar.setValue(round(1000 * share))
         spent_s = time.monotonic() - self._began_s
-        left = f" About {duration(spent_s * (1 / share - 1))} left." if share > 0.1 else ""
+        left = f" About {duration(max(spent_s * (1 / share - 1), 1.0))} left." if share > 0.1 else ""
         self.state.setText(f"Learning the string.{left}")
 
     def _show_learned(self, result: tuple[Any, Any]) -> None:

@@ -106,7 +106,8 @@ def test_where_no_string_is_found_keeping_is_no_default(qtbot: QtBot, played: Co
     assert "no string found: " in dialog.report.toPlainText()
     assert dialog.state.text() == f"Nothing is written yet. {NOT_FOUND}"
     assert dialog.start.text() == "Keep all the same" and not dialog.start.isDefault()
-    dialog.reject()
+    with answered("Discard"):
+        dialog.reject()
     assert not own_patches().exists()
 
 

@@ -12,7 +12,7 @@ from training.cli.console import Failure, print_json, print_table, progress, say
 
 COLUMNS = ("figure", "median", "90 %", "N")
 GATE_COLUMNS = ("kind", "N", "refused", "fitted", "no string found", "kept")
-FITTED_EVERY = 10
+FITTED_EVERY = 20  # notes
 
 
 def recordings(

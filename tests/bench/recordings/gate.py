@@ -53,11 +53,15 @@ def outcomes(
     *,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[Outcome]:
-    """Of judged recordings and seeds; of those that pass the gate, each of so many is fitted (0: none)."""
+    """The outcomes of judged recordings and seeds.
+
+    Args:
+        every: all that is no note and passes the gate is fitted, and one of so many notes; 0: nothing is.
+    """
     judged = {name: sound for name, sound in recordings.items() if is_judged(name)}
     found: list[Outcome] = []
     for case in cases(judged, count, JUDGED_SEED):
-        found.append(outcome(case, every > 0 and len(found) % every == 0))
+        found.append(outcome(case, every > 0 and (not case.is_note or len(found) % every == 0)))
         progress(min(0.99, len(found) / (16 * len(judged) + 5 * count)))
     return found
 
