@@ -60,10 +60,8 @@ from engine.plain_text import one_line
 
 FAILED = "The models cannot be loaded."
 LOADING, COMPILING = "Loading the models …", "Preparing the sound engine, once: one to five minutes …"
-WIDE, HIGH = (
-    1100,
-    560,
-)  # pixels: a narrower window hides brand, keys and ABX button; a lower the preset's facts
+WIDE = 1100  # pixels: in a narrower window brand, keys and ABX button are hidden or in the overflow menu
+HIGH = 560  # pixels: in a lower one, so are the preset's facts
 WIDE_LAB = 1500  # pixels: in Lab a narrower one leaves the brand's room to the preset's name
 COMPACT_BELOW_PX, TIGHT = 1240, 900  # pixels: in a narrower window the controls are compact, and more so
 ALL_HIGH = 640  # pixels: a lower window shows the instrument instead of the views
@@ -341,7 +339,7 @@ class MainWindow(QMainWindow):
             button.setVisible(self._wide >= WIDE and self._shows("test"))
 
     def _hold_rest(self) -> None:
-        """What of the header and of the preset's facts has no room goes to the overflow menu."""
+        """Move the header's controls and the preset's facts that have no room to the overflow menu."""
         buttons = (self._keys_button, self._test_button) if self._shows("test") and self._wide < WIDE else ()
         hides_facts = self._shows("facts") and self._high < HIGH
         facts = (self.presets.card, self.through_label, self.outside_label, self.error_label) if hides_facts else ()
@@ -378,7 +376,7 @@ class MainWindow(QMainWindow):
         self.rate_label.setVisible(self._alive and known and (fault or self._shows("test")))
 
     def show_through(self, text: str, *shorter: str) -> None:
-        """What keys sound through in the Lab, with shorter wordings; "" where a string sounds alone."""
+        """Show the instrument that keys sound through in the Lab; "" where a string sounds alone."""
         self.through_label.say(text, *shorter)
         self.through_label.setToolTip(plain_tip(text))
         self.through_label.setVisible(bool(text))

@@ -21,7 +21,7 @@ from training.fitting.losses import ObservedModel, training_loss
 
 
 def can_be_mapped(models: Sequence[StringModel[Any]], batches: Sequence[Batch]) -> bool:
-    """Whether one pass can serve these models, copies of one another, on these batches of equal shapes.
+    """Return True if one pass can serve these models, copies of one another, on these batches of equal shapes.
 
     Where each seed draws its own frames, a model must take them by number alone, as Koopman and Koopman_var do.
     """
