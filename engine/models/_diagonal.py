@@ -84,6 +84,10 @@ class LearnedEigenvalues(DiagonalModel):
         """The states that the decoder reads, complex like `latents` (..., state_size): the latents themselves."""
         return latents
 
+    def states(self, origin: Tensor, powers: Tensor) -> Tensor:
+        """The observed states (batch, frames, state_size) of z₀ (batch, state_size) after λᵏ (frames, state_size)."""
+        return self.observed(origin[:, None] * powers)
+
     @abstractmethod
     def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
         """Displacement (..., points) of observed states (..., state_size)."""
@@ -102,9 +106,21 @@ def dense(latents: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor
     The weight's columns are interleaved to match the memory of complex numbers, which costs less than to split
     every latent.
     """
-    real, imaginary = weight.chunk(2, dim=-1)
-    interleaved = torch.stack([real, imaginary], dim=-1).flatten(-2)
+    interleaved = torch.stack(weight.chunk(2, dim=-1), dim=-1).flatten(-2)
     return linear(torch.view_as_real(latents).flatten(-2), interleaved, bias)
+
+
+def complex_outputs(layer: nn.Module, inputs: Tensor) -> Tensor:
+    """A dense layer's outputs, or a perceptron's, whose first half are real parts, as complex (..., n).
+
+    The last weight's rows are interleaved to match the memory of complex numbers.
+    """
+    *before, last = layer if isinstance(layer, nn.Sequential) else [layer]
+    assert isinstance(last, nn.Linear)
+    for module in before:
+        inputs = module(inputs)
+    weight, bias = (torch.stack(both.chunk(2), dim=1).flatten(0, 1) for both in (last.weight, last.bias))
+    return torch.view_as_complex(linear(inputs, weight, bias).unflatten(-1, (-1, 2)))
 
 
 def read_weight(weight: Tensor, readout: Tensor | None) -> Tensor:

@@ -17,6 +17,7 @@ from engine.models._dense import Dense, linear
 from engine.models._diagonal import (
     KoopmanState,
     LearnedEigenvalues,
+    complex_outputs,
     dense,
     dense_layers,
     initialise_orthogonal,
@@ -29,7 +30,6 @@ from engine.models._diagonal import (
 )
 from engine.models.base import Physics, check_initialisation
 from engine.models.configurations import KoopmanConfiguration
-from engine.models.eigenvalues import pack
 
 SELU_SLOPE = 1.0507009873554805  # of its straight part, which is what is above 0
 HELD_AT = 4.0  # standard deviations of displacement above SELU's bend: most plucks stay above it ("physics")
@@ -54,7 +54,7 @@ class Koopman(LearnedEigenvalues):
         self.decoder = perceptron(2 * n, *configuration.decoder_widths, configuration.grid_points)
 
     def encode(self, displacement: Tensor) -> KoopmanState:
-        return KoopmanState(pack(self.encoder(displacement)), 0)
+        return KoopmanState(complex_outputs(self.encoder, displacement), 0)
 
     def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
         first, *others = dense_layers(self.decoder)

@@ -16,6 +16,7 @@ from engine.models._dense import Dense
 from engine.models._diagonal import (
     KoopmanState,
     LearnedEigenvalues,
+    complex_outputs,
     dense,
     dense_layers,
     initialise_orthogonal,
@@ -28,7 +29,6 @@ from engine.models._diagonal import (
 )
 from engine.models.base import Physics, check_initialisation
 from engine.models.configurations import KoopmanVarConfiguration
-from engine.models.eigenvalues import pack
 
 
 class KoopmanVar(LearnedEigenvalues):
@@ -46,11 +46,16 @@ class KoopmanVar(LearnedEigenvalues):
         self.decoder = nn.Linear(2 * n, configuration.grid_points)
 
     def encode(self, displacement: Tensor) -> KoopmanState:
-        return KoopmanState(pack(self.encoder(displacement)), 0)
+        return KoopmanState(complex_outputs(self.encoder, displacement), 0)
 
     def observed(self, latents: Tensor) -> Tensor:
         """The multiplied states m(|z|²) ⊙ z."""
-        return latents * pack(self.multiplier(latents.real.square() + latents.imag.square()))
+        return latents * complex_outputs(self.multiplier, _squared_radius(latents))
+
+    def states(self, origin: Tensor, powers: Tensor) -> Tensor:
+        """See the contract; |λᵏ|² |z₀|² costs a training step less than |λᵏz₀|²."""
+        radii = _squared_radius(origin)[:, None] * _squared_radius(powers)
+        return origin[:, None] * powers * complex_outputs(self.multiplier, radii)
 
     def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
         return dense(states, *read_layer(self.decoder, readout))
@@ -88,3 +93,7 @@ class KoopmanVar(LearnedEigenvalues):
         last = dense_layers(self.multiplier)[-1]
         last.weight.mul_(0.01)
         last.bias[:n] = 1
+
+
+def _squared_radius(latents: Tensor) -> Tensor:
+    return latents.real.square() + latents.imag.square()

@@ -5,6 +5,7 @@ Every random choice is a function of (seed, iteration) alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import torch
@@ -27,6 +28,11 @@ class Batch:
     initial: Tensor
     frames: Tensor
     target: Tensor
+
+    def split(self, count: int) -> Iterator[Batch]:
+        """At most `count` trajectories at a time."""
+        for initial, target in zip(self.initial.split(count), self.target.split(count), strict=True):
+            yield Batch(initial, self.frames, target)
 
 
 class TrainingData:

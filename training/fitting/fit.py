@@ -30,7 +30,7 @@ from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting import together
 from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
-from training.fitting.losses import training_loss
+from training.fitting.losses import backward
 from training.fitting.soap import SOAP
 from training.start import LEAST_SQUARES, begin
 
@@ -132,7 +132,7 @@ def fit_seeds(
 ) -> list[FitResult | Diverged]:
     """Train or continue runs that differ in their seeds alone, step by step together; see `fit`.
 
-    Runs at the same step take one pass (`fitting.together`). Those behind, as after a kill between two checkpoints,
+    On a GPU, runs at the same step take one pass (`fitting.together`). Those behind, as after a kill between two checkpoints,
     catch up first. A run that diverges leaves the others.
 
     Returns:
@@ -318,7 +318,8 @@ class _Run:
     def train_alone(self) -> None:
         """Take the step that was begun."""
         if not self.learns_latents:
-            self._descend(*training_loss(self.model, self.draw(), self.recipe))
+            self._optimiser.zero_grad(set_to_none=True)
+            self.descend(backward(self.model, self.draw(), self.recipe))
         elif self.step >= self._latent_steps - self.recipe.latent_polish:
             assert self._latents is not None
             self.end_step(self._latents.polish(self.model, self.recipe))

@@ -305,8 +305,15 @@ def test_a_model_that_no_preset_can_hold_is_refused_before_it_is_trained(small_d
         new_model(configuration, small_dataset.scale_m)
 
 
+@pytest.fixture
+def mapped(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Seeds take one pass here, too, as on a GPU."""
+    monkeypatch.setattr(module.together, "MAPPED_ON", ("cpu",))
+
+
 @pytest.mark.parametrize("recipe", ["ours", "published"])
 @pytest.mark.parametrize("model", SMALL)
+@pytest.mark.usefixtures("mapped")
 def test_a_seed_trained_with_others_is_the_seed_alone(
     small_dataset: Dataset, runs: Path, model: str, recipe: str
 ) -> None:
@@ -337,6 +344,7 @@ def test_a_seed_trained_with_others_is_the_seed_alone(
     torch.testing.assert_close(torch.tensor(losses["together"]), torch.tensor(losses["alone"]), rtol=1e-5, atol=0)
 
 
+@pytest.mark.usefixtures("mapped")
 def test_seeds_of_one_run_take_one_pass(small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     passes = []
     together = module.together.backward
@@ -349,6 +357,7 @@ def test_seeds_of_one_run_take_one_pass(small_dataset: Dataset, runs: Path, monk
     assert passes == [2] * 8
 
 
+@pytest.mark.usefixtures("mapped")
 def test_seeds_that_were_cut_apart_end_as_the_whole(small_dataset: Dataset, runs: Path) -> None:
     """One seed is a checkpoint ahead: the other catches up, and both end as without the cut, to rounding."""
     configurations = [small("koopman_var", seed=n) for n in range(2)]
@@ -366,16 +375,15 @@ def test_seeds_that_were_cut_apart_end_as_the_whole(small_dataset: Dataset, runs
 def test_a_seed_that_diverges_leaves_the_others(
     small_dataset: Dataset, runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    loss = module.training_loss
-    monkeypatch.setattr(module.together, "can_be_mapped", lambda *_: False)
+    backward = module.backward
     first: list[object] = []
 
-    def broken(model: Any, *rest: Any) -> tuple[torch.Tensor, torch.Tensor]:
+    def broken(model: Any, *rest: Any) -> torch.Tensor:
         first.append(model)
-        value, error = loss(model, *rest)
-        return (value, error * math.inf) if model is first[0] else (value, error)
+        error = backward(model, *rest)
+        return error * math.inf if model is first[0] else error
 
-    monkeypatch.setattr(module, "training_loss", broken)
+    monkeypatch.setattr(module, "backward", broken)
     broke, well = fit_seeds([Seed(small("koopman_var", seed=n), runs / str(n)) for n in range(2)], small_dataset)
     assert isinstance(broke, Diverged)
     assert not isinstance(well, Diverged)

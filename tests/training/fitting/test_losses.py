@@ -1,5 +1,8 @@
 """The terms of the Koopman loss, written out."""
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 import torch
 
@@ -10,6 +13,7 @@ from engine.models.koopman_var import KoopmanVar
 from engine.resonators.string import StringParameters
 from training.configuration import Recipe
 from training.data.batches import Batch
+from training.fitting import losses
 from training.fitting.losses import training_loss
 
 RECIPE = Recipe(epochs=1, consistency_weight=0.3)
@@ -81,3 +85,28 @@ def test_frames_that_were_drawn_twice_are_compared_with_themselves() -> None:
     _, prediction = training_loss(model, Batch(initial, frames, whole[:, frames - 1]), RECIPE)
     assert float(prediction) < 1e-12
     assert float(training_loss(model, Batch(initial, frames, whole), RECIPE)[1]) > 1e-9
+
+
+@pytest.mark.parametrize("terms", ["text", "published"])
+@pytest.mark.parametrize("name", ["koopman", "koopman_var", "koopman_integrated"])
+def test_parts_of_a_batch_have_its_gradients_and_error(
+    name: str, terms: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = build_model(name, {"grid_points": 101}).double()
+    physics = Physics(StringParameters().resonator(6), 4_000)
+    model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(1))
+    target = torch.randn(7, 4, 101, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
+    batch = Batch(target[:, 0], torch.tensor([1, 3, 4]), target[:, 1:])
+    recipe = replace(RECIPE, koopman_terms=terms)
+
+    def gradients(frames_at_once: int) -> tuple[list[torch.Tensor], float]:
+        monkeypatch.setattr(losses, "FRAMES_AT_ONCE", frames_at_once)
+        model.zero_grad()
+        error = losses.backward(model, batch, recipe)
+        return [p.grad.clone() for p in model.parameters() if p.grad is not None], float(error)
+
+    (whole, error), (parts, same) = gradients(1000), gradients(6)
+    assert same == pytest.approx(error, rel=1e-12)
+    assert len(parts) == len(whole) > 4
+    for own, all_at_once in zip(parts, whole, strict=True):
+        torch.testing.assert_close(own, all_at_once, rtol=1e-9, atol=1e-12)
