@@ -132,8 +132,8 @@ def fit_seeds(
 ) -> list[FitResult | Diverged]:
     """Train or continue runs that differ in their seeds alone, step by step together; see `fit`.
 
-    On a GPU, runs at the same step take one pass (`fitting.together`). Those behind, as after a kill between two checkpoints,
-    catch up first. A run that diverges leaves the others.
+    On a GPU, runs at the same step take one pass (`fitting.together`). Those behind, as after a kill between two
+    checkpoints, catch up first. A run that diverges leaves the others.
 
     Returns:
         The outcome of each. Seconds are the shares of the time that all took.
