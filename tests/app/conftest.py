@@ -25,12 +25,6 @@ from app.rendering.take import Listened, Signal
 from engine.voices import Ear, Mixer
 from tests.app.questions import none_unanswered
 
-OWN_THREADS = (
-    *("render-worker", "render-ahead", "notes-helper_0", "sound-caretaker", "sound-clock"),
-    *("eigenvalues", "partials", "error-map", "compare"),
-)
-
-
 Hear = Callable[[Take, Ear], None]
 
 
@@ -51,6 +45,20 @@ def hear(derivative: Callable[[np.ndarray, int], np.ndarray]) -> Hear:
         take.listened = listened
 
     return heard
+
+
+@pytest.fixture(autouse=True)
+def threads_begun() -> Iterator[Callable[[], list[str]]]:
+    """Names the threads that the test has begun and that are alive. None is once it is over: a test ends its own."""
+    before = set(threading.enumerate())
+
+    def begun() -> list[threading.Thread]:
+        return [each for each in threading.enumerate() if each not in before]
+
+    yield lambda: [each.name for each in begun()]
+    for each in begun():
+        each.join(AWAITED_MS / 1000)
+    assert not begun()
 
 
 COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a second
@@ -125,7 +133,11 @@ def _closed_without_a_question(window: QWidget) -> None:
 
 @pytest.fixture
 def controller(
-    qtbot: QtBot, preset_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    qtbot: QtBot,
+    preset_folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    threads_begun: Callable[[], list[str]],
 ) -> Iterator[object]:
     from app.session.choices import Choices
     from app.window.controller import Controller
@@ -142,8 +154,7 @@ def controller(
     yield made
     _closed_without_a_question(window)
     window.close()
-    left = [t.name for t in threading.enumerate() if t.name in OWN_THREADS]
-    assert left == []
+    assert threads_begun() == []
 
 
 AWAITED_MS = 60_000  # what comes at all comes within a second on a quiet machine; on a crowded one it may take longer
