@@ -22,6 +22,7 @@ from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
 from app.audio.sound import Sound
 from app.rendering import Take
 from app.rendering.take import Listened, Signal
+from app.shared.vocabulary import Face
 from engine.voices import Ear, Mixer
 from tests.app.questions import none_unanswered
 
@@ -132,11 +133,18 @@ def _closed_without_a_question(window: QWidget) -> None:
 
 
 @pytest.fixture
+def face() -> Face:
+    """With which the window of `controller` opens; modules on the Lab have their own, as its plots take time."""
+    return "play"
+
+
+@pytest.fixture
 def controller(
     qtbot: QtBot,
     preset_folder: Path,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
+    face: Face,
     threads_begun: Callable[[], list[str]],
 ) -> Iterator[object]:
     from app.session.choices import Choices
@@ -147,7 +155,7 @@ def controller(
     monkeypatch.setenv("LEARNED_STRINGS_RECORDINGS", str(tmp_path / "unsaved recordings"))
     window = MainWindow()
     qtbot.addWidget(window, before_close_func=_closed_without_a_question)
-    settings = Settings(choices=Choices(seconds=0.5, face="lab"), instrument=InstrumentChoice(shown=True))
+    settings = Settings(choices=Choices(seconds=0.5, face=face), instrument=InstrumentChoice(shown=True))
     made = Controller(window, settings, tmp_path / "settings.json", make_sound)
     with qtbot.waitExposed(window):
         window.show()

@@ -12,10 +12,16 @@ from pytestqt.qtbot import QtBot
 from app.export.choices import ExportChoices
 from app.export.sampled.choices import SampledChoices
 from app.shared.typed_number import typed_number
+from app.shared.vocabulary import Face
 from app.views.controls.knob import Knob
 from app.views.controls.number_box import CountBox, NumberBox
 from app.views.dialogs.export_dialog import ExportDialog
 from app.window.controller import Controller
+
+
+@pytest.fixture
+def face() -> Face:
+    return "lab"
 
 
 @pytest.fixture(params=["de_DE", "fr_FR", "C"])
