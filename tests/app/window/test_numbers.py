@@ -115,7 +115,7 @@ def texts_of(box: NumberBox | CountBox) -> Iterator[tuple[str, bool]]:
         yield typed, False
 
 
-def test_every_number_field_of_every_dialog(qtbot: QtBot, locale: str, controller: Controller, tmp_path: Path) -> None:
+def test_every_field_of_every_dialog(qtbot: QtBot, locale: str, controller: Controller, tmp_path: Path) -> None:
     assert set(kinds_of(QDialog)) == set(OPENED)
     soundfile.write(tmp_path / "sound.wav", np.zeros(24_000), 48_000)
     for kind, show in OPENED.items():

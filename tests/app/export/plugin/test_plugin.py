@@ -725,8 +725,7 @@ def test_a_plug_in_that_holds_others_is_kept_until_it_is_to_be_replaced(
     with pytest.raises(PluginError, match=r"another instrument, .*--replace"):
         build_plugin(images[1:3], form, this_target(), place, objects)
     assert ({each: each.read_bytes() for each in path.rglob("*") if each.is_file()} or path.read_bytes()) == before
-    build_plugin(images[:2], form, this_target(), place, objects)  # the same instruments, built again
-    build_plugin(images[:3], form, this_target(), place, objects)
+    build_plugin(images[:3], form, this_target(), place, objects)  # the same instruments, built again, and another
     build_plugin(images[1:2], form, this_target(), place, objects, replace=True)
     assert held_in(path) == {images[1].id}
     assert [each.name for each in tmp_path.iterdir()] == [path.name]
