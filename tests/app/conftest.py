@@ -22,14 +22,9 @@ from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind
 from app.audio.sound import Sound
 from app.rendering import Take
 from app.rendering.take import Listened, Signal
+from app.shared.vocabulary import Face
 from engine.voices import Ear, Mixer
 from tests.app.questions import none_unanswered
-
-OWN_THREADS = (
-    *("render-worker", "render-ahead", "notes-helper_0", "sound-caretaker", "sound-clock"),
-    *("eigenvalues", "partials", "error-map", "compare"),
-)
-
 
 Hear = Callable[[Take, Ear], None]
 
@@ -51,6 +46,20 @@ def hear(derivative: Callable[[np.ndarray, int], np.ndarray]) -> Hear:
         take.listened = listened
 
     return heard
+
+
+@pytest.fixture(autouse=True)
+def threads_begun() -> Iterator[Callable[[], list[str]]]:
+    """Names the threads that the test has begun and that are alive. None is once it is over: a test ends its own."""
+    before = set(threading.enumerate())
+
+    def begun() -> list[threading.Thread]:
+        return [each for each in threading.enumerate() if each not in before]
+
+    yield lambda: [each.name for each in begun()]
+    for each in begun():
+        each.join(AWAITED_MS / 1000)
+    assert not begun()
 
 
 COLLECT_ALL_EVERY = 50  # tests: a look at all of torch takes a quarter of a second
@@ -124,8 +133,19 @@ def _closed_without_a_question(window: QWidget) -> None:
 
 
 @pytest.fixture
+def face() -> Face:
+    """With which the window of `controller` opens; modules on the Lab have their own, as its plots take time."""
+    return "play"
+
+
+@pytest.fixture
 def controller(
-    qtbot: QtBot, preset_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    qtbot: QtBot,
+    preset_folder: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    face: Face,
+    threads_begun: Callable[[], list[str]],
 ) -> Iterator[object]:
     from app.session.choices import Choices
     from app.window.controller import Controller
@@ -135,15 +155,14 @@ def controller(
     monkeypatch.setenv("LEARNED_STRINGS_RECORDINGS", str(tmp_path / "unsaved recordings"))
     window = MainWindow()
     qtbot.addWidget(window, before_close_func=_closed_without_a_question)
-    settings = Settings(choices=Choices(seconds=0.5, face="lab"), instrument=InstrumentChoice(shown=True))
+    settings = Settings(choices=Choices(seconds=0.5, face=face), instrument=InstrumentChoice(shown=True))
     made = Controller(window, settings, tmp_path / "settings.json", make_sound)
     with qtbot.waitExposed(window):
         window.show()
     yield made
     _closed_without_a_question(window)
     window.close()
-    left = [t.name for t in threading.enumerate() if t.name in OWN_THREADS]
-    assert left == []
+    assert threads_begun() == []
 
 
 AWAITED_MS = 60_000  # what comes at all comes within a second on a quiet machine; on a crowded one it may take longer

@@ -36,7 +36,7 @@ def test_shares_of_the_gate_are_of_judged_recordings() -> None:
 
 
 def test_a_key_of_neighbouring_pitch_is_compared_with_its_recording() -> None:
-    made = [synthetic_note(5, 2.0, f0_range_hz=(hz, 1.0001 * hz)) for hz in (180.0, 214.0)]  # three semitones
+    made = [synthetic_note(5, 1.0, f0_range_hz=(hz, 1.0001 * hz)) for hz in (180.0, 214.0)]  # three semitones
     found = {f"string_{name}_fa": (each.samples, each.rate_hz) for name, each in zip("ab", made, strict=True)}
     values = neighbours(found, lambda share: None)
     assert len(values["neighbour, distance in dB"]) == 2

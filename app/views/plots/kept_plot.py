@@ -25,7 +25,7 @@ class KeptPlot(pg.PlotWidget):
         self._line_at = 0.0
         self._strip = QRect()  # where it was drawn last
         self._next_strip = QRect()  # and where it is to be
-        super().__init__(parent)
+        super().__init__(parent, enableMenu=False)
 
     @property
     def line_at(self) -> float:

@@ -16,14 +16,13 @@ class PointedPlot(pg.PlotWidget):
     """The left axis has a label and numbers that fit."""
 
     def __init__(self, name: str, tip: str) -> None:
-        super().__init__()
+        super().__init__(enableMenu=False)
         self.setAccessibleName(name)
         self.setToolTip(tip)
         self.setToolTipDuration(TIP_MS)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setMouseTracking(True)
         item = self.getPlotItem()
-        item.setMenuEnabled(False)
         item.hideButtons()
         item.getAxis("bottom").enableAutoSIPrefix(False)
         self._label = UprightLabel(item)

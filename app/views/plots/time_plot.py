@@ -41,7 +41,6 @@ class TimePlot(KeptPlot):
         item.getAxis("bottom").enableAutoSIPrefix(False)
         keep_axes(item)
         item.setContentsMargins(0, 6, 4, 0)  # room for half of the topmost number
-        item.setMenuEnabled(False)
         item.hideButtons()
         item.setMouseEnabled(True, False)
         self._shaded = shaded

@@ -110,7 +110,7 @@ class SpectrumPanel(Panel):
     def __init__(self, session: Session, library: Library) -> None:
         super().__init__(session, library)
         self.setMinimumHeight(LEAST_HEIGHT)
-        self.plot = pg.PlotWidget()
+        self.plot = pg.PlotWidget(enableMenu=False)
         self.plot.setAccessibleName("Spectrum")
         self.plot.setToolTip(
             "At the listening point and the playhead; 0 dB is a sine of the amplitude that the axis names"
@@ -126,7 +126,6 @@ class SpectrumPanel(Panel):
         self._label = UprightLabel(item, ("dB re 10 mm", "dB"))
         item.showGrid(x=True, y=True, alpha=0.18)
         keep_axes(item)
-        item.setMenuEnabled(False)
         item.hideButtons()
         item.setMouseEnabled(False, False)
         item.getAxis("bottom").setTicks([frequency_ticks()])

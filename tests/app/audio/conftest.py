@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterator
-
 import pytest
 
 from app.audio.devices import AudioDevice
@@ -22,10 +19,3 @@ def headphones() -> AudioDevice:
 def speakers() -> AudioDevice:
     """Of another rate."""
     return SPEAKERS
-
-
-@pytest.fixture(autouse=True)
-def no_thread_stays() -> Iterator[None]:
-    before = set(threading.enumerate())
-    yield
-    assert set(threading.enumerate()) <= before

@@ -49,7 +49,7 @@ def test_a_rendered_file_is_shown_and_rendered_again(run, folder: Path) -> None:
 
 def test_a_note_is_learned(run, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder / "own"))
-    made, note = synthetic_note(4), folder / f"{CAFE}.wav"
+    made, note = synthetic_note(4, seconds=0.8), folder / f"{CAFE}.wav"
     with note.open("wb") as file:
         soundfile.write(file, made.samples, made.rate_hz, subtype="PCM_24", format="WAV")
     found = run("learn", note, "--name", CAFE)

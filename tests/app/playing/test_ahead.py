@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -25,11 +24,11 @@ Wait = Callable[[Callable[[], bool]], None]
 
 
 @pytest.fixture
-def ahead() -> Iterator[Ahead]:
+def ahead(threads_begun: Callable[[], list[str]]) -> Iterator[Ahead]:
     made = Ahead()
     yield made
     made.close()
-    assert not any(thread.name == "render-ahead" for thread in threading.enumerate())
+    assert threads_begun() == []
 
 
 class Reported:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 from pytestqt.qtbot import QtBot
@@ -18,12 +18,12 @@ NAME = "a thread of tests"
 
 
 @pytest.fixture
-def background(qtbot: QtBot) -> Iterator[Background]:
+def background(qtbot: QtBot, threads_begun: Callable[[], list[str]]) -> Iterator[Background]:
     made = Background(NAME)
     yield made
     made.close()
     made.close()
-    assert NAME not in [thread.name for thread in threading.enumerate()]
+    assert threads_begun() == []
 
 
 def test_a_job_reports_and_returns(qtbot: QtBot, background: Background) -> None:

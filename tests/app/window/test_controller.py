@@ -14,6 +14,7 @@ from pytestqt.qtbot import QtBot
 from app.instrument.events import NoteOn as MidiNote
 from app.playing.notes import Note
 from app.session.choices import Choices
+from app.shared.vocabulary import Face
 from app.views.stage import MARGIN_X
 from app.window.controller import FRAME_MS, IDLE_MS, Controller
 from app.window.main_window import MainWindow
@@ -22,6 +23,11 @@ from engine.kernels import layout as at
 from engine.voices import Ear
 
 LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def face() -> Face:
+    return "lab"
 
 
 def view(controller: Controller, key: str) -> Any:

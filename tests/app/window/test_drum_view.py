@@ -19,12 +19,18 @@ from app.patches.library import read_patch
 from app.patches.patch import Room
 from app.playing.key_note import KeyNote
 from app.rendering import BlowTake, blow
+from app.shared.vocabulary import Face
 from app.window.controller import Controller
 from app.window.panels.base import Panel
 from app.window.panels.drum import DrumPanel
 from engine.presets import SHIPPED, load_preset
 
 LEFT = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def face() -> Face:
+    return "lab"
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ LEARNED_MS = 90_000
 @pytest.fixture(scope="session")
 def note(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("note") / "Low string.wav"
-    made = synthetic_note(2, seconds=1.5)
+    made = synthetic_note(2, seconds=1.0)
     soundfile.write(path, made.samples, made.rate_hz, "FLOAT")
     return path
 
@@ -98,7 +98,7 @@ def test_what_is_no_note_is_a_body_or_learned_all_the_same(qtbot: QtBot, played:
 
 def test_where_no_string_is_found_keeping_is_no_default(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
     samples, rate_hz = membrane(np.random.default_rng(15))
-    soundfile.write(tmp_path / "drum.wav", samples, rate_hz, "FLOAT")
+    soundfile.write(tmp_path / "drum.wav", samples[:rate_hz], rate_hz, "FLOAT")
     dialog = dialog_of(qtbot, played, tmp_path / "drum.wav")
     dialog.string.setChecked(True)
     dialog.start.click()
@@ -112,7 +112,7 @@ def test_where_no_string_is_found_keeping_is_no_default(qtbot: QtBot, played: Co
 
 
 def test_what_is_only_unusual_is_a_warning(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
-    made = synthetic_note(2, seconds=1.5)
+    made = synthetic_note(2, seconds=1.0)
     limit = np.sort(np.abs(made.samples))[-8]
     soundfile.write(tmp_path / "hot.wav", np.clip(made.samples, -limit, limit), made.rate_hz, "FLOAT")
     dialog = dialog_of(qtbot, played, tmp_path / "hot.wav")

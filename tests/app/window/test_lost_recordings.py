@@ -13,9 +13,11 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from pytestqt.qtbot import QtBot
 
 from app.export.journal import left_journals
 from app.instrument.events import Bend, Controller, NoteOff, NoteOn, PatchTurned
+from app.window.signals import SIGNALS, asked_to_end
 
 ROOT = Path(__file__).parents[3]
 WRITTEN_S = 2.0  # an event is on disk by then
@@ -46,7 +48,7 @@ def watch(controller):
             timer.stop()
             print(json.dumps([each.time_s for each in recorder._recorded]), flush=True)
 
-    timer = QTimer(controller.window, interval=150)
+    timer = QTimer(controller.window, interval=30)
     timer.timeout.connect(step)
     timer.start()
 
@@ -77,9 +79,9 @@ def watch(controller):
             controller.window.may_close = lambda: True
             controller.window.close()
 
-    timer = QTimer(controller.window, interval=100)
+    timer = QTimer(controller.window, interval=30)
     timer.timeout.connect(look)
-    QTimer.singleShot(300, timer.start)
+    timer.start()
 
 raise SystemExit(main.run(alive=watch))
 """
@@ -117,15 +119,15 @@ def recorded(folder: Path, end: signal.Signals) -> list[float]:
     with app(RECORDING, folder) as child:
         times_s = line(child)
         assert times_s is not None
-        time.sleep(WRITTEN_S)
-        if end == signal.SIGKILL:  # another window does not take what is still being recorded
-            assert left_journals(folder / "left") == []
+        if end == signal.SIGKILL:
+            time.sleep(WRITTEN_S)
+            assert left_journals(folder / "left") == []  # another window does not take what is still being recorded
         child.send_signal(end)
         assert child.wait(60) == (-end if end == signal.SIGKILL else 0)
     return times_s
 
 
-@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+@pytest.mark.parametrize("end", [signal.SIGKILL, signal.SIGTERM])
 def test_what_is_recorded_while_the_process_ends_is_offered_at_the_next_start(
     tmp_path: Path, end: signal.Signals
 ) -> None:
@@ -151,3 +153,12 @@ def test_what_is_recorded_while_the_process_ends_is_offered_at_the_next_start(
             assert line(child) == kept, key
             assert child.wait(60) == 0
     assert len(left_journals(tmp_path / "left")) == 1  # it is not saved yet
+
+
+@pytest.mark.parametrize("number", SIGNALS)
+def test_each_signal_that_asks_to_end_is_taken_by_the_event_loop(qtbot: QtBot, number: signal.Signals) -> None:
+    before, asked = signal.getsignal(number), []
+    with asked_to_end(lambda: asked.append(signal.getsignal(number))):
+        os.kill(os.getpid(), number)
+        qtbot.waitUntil(lambda: len(asked) > 0)
+    assert asked == [before], "a second one has its usual effect"

@@ -29,6 +29,11 @@ from app.window.main_window import MainWindow
 ROOT = Path(__file__).parents[3]
 
 
+@pytest.fixture
+def face() -> Face:
+    return "lab"
+
+
 def stops(window: MainWindow) -> list[QWidget]:
     """What the Tab key can reach, as far as it can be seen."""
     return [

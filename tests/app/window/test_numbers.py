@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
+import numpy as np
 import pytest
-from PySide6.QtCore import QLocale, Qt
-from PySide6.QtWidgets import QAbstractSpinBox
+import soundfile
+from PySide6.QtCore import QEvent, QLocale, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QDialog, QWidget
 from pytestqt.qtbot import QtBot
 
-from app.export.choices import ExportChoices
-from app.export.sampled.choices import SampledChoices
-from app.shared.typed_number import typed_number
+from app.shared.typed_number import SIGNS, typed_number
+from app.shared.vocabulary import Face
 from app.views.controls.knob import Knob
+from app.views.controls.notice_list import NoticeList
 from app.views.controls.number_box import CountBox, NumberBox
+from app.views.dialogs.abx_dialog import AbxDialog
+from app.views.dialogs.audio_dialog import AudioDialog
 from app.views.dialogs.export_dialog import ExportDialog
+from app.views.dialogs.help_dialog import HelpDialog
+from app.views.dialogs.learn_dialog import LearnDialog
+from app.views.dialogs.midi_dialog import MidiDialog
 from app.window.controller import Controller
+
+
+@pytest.fixture
+def face() -> Face:
+    return "lab"
 
 
 @pytest.fixture(params=["de_DE", "fr_FR", "C"])
@@ -33,9 +47,21 @@ def patched(qtbot: QtBot, controller: Controller) -> Controller:
     return controller
 
 
+def type_in(widget: QWidget, text: str) -> None:
+    """By keys, of any keyboard."""
+    for character in text:
+        for kind in (QEvent.Type.KeyPress, QEvent.Type.KeyRelease):
+            QApplication.sendEvent(widget, QKeyEvent(kind, 0, Qt.KeyboardModifier.NoModifier, character))
+
+
 def typed_on(qtbot: QtBot, knob: Knob, text: str) -> None:
-    knob._type(text)
-    assert knob._editor is not None
+    if text[0] in SIGNS:
+        type_in(knob, text[0])
+        assert knob._editor is not None
+        type_in(knob._editor, text[1:])
+    else:
+        knob._type(text)
+    assert knob._editor is not None, text
     qtbot.keyClick(knob._editor, Qt.Key.Key_Return)
 
 
@@ -48,25 +74,67 @@ def test_every_knob(qtbot: QtBot, locale: str, patched: Controller) -> None:
         knob.value_asked.connect(asked.append)
         knob.figure_asked.connect(figures.append)
         shown = knob._figure or knob.text
-        for text in (shown, shown.replace(".", ","), shown.replace("-", "\u2212"), shown + " and"):
+        for text in (shown, shown.replace(".", ","), shown.replace("-", "\u2212")):
             typed_on(qtbot, knob, text)
+        knob._type(shown + " and")  # by keys its letters would play
+        qtbot.keyClick(knob._editor, Qt.Key.Key_Return)
         if knob._figure:
             assert figures == [typed_number(shown, knob.parameter.figure_unit or "")] * 3 and asked == []
         else:
             assert [knob.parameter.shown(value) for value in asked] == [shown] * 3 and figures == []
 
 
-def test_every_field_of_the_export_dialog(qtbot: QtBot, locale: str) -> None:
-    dialog = ExportDialog(ExportChoices(), SampledChoices())
-    qtbot.addWidget(dialog)
-    boxes = dialog.findChildren(QAbstractSpinBox)
-    assert len(boxes) > 6
-    for box in boxes:
-        assert isinstance(box, NumberBox | CountBox)
-        for value in (box.minimum(), box.maximum(), (box.minimum() + box.maximum()) // 2):
-            box.setValue(value)
-            value, shown = box.value(), box.text()
-            for text in (shown, shown.replace(".", ","), shown.replace(" ", "\u00a0"), shown + "?", ""):
-                box.lineEdit().setText(text)
-                box.interpretText()
-                assert (box.value(), box.text()) == (value, shown), (box.accessibleName(), text)
+OPENED: dict[type[QDialog], Callable[[Controller, Path], object]] = {
+    ExportDialog: lambda controller, sound: controller.exports.open("note"),
+    LearnDialog: lambda controller, sound: controller.take_file(sound),
+    AbxDialog: lambda controller, sound: controller.listening_test(),
+    AudioDialog: lambda controller, sound: controller.audio.show_dialog(),
+    MidiDialog: lambda controller, sound: controller.instruments.midi.show_dialog(controller.window),
+    HelpDialog: lambda controller, sound: controller.show_help(),
+    NoticeList: lambda controller, sound: controller.window.notices.show_all(),
+}
+FIELDS = {ExportDialog: 9, LearnDialog: 2, AbxDialog: 1}  # of numbers
+
+
+def kinds_of(kind: type[QDialog]) -> Iterator[type[QDialog]]:
+    """The app's dialogs that are derived from this one, without those from which others are."""
+    for each in kind.__subclasses__():
+        if not each.__subclasses__() and each.__module__.startswith("app."):
+            yield each
+        yield from kinds_of(each)
+
+
+def texts_of(box: NumberBox | CountBox) -> Iterator[tuple[str, bool]]:
+    """What people type for the field's value, and whether they type over its prefix and unit too."""
+    shown, number = box.text(), box.textFromValue(box.value())
+    with_units = {number + box.suffix().replace(" ", space) for space in (" ", "", "\u00a0")}
+    for text in {shown, number, *with_units}:
+        for typed in {text, text.replace(".", ",")}:
+            yield typed, True
+    for typed in {number, number.replace(".", ",")}:
+        yield typed, False
+
+
+def test_every_field_of_every_dialog(qtbot: QtBot, locale: str, controller: Controller, tmp_path: Path) -> None:
+    assert set(kinds_of(QDialog)) == set(OPENED)
+    soundfile.write(tmp_path / "sound.wav", np.zeros(24_000), 48_000)
+    for kind, show in OPENED.items():
+        show(controller, tmp_path / "sound.wav")
+        dialog = controller.window.findChild(kind)
+        assert dialog is not None, kind
+        boxes = dialog.findChildren(QAbstractSpinBox)
+        assert len(boxes) == FIELDS.get(kind, 0), kind
+        for box in boxes:
+            assert isinstance(box, NumberBox | CountBox)
+            box.setEnabled(True)
+            for value in (box.minimum(), box.maximum(), (box.minimum() + box.maximum()) // 2):
+                box.setValue(value)
+                value, shown = box.value(), box.text()
+                other = box.maximum() if value == box.minimum() else box.minimum()
+                for text, whole in (*texts_of(box), (f"{shown}?", True)):
+                    box.setValue(value if text.endswith("?") else other)
+                    (box.lineEdit() if whole else box).selectAll()
+                    type_in(box, text)
+                    box.interpretText()
+                    assert (box.value(), box.text()) == (value, shown), (box.accessibleName(), text)
+        dialog.done(0)

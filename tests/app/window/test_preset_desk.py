@@ -13,6 +13,7 @@ from pytestqt.qtbot import QtBot
 
 from app.export.files import export_sound
 from app.export.sound import SoundRequest
+from app.shared.vocabulary import Face
 from app.views.controls.browser import Browser
 from app.window.controller import Controller
 from app.window.settings import FIRST_FAVOURITES, load_settings
@@ -22,6 +23,11 @@ from training.heard_file import Heard, add_heard
 
 KEY = Qt.Key
 CONTROL = Qt.KeyboardModifier.ControlModifier
+
+
+@pytest.fixture
+def face() -> Face:
+    return "lab"
 
 
 @pytest.fixture

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -141,7 +142,7 @@ def test_what_was_chosen_is_remembered(qtbot: QtBot, patched: Controller, tmp_pa
 
 
 def test_closing_the_window_ends_it_where_the_user_says_so(
-    qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch
+    qtbot: QtBot, patched: Controller, monkeypatch: pytest.MonkeyPatch, threads_begun: Callable[[], list[str]]
 ) -> None:
     begun, ended = threading.Event(), threading.Event()
 
@@ -165,5 +166,4 @@ def test_closing_the_window_ends_it_where_the_user_says_so(
     with answered("Cancel export"):
         patched.window.close()
     assert ended.is_set()
-    QApplication.processEvents()
-    assert not [thread for thread in threading.enumerate() if thread.name == "export"]
+    assert threads_begun() == []

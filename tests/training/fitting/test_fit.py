@@ -311,8 +311,10 @@ def mapped(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module.together, "MAPPED_ON", ("cpu",))
 
 
-@pytest.mark.parametrize("recipe", ["ours", "published"])
-@pytest.mark.parametrize("model", SMALL)
+BY_RECIPE = [*((name, "ours") for name in SMALL), *((name, "published") for name in ("koopman", "s5", "frnn"))]
+
+
+@pytest.mark.parametrize(("model", "recipe"), BY_RECIPE)
 @pytest.mark.usefixtures("mapped")
 def test_a_seed_trained_with_others_is_the_seed_alone(
     small_dataset: Dataset, runs: Path, model: str, recipe: str

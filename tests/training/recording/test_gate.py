@@ -30,7 +30,7 @@ def looped(x: np.ndarray) -> np.ndarray:
 
 
 def reverberated(x: np.ndarray) -> np.ndarray:
-    t = np.arange(2 * RATE_HZ) / RATE_HZ
+    t = np.arange(RATE_HZ) / RATE_HZ
     room = np.random.default_rng(0).standard_normal(len(t)) * np.exp(-3 * t)
     room[0] = 1
     return 0.02 * fftconvolve(x, room)[: len(x)]
@@ -137,12 +137,12 @@ def test_a_hum_is_no_second_note(synthetic: SyntheticNote) -> None:
 
 
 def burst() -> np.ndarray:
-    t = np.arange(2 * RATE_HZ) / RATE_HZ
+    t = np.arange(RATE_HZ) / RATE_HZ
     return np.concatenate([np.zeros(4_000), 0.3 * np.random.default_rng(0).standard_normal(len(t)) * np.exp(-6 * t)])
 
 
 def drum() -> np.ndarray:
-    t = np.arange(2 * RATE_HZ) / RATE_HZ
+    t = np.arange(RATE_HZ) / RATE_HZ
     modes = sum(np.sin(2 * np.pi * 110 * m * t) * np.exp(-(6 + m) * t) for m in (1, 1.59, 2.14, 2.30, 2.65, 2.92))
     sound = np.concatenate([np.zeros(4_000), 0.1 * modes])
     return sound + 1e-4 * np.random.default_rng(0).standard_normal(len(sound))

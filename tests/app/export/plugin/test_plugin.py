@@ -91,7 +91,7 @@ def test_it_sounds_as_the_app_renders(bank: Library, name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "rate_hz"),
     [
-        *(("concert_harp", rate_hz) for rate_hz in (44_100, 88_200, 96_000, 192_000)),
+        *(("concert_harp", rate_hz) for rate_hz in (44_100, 96_000, 192_000)),
         *((name, rate_hz) for rate_hz in (44_100, 96_000) for name in (NAMES[1:] if LONG else ())),
     ],
 )
@@ -291,7 +291,7 @@ def with_values(bank: Library, name: str, values: dict[int, float]) -> Instance:
     return instance
 
 
-@pytest.mark.parametrize("seed", range(12 if LONG else 2))
+@pytest.mark.parametrize("seed", range(12 if LONG else 1))
 @pytest.mark.parametrize("name", TURNED)
 def test_with_all_macros_anywhere_it_sounds_as_the_app_renders(bank: Library, name: str, seed: int) -> None:
     patch, instance = patch_of(name), instance_of(bank, name)
@@ -321,7 +321,7 @@ def drawn(patch: Patch, image: Image, draw: np.random.Generator, count: int) -> 
                 return found
 
 
-@pytest.mark.parametrize("count", (1, 1, 1, 1, 4, 9) * (5 if LONG else 1))
+@pytest.mark.parametrize("count", (1, 1, 1, 1, 4, 9) * 5 if LONG else (1, 4, 9))
 @pytest.mark.parametrize("name", [name for name in TURNED if name not in DRUM_NAMES])
 def test_with_any_parameters_anywhere_it_sounds_as_the_app_renders(
     bank: Library, images: list[Image], name: str, count: int, request: pytest.FixtureRequest
@@ -725,8 +725,7 @@ def test_a_plug_in_that_holds_others_is_kept_until_it_is_to_be_replaced(
     with pytest.raises(PluginError, match=r"another instrument, .*--replace"):
         build_plugin(images[1:3], form, this_target(), place, objects)
     assert ({each: each.read_bytes() for each in path.rglob("*") if each.is_file()} or path.read_bytes()) == before
-    build_plugin(images[:2], form, this_target(), place, objects)  # the same instruments, built again
-    build_plugin(images[:3], form, this_target(), place, objects)
+    build_plugin(images[:3], form, this_target(), place, objects)  # the same instruments, built again, and another
     build_plugin(images[1:2], form, this_target(), place, objects, replace=True)
     assert held_in(path) == {images[1].id}
     assert [each.name for each in tmp_path.iterdir()] == [path.name]

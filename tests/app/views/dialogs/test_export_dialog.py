@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -32,9 +33,11 @@ from app.window.exports import heard_note
 from engine.presets import SHIPPED
 from tests.app.questions import answered
 
+Make = Callable[..., ExportDialog]
+
 
 @pytest.fixture
-def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> object:
+def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> Iterator[Make]:
     """Makes a dialog for two presets, `small` and `other`."""
     folder = tmp_path / "presets"
     folder.mkdir()
@@ -48,15 +51,20 @@ def made(qtbot: QtBot, small_preset: Path, tmp_path: Path) -> object:
         struck = Struck(choices.instrument, NoteOn(59, 100)) if isinstance(choices.instrument, Patch) else None
         return heard_note(choices, library, struck)
 
+    dialogs = []
+
     def make(more: dict[str, object] | None = None, heard: dict[str, object] | None = None) -> ExportDialog:
         settings = {"folder": str(tmp_path), "rate_hz": 0, "seconds": 0.5, "until_decayed": False, **(more or {})}
         dialog = ExportDialog(ExportChoices.model_validate(settings), SampledChoices())
+        dialogs.append(dialog)
         qtbot.addWidget(dialog)
         dialog.show_subjects({"note": note(heard or {})})
         dialog.open_at("note")
         return dialog
 
-    return make
+    yield make
+    for dialog in dialogs:
+        dialog.accept()
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import threading
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -54,7 +53,7 @@ def take(small_preset: Path, hear: Hear) -> Take:
 
 
 @pytest.fixture
-def make(qtbot: QtBot, take: Take) -> Iterator[Make]:
+def make(qtbot: QtBot, take: Take, threads_begun: Callable[[], list[str]]) -> Iterator[Make]:
     """A panel that can be seen, with the take."""
     panels: list[Panel] = []
 
@@ -72,8 +71,7 @@ def make(qtbot: QtBot, take: Take) -> Iterator[Make]:
     yield made
     for panel in panels:
         panel.end()
-    names = {panel.key for panel in panels}
-    assert not names & {thread.name for thread in threading.enumerate()}
+    assert threads_begun() == []
 
 
 def watch(qtbot: QtBot, panel: Panel, take: Take, until: Callable[[], bool]) -> None:
