@@ -81,7 +81,7 @@ def launches(name: str, frames: int) -> int:
 
 
 class _Launches(TorchDispatchMode):
-    """Counts operations within, but for views, allocations and numbers that are read."""
+    """Counts operations within, except views, allocations and numbers that are read."""
 
     def __init__(self) -> None:
         super().__init__()
