@@ -67,7 +67,8 @@ def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tenso
     Returns:
         All states, like `inputs`, and the last one, complex128.
     """
-    found: tuple[Tensor, Tensor] = _Recurrence.apply(inputs, log_eigenvalues, state)
+    power = first_powers(log_eigenvalues.detach(), min(CHUNK, len(inputs)))
+    found: tuple[Tensor, Tensor] = _Recurrence.apply(inputs, log_eigenvalues, state, power)
     return found
 
 
@@ -85,44 +86,46 @@ class _Recurrence(torch.autograd.Function):
             of_seeds = tensor.expand(seeds, *tensor.shape) if seed_dim is None else tensor.movedim(seed_dim, 0)
             return of_seeds.movedim(0, -2).flatten(-2)
 
-        states, last = recur(*map(joined, given, in_dims))
+        states, last = _Recurrence.apply(*map(joined, given, in_dims))
         return (states.unflatten(-1, (seeds, -1)), last.unflatten(-1, (seeds, -1))), (2, 1)
 
     @staticmethod
-    def forward(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        return _scan(inputs, log_eigenvalues, state)
+    def forward(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor, power: Tensor) -> tuple[Tensor, Tensor]:
+        return _scan(inputs, power, state)
 
     @staticmethod
     def setup_context(ctx: Any, inputs: tuple[Tensor, ...], output: tuple[Tensor, Tensor]) -> None:
-        _, log_eigenvalues, state = inputs
-        ctx.save_for_backward(log_eigenvalues, state, output[0])
+        _, _, state, power = inputs
+        ctx.save_for_backward(state, power, output[0])
 
     @staticmethod
-    def backward(ctx: Any, *of_outputs: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        log_eigenvalues, state, states = ctx.saved_tensors
+    def backward(ctx: Any, *of_outputs: Tensor) -> tuple[Tensor, Tensor, Tensor, None]:
+        state, power, states = ctx.saved_tensors
         of_states, of_last = of_outputs
-        eigenvalues = log_eigenvalues.exp().conj()
+        power = power.conj().resolve_conj()
         of_states = torch.cat([of_states[:-1], of_states[-1:] + of_last.to(of_states.dtype)])
-        of_inputs, first = _scan(of_states, log_eigenvalues.conj(), torch.zeros_like(state), backwards=True)
+        of_inputs, first = _scan(of_states, power, torch.zeros_like(state), backwards=True)
         products = (states[:-1].conj() * of_inputs[1:]).sum((0, 1)) + (state.conj() * first).sum(0)
-        return of_inputs, eigenvalues * products, eigenvalues * first
+        return of_inputs, power[0] * products, power[0] * first, None
 
 
-def _scan(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor, backwards: bool = False) -> tuple[Tensor, Tensor]:
+def _scan(inputs: Tensor, power: Tensor, state: Tensor, backwards: bool = False) -> tuple[Tensor, Tensor]:
     """`recur` in two levels, or the same from the last step to the first: inside all chunks at once, then between.
 
     The carry is complex128 and its powers of λ are exact, so the rounding of `inputs` is bounded by what one chunk
     collects, however long the layer remembers and wherever a caller splits the time.
+
+    Args:
+        power: λ, λ² … as many as a chunk has steps, complex128 (length, n).
     """
     steps, *row = inputs.shape
-    length = min(CHUNK, steps)
+    length = len(power)
     missing = -steps % length
     padding = inputs.new_zeros(missing, *row)
     padded = torch.cat([padding, inputs] if backwards else [inputs, padding])
     states = padded.unflatten(0, (-1, length))  # a copy, which is overwritten
     order = -1 if backwards else 1
     rows = states.unbind(1)[::order]  # (chunks, batch, n) each
-    power = first_powers(log_eigenvalues, length)
     eigenvalue = power[0].to(inputs.dtype)
     for before, each in pairwise(rows):
         each.addcmul_(eigenvalue, before)
