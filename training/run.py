@@ -94,25 +94,6 @@ def _saved(configuration: TrainingConfiguration, dataset: Dataset, result: FitRe
     return figures | _figures(configuration, result, sums["validation"])
 
 
-def run_row(
-    name: str,
-    recipe: str,
-    configuration: TrainingConfiguration,
-    runs: Path,
-    *,
-    cache: Path | None = None,
-    device: torch.device | str = "cpu",
-    report: Callable[[Progress], None] = lambda progress: None,
-    waits: Callable[[], None] = lambda: None,
-    preset: Path | None = None,
-    checkpoint_every_s: float | None = None,
-) -> Row:
-    """The row of one run; see `run_rows`."""
-    run = NamedRun(name, recipe, configuration, preset, report)
-    (row,) = run_rows([run], runs, cache=cache, device=device, waits=waits, checkpoint_every_s=checkpoint_every_s)
-    return row
-
-
 def run_rows(
     named: Sequence[NamedRun],
     runs: Path,

@@ -84,9 +84,9 @@ class LearnedEigenvalues(DiagonalModel):
         """The states that the decoder reads, complex like `latents` (..., state_size): the latents themselves."""
         return latents
 
-    def states(self, origin: Tensor, powers: Tensor) -> Tensor:
-        """The observed states (batch, frames, state_size) of z₀ (batch, state_size) after λᵏ (frames, state_size)."""
-        return self.observed(origin[:, None] * powers)
+    def states(self, latents: Tensor, origin: Tensor, powers: Tensor) -> Tensor:
+        """The observed states of `latents`, which are z₀ (batch, state_size) times λᵏ (frames, state_size)."""
+        return self.observed(latents)
 
     @abstractmethod
     def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:

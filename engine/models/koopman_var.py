@@ -52,10 +52,10 @@ class KoopmanVar(LearnedEigenvalues):
         """The multiplied states m(|z|²) ⊙ z."""
         return latents * complex_outputs(self.multiplier, _squared_radius(latents))
 
-    def states(self, origin: Tensor, powers: Tensor) -> Tensor:
+    def states(self, latents: Tensor, origin: Tensor, powers: Tensor) -> Tensor:
         """See the contract; |λᵏ|² |z₀|² costs a training step less than |λᵏz₀|²."""
         radii = _squared_radius(origin)[:, None] * _squared_radius(powers)
-        return origin[:, None] * powers * complex_outputs(self.multiplier, radii)
+        return latents * complex_outputs(self.multiplier, radii)
 
     def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
         return dense(states, *read_layer(self.decoder, readout))

@@ -14,7 +14,8 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, cast
+from itertools import pairwise
+from typing import Any, ClassVar, cast
 
 import torch
 from torch import Tensor, nn
@@ -55,11 +56,9 @@ def evolve(log_eigenvalues: Tensor, state: Tensor, steps: int, dtype: torch.dtyp
 
 
 def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-    """x_k = λ x_{k-1} + v_k in two levels: inside all chunks at once, then from chunk to chunk.
+    """x_k = λ x_{k-1} + v_k, with a gradient that is one more recurrence, backwards in time.
 
-    The carry is complex128 and its powers of λ are exact, so the rounding of `inputs` is bounded by what one chunk
-    collects, however long the layer remembers and wherever a caller splits the time. Rendering on a CPU takes
-    `FoldedBlock` instead.
+    Rendering on a CPU takes `FoldedBlock` instead.
 
     Args:
         inputs: v, complex (steps, batch, n).
@@ -68,22 +67,77 @@ def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tenso
     Returns:
         All states, like `inputs`, and the last one, complex128.
     """
+    power = first_powers(log_eigenvalues.detach(), min(CHUNK, len(inputs)))
+    found: tuple[Tensor, Tensor] = _Recurrence.apply(inputs, log_eigenvalues, state, power)
+    return found
+
+
+class _Recurrence(torch.autograd.Function):
+    """`recur`; the gradients u of the inputs are u_k = λ* u_{k+1} + g_k of those of the states, g."""
+
+    @staticmethod
+    def vmap(
+        info: Any, in_dims: tuple[int | None, ...], *given: Tensor
+    ) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
+        """Seeds that are trained together are more states."""
+        seeds = info.batch_size
+
+        def joined(tensor: Tensor, seed_dim: int | None) -> Tensor:
+            of_seeds = tensor.expand(seeds, *tensor.shape) if seed_dim is None else tensor.movedim(seed_dim, 0)
+            return of_seeds.movedim(0, -2).flatten(-2)
+
+        states, last = _Recurrence.apply(*map(joined, given, in_dims))
+        return (states.unflatten(-1, (seeds, -1)), last.unflatten(-1, (seeds, -1))), (2, 1)
+
+    @staticmethod
+    def forward(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor, power: Tensor) -> tuple[Tensor, Tensor]:
+        return _scan(inputs, power, state)
+
+    @staticmethod
+    def setup_context(ctx: Any, inputs: tuple[Tensor, ...], output: tuple[Tensor, Tensor]) -> None:
+        _, _, state, power = inputs
+        ctx.save_for_backward(state, power, output[0])
+
+    @staticmethod
+    def backward(ctx: Any, *of_outputs: Tensor) -> tuple[Tensor, Tensor, Tensor, None]:
+        state, power, states = ctx.saved_tensors
+        of_states, of_last = of_outputs
+        power = power.conj().resolve_conj()
+        of_states = torch.cat([of_states[:-1], of_states[-1:] + of_last.to(of_states.dtype)])
+        of_inputs, first = _scan(of_states, power, torch.zeros_like(state), backwards=True)
+        products = (states[:-1].conj() * of_inputs[1:]).sum((0, 1)) + (state.conj() * first).sum(0)
+        return of_inputs, power[0] * products, power[0] * first, None
+
+
+def _scan(inputs: Tensor, power: Tensor, state: Tensor, backwards: bool = False) -> tuple[Tensor, Tensor]:
+    """`recur` in two levels, or the same from the last step to the first: inside all chunks at once, then between.
+
+    The carry is complex128 and its powers of λ are exact, so the rounding of `inputs` is bounded by what one chunk
+    collects, however long the layer remembers and wherever a caller splits the time.
+
+    Args:
+        power: λ, λ² … as many as a chunk has steps, complex128 (length, n).
+    """
     steps, *row = inputs.shape
-    length = min(CHUNK, steps)
+    length = len(power)
     missing = -steps % length
-    given = torch.cat([inputs, inputs.new_zeros(missing, *row)]).unflatten(0, (-1, length)).unbind(1)
-    power = first_powers(log_eigenvalues, length)
-    rows, eigenvalue = [given[0]], power[0].to(inputs.dtype)  # each (chunks, batch, n)
-    for each in given[1:]:
-        rows.append(torch.addcmul(each, eigenvalue, rows[-1]))
+    padding = inputs.new_zeros(missing, *row)
+    padded = torch.cat([padding, inputs] if backwards else [inputs, padding])
+    states = padded.unflatten(0, (-1, length))  # a copy, which is overwritten
+    order = -1 if backwards else 1
+    rows = states.unbind(1)[::order]  # (chunks, batch, n) each
+    eigenvalue = power[0].to(inputs.dtype)
+    for before, each in pairwise(rows):
+        each.addcmul_(eigenvalue, before)
     carries = [state]
-    for end in rows[-1].to(state.dtype)[:-1]:
+    for end in rows[-1].to(state.dtype).unbind(0)[::order][:-1]:
         carries.append(torch.addcmul(end, power[-1], carries[-1]))
     final = length - 1 - missing
-    last = torch.addcmul(rows[final][-1].to(state.dtype), power[final], carries[-1])
-    carried = torch.stack(carries).to(inputs.dtype)[:, None]
-    states = torch.addcmul(torch.stack(rows, dim=1), power.to(inputs.dtype)[:, None], carried)
-    return states.flatten(0, 1)[:steps], last
+    last = torch.addcmul(rows[final].unbind(0)[::order][-1].to(state.dtype), power[final], carries[-1])
+    carried = torch.stack(carries[::order]).to(inputs.dtype)
+    of_rows = power.flip(0) if backwards else power
+    states.addcmul_(of_rows.to(inputs.dtype)[:, None], carried[:, None])
+    return (states.flatten(0, 1)[missing:] if backwards else states.flatten(0, 1)[:steps]), last
 
 
 def draw_lecun(shape: tuple[int, ...], fan_in: int, generator: torch.Generator) -> Tensor:

@@ -99,9 +99,29 @@ def take(json: Json = False) -> None:
 
 
 @bench.command()
-def train(json: Json = False) -> None:
-    """Time of a training step of every model."""
-    _measure("train", json)
+def train(
+    json: Json = False,
+    against: Annotated[
+        Path | None, typer.Option(metavar="PYTHON", help="A Python with jax, flax, optax and einops.")
+    ] = None,
+    source: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="A clone of rodrigodzf/physmodjax, the authors' code.")
+    ] = None,
+) -> None:
+    """Time and kernel launches of a training step of every model; or its time compared with the authors' code.
+
+    With --against and --source steps of both are taken in turns, on as many threads.
+    """
+    if against is None and source is None:
+        _measure("train", json)
+        return
+    if against is None or source is None:
+        raise typer.BadParameter("--against and --source go together")
+    from tests.bench.authors import measure
+
+    with progress("bench train") as report:
+        found = measure(against.absolute(), source.absolute(), report)
+    show(found, json)
 
 
 @bench.command()

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from dataclasses import dataclass, field
 
 import pytest
@@ -55,6 +56,57 @@ def test_bench_train_measures_a_step(run, monkeypatch: pytest.MonkeyPatch) -> No
     assert {(case["batch"], case["frames"]) for name, case in cases.items() if name != "fgru"} == {(2, 5)}
     assert cases["fgru"]["frames"] == 3
     assert all(case["step_s"] > 0 for case in cases.values())
+    # a rollout of 5 steps, not of a whole horizon
+    assert 50 < cases["koopman"]["launches"] < cases["lru"]["launches"]
+
+
+STAND_IN = """
+import sys
+parameters = {"koopman_var": 134885, "koopman": 191077, "s5": 307879, "lru": 636221}
+for number, _ in enumerate(sys.stdin):
+    print(parameters[sys.argv[2]] if number == 0 else "0.5 1.0", flush=True)
+"""
+
+
+@pytest.fixture
+def stand_in(tmp_path, monkeypatch: pytest.MonkeyPatch):
+    """Another code in the place of the authors'."""
+    monkeypatch.setattr("tests.bench.train.BATCH", 2)
+    monkeypatch.setattr("tests.bench.train.FRAMES", 5)
+    monkeypatch.setattr("tests.bench.authors.TURNS", 2)
+
+    def write(text: str) -> None:
+        driver = tmp_path / "driver.py"
+        driver.write_text(text, encoding="utf-8")
+        monkeypatch.setattr("tests.bench.authors.DRIVER", driver)
+
+    return write
+
+
+def test_bench_train_compares_a_step_with_the_authors(run, stand_in) -> None:
+    stand_in(STAND_IN)
+    cases = json.loads(run("train", "--json", "--against", sys.executable, "--source", "clone").out)["models"]
+    assert [case["model"] for case in cases] == ["koopman_var", "koopman", "s5", "lru"]
+    for case in cases:
+        assert case["authors_s"] == 0.5
+        assert case["ratio"] == pytest.approx(case["step_s"] / 0.5)
+        assert case["processor_ratio"] > 0
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("raise SystemExit('no module named jax')", "no module named jax"),
+        (STAND_IN.replace("134885", "134886"), "134886 in"),
+    ],
+)
+def test_bench_train_says_why_the_authors_code_cannot_be_compared(run, stand_in, text: str, said: str) -> None:
+    stand_in(text)
+    done = run("train", "--against", sys.executable, "--source", "clone")
+    assert done.status == 1
+    assert said in done.err
+    assert run("train", "--against", "/nowhere/python", "--source", "clone").status == 1
+    assert run("train", "--source", "clone").status == 2
 
 
 def test_bench_notes_says_what_is_missing(run, monkeypatch: pytest.MonkeyPatch) -> None:

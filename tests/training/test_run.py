@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,7 +16,8 @@ from training.data.dataset import load_dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import Progress
 from training.fitting.log import Epoch, TrainingLog
-from training.run import run_row, trained_range
+from training.results import Row
+from training.run import NamedRun, run_rows, trained_range
 
 
 def progress(epoch: int, loss: float = 1.0) -> Progress:
@@ -70,6 +72,20 @@ CELL = Cell("koopman_var", True, "gaussian", 4000, 420)
 def configuration(**changes: object) -> TrainingConfiguration:
     made = configuration_of(CELL, DATA, {**QUICK, **changes})
     return replace(made, model_configuration={"state_size": 8, "multiplier_widths": [4]})
+
+
+def run_row(
+    name: str,
+    recipe: str,
+    configuration: TrainingConfiguration,
+    runs: Path,
+    *,
+    cache: Path,
+    preset: Path | None = None,
+    report: Callable[[Progress], None] = lambda progress: None,
+) -> Row:
+    (row,) = run_rows([NamedRun(name, recipe, configuration, preset, report)], runs, cache=cache)
+    return row
 
 
 def test_a_row_reports_what_its_preset_measures(tmp_path: Path) -> None:

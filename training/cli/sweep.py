@@ -94,10 +94,11 @@ def sweep(
     every_s = None if minutes is None else PIECE_CHECKPOINT_S
     if scheduler is None:
         layout = fitted(max(left, 1), device=device, workers=workers, threads=threads, per_device=per_device)
-        options = Options(file, runs, cache, layout.device, layout.threads, retries, every_s, ends_s)
+        seeds_at_once = layout.device == "cuda"
+        options = Options(file, runs, cache, layout.device, layout.threads, retries, every_s, seeds_at_once, ends_s)
         opened = local_workers(layout)
     else:
-        options = Options(file, runs, cache, device, threads, retries, every_s, ends_s)
+        options = Options(file, runs, cache, device, threads, retries, every_s, device == "cuda", ends_s)
         if open_to_anybody(scheduler):
             say(
                 f"warning: {scheduler} neither authenticates nor encrypts: anyone who can connect to it can run code"

@@ -41,7 +41,7 @@ class ObservedModel(Protocol):
 
     def encode(self, displacement: Tensor) -> Any: ...
     def powers(self, frames: Tensor) -> Tensor: ...
-    def states(self, origin: Tensor, powers: Tensor) -> Tensor: ...
+    def states(self, latents: Tensor, origin: Tensor, powers: Tensor) -> Tensor: ...
     def read(self, states: Tensor) -> Tensor: ...
     def decode(self, latents: Tensor) -> Tensor: ...
 
@@ -61,8 +61,9 @@ def training_loss(
         if recipe.koopman_terms == "published":
             return _published_loss(model, batch, recipe, powers)
         origin = model.encode(batch.initial).origin
-        found = model.read(model.states(origin, powers))
-        return _text_loss(model, batch, recipe, origin, origin[:, None] * powers, found)
+        latents = origin[:, None] * powers
+        found = model.read(model.states(latents, origin, powers))
+        return _text_loss(model, batch, recipe, origin, latents, found)
     if isinstance(model, KoopmanModel):
         origin = model.encode(batch.initial).origin
         latents = model.latents(origin, batch.frames)
@@ -119,7 +120,7 @@ def _published_loss(model: ObservedModel, batch: Batch, recipe: Recipe, powers: 
     frames = torch.cat([batch.initial[:, None], batch.target], dim=1)
     encoded = model.encode(frames.flatten(0, 1)).origin.unflatten(0, frames.shape[:2])
     origin, others = encoded.split([1, len(batch.frames)], dim=1)
-    states = model.states(origin[:, 0], powers)
+    states = model.states(origin * powers, origin[:, 0], powers)
     loss, prediction = _prediction(model.read(states), batch.target, recipe)
     loss = loss + _mean_square(model.read(encoded), frames)
     return loss + recipe.consistency_weight * _consistency(states, others), prediction

@@ -10,16 +10,17 @@ import math
 import time
 from collections import Counter, deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Protocol
 
 from engine.schema import write
+from training.cell import Cell
 from training.provenance import now
 from training.results import RESULTS, Row, add_rows
 from training.run import default_runs
 from training.sweeping.plan import Plan, Run
-from training.sweeping.workers.base import Ended, Noted, Progressed, Task, Workers
+from training.sweeping.workers.base import Ended, Noted, OtherSeed, Progressed, Task, Workers
 
 POLL_S = 1.0  # for workers that came or went
 
@@ -32,6 +33,7 @@ class Options:
         results: the file; None: the plan's own, see `results_of`.
         runs, cache: folders, as the workers see them; None: their defaults.
         retries: further tries after a run has failed.
+        seeds_at_once: the seeds of a cell are one piece of work, as is worth it on a GPU; else each is one.
         ends_s: on the clock of `time.monotonic`, when the sweep ends with what is done by then; None: when all is.
     """
 
@@ -42,13 +44,21 @@ class Options:
     threads: int | None = None
     retries: int = 1
     checkpoint_every_s: float | None = None
+    seeds_at_once: bool = False
     ends_s: float | None = None
 
     @property
     def left_s(self) -> float:
         return math.inf if self.ends_s is None else self.ends_s - time.monotonic()
 
-    def task(self, plan: Plan, run: Run) -> Task:
+    def pieces(self, runs: Iterable[Run]) -> list[tuple[Run, ...]]:
+        """The pieces of work that runs are, each where its first run is."""
+        pieces: dict[Cell, list[Run]] = {}
+        for run in runs:
+            pieces.setdefault(replace(run.cell, seed=0) if self.seeds_at_once else run.cell, []).append(run)
+        return [tuple(piece) for piece in pieces.values()]
+
+    def task(self, plan: Plan, run: Run, *others: Run) -> Task:
         return Task(
             name=run.name,
             recipe=run.cell.recipe,
@@ -60,6 +70,7 @@ class Options:
             device=self.device,
             threads=self.threads,
             checkpoint_every_s=self.checkpoint_every_s,
+            others=tuple(OtherSeed(each.name, write(each.configuration), each.digest) for each in others),
         )
 
 
@@ -115,31 +126,34 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[
     """
     file = options.results or results_of(plan, options.runs)
     rows = {row.digest: row for row in add_rows(file, ())}  # fails before the work where it cannot be written
-    waiting = deque(unfinished(plan, rows.values()))
-    running: dict[str, Run] = {}
+    waiting = deque(options.pieces(unfinished(plan, rows.values())))
+    running: dict[str, tuple[Run, ...]] = {}  # pieces by their first run's name
     failures: Counter[str] = Counter()
     while (waiting or running) and options.left_s > 0:
         while waiting and len(running) < workers.capacity():
-            run = waiting.popleft()
-            if not is_finished(rows.get(run.digest)):  # another machine's row may have come in meanwhile
-                running[run.name] = run
-                workers.start(options.task(plan, run))
-                watch.started(run)
+            # another machine's rows may have come in meanwhile
+            piece = tuple(run for run in waiting.popleft() if not is_finished(rows.get(run.digest)))
+            if piece:
+                running[piece[0].name] = piece
+                workers.start(options.task(plan, *piece))
+                for run in piece:
+                    watch.started(run)
         event = workers.next(min(POLL_S, max(options.left_s, 0.0))) if running else None
         if isinstance(event, Progressed):
             watch.progressed(event)
         elif isinstance(event, Noted):
             watch.noted(event)
         elif isinstance(event, Ended):
-            run = running.pop(event.name)
-            failures[run.name] += event.row is None
-            if event.row is None and not event.final and failures[run.name] <= options.retries:
-                watch.noted(Noted(run.name, f"failed and is tried again ({event.error})"))
-                waiting.appendleft(run)
+            piece = running.pop(event.name)
+            failures[event.name] += event.row is None
+            if event.row is None and not event.final and failures[event.name] <= options.retries:
+                watch.noted(Noted(event.name, f"failed and is tried again ({event.error})"))
+                waiting.appendleft(piece)
                 continue
-            row = event.row or _failed(run, event.error)
-            rows.update((other.digest, other) for other in add_rows(file, [row]))
-            watch.finished(row)
+            ended = [event.row, *event.others] if event.row else [_failed(run, event.error) for run in piece]
+            rows.update((other.digest, other) for other in add_rows(file, ended))
+            for row in ended:
+                watch.finished(row)
     return [rows[run.digest] for run in plan.runs if run.digest in rows]
 
 

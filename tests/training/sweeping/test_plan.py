@@ -1,12 +1,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from engine.models import MODELS, OF_MANY_STRINGS
 from engine.schema import SchemaError
+from training.cell import Cell
 from training.sweeping.plan import load_plan, plan_names
 
 PLAN = """
@@ -119,12 +121,25 @@ def test_a_plan_without_blocks_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", ["nothing", "nothing.toml"])
 def test_a_plan_that_is_not_there_is_reported_with_those_that_are(name: str) -> None:
-    with pytest.raises(SchemaError, match=f"no plan '{name}'; give a .toml file or one of: tables, tiny"):
+    with pytest.raises(SchemaError, match=f"no plan '{name}'; give a .toml file or one of: published, tables, tiny"):
         load_plan(name)
 
 
+def test_the_published_plan_begins_with_what_the_paper_is_judged_by() -> None:
+    runs = load_plan("published").runs
+    first = Cell("koopman_var", True, "noise", 4000, 400, "published")
+    assert [run.cell for run in runs[:5]] == [replace(first, seed=seed) for seed in range(5)]
+    counts = Counter((run.cell.model, run.cell.tension_modulated, run.cell.horizon, run.cell.recipe) for run in runs)
+    models = "koopman_var", "koopman", "lru", "s5"
+    assert counts == Counter(
+        {(model, nonlinear, 400, "published"): 4 * 5 for model in models for nonlinear in (True, False)}
+        | {("koopman_var", True, 4000, "published"): 4 * 3, ("koopman_var", True, 400, "paper"): 4 * 3}
+    )
+    assert [run.cell.horizon for run in runs] == sorted(run.cell.horizon for run in runs)
+
+
 def test_committed_plans_are_whole() -> None:
-    assert plan_names() == ["tables", "tiny"]
+    assert plan_names() == ["published", "tables", "tiny"]
     assert load_plan("tiny").trial
     tables = load_plan("tables")
     assert not tables.trial

@@ -129,6 +129,33 @@ def test_what_failed_is_tried_again_then_recorded_and_tried_by_the_next_sweep(pl
     assert again.started == [worst]
 
 
+def test_the_seeds_of_a_cell_are_one_piece_where_they_are_trained_at_once(plan, options: Options) -> None:
+    made = plan(seeds="0, 1, 2")
+    at_once = replace(options, seeds_at_once=True)
+    unlucky = made.runs[1].name
+    add_rows(options.results, [row_of(options.task(made, made.runs[0]))])  # seed 0 of the first cell is done
+    tasks: list[Task] = []
+
+    def outcome(task: Task, tries: int) -> Row | str:
+        tasks.append(task)
+        return f"OSError: try {tries}" if task.name == unlucky else row_of(task)
+
+    class Pieces(Script):
+        def next(self, timeout_s: float) -> Event | None:
+            others = [row_of(replace(self._tasks[-1], **vars(each))) for each in self._tasks[-1].others]
+            ended = super().next(timeout_s)
+            assert isinstance(ended, Ended)
+            return replace(ended, others=tuple(others)) if ended.row else ended
+
+    watch = Record()
+    rows = sweep(made, Pieces(outcome, capacity=1), at_once, watch)
+    pieces = [[task.name, *(each.name for each in task.others)] for task in tasks]
+    assert sorted(map(len, pieces)) == [2, 3, 3, 3, 3]  # the unlucky piece twice
+    assert pieces.count([name for name in pieces[1] if name]) == 2 and pieces[1][0] == unlucky
+    assert len(watch.rows) == 11 and {row.name for row in watch.rows} == {run.name for run in made.runs[1:]}
+    assert sorted(row.name for row in rows if row.status == "failed") == sorted(pieces[1])
+
+
 def test_what_diverged_is_a_result(plan, options: Options) -> None:
     diverged = Script(lambda task, tries: row_of(task, status="diverged", rel_mae=None, message="the loss is nan"))
     assert {row.status for row in sweep(plan(), diverged, options, Mock())} == {"diverged"}
@@ -238,10 +265,14 @@ def here(count: int) -> Layout:
     return replace(fitted(count, device="cpu", workers=count), threads=1)
 
 
-def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(plan, options: Options, alone: Options) -> None:
+@pytest.mark.parametrize("seeds_at_once", [False, True])
+def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(
+    plan, options: Options, alone: Options, seeds_at_once: bool
+) -> None:
     """Two models on two data sets from two seeds: on two processes with a kill, and one after another here."""
     made = plan(epochs=15)
     sweep(made, Inline(), alone, Mock())
+    options = replace(options, seeds_at_once=seeds_at_once)
 
     killer = Killer(options.runs / made.name)
     with local_workers(here(2)) as workers:

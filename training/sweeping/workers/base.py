@@ -18,6 +18,15 @@ class WorkersError(RuntimeError):
 
 
 @dataclass(frozen=True)
+class OtherSeed:
+    """A run that differs from a task's own in its seed alone; the fields are those of `Task`."""
+
+    name: str
+    configuration: dict[str, Any]
+    digest: str
+
+
+@dataclass(frozen=True)
 class Task:
     """A run as plain data, so that a worker of another version says so instead of training something else.
 
@@ -27,6 +36,7 @@ class Task:
         group: a folder in `runs` for this run's folder, "" for none.
         device: "cpu", "cuda" or "auto".
         threads: of the CPU, None: as the worker was started.
+        others: are trained step by step together with the run.
     """
 
     name: str
@@ -39,6 +49,7 @@ class Task:
     device: str = "cpu"
     threads: int | None = None
     checkpoint_every_s: float | None = None
+    others: tuple[OtherSeed, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -61,12 +72,17 @@ class Noted:
 
 @dataclass(frozen=True)
 class Ended:
-    """A task is over. Without a row, `error` says why; `final`: to try again is no use."""
+    """A task is over. Without a row, `error` says why; `final`: to try again is no use.
+
+    Attributes:
+        others: rows of the task's others.
+    """
 
     name: str
     row: Row | None
     error: str = ""
     final: bool = False
+    others: tuple[Row, ...] = ()
 
 
 Event = Progressed | Noted | Ended

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from engine.schema import SchemaError, read, write
 from training.results import Row
-from training.sweeping.workers.base import Ended, Event, Noted, Progressed, Task
+from training.sweeping.workers.base import Ended, Event, Noted, OtherSeed, Progressed, Task
 
 if TYPE_CHECKING:
     from training.fitting.fit import Progress
@@ -25,7 +25,7 @@ _one_at_a_time = threading.Lock()  # a worker of several threads still trains on
 
 
 def perform(plain: Mapping[str, Any], tell: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
-    """Does a written `Task` in this process: {"row": …}, or {"error": text} where it failed.
+    """Does a written `Task` in this process: {"rows": …}, its own first, or {"error": text} where it failed.
 
     Args:
         tell: is given plain data that `event_of` reads.
@@ -35,10 +35,10 @@ def perform(plain: Mapping[str, Any], tell: Callable[[dict[str, Any]], None]) ->
         try:
             task = read(Task, plain, "task")
             folder = _runs(task) / task.name
-            row = _train(task, folder, tell)
+            rows = _train(task, folder, tell)
             with suppress(OSError):  # of an earlier try, or of a worker whose coordinator was killed
                 (folder / FAILURE).unlink(missing_ok=True)
-            return {"row": write(row)}
+            return {"rows": [write(row) for row in rows]}
         except Exception as error:
             if folder is not None:
                 with suppress(OSError):
@@ -47,21 +47,37 @@ def perform(plain: Mapping[str, Any], tell: Callable[[dict[str, Any]], None]) ->
             return {"error": " ".join(f"{type(error).__name__}: {error}".split())}
 
 
-def _train(task: Task, folder: Path, tell: Callable[[dict[str, Any]], None]) -> Row:
+def _train(task: Task, folder: Path, tell: Callable[[dict[str, Any]], None]) -> list[Row]:
     import torch
 
     from training.configuration import TrainingConfiguration
-    from training.run import run_row
+    from training.run import NamedRun, run_rows
 
-    configuration = read(TrainingConfiguration, task.configuration, task.name)
-    if configuration.digest != task.digest:
-        raise RuntimeError("this worker's code is of another version than that which began the sweep; update it")
     if task.threads is not None:
         torch.set_num_threads(task.threads)
     device = task.device
     if device == "auto":
         device = "cuda" if torch.cuda.is_available() else "cpu"
     cache = Path(task.cache) if task.cache else None
+    runs: list[Task | OtherSeed] = [task, *task.others]
+    named = []
+    for run in runs:
+        configuration = read(TrainingConfiguration, run.configuration, run.name)
+        if configuration.digest != run.digest:
+            raise RuntimeError("this worker's code is of another version than that which began the sweep; update it")
+        named.append(NamedRun(run.name, task.recipe, configuration, report=_reporter(run.name, tell)))
+    return run_rows(
+        named,
+        folder.parent,
+        cache=cache,
+        device=device,
+        waits=lambda: tell({"name": task.name, "text": "waits: another process trains it"}),
+        checkpoint_every_s=task.checkpoint_every_s,
+    )
+
+
+def _reporter(name: str, tell: Callable[[dict[str, Any]], None]) -> Callable[[Progress], None]:
+    """A function that reports a run's progress now and then."""
     reported = -TELL_EVERY_S
 
     def report(progress: Progress) -> None:
@@ -69,20 +85,9 @@ def _train(task: Task, folder: Path, tell: Callable[[dict[str, Any]], None]) -> 
         now = time.monotonic()
         if now - reported >= TELL_EVERY_S:
             reported = now
-            facts = {"progress": write(progress), "host": socket.gethostname(), "pid": os.getpid()}
-            tell({"name": task.name, **facts})
+            tell({"name": name, "progress": write(progress), "host": socket.gethostname(), "pid": os.getpid()})
 
-    return run_row(
-        task.name,
-        task.recipe,
-        configuration,
-        folder.parent,
-        cache=cache,
-        device=device,
-        report=report,
-        waits=lambda: tell({"name": task.name, "text": "waits: another process trains it"}),
-        checkpoint_every_s=task.checkpoint_every_s,
-    )
+    return report
 
 
 def _runs(task: Task) -> Path:
@@ -124,6 +129,7 @@ def end_of(name: str, outcome: Mapping[str, Any]) -> Ended:
     if "error" in outcome:
         return Ended(name, None, outcome["error"])
     try:
-        return Ended(name, read(Row, outcome["row"], "row"))
+        row, *others = (read(Row, row, "row") for row in outcome["rows"])
+        return Ended(name, row, others=tuple(others))
     except SchemaError as error:
         return Ended(name, None, f"its result makes no sense: {error}")

@@ -54,7 +54,7 @@ def test_a_damaged_data_cache_is_reported(plan, task: Task, options: Options) ->
     reported = Path(task.runs or "") / task.group / task.name / "failure.txt"
     assert "Traceback" in reported.read_text(encoding="utf-8")
     shutil.rmtree(folder)
-    assert "row" in perform(write(task), lambda reported: None)
+    assert "rows" in perform(write(task), lambda reported: None)
     assert not reported.exists()  # it did not fail in the end
 
 
@@ -69,7 +69,7 @@ def test_a_full_disk_is_reported(task: Task, monkeypatch: pytest.MonkeyPatch) ->
     def full(*arguments: Any, **options: Any) -> None:
         raise OSError(errno.ENOSPC, "No space left on device", "checkpoint")
 
-    monkeypatch.setattr("training.run.run_row", full)
+    monkeypatch.setattr("training.run.run_rows", full)
     assert "No space left on device: 'checkpoint'" in perform(write(task), lambda reported: None)["error"]
 
 
@@ -84,7 +84,7 @@ def test_a_worker_of_another_version_trains_nothing(task: Task) -> None:
 def test_a_row_that_makes_no_sense_is_no_row(task: Task) -> None:
     row = write(Row(task.digest, task.name, "done", "koopman", "linear", "noise", 4000, 60, task.recipe, 0))
     for wrong in ({"rel_mae": math.nan}, {"status": "perhaps"}, {"horizon": "400"}):
-        ended = end_of(task.name, {"row": row | wrong})
+        ended = end_of(task.name, {"rows": [row, row | wrong]})
         assert ended.row is None and "makes no sense" in ended.error
 
 
@@ -108,5 +108,5 @@ def test_two_tasks_never_train_in_one_folder(task: Task) -> None:
             lock.release()
 
     with lock:
-        assert "row" in perform(write(task), reported)
+        assert "rows" in perform(write(task), reported)
     assert notes == ["waits: another process trains it"]

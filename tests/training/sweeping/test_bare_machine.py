@@ -1,0 +1,49 @@
+"""A sweep where there is no app: on a machine that has torch and what `piece.sh` installs."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from training.results import read_results
+
+CODE = Path(__file__).parents[3]
+MISSING = ("app", "presets", "tests", "PySide6", "scipy", "dask", "distributed", "pydantic", "sounddevice", "mido")
+RUN = f"""
+import sys
+sys.modules.update(dict.fromkeys({MISSING!r}))  # to import one is an error
+from pathlib import Path
+from engine.schema import write
+from training.results import Row, add_rows
+from training.sweeping.plan import load_plan
+from training.sweeping.sweep import Options
+from training.sweeping.workers.performing import end_of, perform
+import training.sweeping.__main__
+
+plan = load_plan("tiny")
+for first in (0, 2):  # of the linear string and of the other
+    task = Options().task(plan, plan.runs[first])
+    ended = end_of(task.name, perform(write(task), lambda reported: None))
+    assert ended.row, ended.error
+    add_rows(Path("rows.csv"), [ended.row])
+"""
+
+
+def test_engine_and_training_alone_sweep(tmp_path: Path) -> None:
+    for name in ("engine", "training"):
+        shutil.copytree(CODE / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    environment = {"PYTHONPATH": str(tmp_path), "LEARNED_STRINGS_COMMIT": "abc", "PATH": ""}
+    subprocess.run([sys.executable, "-P", "-c", RUN], cwd=tmp_path, env=environment, check=True, timeout=300)
+    rows = read_results(tmp_path / "rows.csv")
+    assert {(row.status, row.device, row.commit) for row in rows} == {("done", "cpu", "abc")}
+    assert {row.string for row in rows} == {"linear", "nonlinear"}
+    assert all(row.hardware and row.torch for row in rows)
+
+
+def test_the_script_names_what_it_installs_and_a_plan_that_there_is() -> None:
+    script = (CODE / "training" / "sweeping" / "piece.sh").read_text(encoding="utf-8")
+    assert 'packages="numba numpy safetensors typer"' in script
+    assert (CODE / "training" / "sweeping" / "plans" / "published.toml").is_file()
+    assert "published --device cuda --minutes 9" in script
