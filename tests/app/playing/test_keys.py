@@ -43,7 +43,7 @@ from app.playing.notes import Notes
 from app.playing.playback import Playback
 from app.playing.sources import Sources
 from engine.effects import Effects
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.pluck import Pluck
 from engine.voices import Ear, Mixer
 from engine.voices.voice import FADE_S
@@ -260,8 +260,8 @@ def test_a_stop_ends_strings_that_ring_in_sympathy_too(played: Notes, sound: Any
     strike(played, NoteOn((low + high) // 2, 120))
     sound.mixer.render(48_000)
     player = player_of(played)
-    assert player.compiled.memory.view(np.int64)[of.PLAYER_SYMPATHETIC] > 100
-    assert player.compiled.memory.view(np.int64)[of.PLAYER_SYMPATHY_RINGS]
+    assert player.compiled.record["sympathy"]["partials"] > 100
+    assert player.compiled.record["sympathy"]["rings"]
     played.stop()
     sound.mixer.render(4_800)
     assert np.abs(sound.mixer.render(4_800)).max() < 1e-6
