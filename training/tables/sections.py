@@ -37,7 +37,7 @@ class Line:
         initialisation: "" where it is no choice (DMD is fitted).
         structured: whether it started from prior knowledge of the string; see `Row.structured`.
         trained: frames that its runs were trained on; more than the table's where their first frames are measured.
-        hints: what its runs were given of the string without prior knowledge, in words; see `TrainingConfiguration.hints`.
+        hints: of its runs, see `TrainingConfiguration.hints`.
     """
 
     model: str
