@@ -19,7 +19,7 @@ from engine.models.integrated_phase import GAIN_LIMIT, SETTLED, IntegratedPhase
 from engine.pluck import FULL_SCALE_M
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
-from engine.voices.programs import Program, Strike, fits, packed, voice_ends_s
+from engine.voices.program import Program, Strike, fits, packed, voice_ends_s
 
 
 @singledispatch

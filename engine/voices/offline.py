@@ -16,7 +16,7 @@ from engine.resonators.sine_transform import project
 from engine.sources import ModelSource, Runaway
 from engine.voices.ear import Ear
 from engine.voices.mixer import Mixer
-from engine.voices.programs import Program
+from engine.voices.program import Program
 from engine.voices.voice import Voice
 
 SILENCE_S = 0.2  # after the end of one that is rendered until it has decayed

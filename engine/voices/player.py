@@ -21,7 +21,6 @@ from engine.kernels.memory import publish
 from engine.kernels.records import EVENT, PLAYER, REPORT, TABLE, player_slots, slot, slots, voice_bytes
 from engine.pluck import SHAPES, Pluck
 from engine.resonators.string import StringParameters
-from engine.voices.mixer import Mixer
 from engine.voices.voice import possible_s
 
 AT_HAND = 16  # notes whose memory is there from the start
@@ -249,14 +248,14 @@ class CompiledPlayer:
             ring = int(self.record["pushed"] - self.record["taken"])
             return ring + int(self.record["queued"]) + len(self._backlog)
 
-    def catch_up(self, mixer: Mixer) -> None:
+    def catch_up(self, mixer_address: int) -> None:
         """Plays what is due in the mixer's next quantum now, where no device takes its frames."""
         from engine.kernels.playing.events import play
 
         with self._lock:
             while True:
                 self._flush()
-                play(self.address, mixer.address)
+                play(self.address, mixer_address)
                 if not self._backlog or self.record["queued"] == of.QUEUED:
                     return
 

@@ -55,5 +55,5 @@ def sounding(player: InstrumentPlayer) -> list[Seen]:
 
 def taken_up(player: InstrumentPlayer, mixer: Mixer) -> list[Seen]:
     """What rings once the mixer's next quantum has taken up all that is due."""
-    player.compiled.catch_up(mixer)
+    player.compiled.catch_up(mixer.address)
     return seen(player)

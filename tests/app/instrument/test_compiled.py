@@ -440,11 +440,11 @@ def test_wheels_and_pedals_can_be_read(shipped: dict[str, Patch], preset: Preset
         Controller(events.MOD_WHEEL, 127, 3),
     ):
         stage.handle(event, 0)
-    stage.player.compiled.catch_up(stage.mixer)
+    stage.player.compiled.catch_up(stage.mixer.address)
     other = Compiled(patch, preset)
     for event in stage.player.at_hand:
         other.handle(event, 0)
-    other.player.compiled.catch_up(other.mixer)
+    other.player.compiled.catch_up(other.mixer.address)
     for number in range(of.CHANNELS):
         assert other.player.compiled.channel(number) == stage.player.compiled.channel(number)
     one = stage.player.compiled.channel(1)
@@ -481,11 +481,11 @@ def test_another_player_begins_as_the_hands_are(shipped: dict[str, Patch], prese
     stage.player.set_gains({"model": 0.25, "truth": 0.0})
     for event in (Controller(events.SUSTAIN, 127), Bend(-0.5)):
         stage.handle(event, 0)
-    stage.player.compiled.catch_up(stage.mixer)
+    stage.player.compiled.catch_up(stage.mixer.address)
     made = stage.player.again(44_100)
     mixer = Mixer(44_100)
     mixer.set_player(made.compiled)
-    made.compiled.catch_up(mixer)
+    made.compiled.catch_up(mixer.address)
     assert made.rate_hz == 44_100 and made.keys is stage.player.keys
     assert made.compiled.channel(0) == stage.player.compiled.channel(0)
     assert [made.compiled.source_gain(source) for source in (0, 1)] == [0.25, 0.0]

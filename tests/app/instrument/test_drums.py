@@ -140,7 +140,7 @@ def test_the_kernel_strikes_as_the_engine_does() -> None:
     mixer = Mixer(RATE_HZ, limited=False)
     mixer.set_player(player.compiled)
     player.handle(NoteOn(47, 90))
-    player.compiled.catch_up(mixer)
+    player.compiled.catch_up(mixer.address)
     first = slots(PLAYER)
     from engine.kernels import layout as at
 
@@ -161,7 +161,7 @@ def test_a_blow_at_a_place_of_its_own_moves_the_modes_of_that_place() -> None:
     def speeds(where: tuple[float, float] | None) -> np.ndarray:
         player, mixer = InstrumentPlayer(KIT, PRESET, RATE_HZ, {"truth": 1.0}), Mixer(RATE_HZ)
         player.handle(NoteOn(47, 90, place=where))
-        player.compiled.catch_up(mixer)
+        player.compiled.catch_up(mixer.address)
         assert len(player.compiled._struck) == (where is not None)
         player.reports()
         assert not player.compiled._struck, "its memory is free"
@@ -183,7 +183,7 @@ def test_every_pad_has_a_drum_and_others_are_refused() -> None:
     player, mixer = InstrumentPlayer(KIT, PRESET, RATE_HZ, {"model": 1.0}), Mixer(RATE_HZ)
     mixer.set_player(player.compiled)
     player.handle(NoteOn(52, 100))
-    player.compiled.catch_up(mixer)
+    player.compiled.catch_up(mixer.address)
     assert [report.kind for report in player.reports()] == [of.REFUSED]
 
 

@@ -69,7 +69,7 @@ def test_keys_of_a_patch_have_the_gains_that_the_player_computes(name: str, pres
         low, high = each.range
         for key in (low, (low + high) // 2, high):
             player.handle(NoteOn(key, 30))
-        player.compiled.catch_up(mixer)
+        player.compiled.catch_up(mixer.address)
         keys = LoudKeys(each, player.ear, preset.info)
         for report in player.reports():
             found = keys.of_key(report.key)

@@ -26,7 +26,7 @@ from engine.voices import (
     rendered_program,
     truth_program,
 )
-from engine.voices.programs import voice_ends_s
+from engine.voices.program import voice_ends_s
 from engine.voices.voice import END_FADE_S
 
 NAME, PLUCK, SECONDS = "nylon_nonlinear_gaussian_4k_koopman_integrated", Pluck(0.3), 0.2
