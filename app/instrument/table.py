@@ -19,7 +19,8 @@ from engine.contact import CONTACTS
 from engine.kernels import constants as of
 from engine.kernels import layout as at
 from engine.kernels.records import ATTACK, RECORDED, TABLE, slots
-from engine.pluck import FULL_SCALE_M, SHAPES
+from engine.levels import FULL_SCALE_M
+from engine.pluck import SHAPES
 from engine.presets import Preset
 from engine.resonators.polarised import PAIRS
 from engine.resonators.recorded import OF_PARTIALS, RecordedString

@@ -72,6 +72,7 @@ SOUND_OMEGA, SOUND_SIGMA, SOUND_LEFT, SOUND_RIGHT, SOUND_X, SOUND_Y, SOUND_COSIN
 SOUND_ROWS = 8
 
 # What a recording adds to each partial of a string: fields of `RecordedString`
+FADES_SEMITONES = 3.0  # a note's own corrections fall as a Gaussian of this width
 CENTS, RATIO, SECOND_CENTS, SECOND_RATIO, SECOND_SHARE = range(5)
 
 # Channels

@@ -22,7 +22,7 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import behind, drum_at
 from engine.kernels.records import DRUM as DRUM_BLOCK
 from engine.kernels.records import DRUM_ROWS
-from engine.strike import FULL_SCALE_PA
+from engine.levels import FULL_SCALE_PA
 
 HEADER = DRUM_BLOCK.itemsize // 8
 

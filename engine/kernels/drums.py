@@ -19,7 +19,7 @@ from engine.kernels.memory import address_of, behind, drum_at, matrix, reals, wh
 from engine.kernels.modes import TOO_HIGH
 from engine.kernels.playing import channels, slots
 from engine.kernels.records import DRUM, DRUM_ROWS, Drum, Event, Note, Player, Table
-from engine.pluck import MOST_PERIODS, RUNAWAY_FACTOR
+from engine.levels import MOST_PERIODS, RUNAWAY_FACTOR
 
 HERTZ = -0.2  # power of the speed in the time of contact, as in `engine.strike`
 FIRM_S = 0.004  # in which a stick touches a skin at 1 m/s: what touches for as long has the hardness 1

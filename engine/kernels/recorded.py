@@ -16,7 +16,6 @@ from engine.kernels import strings
 from engine.kernels.memory import address_of, behind, recorded_at
 from engine.kernels.records import RECORDED, Recorded, Table
 from engine.kernels.strings import EXACT
-from engine.resonators.recorded import FADES_SEMITONES
 
 HEADER = RECORDED.itemsize // 8
 
@@ -50,7 +49,7 @@ def _own(table: Table, which: int, partial: int, above: float) -> float:
         value = row[partial]
     if which != of.CENTS and 0 <= there < known:
         rest = row[there]
-    away = 12 * math.log2(above) / FADES_SEMITONES
+    away = 12 * math.log2(above) / of.FADES_SEMITONES
     near = math.exp(-away * away)
     if which == of.RATIO or which == of.SECOND_RATIO:
         return math.exp(near * math.log(value) + (1 - near) * math.log(rest))

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.effects import Effects
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.levels import FULL_SCALE_M
+from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import project

@@ -15,9 +15,9 @@ import numpy as np
 from engine.bounds import SUBSTEPS_IN_A_PERIOD
 from engine.kernels import layout as at
 from engine.kernels.scheme import KICKS, ROTATIONS
+from engine.levels import FULL_SCALE_M
 from engine.models._tension_arrays import CURVES
 from engine.models.configurations import KoopmanTensionConfiguration
-from engine.pluck import FULL_SCALE_M
 from engine.presets import Preset, PresetInfo
 from engine.resonators.base import Array, Resonator
 from engine.voices.program import Program, fits, header, packed, voice_ends_s

@@ -31,7 +31,7 @@ from engine.effects.partitions import FADE_S
 from engine.kernels import constants as of
 from engine.kernels import layout as at
 from engine.kernels.records import CHANNEL, EVENT, PLAYER, REPORT, TABLE, slot, slots, voice_bytes
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import Preset
 from engine.voices.derivative import differentiator_taps
 from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S

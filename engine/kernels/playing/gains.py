@@ -7,13 +7,14 @@ import math
 import numpy as np
 from numba import njit
 
+from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
 from engine.kernels import loudness, recorded, strings
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import behind
 from engine.kernels.playing import keys, plucks, voices
 from engine.kernels.records import Player, Table
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, LARGEST_AMPLITUDE_MM
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 
 LEAST_SWING_M = 1e-9
 

@@ -11,6 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
+from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
 from engine.kernels import contact, drums, recorded, strings
 from engine.kernels import layout as at
@@ -18,7 +19,6 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import clear, copy, fence, reals, wholes
 from engine.kernels.playing import changes, channels, gains, keys, plucks, slots, voices
 from engine.kernels.records import Event, Note, Player, Report, Table
-from engine.pluck import LARGEST_AMPLITUDE_MM
 
 MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the key
 STOLEN_S = 0.03  # of the fade of a note that makes room

@@ -7,12 +7,13 @@ import math
 import numpy as np
 from numba import njit
 
+from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 from engine.kernels import constants as of
 from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import behind
 from engine.kernels.records import Player, Table
-from engine.pluck import LARGEST_AMPLITUDE_MM, MOST_PERIODS, POSITION_RANGE, WIDTH_RANGE
+from engine.levels import MOST_PERIODS
 
 LEAST_AMPLITUDE_MM = 1e-6  # -200 dB of the largest: silence, and no division by zero
 

@@ -15,7 +15,7 @@ from engine.kernels.memory import fence, reals, table_at, wholes
 from engine.kernels.modes import TOO_HIGH, row, run_up
 from engine.kernels.playing import channels, keys, slots
 from engine.kernels.records import Note, Player, Table
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_N, LEAST_PEAK_M, RUNAWAY_FACTOR
+from engine.levels import FULL_SCALE_M, FULL_SCALE_N, LEAST_PEAK_M, RUNAWAY_FACTOR
 
 
 @njit(**COMPILED)

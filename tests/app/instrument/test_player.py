@@ -34,7 +34,7 @@ from engine.kernels.constants import WANTED_DB
 from engine.kernels.layout import QUANTUM
 from engine.kernels.loudness import k_weight
 from engine.kernels.playing.notes import PLUCK_STOPS_S
-from engine.pluck import FULL_SCALE_M
+from engine.levels import FULL_SCALE_M
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters

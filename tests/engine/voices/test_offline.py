@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from engine.kernels import layout as at
 from engine.kernels.layout import AHEAD
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.levels import FULL_SCALE_M
+from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, load_preset
 from engine.sources import ModelSource, Runaway
 from engine.voices import (

@@ -1,4 +1,4 @@
-"""Everything compiled is compiled, or loaded, by using it once: `python -m engine.kernels.warm`.
+"""Everything compiled is compiled, or loaded, by using it once: `python -m engine.warm`.
 
 It takes minutes where nothing has been compiled yet, and about a second where all is kept. Two processes compile what
 does not depend on one another.
