@@ -71,7 +71,7 @@ def _beside(work: str) -> AbstractContextManager[object]:
     """Another process does a function of this module meanwhile; what it leaves undone, this one does later."""
     if cache.folder() is None or os.cpu_count() == 1:
         return nullcontext()
-    code = f"from engine.kernels import warm; warm.{work}()"
+    code = f"from engine import warm; warm.{work}()"
     return subprocess.Popen(python_command("-c", code), env=python_environment())
 
 
