@@ -218,7 +218,7 @@ def compile_kernels() -> None:
         return
     say("compiling the sound engine, once for each version of it: one to five minutes")
     trouble = "the sound engine was not compiled, for the reason above; remedy: delete .venv, then try again"
-    run_step([PYTHON, "-m", "engine.kernels.warm"], trouble)
+    run_step([PYTHON, "-m", "engine.warm"], trouble)
     COMPILED.write_text(kernels(), "utf-8")
     say("the sound engine is ready")
 

@@ -155,3 +155,10 @@ def brief(value: object) -> str:
         return f"a whole number of {value.bit_length()} bits"
     text = repr(value)
     return text if len(text) <= 40 else text[:37] + "..."
+
+
+# A pluck: place and width in lengths, peak
+POSITION_RANGE = (0.02, 0.98)
+WIDTH_RANGE = (0.02, 1.0)
+LARGEST_AMPLITUDE_MM = 20.0
+AMPLITUDE_MM_RANGE = (0.0, LARGEST_AMPLITUDE_MM)

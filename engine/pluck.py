@@ -5,22 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
+from engine.bounds import AMPLITUDE_MM_RANGE, POSITION_RANGE, WIDTH_RANGE
+
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
 Shape = Literal["gaussian", "triangular", "raised_cosine", "rounded"]
 SHAPES: tuple[Shape, ...] = get_args(Shape)  # numbers of the kernels
-POSITION_RANGE = (0.02, 0.98)
-WIDTH_RANGE = (0.02, 1.0)
-LARGEST_AMPLITUDE_MM = 20.0
-AMPLITUDE_MM_RANGE = (0.0, LARGEST_AMPLITUDE_MM)
-FULL_SCALE_M = 0.010  # the displacement that is 0 dBFS in sound
-FULL_SCALE_M_S = 30.0  # the velocity that is 0 dBFS: a Gaussian of width 0.08 is as loud as its displacement
-FULL_SCALE_N = 20.0  # the force at the bridge that is 0 dBFS: a Gaussian of width 0.06 and 20 mm on a nylon B3
-RUNAWAY_FACTOR = 20.0  # times its initial peak: a released string never exceeds about that peak
-MOST_PERIODS = 1.0  # of the lowest mode: the longest that finger, hammer or mallet touches what they set in motion
-LEAST_PEAK_M = 1e-4  # of an initial displacement, for that factor
 DEFAULT_LISTEN = 0.37  # the listening point beside a pluck: no low mode is still there
 
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.pluck import LEAST_PEAK_M, RUNAWAY_FACTOR
+from engine.levels import LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.presets import Preset, PresetInfo
 from engine.resonators.base import Array
 

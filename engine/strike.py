@@ -19,14 +19,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from engine import bounds
-from engine.pluck import MOST_PERIODS
+from engine.levels import MOST_PERIODS
 from engine.resonators.base import Array
 
 if TYPE_CHECKING:
     from engine.resonators.drum import DrumModes
 
 HERTZ = -0.2  # power of the speed in the time of contact
-FULL_SCALE_PA = 20.0  # the sound pressure at 1 m that is 0 dBFS, before the gain of a key
 
 
 @dataclass(frozen=True)

@@ -190,7 +190,7 @@ def test_changed_kernels_are_compiled_once_and_that_is_said(run, action, monkeyp
     (run.ROOT / "engine" / "kernels" / "bank.py").write_text("2")
     for _ in range(2):
         run.prepare(action, True)
-    assert steps == [["-m", "engine.kernels.warm"]]
+    assert steps == [["-m", "engine.warm"]]
     assert capsys.readouterr().err.count("compiling the sound engine") == 1
 
 

@@ -14,7 +14,7 @@ from engine.models import RETIRED as RETIRED_SIZES
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, without_retired, write
-from training.start import BLIND_PURSUIT, PHASES, PURSUIT, starts_of
+from training.start import BLIND_PURSUIT, COUNT, PHASES, PURSUIT, SYMMETRIES, given_to, starts_of
 
 DIGEST_VERSION = 3  # of the rule that distinguishes runs
 DATA_VERSION = 3  # raise when the solver, a draw or the cache's files change what they hold
@@ -166,6 +166,20 @@ class TrainingConfiguration:
     def start(self) -> str:
         """The name of the model's start: the recipe's choice, or its source's own."""
         return self.recipe.start or next(iter(starts_of(self.model)))
+
+    @property
+    def hints(self) -> str:
+        """The hints that a start found in the displacement was given, in words; empty for other starts."""
+        if self.start not in (BLIND_PURSUIT, PHASES):
+            return ""
+        counted = self.model == "koopman_integrated" and "state_size" in self.model_configuration
+        given = (SYMMETRIES if self.recipe.flip else "", COUNT if counted else "")
+        return ", and ".join(words for words in given if words)
+
+    @property
+    def knowledge(self) -> str:
+        """The knowledge of the string that the start uses, in words; empty: the displacement alone."""
+        return given_to(self.model, self.start) or self.hints
 
     @property
     def digest(self) -> str:

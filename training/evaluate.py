@@ -17,7 +17,7 @@ import torch
 from torch import Tensor
 
 from engine.metrics import ErrorSums, RelativeError
-from engine.models.base import StringModel
+from engine.models.base import KoopmanModel, StringModel
 from engine.partials import (
     PartialErrors,
     PartialTrack,
@@ -32,7 +32,6 @@ from engine.true_partials import true_phasors
 from engine.truth import ModalState, SplittingSolver
 from training.configuration import DatasetConfiguration
 from training.data.dataset import Dataset, draw_initial, split_rows
-from training.fitting.losses import KoopmanModel
 
 TRAJECTORIES_AT_ONCE = 10
 FRAMES_AT_ONCE = 1000

@@ -9,7 +9,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from engine.audible import FLOOR_DB, AudibleErrors, audible_errors, heard_level_db
-from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, Pluck
+from engine.bounds import LARGEST_AMPLITUDE_MM
+from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import Preset, PresetInfo, preset_digest
 from engine.sources import ModelSource, Runaway
 from engine.voices import Ear, Program, model_program, render_voice, truth_program, voice_blocks

@@ -35,7 +35,6 @@ from training.fitting.fit import Diverged, FitResult, Progress, Seed, fit_seeds
 from training.fitting.log import TrainingLog
 from training.results import QUARTERS, Row
 from training.row_errors import REPEATED, configuration_of, row_errors
-from training.start import knowledge_of
 
 
 @dataclass(frozen=True)
@@ -250,7 +249,7 @@ def preset_info(
         scale_m=dataset.scale_m,
         trained_range=trained_range(data),
         initialisation=configuration.start,
-        knows=knowledge_of(configuration),
+        knows=configuration.knowledge,
         seed=recipe.seed,
         **{name: errors[name] for name in REPEATED},
         training_seconds=result.seconds,

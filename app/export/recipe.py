@@ -17,8 +17,9 @@ from app.export.wav import RATE_RANGE_HZ, WavSettings
 from app.shared.version import PROGRAM, program_version
 from app.shared.vocabulary import DIFFERENCE, Bits, Pickup, PlayedSource, Source
 from engine.bounds import HIGHEST_RATE_HZ, SIZES
+from engine.levels import FULL_SCALE_M
 from engine.plain_text import name_text, one_line
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.pluck import Pluck
 from engine.presets import Preset, PresetError, of_string, preset_digest
 from engine.resonators.string import StringParameters
 from engine.schema import parse_json, read

@@ -31,7 +31,7 @@ from app.instrument.string_keys import StringKeys
 from app.instrument.table import programs_of, strings_of, table_of, wheeled
 from app.patches.drums import Drums
 from app.patches.patch import Patch
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.presets import Preset
 from engine.voices import CompiledPlayer, Ear
 from engine.voices.player import Report, Ringing, Table
@@ -218,8 +218,8 @@ class InstrumentPlayer:
                 self._instrument += 1
                 self._wheel = 0, 0
             self._serial += 1
-            counts = made.table.memory.view(np.int64)
-            counts[of.TABLE_SERIAL], counts[of.TABLE_INSTRUMENT] = self._serial, self._instrument
+            record = made.table.record
+            record["serial"], record["instrument"] = self._serial, self._instrument
             self._keys, self.table = made.keys, made.table
             self.compiled.take(self.table, frame)
 

@@ -16,7 +16,8 @@ from app.instrument.effects import body_curves
 from app.patches.drums import Drums, PlayedDrum
 from app.patches.patch import VELOCITIES, Patch
 from app.patches.tuning import Tuning
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
+from engine.kernels.records import DRUM, DRUM_ROWS
 from engine.resonators.base import Array
 from engine.strike import Strike
 from engine.voices import Ear
@@ -149,13 +150,14 @@ def tuned(drum: DrumParameters, ratio: float, highest_hz: float) -> DrumModes:
 
 
 def block_of(found: DrumKey) -> Array:
-    """The drum of a key as the kernels read it: see `playing_layout`."""
+    """The drum of a key as the kernels read it: see `records.DRUM`."""
     from engine.kernels import drum_modes as kernel
     from engine.resonators.surface import tools
 
-    block = np.zeros(of.DRUM_HEADER + of.DRUM_ROWS * len(found.modes))
+    modes = len(found.modes)
+    block = np.zeros(DRUM.itemsize // 8 + DRUM_ROWS * modes)
     drum = struck_drum(found.played, found.modes.drum)
-    kernel.write(drum, found.modes.rows, np.array(found.points), tools(), block)
+    kernel.write(drum, found.modes.rows, np.array(found.points), tools(), block.ctypes.data, modes)
     return block
 
 

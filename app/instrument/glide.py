@@ -22,8 +22,8 @@ from app.instrument.strings import MOST_MODES, KeyString, Strings, decay_rates
 from app.patches.drums import Drums
 from app.patches.fields import HIGHEST_KEY
 from app.patches.patch import VELOCITIES, Patch
+from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.excitation import blow_factor
-from engine.pluck import LARGEST_AMPLITUDE_MM
 from engine.resonators.sine_transform import analysis_matrix
 from engine.voices import Ear
 

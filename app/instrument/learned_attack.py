@@ -19,8 +19,8 @@ from app.instrument.offline import render_events
 from app.patches.patch import Noise, Patch
 from app.shared.parameters import NOISE_DB
 from engine.effects.curves import RATE_HZ as RESPONSE_HZ
+from engine.kernels.constants import PART_S, REFERENCE_VELOCITY, WANTED_DB
 from engine.kernels.loudness import k_weight
-from engine.kernels.playing_layout import PART_S, REFERENCE_VELOCITY, WANTED_DB
 from engine.presets import Preset
 from engine.resonators.recorded import RecordedAttack, RecordedNote
 from training.recording.attack import attack_force, first_distance_db

@@ -34,7 +34,7 @@ from app.instrument.strings import Strings
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
-from engine.kernels.playing_layout import USUAL_VOLUME
+from engine.kernels.constants import USUAL_VOLUME
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
 

@@ -8,7 +8,8 @@ from app.instrument.effects import body_curves
 from app.instrument.strings import KeyString, Strings
 from app.patches.drums import Drums
 from app.patches.patch import Patch
-from engine.pluck import LARGEST_AMPLITUDE_MM, Pluck
+from engine.bounds import LARGEST_AMPLITUDE_MM
+from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
 from engine.resonators.polarised import Polarisations

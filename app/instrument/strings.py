@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Knobs, Patch, StringSet
 from app.patches.tuning import Tuning
-from engine.kernels.playing_layout import HIGHEST_HZ, MOST_MODES, MOST_SLACKENED
+from engine.kernels.constants import HIGHEST_HZ, MOST_MODES, MOST_SLACKENED
 from engine.resonators.losses import Losses
 from engine.resonators.string import StringParameters
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable
-from dataclasses import astuple
+from dataclasses import asdict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +16,14 @@ from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
 from app.shared.parameters import OF_PATCHES
 from engine.contact import CONTACTS
+from engine.kernels import constants as of
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
-from engine.pluck import FULL_SCALE_M, SHAPES
+from engine.kernels.records import ATTACK, RECORDED, TABLE, slots
+from engine.levels import FULL_SCALE_M
+from engine.pluck import SHAPES
 from engine.presets import Preset
 from engine.resonators.polarised import PAIRS
-from engine.resonators.recorded import OF_PARTIALS, RecordedAttack, RecordedString
+from engine.resonators.recorded import OF_PARTIALS, RecordedString
 from engine.voices.player import Table
 from engine.voices.programs import (
     DRUM_SILENCE,
@@ -106,126 +108,119 @@ def table_of(
         varied: whether plucks vary from stroke to stroke, as the patch says.
     """
     patch, ear = loud.patch, loud.ear
-    memory = np.zeros(of.table_slots(grid_points))
-    counts = memory.view(np.int64)
-    counts[of.TABLE_MODE], counts[of.TABLE_BEND_BY] = MODES[patch.mode], BENDS[patch.bend_by]
-    counts[of.TABLE_LOW], counts[of.TABLE_HIGH] = patch.range
-    counts[of.TABLE_SHAPE], counts[of.TABLE_STOPS] = SHAPES.index(patch.pluck.shape), patch.pluck.stops
-    counts[of.TABLE_STRIKES] = patch.pluck.is_blow
-    counts[of.TABLE_LET_RING] = patch.damping.let_ring
-    counts[of.TABLE_POINTS], counts[of.TABLE_VELOCITY] = len(ear.points), ear.pickup == "velocity"
-    counts[of.TABLE_SOLO], counts[of.TABLE_GRID] = ear.solo, grid_points
+    record = np.zeros(1, TABLE)
+    table = record[0]
+    table["mode"], table["bend_by"] = MODES[patch.mode], BENDS[patch.bend_by]
+    table["low"], table["high"] = patch.range
+    table["shape"], table["stops"] = SHAPES.index(patch.pluck.shape), patch.pluck.stops
+    table["strikes"], table["let_ring"] = patch.pluck.is_blow, patch.damping.let_ring
+    table["points"], table["velocity"] = len(ear.points), ear.pickup == "velocity"
+    table["solo"], table["grid"], table["detuning"] = ear.solo, grid_points, 1.0
     if (moving := loud.polarisations) is not None:
-        counts[of.TABLE_PAIRS], memory[of.TABLE_DETUNING] = PAIRS, moving.detuning
-        for first, both in (
-            (of.TABLE_PULLED, moving.pulled),
-            (of.TABLE_HEARD, moving.heard),
-            (of.TABLE_CONDUCTANCE, (moving.conductance_s_kg, moving.second_conductance_s_kg)),
-        ):
-            memory[first : first + 2] = both
-    else:
-        memory[of.TABLE_DETUNING] = 1.0
+        table["pairs"], table["detuning"] = PAIRS, moving.detuning
+        table["pulled"], table["heard"] = moving.pulled, moving.heard
+        table["conductance"] = moving.conductance_s_kg, moving.second_conductance_s_kg
     if patch.losses is not None:
-        lost = patch.losses.air, patch.losses.friction, patch.losses.bending
-        memory[of.TABLE_LOSSES : of.TABLE_LOSSES + 3] = lost
+        table["losses"] = patch.losses.air, patch.losses.friction, patch.losses.bending
     if patch.sympathy_s_kg > 0:
-        counts[of.TABLE_SYMPATHY] = of.EVERY_KEY if patch.damping.let_ring else of.OPEN_STRINGS
-        memory[of.TABLE_SYMPATHY_S_KG] = patch.sympathy_s_kg
+        table["sympathy"] = of.EVERY_KEY if patch.damping.let_ring else of.OPEN_STRINGS
+        table["sympathy_s_kg"] = patch.sympathy_s_kg
     if ear.pickup == "velocity":
-        memory[of.TABLE_APERTURE_M] = patch.pickup.aperture_mm / 1000
+        table["aperture_m"] = patch.pickup.aperture_mm / 1000
         if patch.pickup.flux_mm > 0:
-            memory[of.TABLE_NEARNESS] = FULL_SCALE_M / (patch.pickup.flux_mm / 1000)
+            table["nearness"] = FULL_SCALE_M / (patch.pickup.flux_mm / 1000)
     course = patch.course
-    counts[of.TABLE_COURSE], counts[of.TABLE_OCTAVES] = course.strings, course.octaves
-    memory[of.TABLE_APART_CENTS], memory[of.TABLE_APART_S] = course.cents, course.apart_ms / 1000
-    memory[of.TABLE_BRIDGE] = course.bridge
-    memory[of.TABLE_VARIATION] = patch.pluck.variation if varied else 0.0
-    memory[of.TABLE_LEVEL] = 10 ** (patch.level_db / 20)
-    memory[of.TABLE_NOISE_LEVEL] = of.PART_S * 10 ** ((of.WANTED_DB + patch.level_db) / 10)
+    table["course"], table["octaves"], table["bridge"] = course.strings, course.octaves, course.bridge
+    table["apart_cents"], table["apart_s"] = course.cents, course.apart_ms / 1000
+    table["variation"] = patch.pluck.variation if varied else 0.0
+    table["level"] = 10 ** (patch.level_db / 20)
+    table["noise_level"] = of.PART_S * 10 ** ((of.WANTED_DB + patch.level_db) / 10)
     for place, each in enumerate(CONTACTS[patch.noise.kind]):
-        first = of.TABLE_CONTACTS + place * of.CONTACT
-        memory[first : first + len(astuple(each))] = astuple(each)
+        for name, value in asdict(each).items():
+            table["contacts"][place][name] = value
     goal = wheel_goal(patch) if patch.mod_wheel in WHEELED else None
-    counts[of.TABLE_WHEEL] = -1 if goal is None else WHEELED.index(patch.mod_wheel)
-    memory[of.TABLE_WHEEL_GOAL] = 0.0 if goal is None else goal
+    table["wheel"] = -1 if goal is None else WHEELED.index(patch.mod_wheel)
+    table["wheel_goal"] = 0.0 if goal is None else goal
     for place, (source, program) in enumerate(zip(sources, programs, strict=True)):
-        counts[of.TABLE_KINDS + place] = at.TRUTH if source == "truth" else at.TENSION
-        counts[of.TABLE_PROGRAMS + place] = program.ctypes.data
-    counts[of.TABLE_SOURCES] = len(programs)
+        table["kinds"][place] = at.TRUTH if source == "truth" else at.TENSION
+        table["programs"][place] = program.ctypes.data
+    table["sources"] = len(programs)
     points = [of.BRIDGE] * len(ear.points) if ear.pickup == "bridge" else ear.points
     values = [*(patch.value(name) for name in (*WHEELED, "body.mix")), *points]
-    memory[of.TABLE_VALUES : of.TABLE_VALUES + len(values)] = values
+    table["values"][: len(values)] = values
+    tail = Tail()
     if loud.body is not None:
-        memory = _with_body(memory, loud.body)
-        counts = memory.view(np.int64)
+        table["body"] = tail.put(loud.body)
     if isinstance(loud, DrumKeys):
-        return Table(_with_drums(memory, loud), programs)
+        table["drums"] = _put_drums(tail, loud)
+    else:
+        _fill_strings(table, tail, loud, grid_points)
+    return Table(np.concatenate([record.view(np.float64), *tail.parts]), programs)
+
+
+class Tail:
+    """What a table points to, which follows its record."""
+
+    def __init__(self) -> None:
+        self.parts: list[NDArray[np.float64]] = []
+        self.slot = slots(TABLE)  # of the next part
+
+    def put(self, *parts: NDArray[np.float64]) -> int:
+        """The slot of the first of these parts, which are put at the end."""
+        first = self.slot
+        self.parts += parts
+        self.slot += sum(map(len, parts))
+        return first
+
+
+def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int) -> None:
+    """Fills in strings, their pitches and what a recording adds to them."""
+    patch = loud.patch
     if loud.recorded is not None:
-        memory = _with_recorded(memory, loud.recorded, grid_points)
+        put_recorded(table, tail, loud.recorded, grid_points)
         if patch.noise.kind == "recorded" and loud.recorded.attack is not None:
-            memory = _with_attack(memory, loud.recorded.attack)
-        counts = memory.view(np.int64)
+            attack = np.zeros(1, ATTACK)
+            samples = loud.recorded.attack.samples
+            attack["rate_hz"], attack["frames"] = loud.recorded.attack.rate_hz, len(samples)
+            table["attack"] = tail.put(attack.view(np.float64), samples)
     elif (edge := patch.javari).distance_mm > 0:
-        memory[of.TABLE_JAVARI : of.TABLE_JAVARI + 3] = edge.distance_mm / 1000, edge.stiffness_n_m, edge.loss_s_m
-    for key in range(of.KEYS):
-        memory[of.TABLE_PITCHES + key] = loud.strings.pitch_hz(key) or 0.0
+        table["javari"] = edge.distance_mm / 1000, edge.stiffness_n_m, edge.loss_s_m
+    table["pitches_hz"] = [loud.strings.pitch_hz(key) or 0.0 for key in range(of.KEYS)]
     strings = patch.strings
     assert not isinstance(strings, Drums)
     if isinstance(strings, Fretted):
-        memory[of.TABLE_OPEN + of.OPEN_STRING : of.TABLE_OPEN + of.OPEN_SLOTS] = _row(strings.string)
+        table["open"][0]["string"] = _row(strings.string)
     else:
-        counts[of.TABLE_STRINGS] = len(strings.strings)
+        table["strings"] = len(strings.strings)
         for number, string in enumerate(strings.strings[::-1]):
-            first = of.TABLE_OPEN + number * of.OPEN_SLOTS
-            row = string.note, loud.strings.open_hz(string.note), *_row(string.string)
-            memory[first : first + of.OPEN_SLOTS] = row
+            table["open"][number] = string.note, loud.strings.open_hz(string.note), _row(string.string)
     turn = 2 * (grid_points - 1)
-    memory[of.TABLE_SINES : of.TABLE_SINES + turn] = np.sin(2 * np.pi * np.arange(turn) / turn)
-    return Table(memory, programs)
+    table["sines"] = tail.put(np.sin(2 * np.pi * np.arange(turn) / turn))
 
 
-def _with_body(memory: NDArray[np.float64], curves: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The table with what the body does at each frequency."""
-    memory.view(np.int64)[of.TABLE_BODY] = len(memory)
-    return np.concatenate([memory, curves])
+def put_recorded(table: np.void, tail: Tail, own: RecordedString, grid_points: int) -> None:
+    """Puts what a recording adds to strings behind a table."""
+    header = np.zeros(1, RECORDED)
+    header["pitch_hz"], header["rest"] = own.pitch_hz, [own.rest(name) for name in OF_PARTIALS]
+    header["smooth"], header["partials"] = len(own.smooth_hz), len(own.cents)
+    header["modes"] = grid_points - 2
+    rows = [np.asarray(getattr(own, name), float) for name in OF_PARTIALS]
+    table["recorded"] = tail.put(header.view(np.float64), np.log(own.smooth_hz), np.log(own.smooth_ratio), *rows)
 
 
-def _with_drums(memory: NDArray[np.float64], loud: DrumKeys) -> NDArray[np.float64]:
-    """The table with the drums of all keys. A key whose drum is impossible has none."""
+def _put_drums(tail: Tail, loud: DrumKeys) -> int:
+    """The slot of the slots of the drums of all keys. A key whose drum is impossible has none."""
     blocks: list[NDArray[np.float64]] = []
-    first = len(memory) + of.KEYS
-    slots = np.zeros(of.KEYS, np.int64)
+    places = np.zeros(of.KEYS, np.int64)
+    free = tail.slot + of.KEYS
     low, high = loud.patch.range
     for key in range(low, high + 1):
         with contextlib.suppress(ValueError):
             if (found := loud.of_key(key)) is not None:
                 blocks.append(block_of(found))
-                slots[key] = first
-                first += len(blocks[-1])
-    memory.view(np.int64)[of.TABLE_DRUMS] = len(memory)
-    return np.concatenate([memory, slots.view(np.float64), *blocks])
-
-
-def _with_recorded(memory: NDArray[np.float64], own: RecordedString, grid_points: int) -> NDArray[np.float64]:
-    """The table with what a recording adds to strings."""
-    header = np.zeros(of.RECORDED_HEADER)
-    header[of.RECORDED_HZ] = own.pitch_hz
-    header[of.RECORDED_REST : of.RECORDED_REST + len(OF_PARTIALS)] = [own.rest(name) for name in OF_PARTIALS]
-    counts = header.view(np.int64)
-    counts[of.RECORDED_SMOOTH], counts[of.RECORDED_PARTIALS] = len(own.smooth_hz), len(own.cents)
-    counts[of.RECORDED_MODES] = grid_points - 2
-    memory.view(np.int64)[of.TABLE_RECORDED] = len(memory)
-    rows = [getattr(own, name) for name in OF_PARTIALS]
-    return np.concatenate([memory, header, np.log(own.smooth_hz), np.log(own.smooth_ratio), *rows])
-
-
-def _with_attack(memory: NDArray[np.float64], attack: RecordedAttack) -> NDArray[np.float64]:
-    """The table with a recorded attack as the noise of strokes."""
-    samples, header = attack.samples, np.zeros(of.ATTACK_HEADER)
-    header[of.ATTACK_RATE] = attack.rate_hz
-    header.view(np.int64)[of.ATTACK_FRAMES] = len(samples)
-    memory.view(np.int64)[of.TABLE_ATTACK] = len(memory)
-    return np.concatenate([memory, header, samples])
+                places[key] = free
+                free += len(blocks[-1])
+    return tail.put(places.view(np.float64), *blocks)
 
 
 def strings_of(patch: Patch) -> int:

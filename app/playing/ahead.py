@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.shared.thread_priority import Rank, lower_priority
-from engine.pluck import FULL_SCALE_M
+from engine.levels import FULL_SCALE_M
 from engine.sources import ModelSource, Runaway, SourceState
 from engine.voices import Voice
 from engine.voices.offline import AHEAD_FIRST, AHEAD_FRAMES

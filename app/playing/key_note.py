@@ -10,7 +10,7 @@ from app.instrument.events import NoteOn
 from app.patches.drums import Drums
 from app.rendering import RenderRequest
 from app.rendering.subject import StringOf
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.pluck import Pluck
 from engine.resonators.string import StringParameters
 from engine.voices import Mixer

@@ -11,7 +11,8 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, Pluck
+from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE
+from engine.pluck import Pluck
 
 if TYPE_CHECKING:
     from engine.presets import PresetInfo  # and NumPy with it, which settings are read without

@@ -36,7 +36,7 @@ from app.playing.key_note import AS_THEY_ARE, KeyNote
 from app.playing.recorder import EventRecorder
 from app.playing.sources import Sources
 from engine.effects import Effects
-from engine.kernels.playing_layout import BEGAN
+from engine.kernels.constants import BEGAN
 from engine.presets import PresetError
 from engine.voices import Ear, Mixer
 

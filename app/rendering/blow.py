@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from app.rendering.strobe import FLASH_HZ
 from app.rendering.take import SOURCES, Listened
+from engine.levels import FULL_SCALE_PA
 from engine.resonators.base import Array
-from engine.strike import FULL_SCALE_PA, Strike
+from engine.strike import Strike
 from engine.voices import Ear
 
 if TYPE_CHECKING:

@@ -16,9 +16,9 @@ from app.rendering.request import RenderListener
 from app.rendering.strobe import FLASH_HZ
 from app.rendering.subject import Subject
 from app.rendering.take import SOURCES, Listened, Signal
+from engine.levels import FULL_SCALE_M
 from engine.models.base import Physics
 from engine.models.koopman_tension import KoopmanTension
-from engine.pluck import FULL_SCALE_M
 from engine.presets import PresetError
 from engine.resonators.base import Array, Resonator
 from engine.truth import ModalState, SplittingSolver, default_substeps

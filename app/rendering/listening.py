@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from app.rendering.take import Motion, Signal
 from engine.kernels.layout import QUANTUM, REACH
-from engine.pluck import FULL_SCALE_M
+from engine.levels import FULL_SCALE_M
 from engine.resonators.base import Array
 from engine.sources import Runaway, SourceState, StringSource
 from engine.voices import Ear, OfflineVoice, Program

@@ -10,7 +10,7 @@ from app.session.choices import Choices
 from app.session.monitor import Monitor
 from app.session.slots import source_title
 from app.shared.vocabulary import DIFFERENCE
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N
 
 LEGEND_FIELDS = {*Monitor.model_fields, "solo", "stereo"}  # of `Choices`: what legends depend on
 _PREFIXES = ((1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n"))  # factor from the SI unit, name

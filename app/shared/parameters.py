@@ -13,8 +13,16 @@ from typing import Literal
 
 from app.shared.typed_number import typed_number
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
-from engine.bounds import AMP_DRIVE_DB, AMP_TONE_DB, BODY_SIZE, ROOM_T60_S
-from engine.pluck import DEFAULT_LISTEN, LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
+from engine.bounds import (
+    AMP_DRIVE_DB,
+    AMP_TONE_DB,
+    BODY_SIZE,
+    LARGEST_AMPLITUDE_MM,
+    POSITION_RANGE,
+    ROOM_T60_S,
+    WIDTH_RANGE,
+)
+from engine.pluck import DEFAULT_LISTEN
 
 Modulation = Literal["none", "learn", "macro", "wheel"]  # each includes those before it
 _ORDER: tuple[Modulation, ...] = ("none", "learn", "macro", "wheel")

@@ -133,7 +133,7 @@ def load_engine() -> None:
     threading.Thread(target=_find_devices, name="sound-finder", daemon=True).start()
     from threadpoolctl import threadpool_limits
 
-    from engine.kernels.warm import warm
+    from engine.warm import warm
 
     # NumPy's products are small here; the threads of its BLAS, one a core, would spin between them for nothing.
     threadpool_limits(limits=1, user_api="blas")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from engine.effects.body import Body
 from engine.effects.impulse import noise_powers, room_for
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 
 RATE_HZ = 48_000  # of the response; keys are as loud at other rates
 FINEST_HZ = 0.75  # of the spectrum
@@ -17,7 +17,7 @@ FINEST_HZ = 0.75  # of the spectrum
 
 @lru_cache(maxsize=16)
 def curves_of(body: Body) -> NDArray[np.float64]:
-    """Of the body alone, (BODY_SLOTS,): see `playing_layout`. It takes some hundredths of a second, once.
+    """Of the body alone, (BODY_SLOTS,): see `kernels.constants`. It takes some hundredths of a second, once.
 
     Each value is the mean of the spectrum half-way to its neighbours. The array is remembered, and not to be written.
     """

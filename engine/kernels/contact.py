@@ -22,10 +22,13 @@ import math
 import numpy as np
 from numba import carray, njit
 
+from engine.kernels import constants as of
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import pointer
+from engine.kernels.memory import address_of, attack_at, behind, player_at, pointer, table_at
+from engine.kernels.records import ATTACK, Attack, Noise, Player, Table
+
+HEADER = ATTACK.itemsize // 8
 
 OFF_DB = -60.0  # from this level down there is no noise
 SHORTENS, BRIGHTENS = -0.2, 0.15  # exponents of strength: of the pulse's length (Hertz), of the band (an estimate)
@@ -48,10 +51,15 @@ def _mixed(number: int) -> int:
 
 
 @njit(**COMPILED)
+def attack_of(table: Table) -> Attack:
+    """The recorded attack of a table that has one."""
+    return attack_at(address_of(table) + 8 * table.attack)
+
+
+@njit(**COMPILED)
 def touch(
-    player: np.ndarray,
-    players: np.ndarray,
-    table: np.ndarray,
+    player: Player,
+    table: Table,
     which: int,
     level_db: float,
     strength: float,
@@ -74,106 +82,100 @@ def touch(
     """
     if not level_db > OFF_DB:
         return
-    first, rate_hz = of.TABLE_CONTACTS + which * of.CONTACT, player[of.PLAYER_RATE]
-    energy = table[of.TABLE_NOISE_LEVEL] * rate_hz * 10.0 ** (level_db / 10)
-    energy *= strength ** (2 * table[first + of.FOLLOWS]) * (HARDEST / (1 + (HARDEST - 1) / hardness**3)) ** 2
-    noise, longest = of.PLAYER_NOISES, -1
+    kind, rate_hz = table.contacts[which], player.rate_hz
+    energy = table.noise_level * rate_hz * 10.0 ** (level_db / 10)
+    energy *= strength ** (2 * kind.follows) * (HARDEST / (1 + (HARDEST - 1) / hardness**3)) ** 2
+    noise, longest = player.noises[0], -1
     for number in range(of.MOST_NOISES):
-        each = of.PLAYER_NOISES + number * of.NOISE_SLOTS
-        if players[each + of.NOISE_LEFT] == 0:
+        each = player.noises[number]
+        if each.left == 0:
             noise = each
             break
-        if players[each + of.NOISE_DONE] > longest:
-            noise, longest = each, players[each + of.NOISE_DONE]
+        if each.done > longest:
+            noise, longest = each, each.done
     shorter = min(max(strength**SHORTENS, 1 / LARGEST_CHANGE), LARGEST_CHANGE)
     brighter = min(max(strength**BRIGHTENS, 1 / LARGEST_CHANGE), LARGEST_CHANGE)
-    pulse_frames = max(2.0, table[first + of.PULSE_S] * shorter / hardness * rate_hz)
-    band_hz, share = table[first + of.BURST_HZ] * brighter * hardness, table[first + of.PULSE_SHARE]
-    attack_s, fall_s = table[first + of.ATTACK_S], table[first + of.FALL_S]
+    pulse_frames = max(2.0, kind.pulse_s * shorter / hardness * rate_hz)
+    band_hz, share = kind.burst_hz * brighter * hardness, kind.pulse_share
+    attack_s, fall_s = kind.attack_s, kind.fall_s
     if slides_s > 0.0:
         band_hz, share = max(slid_m * WINDINGS_M / slides_s, LOWEST_SLIDE_HZ), 0.0
         attack_s, fall_s = 0.5 * slides_s, 0.1 * slides_s
     turn = 2 * math.pi * min(band_hz / rate_hz, HIGHEST_SHARE)
-    alpha = math.sin(turn) / (2 * table[first + of.BURST_Q])
+    alpha = math.sin(turn) / (2 * kind.burst_q)
     shrinks = math.exp(-1 / max(1.0, fall_s * rate_hz))
     attack_frames = max(1.0, attack_s * rate_hz)
     passed = alpha / (1 + alpha)  # power of white noise in the band
     lasts = attack_frames / 3 + 1 / (1 - shrinks * shrinks)
-    players[noise + of.NOISE_FRAME] = frame
-    players[noise + of.NOISE_DONE] = players[noise + of.NOISE_STOPS] = 0
-    players[noise + of.NOISE_SEED] = _mixed((stroke * of.KEYS + key) * 2 + which + 1)
-    player[noise + of.NOISE_PULSE] = math.sqrt(share * energy / (0.375 * pulse_frames))
-    player[noise + of.NOISE_PULSE_FRAMES] = pulse_frames
-    player[noise + of.NOISE_BURST] = math.sqrt((1 - share) * energy / (passed * lasts))
-    player[noise + of.NOISE_ATTACK_FRAMES] = attack_frames
-    player[noise + of.NOISE_SHRINKS] = shrinks
-    player[noise + of.NOISE_ENVELOPE] = 1.0
-    player[noise + of.NOISE_B0] = passed
-    player[noise + of.NOISE_A1] = -2 * math.cos(turn) / (1 + alpha)
-    player[noise + of.NOISE_A2] = (1 - alpha) / (1 + alpha)
-    for each in range(4):
-        player[noise + of.NOISE_PAST + each] = 0.0
-    tables = table.view(np.int64)
-    attack = tables[of.TABLE_ATTACK] if which == of.STROKE else 0
-    players[noise + of.NOISE_RECORDED] = attack != 0
-    if attack != 0:
-        player[noise + of.NOISE_PULSE] = math.sqrt(energy / rate_hz)
-        frames = tables[attack + of.ATTACK_FRAMES] * rate_hz / table[attack + of.ATTACK_RATE]
-        players[noise + of.NOISE_LEFT] = int(frames) + 1
+    noise.frame = frame
+    noise.done, noise.stops = 0, 0
+    noise.seed = _mixed((stroke * of.KEYS + key) * 2 + which + 1)
+    noise.pulse = math.sqrt(share * energy / (0.375 * pulse_frames))
+    noise.pulse_frames = pulse_frames
+    noise.burst = math.sqrt((1 - share) * energy / (passed * lasts))
+    noise.attack_frames = attack_frames
+    noise.shrinks = shrinks
+    noise.envelope = 1.0
+    noise.b0 = passed
+    noise.a1 = -2 * math.cos(turn) / (1 + alpha)
+    noise.a2 = (1 - alpha) / (1 + alpha)
+    for place in range(4):
+        noise.past[place] = 0.0
+    noise.recorded = table.attack != 0 and which == of.STROKE
+    if noise.recorded != 0:
+        noise.pulse = math.sqrt(energy / rate_hz)
+        attack = attack_of(table)
+        noise.left = int(attack.frames * rate_hz / attack.rate_hz) + 1
         return
     falls = attack_frames + LEFT_DB * math.log(10.0) / 20 / math.log(shrinks)
-    players[noise + of.NOISE_LEFT] = int(max(pulse_frames, falls)) + 1
+    noise.left = int(max(pulse_frames, falls)) + 1
 
 
 @njit(**COMPILED)
-def hush(players: np.ndarray, quanta: int) -> None:
+def hush(player: Player, quanta: int) -> None:
     """Lets all noises fade out."""
     for number in range(of.MOST_NOISES):
-        players[of.PLAYER_NOISES + number * of.NOISE_SLOTS + of.NOISE_STOPS] = quanta
+        player.noises[number].stops = quanta
 
 
 @njit(**COMPILED)
 def sound(player_address: int, mixer_address: int) -> None:
     """Adds all noises to the mixer's quantum, both channels alike."""
-    player = carray(pointer(player_address), (1 << 40,), np.float64)
-    players = carray(pointer(player_address), (1 << 40,), np.int64)
-    address = players[of.PLAYER_TABLE]
-    if address == 0:
+    player = player_at(player_address)
+    if player.table == 0:
         return
-    table = carray(pointer(address), (1 << 40,), np.float64)
-    tables = carray(pointer(address), (1 << 40,), np.int64)
-    gain, heard = 0.0, 0
-    for source in range(tables[of.TABLE_SOURCES]):
-        if player[of.PLAYER_SOURCE_GAINS + source] != 0.0:
-            gain = player[of.PLAYER_SOURCE_GAINS + source]
+    table, gain, heard = table_at(player.table), 0.0, 0
+    for source in range(table.sources):
+        if player.source_gains[source] != 0.0:
+            gain = player.source_gains[source]
             heard += 1
-    if heard != 1 or tables[of.TABLE_SOLO] != 0:
+    if heard != 1 or table.solo != 0:
         gain = 0.0
-    before = player[of.PLAYER_NOISE_GAIN]
-    player[of.PLAYER_NOISE_GAIN] = gain
+    before = player.noise_gain
+    player.noise_gain = gain
     mixer = carray(pointer(mixer_address), (at.MIXER_SLOTS,), np.float64)
     mix = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2)
     now = mixer.view(np.int64)[at.M_FRAMES]
     for number in range(of.MOST_NOISES):
-        noise = of.PLAYER_NOISES + number * of.NOISE_SLOTS
-        if players[noise + of.NOISE_LEFT] == 0 or players[noise + of.NOISE_FRAME] >= now + at.QUANTUM:
+        noise = player.noises[number]
+        if noise.left == 0 or noise.frame >= now + at.QUANTUM:
             continue
         begin, gain_from = 0, before
-        if players[noise + of.NOISE_DONE] == 0:
-            begin, gain_from = max(0, players[noise + of.NOISE_FRAME] - now), gain
-        end = min(at.QUANTUM, begin + players[noise + of.NOISE_LEFT])
-        if players[noise + of.NOISE_RECORDED] == 0:
-            _run(player, players, noise, begin, end, gain_from, gain, mix)
-        elif tables[of.TABLE_ATTACK] != 0:
-            _play(player, players, table, tables, noise, begin, end, gain_from, gain, mix)
-        players[noise + of.NOISE_LEFT] -= end - begin
-        stops = players[noise + of.NOISE_STOPS]
+        if noise.done == 0:
+            begin, gain_from = max(0, noise.frame - now), gain
+        end = min(at.QUANTUM, begin + noise.left)
+        if noise.recorded == 0:
+            _run(noise, begin, end, gain_from, gain, mix)
+        elif table.attack != 0:
+            _play(player, table, noise, begin, end, gain_from, gain, mix)
+        noise.left -= end - begin
+        stops = noise.stops
         if stops > 0:
-            player[noise + of.NOISE_PULSE] *= (stops - 1) / stops
-            player[noise + of.NOISE_BURST] *= (stops - 1) / stops
-            players[noise + of.NOISE_STOPS] = stops - 1
+            noise.pulse *= (stops - 1) / stops
+            noise.burst *= (stops - 1) / stops
+            noise.stops = stops - 1
         if stops == 1:
-            players[noise + of.NOISE_LEFT] = 0
+            noise.left = 0
 
 
 @njit(**COMPILED)
@@ -189,9 +191,7 @@ def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, 
 
 @njit(**COMPILED)
 def _run(
-    player: np.ndarray,
-    players: np.ndarray,
-    noise: int,
+    noise: Noise,
     begin: int,
     end: int,
     before: float,
@@ -199,17 +199,13 @@ def _run(
     mix: np.ndarray,
 ) -> None:
     """Adds a noise to frames of the mix, while its gain goes from `before` to `gain`."""
-    pulse, pulse_frames = player[noise + of.NOISE_PULSE], player[noise + of.NOISE_PULSE_FRAMES]
-    burst, attack_frames = player[noise + of.NOISE_BURST], player[noise + of.NOISE_ATTACK_FRAMES]
-    shrinks, envelope = player[noise + of.NOISE_SHRINKS], player[noise + of.NOISE_ENVELOPE]
-    b0, a1, a2 = player[noise + of.NOISE_B0], player[noise + of.NOISE_A1], player[noise + of.NOISE_A2]
-    past = player[noise + of.NOISE_PAST : noise + of.NOISE_PAST + 4]
+    pulse, pulse_frames = noise.pulse, noise.pulse_frames
+    burst, attack_frames = noise.burst, noise.attack_frames
+    shrinks, envelope = noise.shrinks, noise.envelope
+    b0, a1, a2 = noise.b0, noise.a1, noise.a2
+    past = noise.past
     x1, x2, y1, y2 = past[0], past[1], past[2], past[3]
-    seed, done, stops = (
-        players[noise + of.NOISE_SEED],
-        players[noise + of.NOISE_DONE],
-        players[noise + of.NOISE_STOPS],
-    )
+    seed, done, stops = noise.seed, noise.done, noise.stops
     for frame in range(begin, end):
         x = math.sqrt(3.0) * float(_mixed(seed + done) >> 11) / 2.0**52
         y = b0 * (x - x2) - a1 * y1 - a2 * y2
@@ -222,17 +218,15 @@ def _run(
         _add(mix, frame, force, before, gain, stops)
         done += 1
     past[0], past[1], past[2], past[3] = x1, x2, y1, y2
-    player[noise + of.NOISE_ENVELOPE] = envelope
-    players[noise + of.NOISE_DONE] = done
+    noise.envelope = envelope
+    noise.done = done
 
 
 @njit(**COMPILED)
 def _play(
-    player: np.ndarray,
-    players: np.ndarray,
-    table: np.ndarray,
-    tables: np.ndarray,
-    noise: int,
+    player: Player,
+    table: Table,
+    noise: Noise,
     begin: int,
     end: int,
     before: float,
@@ -240,20 +234,16 @@ def _play(
     mix: np.ndarray,
 ) -> None:
     """Adds the table's recorded attack, by linear interpolation between its samples, as `_run` adds a noise."""
-    first = tables[of.TABLE_ATTACK]
-    frames, step = tables[first + of.ATTACK_FRAMES], table[first + of.ATTACK_RATE] / player[of.PLAYER_RATE]
-    first += of.ATTACK_HEADER
-    amplitude, done, stops = (
-        player[noise + of.NOISE_PULSE],
-        players[noise + of.NOISE_DONE],
-        players[noise + of.NOISE_STOPS],
-    )
+    attack = attack_of(table)
+    frames, step = attack.frames, attack.rate_hz / player.rate_hz
+    samples = behind(attack, HEADER, frames)
+    amplitude, done, stops = noise.pulse, noise.done, noise.stops
     for frame in range(begin, end):
         place = done * step
         number = int(place)
         if number < frames:
-            after = table[first + number + 1] if number + 1 < frames else 0.0
-            force = amplitude * (table[first + number] + (place - number) * (after - table[first + number]))
+            after = samples[number + 1] if number + 1 < frames else 0.0
+            force = amplitude * (samples[number] + (place - number) * (after - samples[number]))
             _add(mix, frame, force, before, gain, stops)
         done += 1
-    players[noise + of.NOISE_DONE] = done
+    noise.done = done

@@ -29,9 +29,9 @@ from numba import njit
 from engine.kernels import lanes, tension, truth, voice
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.constants import MOST_PAIRS
 from engine.kernels.memory import fence, reals, wholes
 from engine.kernels.modes import following, row
-from engine.kernels.playing_layout import MOST_PAIRS
 
 MOST = at.MOST_COURSE
 SHARED = 2 * MOST_PAIRS  # modes of a string that have a part in the bridge, at most

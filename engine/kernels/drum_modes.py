@@ -18,9 +18,13 @@ import numpy as np
 from numba import njit
 
 from engine import bounds
-from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
-from engine.strike import FULL_SCALE_PA
+from engine.kernels.memory import behind, drum_at
+from engine.kernels.records import DRUM as DRUM_BLOCK
+from engine.kernels.records import DRUM_ROWS
+from engine.levels import FULL_SCALE_PA
+
+HEADER = DRUM_BLOCK.itemsize // 8
 
 SHAPE, LENGTH, WIDTH, THICKNESS, DENSITY, MODULUS, POISSON, TENSION, D1, D3, UNEVEN, AIR, CAVITY, SHELL = range(14)
 X, Y, MALLET_KG, RADIUS, CONTACT, SOFTEST, HARDEST = range(14, 21)  # of a drum with its blow
@@ -473,14 +477,12 @@ def radiated(drum: np.ndarray, found: np.ndarray, x: float, y: float, tools: Too
 
 
 @njit(**COMPILED)
-def write(drum: np.ndarray, found: np.ndarray, points: np.ndarray, tools: Tools, block: np.ndarray) -> None:
-    """Writes the drum of a key with its blow, heard at points, as the player reads it: see `playing_layout`."""
-    rows, mu = block[of.DRUM_HEADER :], drum[DENSITY] * drum[THICKNESS]
-    n = len(rows) // of.DRUM_ROWS
-    block.view(np.int64)[of.DRUM_MODES] = n
-    block[of.DRUM_MALLET_KG], block[of.DRUM_CONTACT_S] = drum[MALLET_KG], drum[CONTACT]
-    block[of.DRUM_SOFTEST_M_S], block[of.DRUM_HARDEST_M_S] = drum[SOFTEST], drum[HARDEST]
-    block[of.DRUM_MASS_KG] = mass_kg(drum)
+def write(drum: np.ndarray, found: np.ndarray, points: np.ndarray, tools: Tools, address: int, n: int) -> None:
+    """Writes the drum of a key, n modes and its blow, heard at points, as the player reads it: see `records.DRUM`."""
+    mu, block = drum[DENSITY] * drum[THICKNESS], drum_at(address)
+    block.modes, block.mallet_kg, block.contact_s = n, drum[MALLET_KG], drum[CONTACT]
+    block.softest_m_s, block.hardest_m_s, block.mass_kg = drum[SOFTEST], drum[HARDEST], mass_kg(drum)
+    rows = behind(block, HEADER, DRUM_ROWS * n)
     for mode in range(n):
         stretch = (found[Z, mode] / size(drum)) ** 2 * mu / found[MASS, mode]
         rows[mode] = found[OMEGA, mode] ** 2

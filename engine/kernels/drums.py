@@ -9,101 +9,105 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray, njit
+from numba import njit
 
+from engine.kernels import constants as of
 from engine.kernels import layout as at
 from engine.kernels import loudness
-from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import pointer
+from engine.kernels.memory import address_of, behind, drum_at, matrix, reals, wholes
 from engine.kernels.modes import TOO_HIGH
-from engine.kernels.playing import channels
-from engine.pluck import MOST_PERIODS, RUNAWAY_FACTOR
+from engine.kernels.playing import channels, slots
+from engine.kernels.records import DRUM, DRUM_ROWS, Drum, Event, Note, Player, Table
+from engine.levels import MOST_PERIODS, RUNAWAY_FACTOR
 
 HERTZ = -0.2  # power of the speed in the time of contact, as in `engine.strike`
 FIRM_S = 0.004  # in which a stick touches a skin at 1 m/s: what touches for as long has the hardness 1
 MOST_HARDER = 2.0  # the hardness of any other
+HEADER = DRUM.itemsize // 8
+SQUARE, SIGMA, _COUPLING, _STRETCH, STRUCK, WEIGHTS = range(6)  # rows of a drum
 UNHEARD = 1e-7  # of the loudest mode, where the loudness of a key and its peak are computed
 
 
 @njit(**COMPILED)
-def block_of(tables: np.ndarray, key: int) -> int:
-    """First slot of the drum of a key in a table of drums; 0: the key has none."""
-    return tables[tables[of.TABLE_DRUMS] + key]
+def has_drum(table: Table, key: int) -> bool:
+    """Whether there is a drum for a key in a table of drums."""
+    return wholes(address_of(table))[table.drums + key] != 0
 
 
 @njit(**COMPILED)
-def _speed(table: np.ndarray, drum: int, share: float) -> float:
+def drum_of(table: Table, key: int) -> Drum:
+    """The drum of a key that has one."""
+    address = address_of(table)
+    return drum_at(address + 8 * wholes(address)[table.drums + key])
+
+
+@njit(**COMPILED)
+def rows_of(drum: Drum) -> np.ndarray:
+    """Its rows (DRUM_ROWS, modes)."""
+    return matrix(reals(address_of(drum)), HEADER, DRUM_ROWS, drum.modes)
+
+
+@njit(**COMPILED)
+def _speed(drum: Drum, share: float) -> float:
     """Of a mallet at a share of the velocities, in m/s."""
-    soft = table[drum + of.DRUM_SOFTEST_M_S]
-    return soft * (table[drum + of.DRUM_HARDEST_M_S] / soft) ** share
+    return drum.softest_m_s * (drum.hardest_m_s / drum.softest_m_s) ** share
 
 
 @njit(**COMPILED)
-def _speed_of(player: np.ndarray, table: np.ndarray, drum: int, velocity: float) -> float:
+def _speed_of(player: Player, drum: Drum, velocity: float) -> float:
     """Of a mallet at a velocity, by the instrument's curve, in m/s."""
-    curve = player[of.PLAYER_VALUES + of.CURVE]
-    return _speed(table, drum, min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve))
+    curve = player.values[of.CURVE]
+    return _speed(drum, min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve))
 
 
 @njit(**COMPILED)
-def contact_of(
-    player: np.ndarray, table: np.ndarray, tables: np.ndarray, key: int, velocity: float
-) -> tuple[float, float]:
+def contact_of(player: Player, table: Table, key: int, velocity: float) -> tuple[float, float]:
     """Strength and hardness of a blow on a key's drum, for the noise of the contact; see `engine.kernels.contact`."""
-    drum = block_of(tables, key)
-    reference = _speed(table, drum, (of.REFERENCE_VELOCITY - 1) / 126)
-    hardness = min(FIRM_S / table[drum + of.DRUM_CONTACT_S], MOST_HARDER)
-    return _speed_of(player, table, drum, velocity) / reference, hardness
+    drum = drum_of(table, key)
+    reference = _speed(drum, (of.REFERENCE_VELOCITY - 1) / 126)
+    return _speed_of(player, drum, velocity) / reference, min(FIRM_S / drum.contact_s, MOST_HARDER)
 
 
 @njit(**COMPILED)
-def _blow(
-    table: np.ndarray, tables: np.ndarray, drum: int, struck: np.ndarray, speed: float, out: np.ndarray
-) -> None:
+def _blow(drum: Drum, struck: np.ndarray, speed: float, out: np.ndarray) -> None:
     """The speeds (modes,) that a blow gives; `struck`: those that 1 N s gives. As `engine.strike.Strike.speeds`."""
-    n, energy, lowest = tables[drum + of.DRUM_MODES], 0.0, table[drum + of.DRUM_HEADER]
-    for mode in range(n):
-        lowest = min(lowest, table[drum + of.DRUM_HEADER + mode])
-    contact_s = table[drum + of.DRUM_CONTACT_S] * max(speed, 1e-3) ** HERTZ
+    squares, energy = rows_of(drum)[SQUARE], 0.0
+    lowest = squares[0]
+    for mode in range(drum.modes):
+        lowest = min(lowest, squares[mode])
+    contact_s = drum.contact_s * max(speed, 1e-3) ** HERTZ
     contact_s = min(contact_s, MOST_PERIODS * 2 * math.pi / math.sqrt(lowest))
-    for mode in range(n):
-        turns = math.sqrt(table[drum + of.DRUM_HEADER + mode]) * contact_s / (2 * math.pi)
+    for mode in range(drum.modes):
+        turns = math.sqrt(squares[mode]) * contact_s / (2 * math.pi)
         pulse = 0.5
         if turns < 1e-6:
             pulse = 1.0
         elif abs(turns - 1) > 1e-6:
             pulse = math.sin(math.pi * turns) / (math.pi * turns * (1 - turns * turns))
         out[mode] = struck[mode] * pulse
-        energy += 0.5 * table[drum + of.DRUM_MASS_KG] * out[mode] ** 2
-    impulse = speed / (energy + 0.5 / table[drum + of.DRUM_MALLET_KG])
-    for mode in range(n):
+        energy += 0.5 * drum.mass_kg * out[mode] ** 2
+    impulse = speed / (energy + 0.5 / drum.mallet_kg)
+    for mode in range(drum.modes):
         out[mode] *= impulse
 
 
 @njit(**COMPILED)
-def _struck(table: np.ndarray, drum: int, modes: int) -> np.ndarray:
-    """The speeds that 1 N s gives at the drum's own place."""
-    return table[drum + of.DRUM_HEADER + 4 * modes : drum + of.DRUM_HEADER + 5 * modes]
-
-
-@njit(**COMPILED)
-def gain_of(player: np.ndarray, table: np.ndarray, tables: np.ndarray, key: int, drum: int) -> float:
+def gain_of(player: Player, table: Table, key: int) -> float:
     """The factor that makes a key as loud as others, and lets it peak no higher than the highest of them may."""
-    slot = of.PLAYER_GAINS + key * of.GAINS
-    if player[slot] == 0.0:
-        n, rows, first = tables[drum + of.DRUM_MODES], drum + of.DRUM_HEADER, of.PLAYER_SOUND
-        sound = player[first : first + of.SOUND_ROWS * n]
+    if player.gains[key, 0] == 0.0:
+        drum = drum_of(table, key)
+        n, rows = drum.modes, rows_of(drum)
+        sound = player.sound[: of.SOUND_ROWS * n]
         speeds = sound[of.SOUND_X * n : (of.SOUND_X + 1) * n]  # behind the rows below, which have no more modes
         loud = sound[of.SOUND_Y * n : (of.SOUND_Y + 1) * n]
-        speed = _speed(table, drum, (of.REFERENCE_VELOCITY - 1) / 126)
-        _blow(table, tables, drum, _struck(table, drum, n), speed, speeds)
-        stereo, loudest, modes = tables[of.TABLE_POINTS] == 2, 0.0, 0
+        _blow(drum, rows[STRUCK], _speed(drum, (of.REFERENCE_VELOCITY - 1) / 126), speeds)
+        stereo, loudest, modes = table.points == 2, 0.0, 0
         for mode in range(n):
-            speeds[mode] /= math.sqrt(table[rows + mode])
-            weight = abs(table[rows + 5 * n + mode])
+            speeds[mode] /= math.sqrt(rows[SQUARE, mode])
+            weight = abs(rows[WEIGHTS, mode])
             if stereo:
-                weight = max(weight, abs(table[rows + 6 * n + mode]))
+                weight = max(weight, abs(rows[WEIGHTS + 1, mode]))
             loud[mode] = weight * abs(speeds[mode])
             loudest = max(loudest, loud[mode])
         loud[0] = loud[n - 1] = loudest  # so that the peak is looked for in the same frames
@@ -113,84 +117,65 @@ def gain_of(player: np.ndarray, table: np.ndarray, tables: np.ndarray, key: int,
         place = 0
         for mode in range(n):
             if loud[mode] > UNHEARD * loudest:
-                sound[of.SOUND_OMEGA * modes + place] = math.sqrt(table[rows + mode])
-                sound[of.SOUND_SIGMA * modes + place] = table[rows + n + mode]
-                sound[of.SOUND_LEFT * modes + place] = table[rows + 5 * n + mode] * speeds[mode]
-                right = table[rows + 6 * n + mode] * speeds[mode] if stereo else 0.0
+                sound[of.SOUND_OMEGA * modes + place] = math.sqrt(rows[SQUARE, mode])
+                sound[of.SOUND_SIGMA * modes + place] = rows[SIGMA, mode]
+                sound[of.SOUND_LEFT * modes + place] = rows[WEIGHTS, mode] * speeds[mode]
+                right = rows[WEIGHTS + 1, mode] * speeds[mode] if stereo else 0.0
                 sound[of.SOUND_RIGHT * modes + place] = right
                 place += 1
-        curves = tables[of.TABLE_BODY]
-        body = table[curves : curves + of.BODY_SLOTS]
-        mix = player[of.PLAYER_VALUES + of.BODY_MIX] if curves != 0 else 0.0
-        found = loudness.gain(sound, modes, tables[of.TABLE_POINTS], body, mix)
+        body, mix = behind(table, table.body, of.BODY_SLOTS), player.values[of.BODY_MIX] if table.body != 0 else 0.0
+        found = loudness.gain(sound, modes, table.points, body, mix)
         found *= loudness.limit(found * loudness.peak(sound, modes, True, body, mix, 0.0))
-        player[slot] = found * table[of.TABLE_LEVEL]
-    return player[slot]
+        player.gains[key, 0] = found * table.level
+    return player.gains[key, 0]
 
 
 @njit(**COMPILED)
-def strike(
-    player: np.ndarray,
-    players: np.ndarray,
-    table: np.ndarray,
-    tables: np.ndarray,
-    event: int,
-    first_voice: int,
-    stride: int,
-) -> float:
-    """Makes the voices of a note in the player's memory, a stride apart; their gain, 0: no drum."""
-    key, velocity = players[event + of.EVENT_KEY], player[event + of.EVENT_VALUE]
-    drum = block_of(tables, key)
-    if drum == 0 or tables[drum + of.DRUM_MODES] > players[of.PLAYER_MODES]:
+def strike(player: Player, table: Table, event: Event, number: int) -> float:
+    """Makes the voices of one of the player's notes; their gain, 0: no drum."""
+    if not has_drum(table, event.key):
         return 0.0
-    gain = gain_of(player, table, tables, key, drum)
-    modes, elsewhere = tables[drum + of.DRUM_MODES], players[event + of.EVENT_STRUCK]
-    struck = _struck(table, drum, modes)
-    if elsewhere != 0 and players[event + of.EVENT_STRUCK_MODES] == modes:
-        struck = carray(pointer(elsewhere), (1 << 40,), np.float64)[:modes]
-    speed = _speed_of(player, table, drum, velocity)
-    for source in range(tables[of.TABLE_SOURCES]):
-        slot = first_voice + source * stride
-        address = players[of.PLAYER_HERE] + 8 * slot
-        voice = carray(pointer(address), (stride,), np.float64)
-        begun = gain * player[of.PLAYER_SOURCE_GAINS + source]
-        begun *= channels.loudness(players, tables[of.TABLE_MODE], players[event + of.EVENT_CHANNEL])
-        _make(player, table, tables, voice, drum, struck, speed, tables[of.TABLE_KINDS + source])
-        voice.view(np.int64)[at.PROGRAM] = tables[of.TABLE_PROGRAMS + source]
-        voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
+    drum = drum_of(table, event.key)
+    if drum.modes > player.modes:
+        return 0.0
+    gain, struck = gain_of(player, table, event.key), rows_of(drum)[STRUCK]
+    if event.struck != 0 and event.struck_modes == drum.modes:
+        struck = reals(event.struck)[: drum.modes]
+    speed = _speed_of(player, drum, event.value)
+    for source in range(table.sources):
+        address = slots.address_of_voice(player, number, source)
+        begun = gain * player.source_gains[source]
+        begun *= channels.loudness(player, table.mode, event.channel)
+        _make(player, table, address, drum, struck, speed, source)
+        slots.set_gain(address, begun)
     return gain
 
 
 @njit(**COMPILED)
 def _make(
-    player: np.ndarray,
-    table: np.ndarray,
-    tables: np.ndarray,
-    voice: np.ndarray,
-    drum: int,
-    struck: np.ndarray,
-    speed: float,
-    kind: int,
+    player: Player, table: Table, address: int, drum: Drum, struck: np.ndarray, speed: float, source: int
 ) -> None:
     """A voice that sets out from the speeds that a blow gives its modes; `struck`: those that 1 N s gives."""
-    counts, n, rate_hz = voice.view(np.int64), tables[drum + of.DRUM_MODES], player[of.PLAYER_RATE]
+    voice, counts, n, rate_hz, rows = reals(address), wholes(address), drum.modes, player.rate_hz, rows_of(drum)
+    kind = table.kinds[source]
     used = at.FOLLOWING if kind == at.TENSION else at.TRUTH_ROWS  # what follows from them is prepared
     for slot in range(at.state(n) + used * n):
         voice[slot] = 0.0
-    counts[at.KIND], counts[at.MODES], counts[at.POINTS] = kind, n, tables[of.TABLE_POINTS]
+    counts[at.KIND], counts[at.PROGRAM] = kind, table.programs[source]
+    counts[at.MODES], counts[at.POINTS] = n, table.points
     counts[at.BEGAN_FRAME], counts[at.MOVING] = -1, n
     counts[at.FADE_FRAMES] = round(at.FADE_S * rate_hz)
     counts[at.ENDS_AT], counts[at.ENDS_IN] = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
     voice[at.SILENT] = at.SILENT_DB * math.log(10.0) / 20
-    rows = drum + of.DRUM_HEADER
     place = at.state(n) + at.OMEGA_SQUARED * n
-    for slot in range(4 * n):
-        voice[place + slot] = table[rows + slot]
-    weigh(player, table, tables, voice, 0, drum)
+    for row in range(STRUCK):
+        for mode in range(n):
+            voice[place + row * n + mode] = rows[row, mode]
+    weigh(player, table, voice, 0, drum)
     first, widest, loudest = at.state(n), 0.0, 0.0
-    _blow(table, tables, drum, struck, speed, voice[first + n : first + 2 * n])
+    _blow(drum, struck, speed, voice[first + n : first + 2 * n])
     for mode in range(n):
-        moved, omega = voice[first + n + mode], math.sqrt(table[rows + mode])
+        moved, omega = voice[first + n + mode], math.sqrt(rows[SQUARE, mode])
         widest += abs(moved) / omega
         heard = 0.0
         for point in range(counts[at.POINTS]):
@@ -200,51 +185,44 @@ def _make(
 
 
 @njit(**COMPILED)
-def weigh(
-    player: np.ndarray, table: np.ndarray, tables: np.ndarray, voice: np.ndarray, which: int, drum: int
-) -> None:
+def weigh(player: Player, table: Table, voice: np.ndarray, which: int, drum: Drum) -> None:
     """Sets one of the two sets of weights of a voice; modes too high for the rate are not heard."""
-    n, highest = tables[drum + of.DRUM_MODES], TOO_HIGH * player[of.PLAYER_RATE]
-    rows = drum + of.DRUM_HEADER
-    for point in range(tables[of.TABLE_POINTS]):
+    n, highest, rows = drum.modes, TOO_HIGH * player.rate_hz, rows_of(drum)
+    for point in range(table.points):
         for mode in range(n):
-            heard = table[rows + mode] <= highest * highest
+            heard = rows[SQUARE, mode] <= highest * highest
             first = at.weights(n, which, point, 0) + mode
-            voice[first] = table[rows + (5 + point) * n + mode] if heard else 0.0
+            voice[first] = rows[WEIGHTS + point, mode] if heard else 0.0
             voice[first + n] = 0.0
 
 
 @njit(**COMPILED)
-def hear(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, note: int) -> None:
+def hear(player: Player, table: Table, note: Note) -> None:
     """Lets a note follow the gains of sources and the places where the drum is heard."""
-    drum = block_of(tables, players[note + of.NOTE_KEY])
-    if drum == 0:
+    if table.drums == 0 or not has_drum(table, note.key):
         return
-    gain, points = player[note + of.NOTE_GAIN], of.PLAYER_VALUES + of.POINT
-    gain *= channels.loudness(players, tables[of.TABLE_MODE], players[note + of.NOTE_CHANNEL])
+    drum, gain = drum_of(table, note.key), note.gain * channels.loudness(player, table.mode, note.channel)
     moved = False
     for point in range(2):
-        moved = moved or player[note + of.NOTE_POINT + point] != player[points + point]
-    moved = moved and players[note + of.NOTE_POINTS] == tables[of.TABLE_POINTS]
-    for source in range(tables[of.TABLE_SOURCES]):
-        address = players[note + of.NOTE_VOICES + source]
+        moved = moved or note.point[point] != player.values[of.POINT + point]
+    moved = moved and note.points == table.points
+    for source in range(table.sources):
+        address = note.voices[source]
         if address == 0:
             continue
-        voice = carray(pointer(address), (1 << 40,), np.float64)
-        counts = voice.view(np.int64)
-        if counts[at.MODES] != tables[drum + of.DRUM_MODES]:
+        counts = wholes(address)
+        if counts[at.MODES] != drum.modes:
             moved = False
             continue
-        voice[at.WANTED_GAIN] = gain * player[of.PLAYER_SOURCE_GAINS + source]
+        reals(address)[at.WANTED_GAIN] = gain * player.source_gains[source]
         moved = moved and counts[at.NEXT_WEIGHTS] == 0
     if not moved:
         return
     for point in range(2):
-        player[note + of.NOTE_POINT + point] = player[points + point]
-    for source in range(tables[of.TABLE_SOURCES]):
-        address = players[note + of.NOTE_VOICES + source]
+        note.point[point] = player.values[of.POINT + point]
+    for source in range(table.sources):
+        address = note.voices[source]
         if address != 0:
-            voice = carray(pointer(address), (1 << 40,), np.float64)
-            weigh(player, table, tables, voice, 1, drum)
-            voice.view(np.int64)[at.WEIGHTS_FADED] = 0
-            voice.view(np.int64)[at.NEXT_WEIGHTS] = 1
+            weigh(player, table, reals(address), 1, drum)
+            wholes(address)[at.WEIGHTS_FADED] = 0
+            wholes(address)[at.NEXT_WEIGHTS] = 1

@@ -38,9 +38,9 @@ import math
 import numpy as np
 from numba import njit
 
+from engine.kernels import constants as of
 from engine.kernels import lanes, strings, tension, truth
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
 from engine.kernels.modes import damped, following, row
 

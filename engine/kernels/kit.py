@@ -8,13 +8,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from engine.kernels import constants as of
 from engine.kernels import drum_modes as drums
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
+from engine.kernels.constants import KEYS
 from engine.kernels.drum_modes import D1, D3, DRUM, HARDEST, MODULUS, ORDERS, ROWS, SOFTEST, SURFACE
-from engine.kernels.memory import part, reals, table, wholes
-from engine.kernels.playing_layout import KEYS
+from engine.kernels.memory import matrix, part, player_at, reals, table_at, wholes
+from engine.kernels.records import DRUM_ROWS, Event
 
 # Slots of a kit, of a key and of a drum behind its own values. R real number, W whole number
 HIGHEST_HZ = 0  # R
@@ -42,21 +43,21 @@ MOVES = (MODES_MOVED, LOSSES_MOVED, LOSSES_MOVED, PLACES_MOVED, PLACES_MOVED)
 
 
 @njit(**COMPILED)
-def begin(kit_at: int, table_at: int) -> None:
+def begin(kit_address: int, table_address: int) -> None:
     """Writes all keys' blocks into an instrument's table."""
-    kit, counts, values = reals(kit_at), wholes(kit_at), part(reals(table_at), of.TABLE_VALUES, of.VALUES)
+    kit, counts, values = reals(kit_address), wholes(kit_address), table_at(table_address).values
     drums.tabulate(_bessels(kit, counts))
     for which in FOLLOWED:
-        follow(kit_at, which, values[which])
+        follow(kit_address, which, values[which])
     for key in range(KEYS):
-        _update(kit_at, table_at, key)
+        _update(kit_address, table_address, key)
     counts[STALE] = 0
 
 
 @njit(**COMPILED)
-def follow(kit_at: int, which: int, value: float) -> None:
+def follow(kit_address: int, which: int, value: float) -> None:
     """One of the instrument's values has changed."""
-    kit, counts = reals(kit_at), wholes(kit_at)
+    kit, counts = reals(kit_address), wholes(kit_address)
     for number in range(len(FOLLOWED)):
         if which == FOLLOWED[number]:
             kit[VALUES + number] = value
@@ -66,33 +67,33 @@ def follow(kit_at: int, which: int, value: float) -> None:
 
 
 @njit(**COMPILED)
-def prepare(kit_at: int, table_at: int, player_at: int) -> None:
+def prepare(kit_address: int, table_address: int, player_address: int) -> None:
     """What is struck or heard in the next quantum follows."""
-    counts, players = wholes(kit_at), wholes(player_at)
+    counts, player = wholes(kit_address), player_at(player_address)
     if counts[STALE] == 0:
         return
-    for taken in range(players[of.PLAYER_TAKEN], players[of.PLAYER_PUSHED]):
-        _strike(kit_at, table_at, players, of.PLAYER_EVENTS + taken % of.EVENTS * of.EVENT_SLOTS)
-    for place in range(players[of.PLAYER_QUEUED]):
-        _strike(kit_at, table_at, players, of.PLAYER_QUEUE + place * of.EVENT_SLOTS)
+    for taken in range(player.taken, player.pushed):
+        _strike(kit_address, table_address, player.events[taken % of.EVENTS])
+    for place in range(player.queued):
+        _strike(kit_address, table_address, player.queue[place])
     for number in range(of.MOST_NOTES):
-        note = of.PLAYER_NOTES + number * of.NOTE_SLOTS
-        key, voice = players[note + of.NOTE_KEY], players[note + of.NOTE_VOICES]
-        if players[note + of.NOTE_STATE] == of.RINGS and voice != 0:
+        note = player.notes[number]
+        key, voice = note.key, note.voices[0]
+        if note.state == of.RINGS and voice != 0:
             moved = counts[FIRST_KEY + key * KEY + KEY_STALE] & PLACES_MOVED
             if moved and wholes(voice)[at.NEXT_WEIGHTS] == 0:  # else it fades to other places yet
-                _update(kit_at, table_at, key)
+                _update(kit_address, table_address, key)
 
 
 @njit(**COMPILED)
 def _bessels(kit: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    return table(kit, counts[BESSELS], counts[STEPS], counts[COLUMNS])
+    return matrix(kit, counts[BESSELS], counts[STEPS], counts[COLUMNS])
 
 
 @njit(**COMPILED)
-def _strike(kit_at: int, table_at: int, players: np.ndarray, event: int) -> None:
-    if players[event + of.EVENT_KIND] == of.NOTE_ON:
-        _update(kit_at, table_at, players[event + of.EVENT_KEY])
+def _strike(kit_address: int, table_address: int, event: Event) -> None:
+    if event.kind == of.NOTE_ON:
+        _update(kit_address, table_address, event.key)
 
 
 @njit(**COMPILED)
@@ -106,15 +107,18 @@ def _possible(drum: np.ndarray) -> bool:
 
 
 @njit(**COMPILED)
-def _update(kit_at: int, table_at: int, key: int) -> None:
+def _update(kit_address: int, table_address: int, key: int) -> None:
     """Writes the block of a key that is stale."""
-    kit, counts, keys, tables = reals(kit_at), wholes(kit_at), reals(table_at), wholes(table_at)
+    kit, counts, table = reals(kit_address), wholes(kit_address), table_at(table_address)
     own, capacity = FIRST_KEY + key * KEY, counts[CAPACITY]
     stale, drum = counts[own + KEY_STALE], counts[own + KEY_DRUM]
     counts[own + KEY_STALE] = 0
     if stale == 0 or drum == 0:
         return
-    tuned, found = part(kit, own + KEY_TUNED, DRUM), table(kit, counts[FOUND] + key * ROWS * capacity, ROWS, capacity)
+    tuned, found = (
+        part(kit, own + KEY_TUNED, DRUM),
+        matrix(kit, counts[FOUND] + key * ROWS * capacity, ROWS, capacity),
+    )
     work = part(kit, counts[WORK], 4 * counts[MOST] + ORDERS)
     if stale & MODES_MOVED:
         for value in range(DRUM):
@@ -125,14 +129,14 @@ def _update(kit_at: int, table_at: int, key: int) -> None:
         if _possible(tuned):
             low, terms = counts[drum + LOW], counts[drum + AIR_TERMS]
             air = part(kit, counts[drum + AIR], 2 * low * terms).reshape(2, low, terms)
-            around = table(kit, counts[drum + LIST], SURFACE, counts[drum + LISTED]), air, kit[drum + AIR_REACH]
+            around = matrix(kit, counts[drum + LIST], SURFACE, counts[drum + LISTED]), air, kit[drum + AIR_REACH]
             drums.tune(tuned, kit[own + KEY_RATIO], around, work, found)
             if _possible(tuned):
                 most = of.MOST_DRUM_MODES
                 counts[own + KEY_MODES] = drums.modes(tuned, around, kit[HIGHEST_HZ], most, work, found)
     tuned[D1], tuned[D3] = kit[drum + D1] * kit[VALUES + 1], kit[drum + D3] * kit[VALUES + 2]
-    n, slots = counts[own + KEY_MODES], tables[of.TABLE_DRUMS]
-    block = slots + KEYS + key * (of.DRUM_HEADER + of.DRUM_ROWS * capacity)
-    points, tools = part(kit, VALUES + 3, tables[of.TABLE_POINTS]), (_bessels(kit, counts), work)
-    drums.write(tuned, found, points, tools, part(keys, block, of.DRUM_HEADER + of.DRUM_ROWS * n))
-    tables[slots + key] = block if n > 0 and _possible(tuned) else 0
+    n, slots = counts[own + KEY_MODES], table.drums
+    block = slots + KEYS + key * (drums.HEADER + DRUM_ROWS * capacity)
+    points, tools = part(kit, VALUES + 3, table.points), (_bessels(kit, counts), work)
+    drums.write(tuned, found, points, tools, table_address + 8 * block, n)
+    wholes(table_address)[slots + key] = block if n > 0 and _possible(tuned) else 0

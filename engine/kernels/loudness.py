@@ -5,7 +5,7 @@ note. The quiet instrument's modes decay each by itself, so that the mean square
 body's power at its frequency. The peak is looked for in the sum of the modes over one period of the lowest, each
 through the body as in its steady state; a body that is struck by the release itself may peak higher.
 
-A sound is its modes, in rows of `playing_layout`: ω, σ, and amplitudes left and right, re full scale, with room for
+A sound is its modes, in rows of `constants`: ω, σ, and amplitudes left and right, re full scale, with room for
 the peak. `swings`: modes set out from rest at speeds, as sines, otherwise from their amplitudes, as cosines.
 """
 
@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.kernels.compiled import COMPILED
 
 # BS.1770: the shelf and the high-pass as analogue filters of second order
@@ -79,7 +79,7 @@ def gain(sound: np.ndarray, modes: int, points: int, body: np.ndarray, mix: floa
 
     Args:
         points: 1 or 2 amplitudes of each mode that count.
-        body, mix: its curves, as `playing_layout` has them, and how much of it is heard; at 0 they are not read.
+        body, mix: its curves, as `constants` has them, and how much of it is heard; at 0 they are not read.
     """
     total = 0.0
     noise = _noise(body, mix) if mix > 0.0 else 1.0

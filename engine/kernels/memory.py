@@ -6,10 +6,12 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import njit, types
+from numba import from_dtype, njit, types
+from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
+from engine.kernels import records
 from engine.kernels.compiled import COMPILED
 
 # mypy: disable-error-code="no-untyped-def"
@@ -74,6 +76,89 @@ def wholes(address: int) -> np.ndarray:
     return _wholes(address)
 
 
+def _record(dtype: np.dtype[np.void]) -> Any:
+    """An intrinsic: the record at an address (int64)."""
+    kind = from_dtype(dtype)
+
+    @intrinsic
+    def memory(typing_context, address):
+        def generate(context, builder, _signature, arguments):
+            return builder.inttoptr(arguments[0], context.get_value_type(kind))
+
+        return kind(types.int64), generate
+
+    return memory
+
+
+_player, _table, _drum, _recorded, _attack = map(
+    _record, (records.PLAYER, records.TABLE, records.DRUM, records.RECORDED, records.ATTACK)
+)
+
+
+@njit(**COMPILED)
+def player_at(address: int) -> records.Player:
+    """The player at an address."""
+    return _player(address)
+
+
+@njit(**COMPILED)
+def table_at(address: int) -> records.Table:
+    """The instrument's table at an address."""
+    return _table(address)
+
+
+@njit(**COMPILED)
+def drum_at(address: int) -> records.Drum:
+    """The drum of a key at an address; its rows follow."""
+    return _drum(address)
+
+
+@njit(**COMPILED)
+def recorded_at(address: int) -> records.Recorded:
+    """What a recording adds to strings; its curves and rows follow."""
+    return _recorded(address)
+
+
+@njit(**COMPILED)
+def attack_at(address: int) -> records.Attack:
+    """A recorded attack; its samples follow."""
+    return _attack(address)
+
+
+@intrinsic
+def address_of(typing_context: Any, record: Any):
+    """The address (int64) of a record."""
+
+    def generate(context, builder, _signature, arguments):
+        return builder.ptrtoint(arguments[0], ir.IntType(64))
+
+    return types.int64(record), generate
+
+
+@intrinsic
+def clear(typing_context: Any, record: Any):
+    """Fills a record with zeros."""
+
+    def generate(context, builder, signature, arguments):
+        pointer = builder.bitcast(arguments[0], ir.IntType(8).as_pointer())
+        cgutils.memset(builder, pointer, context.get_constant(types.intp, record.size), 0)
+        return context.get_dummy_value()
+
+    return types.void(record), generate
+
+
+@intrinsic
+def copy(typing_context: Any, into: Any, record: Any):
+    """Writes a record over another of its kind."""
+
+    def generate(context, builder, signature, arguments):
+        to, source = (builder.bitcast(each, ir.IntType(8).as_pointer()) for each in arguments)
+        cgutils.memcpy(builder, to, source, context.get_constant(types.intp, into.size))
+        return context.get_dummy_value()
+
+    return types.void(into, record), generate
+
+
 @intrinsic
 def part(typing_context: Any, memory: Any, first: Any, count: Any):
     """`memory[first : first + count]`, whose bounds nobody checks."""
@@ -85,8 +170,14 @@ def part(typing_context: Any, memory: Any, first: Any, count: Any):
     return memory(memory, types.int64, types.int64), generate
 
 
+@njit(**COMPILED)
+def behind(record: Any, slot: int, count: int) -> np.ndarray:
+    """So many real numbers from a slot on, counted from the beginning of a record that they follow."""
+    return part(_reals(address_of(record)), slot, count)
+
+
 @intrinsic
-def table(typing_context: Any, memory: Any, first: Any, rows: Any, columns: Any):
+def matrix(typing_context: Any, memory: Any, first: Any, rows: Any, columns: Any):
     """The same as an array (rows, columns)."""
     kind = types.Array(memory.dtype, 2, "C", readonly=not memory.mutable)
 

@@ -14,7 +14,7 @@ from numba import carray, njit
 
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import fence, part, pointer, table
+from engine.kernels.memory import fence, matrix, part, pointer
 
 TOO_HIGH = 3.0  # rad a frame: a mode that is raised beyond is laid to rest, for it would sound as another
 
@@ -28,7 +28,7 @@ def row(voice: np.ndarray, modes: int, which: int) -> np.ndarray:
 @njit(**COMPILED)
 def following(voice: np.ndarray, modes: int) -> np.ndarray:
     """What follows from the modes of latents that share a tension, (7, modes): see `kernels.tension.prepare`."""
-    return table(voice, at.state(modes) + at.FOLLOWING * modes, 7, modes)
+    return matrix(voice, at.state(modes) + at.FOLLOWING * modes, 7, modes)
 
 
 @njit(**COMPILED)

@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from engine import bounds
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.kernels.compiled import COMPILED
 
 EXACT = {**COMPILED, "fastmath": False}

@@ -21,12 +21,13 @@ import math
 import numpy as np
 from numba import carray, njit
 
+from engine.kernels import constants as of
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
 from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import pointer
-from engine.kernels.playing.keys import string_of
+from engine.kernels.memory import player_at, pointer, table_at
+from engine.kernels.playing.keys import chosen, string_of
+from engine.kernels.records import Player, Table
 
 HIGHEST_HZ = 4_000.0  # of partials: an estimate, above it boards pass hardly anything to other strings
 PARTIALS = 8  # of a string
@@ -35,38 +36,35 @@ NOTHING = 1e-12  # of full scale: below it all rest
 
 
 @njit(**COMPILED)
-def tune(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray) -> None:
+def tune(player: Player, table: Table) -> None:
     """Fills the bank with the strings of an instrument: of every key, or the open ones of a set."""
-    own = player[of.PLAYER_STRINGS + 3 * of.STRING : of.PLAYER_STRINGS + 4 * of.STRING]
-    count, rate_hz, everyone = 0, player[of.PLAYER_RATE], tables[of.TABLE_SYMPATHY] == of.EVERY_KEY
-    for number in range(of.KEYS if everyone else tables[of.TABLE_STRINGS]):
+    own, bank = player.own, player.sympathy
+    count, rate_hz, everyone = 0, player.rate_hz, table.sympathy == of.EVERY_KEY
+    for number in range(of.KEYS if everyone else table.strings):
         if everyone:
-            inside = tables[of.TABLE_LOW] <= number <= tables[of.TABLE_HIGH]
-            key, string, pitch_hz = number, -1, table[of.TABLE_PITCHES + number] if inside else 0.0
+            inside = table.low <= number <= table.high
+            key, string, pitch_hz = number, -1, table.pitches_hz[number] if inside else 0.0
         else:
-            first = of.TABLE_OPEN + number * of.OPEN_SLOTS
-            key, string = int(table[first + of.OPEN_NOTE]), number
-            pitch_hz = table[first + of.OPEN_HZ]
+            key, string, pitch_hz = int(table.open[number].note), number, table.open[number].pitch_hz
         if not pitch_hz > 0.0:
             continue
-        modes, _ = string_of(player, players, table, tables, key, string, pitch_hz, False, own)
-        lost = table[of.TABLE_SYMPATHY_S_KG] * own[of.TENSION] / own[of.LENGTH]
+        modes, _ = string_of(player, table, key, string, pitch_hz, False, own)
+        lost = table.sympathy_s_kg * own[of.TENSION] / own[of.LENGTH]
         for partial in range(1, min(modes, PARTIALS) + 1):
             omega = math.sqrt(strings.omega_squared(own, partial))
             if count == of.MOST_SYMPATHETIC or omega > 2 * math.pi * HIGHEST_HZ:
                 break
-            lossy = table[of.TABLE_LOSSES], table[of.TABLE_LOSSES + 1], table[of.TABLE_LOSSES + 2]
+            lossy = table.losses[0], table.losses[1], table.losses[2]
             sigma = strings.decay_rate(own, partial) + lost + strings.loss(own, partial, *lossy)
             shrunk = math.exp(-sigma / rate_hz)
-            place = of.PLAYER_SYMPATHY + count
-            players[place + of.SYMPATHY_OWNER * of.MOST_SYMPATHETIC] = number
-            player[place + of.SYMPATHY_COSINE * of.MOST_SYMPATHETIC] = shrunk * math.cos(omega / rate_hz)
-            player[place + of.SYMPATHY_SINE * of.MOST_SYMPATHETIC] = shrunk * math.sin(omega / rate_hz)
-            player[place + of.SYMPATHY_GAIN * of.MOST_SYMPATHETIC] = -2 * lost / rate_hz
-            player[place + of.SYMPATHY_X * of.MOST_SYMPATHETIC] = 0.0
-            player[place + of.SYMPATHY_Y * of.MOST_SYMPATHETIC] = 0.0
+            bank.owner[count] = number
+            bank.cosine[count] = shrunk * math.cos(omega / rate_hz)
+            bank.sine[count] = shrunk * math.sin(omega / rate_hz)
+            bank.gain[count] = -2 * lost / rate_hz
+            bank.x[count] = 0.0
+            bank.y[count] = 0.0
             count += 1
-    players[of.PLAYER_SYMPATHETIC] = count
+    bank.partials = count
 
 
 @njit(**COMPILED)
@@ -103,22 +101,16 @@ def ring(
 @njit(**COMPILED)
 def sympathise(player_address: int, mixer_address: int) -> None:
     """Adds what strings ring that are not played to the mixer's quantum, both channels alike."""
-    player = carray(pointer(player_address), (1 << 40,), np.float64)
-    players = carray(pointer(player_address), (1 << 40,), np.int64)
-    address = players[of.PLAYER_TABLE]
-    if address == 0:
+    player = player_at(player_address)
+    if player.table == 0:
         return
-    table = carray(pointer(address), (1 << 40,), np.float64)
-    tables = carray(pointer(address), (1 << 40,), np.int64)
-    if (
-        players[of.PLAYER_TUNED] != tables[of.TABLE_INSTRUMENT]
-        or players[of.PLAYER_TUNED_BY] != tables[of.TABLE_SYMPATHY]
-    ):
-        players[of.PLAYER_SYMPATHETIC] = 0
-        if tables[of.TABLE_SYMPATHY] != of.NO_SYMPATHY:
-            tune(player, players, table, tables)
-        players[of.PLAYER_TUNED], players[of.PLAYER_TUNED_BY] = tables[of.TABLE_INSTRUMENT], tables[of.TABLE_SYMPATHY]
-    count, size = players[of.PLAYER_SYMPATHETIC], of.MOST_SYMPATHETIC
+    table, bank = table_at(player.table), player.sympathy
+    if bank.instrument != table.instrument or bank.kind != table.sympathy:
+        bank.partials = 0
+        if table.sympathy != of.NO_SYMPATHY:
+            tune(player, table)
+        bank.instrument, bank.kind = table.instrument, table.sympathy
+    count = bank.partials
     if count == 0:
         return
     mixer = carray(pointer(mixer_address), (at.MIXER_SLOTS,), np.float64)
@@ -133,46 +125,42 @@ def sympathise(player_address: int, mixer_address: int) -> None:
         force[frame] = given if abs(given) < at.LARGEST else 0.0  # also where it is not a number
         heard = heard or abs(given) > NOTHING
         out[frame] = 0.0
-    if not heard and players[of.PLAYER_SYMPATHY_RINGS] == 0:
-        players[of.PLAYER_SYMPATHY_STOPS] = 0
+    if not heard and bank.rings == 0:
+        bank.stops = 0
         return
-    everyone = tables[of.TABLE_SYMPATHY] == of.EVERY_KEY
-    first = of.PLAYER_SYMPATHY
-    owners = players[first + of.SYMPATHY_OWNER * size : first + of.SYMPATHY_OWNER * size + count]
-    played = player[first + of.SYMPATHY_PLAYED * size : first + of.SYMPATHY_PLAYED * size + count]
+    everyone = table.sympathy == of.EVERY_KEY
+    played = bank.played[:count]
     played[:] = 0.0
-    if players[of.PLAYER_SYMPATHY_STOPS] > 0:
-        players[of.PLAYER_SYMPATHY_STOPS] -= 1
+    if bank.stops > 0:
+        bank.stops -= 1
         played[:] = 1.0
     for number in range(of.MOST_NOTES):
-        note = of.PLAYER_NOTES + number * of.NOTE_SLOTS
-        if players[note + of.NOTE_STATE] != of.RINGS:
+        note = player.notes[number]
+        if note.state != of.RINGS:
             continue
-        string = players[note + of.NOTE_KEY]
+        string = note.key
         if not everyone:
-            string = players[note + of.NOTE_STRING]
+            string = note.string
             if string < 0:
-                for each in range(tables[of.TABLE_STRINGS]):
-                    string = each
-                    if table[of.TABLE_OPEN + each * of.OPEN_SLOTS + of.OPEN_NOTE] <= players[note + of.NOTE_KEY]:
-                        break
+                string = chosen(table, table.strings, note.key)
         for n in range(count):
-            if owners[n] == string:
+            if bank.owner[n] == string:
                 played[n] = 1.0
     largest = ring(
-        player[first + of.SYMPATHY_X * size : first + of.SYMPATHY_X * size + count],
-        player[first + of.SYMPATHY_Y * size : first + of.SYMPATHY_Y * size + count],
-        player[first + of.SYMPATHY_COSINE * size : first + of.SYMPATHY_COSINE * size + count],
-        player[first + of.SYMPATHY_SINE * size : first + of.SYMPATHY_SINE * size + count],
-        player[first + of.SYMPATHY_GAIN * size : first + of.SYMPATHY_GAIN * size + count],
+        bank.x[:count],
+        bank.y[:count],
+        bank.cosine[:count],
+        bank.sine[:count],
+        bank.gain[:count],
         played,
         force,
         out,
     )
     rings = largest > NOTHING * NOTHING
-    players[of.PLAYER_SYMPATHY_RINGS] = rings
+    bank.rings = rings
     if not rings and not heard:
-        player[first + of.SYMPATHY_X * size : first + (of.SYMPATHY_Y + 1) * size] = 0.0
+        bank.x[:count] = 0.0
+        bank.y[:count] = 0.0
     for frame in range(at.QUANTUM):
         mix[frame, 0] += out[frame]
         mix[frame, 1] += out[frame]

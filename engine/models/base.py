@@ -14,7 +14,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, Generic, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 
 import torch
 from torch import Tensor, nn
@@ -122,6 +122,15 @@ class AnyFrameModel(StringModel[State]):
         Returns:
             displacement (batch, frames, grid_points), and the state after all `steps`.
         """
+
+
+@runtime_checkable
+class KoopmanModel(Protocol):
+    """A model whose latents can be had at any frame."""
+
+    def encode(self, displacement: Tensor) -> Any: ...
+    def latents(self, origin: Tensor, frames: Tensor) -> Tensor: ...
+    def decode(self, latents: Tensor) -> Tensor: ...
 
 
 def check_initialisation(model: StringModel[State], how: str) -> None:

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engine import bounds
-from engine.kernels.playing_layout import AIR_DENSITY_KG_M3, AIR_VISCOSITY_PA_S
+from engine.kernels.constants import AIR_DENSITY_KG_M3, AIR_VISCOSITY_PA_S
 from engine.resonators.base import Array
 from engine.resonators.string import StringParameters
 

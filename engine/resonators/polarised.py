@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine import bounds
-from engine.kernels.playing_layout import HIGHEST_SIGMA, MOST_PAIRS
+from engine.kernels.constants import HIGHEST_SIGMA, MOST_PAIRS
 from engine.resonators.base import Array, Resonator
 from engine.resonators.string import StringParameters
 

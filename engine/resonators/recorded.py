@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 
 from engine import bounds
+from engine.kernels.constants import FADES_SEMITONES
 from engine.resonators.base import Array, Resonator
 from engine.resonators.string import StringParameters
 
-FADES_SEMITONES = 3.0  # a note's own corrections fall as a Gaussian of this width
 MOST_CENTS = 60.0
 RATIOS = (0.05, 20.0)
 ATTACK_PEAK = 32_767

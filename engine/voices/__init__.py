@@ -1,6 +1,7 @@
 """Voices: plucks of a model or of the truth as they ring, and the mixer that sums them; compiled in `engine.kernels`.
 
-programs   what all voices of a source share, made from a preset for one sample rate
+program    what all voices of a source share at one sample rate
+programs   those of a preset, and of the truth
 ear        where and how a string is heard
 voice      one pluck of a program
 mixer      the sum: what a device plays
@@ -12,13 +13,8 @@ from engine.voices.ear import Ear
 from engine.voices.mixer import Gap, Mixer
 from engine.voices.offline import OfflineVoice, render_voice, voice_blocks
 from engine.voices.player import CompiledPlayer
-from engine.voices.programs import (
-    Program,
-    model_program,
-    plain_program,
-    rendered_program,
-    truth_program,
-)
+from engine.voices.program import Program
+from engine.voices.programs import model_program, plain_program, rendered_program, truth_program
 from engine.voices.voice import Voice
 
 __all__ = [

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from torch import Tensor, nn
 
 from engine.kernels import layout as at
+from engine.levels import FULL_SCALE_M
 from engine.models.base import StringModel
 from engine.models.dmd import DMD
 from engine.models.integrated_phase import GAIN_LIMIT, SETTLED, IntegratedPhase
-from engine.pluck import FULL_SCALE_M
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
-from engine.voices.programs import Program, Strike, fits, packed, voice_ends_s
+from engine.voices.program import Program, Strike, fits, packed, voice_ends_s
 
 
 @singledispatch

@@ -14,7 +14,7 @@ from engine.effects import Effects
 from engine.effects.partitions import convolver, partitioned
 from engine.kernels import layout as at
 from engine.kernels.memory import publish
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.voices.derivative import differentiator_taps
 from engine.voices.voice import Voice, possible_s
 

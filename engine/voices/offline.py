@@ -9,14 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.effects import Effects
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.levels import FULL_SCALE_M
+from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import project
 from engine.sources import ModelSource, Runaway
 from engine.voices.ear import Ear
 from engine.voices.mixer import Mixer
-from engine.voices.programs import Program
+from engine.voices.program import Program
 from engine.voices.voice import Voice
 
 SILENCE_S = 0.2  # after the end of one that is rendered until it has decayed

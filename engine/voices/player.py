@@ -15,52 +15,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.kernels import constants as of
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
 from engine.kernels.memory import publish
+from engine.kernels.records import EVENT, PLAYER, REPORT, TABLE, player_slots, slot, slots, voice_bytes
 from engine.pluck import SHAPES, Pluck
 from engine.resonators.string import StringParameters
-from engine.voices.mixer import Mixer
 from engine.voices.voice import possible_s
 
 AT_HAND = 16  # notes whose memory is there from the start
 PAGE_SLOTS = 512  # of 4 kB
 LOG_DB = 20 / math.log(10)
 
-# An event and a report as records: the slots of `playing_layout`, in their order
-EVENT = np.dtype(
-    [
-        *((name, np.int64) for name in ("frame", "kind", "channel", "key")),
-        ("value", np.float64),
-        ("id", np.int64),
-        ("position", np.float64),
-        ("amplitude_mm", np.float64),
-        ("table", np.int64),
-        ("struck_s", np.float64),
-        ("width", np.float64),
-        ("struck", np.int64),
-        ("struck_modes", np.int64),
-        ("chord", np.int64),
-        ("came", np.int64),
-        ("string", np.int64),
-        ("shape", np.int64),
-    ]
-)
-REPORT = np.dtype(
-    [
-        *((name, np.int64) for name in ("kind", "id", "channel", "key", "frame")),
-        ("velocity", np.float64),
-        ("string", np.int64),
-        ("table", np.int64),
-        *((name, np.float64) for name in ("position", "amplitude_mm", "width", "gain")),
-        *((name, np.int64) for name in ("modes", "note")),
-        ("spare", np.int64, of.REPORT_OWN - of.REPORT_NOTE - 1),
-        ("own", np.float64, of.STRING),
-    ]
-)
-REPORTED = tuple(name for name in REPORT.fields or () if name not in ("spare", "own"))
-assert EVENT.itemsize == 8 * of.EVENT_SLOTS
-assert REPORT.itemsize == 8 * of.REPORT_SLOTS
+REPORTED = tuple(name for name in REPORT.names or () if name != "own")
+PUSHED = slot(PLAYER, "pushed")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +36,7 @@ class Table:
     """An instrument as the kernels read it, with the memory that it points to.
 
     Attributes:
-        memory: see `playing_layout`.
+        memory: `records.TABLE`, and what it points to.
         programs: of the sources of its notes.
     """
 
@@ -80,8 +48,12 @@ class Table:
         return int(self.memory.ctypes.data)
 
     @property
+    def record(self) -> np.void:
+        return record_of(self.memory, TABLE)
+
+    @property
     def serial(self) -> int:
-        return int(self.memory.view(np.int64)[of.TABLE_SERIAL])
+        return int(self.record["serial"])
 
 
 @dataclass(frozen=True)
@@ -89,7 +61,7 @@ class Report:
     """What became of a note.
 
     Attributes:
-        kind: BEGAN, ENDED or REFUSED of `playing_layout`; for others than BEGAN only the first five count.
+        kind: BEGAN, ENDED or REFUSED of `constants`; for others than BEGAN only the first five count.
         id: of its event.
         frame: of the mixer.
         string: on which of a set it is played, from the highest, 0; -1: the key chooses.
@@ -189,11 +161,12 @@ class CompiledPlayer:
         from engine.kernels.playing.events import begin  # Numba only when it is needed
 
         self.rate_hz = rate_hz
-        self.memory = memory = np.zeros(of.player_slots(modes + of.MOST_PAIRS))
-        for number in range(AT_HAND * of.MOST_SOURCES):  # else the audio thread would wait for pages of memory
-            first = of.PLAYER_VOICES + number * of.voice_slots(modes + of.MOST_PAIRS)
-            memory[first : first + of.voice_slots(modes + of.MOST_PAIRS) : PAGE_SLOTS] = 0.0
-        self._counts = counts = memory.view(np.int64)
+        self.memory = memory = np.zeros(player_slots(modes + of.MOST_PAIRS))
+        self._voice_slots = voice_bytes(modes + of.MOST_PAIRS) // 8
+        at_hand = slots(PLAYER) + AT_HAND * of.MOST_SOURCES * self._voice_slots
+        memory[slots(PLAYER) : at_hand : PAGE_SLOTS] = 0.0  # else the audio thread would wait for pages of memory
+        self._counts = memory.view(np.int64)
+        self.record = record = record_of(memory, PLAYER)
         self._lock = threading.Lock()
         self._ids = itertools.count(1)
         self._backlog: deque[tuple[object, ...]] = deque()  # for which the ring has no room
@@ -201,15 +174,9 @@ class CompiledPlayer:
         self._struck: dict[int, NDArray[np.float64]] = {}  # by event, until it is reported
         self._read = 0
         self.missed = False
-        memory[of.PLAYER_RATE] = rate_hz
-        counts[of.PLAYER_MODES], counts[of.PLAYER_MOST] = modes + of.MOST_PAIRS, most_notes
-        memory[of.PLAYER_SOURCE_GAINS : of.PLAYER_SOURCE_GAINS + of.MOST_SOURCES] = 1.0
+        record["rate_hz"], record["modes"], record["most"] = rate_hz, modes + of.MOST_PAIRS, most_notes
+        record["source_gains"] = 1.0
         begin(self.address)
-        self._events = self._records(of.PLAYER_EVENTS, of.EVENTS, EVENT)
-        self._reports = self._records(of.PLAYER_REPORTS, of.REPORTS, REPORT)
-
-    def _records(self, first: int, count: int, kind: np.dtype[np.void]) -> NDArray[np.void]:
-        return self.memory[first : first + count * kind.itemsize // 8].view(kind)
 
     @property
     def address(self) -> int:
@@ -233,7 +200,7 @@ class CompiledPlayer:
         """Hands an event over; its number, which reports of a note carry. Any thread, at once; none is lost.
 
         Args:
-            kind: one of `playing_layout`, as all that follows.
+            kind: one of `constants`, as all that follows.
             frame: of the mixer, at which it counts; 0: at once.
             by_hand: the pluck of a note; None: as the instrument and the velocity have it.
             note: the number of the note that is tuned, choked or cancelled; 0: all.
@@ -257,9 +224,9 @@ class CompiledPlayer:
         """Plays another table from a frame on; strings that ring glide to it. Any thread."""
         with self._lock:
             self._tables.append(table)
-            while self._tables[0].serial < int(self._counts[of.PLAYER_SERIAL]):
+            while self._tables[0].serial < int(self.record["serial"]):
                 self._tables.popleft()
-            self._push((frame, of.TABLE, 0, 0, 0.0, 0, 0.0, 0.0, table.address, *(0,) * (of.EVENT_SLOTS - 9)))
+            self._push((frame, of.TABLE, 0, 0, 0.0, 0, 0.0, 0.0, table.address, *(0,) * (len(EVENT.names or ()) - 9)))
 
     def _push(self, record: tuple[object, ...]) -> None:
         self._backlog.append(record)
@@ -267,45 +234,43 @@ class CompiledPlayer:
 
     def _flush(self) -> None:
         """Hands over what waits, as far as the ring has room. Under the lock."""
-        counts = self._counts
-        pushed = int(counts[of.PLAYER_PUSHED])
-        room = of.EVENTS - (pushed - int(counts[of.PLAYER_TAKEN]))
+        pushed = int(self.record["pushed"])
+        room = of.EVENTS - (pushed - int(self.record["taken"]))
         for number in range(min(room, len(self._backlog))):
-            self._events[(pushed + number) % of.EVENTS] = self._backlog.popleft()
-            publish(counts, of.PLAYER_PUSHED, pushed + number + 1)
+            self.record["events"][(pushed + number) % of.EVENTS] = self._backlog.popleft()
+            publish(self._counts, PUSHED, pushed + number + 1)
 
     @property
     def waiting(self) -> int:
         """Events that are still to be played."""
         with self._lock:
             self._flush()
-            counts = self._counts
-            ring = int(counts[of.PLAYER_PUSHED] - counts[of.PLAYER_TAKEN])
-            return ring + int(counts[of.PLAYER_QUEUED]) + len(self._backlog)
+            ring = int(self.record["pushed"] - self.record["taken"])
+            return ring + int(self.record["queued"]) + len(self._backlog)
 
-    def catch_up(self, mixer: Mixer) -> None:
+    def catch_up(self, mixer_address: int) -> None:
         """Plays what is due in the mixer's next quantum now, where no device takes its frames."""
         from engine.kernels.playing.events import play
 
         with self._lock:
             while True:
                 self._flush()
-                play(self.address, mixer.address)
-                if not self._backlog or self._counts[of.PLAYER_QUEUED] == of.QUEUED:
+                play(self.address, mixer_address)
+                if not self._backlog or self.record["queued"] == of.QUEUED:
                     return
 
     def set_source_gains(self, gains: Iterable[float]) -> None:
         """The factor of each source, of notes whose voices are the player's own; those that ring fade to it."""
         for source, gain in enumerate(gains):
-            self.memory[of.PLAYER_SOURCE_GAINS + source] = gain
+            self.record["source_gains"][source] = gain
 
     def set_spares(self, spares: bool) -> None:
         """Whether notes begin without voices of sources that are not heard: they cost nothing, and stay silent."""
-        self._counts[of.PLAYER_SPARES] = spares
+        self.record["spares"] = spares
 
     def source_gain(self, source: int) -> float:
         """As it was set."""
-        return float(self.memory[of.PLAYER_SOURCE_GAINS + source])
+        return float(self.record["source_gains"][source])
 
     # What there is
 
@@ -313,12 +278,12 @@ class CompiledPlayer:
         """Those since this was asked for the last time; of very many only the latest. One thread asks."""
         with self._lock:
             self._flush()
-        total, found = int(self._counts[of.PLAYER_REPORTED]), []
+        total, found = int(self.record["reported"]), []
         self.missed |= total > self._read + of.REPORTS
         first, self._read = max(self._read, total - of.REPORTS), total
         for number in range(first, total):
-            record = self._reports[number % of.REPORTS].copy()
-            if int(self._counts[of.PLAYER_REPORTED]) - number >= of.REPORTS:
+            record = self.record["reports"][number % of.REPORTS].copy()
+            if int(self.record["reported"]) - number >= of.REPORTS:
                 self.missed = True  # it was written again meanwhile
                 continue
             known = {name: record[name].item() for name in REPORTED}
@@ -333,22 +298,22 @@ class CompiledPlayer:
         """The notes that have their places and ring. Any thread; the levels are those of the latest quantum."""
         found = []
         for number, note in enumerate(self._notes()):
-            if note[of.NOTE_STATE] != of.RINGS or not note[of.NOTE_HAS_PLACE] or note[of.NOTE_MEMBER]:
+            if note["state"] != of.RINGS or not note["has_place"] or note["member"]:
                 continue
             alive = _alive(self._voices(number, note))
             if alive:
                 level = max(float(voice[at.LOUDNESS]) for voice in alive) * LOG_DB
                 frames = max(int(voice.view(np.int64)[at.FRAME]) for voice in alive)
-                id, channel, key = (int(note[of.NOTE_ID + place]) for place in (0, 2, 3))
-                string, length_m = int(note[of.NOTE_STRING]), self._length_m(note, alive[0])
+                id, channel, key, string = (int(note[name]) for name in ("id", "channel", "key", "string"))
+                length_m = self._length_m(note, alive[0])
                 found.append(Ringing(id, channel, key, level, frames / self.rate_hz, string, length_m))
         return found
 
-    def _length_m(self, note: NDArray[np.int64], voice: NDArray[np.float64]) -> float | None:
+    def _length_m(self, note: np.void, voice: NDArray[np.float64]) -> float | None:
         """Of a note's string: where it glides to, times how far the first mode of a voice has still to go."""
-        if note[of.NOTE_DRUM]:
+        if note["drum"]:
             return None
-        own = _string(note.view(np.float64)[of.NOTE_STRING_NOW : of.NOTE_STRING_NOW + of.STRING])
+        own = _string(note["string_now"])
         if own is None:
             return None
         modes = int(voice.view(np.int64)[at.MODES])
@@ -361,14 +326,13 @@ class CompiledPlayer:
         if not self.missed or self.waiting:
             return []
         self.missed = False
-        rings = {int(note[of.NOTE_ID]) for note in self._notes() if note[of.NOTE_STATE] == of.RINGS}
+        rings = {int(note["id"]) for note in self._notes() if note["state"] == of.RINGS}
         return [id for id in ids if id not in rings]
 
     def playing(self, report: Report) -> Playing | None:
         """How far a note is that `report` says to have begun; None: it has ended. Any thread."""
-        first = of.PLAYER_NOTES + report.note * of.NOTE_SLOTS
-        note = self._counts[first : first + of.NOTE_SLOTS].copy()
-        if note[of.NOTE_STATE] != of.RINGS or note[of.NOTE_ID] != report.id:
+        note = self.record["notes"][report.note].copy()
+        if note["state"] != of.RINGS or note["id"] != report.id:
             return None
         voices = self._voices(report.note, note)
         counts = [voice.view(np.int64) for voice in voices]
@@ -381,8 +345,8 @@ class CompiledPlayer:
     @property
     def rests(self) -> bool:
         """Whether it has nothing to play, and nothing rings."""
-        rings = any(note[of.NOTE_STATE] == of.RINGS for note in self._notes())
-        return not (rings or self._counts[of.PLAYER_SYMPATHY_RINGS] or self.waiting)
+        rings = any(self.record["notes"]["state"] == of.RINGS)
+        return not (rings or self.record["sympathy"]["rings"] or self.waiting)
 
     @property
     def over(self) -> bool:
@@ -396,48 +360,51 @@ class CompiledPlayer:
                 if voice.view(np.int64)[at.RELEASE] == 0:
                     voice.view(np.int64)[at.RELEASE] = max(1, round(seconds * self.rate_hz))
 
-    def _notes(self) -> NDArray[np.int64]:
-        """(MOST_NOTES, NOTE_SLOTS) as they are now."""
-        notes = self._counts[of.PLAYER_NOTES : of.PLAYER_NOTES + of.MOST_NOTES * of.NOTE_SLOTS].copy()
-        return notes.reshape(of.MOST_NOTES, of.NOTE_SLOTS)
+    def _notes(self) -> NDArray[np.void]:
+        """The notes (MOST_NOTES,) as they are now."""
+        return self.record["notes"].copy()
 
-    def _voices(self, number: int, note: NDArray[np.int64]) -> list[NDArray[np.float64]]:
+    def _voices(self, number: int, note: np.void) -> list[NDArray[np.float64]]:
         """The headers of a note's voices; none where it is free."""
-        found, stride = [], of.voice_slots(int(self._counts[of.PLAYER_MODES]))
-        for source in range(of.MOST_SOURCES if note[of.NOTE_STATE] == of.RINGS else 0):
-            address = int(note[of.NOTE_VOICES + source])
-            own = of.PLAYER_VOICES + (number * of.MOST_SOURCES + source) * stride
-            if address:
+        found = []
+        for source in range(of.MOST_SOURCES if note["state"] == of.RINGS else 0):
+            own = slots(PLAYER) + (number * of.MOST_SOURCES + source) * self._voice_slots
+            if note["voices"][source]:
                 found.append(self.memory[own : own + at.HEADER])
         return found
 
     @property
     def wheel(self) -> tuple[int, int]:
         """The modulation wheel, 0 … 127, and the channel that moved it."""
-        return int(self._counts[of.PLAYER_WHEEL]), int(self._counts[of.PLAYER_WHEEL_BY])
+        return int(self.record["wheel"]), int(self.record["wheel_by"])
 
     def channel(self, number: int) -> Channel:
         """Where wheels and pedals of a channel stand."""
-        first = of.PLAYER_CHANNELS + number * of.CHANNEL_SLOTS
-        slots, counts = (each[first : first + of.CHANNEL_SLOTS].copy() for each in (self.memory, self._counts))
-        slide, wide = int(counts[of.CHANNEL_SLIDE]), float(slots[of.CHANNEL_RANGE])
+        own = self.record["channels"][number].copy()
+        slide, wide = int(own["slide"]), float(own["range_semitones"])
+        legato, slides, harmonics, tremolo, strums = map(bool, own["switches"])
         return Channel(
-            float(slots[of.CHANNEL_BEND]),
-            bool(counts[of.CHANNEL_PEDAL]),
+            float(own["bend"]),
+            bool(own["pedal"]),
             slide if slide >= 0 else None,
             wide if wide >= 0 else None,
-            round(127 * float(slots[of.CHANNEL_MUTE])),
-            bool(counts[of.CHANNEL_LEGATO]),
-            bool(counts[of.CHANNEL_SLIDES]),
-            int(counts[of.CHANNEL_TIME]),
-            bool(counts[of.CHANNEL_HARMONICS]),
-            bool(counts[of.CHANNEL_TREMOLO]),
-            bool(counts[of.CHANNEL_STRUMS]),
-            int(counts[of.CHANNEL_VOLUME]),
-            int(counts[of.CHANNEL_EXPRESSION]),
-            int(counts[of.CHANNEL_COARSE_TUNING]),
-            int(counts[of.CHANNEL_FINE_TUNING]),
+            round(127 * float(own["mute"])),
+            legato,
+            slides,
+            int(own["slide_time"]),
+            harmonics,
+            tremolo,
+            strums,
+            int(own["volume"]),
+            int(own["expression"]),
+            int(own["coarse_tuning"]),
+            int(own["fine_tuning"]),
         )
+
+
+def record_of(memory: NDArray[np.float64], kind: np.dtype[np.void]) -> np.void:
+    """The record at the beginning of memory, which shares it."""
+    return memory[: slots(kind)].view(kind)[0]
 
 
 def _string(row: NDArray[np.float64]) -> StringParameters | None:

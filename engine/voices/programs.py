@@ -7,23 +7,20 @@ sound at once, at the device's own rate. Any other model is rendered ahead at it
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from engine.bounds import SUBSTEPS_IN_A_PERIOD
 from engine.kernels import layout as at
-from engine.kernels.modes import TOO_HIGH
 from engine.kernels.scheme import KICKS, ROTATIONS
+from engine.levels import FULL_SCALE_M
 from engine.models._tension_arrays import CURVES
 from engine.models.configurations import KoopmanTensionConfiguration
-from engine.pluck import FULL_SCALE_M
 from engine.presets import Preset, PresetInfo
 from engine.resonators.base import Array, Resonator
-from engine.voices.ear import Ear
+from engine.voices.program import Program, fits, header, packed, voice_ends_s
 
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
 # Drums radiate high modes better than low ones: at 4e-6 they would leave with audible steps.
@@ -31,72 +28,8 @@ DRUM_SILENCE = 2e-7
 # Of the model's drums: shares of the sound, below which a mode rests if it hardly stretches the drum, and of all
 # amplitudes, below which it is laid to rest for good.
 DRUM_UNHEARD, DRUM_STILL = 1e-7, 1e-8
-STRING_SILENT_DB = 120.0  # its slowest mode, below its start
 HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below audibility
 FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
-
-Strike = Callable[[Array], tuple[Array, Array]]
-KEPT_WEIGHTS = 32  # listening points of a program
-
-
-@dataclass(frozen=True, eq=False)
-class Program:
-    """See the module; the kernels read `memory`.
-
-    Attributes:
-        modes: latents of a bank, modes of a solver, 0 where samples are rendered.
-        start: initial displacement (grid_points,) in m to the two rows (modes,) that a voice sets out from.
-        read: weights (grid_points, points) of displacement to weights (points, 2 modes) and bias (points,), of full
-            scale.
-        resonator: whose modes its voices begin with, and may leave; None: its kind has none of its own.
-        ends_s: since the pluck, when a voice ends whatever its model still gives.
-        force: `Resonator.force_weights` of the string that is played; None: it cannot be heard at a bridge.
-    """
-
-    kind: int
-    memory: Array
-    modes: int
-    rate_hz: int
-    grid_points: int
-    start: Strike
-    read: Callable[[Array], tuple[Array, Array]]
-    resonator: Resonator | None = None
-    ends_s: float = math.inf
-    force: Array | None = None
-    _known: dict[Ear, tuple[Array, Array]] = field(default_factory=dict)
-
-    def weights(self, ear: Ear) -> tuple[Array, Array]:
-        """As `read`, of a pair of listening points; remembered. Any thread may ask."""
-        found = self._known.get(ear)
-        if found is None:
-            found = self.read(self.grid_weights(ear))
-            if len(self._known) >= KEPT_WEIGHTS:
-                self._known.clear()
-            self._known[ear] = found
-        return found
-
-    def grid_weights(self, ear: Ear) -> Array:
-        """As `Ear.weights`, for its string; displacement @ weights is the signal."""
-        return ear.weights(self.grid_points, self.force)
-
-    @property
-    def rendered(self) -> bool:
-        """Whether somebody renders the samples of its voices."""
-        return self.kind == at.RENDERED
-
-    @property
-    def address(self) -> int:
-        return int(self.memory.ctypes.data)
-
-
-def voice_ends_s(info: PresetInfo) -> float:
-    """When a pluck of a preset's model has ended for certain, in s; inf where its string has no losses.
-
-    The string itself is silent by then. A model need not be: one that was trained on a part of a second may settle to
-    a hum of its own, and nothing it has learned makes it end. Latents that share a tension need no such end: their
-    energy is held below that of the slowest mode.
-    """
-    return max(info.horizon_s, info.resonator.falls_s(STRING_SILENT_DB))
 
 
 def tension_program(
@@ -162,11 +95,6 @@ def solver_memory(rate_hz: int, coarser: int = HEARD_COARSER, silence: float = H
         **{at.T_KICKS + stage: share for stage, share in enumerate(KICKS)},
     }
     return header(at.T_HEADER, reals, {})
-
-
-def fits(omega: Array) -> Array:
-    """1 where a mode turns by so few rad a frame, ω (modes,), that it sounds as itself, else 0."""
-    return (np.abs(omega) <= TOO_HIGH).astype(np.float64)
 
 
 def _with_modes(kind: int, memory: Array, resonator: Resonator, rate_hz: int, aliased: bool = False) -> Program:
@@ -235,29 +163,3 @@ def _samples_program(
         return np.zeros((weights.shape[1], 0)), np.zeros(weights.shape[1])
 
     return Program(at.RENDERED, memory, 0, rate_hz, grid_points, start, read, None, ends_s, force)
-
-
-def packed(
-    header_slots: int, reals: dict[int, float], wholes: dict[int, int], parts: dict[int, NDArray[np.generic]]
-) -> Array:
-    """One array of a header and its parts, whose places the header gives."""
-    arrays: Sequence[NDArray[np.generic]] = [np.asarray(part).ravel() for part in parts.values()]
-    first = header(header_slots, reals, wholes)
-    memory = np.concatenate([first, np.zeros(sum(len(array) for array in arrays))])
-    counts = memory.view(np.int64)
-    place = header_slots
-    for slot, array in zip(parts, arrays, strict=True):
-        counts[slot] = place
-        target = counts if array.dtype == np.int64 else memory
-        target[place : place + len(array)] = array
-        place += len(array)
-    return memory
-
-
-def header(slots: int, reals: dict[int, float], wholes: dict[int, int]) -> Array:
-    memory = np.zeros(slots)
-    for slot, real in reals.items():
-        memory[slot] = real
-    for slot, whole in wholes.items():
-        memory.view(np.int64)[slot] = whole
-    return memory

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from engine.kernels import layout as at
 from engine.kernels.layout import ATTACK_S, END_FADE_S, FADE_S, LONGEST_S, SILENT_DB
 from engine.kernels.memory import publish
-from engine.pluck import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
+from engine.levels import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.resonators.base import Resonator
 from engine.voices.ear import Ear
-from engine.voices.programs import Program
+from engine.voices.program import Program
 
 SPARE_S = 0.1  # of samples that are rendered ahead, behind that fade
 LONGEST_WAIT_S = 10.0  # between two readings of a device's clock that are of one sound

@@ -12,7 +12,8 @@ from app.patches.patch import Fretted, Patch, PhysicalString, StringSet
 from app.session.choices import Choices
 from app.shared.parameters import OF_CHOICES
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
-from engine.pluck import LARGEST_AMPLITUDE_MM, POSITION_RANGE, SHAPES, WIDTH_RANGE
+from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
+from engine.pluck import SHAPES
 
 SECONDS_RANGE = (0.5, 4.0)
 VOLUME_RANGE_DB = (-40.0, 6.0)

@@ -15,8 +15,8 @@ from app.instrument.events import Bend, Event, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events, render_note
 from app.instrument.strings import Strings
 from app.patches.patch import Body, Patch, Room
+from engine.kernels.constants import PART_S, REFERENCE_VELOCITY
 from engine.kernels.loudness import k_weight
-from engine.kernels.playing_layout import PART_S, REFERENCE_VELOCITY
 from engine.presets import Preset
 from tests.bench.machine import Machine
 

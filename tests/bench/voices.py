@@ -21,8 +21,9 @@ from app.instrument.strings import Strings
 from app.patches.library import find_patch
 from app.patches.patch import Noise
 from app.presets.library import STUDIO
-from engine.kernels.playing_layout import MOST_NOTES, MOST_PAIRS
-from engine.pluck import DEFAULT_LISTEN, FULL_SCALE_M, Pluck
+from engine.kernels.constants import MOST_NOTES, MOST_PAIRS
+from engine.levels import FULL_SCALE_M
+from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import SHIPPED, Preset, load_preset, preset_files
 from engine.resonators.sine_transform import project
 from engine.sources import ModelSource, StringSource, TruthSource

@@ -19,7 +19,7 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch, save_patch
 from app.patches.patch import Patch
 from app.window.settings import Settings, save_settings
-from engine.kernels import warm
+from engine import warm
 from engine.presets import SHIPPED, load_preset
 from training.cell import load
 from training.data.dataset import load_dataset

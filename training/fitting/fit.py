@@ -32,7 +32,8 @@ from training.fitting import together
 from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.fitting.losses import backward
 from training.fitting.soap import SOAP
-from training.start import LEAST_SQUARES, begin
+from training.fitting.start import begin
+from training.start import LEAST_SQUARES
 
 CHECKPOINT_EVERY_S = 30.0  # at most, or a step where one takes longer
 TELL_EVERY_S = 5.0  # within an epoch

@@ -18,21 +18,12 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from engine.models.base import StringModel
+from engine.models.base import KoopmanModel, StringModel
 from training.configuration import Recipe
 from training.data.batches import Batch
 
 FRAMES_AT_ONCE = 2048  # on a CPU: their numbers stay in a core's cache
 SILENT = 1e-12  # a string's mean square in normalised units that a relative loss divides by at least
-
-
-@runtime_checkable
-class KoopmanModel(Protocol):
-    """A model whose latents can be had at any frame."""
-
-    def encode(self, displacement: Tensor) -> Any: ...
-    def latents(self, origin: Tensor, frames: Tensor) -> Tensor: ...
-    def decode(self, latents: Tensor) -> Tensor: ...
 
 
 @runtime_checkable

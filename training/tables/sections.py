@@ -12,7 +12,6 @@ from engine.schema import SchemaError
 from training.cell import HORIZON, load
 from training.configuration import TrainingConfiguration
 from training.results import SHORT_HORIZON, Row
-from training.start import hints_of
 from training.tables.paper import (
     COLUMNS,
     HORIZONS,
@@ -38,7 +37,7 @@ class Line:
         initialisation: "" where it is no choice (DMD is fitted).
         structured: whether it started from prior knowledge of the string; see `Row.structured`.
         trained: frames that its runs were trained on; more than the table's where their first frames are measured.
-        hints: what its runs were given of the string without prior knowledge, in words; see `hints_of`.
+        hints: of its runs, see `TrainingConfiguration.hints`.
     """
 
     model: str
@@ -148,7 +147,7 @@ def _is_measured(row: Row, horizon: int) -> bool:
 
 def _line(row: Row) -> Line:
     how = "" if row.model == "dmd" else row.initialisation  # fitted: an initialisation is asked of it by nobody
-    return Line(row.model, row.recipe, how, row.structured, row.horizon, hints_of(load(row.name)))
+    return Line(row.model, row.recipe, how, row.structured, row.horizon, load(row.name).hints)
 
 
 def _entry(rows: Sequence[Row], horizon: int) -> Entry:

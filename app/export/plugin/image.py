@@ -28,12 +28,14 @@ from engine import bounds
 from engine.effects import body, curves, impulse, room
 from engine.effects.amp import NOMINAL
 from engine.effects.partitions import FADE_S
+from engine.kernels import constants as of
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
+from engine.kernels.records import CHANNEL, EVENT, PLAYER, REPORT, TABLE, slot, slots, voice_bytes
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import Preset
 from engine.voices.derivative import differentiator_taps
 from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S
+from engine.voices.player import record_of
 
 PREPARED_HZ = 48_000
 MAKER = "Learned Strings"
@@ -200,10 +202,10 @@ def image_of(patch: Patch, preset: Preset) -> Image:
         whole.extend(content)
         return first
 
-    drums_at = table.memory.view(np.int64)[of.TABLE_DRUMS]
+    drums_at = int(table.record["drums"])
     kit = kit_of(player.keys) if isinstance(player.keys, DrumKeys) else None
     memory = table.memory[: drums_at or None].copy()  # the shell computes the drums of keys
-    memory.view(np.int64)[of.TABLE_PROGRAMS : of.TABLE_PROGRAMS + of.MOST_SOURCES] = 0
+    record_of(memory, TABLE)["programs"] = 0
     header.table, header.table_slots = put(memory.tobytes()) // 8, len(memory)
     model, truth = table.programs
     header.model, header.model_slots = put(model.tobytes()) // 8, len(model)
@@ -348,26 +350,29 @@ def layout_header(version: str) -> str:
         "M_EFFECTS_NOW M_EFFECTS_NEXT M_PLAYER M_TAPS M_GAINS M_ADDRESS M_SCRATCH M_AMPLIFIER A_WANTED_DRIVE "
         "A_WANTED_GAIN NEXT_WEIGHTS A_WANTED_TONE I_HEADER C_CAPACITY C_FADE_WINDOWS "
         "C_ACTIVE C_STEP C_COSINES C_SINES C_WORK C_LATE S_RATE T_RATE",
-        of: "NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENT_FRAME EVENT_KIND "
-        "EVENT_CHANNEL EVENT_KEY EVENT_VALUE EVENT_ID EVENT_TABLE EVENT_SLOTS "
-        "EVENTS REPORTS MOST_NOTES MOST_SOURCES TABLE_MODE TABLE_SOURCES TABLE_PROGRAMS MPE KEYS "
-        "CHANNELS CHANNEL_SLOTS CHANNEL_RANGE BEND_SEMITONES PLAYER_MOST PLAYER_MODES PLAYER_PUSHED "
-        "PLAYER_TAKEN PLAYER_QUEUED PLAYER_REPORTED PLAYER_RATE PLAYER_SOURCE_GAINS PLAYER_VALUES "
-        "PLAYER_CHANNELS PLAYER_EVENTS PLAYER_REPORTS PLAYER_VOICES BEGAN REPORT_KIND REPORT_ID "
-        "REPORT_CHANNEL REPORT_KEY REPORT_SLOTS PLAYER_WHEEL "
-        "BODY_MIX "
-        "TABLE_BODY BODY_CROSS BODY_STEP BODY_HEADER BODY_POINTS BODY_LOWEST_HZ BODY_STEPS BODY_SLOTS",
+        of: "NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENTS REPORTS MOST_NOTES "
+        "MOST_SOURCES MPE KEYS CHANNELS BEND_SEMITONES BEGAN BODY_MIX BODY_CROSS BODY_STEP BODY_HEADER "
+        "BODY_POINTS BODY_LOWEST_HZ BODY_STEPS BODY_SLOTS",
     }
     lines = [f'#define LS_VERSION "{version}"']
     for module, names in wanted.items():
         lines += [f"#define {name} {getattr(module, name)}" for name in names.split()]
-    none = of.voice_slots(0)
+    for name, kind in (
+        ("PLAYER", PLAYER),
+        ("EVENT", EVENT),
+        ("REPORT", REPORT),
+        ("TABLE", TABLE),
+        ("CHANNEL", CHANNEL),
+    ):
+        lines += [f"#define {name}_{field.upper()} {slot(kind, field)}" for field in kind.names or ()]
+        lines += [f"#define {name}_SLOTS {slots(kind)}"]
+    none = voice_bytes(0) // 8
     records = {"IMAGE": _Header, "PARAMETER": _Parameter, "MACRO": _Macro}
     lines += [f"#define {name}_BYTES {ctypes.sizeof(record)}" for name, record in records.items()]
     lines += [f"#define {name} {_in_c(value)}" for name, value in _RESPONSES.items()]
     lines += [
         f"#define VOICE_SLOTS_FIXED {none}",
-        f"#define VOICE_SLOTS_A_MODE {of.voice_slots(1) - none}",
+        f"#define VOICE_SLOTS_A_MODE {voice_bytes(1) // 8 - none}",
         f"#define CONVOLVER_FADE_S {FADE_S}",
         f"#define AMP_NOMINAL {NOMINAL}",
         f"#define LIMITER_RELEASE_S {LIMITER_RELEASE_S}",

@@ -17,9 +17,10 @@ from app.shared.parameters import OF_PATCHES
 from engine.bounds import BODY_SIZE
 from engine.effects import BODIES
 from engine.effects.body import HIGHEST_HZ, SUBSONIC, modes_of
+from engine.kernels import constants as of
 from engine.kernels import drum_modes as kernel
 from engine.kernels import kit
-from engine.kernels import playing_layout as of
+from engine.kernels.records import DRUM, DRUM_ROWS, slots
 from engine.resonators.base import Array
 
 EFFECTS = ("body.mix", "room.mix", "body.size", "room.t60_s")  # in the shell's order
@@ -79,7 +80,7 @@ class Kit:
     @property
     def table_room(self) -> int:
         """Slots behind an instrument's table for the drums of all keys."""
-        return of.KEYS * (1 + of.DRUM_HEADER + of.DRUM_ROWS * self.modes)
+        return of.KEYS * (1 + slots(DRUM) + DRUM_ROWS * self.modes)
 
 
 def kit_of(own: DrumKeys) -> Kit:

@@ -24,12 +24,8 @@ from app.views.controls.plain import Label
 from app.views.controls.shape_box import AT_BRIDGE, NO_WIDTH, pickup_box, shape_box
 from app.views.controls.slot_buttons import SlotButtons
 from app.views.faces import Area
-from engine.pluck import (
-    FULL_SCALE_M,
-    FULL_SCALE_M_S,
-    FULL_SCALE_N,
-    SHAPES,
-)
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N
+from engine.pluck import SHAPES
 
 KNOBS = ("position", "amplitude_mm", "width", "listen", "listen_right", "seconds", "speed", "volume_db")
 OF_THE_PATCH = "While keys play the instrument, it is the instrument's own and is saved with it"

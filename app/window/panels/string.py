@@ -24,7 +24,8 @@ from app.views.string.ground import TrainedPlucks
 from app.views.string.ink import ShownPluck
 from app.views.string.view import StringView
 from app.window.panels.base import Moment, StagePanel
-from engine.pluck import SHAPES, WIDTH_RANGE, Pluck
+from engine.bounds import WIDTH_RANGE
+from engine.pluck import SHAPES, Pluck
 from engine.presets import PresetInfo, outside_training
 
 MM = 1000.0

@@ -15,12 +15,11 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.kernels.compiled import COMPILED
-from engine.kernels.playing import slots
+from engine.kernels.records import Event, Player, Table
 
 MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
 WIDEST_SEMITONES = 96.0  # that messages may ask for
@@ -37,66 +36,59 @@ DATA, FINE_DATA, INCREMENT, DECREMENT, FINE_OTHER, OTHER, FINE_REGISTERED, REGIS
     101,
 )
 NO_PARAMETER, BEND_RANGE, FINE_TUNING, COARSE_TUNING = 127, 0, 1, 2  # registered parameters
-SWITCHES = (
-    of.CHANNEL_LEGATO,
-    of.CHANNEL_SLIDES,
-    of.CHANNEL_HARMONICS,
-    of.CHANNEL_TREMOLO,
-    of.CHANNEL_STRUMS,
-)
 
 
 @njit(**COMPILED)
-def rest(player: np.ndarray, players: np.ndarray, number: int, pedal: int, plays: int) -> None:
+def rest(player: Player, number: int, pedal: int, plays: int) -> None:
     """A channel as if nobody had moved anything on it, except for these."""
-    channel = slots.channel(number)
-    player[channel + of.CHANNEL_BEND] = 0.0
-    player[channel + of.CHANNEL_RANGE] = -1.0
-    players[channel + of.CHANNEL_PEDAL] = pedal
-    players[channel + of.CHANNEL_SLIDE] = -1
-    players[channel + of.CHANNEL_PLAYS] = plays
-    players[channel + of.CHANNEL_COARSE] = NO_PARAMETER
-    players[channel + of.CHANNEL_FINE] = NO_PARAMETER
-    players[channel + of.CHANNEL_COARSE_TUNING] = 0
-    players[channel + of.CHANNEL_FINE_TUNING] = 0
+    channel = player.channels[number]
+    channel.bend = 0.0
+    channel.range_semitones = -1.0
+    channel.pedal = pedal
+    channel.slide = -1
+    channel.plays = plays
+    channel.coarse = NO_PARAMETER
+    channel.fine = NO_PARAMETER
+    channel.coarse_tuning = 0
+    channel.fine_tuning = 0
 
 
 @njit(**COMPILED)
-def reset(player: np.ndarray, players: np.ndarray, number: int) -> None:
+def reset(player: Player, number: int) -> None:
     """Resets wheel, pedals, expression and the choice of a parameter, as MIDI's RP-015 has it; all else stays."""
-    channel = slots.channel(number)
-    player[channel + of.CHANNEL_BEND] = player[channel + of.CHANNEL_MUTE] = 0.0
-    players[channel + of.CHANNEL_PEDAL] = 0
-    players[channel + of.CHANNEL_COARSE] = NO_PARAMETER
-    players[channel + of.CHANNEL_FINE] = NO_PARAMETER
-    players[channel + of.CHANNEL_EXPRESSION] = 127
-    for switch in SWITCHES:
-        players[channel + switch] = 0
+    channel = player.channels[number]
+    channel.bend = channel.mute = 0.0
+    channel.pedal = 0
+    channel.coarse = NO_PARAMETER
+    channel.fine = NO_PARAMETER
+    channel.expression = 127
+    for switch in range(of.SWITCHES):
+        channel.switches[switch] = 0
 
 
 @njit(**COMPILED)
-def begin(player: np.ndarray, players: np.ndarray, number: int) -> None:
+def begin(player: Player, number: int) -> None:
     """Puts a channel in the state in which nobody has played on it."""
-    reset(player, players, number)
-    rest(player, players, number, 0, 0)
-    players[slots.channel(number) + of.CHANNEL_VOLUME] = of.USUAL_VOLUME
+    reset(player, number)
+    rest(player, number, 0, 0)
+    player.channels[number].volume = of.USUAL_VOLUME
 
 
 @njit(**COMPILED)
-def loudness(players: np.ndarray, mode: int, channel: int) -> float:
+def loudness(player: Player, mode: int, channel: int) -> float:
     """The factor of what was struck on a channel, by its volume and expression: General MIDI's squares."""
     share = 1.0
     for each in range(of.CHANNELS):
         if acts_on(mode, each, channel):
-            share *= players[slots.channel(each) + of.CHANNEL_VOLUME] / of.USUAL_VOLUME
-            share *= players[slots.channel(each) + of.CHANNEL_EXPRESSION] / 127
+            share *= player.channels[each].volume / of.USUAL_VOLUME
+            share *= player.channels[each].expression / 127
     return share * share
 
 
 @njit(**COMPILED)
-def loudness_db(players: np.ndarray, mode: int, channel: int) -> float:
+def loudness_db(player: Player, mode: int, channel: int) -> float:
     """The same in dB."""
-    return 20 * math.log10(max(loudness(players, mode, channel), 1e-9))
+    return 20 * math.log10(max(loudness(player, mode, channel), 1e-9))
 
 
 @njit(**COMPILED)
@@ -112,24 +104,24 @@ def acts_on(mode: int, channel: int, other: int) -> bool:
 
 
 @njit(**COMPILED)
-def pedal_down(players: np.ndarray, mode: int, channel: int) -> bool:
+def pedal_down(player: Player, mode: int, channel: int) -> bool:
     """Whether a pedal holds what was struck on a channel."""
+    down = False
     for each in range(of.CHANNELS):
-        if players[slots.channel(each) + of.CHANNEL_PEDAL] != 0 and acts_on(mode, each, channel):
-            return True
-    return False
+        down = down or (player.channels[each].pedal != 0 and acts_on(mode, each, channel))
+    return down
 
 
 @njit(**COMPILED)
-def semitones(player: np.ndarray, players: np.ndarray, mode: int, channel: int) -> float:
+def semitones(player: Player, mode: int, channel: int) -> float:
     """How far pitch wheels bend what was struck on a channel, and how far it is tuned."""
     total = 0.0
     for each in range(of.CHANNELS):
         if acts_on(mode, each, channel):
-            own = slots.channel(each)
-            total += players[own + of.CHANNEL_COARSE_TUNING] + players[own + of.CHANNEL_FINE_TUNING] / of.TUNING_STEPS
-            if player[own + of.CHANNEL_BEND] != 0.0:
-                total += player[own + of.CHANNEL_BEND] * _bend_range(player, mode, each)
+            own = player.channels[each]
+            total += own.coarse_tuning + own.fine_tuning / of.TUNING_STEPS
+            if own.bend != 0.0:
+                total += own.bend * _bend_range(player, mode, each)
     return total
 
 
@@ -139,33 +131,31 @@ def _is_member(mode: int, number: int) -> bool:
 
 
 @njit(**COMPILED)
-def _bend_range(player: np.ndarray, mode: int, number: int) -> float:
+def _bend_range(player: Player, mode: int, number: int) -> float:
     """Semitones of a whole bend of a channel."""
-    wide = player[slots.channel(number) + of.CHANNEL_RANGE]
+    wide = player.channels[number].range_semitones
     if wide >= 0.0:
         return wide
-    return MPE_BEND_SEMITONES if _is_member(mode, number) else player[of.PLAYER_VALUES + of.BEND_SEMITONES]
+    return MPE_BEND_SEMITONES if _is_member(mode, number) else player.values[of.BEND_SEMITONES]
 
 
 @njit(**COMPILED)
-def set_parameter(
-    player: np.ndarray, players: np.ndarray, mode: int, number: int, controller: int, value: int
-) -> bool:
+def set_parameter(player: Player, mode: int, number: int, controller: int, value: int) -> bool:
     """Follows the controllers that choose a registered parameter and set it; whether they set one that counts here.
 
     Increments are of the least step, as MIDI's RP-018 has it. A member's range of bends is that of all members.
     """
-    own = slots.channel(number)
+    own = player.channels[number]
     if controller in (OTHER, FINE_OTHER):
-        players[own + of.CHANNEL_COARSE] = NO_PARAMETER
-        players[own + of.CHANNEL_FINE] = NO_PARAMETER
+        own.coarse = NO_PARAMETER
+        own.fine = NO_PARAMETER
     elif controller == REGISTERED:
-        players[own + of.CHANNEL_COARSE] = value
+        own.coarse = value
     elif controller == FINE_REGISTERED:
-        players[own + of.CHANNEL_FINE] = value
-    if controller not in (DATA, FINE_DATA, INCREMENT, DECREMENT) or players[own + of.CHANNEL_COARSE] != 0:
+        own.fine = value
+    if controller not in (DATA, FINE_DATA, INCREMENT, DECREMENT) or own.coarse != 0:
         return False
-    chosen, step = players[own + of.CHANNEL_FINE], 1 if controller == INCREMENT else -1
+    chosen, step = own.fine, 1 if controller == INCREMENT else -1
     if chosen == BEND_RANGE:
         wide = _bend_range(player, mode, number)
         if controller == DATA:
@@ -176,107 +166,102 @@ def set_parameter(
             wide += step / 100
         for each in range(of.CHANNELS):
             if each == number or (_is_member(mode, number) and _is_member(mode, each)):
-                player[slots.channel(each) + of.CHANNEL_RANGE] = min(max(wide, 0.0), WIDEST_SEMITONES)
+                player.channels[each].range_semitones = min(max(wide, 0.0), WIDEST_SEMITONES)
     elif chosen == FINE_TUNING:
-        steps = players[own + of.CHANNEL_FINE_TUNING] + of.TUNING_STEPS
+        steps = own.fine_tuning + of.TUNING_STEPS
         if controller == DATA:
             steps = 128 * value
         elif controller == FINE_DATA:
             steps = steps // 128 * 128 + value
         else:
             steps += step
-        players[own + of.CHANNEL_FINE_TUNING] = min(max(steps, 0), 2 * of.TUNING_STEPS - 1) - of.TUNING_STEPS
+        own.fine_tuning = min(max(steps, 0), 2 * of.TUNING_STEPS - 1) - of.TUNING_STEPS
     elif chosen == COARSE_TUNING and controller != FINE_DATA:
-        semitone = value - 64 if controller == DATA else players[own + of.CHANNEL_COARSE_TUNING] + step
-        players[own + of.CHANNEL_COARSE_TUNING] = min(max(semitone, -64), 63)
+        semitone = value - 64 if controller == DATA else own.coarse_tuning + step
+        own.coarse_tuning = min(max(semitone, -64), 63)
     else:
         return False
     return True
 
 
 @njit(**COMPILED)
-def _is_string(players: np.ndarray, tables: np.ndarray, channel: int) -> bool:
+def _is_string(player: Player, table: Table, channel: int) -> bool:
     """Whether a channel is one string of a guitar. The first one is, once another string has played."""
-    if tables[of.TABLE_MODE] != of.GUITAR:
+    if table.mode != of.GUITAR:
         return False
     count = of.GUITAR_STRINGS
-    if tables[of.TABLE_STRINGS] > 0:
-        count = min(count, tables[of.TABLE_STRINGS])
+    if table.strings > 0:
+        count = min(count, table.strings)
     others = 0
     for each in range(of.FIRST + 1, count):
-        others += players[slots.channel(each) + of.CHANNEL_PLAYS]
+        others += player.channels[each].plays
     return channel < count and others > 0
 
 
 @njit(**COMPILED)
-def place_of(players: np.ndarray, tables: np.ndarray, event: int) -> int:
+def place_of(player: Player, table: Table, event: Event) -> int:
     """Which string of the instrument the note of an event has; 256 (n + 1): string n of a set, which was given."""
-    channel, string = players[event + of.EVENT_CHANNEL], players[event + of.EVENT_STRING]
-    if _is_string(players, tables, channel):
+    channel, string = event.channel, event.string
+    if _is_string(player, table, channel):
         return 256 * (channel + 1)
-    if 0 < string <= min(tables[of.TABLE_STRINGS], of.GUITAR_STRINGS):
+    if 0 < string <= min(table.strings, of.GUITAR_STRINGS):
         return 256 * string
-    return (256 * (channel + 1) if tables[of.TABLE_MODE] == of.MPE else 0) + players[event + of.EVENT_KEY] + 1
+    return (256 * (channel + 1) if table.mode == of.MPE else 0) + event.key + 1
 
 
 @njit(**COMPILED)
-def hold(players: np.ndarray, channel: int, key: int, down: bool) -> None:
+def hold(player: Player, channel: int, key: int, down: bool) -> None:
     """Notes that a key is down, or is not."""
-    slot = slots.channel(channel) + of.CHANNEL_HELD + key // 64
-    bit = np.int64(1) << np.int64(key % 64)
-    players[slot] = players[slot] | bit if down else players[slot] & ~bit
+    player.channels[channel].held[key] = down
 
 
 @njit(**COMPILED)
-def strike(players: np.ndarray, channel: int, key: int) -> None:
+def strike(player: Player, channel: int, key: int) -> None:
     """Counts a stroke of a key."""
-    players[slots.channel(channel) + of.CHANNEL_STRUCK + key] += 1
+    player.channels[channel].strokes[key] += 1
 
 
 @njit(**COMPILED)
-def release_latest(players: np.ndarray, channel: int, key: int) -> bool:
+def release_latest(player: Player, channel: int, key: int) -> bool:
     """Takes a release of a key for its earliest stroke that has none; whether that is the latest."""
-    slot = slots.channel(channel) + of.CHANNEL_STRUCK + key
-    players[slot] = max(players[slot] - 1, 0)
-    return players[slot] == 0
+    strokes = player.channels[channel].strokes
+    strokes[key] = max(strokes[key] - 1, 0)
+    return strokes[key] == 0
 
 
 @njit(**COMPILED)
-def is_down(players: np.ndarray, channel: int, key: int) -> bool:
-    slot = slots.channel(channel) + of.CHANNEL_HELD + key // 64
-    return (players[slot] >> np.int64(key % 64)) & 1 != 0
+def is_down(player: Player, channel: int, key: int) -> bool:
+    return player.channels[channel].held[key] != 0
 
 
 @njit(**COMPILED)
-def release_key(players: np.ndarray, channel: int, key: int) -> None:
+def release_key(player: Player, channel: int, key: int) -> None:
     """A key is not down, and none of its strokes awaits a release."""
-    hold(players, channel, key, False)
-    players[slots.channel(channel) + of.CHANNEL_STRUCK + key] = 0
+    hold(player, channel, key, False)
+    player.channels[channel].strokes[key] = 0
 
 
 @njit(**COMPILED)
-def release_keys(players: np.ndarray, channel: int) -> None:
+def release_keys(player: Player, channel: int) -> None:
     """No key of a channel is down."""
-    players[slots.channel(channel) + of.CHANNEL_HELD] = 0
-    players[slots.channel(channel) + of.CHANNEL_HELD + 1] = 0
     for key in range(of.KEYS):
-        players[slots.channel(channel) + of.CHANNEL_STRUCK + key] = 0
+        release_key(player, channel, key)
 
 
 @njit(**COMPILED)
-def switched(players: np.ndarray, mode: int, channel: int, which: int) -> bool:
-    """Whether a footswitch, by its slot of a channel, holds for a channel."""
+def switched(player: Player, mode: int, channel: int, which: int) -> bool:
+    """Whether a footswitch, by its number, holds for a channel."""
     down = False
     for each in range(of.CHANNELS):
-        down = down or (players[slots.channel(each) + which] != 0 and acts_on(mode, each, channel))
+        down = down or (player.channels[each].switches[which] != 0 and acts_on(mode, each, channel))
     return down
 
 
 @njit(**COMPILED)
-def moves_in_s(players: np.ndarray, mode: int, channel: int) -> float:
+def moves_in_s(player: Player, mode: int, channel: int) -> float:
     """The time in which a note moves to another key of its channel."""
     for each in range(of.CHANNELS):
-        own = slots.channel(each)
-        if players[own + of.CHANNEL_SLIDES] != 0 and acts_on(mode, each, channel):
-            return SLIDE_S[0] * (SLIDE_S[1] / SLIDE_S[0]) ** (players[own + of.CHANNEL_TIME] / 127)
+        own = player.channels[each]
+        if own.switches[of.SLIDES] != 0 and acts_on(mode, each, channel):
+            return SLIDE_S[0] * (SLIDE_S[1] / SLIDE_S[0]) ** (own.slide_time / 127)
     return HAMMER_S

@@ -8,173 +8,166 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import reals, wholes
+from engine.kernels.memory import copy, table_at
 from engine.kernels.playing import channels, keys, notes, slots
+from engine.kernels.records import Event, Player, Table
 
 CHORD_S = 0.03  # in which notes come that are one chord: an estimate
 USUAL_STRUM_MS = 12.0  # of its footswitch
 
 
 @njit(**COMPILED)
-def _height(players: np.ndarray, tables: np.ndarray, event: int) -> int:
+def _height(player: Player, table: Table, event: Event) -> int:
     """Rises from the lowest note of a chord to the highest: by strings where these are given, else by keys."""
-    place = channels.place_of(players, tables, event)
+    place = channels.place_of(player, table, event)
     string = of.CHANNELS + 1 - place // 256 if place % 256 == 0 else 0
-    return string * of.KEYS + players[event + of.EVENT_KEY]
+    return string * of.KEYS + event.key
 
 
 @njit(**COMPILED)
-def _strums_in(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, event: int) -> int:
+def _strums_in(player: Player, table: Table, event: Event) -> int:
     """Frames from string to string of a chord that the note of an event is in; 0: notes begin as they come."""
-    note_on = players[event + of.EVENT_KIND] == of.NOTE_ON and player[event + of.EVENT_VALUE] > 0.0
-    channel = players[event + of.EVENT_CHANNEL]
-    by_hand = player[event + of.EVENT_POSITION] > 0.0
-    if not note_on or by_hand or not 0 <= channel < of.CHANNELS or tables[of.TABLE_DRUMS] != 0:
+    note_on = event.kind == of.NOTE_ON and event.value > 0.0
+    channel = event.channel
+    by_hand = event.position > 0.0
+    if not note_on or by_hand or not 0 <= channel < of.CHANNELS or table.drums != 0:
         return 0
-    switch = of.CHANNEL_STRUMS
-    milliseconds = keys.technique_of(player, players, table, tables, channel, of.STRUM_MS, switch, USUAL_STRUM_MS)
+    switch = of.STRUMS
+    milliseconds = keys.technique_of(player, table, channel, of.STRUM_MS, switch, USUAL_STRUM_MS)
     return slots.frames(player, milliseconds / 1000) if milliseconds > 0.0 else 0
 
 
 @njit(**COMPILED)
-def _continues(player: np.ndarray, players: np.ndarray, frame: int) -> bool:
+def _continues(player: Player, frame: int) -> bool:
     """Whether a note that comes at a frame belongs to the latest chord."""
-    since = frame - players[of.PLAYER_CHORD_BEGAN]
-    return players[of.PLAYER_CHORD] != 0 and 0 <= since <= slots.frames(player, CHORD_S)
+    since = frame - player.chord_began
+    return player.chord != 0 and 0 <= since <= slots.frames(player, CHORD_S)
 
 
 @njit(**COMPILED)
-def _goes_up(player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray) -> bool:
+def _goes_up(player: Player, table: Table) -> bool:
     """Whether the next strum goes from the highest note to the lowest."""
-    strokes = round(keys.value_of(player, players, table, tables, of.STROKES))
-    return strokes == of.UP or (strokes == of.ALTERNATE and players[of.PLAYER_NEXT_UP] != 0)
+    strokes = round(keys.value_of(player, table, of.STROKES))
+    return strokes == of.UP or (strokes == of.ALTERNATE and player.next_up != 0)
 
 
 @njit(**COMPILED)
-def _swap(players: np.ndarray, first: int, second: int) -> None:
+def _swap(player: Player, first: Event, second: Event) -> None:
     """Exchanges two events; each place keeps its frame."""
-    for slot in range(of.EVENT_SLOTS):
-        if slot != of.EVENT_FRAME:
-            kept = players[first + slot]
-            players[first + slot] = players[second + slot]
-            players[second + slot] = kept
+    kept, frame, other_frame = player.kept_event, first.frame, second.frame
+    copy(kept, first)
+    copy(first, second)
+    copy(second, kept)
+    first.frame, second.frame = frame, other_frame
 
 
 @njit(**COMPILED)
-def arrange(player: np.ndarray, players: np.ndarray, now: int, first: int, count: int, place: int, end: int) -> None:
+def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) -> None:
     """Lets the first string of a chord come first, of notes that come at the same frame.
 
     Args:
-        first, count: slot and number of the events of a ring, of which `place` is played next, and `end` is the last
-            one's successor.
+        ring: events (count,), of which `place` is played next, and `end` is the last one's successor.
     """
-    address, event = players[of.PLAYER_TABLE], first + place % count * of.EVENT_SLOTS
-    if address == 0 or players[event + of.EVENT_CHORD] != 0:
+    address, event = player.table, ring[place % len(ring)]
+    if address == 0 or event.chord != 0:
         return
-    table, tables, frame = reals(address), wholes(address), max(players[event + of.EVENT_FRAME], now)
-    if _strums_in(player, players, table, tables, event) == 0 or _continues(player, players, frame):
+    table, frame = table_at(address), max(event.frame, now)
+    if _strums_in(player, table, event) == 0 or _continues(player, frame):
         return
-    up, best = _goes_up(player, players, table, tables), event
+    up, best = _goes_up(player, table), event
     for each in range(place + 1, end):
-        other = first + each % count * of.EVENT_SLOTS
-        together = max(players[other + of.EVENT_FRAME], now) == frame and players[other + of.EVENT_CHORD] == 0
-        if not together or _strums_in(player, players, table, tables, other) == 0:
+        other = ring[each % len(ring)]
+        together = max(other.frame, now) == frame and other.chord == 0
+        if not together or _strums_in(player, table, other) == 0:
             break
-        higher = _height(players, tables, other) > _height(players, tables, best)
+        higher = _height(player, table, other) > _height(player, table, best)
         if higher == up:
             best = other
-    _swap(players, event, best)
+    _swap(player, event, best)
 
 
 @njit(**COMPILED)
-def strum(
-    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, event: int, now: int
-) -> bool:
+def strum(player: Player, table: Table, event: Event, now: int) -> bool:
     """Lets a note wait for its turn in a chord; False: it begins now."""
-    chord = players[of.PLAYER_CHORD]
-    if players[event + of.EVENT_CHORD] != 0:  # its turn has come
-        players[of.PLAYER_CHORD_BEGUN] += players[event + of.EVENT_CHORD] == chord
-        players[event + of.EVENT_CHORD] = 0
+    chord = player.chord
+    if event.chord != 0:  # its turn has come
+        player.chord_begun += event.chord == chord
+        event.chord = 0
         return False
-    step, frame = _strums_in(player, players, table, tables, event), max(players[event + of.EVENT_FRAME], now)
+    step, frame = _strums_in(player, table, event), max(event.frame, now)
     if step == 0:
         return False
-    if not _continues(player, players, frame):
-        players[of.PLAYER_CHORD] += 1
-        players[of.PLAYER_CHORD_BEGAN] = frame
-        players[of.PLAYER_CHORD_BEGUN] = 1
-        players[of.PLAYER_CHORD_UP] = _goes_up(player, players, table, tables)
+    if not _continues(player, frame):
+        player.chord += 1
+        player.chord_began = frame
+        player.chord_begun = 1
+        player.chord_up = _goes_up(player, table)
         return False
-    if players[of.PLAYER_QUEUED] == of.QUEUED:
+    if player.queued == of.QUEUED:
         return False
-    players[of.PLAYER_NEXT_UP] = 1 - players[of.PLAYER_CHORD_UP]
-    turn = players[of.PLAYER_CHORD_BEGUN]
-    for place in range(players[of.PLAYER_QUEUED]):
-        turn += players[of.PLAYER_QUEUE + place * of.EVENT_SLOTS + of.EVENT_CHORD] == chord
-    players[event + of.EVENT_CHORD], players[event + of.EVENT_CAME] = chord, frame
-    players[event + of.EVENT_FRAME] = max(players[of.PLAYER_CHORD_BEGAN] + turn * step, frame)
-    player[event + of.EVENT_STRUCK_S] = 0.0  # its latency is meant
-    queue(players, event)
-    players[event + of.EVENT_CHORD] = 0
-    later, up = 0, players[of.PLAYER_CHORD_UP] != 0
-    for place in range(players[of.PLAYER_QUEUED] - 1, -1, -1):  # from the new one, which is the last, to its turn
-        each = of.PLAYER_QUEUE + place * of.EVENT_SLOTS
-        if players[each + of.EVENT_CHORD] != chord:
+    player.next_up = 1 - player.chord_up
+    turn = player.chord_begun
+    for place in range(player.queued):
+        turn += player.queue[place].chord == chord
+    event.chord, event.came = chord, frame
+    event.frame = max(player.chord_began + turn * step, frame)
+    event.struck_s = 0.0  # its latency is meant
+    queue(player, event)
+    event.chord = 0
+    later, up = -1, player.chord_up != 0
+    for place in range(player.queued - 1, -1, -1):  # from the new one, which is the last, to its turn
+        each = player.queue[place]
+        if each.chord != chord:
             continue
-        if later != 0:
-            if (_height(players, tables, each) < _height(players, tables, later)) != up:
+        if later >= 0:
+            if (_height(player, table, each) < _height(player, table, player.queue[later])) != up:
                 break
-            _swap(players, each, later)
-        later = each
+            _swap(player, each, player.queue[later])
+        later = place
     return True
 
 
 @njit(**COMPILED)
-def waits(players: np.ndarray, event: int, now: int) -> bool:
+def waits(player: Player, event: Event, now: int) -> bool:
     """Puts what is meant for a note behind it where that waits for its turn in a chord; whether it does."""
-    id, channel, key = players[event + of.EVENT_ID], players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
-    by_id = id != 0 and players[event + of.EVENT_KIND] in (of.TUNE, of.CHOKE)
-    for place in range(players[of.PLAYER_QUEUED]):
-        each = of.PLAYER_QUEUE + place * of.EVENT_SLOTS
-        if players[each + of.EVENT_CHORD] == 0:
+    id, channel, key = event.id, event.channel, event.key
+    by_id = id != 0 and event.kind in (of.TUNE, of.CHOKE)
+    for place in range(player.queued):
+        each = player.queue[place]
+        if each.chord == 0:
             continue
-        meant = players[each + of.EVENT_CHANNEL] == channel and players[each + of.EVENT_KEY] == key
-        meant = meant and players[event + of.EVENT_STRING] in (0, players[each + of.EVENT_STRING])
+        meant = each.channel == channel and each.key == key
+        meant = meant and event.string in (0, each.string)
         if by_id:
-            meant = players[each + of.EVENT_ID] == id
-        if meant and players[of.PLAYER_QUEUED] < of.QUEUED:
-            later = players[each + of.EVENT_FRAME] - players[each + of.EVENT_CAME]
-            players[event + of.EVENT_FRAME] = max(players[event + of.EVENT_FRAME], now) + later
-            queue(players, event)
+            meant = each.id == id
+        if meant and player.queued < of.QUEUED:
+            later = each.frame - each.came
+            event.frame = max(event.frame, now) + later
+            queue(player, event)
             return True
     return False
 
 
 @njit(**COMPILED)
-def forget_turns(player: np.ndarray, players: np.ndarray, mode: int, channel: int) -> None:
+def forget_turns(player: Player, mode: int, channel: int) -> None:
     """Forgets notes that wait for their turns in a chord: those of a channel, or all, -1."""
-    for place in range(players[of.PLAYER_QUEUED]):
-        event = of.PLAYER_QUEUE + place * of.EVENT_SLOTS
-        meant = channel < 0 or channels.is_master(mode, channel, players[event + of.EVENT_CHANNEL])
-        if players[event + of.EVENT_CHORD] != 0 and meant:
-            notes.refuse(player, players, event)
-            players[event + of.EVENT_CHORD] = 0
-            players[event + of.EVENT_KIND] = of.NOTHING
+    for place in range(player.queued):
+        event = player.queue[place]
+        meant = channel < 0 or channels.is_master(mode, channel, event.channel)
+        if event.chord != 0 and meant:
+            notes.refuse(player, event)
+            event.chord = 0
+            event.kind = of.NOTHING
 
 
 @njit(**COMPILED)
-def queue(players: np.ndarray, event: int) -> None:
+def queue(player: Player, event: Event) -> None:
     """Puts an event behind those of its frame and of earlier ones."""
-    place, size = players[of.PLAYER_QUEUED], of.EVENT_SLOTS
-    while place > 0:
-        before = of.PLAYER_QUEUE + (place - 1) * size
-        if players[before + of.EVENT_FRAME] <= players[event + of.EVENT_FRAME]:
-            break
-        for each in range(size):
-            players[before + size + each] = players[before + each]
+    place = player.queued
+    while place > 0 and player.queue[place - 1].frame > event.frame:
+        copy(player.queue[place], player.queue[place - 1])
         place -= 1
-    for each in range(size):
-        players[of.PLAYER_QUEUE + place * size + each] = players[event + each]
-    players[of.PLAYER_QUEUED] += 1
+    copy(player.queue[place], event)
+    player.queued += 1

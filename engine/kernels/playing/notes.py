@@ -11,13 +11,14 @@ import math
 import numpy as np
 from numba import njit
 
+from engine.bounds import LARGEST_AMPLITUDE_MM
+from engine.kernels import constants as of
 from engine.kernels import contact, drums, recorded, strings
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import fence, reals, wholes
+from engine.kernels.memory import clear, copy, fence, reals, wholes
 from engine.kernels.playing import changes, channels, gains, keys, plucks, slots, voices
-from engine.pluck import LARGEST_AMPLITUDE_MM
+from engine.kernels.records import Event, Note, Player, Report, Table
 
 MPE_POSITIONS = (0.05, 0.5)  # pluck positions for slide 0 and 127 before the key
 STOLEN_S = 0.03  # of the fade of a note that makes room
@@ -34,349 +35,333 @@ COURSES_VARY = 0.5  # by how much detuning varies from key to key, at most
 
 
 @njit(**COMPILED)
-def report(
-    player: np.ndarray, players: np.ndarray, kind: int, id: int, channel: int, key: int, frame: int, velocity: float
-) -> int:
-    """One more report; its first slot, for what else is in it. `reported` publishes it."""
-    slot = of.PLAYER_REPORTS + players[of.PLAYER_REPORTED] % of.REPORTS * of.REPORT_SLOTS
-    players[slot + of.REPORT_KIND] = kind
-    players[slot + of.REPORT_ID] = id
-    players[slot + of.REPORT_CHANNEL] = channel
-    players[slot + of.REPORT_KEY] = key
-    players[slot + of.REPORT_FRAME] = frame
-    player[slot + of.REPORT_VELOCITY] = velocity
-    return slot
+def report(player: Player, kind: int, id: int, channel: int, key: int, frame: int, velocity: float) -> Report:
+    """One more report, for what else is in it. `reported` publishes it."""
+    made = player.reports[player.reported % of.REPORTS]
+    made.kind = kind
+    made.id = id
+    made.channel = channel
+    made.key = key
+    made.frame = frame
+    made.velocity = velocity
+    return made
 
 
 @njit(**COMPILED)
-def reported(players: np.ndarray) -> None:
+def reported(player: Player) -> None:
     fence()
-    players[of.PLAYER_REPORTED] += 1
+    player.reported += 1
 
 
 @njit(**COMPILED)
-def refuse(player: np.ndarray, players: np.ndarray, event: int) -> None:
+def refuse(player: Player, event: Event) -> None:
     """Reports a note that no string can play, or that was cancelled."""
-    id, channel, key = players[event + of.EVENT_ID], players[event + of.EVENT_CHANNEL], players[event + of.EVENT_KEY]
-    frame, velocity = players[event + of.EVENT_FRAME], player[event + of.EVENT_VALUE]
-    report(player, players, of.REFUSED, id, channel, key, frame, velocity)
-    reported(players)
+    report(player, of.REFUSED, event.id, event.channel, event.key, event.frame, event.value)
+    reported(player)
 
 
 @njit(**COMPILED)
-def _forget(player: np.ndarray, players: np.ndarray, note: int, frame: int) -> None:
-    """A note has ended: its slots are free."""
-    players[note + of.NOTE_STATE] = of.FREE
-    if players[note + of.NOTE_MEMBER] != 0:
+def _forget(player: Player, note: Note, frame: int) -> None:
+    """A note has ended: its place is free."""
+    note.state = of.FREE
+    if note.member != 0:
         return
-    id, channel, key = players[note + of.NOTE_ID], players[note + of.NOTE_CHANNEL], players[note + of.NOTE_KEY]
-    report(player, players, of.ENDED, id, channel, key, frame, 0.0)
-    reported(players)
+    report(player, of.ENDED, note.id, note.channel, note.key, frame, 0.0)
+    reported(player)
 
 
 @njit(**COMPILED)
-def free_note(player: np.ndarray, players: np.ndarray, mixers: np.ndarray) -> int:
+def free_note(player: Player, mixers: np.ndarray) -> Note:
     """A free note; where there is none, one which has not begun or fades is cut, else the oldest."""
-    best, best_rank, best_age = 0, 3, 0
+    best, best_rank = player.notes[0], 3
     for number in range(of.MOST_NOTES):
-        note = slots.note(number)
-        if players[note + of.NOTE_STATE] == of.FREE:
-            return number
-        if slots.over(players, note):
-            _forget(player, players, note, mixers[at.M_FRAMES])
-            return number
+        note = player.notes[number]
+        if note.state != of.FREE and slots.over(note):
+            _forget(player, note, mixers[at.M_FRAMES])
+        if note.state == of.FREE:
+            return note
         begun = False
         for source in range(of.MOST_SOURCES):
-            address = players[note + of.NOTE_VOICES + source]
+            address = note.voices[source]
             begun = begun or (address != 0 and wholes(address)[at.STATE] != at.WAITING)
         rank = 2
-        if players[note + of.NOTE_RELEASED] != 0 or players[note + of.NOTE_HAS_PLACE] == 0:
+        if note.released != 0 or note.has_place == 0:
             rank = 1 if begun else 0
-        age = players[note + of.NOTE_AGE]
-        if rank < best_rank or (rank == best_rank and age < best_age):
-            best, best_rank, best_age = number, rank, age
+        if rank < best_rank or (rank == best_rank and note.age < best.age):
+            best, best_rank = note, rank
     for source in range(of.MOST_SOURCES):
-        address = players[slots.note(best) + of.NOTE_VOICES + source]
-        if address != 0:
-            voices.take_out(mixers, address)
-    players[of.PLAYER_CUT] += 1
-    _forget(player, players, slots.note(best), mixers[at.M_FRAMES])
+        if best.voices[source] != 0:
+            voices.take_out(mixers, best.voices[source])
+    player.cut += 1
+    _forget(player, best, mixers[at.M_FRAMES])
     return best
 
 
 @njit(**COMPILED)
-def _follow(player: np.ndarray, players: np.ndarray, tables: np.ndarray, note: int, before: int) -> None:
+def _follow(player: Player, table: Table, note: Note, before: Note) -> None:
     """A note has the string of the one before, which is stopped, or whose motion continues in it."""
     stops = slots.frames(player, PLUCK_STOPS_S)
     for source in range(of.MOST_SOURCES):
-        address, other = players[note + of.NOTE_VOICES + source], players[before + of.NOTE_VOICES + source]
+        address, other = note.voices[source], before.voices[source]
         if other == 0 or slots.voice_over(other):
             continue
         if address == 0:
             voices.release(other, stops)
             continue
         wholes(address)[at.PREVIOUS_VOICE] = other
-        wholes(address)[at.STOPS_IN] = stops if tables[of.TABLE_STOPS] != 0 else 0
+        wholes(address)[at.STOPS_IN] = stops if table.stops != 0 else 0
 
 
 @njit(**COMPILED)
-def _make_room(player: np.ndarray, players: np.ndarray) -> None:
+def _make_room(player: Player) -> None:
     """Releases the oldest notes where more ring than may."""
     while True:
-        ringing, oldest, age = 0, 0, 0
+        ringing, oldest = 0, player.notes[0]
         for number in range(of.MOST_NOTES):
-            note = slots.note(number)
-            free = players[note + of.NOTE_STATE] == of.FREE or players[note + of.NOTE_RELEASED] != 0
-            if free or slots.over(players, note):
+            note = player.notes[number]
+            if note.state == of.FREE or note.released != 0 or slots.over(note):
                 continue
-            if ringing == 0 or players[note + of.NOTE_AGE] < age:
-                oldest, age = note, players[note + of.NOTE_AGE]
+            if ringing == 0 or note.age < oldest.age:
+                oldest = note
             ringing += 1
-        if ringing <= players[of.PLAYER_MOST]:
+        if ringing <= player.most:
             return
-        voices.release_note(player, players, oldest, STOLEN_S, 0)
+        voices.release_note(player, oldest, STOLEN_S, 0)
 
 
 @njit(**COMPILED)
-def strike(
-    player: np.ndarray, players: np.ndarray, table: np.ndarray, tables: np.ndarray, mixers: np.ndarray, event: int
-) -> None:
+def strike(player: Player, table: Table, mixers: np.ndarray, event: Event) -> None:
     """Plays all strings of a key's course, one after the other; the first is the one that is reported."""
-    note_on(player, players, table, tables, mixers, event, 0)
-    frame = players[event + of.EVENT_FRAME]
-    for member in range(1, tables[of.TABLE_COURSE]):
-        later = round(member * table[of.TABLE_APART_S] * player[of.PLAYER_RATE])
+    note_on(player, table, mixers, event, 0)
+    frame = event.frame
+    for member in range(1, table.course):
+        later = round(member * table.apart_s * player.rate_hz)
         later += voices.lag_of(player, table, member)
-        players[event + of.EVENT_FRAME] = max(frame, mixers[at.M_FRAMES]) + later if later > 0 else frame
-        note_on(player, players, table, tables, mixers, event, member)
-    players[event + of.EVENT_FRAME] = frame
+        event.frame = max(frame, mixers[at.M_FRAMES]) + later if later > 0 else frame
+        note_on(player, table, mixers, event, member)
+    event.frame = frame
 
 
 @njit(**COMPILED)
-def note_on(
-    player: np.ndarray,
-    players: np.ndarray,
-    table: np.ndarray,
-    tables: np.ndarray,
-    mixers: np.ndarray,
-    event: int,
-    member: int,
-) -> None:
-    """Plays a note, of a course one string. A string that is impossible is refused, unless another sounds."""
-    channel, key, velocity = (
-        players[event + of.EVENT_CHANNEL],
-        players[event + of.EVENT_KEY],
-        player[event + of.EVENT_VALUE],
-    )
-    frame, mode, drum = players[event + of.EVENT_FRAME], tables[of.TABLE_MODE], tables[of.TABLE_DRUMS] != 0
-    by_hand = player[event + of.EVENT_POSITION] > 0.0
-    players[slots.channel(channel) + of.CHANNEL_PLAYS] = 1
-    place, string, count = channels.place_of(players, tables, event), -1, tables[of.TABLE_STRINGS]
-    if place % 256 == 0 and count > 0 and keys.chosen(table, count, key) != place // 256 - 1:
-        string = place // 256 - 1
-    place += MEMBERS_APART * member
-    octaves = keys.has_octave(table, tables, key, string)
-    octave = member > 0 and octaves
-    own, modes, gain, highest_m = slots.moment(player, 3), 0, 1.0, 0.0
-    position = amplitude_mm = width = 0.0
-    pairs, strength, hardness, stroke, touched = 0, 1.0, 1.0, 0, 0
-    if not drum:
-        pitch_hz = keys.pitch_of(table, tables, key)
-        shortened = 1.0
-        if pitch_hz > 0.0:
-            modes, shortened = keys.string_of(player, players, table, tables, key, string, pitch_hz, False, own)
-        if octave and modes > 0:
-            strings.thin(own, pitch_hz)
-            modes = min(modes, strings.modes_below(own, of.HIGHEST_HZ)) if strings.possible(own) else 0
-        if modes < 1 or strings.overdamped(own, modes):
-            if member > 0:
-                return
-            refuse(player, players, event)
+def note_on(player: Player, table: Table, mixers: np.ndarray, event: Event, member: int) -> None:
+    """Plays a note, of a course one string. A string that is impossible is refused, unless another sounds.
+
+    The note is drafted first: one that is refused takes no other's place.
+    """
+    draft = player.draft
+    clear(draft)
+    _identify(player, table, event, member, draft)
+    if table.drums != 0:
+        draft.drum, draft.gain = 1, 1.0
+        draft.strength, draft.hardness = drums.contact_of(player, table, draft.key, draft.velocity)
+    else:
+        if not _take_string(player, table, draft):
+            if member == 0:
+                refuse(player, event)
             return
-        gain = gains.gain_of(player, players, table, tables, key, string)
-        curve, soft = (
-            keys.value_of(player, players, table, tables, of.CURVE),
-            keys.value_of(player, players, table, tables, of.SOFTEST_MM),
+        _pluck(player, table, event, draft)
+    note = free_note(player, mixers)
+    player.age += 1
+    draft.number, draft.age, draft.began = note.number, player.age, max(event.frame, mixers[at.M_FRAMES])
+    copy(note, draft)
+    _keep_of_table(player, table, note)
+    _make_voices(player, table, note)
+    _take_place(player, table, note)
+    _begin_voices(player, mixers, event, note)
+    changes.retune(player, table, note, 0.0, 0, mixers[at.M_FRAMES])
+    if member == 0:
+        level_db = keys.value_of(player, table, of.ONSET_DB)
+        level_db += channels.loudness_db(player, table.mode, note.channel)
+        contact.touch(
+            player,
+            table,
+            of.STROKE,
+            level_db,
+            note.strength,
+            note.hardness,
+            note.stroke,
+            note.key,
+            event.frame,
+            0.0,
+            0.0,
         )
-        share = min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve)
-        harder = keys.value_of(player, players, table, tables, of.HARDEST_MM) / soft
-        amplitude_mm = min(soft * harder**share * shortened, LARGEST_AMPLITUDE_MM)
-        if by_hand:
-            amplitude_mm = min(player[event + of.EVENT_AMPLITUDE_MM], LARGEST_AMPLITUDE_MM)
-            if harder != 1.0:
-                share = min(max(math.log(amplitude_mm / soft / shortened) / math.log(harder), 0.0), 1.0)
-        strength = harder ** (share - ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0**-curve))
-        width = keys.value_of(player, players, table, tables, of.WIDTH)
-        width *= (keys.value_of(player, players, table, tables, of.WIDTH_HARD) / width) ** share
-        position, slide = (
-            keys.value_of(player, players, table, tables, of.POSITION),
-            players[slots.channel(channel) + of.CHANNEL_SLIDE],
-        )
-        if by_hand:
-            position = player[event + of.EVENT_POSITION]
-            width = player[event + of.EVENT_WIDTH]
-        elif mode == of.MPE and slide >= 0:
-            position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
-        turned, varies = 0.0, table[of.TABLE_VARIATION]
-        softest_ms = keys.value_of(player, players, table, tables, of.CONTACT_MS)
-        release_s = plucks.contact_s(
-            softest_ms, keys.value_of(player, players, table, tables, of.CONTACT_HARD_MS), share
-        )
-        if varies > 0.0:
-            stroke = players[of.PLAYER_AGE]
-            if not by_hand:
-                position, amplitude_mm, width = plucks.vary(position, amplitude_mm, width, varies, stroke, key)
-            release_s *= 1 + varies * VARIES_RELEASE * plucks.varied(stroke, key, 3)
-            turned = varies * VARIES_ANGLE * plucks.varied(stroke, key, 4)
-        touched = keys.node_of(player, players, table, tables, channel, modes)
-        if touched > 0 and not by_hand:
-            position = min(position, HARMONIC_REACH / touched)
-        position, amplitude_mm, width = plucks.nearest(position, amplitude_mm, width)
-        shape = players[event + of.EVENT_SHAPE] if by_hand else tables[of.TABLE_SHAPE]
-        highest_m = plucks.pull(player, table, tables, shape, modes, position, amplitude_mm / 1000, width)
-        plucks.release_pluck(player, tables, own, modes, release_s)
-        if tables[of.TABLE_RECORDED] != 0:
-            modes = recorded.modes_of(tables, modes)
-            pairs = (modes + 1) // 2
-            recorded.split(table, tables, own, modes, player[of.PLAYER_AMPLITUDES : of.PLAYER_AMPLITUDES + modes])
-        else:
-            pairs = plucks.split(player, table, tables, modes, turned)
-            modes += pairs
-    number = free_note(player, players, mixers)
-    note = slots.note(number)
-    for slot in range(of.NOTE_SLOTS):
-        players[note + slot] = 0
-    players[of.PLAYER_AGE] += 1
-    players[note + of.NOTE_STATE] = of.RINGS
-    players[note + of.NOTE_ID] = players[event + of.EVENT_ID]
-    players[note + of.NOTE_AGE] = players[of.PLAYER_AGE]
-    players[note + of.NOTE_CHANNEL] = channel
-    players[note + of.NOTE_KEY] = key
-    players[note + of.NOTE_PLACE] = place
-    players[note + of.NOTE_STRING] = string
-    players[note + of.NOTE_HELD] = 1
-    players[note + of.NOTE_DRUM] = drum
-    players[note + of.NOTE_BY_HAND] = by_hand
-    players[note + of.NOTE_MODES] = modes
-    players[note + of.NOTE_PAIRS] = pairs
+    _make_room(player)
+    report_began(player, table, event, note, note.own)
+
+
+@njit(**COMPILED)
+def _identify(player: Player, table: Table, event: Event, member: int, note: Note) -> None:
+    """Whose note it is, and on which string it is played."""
+    note.state, note.held = of.RINGS, 1
+    note.id, note.channel, note.key = event.id, event.channel, event.key
+    note.velocity, note.frame, note.member = event.value, event.frame, member
+    note.by_hand = event.position > 0.0
+    player.channels[note.channel].plays = 1
+    note.place, note.string = channels.place_of(player, table, event), -1
+    if note.place % 256 == 0 and table.strings > 0:
+        string = note.place // 256 - 1
+        if keys.chosen(table, table.strings, note.key) != string:
+            note.string = string
+    note.place += MEMBERS_APART * member
+    note.octave = member > 0 and keys.has_octave(table, note.key, note.string)
+
+
+@njit(**COMPILED)
+def _take_string(player: Player, table: Table, note: Note) -> bool:
+    """The string of a note's key with its modes and its gain; False: it is impossible."""
+    pitch_hz, own = keys.pitch_of(table, note.key), note.own
+    note.shortened = 1.0
+    if pitch_hz > 0.0:
+        modes, shortened = keys.string_of(player, table, note.key, note.string, pitch_hz, False, own)
+        note.modes, note.shortened = modes, shortened
+    if note.octave != 0 and note.modes > 0:
+        strings.thin(own, pitch_hz)
+        modes = min(note.modes, strings.modes_below(own, of.HIGHEST_HZ)) if strings.possible(own) else 0
+        note.modes = modes
+    if note.modes < 1 or strings.overdamped(own, note.modes):
+        return False
+    note.gain = gains.gain_of(player, table, note.key, note.string)
+    note.swing_m = player.swings_m[note.key, 1 + note.string]
+    return True
+
+
+@njit(**COMPILED)
+def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
+    """The pluck of a note by its velocity, or by hand, as amplitudes of its modes in the player."""
+    shortened = note.shortened
+    curve, soft = keys.value_of(player, table, of.CURVE), keys.value_of(player, table, of.SOFTEST_MM)
+    share = min(max((note.velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve)
+    harder = keys.value_of(player, table, of.HARDEST_MM) / soft
+    amplitude_mm = min(soft * harder**share * shortened, LARGEST_AMPLITUDE_MM)
+    if note.by_hand != 0:
+        amplitude_mm = min(event.amplitude_mm, LARGEST_AMPLITUDE_MM)
+        if harder != 1.0:
+            share = min(max(math.log(amplitude_mm / soft / shortened) / math.log(harder), 0.0), 1.0)
+    note.strength = harder ** (share - ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0**-curve))
+    note.hardness = 1.0
+    width = keys.value_of(player, table, of.WIDTH)
+    width *= (keys.value_of(player, table, of.WIDTH_HARD) / width) ** share
+    position, slide = keys.value_of(player, table, of.POSITION), player.channels[note.channel].slide
+    if note.by_hand != 0:
+        position, width = event.position, event.width
+    elif table.mode == of.MPE and slide >= 0:
+        position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
+    turned, varies, softest_ms = 0.0, table.variation, keys.value_of(player, table, of.CONTACT_MS)
+    release_s = plucks.contact_s(softest_ms, keys.value_of(player, table, of.CONTACT_HARD_MS), share)
+    if varies > 0.0:
+        note.stroke = player.age
+        if note.by_hand == 0:
+            position, amplitude_mm, width = plucks.vary(position, amplitude_mm, width, varies, note.stroke, note.key)
+        release_s *= 1 + varies * VARIES_RELEASE * plucks.varied(note.stroke, note.key, 3)
+        turned = varies * VARIES_ANGLE * plucks.varied(note.stroke, note.key, 4)
+    note.touched = keys.node_of(player, table, note.channel, note.modes)
+    if note.touched > 0 and note.by_hand == 0:
+        position = min(position, HARMONIC_REACH / note.touched)
+    position, amplitude_mm, width = plucks.nearest(position, amplitude_mm, width)
+    note.position, note.amplitude_mm, note.width = position, amplitude_mm, width
+    shape = event.shape if note.by_hand != 0 else table.shape
+    note.highest_m = plucks.pull(player, table, shape, note.modes, position, amplitude_mm / 1000, width)
+    plucks.release_pluck(player, table, note.own, note.modes, release_s)
+    if table.recorded != 0:
+        note.modes = recorded.modes_of(table, note.modes)
+        note.pairs = (note.modes + 1) // 2
+        recorded.split(table, note.own, note.modes, player.amplitudes[: note.modes])
+    else:
+        note.pairs = plucks.split(player, table, note.modes, turned)
+        note.modes += note.pairs
+
+
+@njit(**COMPILED)
+def _keep_of_table(player: Player, table: Table, note: Note) -> None:
+    """What a note keeps of the table that it was struck by."""
+    key, member = note.key, note.member
+    note.detuning, note.aperture_m = table.detuning, table.aperture_m
+    note.points, note.solo = table.points, table.solo
     for each in range(3):
-        player[note + of.NOTE_LOSSES + each] = table[of.TABLE_LOSSES + each]
-    player[note + of.NOTE_DETUNING] = table[of.TABLE_DETUNING]
-    player[note + of.NOTE_APERTURE_M] = table[of.TABLE_APERTURE_M]
-    if not drum:
-        player[note + of.NOTE_SWING_M] = player[gains.swing_slot(key, string)]
-    players[note + of.NOTE_MEMBER] = member
-    players[note + of.NOTE_OCTAVE] = octave
-    if not drum and not octaves and tables[of.TABLE_COURSE] > 1 and table[of.TABLE_CONDUCTANCE] > 0.0:
-        player[note + of.NOTE_BRIDGE] = table[of.TABLE_BRIDGE] if pairs > 0 else 0.0
+        note.losses[each] = table.losses[each]
+    polarised = note.pairs > 0 and table.recorded == 0
+    for each in range(2):
+        note.heard[each] = table.heard[each] if polarised else 1.0
+        note.conductance[each] = table.conductance[each]
+        note.point[each] = player.values[of.POINT + each]
+    octaves = keys.has_octave(table, key, note.string)
+    if note.drum == 0 and not octaves and table.course > 1 and table.conductance[0] > 0.0 and note.pairs > 0:
+        note.bridge = table.bridge
     if member > 0:  # above and below the first by turns, each key a little otherwise
         apart = (
             (member + 1) // 2 * (1 if member % 2 == 1 else -1) * (1 + COURSES_VARY * plucks.varied(0, key, member))
         )
-        player[note + of.NOTE_APART] = apart * table[of.TABLE_APART_CENTS] / 100
-    for each in range(2):
-        polarised = pairs > 0 and tables[of.TABLE_RECORDED] == 0
-        player[note + of.NOTE_HEARD + each] = table[of.TABLE_HEARD + each] if polarised else 1.0
-        player[note + of.NOTE_CONDUCTANCE + each] = table[of.TABLE_CONDUCTANCE + each]
-    players[note + of.NOTE_FRAME] = frame
-    players[note + of.NOTE_BEGAN] = max(frame, mixers[at.M_FRAMES])
-    player[note + of.NOTE_VELOCITY] = velocity
-    if touched > 0:
-        players[note + of.NOTE_TOUCHED] = touched
-        lasts = slots.frames(player, TOUCH_PERIODS / strings.pitch_hz(own))
-        players[note + of.NOTE_LIFTED] = players[note + of.NOTE_BEGAN] + lasts
-    player[note + of.NOTE_MUTE] = keys.mute_of(player, players, table, tables, channel)
-    player[note + of.NOTE_PLUCK] = position
-    player[note + of.NOTE_PLUCK + 1] = amplitude_mm
-    player[note + of.NOTE_PLUCK + 2] = width
-    player[note + of.NOTE_GAIN] = gain
-    for each in range(of.STRING):
-        player[note + of.NOTE_OWN + each] = own[each]
-        player[note + of.NOTE_STRING_NOW + each] = own[each]
-    players[note + of.NOTE_POINTS] = tables[of.TABLE_POINTS]
-    players[note + of.NOTE_SOLO] = tables[of.TABLE_SOLO]
-    for point in range(2):
-        player[note + of.NOTE_POINT + point] = player[of.PLAYER_VALUES + of.POINT + point]
-    for source in range(tables[of.TABLE_SOURCES]):
-        address = players[of.PLAYER_HERE] + 8 * voices.slots_of_voice(players, number, source)
-        if not drum:
-            kind, program = tables[of.TABLE_KINDS + source], tables[of.TABLE_PROGRAMS + source]
-            voices.make_voice(
-                player,
-                players,
-                table,
-                tables,
-                address,
-                note,
-                kind,
-                program,
-                tables[of.TABLE_VELOCITY],
-                highest_m,
-            )
-            voice, begun = reals(address), gain * player[of.PLAYER_SOURCE_GAINS + source]
-            begun *= channels.loudness(players, mode, channel)
-            if player[note + of.NOTE_BRIDGE] > 0.0:
-                first = players[of.PLAYER_AGE] - member  # of this player, for another may ring as well
-                wholes(address)[at.COURSE] = players[of.PLAYER_HERE] + of.MOST_SOURCES * first + source
-            voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = begun
-        players[note + of.NOTE_VOICES + source] = address
-    for each in range(of.MOST_NOTES):
-        before = slots.note(each)
-        has_place = players[before + of.NOTE_STATE] == of.RINGS and players[before + of.NOTE_HAS_PLACE] != 0
-        if has_place and players[before + of.NOTE_PLACE] == place:
-            players[before + of.NOTE_HAS_PLACE] = 0
-            _follow(player, players, tables, note, before)
-    players[note + of.NOTE_HAS_PLACE] = 1
+        note.apart = apart * table.apart_cents / 100
+    if note.touched > 0:
+        note.lifted = note.began + slots.frames(player, TOUCH_PERIODS / strings.pitch_hz(note.own))
+    note.mute = keys.mute_of(player, table, note.channel)
+    for place in range(of.STRING):
+        note.string_now[place] = note.own[place]
+
+
+@njit(**COMPILED)
+def _make_voices(player: Player, table: Table, note: Note) -> None:
+    """The voices of a note, one of each source; those of a drum are made."""
+    for source in range(table.sources):
+        address = slots.address_of_voice(player, note.number, source)
+        if note.drum == 0:
+            voices.make_voice(player, table, address, note, source)
+            begun = note.gain * player.source_gains[source]
+            begun *= channels.loudness(player, table.mode, note.channel)
+            slots.set_gain(address, begun)
+            if note.bridge > 0.0:
+                first = player.age - note.member  # of this player, for another may ring as well
+                wholes(address)[at.COURSE] = player.here + of.MOST_SOURCES * first + source
+        note.voices[source] = address
+
+
+@njit(**COMPILED)
+def _take_place(player: Player, table: Table, note: Note) -> None:
+    """A note is the latest of its place, and follows the one before."""
+    for number in range(of.MOST_NOTES):
+        before = player.notes[number]
+        if before.state == of.RINGS and before.has_place != 0 and before.place == note.place:
+            before.has_place = 0
+            _follow(player, table, note, before)
+    note.has_place = 1
+
+
+@njit(**COMPILED)
+def _begin_voices(player: Player, mixers: np.ndarray, event: Event, note: Note) -> None:
+    """Hands the voices of a note to the mixer; those that have no room there, or that nobody hears, are over."""
     for source in range(of.MOST_SOURCES):
-        address = players[note + of.NOTE_VOICES + source]
+        address = note.voices[source]
         if address == 0:
             continue
-        wholes(address)[at.BEGIN_AT] = frame
-        reals(address)[at.STRUCK_S] = player[event + of.EVENT_STRUCK_S]
+        wholes(address)[at.BEGIN_AT] = event.frame
+        reals(address)[at.STRUCK_S] = event.struck_s
         wholes(address)[at.OF_INSTRUMENT] = 1
-        spared = players[of.PLAYER_SPARES] != 0 and player[of.PLAYER_SOURCE_GAINS + source] == 0.0
+        spared = player.spares != 0 and player.source_gains[source] == 0.0
         if mixers[at.M_ACTIVE] < at.MOST_VOICES and not spared:
             mixers[at.M_VOICES + mixers[at.M_ACTIVE]] = address
             mixers[at.M_ACTIVE] += 1
         else:
             wholes(address)[at.STATE] = at.OVER
-    changes.retune(player, players, table, tables, number, 0.0, 0, mixers[at.M_FRAMES])
-    if drum:
-        strength, hardness = drums.contact_of(player, table, tables, key, velocity)
-    if member == 0:
-        level_db = keys.value_of(player, players, table, tables, of.ONSET_DB)
-        level_db += channels.loudness_db(players, mode, channel)
-        contact.touch(player, players, table, of.STROKE, level_db, strength, hardness, stroke, key, frame, 0.0, 0.0)
-    _make_room(player, players)
-    report_began(player, players, tables, event, number, player[note + of.NOTE_OWN : note + of.NOTE_OWN + of.STRING])
 
 
 @njit(**COMPILED)
-def report_began(
-    player: np.ndarray, players: np.ndarray, tables: np.ndarray, event: int, number: int, own: np.ndarray
-) -> None:
+def report_began(player: Player, table: Table, event: Event, note: Note, own: np.ndarray) -> None:
     """Reports the note of an event, and the string of its key."""
-    note, frame = slots.note(number), players[event + of.EVENT_FRAME]
-    if players[note + of.NOTE_MEMBER] != 0:
+    if note.member != 0:
         return
-    id, channel, key = players[note + of.NOTE_ID], players[note + of.NOTE_CHANNEL], players[note + of.NOTE_KEY]
-    slot = report(player, players, of.BEGAN, id, channel, key, frame, player[event + of.EVENT_VALUE])
-    players[slot + of.REPORT_STRING] = players[note + of.NOTE_STRING]
-    players[slot + of.REPORT_TABLE] = tables[of.TABLE_SERIAL]
-    players[slot + of.REPORT_MODES] = players[note + of.NOTE_MODES]
-    players[slot + of.REPORT_NOTE] = number
-    player[slot + of.REPORT_POSITION] = player[note + of.NOTE_PLUCK]
-    player[slot + of.REPORT_AMPLITUDE_MM] = player[note + of.NOTE_PLUCK + 1]
-    player[slot + of.REPORT_WIDTH] = player[note + of.NOTE_PLUCK + 2]
-    player[slot + of.REPORT_GAIN] = player[note + of.NOTE_GAIN]
-    for each in range(of.STRING):
-        player[slot + of.REPORT_OWN + each] = own[each]
-    reported(players)
+    made = report(player, of.BEGAN, note.id, note.channel, note.key, event.frame, event.value)
+    made.string, made.table = note.string, table.serial
+    made.modes, made.note, made.gain = note.modes, note.number, note.gain
+    made.position, made.amplitude_mm, made.width = note.position, note.amplitude_mm, note.width
+    for place in range(of.STRING):
+        made.own[place] = own[place]
+    reported(player)
 
 
 @njit(**COMPILED)
-def tend(player: np.ndarray, players: np.ndarray, now: int) -> None:
+def tend(player: Player, now: int) -> None:
     """Reports notes that have ended."""
     for number in range(of.MOST_NOTES):
-        if players[slots.note(number) + of.NOTE_STATE] == of.RINGS and slots.over(players, slots.note(number)):
-            _forget(player, players, slots.note(number), now)
+        note = player.notes[number]
+        if note.state == of.RINGS and slots.over(note):
+            _forget(player, note, now)

@@ -7,10 +7,13 @@ import math
 import numpy as np
 from numba import njit
 
-from engine.kernels import playing_layout as of
+from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
+from engine.kernels import constants as of
 from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
-from engine.pluck import LARGEST_AMPLITUDE_MM, MOST_PERIODS, POSITION_RANGE, WIDTH_RANGE
+from engine.kernels.memory import behind
+from engine.kernels.records import Player, Table
+from engine.levels import MOST_PERIODS
 
 LEAST_AMPLITUDE_MM = 1e-6  # -200 dB of the largest: silence, and no division by zero
 
@@ -21,9 +24,8 @@ VARIES_PLACE, VARIES_DB, VARIES_WIDTH = 0.08, 1.0, 0.12  # shares, dB
 
 @njit(**COMPILED)
 def pull(
-    player: np.ndarray,
-    table: np.ndarray,
-    tables: np.ndarray,
+    player: Player,
+    table: Table,
     shape: int,
     modes: int,
     position: float,
@@ -34,9 +36,10 @@ def pull(
 
     Those of a blow are divided by its width, the shape's area over its height; `release_pluck` does the rest.
     """
-    grid, highest = tables[of.TABLE_GRID], 0.0
+    grid, highest = table.grid, 0.0
+    sines = behind(table, table.sines, 2 * (grid - 1))
     if shape == of.ROUNDED:
-        _round(player, table, grid, modes, position, peak_m, width)
+        _round(player, sines, modes, position, peak_m, width)
         return peak_m
     for point in range(grid):
         x = point / (grid - 1)
@@ -49,7 +52,7 @@ def pull(
             found = peak_m * math.exp(-distance * distance)
         else:
             found = peak_m / 2 * (1 + math.cos(2 * math.pi * distance)) if abs(distance) < 0.5 else 0.0
-        player[of.PLAYER_PULLED + point] = found
+        player.pulled[point] = found
         highest = max(highest, found)
     turn = 2 * (grid - 1)
     for mode in range(modes):
@@ -58,61 +61,60 @@ def pull(
             place += mode + 1
             if place >= turn:
                 place -= turn
-            total += player[of.PLAYER_PULLED + point] * table[of.TABLE_SINES + place]
-        player[of.PLAYER_AMPLITUDES + mode] = total * (2 / (grid - 1))
-    if tables[of.TABLE_STRIKES] != 0:
+            total += player.pulled[point] * sines[place]
+        player.amplitudes[mode] = total * (2 / (grid - 1))
+    if table.strikes != 0:
         area = 0.0
         for point in range(grid):
-            area += player[of.PLAYER_PULLED + point] / (peak_m * (grid - 1))
+            area += player.pulled[point] / (peak_m * (grid - 1))
         for mode in range(modes):
-            player[of.PLAYER_AMPLITUDES + mode] /= area
+            player.amplitudes[mode] /= area
     return highest
 
 
 @njit(**COMPILED)
-def _round(
-    player: np.ndarray, table: np.ndarray, grid: int, modes: int, position: float, peak_m: float, width: float
-) -> None:
+def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_m: float, width: float) -> None:
     """The amplitudes of the modes of a rounded triangle: as `excitation.rounded`.
 
     It peaks where the force pulls: elsewhere it is straight.
     """
-    turn, highest = 2 * (grid - 1), 0.0
+    turn, grid, highest = len(sines), len(sines) // 2 + 1, 0.0
     near = int((position - width / 2) * (grid - 1)) - 1
     far = int((position + width / 2) * (grid - 1)) + 2
     low, high = max(near, 1), min(far, grid - 2) + 1
-    player[of.PLAYER_PULLED + low : of.PLAYER_PULLED + high] = 0.0
+    for point in range(low, high):
+        player.pulled[point] = 0.0
     for mode in range(1, grid - 1):
         half = mode * width / 2
         spread = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
         each, place = math.sin(math.pi * mode * position) / (mode * mode) * spread, mode * low % turn
         for point in range(low, high):
-            player[of.PLAYER_PULLED + point] += each * table[of.TABLE_SINES + place]
+            player.pulled[point] += each * sines[place]
             place += mode
             if place >= turn:
                 place -= turn
         if mode <= modes:
-            player[of.PLAYER_AMPLITUDES + mode - 1] = each
+            player.amplitudes[mode - 1] = each
     for point in range(low, high):
-        highest = max(highest, player[of.PLAYER_PULLED + point])
+        highest = max(highest, player.pulled[point])
     for mode in range(modes):
-        player[of.PLAYER_AMPLITUDES + mode] *= peak_m / highest
+        player.amplitudes[mode] *= peak_m / highest
 
 
 @njit(**COMPILED)
-def release_pluck(player: np.ndarray, tables: np.ndarray, own: np.ndarray, partials: int, release_s: float) -> None:
+def release_pluck(player: Player, table: Table, own: np.ndarray, partials: int, release_s: float) -> None:
     """Releases a pluck's partials within a time, or strikes them for so long: as `excitation`.
 
     What touches a string leaves it within a period of its lowest partial. So soft strokes of high keys are heard.
     """
     release_s = min(release_s, MOST_PERIODS * 2 * math.pi / math.sqrt(strings.omega_squared(own, 1)))
-    for mode in range(partials if tables[of.TABLE_STRIKES] != 0 else 0):
+    for mode in range(partials if table.strikes != 0 else 0):
         share = math.sqrt(strings.omega_squared(own, 1) / strings.omega_squared(own, mode + 1))
-        player[of.PLAYER_AMPLITUDES + mode] *= 2 / math.pi * share
+        player.amplitudes[mode] *= 2 / math.pi * share
     for mode in range(partials if release_s > 0.0 else 0):
         half = math.sqrt(strings.omega_squared(own, mode + 1)) * release_s / (2 * math.pi)
         left = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
-        player[of.PLAYER_AMPLITUDES + mode] *= left
+        player.amplitudes[mode] *= left
 
 
 @njit(**COMPILED)
@@ -148,31 +150,31 @@ def vary(
 
 
 @njit(**COMPILED)
-def split(player: np.ndarray, table: np.ndarray, tables: np.ndarray, partials: int, turned: float) -> int:
+def split(player: Player, table: Table, partials: int, turned: float) -> int:
     """Splits a pluck's partials into modes of both polarisations; how many partials have two.
 
     Args:
         turned: by so many rad from the instrument's angle.
     """
-    pairs = min(tables[of.TABLE_PAIRS], partials)
+    pairs = min(table.pairs, partials)
     if pairs == 0:
         return 0
-    first, cosine, sine = of.PLAYER_AMPLITUDES, math.cos(turned), math.sin(turned)
-    normal, along = table[of.TABLE_PULLED], table[of.TABLE_PULLED + 1]
+    cosine, sine = math.cos(turned), math.sin(turned)
+    normal, along = table.pulled[0], table.pulled[1]
     for mode in range(partials + pairs - 1, -1, -1):
-        amplitude = player[first + strings.partial_of(mode, pairs) - 1]
+        amplitude = player.amplitudes[strings.partial_of(mode, pairs) - 1]
         second = strings.direction_of(mode, pairs) == 1
         part = along * cosine + normal * sine if second else normal * cosine - along * sine
         if mode >= 2 * pairs:  # heard as the others are
-            part = 1 / table[of.TABLE_HEARD]
-        player[first + mode] = part * amplitude
+            part = 1 / table.heard[0]
+        player.amplitudes[mode] = part * amplitude
     return pairs
 
 
 @njit(**COMPILED)
-def reference_share(player: np.ndarray) -> float:
+def reference_share(player: Player) -> float:
     """The share of the velocities at which keys are equally loud."""
-    return ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0 ** -player[of.PLAYER_VALUES + of.CURVE])
+    return ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0 ** -player.values[of.CURVE])
 
 
 @njit(**COMPILED)

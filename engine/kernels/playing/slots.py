@@ -1,46 +1,28 @@
-"""Where notes and channels lie in a player's memory, and what their slots say.
-
-Memory is passed twice, as real numbers and as whole ones (`players`, `tables`, `mixers`), and notes, channels and
-events by their first slot: views of slices would take the compiler five times as long.
-"""
+"""Times in frames; the voices of a player's notes, and whether they are over."""
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
+from engine.kernels import constants as of
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
+from engine.kernels import records
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import wholes
+from engine.kernels.memory import reals, wholes
+from engine.kernels.records import PLAYER, Note, Player
+
+VOICES_AT = PLAYER.itemsize
+voice_bytes = njit(**COMPILED)(records.voice_bytes)
 
 
 @njit(**COMPILED)
-def note(number: int) -> int:
-    """First slot of a note."""
-    return of.PLAYER_NOTES + number * of.NOTE_SLOTS
+def frames(player: Player, seconds: float) -> int:
+    return max(1, round(seconds * player.rate_hz))
 
 
 @njit(**COMPILED)
-def channel(number: int) -> int:
-    """First slot of a channel."""
-    return of.PLAYER_CHANNELS + number * of.CHANNEL_SLOTS
-
-
-@njit(**COMPILED)
-def moment(player: np.ndarray, number: int) -> np.ndarray:
-    """Room for a string, for a moment."""
-    return player[of.PLAYER_STRINGS + number * of.STRING : of.PLAYER_STRINGS + (number + 1) * of.STRING]
-
-
-@njit(**COMPILED)
-def frames(player: np.ndarray, seconds: float) -> int:
-    return max(1, round(seconds * player[of.PLAYER_RATE]))
-
-
-@njit(**COMPILED)
-def quanta(player: np.ndarray, seconds: float) -> int:
-    return max(1, round(seconds * player[of.PLAYER_RATE] / at.QUANTUM))
+def quanta(player: Player, seconds: float) -> int:
+    return max(1, round(seconds * player.rate_hz / at.QUANTUM))
 
 
 @njit(**COMPILED)
@@ -50,20 +32,29 @@ def voice_over(address: int) -> bool:
 
 
 @njit(**COMPILED)
-def over(players: np.ndarray, note: int) -> bool:
+def over(note: Note) -> bool:
     """Whether all voices of a note are."""
     for source in range(of.MOST_SOURCES):
-        address = players[note + of.NOTE_VOICES + source]
+        address = note.voices[source]
         if address != 0 and not voice_over(address):
             return False
     return True
 
 
 @njit(**COMPILED)
-def sounds(players: np.ndarray, note: int) -> bool:
+def sounds(note: Note) -> bool:
     """Whether a note has its place and rings."""
-    return (
-        players[note + of.NOTE_STATE] == of.RINGS
-        and players[note + of.NOTE_HAS_PLACE] == 1
-        and not over(players, note)
-    )
+    return note.state == of.RINGS and note.has_place == 1 and not over(note)
+
+
+@njit(**COMPILED)
+def address_of_voice(player: Player, number: int, source: int) -> int:
+    """The player's own voice for one of its notes and a source."""
+    return player.here + VOICES_AT + (number * of.MOST_SOURCES + source) * voice_bytes(player.modes)
+
+
+@njit(**COMPILED)
+def set_gain(address: int, gain: float) -> None:
+    """Sets the gain of a voice that begins."""
+    voice = reals(address)
+    voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = gain

@@ -34,7 +34,8 @@ except build.PluginError as error:
     print(error)
 """
 WARMING = """
-from engine.kernels import cache, warm
+from engine import warm
+from engine.kernels import cache
 warm.os.cpu_count = lambda: 2
 with warm._beside("os.getpid") as process:  # a function that compiles nothing
     process.wait()

@@ -24,7 +24,8 @@ from app.playing.ahead import AheadVoice
 from app.shared.vocabulary import BITS, Bits, Source
 from app.shared.worker import Cancelled
 from engine.kernels.limiter import AHEAD
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
+from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetError, load_preset
 from engine.resonators.sine_transform import listening_weights, project
 from engine.result_file import WriteError

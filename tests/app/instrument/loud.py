@@ -12,8 +12,8 @@ from app.instrument.string_keys import StringKeys, on_string, polarisations_of
 from app.instrument.strings import KeyString, has_octave
 from app.patches.patch import Patch
 from engine.excitation import blow_factor, release_factor
-from engine.kernels import playing_layout as of
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S
+from engine.kernels import constants as of
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import PresetInfo
 from engine.resonators.base import Array, Resonator
 from engine.resonators.losses import Losses

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from app.instrument.compiled import InstrumentPlayer
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.resonators.string import StringParameters
 from engine.voices import Mixer
 
@@ -36,22 +34,17 @@ class Seen:
 
 def seen(player: InstrumentPlayer) -> list[Seen]:
     """The notes that ring, the oldest first."""
-    memory = player.compiled.memory
-    size = of.MOST_NOTES * of.NOTE_SLOTS
-    reals = memory[of.PLAYER_NOTES : of.PLAYER_NOTES + size].reshape(of.MOST_NOTES, of.NOTE_SLOTS).copy()
     found = []
-    for real in reals:
-        whole = real.view(np.int64)
-        if whole[of.NOTE_STATE] != of.RINGS:
+    for note in player.compiled.record["notes"].copy():
+        if note["state"] != of.RINGS:
             continue
         own, now = (
-            StringParameters(*real[first : first + of.STRING].tolist()) if real[first] else StringParameters()
-            for first in (of.NOTE_OWN, of.NOTE_STRING_NOW)
+            StringParameters(*string.tolist()) if string[0] else StringParameters()
+            for string in (note["own"], note["string_now"])
         )
-        flags = (bool(whole[slot]) for slot in (of.NOTE_HELD, of.NOTE_KEPT, of.NOTE_DAMPED, of.NOTE_HAS_PLACE))
-        numbers = (int(whole[slot]) for slot in (of.NOTE_ID, of.NOTE_CHANNEL, of.NOTE_KEY, of.NOTE_PLACE))
-        note = Seen(*numbers, *flags, float(real[of.NOTE_GAIN]), own, now)
-        found.append((int(whole[of.NOTE_AGE]), note))
+        flags = (bool(note[name]) for name in ("held", "kept", "damped", "has_place"))
+        numbers = (int(note[name]) for name in ("id", "channel", "key", "place"))
+        found.append((int(note["age"]), Seen(*numbers, *flags, float(note["gain"]), own, now)))
     return [note for _, note in sorted(found, key=lambda each: each[0])]
 
 
@@ -62,5 +55,5 @@ def sounding(player: InstrumentPlayer) -> list[Seen]:
 
 def taken_up(player: InstrumentPlayer, mixer: Mixer) -> list[Seen]:
     """What rings once the mixer's next quantum has taken up all that is due."""
-    player.compiled.catch_up(mixer)
+    player.compiled.catch_up(mixer.address)
     return seen(player)

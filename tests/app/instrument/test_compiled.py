@@ -26,18 +26,20 @@ from app.instrument import events
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.string_keys import StringKeys, on_string
-from app.instrument.table import PLAYED_PARAMETERS, _with_recorded
+from app.instrument.table import PLAYED_PARAMETERS, Tail, put_recorded
 from app.patches.library import find_patch, read_patch
 from app.patches.patch import Losses, Noise, Patch, Pickup, Polarisations
 from app.patches.tuning import TuningChoice
+from engine.kernels import constants as of
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
 from engine.kernels.layout import QUANTUM
 from engine.kernels.recorded import correct
+from engine.kernels.records import TABLE
 from engine.pluck import SHAPES, Pluck, Shape
 from engine.presets import Preset
 from engine.resonators.string import StringParameters
 from engine.voices import Mixer
+from engine.voices.player import record_of
 from tests.app.instrument.loud import LoudKeys
 from tests.app.instrument.seen import sounding
 from tests.engine.resonators.test_recorded import recorded
@@ -219,8 +221,10 @@ def test_the_kernels_have_the_modes_of_a_recorded_string_at_every_pitch(semitone
     string = replace(StringParameters(), length_m=StringParameters().length_m / 2 ** (semitones / 12))
     modes, law = own.resonator(string, 10), string.resonator(5)
     rows = np.concatenate([np.repeat(law.omega, 2) ** 2, np.repeat(law.sigma, 2), np.zeros(20)])
-    table = _with_recorded(np.zeros(of.TABLE_RECORDED + 1), own, 101)
-    correct(table, table.view(np.int64), np.array(astuple(string)), 10, rows)
+    header, tail = np.zeros(1, TABLE), Tail()
+    put_recorded(header[0], tail, own, 101)
+    table = np.concatenate([header.view(np.float64), *tail.parts])
+    correct(record_of(table, TABLE), np.array(astuple(string)), 10, rows)
     np.testing.assert_allclose(rows[:20], np.concatenate([modes.omega**2, modes.sigma]), rtol=1e-12)
 
 
@@ -301,7 +305,7 @@ def test_threads_may_give_events_while_the_mixer_plays(shipped: dict[str, Patch]
     while any(thread.is_alive() for thread in threads) or stage.player.compiled.waiting:
         quantum(stage.mixer)
     assert [stage.player.compiled.channel(channel).bend for channel in range(5)] == [1, 1, 1, 1, 0]
-    assert int(stage.player.compiled.memory.view(np.int64)[of.PLAYER_TAKEN]) == 4 * count + 1
+    assert int(stage.player.compiled.record["taken"]) == 4 * count + 1
 
 
 def test_the_same_events_give_the_same_samples(shipped: dict[str, Patch], preset: Preset) -> None:
@@ -436,11 +440,11 @@ def test_wheels_and_pedals_can_be_read(shipped: dict[str, Patch], preset: Preset
         Controller(events.MOD_WHEEL, 127, 3),
     ):
         stage.handle(event, 0)
-    stage.player.compiled.catch_up(stage.mixer)
+    stage.player.compiled.catch_up(stage.mixer.address)
     other = Compiled(patch, preset)
     for event in stage.player.at_hand:
         other.handle(event, 0)
-    other.player.compiled.catch_up(other.mixer)
+    other.player.compiled.catch_up(other.mixer.address)
     for number in range(of.CHANNELS):
         assert other.player.compiled.channel(number) == stage.player.compiled.channel(number)
     one = stage.player.compiled.channel(1)
@@ -477,11 +481,11 @@ def test_another_player_begins_as_the_hands_are(shipped: dict[str, Patch], prese
     stage.player.set_gains({"model": 0.25, "truth": 0.0})
     for event in (Controller(events.SUSTAIN, 127), Bend(-0.5)):
         stage.handle(event, 0)
-    stage.player.compiled.catch_up(stage.mixer)
+    stage.player.compiled.catch_up(stage.mixer.address)
     made = stage.player.again(44_100)
     mixer = Mixer(44_100)
     mixer.set_player(made.compiled)
-    made.compiled.catch_up(mixer)
+    made.compiled.catch_up(mixer.address)
     assert made.rate_hz == 44_100 and made.keys is stage.player.keys
     assert made.compiled.channel(0) == stage.player.compiled.channel(0)
     assert [made.compiled.source_gain(source) for source in (0, 1)] == [0.25, 0.0]

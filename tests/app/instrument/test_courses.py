@@ -10,7 +10,7 @@ import scipy.signal
 
 from app.instrument.events import LEGATO, MOD_WHEEL, PORTAMENTO, SLIDE_TIME, Controller, NoteOff, NoteOn
 from app.patches.patch import Course, Fretted, Noise, Patch, Pickup, Technique
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.kernels.playing.channels import SLIDE_S
 from engine.presets import Preset
 from tests.app.instrument.seen import seen

@@ -20,7 +20,8 @@ from app.patches.drums import Drums, PhysicalMallet
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, read_patch
 from app.patches.patch import Noise, Patch, Room
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
+from engine.kernels.records import PLAYER, slots
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
 from engine.voices import Ear, Mixer
@@ -139,8 +140,8 @@ def test_the_kernel_strikes_as_the_engine_does() -> None:
     mixer = Mixer(RATE_HZ, limited=False)
     mixer.set_player(player.compiled)
     player.handle(NoteOn(47, 90))
-    player.compiled.catch_up(mixer)
-    first = of.PLAYER_VOICES
+    player.compiled.catch_up(mixer.address)
+    first = slots(PLAYER)
     from engine.kernels import layout as at
 
     n = len(found.modes)
@@ -155,12 +156,12 @@ def test_a_blow_at_a_place_of_its_own_moves_the_modes_of_that_place() -> None:
     found = DrumKeys(KIT, Ear((0.5,))).of_key(47)
     assert found is not None
     n = len(found.modes)
-    place = of.PLAYER_VOICES + at.state(n) + n
+    place = slots(PLAYER) + at.state(n) + n
 
     def speeds(where: tuple[float, float] | None) -> np.ndarray:
         player, mixer = InstrumentPlayer(KIT, PRESET, RATE_HZ, {"truth": 1.0}), Mixer(RATE_HZ)
         player.handle(NoteOn(47, 90, place=where))
-        player.compiled.catch_up(mixer)
+        player.compiled.catch_up(mixer.address)
         assert len(player.compiled._struck) == (where is not None)
         player.reports()
         assert not player.compiled._struck, "its memory is free"
@@ -182,7 +183,7 @@ def test_every_pad_has_a_drum_and_others_are_refused() -> None:
     player, mixer = InstrumentPlayer(KIT, PRESET, RATE_HZ, {"model": 1.0}), Mixer(RATE_HZ)
     mixer.set_player(player.compiled)
     player.handle(NoteOn(52, 100))
-    player.compiled.catch_up(mixer)
+    player.compiled.catch_up(mixer.address)
     assert [report.kind for report in player.reports()] == [of.REFUSED]
 
 

@@ -41,8 +41,8 @@ from app.instrument.events import (
 from app.instrument.offline import render_events
 from app.instrument.strings import pitch_hz_of
 from app.patches.patch import Knobs, OpenString, Patch, StringSet
+from engine.kernels.constants import BEGAN
 from engine.kernels.playing.channels import WIDEST_SEMITONES
-from engine.kernels.playing_layout import BEGAN
 from engine.presets import Preset
 from engine.voices import Mixer
 from engine.voices.player import Report

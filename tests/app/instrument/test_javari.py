@@ -58,7 +58,7 @@ def watched(
 ) -> tuple[Watched, Equation]:
     """A note before its first quantum is rendered, whose equation has the modes of its first."""
     note = Watched(patch, preset, source, velocity, key)
-    note.player.compiled.catch_up(note.mixer)
+    note.player.compiled.catch_up(note.mixer.address)
     return note, Equation(note.voices()[0])
 
 

@@ -10,9 +10,9 @@ from app.instrument.events import NoteOn, TimedEvent
 from app.instrument.offline import render_events, render_note
 from app.patches.library import SHIPPED, find_patch, list_patches
 from app.patches.patch import Patch
+from engine.kernels.constants import HIGHEST_PEAK_DB, PART_S, REFERENCE_VELOCITY, WANTED_DB
 from engine.kernels.limiter import CEILING
 from engine.kernels.loudness import k_weight
-from engine.kernels.playing_layout import HIGHEST_PEAK_DB, PART_S, REFERENCE_VELOCITY, WANTED_DB
 from engine.presets import Preset
 from engine.voices import Mixer
 from tests.app.instrument.loud import LoudKeys
@@ -69,7 +69,7 @@ def test_keys_of_a_patch_have_the_gains_that_the_player_computes(name: str, pres
         low, high = each.range
         for key in (low, (low + high) // 2, high):
             player.handle(NoteOn(key, 30))
-        player.compiled.catch_up(mixer)
+        player.compiled.catch_up(mixer.address)
         keys = LoudKeys(each, player.ear, preset.info)
         for report in player.reports():
             found = keys.of_key(report.key)

@@ -29,12 +29,12 @@ from app.patches.library import read_patch
 from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, PluckChoices, Room
 from engine import bounds
 from engine.excitation import blow_factor, release_factor
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
+from engine.kernels.constants import WANTED_DB
 from engine.kernels.layout import QUANTUM
 from engine.kernels.loudness import k_weight
 from engine.kernels.playing.notes import PLUCK_STOPS_S
-from engine.kernels.playing_layout import WANTED_DB
-from engine.pluck import FULL_SCALE_M
+from engine.levels import FULL_SCALE_M
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
 from engine.resonators.string import StringParameters

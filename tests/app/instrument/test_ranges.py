@@ -19,10 +19,11 @@ from app.patches.library import SHIPPED, list_patches
 from app.patches.patch import ASSIGNABLE, VELOCITIES, WHEEL, Fretted, Patch
 from app.playing.key_note import KeyNote
 from app.shared.parameters import OF_PATCHES
-from engine.kernels import playing_layout as of
+from engine.bounds import AMPLITUDE_MM_RANGE, POSITION_RANGE, WIDTH_RANGE
+from engine.kernels import constants as of
 from engine.kernels import strings
 from engine.kernels.playing.plucks import vary
-from engine.pluck import AMPLITUDE_MM_RANGE, POSITION_RANGE, WIDTH_RANGE, Pluck
+from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.strike import Strike
 from engine.voices import Ear, Mixer

@@ -26,7 +26,7 @@ from app.instrument.events import (
     NoteOn,
 )
 from app.patches.patch import Fretted, Patch, Pickup, Polarisations, Technique
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.kernels.layout import QUANTUM
 from engine.kernels.playing.chords import CHORD_S, USUAL_STRUM_MS
 from engine.kernels.playing.hands import USUAL_TREMOLO_HZ

@@ -14,8 +14,9 @@ from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import Bend, NoteOff, NoteOn
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Course, Fretted, Patch, Pickup, PluckChoices, Polarisations, Technique
+from engine.kernels import constants as of
 from engine.kernels import layout as at
-from engine.kernels import playing_layout as of
+from engine.kernels.records import PLAYER, slots, voice_bytes
 from engine.kernels.tension import physical as physical_of
 from engine.presets import Preset
 from engine.voices import Mixer
@@ -56,14 +57,12 @@ class Watched:
 
     def voices(self) -> list[NDArray[np.float64]]:
         """Memory of the strings of the course, the first first."""
-        memory = self.player.compiled.memory
-        whole, found = memory.view(np.int64), []
-        stride = of.voice_slots(int(whole[of.PLAYER_MODES]))
-        for number in range(of.MOST_NOTES):
-            note = of.PLAYER_NOTES + number * of.NOTE_SLOTS
-            if whole[note + of.NOTE_STATE] == of.RINGS:
-                first = of.PLAYER_VOICES + number * of.MOST_SOURCES * stride
-                found.append((int(whole[note + of.NOTE_AGE]), memory[first : first + stride]))
+        player, found = self.player.compiled, []
+        stride = voice_bytes(int(player.record["modes"])) // 8
+        for number, note in enumerate(player.record["notes"]):
+            if note["state"] == of.RINGS:
+                first = slots(PLAYER) + number * of.MOST_SOURCES * stride
+                found.append((int(note["age"]), player.memory[first : first + stride]))
         return [voice for _, voice in sorted(found, key=lambda each: each[0])]
 
     def states(self, quanta: int) -> NDArray[np.float64]:

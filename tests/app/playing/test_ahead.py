@@ -12,8 +12,9 @@ import torch
 
 from app.playing.ahead import CARE, LEAST_S, Ahead, AheadVoice
 from app.playing.sources import Sources
+from engine.levels import FULL_SCALE_M
 from engine.models.koopman_var import KoopmanState, KoopmanVar
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.pluck import Pluck
 from engine.resonators.sine_transform import project
 from engine.sources import ModelSource
 from engine.voices import Ear, Mixer, Voice

@@ -43,7 +43,7 @@ from app.playing.notes import Notes
 from app.playing.playback import Playback
 from app.playing.sources import Sources
 from engine.effects import Effects
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.pluck import Pluck
 from engine.voices import Ear, Mixer
 from engine.voices.voice import FADE_S
@@ -94,7 +94,7 @@ def strike(notes: Notes, event: NoteOn, due: Due | None = None) -> KeyNote:
     """The note of a key, which the player has taken up."""
     note = notes.handle(event, due)
     assert isinstance(note, KeyNote)
-    note.player.compiled.catch_up(notes.mixer)
+    note.player.compiled.catch_up(notes.mixer.address)
     notes.look()
     return note
 
@@ -155,8 +155,9 @@ def test_the_last_of_many_turns_counts(played: Notes, patch: Patch, wait: Wait) 
     exact = player_of(played)
     fresh = InstrumentPlayer(exact.patch, exact.preset, 48_000, {"model": 1.0}, exact.ear)
     assert struck.parameters is not None
+    mixer = Mixer(48_000)
     fresh.handle(NoteOn(45, 60))
-    fresh.compiled.catch_up(Mixer(48_000))
+    fresh.compiled.catch_up(mixer.address)
     (report,) = fresh.reports()
     assert strike(played, NoteOn(45, 60)).gain == report.gain
     turned = [each.event.patch for each in played.keys.recorder.end() if isinstance(each.event, PatchTurned)]
@@ -260,8 +261,8 @@ def test_a_stop_ends_strings_that_ring_in_sympathy_too(played: Notes, sound: Any
     strike(played, NoteOn((low + high) // 2, 120))
     sound.mixer.render(48_000)
     player = player_of(played)
-    assert player.compiled.memory.view(np.int64)[of.PLAYER_SYMPATHETIC] > 100
-    assert player.compiled.memory.view(np.int64)[of.PLAYER_SYMPATHY_RINGS]
+    assert player.compiled.record["sympathy"]["partials"] > 100
+    assert player.compiled.record["sympathy"]["rings"]
     played.stop()
     sound.mixer.render(4_800)
     assert np.abs(sound.mixer.render(4_800)).max() < 1e-6
@@ -667,5 +668,5 @@ def test_switches_hold_for_another_instruments_player_too(played: Notes, patch: 
         wait(lambda other=other: played.keys.player is not None and played.keys.player.patch == other)
     player = played.keys.player
     assert player is not None
-    player.compiled.catch_up(played.mixer)
+    player.compiled.catch_up(played.mixer.address)
     assert player.at_hand == switches

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels.playing_layout import PART_S
+from engine.kernels.constants import PART_S
 from tests.bench.play.sound_server import RATE_HZ
 from tests.bench.tune import loudness_db, pitch_hz
 

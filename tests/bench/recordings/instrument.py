@@ -20,7 +20,7 @@ from app.patches.library import find_patch
 from app.patches.patch import Patch
 from app.shared.parameters import NOISE_DB
 from engine.folders import FOLDER_VARIABLE
-from engine.kernels.playing_layout import PART_S
+from engine.kernels.constants import PART_S
 from engine.presets import Preset, load_preset
 from tests.bench.recordings.synthetic import synthetic_note
 from training.recording.attack import first_distance_db

@@ -13,10 +13,11 @@ import torch
 from numpy.typing import NDArray
 
 from engine.kernels import layout as at
+from engine.levels import FULL_SCALE_M
 from engine.models.configurations import DMDConfiguration
 from engine.models.dmd import DMD
 from engine.models.integrated_phase import IntegratedPhase
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.schema import write

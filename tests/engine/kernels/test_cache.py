@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from engine.kernels import cache, warm
+from engine import warm
+from engine.kernels import cache
 
 
 def reported(code: str, **environment: str) -> str:

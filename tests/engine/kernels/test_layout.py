@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from engine import kernels, voices
-from engine.kernels import layout, playing_layout
+from engine.kernels import constants, layout
 
-SOURCES = {"at": layout, "of": playing_layout}
+SOURCES = {"at": layout, "of": constants}
 TAGS = {
     f"{short}.{slot}": kind
     for short, module in SOURCES.items()

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from engine.effects import Body, Effects
 from engine.effects.curves import RATE_HZ, curves_of
 from engine.effects.impulse import Impulse, convolved
+from engine.kernels import constants as of
 from engine.kernels import loudness
-from engine.kernels import playing_layout as of
 
 Array = NDArray[np.float64]
 NO_BODY = np.zeros(0)

@@ -12,7 +12,8 @@ from engine.effects import Effects, Room
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import publish
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.levels import FULL_SCALE_M
+from engine.pluck import Pluck
 from engine.resonators.string import StringParameters
 from engine.voices import Ear, Mixer, Voice, plain_program
 from engine.voices import mixer as mixer_module

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels import playing_layout as of
+from engine.kernels import constants as of
 from engine.kernels import strings
 from engine.resonators.string import StringParameters
 

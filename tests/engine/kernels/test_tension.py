@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from engine.kernels import layout, tension
 from engine.kernels.modes import row
+from engine.levels import FULL_SCALE_M, FULL_SCALE_N
 from engine.models.koopman_tension import KoopmanTension
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_N, Pluck
+from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, of_string
 from engine.sources import ModelSource, TruthSource
 from engine.truth import ModalState, SplittingSolver

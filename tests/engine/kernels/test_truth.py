@@ -11,7 +11,8 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.levels import FULL_SCALE_M
+from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import TruthSource

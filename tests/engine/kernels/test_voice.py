@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.kernels import layout as at
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.models.integrated_phase import IntegratedPhase
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, Pluck
+from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo
 from engine.resonators.string import StringParameters
 from engine.voices import Ear, Mixer, Voice, model_program, plain_program, truth_program

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from engine.resonators.recorded import FADES_SEMITONES, RecordedAttack, RecordedNote, RecordedString
+from engine.kernels.constants import FADES_SEMITONES
+from engine.resonators.recorded import RecordedAttack, RecordedNote, RecordedString
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, write
 

@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from engine.kernels import layout
+from engine.levels import FULL_SCALE_M
 from engine.models._tension_arrays import CURVES
 from engine.models.base import Physics
 from engine.models.configurations import KoopmanTensionConfiguration
 from engine.models.koopman_tension import KoopmanTension
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.pluck import Pluck
 from engine.resonators.base import Resonator
 from engine.resonators.string import StringParameters
 from engine.voices import Ear, Mixer, Program, Voice

@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from engine.excitation import triangular
-from engine.pluck import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, RUNAWAY_FACTOR, Pluck
+from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, RUNAWAY_FACTOR
+from engine.pluck import Pluck
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.resonators.string import StringParameters

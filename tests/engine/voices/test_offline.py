@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from engine.kernels import layout as at
 from engine.kernels.layout import AHEAD
-from engine.pluck import FULL_SCALE_M, Pluck
+from engine.levels import FULL_SCALE_M
+from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, load_preset
 from engine.sources import ModelSource, Runaway
 from engine.voices import (
@@ -26,7 +27,7 @@ from engine.voices import (
     rendered_program,
     truth_program,
 )
-from engine.voices.programs import voice_ends_s
+from engine.voices.program import voice_ends_s
 from engine.voices.voice import END_FADE_S
 
 NAME, PLUCK, SECONDS = "nylon_nonlinear_gaussian_4k_koopman_integrated", Pluck(0.3), 0.2

@@ -20,7 +20,7 @@ from training.fitting import fit as module
 from training.fitting.checkpoint import Checkpoint
 from training.fitting.fit import Diverged, Progress, Seed, fit, fit_seeds, horizon_at, learning_rate_at
 from training.fitting.losses import training_loss
-from training.start import new_model
+from training.fitting.start import new_model
 
 DATA = {"count": 20, "steps": 450, "modes": 5}
 QUICK = {"epochs": 4, "validate_every": 1, "batch_size": 8, "first_horizon": 20, "steps_per_batch": 16}

@@ -20,7 +20,8 @@ from training.evaluate import evaluate_model
 from training.fitting.fit import fit
 from training.fitting.modes import Modes, found_modes
 from training.fitting.phases import _Motion, _upright, fit_phases, mean_motions, start_from_phases
-from training.start import BLIND_PURSUIT, COUNT, PHASES, PURSUIT, SYMMETRIES, begin, knowledge_of
+from training.fitting.start import begin
+from training.start import BLIND_PURSUIT, COUNT, PHASES, PURSUIT, SYMMETRIES
 
 STEPS = 450
 
@@ -155,7 +156,7 @@ BLIND_CELLS = [
 @pytest.mark.parametrize("cell", BLIND_CELLS, ids=lambda cell: cell.name)
 def test_the_blind_recipe_is_given_nothing_of_the_string(cell: Cell) -> None:
     configuration = configuration_of(cell)
-    assert knowledge_of(configuration) == ""
+    assert configuration.knowledge == ""
     assert not configuration.recipe.flip
     assert "state_size" not in configuration.model_configuration
 
@@ -165,8 +166,8 @@ def test_hints_are_reported() -> None:
         configuration_of(Cell(model, True, "gaussian", 4000, recipe="hinted"))
         for model in ("koopman", "koopman_integrated")
     )
-    assert knowledge_of(koopman) == SYMMETRIES
-    assert knowledge_of(phase) == f"{SYMMETRIES}, and {COUNT}"
+    assert koopman.knowledge == SYMMETRIES
+    assert phase.knowledge == f"{SYMMETRIES}, and {COUNT}"
 
 
 def blind_weights(cell: Cell, dataset: Dataset, runs: Path) -> StringModel:

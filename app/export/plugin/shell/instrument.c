@@ -120,7 +120,7 @@ static void rest(instrument *own) {
   slot *mixer = own->mixer, *player = own->player;
   memset(mixer, 0, M_SCRATCH * sizeof(slot));
   memset(mixer + M_AMPLIFIER, 0, (MIXER_SLOTS - M_AMPLIFIER) * sizeof(slot));
-  memset(player, 0, PLAYER_VOICES * sizeof(slot));
+  memset(player, 0, PLAYER_SLOTS * sizeof(slot));
   mixer[M_RATE].real = rate_hz;
   mixer[M_CHANNELS].whole = 2;
   mixer[M_LIMITING].whole = 1;
@@ -132,7 +132,7 @@ static void rest(instrument *own) {
   for (int tap = 0; tap < 2 * REACH + 1; tap++) mixer[M_TAPS + tap].real = taps[tap] * rate_hz;
   mixer[M_ADDRESS].whole = number_of(mixer);
   mixer[M_PLAYER].whole = number_of(player);
-  player[PLAYER_RATE].real = rate_hz;
+  player[PLAYER_RATE_HZ].real = rate_hz;
   player[PLAYER_MODES].whole = of->modes;
   player[PLAYER_MOST].whole = of->most_notes;
   void *error = NULL, *result = NULL;
@@ -170,7 +170,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
   own->rate_hz = rate_hz;
   own->kernels = kernels_here();
   own->mixer = calloc(MIXER_SLOTS, sizeof(slot));
-  own->player = calloc((size_t)(PLAYER_VOICES + MOST_NOTES * MOST_SOURCES * (VOICE_SLOTS_FIXED + of->modes * VOICE_SLOTS_A_MODE)),
+  own->player = calloc((size_t)(PLAYER_SLOTS + MOST_NOTES * MOST_SOURCES * (VOICE_SLOTS_FIXED + of->modes * VOICE_SLOTS_A_MODE)),
                        sizeof(slot));
   own->scratch = calloc(QUANTUM, sizeof(slot));
   own->table = copied(of, of->table, of->table_slots, of->table_room);

@@ -1,4 +1,4 @@
-"""Everything compiled is compiled, or loaded, by using it once: `python -m engine.kernels.warm`.
+"""Everything compiled is compiled, or loaded, by using it once: `python -m engine.warm`.
 
 It takes minutes where nothing has been compiled yet, and about a second where all is kept. Two processes compile what
 does not depend on one another.
@@ -71,7 +71,7 @@ def _beside(work: str) -> AbstractContextManager[object]:
     """Another process does a function of this module meanwhile; what it leaves undone, this one does later."""
     if cache.folder() is None or os.cpu_count() == 1:
         return nullcontext()
-    code = f"from engine.kernels import warm; warm.{work}()"
+    code = f"from engine import warm; warm.{work}()"
     return subprocess.Popen(python_command("-c", code), env=python_environment())
 
 
@@ -144,7 +144,8 @@ def _string() -> None:
 
 def _drum() -> None:
     """What makes modes of a drum, and a picture of it."""
-    from engine.kernels import drum_modes, playing_layout
+    from engine.kernels import drum_modes
+    from engine.kernels.records import DRUM_ROWS
     from engine.resonators.drum import DrumParameters
     from engine.resonators.surface import tools
 
@@ -153,15 +154,15 @@ def _drum() -> None:
     found.struck((0.0, 0.0), 0.01)
     found.radiated((0.0, 0.0))
     found.resonator(np.zeros((1, 2)))
-    block = np.zeros(playing_layout.DRUM_HEADER + playing_layout.DRUM_ROWS * len(found))
-    drum_modes.write(blow, found.rows, np.zeros(1), tools(), block)
+    block = np.zeros(drum_modes.HEADER + DRUM_ROWS * len(found))
+    drum_modes.write(blow, found.rows, np.zeros(1), tools(), block.ctypes.data, len(found))
 
 
 def _loudness() -> None:
     """How loud a sound of one mode is."""
-    from engine.kernels import loudness, playing_layout
+    from engine.kernels import constants, loudness
 
-    sound, no_body = np.ones(playing_layout.SOUND_ROWS), np.zeros(0)
+    sound, no_body = np.ones(constants.SOUND_ROWS), np.zeros(0)
     no_body.setflags(write=False)  # as curves are
     loudness.gain(sound, 1, 1, no_body, 0.0)
     loudness.limit(loudness.peak(sound, 1, False, no_body, 0.0, 0.0))
