@@ -8,4 +8,4 @@ packages="numba numpy safetensors typer"
 "$python" -c "import $(echo $packages | tr ' ' ',')" 2>/dev/null || "$python" -m pip install $packages
 export LEARNED_STRINGS_COMMIT=$(cat COMMIT)
 [ $# -gt 0 ] || set -- published --device cuda --minutes 9
-exec "$python" -m training.sweeping "$@"
+exec "$python" -m training.cli "$@"

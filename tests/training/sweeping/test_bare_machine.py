@@ -20,7 +20,7 @@ from training.results import Row, add_rows
 from training.sweeping.plan import load_plan
 from training.sweeping.sweep import Options
 from training.sweeping.workers.performing import end_of, perform
-import training.sweeping.__main__
+import training.cli.__main__
 
 plan = load_plan("tiny")
 for first in (0, 2):  # of the linear string and of the other

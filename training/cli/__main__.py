@@ -1,4 +1,4 @@
-"""`python -m training.sweeping PLAN`: the command `sweep` alone, where no app is."""
+"""`python -m training.cli PLAN`: the command `sweep` alone, where no app is."""
 
 import sys
 
