@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import torch
 
@@ -13,12 +13,12 @@ from engine.models.base import Physics, StringModel
 from engine.models.dmd import DMD
 from training.configuration import TrainingConfiguration
 from training.data.dataset import Dataset
-from training.fitting.modes import found_modes
-from training.fitting.phases import start_from_phases
-from training.fitting.pursuit import LatentFit, pursue
 from training.start import BLIND_PURSUIT, LEAST_SQUARES, PHASES, PURSUIT, STARTS
 
-Made = tuple[StringModel[Any], LatentFit | None]  # what the encoder shall learn first, if anything
+if TYPE_CHECKING:
+    from training.fitting.pursuit import LatentFit
+
+    Made = tuple[StringModel[Any], LatentFit | None]  # what the encoder shall learn first, if anything
 
 
 def begin(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
@@ -61,12 +61,17 @@ def _least_squares(configuration: TrainingConfiguration, dataset: Dataset) -> Ma
 
 
 def _pursued(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
+    from training.fitting.pursuit import pursue  # and SciPy, which other starts do without
+
     model = new_model(configuration, dataset.scale_m)
     generator = torch.Generator().manual_seed(configuration.recipe.seed)
     return model, pursue(model, dataset, configuration.steps, generator, configuration.start == BLIND_PURSUIT)
 
 
 def _from_phases(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
+    from training.fitting.modes import found_modes
+    from training.fitting.phases import start_from_phases
+
     modes = found_modes(dataset, configuration.steps)
     counted = configuration.model != "koopman_integrated" or "state_size" in configuration.model_configuration
     found = None if counted else {"state_size": len(modes.shapes)}
