@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import ndimage, signal
 
 from training.recording.note import Note, envelope
-from training.recording.numbering import SPECTRUM_S, Series, apart_cents, chance, followed, number, peaks_of
+from training.recording.numbering import SPECTRUM_S, Peaks, Series, followed, number, peaks_of
 
 Array = NDArray[np.float64]
 
@@ -32,12 +32,16 @@ LEAST_FITTED = 0.12  # the same: less is not even tried
 MOST_MISSING = 0.45
 BODY_SILENT_S = 0.25  # after the attack
 CLEAR_DB = 15.0  # above the floor: less may be noise
-MOST_OFF = 0.02  # of the energy then: more is not one string's
-SECOND_SERIES = 0.82  # see `second_series`
-LEAST_SECOND = 2  # of its partials
-UNISON_CENTS = 60.0  # nearer, it is made of partials that the body pulls
-LOUD_DB = -30.0  # of a second note's three loudest partials, below the loudest peak
-LEAST_LOUD_DB = -34.0  # fainter, they are other strings' that ring along
+BODY_HZ = 200.0  # above it, less may be left of a body's mode
+HIGHEST_BODY_HZ = 1_000.0
+MOST_OFF = 0.006  # of the energy then, at BODY_HZ: more is not one string's
+LOUD_DB = -12.0  # below the loudest peak that is off the law
+LEAST_SECOND = 2  # of a second note's partials
+SIMPLE_INTERVALS = ((4, 5), (3, 5), (3, 4), (2, 3))  # the first fits, for it is the narrowest
+LEAST_OF_TWO = 0.003  # of the energy, in partials that only one of two notes has
+MOST_OF_NEITHER = 1e-4
+HUM_BLOCK_S = 0.02
+ATTACK_S = 0.06  # at most before the onset
 SLOWEST_ATTACK_S = 0.12
 PLUCKED_S = 0.06  # as long rises the level of a pluck, in a window of 0.05 s
 MOST_BEFORE_PEAK = 0.5  # of the energy: more is a note reversed
@@ -246,7 +250,10 @@ def no_series(series: Series | None) -> Finding | None:
 
 
 def second_series(note: Note, series: Series) -> Finding | None:
-    """Sound off the law of one string, once the body is silent: another note's, or a drum's."""
+    """Sound off the law of one string, once the body is silent: another note's, or a drum's.
+
+    A body's mode loses its energy within a number of periods, so the higher a peak is, the less may be left of it.
+    """
     begin_s = BODY_SILENT_S if note.seconds > 2 * BODY_SILENT_S else 0.4 * note.seconds
     part = note.part(begin_s, min(begin_s + SPECTRUM_S, 0.9 * note.seconds))
     if len(part) * series.f0_hz < LEAST_PERIODS * note.rate_hz:
@@ -255,27 +262,43 @@ def second_series(note: Note, series: Series) -> Finding | None:
     if len(peaks.hz) == 0:
         return None
     own = followed(peaks, series)
-    rest = peaks.without(own, CLEAR_DB, _hum_db(note, part))
-    if len(rest.hz) == 0:
-        return None
     remedy = "record one note alone; drums, slaps and strums are no strings"
-    other = number(rest)
-    if other is not None and rest.near(other).sum() >= LEAST_SECOND and apart_cents(own, other) > UNISON_CENTS:
-        loud_db = float(np.sort(rest.level_db[rest.near(other)])[-3:].mean() - peaks.level_db.max())
-        # what it explains more than any series of its spacing would, and how loud it is
-        clear = other.explained - chance(rest, other) + 0.02 * (loud_db - LOUD_DB)
-        if loud_db > LEAST_LOUD_DB and clear > SECOND_SERIES:
-            words = f"a second note sounds at {other.f0_hz:.1f} Hz beside {series.f0_hz:.1f} Hz"
-            return Finding("chord", words, remedy, refused=True)
-    off = float(np.sum(10 ** (rest.level_db / 10)) / np.sum(10 ** (peaks.level_db / 10)))
-    if off < MOST_OFF:
+    if (both := _two_in(peaks, own)) is not None:
+        words = "two notes sound, at {:.1f} Hz and {:.1f} Hz".format(*both)
+        return Finding("chord", words, remedy, refused=True)
+    rest = peaks.without(own, CLEAR_DB, _hum_db(note, part))
+    lasting = np.minimum(rest.hz, HIGHEST_BODY_HZ) / BODY_HZ
+    if float(np.sum(lasting * rest.power)) < MOST_OFF * float(np.sum(peaks.power)):
         return None
-    words = f"{off:.0%} of it sounds off the partials of one string, {begin_s:.2f} s after the attack"
+    other = number(rest.loudest(LOUD_DB))
+    if other is not None and rest.near(other).sum() >= LEAST_SECOND:
+        words = f"a second note sounds at {other.f0_hz:.1f} Hz beside {own.f0_hz:.1f} Hz"
+        return Finding("chord", words, remedy, refused=True)
+    loudest_hz = float(rest.hz[np.argmax(rest.level_db)])
+    words = f"a sound at {loudest_hz:.1f} Hz is off the partials of one string at {own.f0_hz:.1f} Hz"
     return Finding("off the law", words, remedy, refused=True)
 
 
+def _two_in(peaks: Peaks, series: Series) -> tuple[float, float] | None:
+    """The pitches of two strings that were numbered as one: of a fifth, only multiples of 2 and of 3 sound."""
+    numbers = series.numbers_of(peaks.hz)
+    power = np.where(peaks.near(series), peaks.power, 0.0)
+    for low, high in SIMPLE_INTERVALS:
+        of_low, of_high = numbers % low == 0, numbers % high == 0
+        least = min(float(power[of_low & ~of_high].sum()), float(power[of_high & ~of_low].sum()))
+        if least > LEAST_OF_TWO * power.sum() and power[~of_low & ~of_high].sum() < MOST_OF_NEITHER * power.sum():
+            return low * series.f0_hz, high * series.f0_hz
+    return None
+
+
 def _hum_db(note: Note, part: Array) -> float:
-    """The level of a peak that holds all that sounds before the attack, as a hum may."""
-    before = note.samples[: max(0, note.onset - round(0.02 * note.rate_hz))]
-    power = float(np.mean(before**2)) if len(before) > 0.03 * note.rate_hz else 0.0
+    """The level of a peak that holds all that sounds before the attack, as a hum may.
+
+    The median over short blocks that are no digital silence, well before the onset, for an attack may be slow.
+    """
+    block = round(HUM_BLOCK_S * note.rate_hz)
+    count = max(0, note.onset - round(ATTACK_S * note.rate_hz)) // block
+    powers = np.var(note.samples[: count * block].reshape(count, block), axis=1)
+    heard = powers[powers > 0]
+    power = float(np.median(heard)) if len(heard) else 0.0
     return float(10 * np.log10(power / 2 * np.sum(np.hanning(len(part) + 2)) ** 2 + 1e-30))

@@ -7,7 +7,7 @@ and pays for partials that it predicts and the spectrum lacks; so neither an oct
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ HEARD_HZ = 1_500.0  # below it a pluck's first partials are heard
 HEARD = 3  # so many of them
 MISSING = 0.55  # what a predicted partial costs that is not there, of a strong one
 SPECTRUM_S = 0.7
+GLIDES_CENTS = np.arange(-60.0, 31.0, 5.0)  # down from a loud attack, or a little up
 
 
 @dataclass(frozen=True)
@@ -52,6 +53,10 @@ class Series:
     def partials_hz(self, count: int) -> Array:
         """The first partials' frequencies, (count,)."""
         return partials_hz(self.f0_hz, self.stiffness, count)
+
+    def numbers_of(self, hz: Array) -> NDArray[np.int_]:
+        """The number of the partial that is nearest to each frequency."""
+        return np.maximum(1, np.round(_number(hz, self.f0_hz, self.stiffness))).astype(int)
 
 
 def apart_cents(first: Series, other: Series) -> float:
@@ -80,6 +85,10 @@ class Peaks:
         """From 0 for one that barely stands out to 1."""
         return np.clip((self.above_db - PRESENT_DB / 2) / (FULL_DB - PRESENT_DB / 2), 0.0, 1.0)
 
+    @property
+    def power(self) -> Array:
+        return np.asarray(10 ** (self.level_db / 10), np.float64)
+
     def near(self, series: Series) -> NDArray[np.bool_]:
         """The peaks that a series explains, as a mask."""
         distance = distances(self.hz, series.f0_hz, series.stiffness)
@@ -88,8 +97,14 @@ class Peaks:
     def without(self, series: Series, least_above_db: float = 0.0, least_level_db: float = -np.inf) -> Peaks:
         """The peaks that a series does not explain, of those so clear and so loud."""
         kept = ~self.near(series) & (self.above_db >= least_above_db) & (self.level_db >= least_level_db)
-        hidden = series.partials_hz(MOST_PARTIALS)
-        return Peaks(self.hz[kept], self.above_db[kept], self.level_db[kept], self.width_hz, self.highest_hz, hidden)
+        return replace(self._of(kept), hidden_hz=series.partials_hz(MOST_PARTIALS))
+
+    def loudest(self, least_db: float) -> Peaks:
+        """The peaks that are louder than this below the loudest."""
+        return self._of(self.level_db >= self.level_db.max(initial=-np.inf) + least_db)
+
+    def _of(self, kept: NDArray[np.bool_]) -> Peaks:
+        return replace(self, hz=self.hz[kept], above_db=self.above_db[kept], level_db=self.level_db[kept])
 
 
 def distances(hz: Array, f0_hz: float, stiffness: float) -> Array:
@@ -151,11 +166,7 @@ def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Seri
             tried = series_at(peaks, f0, float(stiffness))
             if best is None or tried.score > best.score:
                 best = tried
-    if best is None:
-        return None
-    for _ in range(3):
-        best = max((_refined(peaks, best), best), key=lambda each: each.score)
-    return best
+    return None if best is None else _best_refined(peaks, best)
 
 
 def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> Series:
@@ -165,9 +176,15 @@ def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> Series:
 
 
 def followed(peaks: Peaks, series: Series) -> Series:
-    """The same string's series in other peaks of its note, refined where that explains more."""
-    same = series_at(peaks, series.f0_hz, series.stiffness)
-    return max((_refined(peaks, same), same), key=lambda each: each.score)
+    """The same string's series in other peaks of its note, where it may have glided."""
+    tried = (series_at(peaks, series.f0_hz * 2 ** (cents / 1200), series.stiffness) for cents in GLIDES_CENTS)
+    return _best_refined(peaks, max(tried, key=lambda each: each.score))
+
+
+def _best_refined(peaks: Peaks, series: Series) -> Series:
+    for _ in range(3):
+        series = max((_refined(peaks, series), series), key=lambda each: each.score)
+    return series
 
 
 def _candidates(peaks: Peaks, f0_range_hz: tuple[float, float]) -> Array:
@@ -238,13 +255,6 @@ def _refined(peaks: Peaks, series: Series) -> Series:
         residual = np.abs((hz / k) ** 2 - rows @ np.array([square, slope])) * k / hz
         scale = weight * k / hz / np.maximum(1.0, residual / (2 * np.median(residual) + 1e-9))
     return series_at(peaks, float(np.sqrt(square)), float(max(0.0, slope / square)))
-
-
-def chance(peaks: Peaks, series: Series) -> float:
-    """The share of peaks that a series of this spacing would explain wherever they lay."""
-    return (
-        float(np.mean(2 * tolerance(peaks.hz, series.f0_hz, peaks.width_hz) / series.f0_hz)) if len(peaks.hz) else 1.0
-    )
 
 
 def number_note(note: Note, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Series | None:

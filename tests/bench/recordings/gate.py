@@ -16,7 +16,7 @@ from training.recording.physics import physics_of
 from training.recording.report import report_of
 from training.recording.verdict import verdict_of
 
-JUDGED_SEED = 60_000  # of sounds that no threshold was set on
+JUDGED_SEED = 95_000  # of sounds that no threshold was set on
 KEPT, REFUSED, NOT_FOUND, PASSED = "kept", "refused", "not found", "passed, not fitted"
 
 

@@ -10,7 +10,10 @@ from scipy.signal import fftconvolve
 
 from tests.bench.recordings.sounds import CHANGES, membrane
 from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
+from training.recording.gate import second_series
 from training.recording.learn import Learned, NotFound, Refused, examined, learn, require_found
+from training.recording.note import note_of
+from training.recording.numbering import peaks_of, series_at
 from training.recording.preset import Source
 
 RATE_HZ = 44_100
@@ -108,6 +111,50 @@ def test_a_second_note_is_heard(synthetic: SyntheticNote, level_db: float) -> No
 def test_a_second_note_of_few_partials_is_heard(synthetic: SyntheticNote, hz: float) -> None:
     other = synthetic_note(3, f0_range_hz=(hz, 1.001 * hz), highest_hz=2_500.0).samples
     assert refused(synthetic.samples + 10 ** (-10 / 20) * other) & {"chord", "off the law"}
+
+
+def string(hz: float, count: int, decay: float, begin_s: float = 0.09) -> np.ndarray:
+    """A stiff string's first partials, of 1.7 s, from a time on."""
+    t = np.arange(round(1.7 * RATE_HZ)) / RATE_HZ - begin_s
+    k = np.arange(1, count + 1)[:, None]
+    waves = np.sin(2 * np.pi * hz * k * np.sqrt(1 + 3e-5 * k**2) * t + k**2) * np.exp(-decay * (1 + 0.1 * k) * t) / k
+    return np.asarray(np.where(t < 0, 0.0, waves.sum(0)))
+
+
+def together(first: np.ndarray, second: np.ndarray, level_db: float) -> np.ndarray:
+    """Two notes and a faint noise, the second so far below the first's energy."""
+    second = second * 10 ** (level_db / 20) * np.sqrt(float(first @ first) / float(second @ second))
+    return 0.3 * (first + second) + 1e-5 * np.random.default_rng(0).standard_normal(len(first))
+
+
+@pytest.mark.parametrize("interval", [3 / 2, 2 ** (7 / 12), 4 / 3, 5 / 4, 2 ** (3 / 12)])
+@pytest.mark.parametrize("hz", [110.0, 330.0])
+@pytest.mark.parametrize("strum_s", [0.0, 0.03])
+def test_a_soft_second_note_is_heard_at_each_interval(hz: float, interval: float, strum_s: float) -> None:
+    first, second = string(hz, 8, 2.0), string(interval * hz, 6, 4.0, 0.09 + strum_s)
+    assert refused(together(first, second, -10)) == {"chord"}
+    assert refused(together(first, second, -90)) == set()
+
+
+@pytest.mark.parametrize("low, high", [(2, 3), (3, 4)])
+def test_two_notes_that_were_numbered_as_one_are_heard(low: int, high: int) -> None:
+    sound = together(string(55.0 * low, 8, 3.0), string(55.0 * high, 8, 3.0), -3)
+    note = note_of(sound, RATE_HZ)
+    below = series_at(peaks_of(note.part(0.06, 0.76), RATE_HZ, note.noise_power), 55.0, 0.0)
+    found = second_series(note, below)
+    assert found is not None and found.reason.startswith(f"two notes sound, at {low * 55}")
+
+
+def test_an_offset_before_the_attack_is_no_hum() -> None:
+    sound, rate_hz = membrane(np.random.default_rng(3))
+    lead = 1e-6 * np.random.default_rng(0).standard_normal(rate_hz // 3)
+    assert refused(np.append(lead, sound + 0.1 * np.abs(sound))) & {"chord", "off the law"}
+
+
+def test_silence_before_a_hum_leaves_it_a_hum(synthetic: SyntheticNote) -> None:
+    t = np.arange(len(synthetic.samples)) / RATE_HZ
+    hum = sum(np.sin(2 * np.pi * 50 * k * t + k) / k for k in (1, 2, 3, 4))
+    assert refused(np.append(np.zeros(RATE_HZ), synthetic.samples + 3e-3 * hum)) == set()
 
 
 @pytest.mark.parametrize("seed", range(4))

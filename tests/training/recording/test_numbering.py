@@ -9,7 +9,7 @@ import pytest
 
 from tests.bench.recordings.synthetic import SyntheticNote
 from training.recording.note import note_of
-from training.recording.numbering import number_note
+from training.recording.numbering import followed, number_note, peaks_of, series_at
 
 RATE_HZ = 44_100
 
@@ -56,3 +56,10 @@ def test_a_body_is_no_low_string_below_a_high_note() -> None:
     series = number_note(note_of(sound, RATE_HZ))
     assert series is not None
     assert abs(1200 * math.log2(series.f0_hz / 2_815.0)) < 12
+
+
+@pytest.mark.parametrize("cents", [-40, -15, 20])
+def test_a_string_is_followed_as_it_glides(cents: float) -> None:
+    peaks = peaks_of(stiff_note(110.0, 4e-5)[8_000:40_000], RATE_HZ)
+    series = followed(peaks, series_at(peaks, 110.0 * 2 ** (-cents / 1200), 4e-5))
+    assert abs(1200 * math.log2(series.f0_hz / 110.0)) < 2
