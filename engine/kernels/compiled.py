@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 from numba import config, njit
-from numba.core.dispatcher import Dispatcher
-from numba.core.types.misc import unliteral
 
 from engine.kernels import cache
+from engine.kernels.numba_internals import compile_once_for_all_numbers
 
 PLACE = cache.folder()
 config.CACHE_DIR = str(PLACE or "")
@@ -24,15 +23,7 @@ COMPILED: dict[str, Any] = {
 }
 
 
-_usual = Dispatcher.get_call_template
-
-
-def _template(dispatcher: Any, arguments: Any, named: Any) -> Any:
-    """Numba would compile a function again for each number that a call of it states."""
-    return _usual(dispatcher, tuple(map(unliteral, arguments)), named)
-
-
-Dispatcher.get_call_template = _template  # type: ignore[method-assign, assignment]
+compile_once_for_all_numbers()
 
 # A number in the source would be a double and take the whole expression with it.
 ZERO, HALF, ONE, _TWO, _LARGE = (np.float32(x) for x in (0, 0.5, 1, 2, 9))

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from engine.kernels.numba_internals import stop_before_machine_code
 from engine.result_file import explain
 
 PREFIX = "ls_"  # of the entries' names
@@ -21,23 +22,6 @@ PARTS = {
     "playing": ("play", "sound", "sympathise", "begin", "kit_begin", "kit_follow", "kit_prepare"),
 }
 SELDOM = 50_000, 20, 50  # of objects and passes: a fifth of the time went to collections that freed next to nothing
-NOWHERE = 1  # an address that is never called
-
-
-def _stop_early() -> None:
-    """Leaves Numba's code as it is lowered: not optimised, not linked, not made into machine code."""
-    import numba
-    from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen
-
-    def finalize(library: Any) -> None:
-        library._finalized = True
-        print(".", end="", flush=True)
-
-    numba.cfunc = lambda *_signature, **_options: lambda function: function  # what devices call is not asked for
-    CPUCodeLibrary._optimize_functions = lambda library, module: None
-    CPUCodeLibrary.finalize = finalize
-    JITCodeLibrary.get_pointer_to_function = lambda library, name: NOWHERE
-    JITCPUCodegen.set_env = lambda codegen, name, env: None
 
 
 def _libraries(library: Any, seen: set[int]) -> Iterator[Any]:
@@ -74,7 +58,7 @@ def _elsewhere(name: str) -> Any:
 
 def text(part: str) -> str:
     """LLVM code of all entries of a part together, as Numba has it for the processor of its settings."""
-    _stop_early()
+    stop_before_machine_code()
     import llvmlite.binding as llvm
     from numba import njit
 

@@ -1,0 +1,68 @@
+"""The installed Numba is the one whose internals are replaced; on another, each of these says what to look at."""
+
+from __future__ import annotations
+
+import inspect
+import subprocess
+import sys
+from collections.abc import Callable
+from typing import Any
+
+import numba
+import pytest
+from numba import njit
+from numba.core.codegen import CPUCodeLibrary, JITCodeLibrary, JITCPUCodegen
+from numba.core.types.misc import unliteral
+
+from engine.kernels import numba_internals
+from engine.kernels.compiled import COMPILED
+
+READ = "read engine/kernels/numba_internals.py beside its source"
+
+
+def test_the_version_is_the_one_that_was_read() -> None:
+    installed = ".".join(numba.__version__.split(".")[:2])
+    assert installed == numba_internals.VERSION, f"Numba is {numba.__version__}: {READ}, then raise VERSION"
+
+
+@pytest.mark.parametrize(
+    ("replaced", "parameters"),
+    [
+        (CPUCodeLibrary._optimize_functions, ["self", "ll_module"]),
+        (CPUCodeLibrary.finalize, ["self"]),
+        (JITCodeLibrary.get_pointer_to_function, ["self", "name"]),
+        (JITCPUCodegen.set_env, ["self", "env_name", "env"]),
+        (unliteral, ["lit_type"]),
+    ],
+)
+def test_what_is_replaced_is_called_as_it_was(replaced: Callable[..., Any], parameters: list[str]) -> None:
+    assert list(inspect.signature(replaced).parameters) == parameters, f"{replaced.__qualname__}: {READ}"
+
+
+def test_a_function_is_compiled_once_for_all_numbers_that_calls_state() -> None:
+    options = {**COMPILED, "cache": False}
+
+    @njit(**options)
+    def add(one: int, other: int) -> int:
+        return one + other
+
+    @njit(**options)
+    def calls(one: int) -> int:
+        return int(add(one, 1) + add(one, 2) + add(one, 3))
+
+    assert calls(1) == 9
+    assert len(add.signatures) == 1
+
+
+def test_machine_code_is_not_made_where_text_alone_is_wanted() -> None:
+    code = (
+        "from engine.kernels.numba_internals import NOWHERE, stop_before_machine_code\n"
+        "stop_before_machine_code()\n"
+        "from numba import njit\n"
+        "f = njit('int64(int64)')(lambda x: x + 1)\n"
+        "library = next(iter(f.overloads.values())).library\n"
+        "assert library.get_pointer_to_function('anything') == NOWHERE\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert set(done.stdout) == {"."}
