@@ -113,6 +113,15 @@ class ErrorSums:
         """Relative MSE and MAE of each trajectory over all frames, (trajectories,) each."""
         return _ratios(self._trajectories)
 
+    def mean_of_batches(self, count: int) -> RelativeError:
+        """The mean of the relative errors of so many trajectories at a time, in their order; the last may be fewer.
+
+        So the authors' script measures, by batches of 50 (rodrigodzf/physmodjax, `accumulate_metrics`).
+        """
+        sums = self._trajectories
+        batches = [sums[:, first : first + count].sum(1, keepdims=True) for first in range(0, sums.shape[1], count)]
+        return RelativeError(*(float(np.mean(errors)) for errors in _ratios(np.concatenate(batches, axis=1))))
+
     def spread(self) -> RelativeError:
         """The population's standard deviation of the trajectories' own errors; infinite where one of them is."""
         with np.errstate(over="ignore", invalid="ignore"):  # of errors that are infinite, or nearly

@@ -83,6 +83,18 @@ def test_per_frame_and_per_trajectory() -> None:
     assert sums.spread().rel_mae == pytest.approx(np.std([error.rel_mae for error in alone]))
 
 
+def test_the_mean_of_batches_is_that_of_their_own_errors() -> None:
+    predicted, truth = motions(5, 6, 3)
+    truth[0] *= 100
+    sums = ErrorSums(6)
+    sums.add(predicted, truth)
+    own = [relative_error(predicted[rows], truth[rows]) for rows in (slice(0, 2), slice(2, 4), slice(4, 5))]
+    found = sums.mean_of_batches(2)
+    assert found.rel_mse == pytest.approx(np.mean([error.rel_mse for error in own]))
+    assert found.rel_mae == pytest.approx(np.mean([error.rel_mae for error in own]))
+    assert found.rel_mse != pytest.approx(sums.total().rel_mse, rel=0.01)
+
+
 def spoilt(shares: list[float], loudness: list[float] | None = None) -> ErrorSums:
     """Sums of trajectories of one frame that are wrong by these shares of their amplitude."""
     truth = torch.tensor(loudness or [1.0] * len(shares), dtype=torch.float64)[:, None, None]
