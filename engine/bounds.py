@@ -1,4 +1,4 @@
-"""How large whatever a file asks for may be: the one place for it, looked at before anything is built.
+"""The bounds on whatever a file asks for: the one place for them, looked at before anything is built.
 
 Presets, settings and plans come from strangers. A few bytes of them can ask for any amount of memory or time, so each
 number has a bound here. The bounds lie far beyond every string and model that anybody would train on one computer.

@@ -76,7 +76,7 @@ def _beside(work: str) -> AbstractContextManager[object]:
 
 
 def playing() -> None:
-    """What makes voices of events, for strings and drums."""
+    """Compile what makes voices of events, for strings and drums."""
     from engine.kernels import contact, sympathy
     from engine.kernels.playing import events
 
@@ -132,7 +132,7 @@ def models() -> None:
 
 
 def _string() -> None:
-    """What a bend, a slide, a damper and a knob make of a string."""
+    """Compile the changes of a string by a bend, a slide, a damper and a knob."""
     from engine.kernels import strings
 
     string = np.array(astuple(StringParameters()))
@@ -143,7 +143,7 @@ def _string() -> None:
 
 
 def _drum() -> None:
-    """What makes modes of a drum, and a picture of it."""
+    """Compile what makes modes of a drum, and a picture of it."""
     from engine.kernels import drum_modes
     from engine.kernels.records import DRUM_ROWS
     from engine.resonators.drum import DrumParameters
@@ -159,7 +159,7 @@ def _drum() -> None:
 
 
 def _loudness() -> None:
-    """How loud a sound of one mode is."""
+    """Compile the loudness of a sound, by one of one mode."""
     from engine.kernels import constants, loudness
 
     sound, no_body = np.ones(constants.SOUND_ROWS), np.zeros(0)

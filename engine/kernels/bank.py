@@ -218,7 +218,7 @@ def _integrate_to(voice: np.ndarray, program: np.ndarray, time: float, scratch: 
 
 @njit(**COMPILED)
 def _change(program: np.ndarray, level: np.ndarray, n: int, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
-    """What A adds to the log gain of each latent, of levels log |z| (modes,)."""
+    """The change that A adds to the log gain of each latent, of levels log |z| (modes,)."""
     whole = program.view(np.int64)
     weight = program[whole[at.O_A] :]  # transposed
     squares, energy = scratch[:alive], scratch[at.MOST_MODES : at.MOST_MODES + alive]
@@ -364,7 +364,7 @@ def generate(
 
 @njit(**COMPILED)
 def _keep_end(voice: np.ndarray, program: np.ndarray, time: float, scratch: np.ndarray) -> None:
-    """Where the next segment begins."""
+    """Keep the state at which the next segment begins."""
     counts = voice.view(np.int64)
     n = program.view(np.int64)[at.P_MODES]
     rows = at.state(n)
@@ -478,7 +478,10 @@ def _sum(
 
 @njit(**COMPILED)
 def _look(voice: np.ndarray, program: np.ndarray, z: np.ndarray, scratch: np.ndarray) -> None:
-    """Which latents' modulation can be heard, and whose squares are heard in it. Energies decay: no more later."""
+    """Find the latents whose modulation can be heard, and those whose squares are heard in it.
+
+    Energies decay: later there are no more.
+    """
     whole = program.view(np.int64)
     counts = voice.view(np.int64)
     n = whole[at.P_MODES]

@@ -112,7 +112,7 @@ def _take(counts: np.ndarray, whole: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def _wake(convolver: np.ndarray, whole: np.ndarray) -> None:
-    """As if there had never been any input."""
+    """Reset the convolver, as if there had never been any input."""
     convolver[at.C_EARLY_INPUT : at.C_WORK] = 0.0
     convolver[at.C_GIVEN : at.C_WET] = 0.0
     whole[at.C_PHASE] = whole[at.C_WINDOWS] = whole[at.C_QUIET] = 0
@@ -293,5 +293,5 @@ def _mix(convolver: np.ndarray, whole: np.ndarray, mix: np.ndarray, wet_now: boo
 
 @njit(**COMPILED)
 def _way(share: float) -> float:
-    """From 0 to 1 without a corner."""
+    """The smooth way from 0 to 1, without a corner."""
     return share * share * (3 - 2 * share)

@@ -301,7 +301,7 @@ def air_at(
 
 @njit(**COMPILED)
 def _chebyshev(row: np.ndarray, ka: float, reach: float) -> float:
-    """One of the functions of `air_at`, of polynomials of the square of ka."""
+    """The value at ka of one function of `air_at`: a Chebyshev series in the square of ka."""
     share = min(ka / reach, 1.0)
     t, one, two = 2 * share * share - 1, 0.0, 0.0
     for term in range(len(row) - 1, 0, -1):

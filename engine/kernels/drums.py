@@ -31,7 +31,7 @@ UNHEARD = 1e-7  # of the loudest mode, where the loudness of a key and its peak 
 
 @njit(**COMPILED)
 def has_drum(table: Table, key: int) -> bool:
-    """Whether there is a drum for a key in a table of drums."""
+    """Return True if a table of drums has one for a key."""
     return wholes(address_of(table))[table.drums + key] != 0
 
 
@@ -50,13 +50,13 @@ def rows_of(drum: Drum) -> np.ndarray:
 
 @njit(**COMPILED)
 def _speed(drum: Drum, share: float) -> float:
-    """Of a mallet at a share of the velocities, in m/s."""
+    """The speed of a mallet at a share of the velocities, in m/s."""
     return drum.softest_m_s * (drum.hardest_m_s / drum.softest_m_s) ** share
 
 
 @njit(**COMPILED)
 def _speed_of(player: Player, drum: Drum, velocity: float) -> float:
-    """Of a mallet at a velocity, by the instrument's curve, in m/s."""
+    """The speed of a mallet at a velocity, by the instrument's curve, in m/s."""
     curve = player.values[of.CURVE]
     return _speed(drum, min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve))
 

@@ -56,7 +56,7 @@ def begin(kit_address: int, table_address: int) -> None:
 
 @njit(**COMPILED)
 def follow(kit_address: int, which: int, value: float) -> None:
-    """One of the instrument's values has changed."""
+    """Follow the change of one of the instrument's values."""
     kit, counts = reals(kit_address), wholes(kit_address)
     for number in range(len(FOLLOWED)):
         if which == FOLLOWED[number]:
@@ -68,7 +68,7 @@ def follow(kit_address: int, which: int, value: float) -> None:
 
 @njit(**COMPILED)
 def prepare(kit_address: int, table_address: int, player_address: int) -> None:
-    """What is struck or heard in the next quantum follows."""
+    """Prepare the drums that are struck or heard in the next quantum: they follow changed values."""
     counts, player = wholes(kit_address), player_at(player_address)
     if counts[STALE] == 0:
         return
@@ -98,7 +98,7 @@ def _strike(kit_address: int, table_address: int, event: Event) -> None:
 
 @njit(**COMPILED)
 def _possible(drum: np.ndarray) -> bool:
-    """Whether `DrumParameters` would take it, as far as knobs and tuning change it."""
+    """Return True if `DrumParameters` would take the drum, as far as knobs and tuning change it."""
     for value in range(1, drums.X):
         if not drums.LOWEST[value - 1] <= drum[value] <= drums.HIGHEST[value - 1]:
             return False

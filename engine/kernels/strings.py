@@ -25,7 +25,7 @@ TOUCH_RESISTANCE = 1.0  # of a finger that touches a string, over the string's o
 
 @njit(**EXACT)
 def possible(string: np.ndarray) -> bool:
-    """Whether all numbers are finite and within bounds: as `StringParameters` checks them."""
+    """Return True if all numbers are finite and within bounds: as `StringParameters` checks them."""
     for place in range(of.STRING):
         value = string[place]
         low, high = _BOUNDS[place]
@@ -122,7 +122,7 @@ def fretted(string: np.ndarray, wanted_hz: float) -> float:
 
 @njit(**EXACT)
 def is_wound(string: np.ndarray) -> bool:
-    """Whether its mass per volume of core is above that of metal, or of gut and nylon."""
+    """Return True if it is wound: its mass per volume of core is above that of metal, or of gut and nylon."""
     return string[of.DENSITY] > (8_900.0 if string[of.MODULUS] > 5e10 else 2_000.0)
 
 
@@ -160,7 +160,7 @@ def damped(string: np.ndarray, t60_s: float) -> float:
 
 @njit(**EXACT)
 def overdamped(string: np.ndarray, modes: int) -> bool:
-    """Whether the first or the last mode does not swing; otherwise all do."""
+    """Return True if the first or the last mode does not swing; otherwise all do."""
     first = decay_rate(string, 1) < math.sqrt(omega_squared(string, 1))
     return not (first and decay_rate(string, modes) < math.sqrt(omega_squared(string, modes)))
 

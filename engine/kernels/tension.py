@@ -165,7 +165,7 @@ def advance(
 
 @njit(**COMPILED)
 def _nodes(voice: np.ndarray, program: np.ndarray, kick: float) -> int:
-    """Of a frame, as many as the modes that move need: as `KoopmanTension.step`.
+    """The number of nodes in a frame, as many as the modes that move need: as `KoopmanTension.step`.
 
     Args:
         kick: Σ η² k (q² + v²/ω²).
@@ -182,7 +182,7 @@ def _nodes(voice: np.ndarray, program: np.ndarray, kick: float) -> int:
 
 @njit(**COMPILED)
 def _needs_fewer_nodes(voice: np.ndarray, program: np.ndarray) -> bool:
-    """Whether high modes have fallen silent since its rows were prepared, so that fewer nodes are enough."""
+    """Return True if fewer nodes are enough: high modes have fallen silent since its rows were prepared."""
     counts = voice.view(np.int64)
     if counts[at.STEPS] == 1 or program[at.S_UNHEARD] > 0:
         return False
@@ -467,7 +467,7 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
 
 @njit(**COMPILED)
 def bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
-    """What follows from its modes, and the latents, where a voice begins or its modes change."""
+    """Bring up to date what follows from the modes, and the latents, where a voice begins or its modes change."""
     counts = voice.view(np.int64)
     n = counts[at.MODES]
     fewer = counts[at.PREPARED] and _needs_fewer_nodes(voice, program)

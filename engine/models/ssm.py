@@ -1,4 +1,4 @@
-"""What the state-space strings (LRU, S5) share: the recurrence, the block, the stack and its streaming state.
+"""The base of the state-space strings (LRU, S5): the recurrence, the block, the stack and its streaming state.
 
 Source: the paper, §3.2. A first linear layer takes the initial displacement u₀ as an impulse,
 x_{k+1} = Ā x_k + B̄ u_k δ_k, y_k = C̄ x_k, where y is one sample late. Blocks follow: batch norm, a diagonal
@@ -190,7 +190,7 @@ class DiagonalSSM(nn.Module, ABC):
         return torch.view_as_complex(linear(inputs, matrix.flatten(0, 1)).unflatten(-1, (-1, 2)))
 
     def diagonal(self) -> tuple[Tensor, Tensor]:
-        """Around the diagonal recurrence: B̄ (2 states, inputs), and the matrix of Re(C̄ x) (outputs, 2 states).
+        """The matrices around the diagonal recurrence: B̄ (2 states, inputs) and Re(C̄ x) (outputs, 2 states).
 
         All real parts come before all imaginary ones.
         """
@@ -272,7 +272,7 @@ class FoldedBlock:
     gate: nn.Linear
 
     def __call__(self, frames: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """As the block; `frames` may be overwritten."""
+        """Compute the block's output and state; `frames` may be overwritten."""
         from engine.models import _ssm_kernel as kernel  # Numba only when it is needed
 
         last = state.clone()

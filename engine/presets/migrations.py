@@ -1,4 +1,4 @@
-"""From what earlier versions wrote to what this one reads: a step for each version of the metadata.
+"""The steps from metadata of earlier versions to those that this one reads, one for each version.
 
 Every preset that was ever shipped loads for ever; weights are never changed on the way.
 """

@@ -23,7 +23,7 @@ from engine.resonators.string import StringParameters
 
 @dataclass(frozen=True)
 class Losses:
-    """How much of each.
+    """The strength of each loss.
 
     Attributes:
         air: factor of the losses to the air, a; 1 is that of physics.

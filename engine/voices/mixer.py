@@ -176,7 +176,7 @@ class Mixer:
 
     @property
     def voices(self) -> list[Voice]:
-        """Those that have been handed over and are not over."""
+        """The voices that have been handed over and are not over."""
         with self._lock:
             return [voice for voice in self._voices if not voice.over]
 
@@ -195,7 +195,7 @@ class Mixer:
         return out.reshape(frames, channels)
 
     def set_volume(self, factor: float) -> None:
-        """Of everything; 1 leaves the samples as they are."""
+        """Set the volume of everything; 1 leaves the samples as they are."""
         self.memory[at.M_WANTED_VOLUME] = factor
 
     def sound_tone(self, side: str) -> None:
@@ -207,17 +207,17 @@ class Mixer:
 
     @property
     def frames(self) -> int:
-        """Of sound, given so far."""
+        """The frames of sound given so far."""
         return int(self._counts[at.M_FRAMES])
 
     @property
     def seconds(self) -> float:
-        """Of sound, given so far."""
+        """The seconds of sound given so far."""
         return float(self._counts[at.M_FRAMES]) / self.rate_hz
 
     @property
     def calls(self) -> int:
-        """Of the device's callback."""
+        """The number of calls of the device's callback."""
         return int(self._counts[at.M_CALLS])
 
     @property
@@ -226,7 +226,7 @@ class Mixer:
 
     @property
     def output_latency_s(self) -> float:
-        """From a voice to the loudspeaker: the limiter's delay, and from a callback to its first sample.
+        """The latency from a voice to the loudspeaker: the limiter's delay, and from a callback to its first sample.
 
         The latter is what the device said last; 0 where it says nothing, or what cannot be.
         """
@@ -246,7 +246,7 @@ class Mixer:
         return -20 * math.log10(gain)
 
     def new_gaps(self) -> list[Gap]:
-        """Those since this was asked for the last time; of very many only the latest."""
+        """The gaps since this was asked for the last time; of very many only the latest."""
         found, total = [], int(self._counts[at.M_GAPS])
         for number in range(max(self._gaps_read, total - at.GAPS), total):
             slot = at.M_GAP_LIST + number % at.GAPS * at.GAP_FIELDS

@@ -41,14 +41,14 @@ def _strums_in(player: Player, table: Table, event: Event) -> int:
 
 @njit(**COMPILED)
 def _continues(player: Player, frame: int) -> bool:
-    """Whether a note that comes at a frame belongs to the latest chord."""
+    """Return True if a note that comes at a frame belongs to the latest chord."""
     since = frame - player.chord_began
     return player.chord != 0 and 0 <= since <= slots.frames(player, CHORD_S)
 
 
 @njit(**COMPILED)
 def _goes_up(player: Player, table: Table) -> bool:
-    """Whether the next strum goes from the highest note to the lowest."""
+    """Return True if the next strum goes from the highest note to the lowest."""
     strokes = round(keys.value_of(player, table, of.STROKES))
     return strokes == of.UP or (strokes == of.ALTERNATE and player.next_up != 0)
 

@@ -1,4 +1,4 @@
-"""How loud a key is: the gain that makes all keys equally loud, found from the sound of each."""
+"""The gains that make all keys equally loud, found from the sound of each."""
 
 from __future__ import annotations
 

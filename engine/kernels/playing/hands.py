@@ -183,7 +183,7 @@ def note_off(
 
 @njit(**COMPILED)
 def _is_meant(event: Event, note: Note) -> bool:
-    """Whether an event is for a note: of its number, channel and key, as far as they are given."""
+    """Return True if an event is for a note: of its number, channel and key, as far as they are given."""
     id, channel, key = event.id, event.channel, event.key
     if note.state != of.RINGS or (id != 0 and note.id != id):
         return False

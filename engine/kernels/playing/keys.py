@@ -16,7 +16,7 @@ USUAL_HARMONIC = 2.0  # of its footswitch where the parameter is off: an estimat
 
 @njit(**COMPILED)
 def value_of(player: Player, table: Table, which: int) -> float:
-    """One of the instrument's values, as the modulation wheel turns it."""
+    """The instrument's value of that number, as the modulation wheel turns it."""
     value, wheel = player.values[which], player.wheel
     if wheel != 0 and table.wheel == which:
         return value + wheel / 127 * (table.wheel_goal - value)
@@ -25,7 +25,7 @@ def value_of(player: Player, table: Table, which: int) -> float:
 
 @njit(**COMPILED)
 def mute_of(player: Player, table: Table, channel: int) -> float:
-    """How far a hand mutes what was struck on a channel, 0 … 1."""
+    """The strength of a hand's mute on what was struck on a channel, 0 … 1."""
     share = value_of(player, table, of.MUTE)
     for each in range(of.CHANNELS):
         if channels.acts_on(table.mode, each, channel):
@@ -51,7 +51,7 @@ def technique_of(
 
 @njit(**COMPILED)
 def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
-    """At 1 over how much of its length a string is touched as it is plucked; 0: it is not."""
+    """The n of a string that is touched at 1/n of its length as it is plucked; 0: it is not."""
     switch = of.HARMONICS
     node = round(technique_of(player, table, channel, of.HARMONIC, switch, USUAL_HARMONIC))
     return node if 1 < node <= partials else 0
@@ -59,7 +59,7 @@ def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
 
 @njit(**COMPILED)
 def chosen(table: Table, count: int, key: int) -> int:
-    """Which string of a set, from the highest, 0, a key chooses: the highest at or below it, else the lowest."""
+    """The string of a set, from the highest, 0, that a key chooses: the highest at or below it, else the lowest."""
     for number in range(count):
         if table.open[number].note <= key:
             return number
@@ -111,14 +111,14 @@ def string_of(
 
 @njit(**COMPILED)
 def has_octave(table: Table, key: int, number: int) -> bool:
-    """Whether the course of a key has octave strings, on a string of a set; -1: on the one that the key chooses."""
+    """Return True if a key's course has octave strings, on a string of a set; -1: on the one that it chooses."""
     count, octaves = table.strings, table.octaves
     return octaves > 0 and (number if number >= 0 else chosen(table, count, key)) >= count - octaves
 
 
 @njit(**COMPILED)
 def pitch_of(table: Table, key: int) -> float:
-    """Of a note; 0: its key is silent."""
+    """The pitch of a key in Hz; 0: it is silent."""
     if not table.low <= key <= table.high:
         return 0.0
     return table.pitches_hz[key]

@@ -20,7 +20,7 @@ from engine.levels import FULL_SCALE_M, FULL_SCALE_N, LEAST_PEAK_M, RUNAWAY_FACT
 
 @njit(**COMPILED)
 def weight_of(own: np.ndarray, partial: int, place: float, aperture_m: float) -> float:
-    """What an amplitude of 1 m of a partial is at a listening point, re full scale, averaged over an aperture."""
+    """The level at a listening point of a partial's amplitude of 1 m, re full scale, averaged over an aperture."""
     if place == of.BRIDGE:
         return strings.bridge_force(own, partial) / FULL_SCALE_N
     half = math.pi * partial * aperture_m / (2 * own[of.LENGTH])
@@ -135,7 +135,7 @@ def make_voice(
 
 @njit(**COMPILED)
 def swing_m(note: Note) -> float:
-    """How far a note's string swings now: the root of its modes' summed squares. 0: it is over."""
+    """The swing of a note's string now: the root of its modes' summed squares. 0: it is over."""
     for source in range(of.MOST_SOURCES):
         address = note.voices[source]
         if address == 0 or slots.voice_over(address):
