@@ -101,7 +101,7 @@ class Row:
 
     @property
     def structured(self) -> bool:
-        """Whether it started from prior knowledge of the string, which the paper's models do not have."""
+        """Return True if it started from prior knowledge of the string, which the paper's models do not have."""
         return bool(given_to(self.model, self.initialisation))
 
 

@@ -30,7 +30,7 @@ class Batch:
     target: Tensor
 
     def split(self, count: int) -> Iterator[Batch]:
-        """At most `count` trajectories at a time."""
+        """Split the batch into parts of at most `count` trajectories."""
         for initial, target in zip(self.initial.split(count), self.target.split(count), strict=True):
             yield Batch(initial, self.frames, target)
 
@@ -63,7 +63,7 @@ class TrainingData:
 
 
 def flips(count: int, generator: torch.Generator, device: torch.device) -> tuple[Tensor, Tensor]:
-    """Which trajectories are turned over, as a sign, and which are mirrored: (count, 1) each."""
+    """The random flips of trajectories: signs of those turned over, and True where mirrored, (count, 1) each."""
     coin = torch.randint(0, 2, (2, count, 1), generator=generator).to(device)
     return 1 - 2 * coin[0], coin[1] == 1
 

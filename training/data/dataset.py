@@ -74,7 +74,7 @@ def dataset_key(configuration: DatasetConfiguration) -> str:
 
 
 def dataset_folder(configuration: DatasetConfiguration, cache: Path | None = None) -> Path:
-    """Where the data set lies, or will."""
+    """The folder in which the data set lies, or will."""
     return (cache or default_cache()) / "datasets" / dataset_key(configuration)
 
 

@@ -49,7 +49,7 @@ LEAST_FILLED_DB = 20.0  # between partials, below them, half a second after the 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that speaks against a recording, and the remedy.
+    """A reason against a recording, and the remedy.
 
     Attributes:
         kind: a short name for tables.
@@ -153,7 +153,7 @@ def reverberant(note: Note, series: Series | None) -> Finding | None:
 
 
 def too_short(note: Note, series: Series | None) -> Finding | None:
-    """How long it stands out of its noise, and by how much."""
+    """The finding that a note rings too briefly, or stands too little above its noise; None: neither."""
     remedy = "let the note ring for two seconds or more"
     level = envelope(note.samples[note.onset :], note.rate_hz, 0.03)
     noise = np.sqrt(note.noise_power)

@@ -23,7 +23,7 @@ from training.recording.report import figures
 
 
 def combined(learned: Sequence[Learned], settings: dict[str, Any]) -> RecordedString:
-    """What recordings add to the string of the first."""
+    """The additions of all recordings to the string of the first."""
     first = learned[0]
     note = recorded_note(first.note, first.fitted, first.source)
     own = recorded_string(note, first.physics, first.strung, first.source, settings, figures(first.report))
