@@ -126,7 +126,7 @@ def check(name: str, value: float, limits: tuple[float, float], unit: str = "") 
 
 
 def check_sizes(configuration: object) -> None:
-    """Every whole number of a model's configuration, and each of its tuples.
+    """Check every whole number of a model's configuration, and each of its tuples.
 
     Raises:
         ValueError: one is out of its bounds; the message names the field.

@@ -53,7 +53,7 @@ def phasors(before: Array, now: Array, after: Array, spacing_s: float, resonator
 
 
 def _complex(real: Array, imaginary: Array) -> Phasors:
-    """Also where parts are not finite, of which a product with i would make others."""
+    """The complex numbers of two parts, also where these are not finite: a product with i would make others."""
     found = real.astype(np.complex128)
     found.imag = imaginary
     return found

@@ -1,4 +1,4 @@
-"""Everything compiled is compiled, or loaded, by using it once: `python -m engine.warm`.
+"""The preparation of compiled code by using it once: it is compiled, or loaded. Run `python -m engine.warm`.
 
 It takes minutes where nothing has been compiled yet, and about a second where all is kept. Two processes compile what
 does not depend on one another.
@@ -68,7 +68,7 @@ def warm() -> None:
 
 
 def _beside(work: str) -> AbstractContextManager[object]:
-    """Another process does a function of this module meanwhile; what it leaves undone, this one does later."""
+    """Start another process with a function of this module; what it leaves undone, this one does later."""
     if cache.folder() is None or os.cpu_count() == 1:
         return nullcontext()
     code = f"from engine import warm; warm.{work}()"
@@ -95,7 +95,10 @@ def unheard() -> None:
 
 
 def voices() -> None:
-    """All sound: a few quanta of every kind of voice; what a device calls is compiled as it is imported."""
+    """Compile all sound by a few quanta of every kind of voice.
+
+    What a device calls is compiled as it is imported.
+    """
     unheard()
     for voice in _each():
         _sound(voice)

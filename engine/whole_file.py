@@ -17,7 +17,9 @@ ENDING = ".unfinished"
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A path beside `path` to write to: it takes its place when the block ends well, and an error leaves nothing.
+    """A path beside `path` to write to.
+
+    It takes its place when the block ends well, and an error leaves nothing.
 
     What killed processes have left in its folder is removed first.
 

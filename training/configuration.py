@@ -204,7 +204,7 @@ class TrainingConfiguration:
 
 
 def digest_of(plain: dict[str, Any]) -> str:
-    """Sixteen digits that tell plain data apart."""
+    """The sixteen digits that tell plain data apart."""
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
 
 

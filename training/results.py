@@ -122,7 +122,7 @@ def read_results(path: Path) -> list[Row]:
 
 
 def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:
-    """Adds rows to a results file, or makes it; of two rows of one run the one that finished later stays.
+    """Add rows to a results file, or make it; of two rows of one run the one that finished later stays.
 
     A run that is done is never replaced by a failure. Locked against other processes; whole or not at all.
 

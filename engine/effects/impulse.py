@@ -81,7 +81,7 @@ def without_subsonic(samples: NDArray[np.float64], edge_hz: float, rate_hz: int)
 
 
 def faded(samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Its end goes to nothing."""
+    """The samples with their end faded to nothing."""
     frames = max(1, round(FADE_SHARE * len(samples)))
     end = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, frames + 1) / frames)
     return np.concatenate([samples[:-frames], samples[-frames:] * end[:, None]])

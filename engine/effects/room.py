@@ -105,7 +105,7 @@ def _images(sides_m: NDArray[np.float64], until_s: float, frames: int) -> tuple[
 
 
 def _decayed(found: NDArray[np.float64], time_s: NDArray[np.float64], t60_s: float) -> NDArray[np.float64]:
-    """Each band with its own decay; bands overlap, and are the whole together."""
+    """The reflections with each band's own decay; bands overlap, and are the whole together."""
     size = room_for(2 * len(found))
     octaves = np.log2(np.maximum(np.fft.rfftfreq(size, 1 / RATE_HZ), 1.0))
     total = np.zeros((size // 2 + 1, 2), complex)

@@ -139,7 +139,7 @@ def _shape(amp: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def _give(mixer: np.ndarray, amp: np.ndarray, share: float, share_to: float) -> None:
-    """Back to the rate of the mixer, without the mean, through gain and tone."""
+    """Bring the sound back to the rate of the mixer, without the mean, through gain and tone."""
     last, rows = at.A_TAPS // at.OVERSAMPLING, at.OVERSAMPLING
     wide = last + at.QUANTUM
     out = amp[at.A_OUT : at.A_OUT + at.QUANTUM]

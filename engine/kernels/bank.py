@@ -41,7 +41,10 @@ def _turn(angle: float) -> tuple[float, float]:
 
 @njit(inline="always", **COMPILED)
 def _exp(x: float) -> float:
-    """e^x to a share of 1e-9 for -17 … 17 and of 5e-4 up to ±64, the same way; below it is as good as nothing."""
+    """The exponential e^x, to a share of 1e-9 for -17 … 17 and of 5e-4 up to ±64.
+
+    It is computed the same way for all x; below -64 it is as good as nothing.
+    """
     y = max(x, -64.0) / 64
     e = 1 + y * (
         1 + y * (0.5 + y * (1 / 6 + y * (1 / 24 + y * (1 / 120 + y * (1 / 720 + y * (1 / 5040 + y / 40320))))))

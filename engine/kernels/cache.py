@@ -59,7 +59,7 @@ def _places() -> Iterator[Path]:
 
 
 def _can_be_written(place: Path) -> bool:
-    """Tried, not asked: permissions are not all that can forbid it."""
+    """Return True if a trial file can be made there: permissions are not all that can forbid it."""
     try:
         place.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=place):

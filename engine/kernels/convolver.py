@@ -197,7 +197,7 @@ def _play(convolver: np.ndarray, whole: np.ndarray, address: int, lane: int, lat
 def _compute(
     convolver: np.ndarray, whole: np.ndarray, impulse: np.ndarray, channels: int, late: int, lane: int
 ) -> None:
-    """This quantum's part of what the late partitions give in the next window."""
+    """Compute this quantum's part of what the late partitions give in the next window."""
     phase, bins, sums = whole[at.C_PHASE], at.WINDOW + 1, at.C_SUMS + lane * 4 * (at.WINDOW + 1)
     count = min(late, whole[at.C_LATE_FILLED])
     if 1 <= phase <= _SUMMING:

@@ -87,7 +87,7 @@ def bessels(x: float, out: np.ndarray) -> float:
 
 @njit(**COMPILED)
 def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray, scratch: np.ndarray) -> int:
-    """Writes rows (z, m, 1 of a sine or 0, J_m'(z)) of the zeros of all J_m up to `highest`: how many they are."""
+    """Write rows (z, m, 1 of a sine or 0, J_m'(z)) of the zeros of all J_m up to `highest`; return their number."""
     count, x = 0, 0.0
     bessels(x, before)
     while x < highest:
@@ -248,7 +248,10 @@ def shapes(drum: np.ndarray, surface: np.ndarray, places: np.ndarray, tools: Too
 
 @njit(**COMPILED)
 def spread(turn: float, tools: Tools) -> float:
-    """The mean of a mode over a disc, of its value at the centre: 2 J₁(κR)/κR, as for any solution of -∇²φ = κ²φ."""
+    """The mean of a mode over a disc, of its value at the centre: 2 J₁(κR)/κR.
+
+    It is so for any solution of -∇²φ = κ²φ.
+    """
     return 1.0 if turn < 1e-6 else 2 * bessel(1, turn, tools) / turn
 
 
@@ -415,7 +418,10 @@ def lowest(drum: np.ndarray) -> float:
 
 @njit(**COMPILED)
 def _principal(drum: np.ndarray, around: Around, work: np.ndarray, out: np.ndarray) -> float:
-    """ω of the mode that gives a drum its pitch: over a kettle (1,1), for (0,1) dies away at once; else the first."""
+    """The ω of the mode that gives a drum its pitch: over a kettle (1,1), else the first.
+
+    Over a kettle (0,1) dies away at once.
+    """
     across = lowest(drum)
     stiff = drum[TENSION] + stretching(drum) * (drum[THICKNESS] * across) ** 2 / 6
     in_vacuo_hz = across * math.sqrt(stiff / (drum[DENSITY] * drum[THICKNESS])) / (2 * math.pi)

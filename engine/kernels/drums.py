@@ -44,7 +44,7 @@ def drum_of(table: Table, key: int) -> Drum:
 
 @njit(**COMPILED)
 def rows_of(drum: Drum) -> np.ndarray:
-    """Its rows (DRUM_ROWS, modes)."""
+    """The rows (DRUM_ROWS, modes) of a drum."""
     return matrix(reals(address_of(drum)), HEADER, DRUM_ROWS, drum.modes)
 
 

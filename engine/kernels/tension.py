@@ -381,7 +381,7 @@ def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray
 
 @njit(**COMPILED)
 def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.ndarray, sign: float) -> None:
-    """Half of what `node` does first, forward or back, in place of y."""
+    """Apply half of the kick that `node` begins with to y in place, forward or back."""
     first = second = 0.0
     for m in range(len(x)):
         stretch = rows[3, m] * x[m] * x[m]

@@ -108,7 +108,7 @@ class _Rates(NamedTuple):
 
 
 class _Motion(NamedTuple):
-    """Beside the decay e^{-σt}: float64 (batch, times, state_size) each."""
+    """The motion beside the decay e^{-σt}: float64 (batch, times, state_size) each."""
 
     gain: Tensor  # b tanh(Re I / b), in nepers
     phase: Tensor  # ωt + Im I

@@ -228,7 +228,7 @@ class Block(nn.Module):
         return inputs + gated, last
 
     def fold(self) -> FoldedBlock:
-        """This block in evaluation."""
+        """The folded block that equals this one in evaluation."""
         norm = self.normalization
         assert norm.running_mean is not None and norm.running_var is not None
         scale = norm.weight * torch.rsqrt(norm.running_var + norm.eps)
@@ -292,7 +292,7 @@ class FoldedBlock:
 
 @dataclass(frozen=True)
 class SSMState:
-    """Every layer's x, complex128 (batch, states) each, the first layer's first.
+    """The state x of every layer, complex128 (batch, states) each, the first layer's first.
 
     Double precision keeps the carried phases exact; the layers themselves run in the precision of the weights.
 

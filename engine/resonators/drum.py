@@ -147,7 +147,7 @@ class DrumParameters:
         return surface.modes_below(self.shape, self.aspect, reach), air, ka
 
     def modes(self, highest_hz: float, most: int = MOST_MODES) -> DrumModes:
-        """Its lowest modes below a frequency, so many at most.
+        """The lowest modes below a frequency, so many at most.
 
         Raises:
             ValueError: there is none, or far too many; the message names the remedy.

@@ -1,4 +1,4 @@
-"""Decay by mode as physics gives it, beside the two numbers d₁ and d₃ of a string, which may be 0 then.
+"""The decay by mode as physics gives it, beside a string's two numbers d₁ and d₃, which may be 0 then.
 
     σ_n = a π (ν + d √(π ν ρ f_n)) / ρA  +  ω_n/2 · (T δ + E I η_n² β) / (T + E I η_n²)
 

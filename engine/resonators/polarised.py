@@ -29,7 +29,7 @@ PAIRS = MOST_PAIRS  # lowest partials that have two modes; an estimate: above th
 
 @dataclass(frozen=True)
 class Polarisations:
-    """Two directions, the first normal to the board.
+    """The two directions of polarisation, the first normal to the board.
 
     Attributes:
         angle_deg: of the pluck, from the first direction.

@@ -63,7 +63,7 @@ class Surface:
 
     @property
     def n(self) -> NDArray[np.int64]:
-        """Half-waves across a rectangle; of a circle 1 for a sine."""
+        """The half-waves across a rectangle; of a circle 1 for a sine."""
         return self.rows[kernel.N].astype(np.int64)
 
     def shapes(self, places: Array) -> Array:

@@ -38,7 +38,9 @@ class Gap:
 
 
 class Mixer:
-    """Its memory is what the kernels work on; commands come from any thread, frames are taken by one.
+    """The mixer of voices, on memory that the kernels use.
+
+    Commands come from any thread, frames are taken by one.
 
     Args:
         limited: whether the safety limiter is at work: for ears, not for files. It delays by `layout.AHEAD` frames.

@@ -25,7 +25,7 @@ def possible_s(seconds: float) -> float | None:
 
 
 class Voice:
-    """Made and commanded by one thread, rendered by another: a command is heard within a quantum.
+    """A voice, made and commanded by one thread, rendered by another: a command is heard within a quantum.
 
     Args:
         displacement_m: at its release, (grid_points,), projected on the modes in use.
@@ -192,7 +192,7 @@ class Voice:
         return True
 
     def append(self, samples: NDArray[np.floating]) -> None:
-        """More of what a rendered voice reads, (frames, points) of full scale at its own rate."""
+        """Append samples that a rendered voice reads, (frames, points) of full scale at its own rate."""
         assert self._samples is not None
         ready = int(self._counts[at.READY])
         count = min(len(samples), len(self._samples) - ready)

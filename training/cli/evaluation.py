@@ -177,7 +177,7 @@ class _Measurement:
     report: Shares
 
     def of(self, split: str) -> dict[str, Any]:
-        """All figures of a split, by name."""
+        """The figures of a split, all by name."""
         from training.evaluate import errors_by_rise, evaluate_past_horizon
         from training.results import SHORT_HORIZON
 

@@ -78,7 +78,7 @@ def batches(recipe: Recipe, count: int, epoch: int) -> tuple[Tensor, ...]:
 
 
 def _frames(recipe: Recipe, horizon: int, generator: torch.Generator) -> Tensor:
-    """Kept frames 1 … horizon, all or a random choice, ascending."""
+    """The frames that are kept of 1 … horizon, all or a random choice, ascending."""
     if not recipe.steps_per_batch or recipe.steps_per_batch >= horizon:
         return torch.arange(1, horizon + 1)
     count = recipe.steps_per_batch

@@ -1,4 +1,4 @@
-"""Simulated trajectories, kept as modal amplitudes in a cache keyed by all that determines them.
+"""The simulated trajectories, kept as modal amplitudes in a cache keyed by all that determines them.
 
 The kept modes make the data band-limited, so 10 or 25 amplitudes hold a frame of 101 points exactly.
 """

@@ -210,7 +210,10 @@ class _UnderWay:
 
 
 def learning_rate_at(recipe: Recipe, share: float) -> float:
-    """Constant, or one cycle: a linear warm-up to the peak, then a cosine to zero. `share`: of the run, 0 … 1."""
+    """The learning rate: constant, or one cycle of a linear warm-up to the peak, then a cosine to zero.
+
+    `share`: of the run, 0 … 1.
+    """
     if recipe.schedule == "constant":
         return recipe.peak_learning_rate
     if share < recipe.warm_up:

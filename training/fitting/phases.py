@@ -108,7 +108,10 @@ def _string_modes(found: list[Floats], slowest: float, modes: Modes) -> StringMo
 
 
 def _first_guess(motions: Floats, count: int) -> Floats:
-    """ω, σ, Re s, Im s and κ (count,) of the first frames: the frequency at which u(t+1) + u(t-1) = 2 cos ω u(t)."""
+    """The guess of ω, σ, Re s, Im s and κ (count,) from the first frames.
+
+    ω is the frequency at which u(t+1) + u(t-1) = 2 cos ω u(t).
+    """
     first = motions[:, : 4 * FIRST_FRAMES]
     now = first[:, 1:-1]
     cosine = np.sum(now * (first[:, 2:] + first[:, :-2])) / (2 * np.sum(now**2))

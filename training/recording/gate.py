@@ -63,7 +63,7 @@ class Finding:
 
 
 def examine(samples: Array, note: Note, series: Series | None) -> tuple[Finding, ...]:
-    """All that speaks against a recording; empty: nothing does."""
+    """The findings against a recording; empty: nothing speaks against it."""
     found = [
         clipped(samples, note),
         already_playing(note),

@@ -35,7 +35,10 @@ DRAWS = 400
 
 @dataclass(frozen=True)
 class Spread:
-    """95 % intervals of a partial: Hz at rest, σ in 1/s, dB of its level; `rest_cents`: of Hz, above its poles'."""
+    """The 95 % intervals of a partial: Hz at rest, σ in 1/s, dB of its level.
+
+    `rest_cents`: of Hz, above its poles'.
+    """
 
     hz: tuple[float, float]
     decay: tuple[float, float]

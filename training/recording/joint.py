@@ -1,4 +1,4 @@
-"""Several recordings of one instrument: what they share, and what each adds.
+"""The combination of several recordings of one instrument: what they share, and what each adds.
 
 The first gives the string and the recorded note. Takes of its pitch share their poles (`fit.fit_takes`),
 and the medians of their partials' levels. Notes of every pitch share the smooth decay. So one take's accident does

@@ -134,7 +134,10 @@ def errors_of(truth: Array, found: Array, rate_hz: int, noise_power: float = 0.0
 
 
 def aligned(truth: Array, found: Array, rate_hz: float) -> tuple[Array, float, float]:
-    """`found` with the gain and the delay, below 2 ms, that leave the least; the gain, and the delay in s."""
+    """The sound `found` with the gain and the delay, below 2 ms, that leave the least.
+
+    Beside it the gain, and the delay in s.
+    """
     size = fft.next_fast_len(2 * len(truth), real=True)
     theirs, ours = fft.rfft(truth, size), fft.rfft(found, size)
     cross = fft.irfft(theirs * ours.conj(), size)

@@ -1,4 +1,4 @@
-"""Weights with which the Fourier cells of `fno` are a string of known modes: where a training may set out from.
+"""The weights with which the Fourier cells of `fno` are a string of known modes, from which a training may start.
 
 A Fourier convolution of a zero-padded field is any map that looks the same from every point: a kernel of lags for
 each pair of channels. A string is not the same at every point, so that its state is kept as numbers at single points
@@ -139,7 +139,7 @@ HELD_DOWN = -300.0
 
 
 def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
-    """Its pointwise maps are 0. Couplings are left out.
+    """Wire an FRNN for the modes: its pointwise maps are 0, and couplings are left out.
 
     The state of a mode are its amplitude, which the field holds, and a number that is 0 at rest. Pairs of modes that
     share a channel are kept as sum and difference, so that one kernel turns both.

@@ -84,7 +84,7 @@ class Watch(Protocol):
         """An epoch is over."""
 
     def noted(self, event: Noted) -> None:
-        """Something worth a line."""
+        """A note is worth a line."""
 
     def finished(self, row: Row) -> None:
         """A run has ended, and its row is in the results file."""

@@ -246,7 +246,7 @@ def release_key(player: Player, channel: int, key: int) -> None:
 
 @njit(**COMPILED)
 def release_keys(player: Player, channel: int) -> None:
-    """No key of a channel is down."""
+    """Release all keys of a channel."""
     for key in range(of.KEYS):
         release_key(player, channel, key)
 

@@ -131,7 +131,7 @@ def strum(player: Player, table: Table, event: Event, now: int) -> bool:
 
 @njit(**COMPILED)
 def waits(player: Player, event: Event, now: int) -> bool:
-    """Puts what is meant for a note behind it where that waits for its turn in a chord; whether it does."""
+    """Put what is meant for a note behind it where that waits for its turn in a chord; return True if it does."""
     id, channel, key = event.id, event.channel, event.key
     by_id = id != 0 and event.kind in (of.TUNE, of.CHOKE)
     for place in range(player.queued):

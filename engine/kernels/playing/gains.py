@@ -30,7 +30,9 @@ def forget_gains(player: Player) -> None:
 
 @njit(**COMPILED)
 def _sound(player: Player, table: Table, key: int, string: int) -> int:
-    """Fills the sound of a key at the reference velocity, see `loudness`; how many modes it has, 0: it is silent.
+    """Fill the sound of a key at the reference velocity, see `loudness`.
+
+    Returns how many modes it has; 0: it is silent.
 
     The modulation wheel and the mute do not count: what they change is heard as louder or softer.
     """

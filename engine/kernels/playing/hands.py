@@ -95,7 +95,7 @@ def _move_others(
 
 @njit(**COMPILED)
 def hammer_on(player: Player, table: Table, event: Event, frame: int, now: int) -> bool:
-    """Lets a key have the latest note that is held on its channel, where legato is on; whether it has one.
+    """Give a key the latest note that is held on its channel, where legato is on; return True if it has one.
 
     Where the event gives a string, only a note on that string.
     """
@@ -140,7 +140,7 @@ def _pull_off(
     frame: int,
     now: int,
 ) -> bool:
-    """Gives the note of a released key to the highest key that is down and has none; whether there is one."""
+    """Give the note of a released key to the highest key that is down and has none; return True if there is one."""
     channel, before = note.channel, note.key
     if not channels.switched(player, table.mode, channel, of.LEGATO):
         return False

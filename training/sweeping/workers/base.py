@@ -14,7 +14,7 @@ DEATHS = 3  # of processes that a task survives; Dask's own default
 
 
 class WorkersError(RuntimeError):
-    """No workers can be had, or they are gone; the message says which and the remedy."""
+    """A lack of workers: none can be had, or they are gone; the message says which and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Progressed:
 
 @dataclass(frozen=True)
 class Noted:
-    """Something that a person may want to know of a run."""
+    """A note on a run for a person."""
 
     name: str
     text: str

@@ -97,7 +97,7 @@ def _runs(task: Task) -> Path:
 
 
 def _leave_if_broken(device: str) -> None:
-    """Ends this process if its CUDA device has faulted: nothing later would work in it, and a new one replaces it."""
+    """End this process if its CUDA device has faulted: nothing later would work, and a new process replaces it."""
     if device == "cpu":
         return
     import torch
