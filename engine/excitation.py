@@ -49,7 +49,7 @@ def rounded(position: float, width: float, peak_m: float, grid_points: int) -> A
 
 
 def release_factor(omega: Array, release_s: float) -> Array:
-    """The share left of modes of angular frequencies ω when the force that pulls them falls to nothing in a time.
+    """The share left of modes of angular frequencies ω when the pulling force falls to nothing in a time.
 
     The force falls as a raised cosine does. In a linear string the motion that follows is that of a release at once,
     in the middle of that time, from amplitudes that are smaller by the Fourier transform of the fall's slope: a slow

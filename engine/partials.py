@@ -303,7 +303,10 @@ class _Motion:
 
 
 def _continued_cycles(gain: NDArray[np.complex128], phased: NDArray[np.bool_]) -> Array:
-    """Phases in cycles without jumps along axis 1, from one segment that has a phase to the next that has one."""
+    """The phases in cycles without jumps along axis 1.
+
+    They follow from one segment that has a phase to the next that has one.
+    """
     place = np.where(phased, np.arange(gain.shape[1])[None, :, None], 0)
     last = np.maximum.accumulate(place, axis=1)
     angle = np.where(phased, np.angle(np.where(phased, gain, 1.0)), 0.0)

@@ -81,7 +81,10 @@ def lasting_folder(parent: Path, name: str) -> Path:
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Name what was to be written in an OSError of the system's within: of a full disk it names no file at all."""
+    """Name what was to be written in an OSError of the system's within.
+
+    Of a full disk it names no file at all.
+    """
     try:
         yield
     except OSError as error:

@@ -1,4 +1,4 @@
-"""A cell of the paper's tables: one model on one data set over one horizon, by one recipe, from one seed.
+"""A cell of the paper's tables: one model, data set and horizon, by one recipe, from one seed.
 
 A cell has a name, which is its preset's, and from the name alone its whole configuration follows: the paper's
 protocol gives the data, `recipes/RECIPE.toml` gives the rest. `load` reads runs that are no cells, too.

@@ -57,7 +57,10 @@ def amplify(mixer: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def _begin(amp: np.ndarray, whole: np.ndarray) -> None:
-    """Reset the amplifier: all at rest, which is where the bias has it, as if there had never been any input."""
+    """Reset the amplifier, as if there had never been any input.
+
+    All is at rest, which is where the bias has it.
+    """
     amp[at.A_STATE :] = 0.0
     rest = BIAS / math.sqrt(1 + BIAS * BIAS)
     amp[at.A_STATE + 1], amp[at.A_STATE + 2] = BIAS, rest

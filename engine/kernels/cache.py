@@ -31,7 +31,9 @@ def _version() -> str:
 
 @cache
 def folder() -> Path | None:
-    """A folder for these very sources: where the user says, else beside them, in the home folder, or a temporary one.
+    """A folder for these very sources.
+
+    It is where the user says, else beside them, in the home folder, or a temporary one.
 
     None where nothing can be written at all: then what is compiled is not kept. Numba notices that a function's own
     file has changed, but not a file that it calls into. With one folder a version nothing compiled for another memory

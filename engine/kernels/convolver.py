@@ -276,7 +276,10 @@ def _transform(convolver: np.ndarray, re: np.ndarray, im: np.ndarray, re2: np.nd
 
 @njit(**COMPILED)
 def _mix(convolver: np.ndarray, whole: np.ndarray, mix: np.ndarray, wet_now: bool, wet_next: bool) -> None:
-    """The output: a lane, or the fade from one to the other; a lane without a response is the mix itself."""
+    """The output: a lane, or the fade from one to the other.
+
+    A lane without a response is the mix itself.
+    """
     step, lane = whole[at.C_STEP], whole[at.C_LANE]
     now, following = at.C_WET + lane * 2 * at.QUANTUM, at.C_WET + (1 - lane) * 2 * at.QUANTUM
     done = (step - 1) * at.WINDOW + whole[at.C_PHASE] * at.QUANTUM

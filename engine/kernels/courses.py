@@ -53,7 +53,7 @@ def _out(mixer: np.ndarray, which: int) -> np.ndarray:
 
 @njit(**COMPILED)
 def _joins(course: int, late: int, address: int, now: int) -> bool:
-    """Return True if a voice is a string of a course that begins in the mixer's next quantum, in step with it."""
+    """Return True if a voice is a string of a course that begins in step in the mixer's next quantum."""
     counts = wholes(address)
     if counts[at.COURSE] != course or counts[at.COURSE_DONE] == now + 1:
         return False
@@ -65,7 +65,9 @@ def _joins(course: int, late: int, address: int, now: int) -> bool:
 
 @njit(**COMPILED)
 def add(mixer: np.ndarray, place: int, now_s: float) -> int:
-    """Adds the next quantum of the course of an active voice, by its place, to the mix; the state of that voice.
+    """Add the next quantum of the course of an active voice, by its place, to the mix.
+
+    Returns the state of that voice.
 
     Others of the course have theirs from here on, and only give it at their own places.
     """
@@ -203,7 +205,10 @@ def _speeds(address: int, shared: int) -> np.ndarray:
 
 @njit(**COMPILED)
 def _set_up(string: np.ndarray, scratch: np.ndarray, place: int, solved: bool) -> int:
-    """Prepares a string for a quantum, with its record from a slot of the scratch on; the first slot behind it."""
+    """Prepare a string for a quantum, with its record from a slot of the scratch on.
+
+    Returns the first slot behind it.
+    """
     counts, whole = string.view(np.int64), scratch.view(np.int64)
     program, n = reals(counts[at.PROGRAM]), counts[at.MODES]
     if solved:

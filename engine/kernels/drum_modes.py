@@ -285,7 +285,9 @@ def densities(drum: np.ndarray, surface: np.ndarray, s: float, out: np.ndarray, 
 def air_at(
     drum: np.ndarray, surface: np.ndarray, ka: float, points: int, out: np.ndarray, scratch: np.ndarray
 ) -> None:
-    """Writes what the air adds to modes at k times size: reactance, and resistance by ka, (2, modes), at a size of 1.
+    """Write what the air adds to modes at k times size: reactance, and resistance by ka.
+
+    The shape is (2, modes), at a size of 1.
 
     ∫ D(s)/√(s² - k²) ds over s > k, with s² = k² + u²: ∫ D(s)/s du. And ∫ D(s)/√(k² - s²) ds over s < k, with
     s = k sin α.

@@ -94,7 +94,10 @@ def _blow(drum: Drum, struck: np.ndarray, speed: float, out: np.ndarray) -> None
 
 @njit(**COMPILED)
 def gain_of(player: Player, table: Table, key: int) -> float:
-    """The factor that makes a key as loud as others, and lets it peak no higher than the highest of them may."""
+    """The factor that makes a key as loud as others.
+
+    It lets the key peak no higher than the highest of them may.
+    """
     if player.gains[key, 0] == 0.0:
         drum = drum_of(table, key)
         n, rows = drum.modes, rows_of(drum)
@@ -155,7 +158,10 @@ def strike(player: Player, table: Table, event: Event, number: int) -> float:
 def _make(
     player: Player, table: Table, address: int, drum: Drum, struck: np.ndarray, speed: float, source: int
 ) -> None:
-    """A voice that sets out from the speeds that a blow gives its modes; `struck`: those that 1 N s gives."""
+    """A voice that sets out from the speeds that a blow gives its modes.
+
+    `struck`: those that 1 N s gives.
+    """
     voice, counts, n, rate_hz, rows = reals(address), wholes(address), drum.modes, player.rate_hz, rows_of(drum)
     kind = table.kinds[source]
     used = at.FOLLOWING if kind == at.TENSION else at.TRUTH_ROWS  # what follows from them is prepared

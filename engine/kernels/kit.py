@@ -1,4 +1,6 @@
-"""Drums of a plug-in: whose knobs are turned, and whose keys' blocks are written again when they are struck or heard.
+"""The drums of a plug-in, whose knobs are turned.
+
+The blocks of keys are written again when these are struck or heard.
 
 A kit is memory of numbers, as `written` lays it out: its values, its keys, its drums, and room to work in.
 """

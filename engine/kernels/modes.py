@@ -63,7 +63,10 @@ def damped(omega_squared: float, sigma: float) -> float:
 
 @njit(**COMPILED)
 def run_up(voice: np.ndarray, seconds: float) -> None:
-    """Lets amplitudes and speeds of a voice that has not begun move on for so long, alone and at rest's tension."""
+    """Advance amplitudes and speeds of a voice that has not begun by so long.
+
+    Each mode moves alone, at rest's tension.
+    """
     n = voice.view(np.int64)[at.MODES]
     q, v, squares = row(voice, n, 0), row(voice, n, 1), row(voice, n, at.OMEGA_SQUARED)
     for m in range(n):

@@ -72,7 +72,9 @@ def node(
     largest_stretch: float,
     heard: np.ndarray,
 ) -> tuple[float, float]:
-    """The kick of the common tension and the turn to the next node, in place: from S and R here to those there.
+    """The kick of the common tension and the turn to the next node, in place.
+
+    It leads from S and R here to those there.
 
     Args:
         sums, rest: S and R of the blocks here, and what resting modes add; the result is of the blocks.

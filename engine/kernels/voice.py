@@ -127,7 +127,7 @@ def differentiate(voice: np.ndarray, out: np.ndarray, taps: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
-    """Take over the string of the voice before as this one begins: stop its motion, or add this pluck to it.
+    """Take over the string of the voice before: stop its motion as this one begins, or add this pluck to it.
 
     One that is to begin later, or is stopped before it has begun, is not heard at all; then the string is that of
     the voice before that one, which is left as what is to be taken over.

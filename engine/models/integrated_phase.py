@@ -441,7 +441,10 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
 
 
 def _integrated_nodes(time: int, spacing: int) -> int:
-    """The node at which the integral of a state ends: one is kept back for the segment that `time` lies in."""
+    """The node at which the integral of a state ends.
+
+    One is kept back for the segment that `time` lies in.
+    """
     return max(0, time // spacing - 1)
 
 

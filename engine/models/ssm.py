@@ -253,7 +253,9 @@ class Block(nn.Module):
 
 @dataclass(frozen=True)
 class FoldedBlock:
-    """A block in evaluation for rendering on a CPU: batch norm is in the matrices, and what is left is few calls.
+    """A block in evaluation for rendering on a CPU.
+
+    Batch norm is in the matrices, and what is left is few calls.
 
     Attributes:
         input, input_bias: what is added to the states, (2 states, features), all real parts first.

@@ -50,7 +50,7 @@ def _displacement_alone(data: Metadata) -> Metadata:
 
 
 def _range_of_training(data: Metadata) -> Metadata:
-    """Migrate 4 → 5: widths by shape; no peak of plucks that were scaled to a rise of tension, as a family's are."""
+    """Migrate 4 → 5: widths by shape, and no peak of plucks scaled to a rise of tension, as a family's are."""
     trained, family = data.get("trained_range"), data.get("family")
     if not isinstance(trained, dict):
         return data

@@ -111,7 +111,7 @@ class Resonator:
         return -self.sigma + 1j * np.sqrt(squared)
 
     def falls_s(self, db: float) -> float:
-        """The time in s in which its slowest mode falls by so many dB, as a free one; inf where it never does."""
+        """The time in s in which its slowest mode, free, falls by so many dB; inf where it never does."""
         slowest = float(self.sigma.min())
         return db * math.log(10) / 20 / slowest if slowest > 0 else math.inf
 

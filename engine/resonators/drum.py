@@ -244,7 +244,7 @@ class DrumModes:
         return float(kernel.mass_kg(self.drum.numbers))
 
     def struck(self, place: tuple[float, float], radius_m: float) -> Array:
-        """Speeds (modes,) in m/s that a sudden blow of 1 N s gives, spread over a disc at a place."""
+        """The speeds (modes,) in m/s from a sudden blow of 1 N s, spread over a disc at a place."""
         found = np.empty(len(self))
         kernel.struck(self.drum.numbers, self.rows, *map(float, place), radius_m, tools(), found)
         return found

@@ -1,4 +1,6 @@
-"""The decay by mode as physics gives it, beside a string's two numbers d₁ and d₃, which may be 0 then.
+"""The decay by mode as physics gives it.
+
+A string's two numbers d₁ and d₃ stand beside it, and may be 0 then.
 
     σ_n = a π (ν + d √(π ν ρ f_n)) / ρA  +  ω_n/2 · (T δ + E I η_n² β) / (T + E I η_n²)
 

@@ -75,7 +75,7 @@ class Ear:
         return max(peak, tension * steepest * (FULL_SCALE_M / FULL_SCALE_N))
 
     def is_on_node(self, point: float) -> bool:
-        """Return True if nothing can be heard there: a fixed end, or a node of the mode that is heard alone."""
+        """Return True if nothing can be heard there: a fixed end, or a node of the only mode heard."""
         if self.pickup == "bridge":
             return False
         return point in (0.0, 1.0) or (self.solo > 0 and abs(math.sin(math.pi * self.solo * point)) < 1e-3)

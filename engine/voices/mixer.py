@@ -30,7 +30,10 @@ CAUSES = {at.CAUSE_DEVICE: "device", at.CAUSE_STARVED: "rendering", at.CAUSE_RUN
 
 @dataclass(frozen=True)
 class Gap:
-    """A silence that nobody asked for: when, as seconds of sound since the mixer began, why, and 0 ms if unknown."""
+    """A silence that nobody asked for: its time in s of sound since the mixer began, cause and length.
+
+    0 ms: unknown.
+    """
 
     time_s: float
     cause: str

@@ -310,7 +310,10 @@ class CompiledPlayer:
         return found
 
     def _length_m(self, note: np.void, voice: NDArray[np.float64]) -> float | None:
-        """The length of a note's string in m: its goal, times how far a voice's first mode has still to go."""
+        """The length of a note's string in m.
+
+        It is its goal, times how far a voice's first mode has still to go.
+        """
         if note["drum"]:
             return None
         own = _string(note["string_now"])

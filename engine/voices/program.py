@@ -72,7 +72,9 @@ class Program:
 
 
 def voice_ends_s(info: PresetInfo) -> float:
-    """The time in s until a pluck of a preset's model has ended for certain; inf where its string has no losses.
+    """The time in s until a pluck of a preset's model has ended for certain.
+
+    It is inf where its string has no losses.
 
     The string itself is silent by then. A model need not be: one that was trained on a part of a second may settle to
     a hum of its own, and nothing it has learned makes it end. Latents that share a tension need no such end: their

@@ -99,7 +99,10 @@ class Voice:
         return bool(self._counts[at.STATE] in (at.OVER, at.RUNAWAY))
 
     def refuse(self) -> None:
-        """End a voice that no mixer has: it was not handed over, or its mixer is not in use any more."""
+        """End a voice that no mixer has.
+
+        It was not handed over, or its mixer is not in use any more.
+        """
         self._counts[at.STATE] = at.OVER
 
     @property
@@ -146,7 +149,10 @@ class Voice:
         self.memory[at.GAIN_FROM] = self.memory[at.GAIN_TO] = gain
 
     def begin_at(self, frame: int) -> None:
-        """Set the frame of the mixer at which it begins, before it is handed over; if that is past, at once."""
+        """Set the frame of the mixer at which it begins; if that is past, at once.
+
+        Call this before it is handed over.
+        """
         self._counts[at.BEGIN_AT] = frame
 
     def release_at(self, frame: int) -> None:

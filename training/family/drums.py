@@ -1,4 +1,6 @@
-"""Drums that no model has seen, and how well models of many strings play them: the same equation in two dimensions.
+"""The drums that no model has seen, and how well models of many strings play them.
+
+It is the same equation in two dimensions.
 
 Drums differ in kind, size, pitch, decay and blow. Half of the membranes are loaded by air. Decay rates scatter by
 20 % from mode to mode. Half of the blows are those of a mallet (speeds alone), half begin pressed down, at rest.

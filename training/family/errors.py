@@ -127,7 +127,10 @@ def rollout(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tens
 
 
 def by_rise(errors: Sequence[StringError], edges: Sequence[float]) -> list[tuple[tuple[float, float], FamilyErrors]]:
-    """Errors in ranges of the rise of tension; the last has both ends, and ranges without a string are left out."""
+    """The errors in ranges of the rise of tension.
+
+    The last has both ends, and ranges without a string are left out.
+    """
     found = []
     for low, high in pairwise(edges):
         inside = tuple(

@@ -152,7 +152,10 @@ def _of_string(learned: LearnedNote, number: int) -> list[Pole]:
 
 
 def physics_of(learned: LearnedNote) -> Physics:
-    """Fit f0, B and the decay over frequency to a note's partials; those pulled by the body count little for it."""
+    """Fit f0, B and the decay over frequency to a note's partials.
+
+    Those pulled by the body count little for it.
+    """
     partials = partials_of(learned)
     k = np.array([each.number for each in partials], float)
     hz = np.array([each.hz for each in partials])

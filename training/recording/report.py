@@ -47,7 +47,10 @@ class Errors:
 
 @dataclass(frozen=True)
 class Band:
-    """Decay of an octave: T60 of the recording and of the learned note, in s; nan where it does not decay."""
+    """The decay of an octave: T60 of the recording and of the learned note, in s.
+
+    It is nan where it does not decay.
+    """
 
     hz: float
     recorded_s: float

@@ -1,4 +1,6 @@
-"""The weights with which the Fourier cells of `fno` are a string of known modes, from which a training may start.
+"""The weights that make the Fourier cells of `fno` a string of known modes.
+
+A training may start from them.
 
 A Fourier convolution of a zero-padded field is any map that looks the same from every point: a kernel of lags for
 each pair of channels. A string is not the same at every point, so that its state is kept as numbers at single points

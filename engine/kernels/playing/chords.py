@@ -28,7 +28,7 @@ def _height(player: Player, table: Table, event: Event) -> int:
 
 @njit(**COMPILED)
 def _strums_in(player: Player, table: Table, event: Event) -> int:
-    """Frames from string to string of a chord that the note of an event is in; 0: notes begin as they come."""
+    """The frames from string to string of the chord of an event's note; 0: notes begin as they come."""
     note_on = event.kind == of.NOTE_ON and event.value > 0.0
     channel = event.channel
     by_hand = event.position > 0.0
@@ -131,7 +131,10 @@ def strum(player: Player, table: Table, event: Event, now: int) -> bool:
 
 @njit(**COMPILED)
 def waits(player: Player, event: Event, now: int) -> bool:
-    """Put what is meant for a note behind it where that waits for its turn in a chord; return True if it does."""
+    """Put what is meant for a note behind it where that waits for its turn in a chord.
+
+    Returns True if it does.
+    """
     id, channel, key = event.id, event.channel, event.key
     by_id = id != 0 and event.kind in (of.TUNE, of.CHOKE)
     for place in range(player.queued):

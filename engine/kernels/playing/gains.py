@@ -124,7 +124,9 @@ def _look_at_peaks(player: Player, table: Table) -> None:
 
 @njit(**COMPILED)
 def gain_of(player: Player, table: Table, key: int, string: int) -> float:
-    """The factor that makes a key as loud as others on a string of a set, -1: the one that it chooses.
+    """The factor that makes a key as loud as others on a string of a set.
+
+    -1: the string that the key chooses.
 
     Beside it is kept how far that string swings.
     """

@@ -42,7 +42,10 @@ def technique_of(
     switch: int,
     usual: float,
 ) -> float:
-    """The value of a technique for a channel; the usual one where its footswitch is down and the value is off."""
+    """The value of a technique for a channel.
+
+    It is the usual one where its footswitch is down and the value is off.
+    """
     value, off = value_of(player, table, which), 1.0 if which == of.HARMONIC else 0.0
     if value <= off and channels.switched(player, table.mode, channel, switch):
         return usual
@@ -59,7 +62,10 @@ def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
 
 @njit(**COMPILED)
 def chosen(table: Table, count: int, key: int) -> int:
-    """The string of a set, from the highest, 0, that a key chooses: the highest at or below it, else the lowest."""
+    """The string of a set, from the highest, 0, that a key chooses.
+
+    It is the highest at or below the key, else the lowest.
+    """
     for number in range(count):
         if table.open[number].note <= key:
             return number
@@ -76,7 +82,9 @@ def string_of(
     wheeled: bool,
     out: np.ndarray,
 ) -> tuple[int, float]:
-    """The string of a key, before bends: its partials, 0 where there is none, and its share of the whole string.
+    """The string of a key, before bends.
+
+    Returns its partials, 0 where there is none, and its share of the whole string.
 
     Args:
         number: on which of a set it is played, from the highest, 0; -1, or one that would have to be slackened too
@@ -111,7 +119,10 @@ def string_of(
 
 @njit(**COMPILED)
 def has_octave(table: Table, key: int, number: int) -> bool:
-    """Return True if a key's course has octave strings, on a string of a set; -1: on the one that it chooses."""
+    """Return True if a key's course has octave strings, on a string of a set.
+
+    -1: on the string that the key chooses.
+    """
     count, octaves = table.strings, table.octaves
     return octaves > 0 and (number if number >= 0 else chosen(table, count, key)) >= count - octaves
 
@@ -126,7 +137,10 @@ def pitch_of(table: Table, key: int) -> float:
 
 @njit(**COMPILED)
 def string_now(player: Player, table: Table, note: Note, out: np.ndarray) -> None:
-    """The string of a note with the present knobs, wheels and damper; where there is none, it stays as it is."""
+    """Write the string of a note with the present knobs, wheels and damper.
+
+    Where there is none, it stays as it is.
+    """
     key, mode = note.key, table.mode
     pitch_hz, fits = pitch_of(table, key), True
     if pitch_hz > 0.0:

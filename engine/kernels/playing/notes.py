@@ -328,7 +328,10 @@ def _take_place(player: Player, table: Table, note: Note) -> None:
 
 @njit(**COMPILED)
 def _begin_voices(player: Player, mixers: np.ndarray, event: Event, note: Note) -> None:
-    """Hands the voices of a note to the mixer; those that have no room there, or that nobody hears, are over."""
+    """Hand the voices of a note to the mixer.
+
+    Those that have no room there, or that nobody hears, are over.
+    """
     for source in range(of.MOST_SOURCES):
         address = note.voices[source]
         if address == 0:
