@@ -1,4 +1,4 @@
-"""What an ear finds between a model's sound and the true one: spectrum, level, pitch, a second pitch; never phase.
+"""The audible differences between a model's sound and the truth: spectrum, level, pitch, second pitch; never phase.
 
 The frames of both sounds are long enough that the partials of a low string are apart, as the ear has them apart up to
 the fifth or eighth. Below 20 Hz nothing counts: a string that rests beside its place is not heard.
@@ -86,7 +86,7 @@ def audible_errors(
 
 
 def heard_level_db(sound: NDArray[np.floating], rate_hz: int) -> float:
-    """Of a stationary sound (samples,) of ±1 at full scale, as a sine's amplitude in dB; -200 where it is silent."""
+    """The level of a stationary sound (samples,) as a sine's amplitude, in dB of full scale ±1; -200 if silent."""
     window = np.hanning(len(sound))
     amplitudes = np.abs(np.fft.rfft((sound - np.mean(sound)) * window)) * 2 / window.sum()
     power = float(np.square(amplitudes[math.ceil(LOWEST_HZ * len(sound) / rate_hz) :]).sum()) / HANN_WIDTH
@@ -126,7 +126,7 @@ def _level_change(found: Array, true: Array, rate_hz: int) -> float:
 
 
 def _rise(found: Array, true: Array, rate_hz: int) -> float:
-    """Of means over RISE_S; what lies under the truth's floor does not count."""
+    """The rise in level of means over RISE_S; what lies under the truth's floor does not count."""
     length = max(1, round(RISE_S / _hop_s(rate_hz)))
     count = max(1, len(found) // length)
     means = np.array([part.mean() for part in np.array_split(found, count)])
@@ -164,7 +164,7 @@ def _pitch(
 
 
 def _bands(partials_hz: Sequence[float], rate_hz: int) -> list[tuple[float, float]]:
-    """Around each low partial, to the middles between it and its neighbours."""
+    """The bands around each low partial, to the middles between it and its neighbours."""
     known = [0.0, *(hz for hz in partials_hz[: LOW_PARTIALS + 1] if hz < rate_hz / 2)]
     edges = [(a + b) / 2 for a, b in pairwise(known)]
     edges.append(min(known[-1] + (known[-1] - edges[-1]), rate_hz / 2) if edges else 0.0)
@@ -187,7 +187,7 @@ def _peaks(power: Array) -> list[tuple[float, float]]:
 
 
 def _refined(power: Array, place: int) -> tuple[float, float]:
-    """By a parabola through the logarithms of three."""
+    """Refine the place and power of a peak by a parabola through the logarithms of three."""
     left, middle, right = np.log(np.maximum(power[place - 1 : place + 2], np.finfo(np.float64).tiny))
     bend = left - 2 * middle + right
     return place + (0.5 * (left - right) / bend if bend < 0 else 0.0), float(power[place])

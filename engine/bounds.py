@@ -1,4 +1,4 @@
-"""How large whatever a file asks for may be: the one place for it, looked at before anything is built.
+"""The bounds on whatever a file asks for: the one place for them, looked at before anything is built.
 
 Presets, settings and plans come from strangers. A few bytes of them can ask for any amount of memory or time, so each
 number has a bound here. The bounds lie far beyond every string and model that anybody would train on one computer.
@@ -126,7 +126,7 @@ def check(name: str, value: float, limits: tuple[float, float], unit: str = "") 
 
 
 def check_sizes(configuration: object) -> None:
-    """Every whole number of a model's configuration, and each of its tuples.
+    """Check every whole number of a model's configuration, and each of its tuples.
 
     Raises:
         ValueError: one is out of its bounds; the message names the field.

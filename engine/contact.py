@@ -1,4 +1,4 @@
-"""What touches strings, and the noise that it makes: pulses and bursts for `engine.kernels.contact`.
+"""The noise of what touches strings: pulses and bursts for `engine.kernels.contact`.
 
 Mechanisms have sources; levels and bands are estimates, chosen by the energy between and below partials that sampled
 instruments have in their first 50 ms.

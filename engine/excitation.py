@@ -49,7 +49,7 @@ def rounded(position: float, width: float, peak_m: float, grid_points: int) -> A
 
 
 def release_factor(omega: Array, release_s: float) -> Array:
-    """What is left of modes of angular frequencies ω when the force that pulls them falls to nothing in a time.
+    """The share left of modes of angular frequencies ω when the pulling force falls to nothing in a time.
 
     The force falls as a raised cosine does. In a linear string the motion that follows is that of a release at once,
     in the middle of that time, from amplitudes that are smaller by the Fourier transform of the fall's slope: a slow
@@ -62,7 +62,7 @@ def release_factor(omega: Array, release_s: float) -> Array:
 
 
 def blow_factor(omega: Array, shape: Array) -> Array:
-    """From amplitudes a pluck of this shape would give modes, to those of a blow on the same width of string.
+    """The factor from a pluck's modal amplitudes to those of a blow on the same width of string.
 
     A hammer's force for a time τ, a raised cosine, spread over the string as `shape`. A mode then moves as if kicked
     in the pulse's middle, at rest until then, with its spectrum at the mode's frequency, which is `release_factor` of

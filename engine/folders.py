@@ -1,4 +1,4 @@
-"""Where presets lie: the shipped folder and the user's own. Importing this does not load torch."""
+"""The folders of presets: the shipped one and the user's own. Importing this does not load torch."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ class ErrorSums:
         return RelativeError(float(mse[0]), float(mae[0]))
 
     def shares(self) -> NDArray[np.float64]:
-        """What part of all squared error is each trajectory's, (trajectories,); zeros where there is no error."""
+        """The share of each trajectory in all squared error, (trajectories,); zeros where there is no error."""
         squared = self._trajectories[0]
         whole = float(squared.sum())
         return squared / whole if whole > 0 else squared.copy()
@@ -182,7 +182,7 @@ def _over_points(terms: Any) -> NDArray[np.float64]:
 
 
 def _ratios(sums: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Of sums (4, n); a silent truth matched by silence is no error, unmatched an infinite one."""
+    """The ratios of sums (4, n); a silent truth matched by silence is no error, unmatched an infinite one."""
     error, truth = sums[::2], sums[1::2]
     with np.errstate(divide="ignore", invalid="ignore"):
         mse, mae = np.where(truth == 0, np.where(error == 0, 0.0, math.inf), error / truth)

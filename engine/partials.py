@@ -53,7 +53,7 @@ def phasors(before: Array, now: Array, after: Array, spacing_s: float, resonator
 
 
 def _complex(real: Array, imaginary: Array) -> Phasors:
-    """Also where parts are not finite, of which a product with i would make others."""
+    """The complex numbers of two parts, also where these are not finite: a product with i would make others."""
     found = real.astype(np.complex128)
     found.imag = imaginary
     return found
@@ -82,7 +82,7 @@ class PartialTrack:
 
     @classmethod
     def join(cls, tracks: Sequence[PartialTrack]) -> PartialTrack:
-        """Of successive blocks."""
+        """Join the tracks of successive blocks."""
         return cls(*(np.concatenate([getattr(track, field.name) for track in tracks], 1) for field in fields(cls)))
 
     def gain(self) -> Phasors:
@@ -153,11 +153,11 @@ class PartialErrors:
 
     @classmethod
     def join(cls, errors: Sequence[PartialErrors]) -> PartialErrors:
-        """Of further trajectories."""
+        """Join the errors of further trajectories."""
         return cls(*(np.concatenate([getattr(e, field.name) for e in errors]) for field in fields(cls)))
 
     def by_mode(self, window: int) -> list[PartialSummary]:
-        """What the trajectories have in common, mode by mode."""
+        """The medians over the trajectories, mode by mode."""
         return [
             PartialSummary(
                 mode + 1,
@@ -188,7 +188,7 @@ class PartialErrors:
 
 @dataclass(frozen=True)
 class PartialSummary:
-    """One mode over the trajectories in which it is there: medians, of the errors' magnitudes. None: in none."""
+    """A mode over the trajectories in which it is there: medians, of the errors' magnitudes. None: in none."""
 
     mode: int
     trajectories: int
@@ -298,12 +298,15 @@ class _Motion:
         return [energy, *(np.where(enough, values, math.nan) for values in rest)]
 
     def _cents(self, inside: slice, there: NDArray[np.bool_], true_hz: Array) -> Array:
-        """Of the prediction's frequency over the truth's, in the segments that are there, (batch, modes)."""
+        """The prediction's frequency over the truth's in cents, in the segments that are there, (batch, modes)."""
         return _in_cents(1 + _slope(self.time_s[inside], self.phase[:, inside], there) / true_hz)
 
 
 def _continued_cycles(gain: NDArray[np.complex128], phased: NDArray[np.bool_]) -> Array:
-    """Phases in cycles without jumps along axis 1, from one segment that has a phase to the next that has one."""
+    """The phases in cycles without jumps along axis 1.
+
+    They follow from one segment that has a phase to the next that has one.
+    """
     place = np.where(phased, np.arange(gain.shape[1])[None, :, None], 0)
     last = np.maximum.accumulate(place, axis=1)
     angle = np.where(phased, np.angle(np.where(phased, gain, 1.0)), 0.0)
@@ -315,7 +318,7 @@ def _in_cents(ratio: Array) -> Array:
 
 
 def _outer_thirds(there: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Of the segments that are there, along axis 1."""
+    """The first and the last third of the segments that are there, along axis 1."""
     place, count = there.cumsum(1), there.sum(1, keepdims=True)
     return there & (3 * place <= count), there & (3 * place > 2 * count)
 
@@ -325,7 +328,7 @@ def _mean(values: Array, there: NDArray[np.bool_]) -> Array:
 
 
 def _slope(time_s: NDArray[np.floating[Any]], values: Array, there: NDArray[np.bool_]) -> Array:
-    """Of the straight line through `values` (batch, segments, modes), NaN for less than LEAST_SEGMENTS of them."""
+    """The slope of the line through `values` (batch, segments, modes), NaN for less than LEAST_SEGMENTS of them."""
     times = np.broadcast_to(time_s[None, :, None], values.shape)
     time_off = np.where(there, times - _mean(times, there)[:, None], 0.0)
     value_off = np.where(there, values - _mean(values, there)[:, None], 0.0)
@@ -334,6 +337,6 @@ def _slope(time_s: NDArray[np.floating[Any]], values: Array, there: NDArray[np.b
 
 
 def _median(values: Array) -> float | None:
-    """Of those that are there."""
+    """The median of the values that are there."""
     there = values[~np.isnan(values)]
     return float(np.median(there)) if len(there) else None

@@ -1,4 +1,7 @@
-"""Text made fit for one line of a terminal or a label: what came from a file, and durations in words."""
+"""Text made fit for one line of a terminal or a label.
+
+It comes from a file, or gives a duration in words.
+"""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ DEFAULT_LISTEN = 0.37  # the listening point beside a pluck: no low mode is stil
 
 @dataclass(frozen=True)
 class Pluck:
-    """Where and how the string is pulled before its release.
+    """The pull on the string before its release: its place, height and shape.
 
     Attributes:
         position: 0 and 1 are the fixed ends, 0.5 the middle.

@@ -37,7 +37,7 @@ def python_environment() -> dict[str, str]:
 
 @contextmanager
 def safe_children() -> Iterator[None]:
-    """Within, Python processes that libraries start, as those of `multiprocessing`, do without the current folder."""
+    """Keep the current folder from Python processes that libraries start within, as those of `multiprocessing`."""
     before = os.environ.get(_SAFE)
     os.environ[_SAFE] = "1"
     try:

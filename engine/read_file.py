@@ -11,7 +11,7 @@ _FLAGS = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
 
 
 class UnusableFile(OSError):
-    """It is there, and must not be read: no ordinary file, or larger than any of ours. `strerror` says which."""
+    """A file that is there and must not be read: not ordinary, or larger than any of ours. `strerror` says which."""
 
 
 def read_bounded(path: Path, most_bytes: int) -> bytes:

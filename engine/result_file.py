@@ -46,6 +46,6 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
 
 
 def explain(path: Path, error: OSError) -> str:
-    """One line: the path, the system's words and what to do."""
+    """The error in one line: the path, the system's words and what to do."""
     remedy = REMEDIES.get(error.errno or 0, "choose another place")
     return f"{path}: cannot be written ({error.strerror or error}); {remedy}"

@@ -1,4 +1,4 @@
-"""Checked reading of plain data (JSON, TOML) into frozen dataclasses, and back.
+"""The checked reading of plain data (JSON, TOML) into frozen dataclasses, and back.
 
 Every error names the place, the field and the remedy. Types are read from the annotations; supported are
 bool, int, float, str, Literal, None unions, tuples of one type, string-keyed mappings and nested dataclasses.

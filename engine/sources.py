@@ -1,4 +1,4 @@
-"""What can be heard: a preset's model and the physics that it learned, behind one face, in metres and in NumPy.
+"""The sources of sound: a preset's model and its physics behind one interface, in metres and in NumPy.
 
 A source is given initial displacements, yields frames in blocks, and keeps nothing: the state is passed. Rendering,
 comparing, the command line and the app treat model and truth alike through it. Torch is imported with the first
@@ -32,7 +32,7 @@ class Runaway(RuntimeError):
 
 @dataclass(frozen=True)
 class SourceState:
-    """Where a source is: its own state, the frames done, and the largest displacement that is possible."""
+    """The state of a source: its own, the frames done, and the largest displacement that is possible."""
 
     inner: Any
     frame: int
@@ -65,7 +65,7 @@ class StringSource(ABC):
 
     @abstractmethod
     def sample(self, state: SourceState, frames: NDArray[np.int64], steps: int) -> tuple[Floats, SourceState]:
-        """As `advance` on the whole grid, of which only some frames are kept, (batch, frames, grid_points).
+        """Sample the motion on the whole grid, as `advance`, keeping some frames, (batch, frames, grid_points).
 
         Args:
             frames: their numbers, ascending, of 1 … steps; int64 (frames,).
@@ -115,7 +115,7 @@ class ModelSource(StringSource):
         return self._checked(found.numpy(), frames, state), self._after(state, inner, steps)
 
     def _checked(self, found: Floats, frames: NDArray[np.int64], state: SourceState) -> Floats:
-        """In m. Raises Runaway."""
+        """The displacement in m, checked. Raises Runaway."""
         found = found * found.dtype.type(self._scale_m)
         possible = np.abs(found) <= state.limit_m  # False for a NaN
         if not possible.all():

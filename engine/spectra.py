@@ -1,4 +1,4 @@
-"""How far apart two sounds are in their spectra: phases do not count, at several resolutions of time and frequency.
+"""The distance of two sounds in their spectra, at several resolutions of time and frequency; phases do not count.
 
 Source: Yamamoto, Song, Kim, "Parallel WaveGAN", ICASSP 2020 (arXiv:1910.11480): spectral convergence (after Arık,
 Jun, Diamos 2018) and the mean difference of the logarithmic magnitudes, each averaged over the resolutions. Here the

@@ -30,7 +30,7 @@ HERTZ = -0.2  # power of the speed in the time of contact
 
 @dataclass(frozen=True)
 class Mallet:
-    """What strikes. Default: a drumstick, of wood.
+    """The mallet that strikes. Default: a drumstick, of wood.
 
     Attributes:
         radius_m: of the face that touches.
@@ -75,7 +75,7 @@ class Strike:
             bounds.check("strike place", side, (-1.0, 1.0))
 
     def speeds(self, modes: DrumModes) -> Array:
-        """Of the modes in m/s at amplitude 0, float64 (modes,).
+        """The speeds of the modes in m/s at amplitude 0, float64 (modes,).
 
         Raises:
             ValueError: the place is not on the surface.
@@ -90,7 +90,7 @@ class Strike:
 
 
 def pulse_spectrum(omega: Array, contact_s: float) -> Array:
-    """Of a raised cosine of area 1, at ω in rad/s, about its middle: sinc(ωτ/2) / (1 - (ωτ/2π)²)."""
+    """The spectrum of a raised cosine of area 1, at ω in rad/s, about its middle: sinc(ωτ/2) / (1 - (ωτ/2π)²)."""
     turns = omega * contact_s / (2 * math.pi)
     near = np.abs(turns - 1) < 1e-6
     found: Array = np.where(near, 0.5, np.sinc(turns) / np.where(near, 1.0, 1 - turns**2))

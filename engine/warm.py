@@ -1,4 +1,4 @@
-"""Everything compiled is compiled, or loaded, by using it once: `python -m engine.warm`.
+"""The preparation of compiled code by using it once: it is compiled, or loaded. Run `python -m engine.warm`.
 
 It takes minutes where nothing has been compiled yet, and about a second where all is kept. Two processes compile what
 does not depend on one another.
@@ -68,7 +68,7 @@ def warm() -> None:
 
 
 def _beside(work: str) -> AbstractContextManager[object]:
-    """Another process does a function of this module meanwhile; what it leaves undone, this one does later."""
+    """Start another process with a function of this module; what it leaves undone, this one does later."""
     if cache.folder() is None or os.cpu_count() == 1:
         return nullcontext()
     code = f"from engine import warm; warm.{work}()"
@@ -76,7 +76,7 @@ def _beside(work: str) -> AbstractContextManager[object]:
 
 
 def playing() -> None:
-    """What makes voices of events, for strings and drums."""
+    """Compile what makes voices of events, for strings and drums."""
     from engine.kernels import contact, sympathy
     from engine.kernels.playing import events
 
@@ -95,7 +95,10 @@ def unheard() -> None:
 
 
 def voices() -> None:
-    """All sound: a few quanta of every kind of voice; what a device calls is compiled as it is imported."""
+    """Compile all sound by a few quanta of every kind of voice.
+
+    What a device calls is compiled as it is imported.
+    """
     unheard()
     for voice in _each():
         _sound(voice)
@@ -132,7 +135,7 @@ def models() -> None:
 
 
 def _string() -> None:
-    """What a bend, a slide, a damper and a knob make of a string."""
+    """Compile the changes of a string by a bend, a slide, a damper and a knob."""
     from engine.kernels import strings
 
     string = np.array(astuple(StringParameters()))
@@ -143,7 +146,7 @@ def _string() -> None:
 
 
 def _drum() -> None:
-    """What makes modes of a drum, and a picture of it."""
+    """Compile what makes modes of a drum, and a picture of it."""
     from engine.kernels import drum_modes
     from engine.kernels.records import DRUM_ROWS
     from engine.resonators.drum import DrumParameters
@@ -159,7 +162,7 @@ def _drum() -> None:
 
 
 def _loudness() -> None:
-    """How loud a sound of one mode is."""
+    """Compile the loudness of a sound, by one of one mode."""
     from engine.kernels import constants, loudness
 
     sound, no_body = np.ones(constants.SOUND_ROWS), np.zeros(0)

@@ -17,7 +17,9 @@ ENDING = ".unfinished"
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A path beside `path` to write to: it takes its place when the block ends well, and an error leaves nothing.
+    """A path beside `path` to write to.
+
+    It takes its place when the block ends well, and an error leaves nothing.
 
     What killed processes have left in its folder is removed first.
 
@@ -79,7 +81,10 @@ def lasting_folder(parent: Path, name: str) -> Path:
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Within, an OSError of the system's names what was to be written: of a full disk it names no file at all."""
+    """Name what was to be written in an OSError of the system's within.
+
+    Of a full disk it names no file at all.
+    """
     try:
         yield
     except OSError as error:
@@ -117,12 +122,12 @@ def _mark(name: str) -> str:
 
 
 def this_computer() -> str:
-    """In a name, the mark of processes of this computer."""
+    """The mark, in a name, of processes of this computer."""
     return f"{zlib.crc32(platform.node().encode()):08x}"
 
 
 def is_alive(process: int) -> bool:
-    """Whether there is such a process on this computer."""
+    """Return True if there is such a process on this computer."""
     import psutil  # only where something was left
 
     return bool(psutil.pid_exists(process))

@@ -1,4 +1,4 @@
-"""A cell of the paper's tables: one model on one data set over one horizon, by one recipe, from one seed.
+"""A cell of the paper's tables: one model, data set and horizon, by one recipe, from one seed.
 
 A cell has a name, which is its preset's, and from the name alone its whole configuration follows: the paper's
 protocol gives the data, `recipes/RECIPE.toml` gives the rest. `load` reads runs that are no cells, too.
@@ -95,7 +95,7 @@ class Cell:
 
     @property
     def title(self) -> str:
-        """For a list of presets: string, training data and rate, then model and what is unusual in its training."""
+        """The title in a list of presets: string, training data and rate, then model and what is unusual in it."""
         string = "Nylon B3" if self.tension_modulated else "Nylon B3, linear"
         start = "plucks" if self.initial == "gaussian" else "random shapes"
         details = [TITLE_WORDS.get(self.model, MODEL_NAMES[self.model])]
@@ -138,7 +138,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Case:
-    """Where a recipe differs from its default: in cells that match every field given here."""
+    """A difference of a recipe from its default, in cells that match every field given here."""
 
     model: tuple[str, ...] = ()  # any of these; empty: all
     initial: tuple[str, ...] = ()
@@ -237,7 +237,7 @@ def configuration_of(
 
 
 def follows_protocol(data: DatasetConfiguration) -> bool:
-    """Whether a data set is one of the paper's."""
+    """Return True if a data set is one of the paper's."""
     return data.rate_hz in MODES and data == _protocol(data.initial, data.rate_hz, data.tension_modulated)
 
 

@@ -1,4 +1,4 @@
-"""What one training run is: of a cell of the paper's tables (`cell.py`), or a TOML file of one's own."""
+"""The configuration of one training run: of a cell of the paper's tables (`cell.py`), or one's own TOML file."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class DatasetConfiguration:
 
     @cached_property
     def resonator(self) -> Resonator:
-        """What moves."""
+        """The resonator whose motion is learned."""
         return self.string.resonator(
             self.modes, tension_modulated=self.tension_modulated, grid_points=self.grid_points
         )
@@ -68,7 +68,7 @@ class DatasetConfiguration:
 
 @dataclass(frozen=True)
 class Recipe:
-    """How a model is fitted."""
+    """The recipe of a model's fit."""
 
     epochs: int  # passes over the training set
     seed: int = 0
@@ -183,7 +183,7 @@ class TrainingConfiguration:
 
     @property
     def digest(self) -> str:
-        """Of all that determines the run's result, the model's defaults among it; what it is called does not.
+        """The digest of all that determines the run's result, the model's defaults among it. Its name does not count.
 
         Of data and recipe, whose defaults are never changed, fields that have theirs are left out, so that one which
         comes later leaves earlier runs their digest; sizes that are no longer there count with the value that they
@@ -204,7 +204,7 @@ class TrainingConfiguration:
 
 
 def digest_of(plain: dict[str, Any]) -> str:
-    """Sixteen digits that tell plain data apart."""
+    """The sixteen digits that tell plain data apart."""
     return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
 
 

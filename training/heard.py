@@ -102,7 +102,7 @@ def _hum_db(
     ear: Ear,
     advanced: Callable[[float], None],
 ) -> float | None:
-    """What a model still gives where its voice is made to end, in dB of full scale; None: it is silent by then."""
+    """The level of a model at the end of its voice, in dB of full scale; None: it is silent by then."""
     if program.ends_s > LONGEST_HUM_S:
         return None
     frames, last = round(program.ends_s * program.rate_hz), round(HUM_S * program.rate_hz)

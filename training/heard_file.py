@@ -1,4 +1,4 @@
-"""What was heard of presets, in a table beside them: one a line, known by the digest of the preset's file.
+"""The table of audible errors beside the presets: one a line, known by the digest of the preset's file.
 
 So a preset that changes carries no old claim, and a copy keeps its own. The table may come from anywhere: whatever is
 wrong in it is reported, and skipped.
@@ -78,7 +78,7 @@ COLUMNS = columns_of(Heard)
 
 
 def read_heard(folder: Path) -> tuple[dict[str, Heard], list[str]]:
-    """What is known of a folder's presets by their digest, and a line for whatever is wrong. Raises nothing."""
+    """Read the audible errors of a folder's presets by digest, and a line for whatever is wrong. Raises nothing."""
     path = folder / NAME
     found: dict[str, Heard] = {}
     problems: list[str] = []
@@ -115,6 +115,6 @@ def add_heard(folder: Path, measured: Iterable[Heard]) -> None:
 
 
 def _rounded(heard: Heard) -> Heard:
-    """To a thousandth, which is far less than can be heard; adding nothing makes -0 a 0."""
+    """Round to a thousandth, which is far less than can be heard; adding nothing makes -0 a 0."""
     figures = {name: getattr(heard, name) for name in _BOUNDS}
     return replace(heard, **{name: round(value, 3) + 0.0 for name, value in figures.items() if value is not None})

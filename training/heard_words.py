@@ -1,4 +1,4 @@
-"""How true a preset sounds, in a musician's words.
+"""The fidelity of a preset's sound in a musician's words.
 
 Only what can be heard is named: 3 cents (0.2 %) and 1 dB are about the least that is noticed from one tone to the
 next (Moore, "An Introduction to the Psychology of Hearing"). For changes of level the threshold is 2 dB, because they
@@ -23,7 +23,7 @@ HEARD_TIP = (
 
 
 def heard_word(heard: Heard | None) -> str:
-    """For a list: "true", the worst fault, or the distance of the spectra in dB."""
+    """The word for a list: "true", the worst fault, or the distance of the spectra in dB."""
     if heard is None:
         return UNMEASURED
     if found := faults(heard):
@@ -32,7 +32,7 @@ def heard_word(heard: Heard | None) -> str:
 
 
 def heard_sentence(heard: Heard | None, name: str) -> str:
-    """For a preset's card: all faults, and the distance of the spectra in dB. `name`: the preset's."""
+    """The sentence for a preset's card: all faults, and the distance of the spectra in dB. `name`: the preset's."""
     if heard is None:
         return f"{UNMEASURED}; to measure it: learned-strings evaluate {name} --heard --write"
     apart = f"spectra {heard.distance_db:.2g} dB apart over {heard.seconds:.2g} s"

@@ -1,4 +1,4 @@
-"""Where a result comes from: the code and the machine."""
+"""The origin of a result: the code and the machine."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""The results file: one row a run, tidy CSV, safe to write from several processes and to merge from several machines.
+"""The results file: one row a run, in tidy CSV.
+
+It is safe to write from several processes and to merge from several machines.
 
 A row is found again by the digest of its configuration, which holds the seed; a later row replaces an earlier one
 of the same run. From a row's `name` follows the command that repeats it: `learned-strings train NAME`.
@@ -101,7 +103,7 @@ class Row:
 
     @property
     def structured(self) -> bool:
-        """Whether it started from prior knowledge of the string, which the paper's models do not have."""
+        """Return True if it started from prior knowledge of the string, which the paper's models do not have."""
         return bool(given_to(self.model, self.initialisation))
 
 
@@ -122,7 +124,9 @@ def read_results(path: Path) -> list[Row]:
 
 
 def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:
-    """Adds rows to a results file, or makes it; of two rows of one run the one that finished later stays.
+    """Add rows to a results file, or make it.
+
+    Of two rows of one run the one that finished later stays.
 
     A run that is done is never replaced by a failure. Locked against other processes; whole or not at all.
 

@@ -1,4 +1,7 @@
-"""The figures of both splits in a row of the results: errors, their standard errors, and the same over 400 frames."""
+"""The figures of both splits in a row of the results.
+
+They are errors, their standard errors, and the same over 400 frames.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,9 @@ REPEATED = ("rel_mse", "rel_mae", "test_rel_mse", "test_rel_mae")
 def row_errors(
     model: StringModel[Any], dataset: Dataset, whole: Mapping[str, ErrorSums], steps: int
 ) -> dict[str, float | None]:
-    """The columns of a row by name; None for an error that is infinite, and none over 400 frames of a shorter run.
+    """The columns of a row by name.
+
+    None for an error that is infinite, and none over 400 frames of a shorter run.
 
     Args:
         whole: of "validation" and "test", over `steps` frames.

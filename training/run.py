@@ -176,7 +176,7 @@ def _row(
 
 
 def _made_by(configuration: TrainingConfiguration, preset: Path) -> bool:
-    """Whether a file is the preset of this run."""
+    """Return True if a file is the preset of this run."""
     try:
         return configuration_of(read_info(preset), str(preset)).digest == configuration.digest
     except (PresetError, SchemaError):
@@ -198,7 +198,7 @@ def _held(path: Path, waits: Callable[[], None]) -> Iterator[None]:
 
 
 def _figures(configuration: TrainingConfiguration, result: FitResult, sums: ErrorSums) -> dict[str, Any]:
-    """What a run took, and how its errors on validation are spread over trajectories and time, as in a row."""
+    """The figures of a run: its cost, and how validation errors spread over trajectories and time, as in a row."""
     spread, data = sums.spread(), configuration.data
     figures: dict[str, Any] = {
         "rel_mse_spread": spread.rel_mse,
@@ -232,7 +232,7 @@ def default_runs() -> Path:
 def preset_info(
     configuration: TrainingConfiguration, dataset: Dataset, result: FitResult, errors: Mapping[str, Any]
 ) -> PresetInfo:
-    """What the preset of a finished fit says of itself; `errors` as in a row."""
+    """The description of a finished fit's preset; `errors` as in a row."""
     data, recipe = configuration.data, configuration.recipe
     return PresetInfo(
         title=configuration.title,
@@ -258,7 +258,7 @@ def preset_info(
 
 
 def trained_range(data: DatasetConfiguration) -> TrainedRange:
-    """What the random draws of a data set cover; noise has neither a place nor a width."""
+    """The ranges of a data set's random draws; noise has neither a place nor a width."""
     if data.initial == "pluck":
         position, width, peak_m = PLUCK_POSITION_RANGE, PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M
         widths = {"gaussian": width, "raised_cosine": width}

@@ -40,7 +40,7 @@ class Amp:
 
     @property
     def factors(self) -> tuple[float, float, float]:
-        """As the mixer has them: before the shape, behind it, and of the tone. All 0 without an amplifier."""
+        """The mixer's factors: before the shape, behind it, and of the tone. All 0 without an amplifier."""
         if self.drive_db == 0:
             return 0.0, 0.0, 0.0
         drive, level = 10 ** (self.drive_db / 20), 10 ** (self.level_db / 20)
@@ -48,7 +48,7 @@ class Amp:
 
 
 def amplified(amp: Amp, sound: NDArray[np.float64], rate_hz: int) -> NDArray[np.float64]:
-    """What a mixer with this amplifier gives of (frames, 2): its first frames, as many."""
+    """The sound (frames, 2) through the amplifier of a mixer: its first frames, as many."""
     from engine.kernels import layout as at
     from engine.kernels.amplifier import amplify  # Numba only when it is needed
 

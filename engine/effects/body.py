@@ -53,7 +53,7 @@ class Body:
             raise ValueError(f"no body is named {bounds.brief(self.name)}; there are {', '.join(BODIES)}")
 
     def response(self, rate_hz: int) -> NDArray[np.float64]:
-        """Of the body alone, (frames, 1 or 2), as loud as what it is given."""
+        """The response of the body alone, (frames, 1 or 2), as loud as what it is given."""
         return _response(self.name, self.impulse, self.size, rate_hz)
 
 

@@ -1,4 +1,4 @@
-"""What a body does to the loudness of a key: its gain at frequencies, as `engine.kernels.loudness` reads it."""
+"""The effect of a body on a key's loudness: its gain at frequencies, for `engine.kernels.loudness`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ FINEST_HZ = 0.75  # of the spectrum
 
 @lru_cache(maxsize=16)
 def curves_of(body: Body) -> NDArray[np.float64]:
-    """Of the body alone, (BODY_SLOTS,): see `kernels.constants`. It takes some hundredths of a second, once.
+    """The curves of the body alone, (BODY_SLOTS,), see `kernels.constants`: some hundredths of a second, once.
 
     Each value is the mean of the spectrum half-way to its neighbours. The array is remembered, and not to be written.
     """

@@ -27,28 +27,28 @@ class Effects:
 
     @property
     def neutral(self) -> bool:
-        """Whether nothing is changed at all."""
+        """Return True if nothing is changed at all."""
         return not self.rings and self.factors[0] == 0.0
 
     @property
     def rings(self) -> bool:
-        """Whether there is a body or a room."""
+        """Return True if there is a body or a room."""
         return any(part is not None and part.mix > 0 for part in (self.body, self.room))
 
     @property
     def factors(self) -> tuple[float, float, float]:
-        """Of the amplifier, see `Amp.factors`."""
+        """The factors of the amplifier, see `Amp.factors`."""
         return Amp().factors if self.amp is None else self.amp.factors
 
     def impulse(self, rate_hz: int) -> NDArray[np.float64]:
-        """Of body and room, (frames, 1 or 2): of pink noise the level stays, at any mix.
+        """The impulse response of body and room, (frames, 1 or 2): the level of pink noise stays, at any mix.
 
         It is remembered, and not to be written.
         """
         return _impulse(replace(self, amp=None), rate_hz)
 
     def tail_s(self, rate_hz: int) -> float:
-        """For how long it sounds on after its input, at most."""
+        """The longest time for which it sounds on after its input."""
         return (len(self.impulse(rate_hz)) - 1) / rate_hz
 
 
@@ -66,7 +66,7 @@ def _impulse(effects: Effects, rate_hz: int) -> NDArray[np.float64]:
 
 
 def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) -> NDArray[np.float64]:
-    """What a mixer with these effects gives, (frames, 2), of sound (frames, 1 or 2): its first frames, as many.
+    """Apply these effects to sound (frames, 1 or 2) as a mixer does: its first frames, as many, (frames, 2).
 
     Give silence after the sound where the end shall ring out, `Effects.tail_s`. Samples that are no numbers, and
     those too large or too small to be sound, are taken as silence, as the mixer does.

@@ -66,14 +66,14 @@ def resampled(samples: NDArray[np.float64], from_hz: float, to_hz: float) -> NDA
 
 
 def convolved(one: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Of (frames, channels) each; one channel goes with any number."""
+    """The convolution of two sounds (frames, channels) each; one channel goes with any number."""
     frames = len(one) + len(other) - 1
     size = room_for(frames)
     return np.fft.irfft(np.fft.rfft(one, size, axis=0) * np.fft.rfft(other, size, axis=0), size, axis=0)[:frames]
 
 
 def without_subsonic(samples: NDArray[np.float64], edge_hz: float, rate_hz: int) -> NDArray[np.float64]:
-    """Through Butterworth's high-pass of second order."""
+    """Filter samples through Butterworth's high-pass of second order."""
     size = room_for(2 * len(samples))
     s = 1j * np.fft.rfftfreq(size, 1 / rate_hz)[:, None] / edge_hz
     response = s**2 / (s**2 + np.sqrt(2) * s + 1)
@@ -81,7 +81,7 @@ def without_subsonic(samples: NDArray[np.float64], edge_hz: float, rate_hz: int)
 
 
 def faded(samples: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Its end goes to nothing."""
+    """The samples with their end faded to nothing."""
     frames = max(1, round(FADE_SHARE * len(samples)))
     end = 0.5 + 0.5 * np.cos(np.pi * np.arange(1, frames + 1) / frames)
     return np.concatenate([samples[:-frames], samples[-frames:] * end[:, None]])

@@ -36,7 +36,7 @@ def _spectra(part: NDArray[np.float64], frames: int) -> NDArray[np.float64]:
 
 
 def convolver(rate_hz: int) -> NDArray[np.float64]:
-    """For responses of up to `LONGEST_S`."""
+    """The memory of a convolver for responses of up to `LONGEST_S`."""
     capacity = math.ceil(LONGEST_S * rate_hz / at.WINDOW)
     memory = np.empty(at.C_LATE + capacity * 4 * (at.WINDOW + 1))
     memory[:] = 0.0  # written to, so that the device's thread finds every page in place

@@ -53,7 +53,7 @@ class Room:
         bounds.check("t60_s", self.t60_s, bounds.ROOM_T60_S, "s")
 
     def response(self, rate_hz: int) -> NDArray[np.float64]:
-        """Of the reverberation alone, (frames, 2), as loud as what it is given."""
+        """The response of the reverberation alone, (frames, 2), as loud as what it is given."""
         return _response(self.t60_s, rate_hz)
 
 
@@ -75,12 +75,15 @@ def _response(t60_s: float, rate_hz: int) -> NDArray[np.float64]:
 
 
 def room_noise(frames: int) -> NDArray[np.float64]:
-    """What late reflections are before their decay, (frames, 2), of power 1: the same in every room."""
+    """Noise of power 1, (frames, 2), from which late reflections are made by decay: the same in every room."""
     return np.random.default_rng(_SEED).standard_normal((round(bounds.ROOM_T60_S[1] * RATE_HZ), 2))[:frames]
 
 
 def _images(sides_m: NDArray[np.float64], until_s: float, frames: int) -> tuple[NDArray[np.float64], float]:
-    """Of walls that reflect all, (frames, 2), from when the direct sound arrives as 1; and its way in m."""
+    """The reflections of walls that reflect all, (frames, 2), and the direct sound's way in m.
+
+    They start when the direct sound arrives as 1.
+    """
     source_m, listener_m = SOURCE * sides_m, LISTENER * sides_m
     direct_m = float(np.linalg.norm(source_m - listener_m))
     furthest = math.ceil((until_s * SPEED_M_S + direct_m) / (2 * float(sides_m.min()))) + 1
@@ -102,7 +105,7 @@ def _images(sides_m: NDArray[np.float64], until_s: float, frames: int) -> tuple[
 
 
 def _decayed(found: NDArray[np.float64], time_s: NDArray[np.float64], t60_s: float) -> NDArray[np.float64]:
-    """Each band with its own decay; bands overlap, and are the whole together."""
+    """The reflections with each band's own decay; bands overlap, and are the whole together."""
     size = room_for(2 * len(found))
     octaves = np.log2(np.maximum(np.fft.rfftfreq(size, 1 / RATE_HZ), 1.0))
     total = np.zeros((size // 2 + 1, 2), complex)

@@ -1,4 +1,4 @@
-"""Everything compiled that makes sound: voices, and the mixer that a sound device calls without the interpreter.
+"""The compiled code that makes sound: voices, and the mixer that a sound device calls without the interpreter.
 
     memory     pointers, fences, and what is published to another thread
     layout     what lies where in a voice, a program and a mixer

@@ -57,7 +57,10 @@ def amplify(mixer: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def _begin(amp: np.ndarray, whole: np.ndarray) -> None:
-    """As if there had never been any input: all at rest, which is where the bias has it."""
+    """Reset the amplifier, as if there had never been any input.
+
+    All is at rest, which is where the bias has it.
+    """
     amp[at.A_STATE :] = 0.0
     rest = BIAS / math.sqrt(1 + BIAS * BIAS)
     amp[at.A_STATE + 1], amp[at.A_STATE + 2] = BIAS, rest
@@ -139,7 +142,7 @@ def _shape(amp: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def _give(mixer: np.ndarray, amp: np.ndarray, share: float, share_to: float) -> None:
-    """Back to the rate of the mixer, without the mean, through gain and tone."""
+    """Bring the sound back to the rate of the mixer, without the mean, through gain and tone."""
     last, rows = at.A_TAPS // at.OVERSAMPLING, at.OVERSAMPLING
     wide = last + at.QUANTUM
     out = amp[at.A_OUT : at.A_OUT + at.QUANTUM]

@@ -41,7 +41,10 @@ def _turn(angle: float) -> tuple[float, float]:
 
 @njit(inline="always", **COMPILED)
 def _exp(x: float) -> float:
-    """e^x to a share of 1e-9 for -17 … 17 and of 5e-4 up to ±64, the same way; below it is as good as nothing."""
+    """The exponential e^x, to a share of 1e-9 for -17 … 17 and of 5e-4 up to ±64.
+
+    It is computed the same way for all x; below -64 it is as good as nothing.
+    """
     y = max(x, -64.0) / 64
     e = 1 + y * (
         1 + y * (0.5 + y * (1 / 6 + y * (1 / 24 + y * (1 / 120 + y * (1 / 720 + y * (1 / 5040 + y / 40320))))))
@@ -218,7 +221,7 @@ def _integrate_to(voice: np.ndarray, program: np.ndarray, time: float, scratch: 
 
 @njit(**COMPILED)
 def _change(program: np.ndarray, level: np.ndarray, n: int, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
-    """What A adds to the log gain of each latent, of levels log |z| (modes,)."""
+    """The change that A adds to the log gain of each latent, of levels log |z| (modes,)."""
     whole = program.view(np.int64)
     weight = program[whole[at.O_A] :]  # transposed
     squares, energy = scratch[:alive], scratch[at.MOST_MODES : at.MOST_MODES + alive]
@@ -364,7 +367,7 @@ def generate(
 
 @njit(**COMPILED)
 def _keep_end(voice: np.ndarray, program: np.ndarray, time: float, scratch: np.ndarray) -> None:
-    """Where the next segment begins."""
+    """Keep the state at which the next segment begins."""
     counts = voice.view(np.int64)
     n = program.view(np.int64)[at.P_MODES]
     rows = at.state(n)
@@ -478,7 +481,10 @@ def _sum(
 
 @njit(**COMPILED)
 def _look(voice: np.ndarray, program: np.ndarray, z: np.ndarray, scratch: np.ndarray) -> None:
-    """Which latents' modulation can be heard, and whose squares are heard in it. Energies decay: no more later."""
+    """Find the latents whose modulation can be heard, and those whose squares are heard in it.
+
+    Energies decay: later there are no more.
+    """
     whole = program.view(np.int64)
     counts = voice.view(np.int64)
     n = whole[at.P_MODES]

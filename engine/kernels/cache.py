@@ -1,4 +1,4 @@
-"""Where compiled kernels are kept, and whether all of them are there, found without loading the compiler."""
+"""The folder of compiled kernels, and a check that all of them are there, made without loading the compiler."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from engine.whole_file import lasting_folder
 
 
 def _sources() -> list[Path]:
-    """Of all functions that sound and pictures are made with, which call one another across files."""
+    """The source files of all functions that make sound and pictures, and call one another across files."""
     engine = Path(__file__).parents[1]
     return sorted([*(engine / "kernels").rglob("*.py"), *engine.glob("*/_*kernel.py")])
 
@@ -31,7 +31,9 @@ def _version() -> str:
 
 @cache
 def folder() -> Path | None:
-    """A folder for these very sources: where the user says, else beside them, in the home folder, or a temporary one.
+    """A folder for these very sources.
+
+    It is where the user says, else beside them, in the home folder, or a temporary one.
 
     None where nothing can be written at all: then what is compiled is not kept. Numba notices that a function's own
     file has changed, but not a file that it calls into. With one folder a version nothing compiled for another memory
@@ -49,7 +51,7 @@ def folder() -> Path | None:
 
 
 def _places() -> Iterator[Path]:
-    """In the order of preference."""
+    """The folders for compiled kernels, in the order of preference."""
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         yield Path(chosen)
     name = f"kernels-{_version()}"
@@ -59,7 +61,7 @@ def _places() -> Iterator[Path]:
 
 
 def _can_be_written(place: Path) -> bool:
-    """Tried, not asked: permissions are not all that can forbid it."""
+    """Return True if a trial file can be made there: permissions are not all that can forbid it."""
     try:
         place.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=place):
@@ -69,7 +71,7 @@ def _can_be_written(place: Path) -> bool:
 
 
 def is_whole() -> bool:
-    """Whether everything has been compiled, so that nobody has to wait for it."""
+    """Return True if everything has been compiled, so that nobody has to wait for it."""
     mark = _mark()
     return mark is not None and mark.exists()
 

@@ -1,4 +1,4 @@
-"""What the compiled kernels share: how they are compiled, where that is kept, and a tanh for vector instructions."""
+"""The means that compiled kernels share: compiler options, the cache's place, and a tanh for vector instructions."""
 
 from __future__ import annotations
 

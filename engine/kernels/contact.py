@@ -180,7 +180,10 @@ def sound(player_address: int, mixer_address: int) -> None:
 
 @njit(**COMPILED)
 def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, stops: int) -> None:
-    """Adds a force to a frame of the mix, at a gain between two quanta; it fades out where the noise stops."""
+    """Add a force to a frame of the mix, at a gain between two quanta.
+
+    It fades out where the noise stops.
+    """
     share = (frame + 1) / at.QUANTUM
     level = before + (gain - before) * share
     if stops > 0:

@@ -112,7 +112,7 @@ def _take(counts: np.ndarray, whole: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def _wake(convolver: np.ndarray, whole: np.ndarray) -> None:
-    """As if there had never been any input."""
+    """Reset the convolver, as if there had never been any input."""
     convolver[at.C_EARLY_INPUT : at.C_WORK] = 0.0
     convolver[at.C_GIVEN : at.C_WET] = 0.0
     whole[at.C_PHASE] = whole[at.C_WINDOWS] = whole[at.C_QUIET] = 0
@@ -197,7 +197,7 @@ def _play(convolver: np.ndarray, whole: np.ndarray, address: int, lane: int, lat
 def _compute(
     convolver: np.ndarray, whole: np.ndarray, impulse: np.ndarray, channels: int, late: int, lane: int
 ) -> None:
-    """This quantum's part of what the late partitions give in the next window."""
+    """Compute this quantum's part of what the late partitions give in the next window."""
     phase, bins, sums = whole[at.C_PHASE], at.WINDOW + 1, at.C_SUMS + lane * 4 * (at.WINDOW + 1)
     count = min(late, whole[at.C_LATE_FILLED])
     if 1 <= phase <= _SUMMING:
@@ -276,7 +276,10 @@ def _transform(convolver: np.ndarray, re: np.ndarray, im: np.ndarray, re2: np.nd
 
 @njit(**COMPILED)
 def _mix(convolver: np.ndarray, whole: np.ndarray, mix: np.ndarray, wet_now: bool, wet_next: bool) -> None:
-    """The output: a lane, or the fade from one to the other; a lane without a response is the mix itself."""
+    """The output: a lane, or the fade from one to the other.
+
+    A lane without a response is the mix itself.
+    """
     step, lane = whole[at.C_STEP], whole[at.C_LANE]
     now, following = at.C_WET + lane * 2 * at.QUANTUM, at.C_WET + (1 - lane) * 2 * at.QUANTUM
     done = (step - 1) * at.WINDOW + whole[at.C_PHASE] * at.QUANTUM
@@ -293,5 +296,5 @@ def _mix(convolver: np.ndarray, whole: np.ndarray, mix: np.ndarray, wet_now: boo
 
 @njit(**COMPILED)
 def _way(share: float) -> float:
-    """From 0 to 1 without a corner."""
+    """The smooth way from 0 to 1, without a corner."""
     return share * share * (3 - 2 * share)

@@ -46,14 +46,14 @@ RECORD = HEARD + 2 * lanes.MOST_EARS
 
 @njit(inline="always", **COMPILED)
 def _out(mixer: np.ndarray, which: int) -> np.ndarray:
-    """Where a string of the course is heard, (4, QUANTUM)."""
+    """The output of a string of the course, (4, QUANTUM)."""
     first = at.M_OUT + which * 4 * at.QUANTUM
     return mixer[first : first + 4 * at.QUANTUM].reshape(4, at.QUANTUM)
 
 
 @njit(**COMPILED)
 def _joins(course: int, late: int, address: int, now: int) -> bool:
-    """Whether a voice is a string of a course that has begun in the mixer's next quantum, in step with it."""
+    """Return True if a voice is a string of a course that begins in step in the mixer's next quantum."""
     counts = wholes(address)
     if counts[at.COURSE] != course or counts[at.COURSE_DONE] == now + 1:
         return False
@@ -65,7 +65,9 @@ def _joins(course: int, late: int, address: int, now: int) -> bool:
 
 @njit(**COMPILED)
 def add(mixer: np.ndarray, place: int, now_s: float) -> int:
-    """Adds the next quantum of the course of an active voice, by its place, to the mix; the state of that voice.
+    """Add the next quantum of the course of an active voice, by its place, to the mix.
+
+    Returns the state of that voice.
 
     Others of the course have theirs from here on, and only give it at their own places.
     """
@@ -146,7 +148,7 @@ def _generate(mixer: np.ndarray, first: bool) -> None:
 
 @njit(**COMPILED)
 def _number(counts: np.ndarray, address: int) -> int:
-    """Which string of the course a voice is."""
+    """The number of a voice's string in its course."""
     number = 0
     while counts[at.M_COURSE + number] != address:
         number += 1
@@ -203,7 +205,10 @@ def _speeds(address: int, shared: int) -> np.ndarray:
 
 @njit(**COMPILED)
 def _set_up(string: np.ndarray, scratch: np.ndarray, place: int, solved: bool) -> int:
-    """Prepares a string for a quantum, with its record from a slot of the scratch on; the first slot behind it."""
+    """Prepare a string for a quantum, with its record from a slot of the scratch on.
+
+    Returns the first slot behind it.
+    """
     counts, whole = string.view(np.int64), scratch.view(np.int64)
     program, n = reals(counts[at.PROGRAM]), counts[at.MODES]
     if solved:
@@ -237,7 +242,7 @@ def _set_up(string: np.ndarray, scratch: np.ndarray, place: int, solved: bool) -
 def _take_parts(
     places: np.ndarray, strings: int, shared: int, step_s: float, scratch: np.ndarray, sums: np.ndarray
 ) -> None:
-    """What modes of strings add to the motion of the bridge, and what that takes from them in a frame.
+    """Compute the parts of strings' modes in the bridge's motion, and what that takes from them in a frame.
 
     A mode that rests has no part, so that it is not moved; one that others have not loses as much as alone.
     """
@@ -266,7 +271,7 @@ def _take_parts(
 
 @njit(inline="always", **COMPILED)
 def _advance(string: np.ndarray, scratch: np.ndarray, place: int, frame: int, out: np.ndarray) -> None:
-    """One frame of latents that share a tension, after it is heard: as `tension.generate`."""
+    """Advance latents that share a tension by one frame, after it is heard: as `tension.generate`."""
     whole = scratch.view(np.int64)
     first, near, ears = whole[place + FIRST], whole[place + NEAR], whole[place + EARS]
     heard, largest = scratch[place + HEARD : place + RECORD], string[at.LARGEST_STRETCH]

@@ -87,7 +87,7 @@ def bessels(x: float, out: np.ndarray) -> float:
 
 @njit(**COMPILED)
 def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray, scratch: np.ndarray) -> int:
-    """Writes rows (z, m, 1 of a sine or 0, J_m'(z)) of the zeros of all J_m up to `highest`: how many they are."""
+    """Write rows (z, m, 1 of a sine or 0, J_m'(z)) of the zeros of all J_m up to `highest`; return their number."""
     count, x = 0, 0.0
     bessels(x, before)
     while x < highest:
@@ -248,7 +248,10 @@ def shapes(drum: np.ndarray, surface: np.ndarray, places: np.ndarray, tools: Too
 
 @njit(**COMPILED)
 def spread(turn: float, tools: Tools) -> float:
-    """The mean of a mode over a disc, of its value at the centre: 2 J₁(κR)/κR, as for any solution of -∇²φ = κ²φ."""
+    """The mean of a mode over a disc, of its value at the centre: 2 J₁(κR)/κR.
+
+    It is so for any solution of -∇²φ = κ²φ.
+    """
     return 1.0 if turn < 1e-6 else 2 * bessel(1, turn, tools) / turn
 
 
@@ -282,7 +285,9 @@ def densities(drum: np.ndarray, surface: np.ndarray, s: float, out: np.ndarray, 
 def air_at(
     drum: np.ndarray, surface: np.ndarray, ka: float, points: int, out: np.ndarray, scratch: np.ndarray
 ) -> None:
-    """Writes what the air adds to modes at k times size: reactance, and resistance by ka, (2, modes), at a size of 1.
+    """Write what the air adds to modes at k times size: reactance, and resistance by ka.
+
+    The shape is (2, modes), at a size of 1.
 
     ∫ D(s)/√(s² - k²) ds over s > k, with s² = k² + u²: ∫ D(s)/s du. And ∫ D(s)/√(k² - s²) ds over s < k, with
     s = k sin α.
@@ -301,7 +306,7 @@ def air_at(
 
 @njit(**COMPILED)
 def _chebyshev(row: np.ndarray, ka: float, reach: float) -> float:
-    """One of the functions of `air_at`, of polynomials of the square of ka."""
+    """The value at ka of one function of `air_at`: a Chebyshev series in the square of ka."""
     share = min(ka / reach, 1.0)
     t, one, two = 2 * share * share - 1, 0.0, 0.0
     for term in range(len(row) - 1, 0, -1):
@@ -415,7 +420,10 @@ def lowest(drum: np.ndarray) -> float:
 
 @njit(**COMPILED)
 def _principal(drum: np.ndarray, around: Around, work: np.ndarray, out: np.ndarray) -> float:
-    """ω of the mode that gives a drum its pitch: over a kettle (1,1), for (0,1) dies away at once; else the first."""
+    """The ω of the mode that gives a drum its pitch: over a kettle (1,1), else the first.
+
+    Over a kettle (0,1) dies away at once.
+    """
     across = lowest(drum)
     stiff = drum[TENSION] + stretching(drum) * (drum[THICKNESS] * across) ** 2 / 6
     in_vacuo_hz = across * math.sqrt(stiff / (drum[DENSITY] * drum[THICKNESS])) / (2 * math.pi)

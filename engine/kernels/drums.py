@@ -31,7 +31,7 @@ UNHEARD = 1e-7  # of the loudest mode, where the loudness of a key and its peak 
 
 @njit(**COMPILED)
 def has_drum(table: Table, key: int) -> bool:
-    """Whether there is a drum for a key in a table of drums."""
+    """Return True if a table of drums has one for a key."""
     return wholes(address_of(table))[table.drums + key] != 0
 
 
@@ -44,19 +44,19 @@ def drum_of(table: Table, key: int) -> Drum:
 
 @njit(**COMPILED)
 def rows_of(drum: Drum) -> np.ndarray:
-    """Its rows (DRUM_ROWS, modes)."""
+    """The rows (DRUM_ROWS, modes) of a drum."""
     return matrix(reals(address_of(drum)), HEADER, DRUM_ROWS, drum.modes)
 
 
 @njit(**COMPILED)
 def _speed(drum: Drum, share: float) -> float:
-    """Of a mallet at a share of the velocities, in m/s."""
+    """The speed of a mallet at a share of the velocities, in m/s."""
     return drum.softest_m_s * (drum.hardest_m_s / drum.softest_m_s) ** share
 
 
 @njit(**COMPILED)
 def _speed_of(player: Player, drum: Drum, velocity: float) -> float:
-    """Of a mallet at a velocity, by the instrument's curve, in m/s."""
+    """The speed of a mallet at a velocity, by the instrument's curve, in m/s."""
     curve = player.values[of.CURVE]
     return _speed(drum, min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve))
 
@@ -94,7 +94,10 @@ def _blow(drum: Drum, struck: np.ndarray, speed: float, out: np.ndarray) -> None
 
 @njit(**COMPILED)
 def gain_of(player: Player, table: Table, key: int) -> float:
-    """The factor that makes a key as loud as others, and lets it peak no higher than the highest of them may."""
+    """The factor that makes a key as loud as others.
+
+    It lets the key peak no higher than the highest of them may.
+    """
     if player.gains[key, 0] == 0.0:
         drum = drum_of(table, key)
         n, rows = drum.modes, rows_of(drum)
@@ -155,7 +158,10 @@ def strike(player: Player, table: Table, event: Event, number: int) -> float:
 def _make(
     player: Player, table: Table, address: int, drum: Drum, struck: np.ndarray, speed: float, source: int
 ) -> None:
-    """A voice that sets out from the speeds that a blow gives its modes; `struck`: those that 1 N s gives."""
+    """A voice that sets out from the speeds that a blow gives its modes.
+
+    `struck`: those that 1 N s gives.
+    """
     voice, counts, n, rate_hz, rows = reals(address), wholes(address), drum.modes, player.rate_hz, rows_of(drum)
     kind = table.kinds[source]
     used = at.FOLLOWING if kind == at.TENSION else at.TRUTH_ROWS  # what follows from them is prepared

@@ -52,7 +52,7 @@ def _fours(
     stride: int,
     unit: int,
 ) -> None:
-    """One pass of butterflies of four: x[q + stride (p + count j)] to y[q + stride (4p + j)]."""
+    """Compute one pass of butterflies of four: x[q + stride (p + count j)] to y[q + stride (4p + j)]."""
     apart = stride * count
     for p in range(count):
         c1, s1 = cosines[p * unit], -sines[p * unit]

@@ -115,7 +115,7 @@ def generate(
 
 @njit(**COMPILED)
 def _prepare(voice: np.ndarray, step_s: float) -> None:
-    """What a force of 1 N within a step changes, of a string whose modes are new."""
+    """Prepare the change by a force of 1 N within a step, of a string whose modes are new."""
     n, give = voice.view(np.int64)[at.MODES], 0.0
     shapes, given, speeds = row(voice, n, at.JAVARI), row(voice, n, at.GIVEN), row(voice, n, at.GIVEN_SPEED)
     for mode in range(n):

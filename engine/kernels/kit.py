@@ -1,4 +1,6 @@
-"""Drums of a plug-in: whose knobs are turned, and whose keys' blocks are written again when they are struck or heard.
+"""The drums of a plug-in, whose knobs are turned.
+
+The blocks of keys are written again when these are struck or heard.
 
 A kit is memory of numbers, as `written` lays it out: its values, its keys, its drums, and room to work in.
 """
@@ -56,7 +58,7 @@ def begin(kit_address: int, table_address: int) -> None:
 
 @njit(**COMPILED)
 def follow(kit_address: int, which: int, value: float) -> None:
-    """One of the instrument's values has changed."""
+    """Follow the change of one of the instrument's values."""
     kit, counts = reals(kit_address), wholes(kit_address)
     for number in range(len(FOLLOWED)):
         if which == FOLLOWED[number]:
@@ -68,7 +70,7 @@ def follow(kit_address: int, which: int, value: float) -> None:
 
 @njit(**COMPILED)
 def prepare(kit_address: int, table_address: int, player_address: int) -> None:
-    """What is struck or heard in the next quantum follows."""
+    """Prepare the drums that are struck or heard in the next quantum: they follow changed values."""
     counts, player = wholes(kit_address), player_at(player_address)
     if counts[STALE] == 0:
         return
@@ -98,7 +100,7 @@ def _strike(kit_address: int, table_address: int, event: Event) -> None:
 
 @njit(**COMPILED)
 def _possible(drum: np.ndarray) -> bool:
-    """Whether `DrumParameters` would take it, as far as knobs and tuning change it."""
+    """Return True if `DrumParameters` would take the drum, as far as knobs and tuning change it."""
     for value in range(1, drums.X):
         if not drums.LOWEST[value - 1] <= drum[value] <= drums.HIGHEST[value - 1]:
             return False

@@ -210,7 +210,7 @@ def energies(typing_context: Any, memory: Any, first: Any, blocks: Any):
 
 @intrinsic
 def felt(typing_context, memory, blocks, modes, parts):
-    """Two sums over blocks: of x, and of x κ p, times the first row of their parts, see `press`."""
+    """The sums over blocks of x, and of x κ p, times the first row of their parts, see `press`."""
 
     def generate(context, builder, signature, arguments):
         code, part = (_Blocks(context, builder, signature.args[0], arguments[0], 2) for _ in range(2))

@@ -1,4 +1,4 @@
-"""What lies where: a voice, a program and a mixer are flat arrays of eight-byte numbers, real or whole.
+"""The memory of voices, programs and mixers: flat arrays of eight-byte numbers, real or whole.
 
 A *program* is what voices of one source share: a model's parameters, or a solver's. A *voice* is one pluck of it as
 it rings. Slots are counted in eight-byte numbers. Whole numbers and real ones share the memory; each slot is always

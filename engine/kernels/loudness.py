@@ -1,4 +1,4 @@
-"""How loud a key is, and how high it peaks, from its modes as they set out: a few microseconds, without Python.
+"""The loudness and peak of a key, from its modes as they set out: a few microseconds, without Python.
 
 Measured as loudness meters do: mean square after the K-weighting of ITU-R BS.1770-5, here over the first part of the
 note. The quiet instrument's modes decay each by itself, so that the mean square is a sum over them, each through the
@@ -31,7 +31,7 @@ LOOKED_AT = 5  # keys of an instrument, whose peaks are known
 
 @njit(**COMPILED)
 def looked_at(low: int, high: int, number: int) -> int:
-    """One of the keys whose peaks are known: evenly over the range."""
+    """The key of a number among those whose peaks are known: evenly over the range."""
     return low + (2 * number * (high - low) + LOOKED_AT - 1) // (2 * (LOOKED_AT - 1))
 
 
@@ -55,7 +55,7 @@ def _at(body: np.ndarray, which: int, place: float) -> float:
 
 @njit(**COMPILED)
 def _place(omega: float) -> float:
-    """Of a frequency on the grid of a body's curves."""
+    """The place of a frequency on the grid of a body's curves."""
     place = of.BODY_STEPS * math.log2(max(omega / (2 * math.pi * of.BODY_LOWEST_HZ), 1.0))
     return min(place, of.BODY_POINTS - 1.001)
 

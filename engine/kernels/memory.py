@@ -29,7 +29,7 @@ def pointer(typing_context: Any, address: Any):
 
 @intrinsic
 def fence(typing_context: Any):
-    """What was written before is seen by other threads before what is written after."""
+    """Order memory: other threads see what was written before ahead of what is written after."""
 
     def generate(context, builder, _signature, _arguments):
         builder.fence("seq_cst")
@@ -115,7 +115,7 @@ def drum_at(address: int) -> records.Drum:
 
 @njit(**COMPILED)
 def recorded_at(address: int) -> records.Recorded:
-    """What a recording adds to strings; its curves and rows follow."""
+    """The record at an address of what a recording adds to strings; its curves and rows follow."""
     return _recorded(address)
 
 
@@ -172,7 +172,7 @@ def part(typing_context: Any, memory: Any, first: Any, count: Any):
 
 @njit(**COMPILED)
 def behind(record: Any, slot: int, count: int) -> np.ndarray:
-    """So many real numbers from a slot on, counted from the beginning of a record that they follow."""
+    """The real numbers, as many as `count`, from a slot of a record that they follow, counted from its beginning."""
     return part(_reals(address_of(record)), slot, count)
 
 

@@ -21,19 +21,19 @@ TOO_HIGH = 3.0  # rad a frame: a mode that is raised beyond is laid to rest, for
 
 @njit(**COMPILED)
 def row(voice: np.ndarray, modes: int, which: int) -> np.ndarray:
-    """One row (modes,) of a voice's state."""
+    """The row (modes,) of that number in a voice's state."""
     return part(voice, at.state(modes) + which * modes, modes)
 
 
 @njit(**COMPILED)
 def following(voice: np.ndarray, modes: int) -> np.ndarray:
-    """What follows from the modes of latents that share a tension, (7, modes): see `kernels.tension.prepare`."""
+    """The values that follow from modes of latents with one tension, (7, modes): see `kernels.tension.prepare`."""
     return matrix(voice, at.state(modes) + at.FOLLOWING * modes, 7, modes)
 
 
 @njit(**COMPILED)
 def gliding(voice: np.ndarray) -> bool:
-    """Whether its modes are still to change."""
+    """Return True if the voice's modes are still to change."""
     counts = voice.view(np.int64)
     return counts[at.RESONATOR] != counts[at.CURRENT_MODES] or counts[at.GLIDE] > 0
 
@@ -63,7 +63,10 @@ def damped(omega_squared: float, sigma: float) -> float:
 
 @njit(**COMPILED)
 def run_up(voice: np.ndarray, seconds: float) -> None:
-    """Lets amplitudes and speeds of a voice that has not begun move on for so long, alone and at rest's tension."""
+    """Advance amplitudes and speeds of a voice that has not begun by so long.
+
+    Each mode moves alone, at rest's tension.
+    """
     n = voice.view(np.int64)[at.MODES]
     q, v, squares = row(voice, n, 0), row(voice, n, 1), row(voice, n, at.OMEGA_SQUARED)
     for m in range(n):

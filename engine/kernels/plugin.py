@@ -39,7 +39,7 @@ def begin(player_at: int) -> None:
 
 @njit(**COMPILED)
 def play(player_at: int, mixer_at: int) -> None:
-    """What a player has to do before the mixer's next quantum."""
+    """Play the events that are due before the mixer's next quantum."""
     events.play(player_at, mixer_at)
 
 

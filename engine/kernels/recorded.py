@@ -1,4 +1,4 @@
-"""What a recording adds to the string of a key: as `engine.resonators.recorded.RecordedString.resonator`.
+"""The effect of a recording on a key's string: as `engine.resonators.recorded.RecordedString.resonator`.
 
 Each partial has two modes, side by side, of the first and of the second polarisation. What single partials of the
 recorded note add to the law fades with the distance of the string in pitch, to what the note has at that frequency.
@@ -27,7 +27,7 @@ def _of(table: Table) -> Recorded:
 
 @njit(**EXACT)
 def modes_of(table: Table, partials: int) -> int:
-    """How many modes so many partials have: as `PresetInfo.modes_of`."""
+    """The number of modes of so many partials: as `PresetInfo.modes_of`."""
     return min(2 * partials, _of(table).modes)
 
 
@@ -40,7 +40,7 @@ def _above(table: Table, string: np.ndarray) -> float:
 
 @njit(**EXACT)
 def _own(table: Table, which: int, partial: int, above: float) -> float:
-    """One of the five values of a partial, from 0; ratios fade by their logarithms."""
+    """The value `which`, of five, of a partial, from 0; ratios fade by their logarithms."""
     recorded = _of(table)
     rest, known = recorded.rest[which], recorded.partials
     row = behind(recorded, HEADER + 2 * recorded.smooth + which * known, known)

@@ -1,4 +1,4 @@
-"""What lies where in what is played: events, an instrument's table, a player with its notes, and its reports.
+"""The records of playing: events, an instrument's table, a player with its notes, and its reports.
 
 Each is a NumPy record of eight-byte fields, real (R) or whole (W), which the kernels read by the same names. A player
 and a table hold no reference to Python: a table is written by the thread that prepares it, then handed over by its

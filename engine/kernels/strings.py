@@ -25,7 +25,7 @@ TOUCH_RESISTANCE = 1.0  # of a finger that touches a string, over the string's o
 
 @njit(**EXACT)
 def possible(string: np.ndarray) -> bool:
-    """Whether all numbers are finite and within bounds: as `StringParameters` checks them."""
+    """Return True if all numbers are finite and within bounds: as `StringParameters` checks them."""
     for place in range(of.STRING):
         value = string[place]
         low, high = _BOUNDS[place]
@@ -122,13 +122,13 @@ def fretted(string: np.ndarray, wanted_hz: float) -> float:
 
 @njit(**EXACT)
 def is_wound(string: np.ndarray) -> bool:
-    """Whether its mass per volume of core is above that of metal, or of gut and nylon."""
+    """Return True if it is wound: denser, by volume of core, than metal, or than gut and nylon."""
     return string[of.DENSITY] > (8_900.0 if string[of.MODULUS] > 5e10 else 2_000.0)
 
 
 @njit(**EXACT)
 def thin(string: np.ndarray, pitch_hz: float) -> None:
-    """Makes it the octave string of its course: half as thick, as tight, and so long that it has twice the pitch."""
+    """Make it the octave string of its course: half as thick, equally tight, with twice the pitch by its length."""
     for place in (of.AREA, of.D1, of.D3):
         string[place] *= 0.25
     string[of.MOMENT] *= 0.0625
@@ -160,7 +160,7 @@ def damped(string: np.ndarray, t60_s: float) -> float:
 
 @njit(**EXACT)
 def overdamped(string: np.ndarray, modes: int) -> bool:
-    """Whether the first or the last mode does not swing; otherwise all do."""
+    """Return True if the first or the last mode does not swing; otherwise all do."""
     first = decay_rate(string, 1) < math.sqrt(omega_squared(string, 1))
     return not (first and decay_rate(string, modes) < math.sqrt(omega_squared(string, modes)))
 
@@ -178,7 +178,9 @@ def loss(string: np.ndarray, partial: int, air: float, friction: float, bending:
 
 @njit(**EXACT)
 def mute(string: np.ndarray, modes: int, pairs: int, share: float, out: np.ndarray) -> None:
-    """Adds to σ, in `out` as of `rows`, what a hand adds that lies on the string from the bridge on.
+    """Add to σ the losses to a hand that lies on the string from the bridge on.
+
+    `out` is as of `rows`.
 
     A resistance per length from 0 to a gives σ_n = σ∞ (1 - sin(2ηa) / 2ηa): low partials ring on, high ones stop.
     Length and σ∞ are estimates: E2 of a guitar then falls by 60 dB in half a second, its tenth partial in 20 ms.
@@ -192,7 +194,9 @@ def mute(string: np.ndarray, modes: int, pairs: int, share: float, out: np.ndarr
 
 @njit(**EXACT)
 def touch(string: np.ndarray, modes: int, pairs: int, node: int, out: np.ndarray) -> None:
-    """Adds to σ, in `out` as of `rows`, what a finger adds that touches the string at 1/node of its length.
+    """Add to σ the losses to a finger that touches the string at 1/node of its length.
+
+    `out` is as of `rows`.
 
     A resistance R at x gives σ_n = R/(ρAℓ) sin²(nπx/ℓ), to first order (Rayleigh, Theory of Sound, § 102): partials
     with a node there stay as they are. With R = √(TρA) the largest is 2 f₁.
@@ -208,7 +212,9 @@ def touch(string: np.ndarray, modes: int, pairs: int, node: int, out: np.ndarray
 def stand(
     string: np.ndarray, modes: int, pairs: int, conductance: float, second_conductance: float, out: np.ndarray
 ) -> None:
-    """Takes what pairs lose to a bridge that others share from σ, and writes it, in `out` as of `rows`, behind η².
+    """Move what pairs lose to a bridge that others share from σ to the place behind η².
+
+    `out` is as of `rows`.
 
     Args:
         conductance, second_conductance: of what is shared, in both directions; 0: nothing is.

@@ -72,7 +72,9 @@ def node(
     largest_stretch: float,
     heard: np.ndarray,
 ) -> tuple[float, float]:
-    """The kick of the common tension and the turn to the next node, in place: from S and R here to those there.
+    """The kick of the common tension and the turn to the next node, in place.
+
+    It leads from S and R here to those there.
 
     Args:
         sums, rest: S and R of the blocks here, and what resting modes add; the result is of the blocks.
@@ -165,7 +167,7 @@ def advance(
 
 @njit(**COMPILED)
 def _nodes(voice: np.ndarray, program: np.ndarray, kick: float) -> int:
-    """Of a frame, as many as the modes that move need: as `KoopmanTension.step`.
+    """The number of nodes in a frame, as many as the modes that move need: as `KoopmanTension.step`.
 
     Args:
         kick: Σ η² k (q² + v²/ω²).
@@ -182,7 +184,7 @@ def _nodes(voice: np.ndarray, program: np.ndarray, kick: float) -> int:
 
 @njit(**COMPILED)
 def _needs_fewer_nodes(voice: np.ndarray, program: np.ndarray) -> bool:
-    """Whether high modes have fallen silent since its rows were prepared, so that fewer nodes are enough."""
+    """Return True if fewer nodes are enough: high modes have fallen silent since its rows were prepared."""
     counts = voice.view(np.int64)
     if counts[at.STEPS] == 1 or program[at.S_UNHEARD] > 0:
         return False
@@ -381,7 +383,7 @@ def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray
 
 @njit(**COMPILED)
 def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.ndarray, sign: float) -> None:
-    """Half of what `node` does first, forward or back, in place of y."""
+    """Apply half of the kick that `node` begins with to y in place, forward or back."""
     first = second = 0.0
     for m in range(len(x)):
         stretch = rows[3, m] * x[m] * x[m]
@@ -467,7 +469,7 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
 
 @njit(**COMPILED)
 def bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
-    """What follows from its modes, and the latents, where a voice begins or its modes change."""
+    """Bring up to date what follows from the modes, and the latents, where a voice begins or its modes change."""
     counts = voice.view(np.int64)
     n = counts[at.MODES]
     fewer = counts[at.PREPARED] and _needs_fewer_nodes(voice, program)

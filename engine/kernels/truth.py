@@ -17,7 +17,7 @@ from engine.kernels.modes import damped, glide, gliding, rest_above, row
 
 @njit(**COMPILED)
 def _sub_steps(voice: np.ndarray, program: np.ndarray) -> int:
-    """Of a frame: they follow the highest mode that moves. What is linear needs none, which 0 says."""
+    """The number of sub-steps of a frame, by the highest mode that moves; 0: what is linear needs none."""
     counts = voice.view(np.int64)
     n = counts[at.MODES]
     squares, couplings = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.COUPLING)
@@ -76,7 +76,7 @@ def advance(
     heard: bool,
     out: np.ndarray,
 ) -> None:
-    """One frame of a quantum, after it is heard."""
+    """Advance by one frame of a quantum, after it is heard."""
     hear(voice, program, frame, fading, heard, out)
     ring(voice, program, sub_steps, max(sub_steps, 1))
 
@@ -118,7 +118,7 @@ def hear(voice: np.ndarray, program: np.ndarray, frame: int, fading: bool, heard
 
 @njit(**COMPILED)
 def ring(voice: np.ndarray, program: np.ndarray, sub_steps: int, count: int) -> None:
-    """So many of a frame's sub-steps; of what is linear, 0, it is the frame."""
+    """Advance by so many of a frame's sub-steps; of what is linear, 0, it is the frame."""
     counts = voice.view(np.int64)
     n, moving = counts[at.MODES], counts[at.MOVING]
     q, v = row(voice, n, 0), row(voice, n, 1)

@@ -1,4 +1,4 @@
-"""What all voices share: listening points that may move, the pick-up, the gain, and the end."""
+"""The parts that all voices share: listening points that may move, the pick-up, the gain, and the end."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def move_points(voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray)
 def _velocity(
     voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray
 ) -> None:
-    """As `_generate`, differentiated; the voice is generated a quantum ahead for that."""
+    """Generate the motion of `_generate`, differentiated; the voice is generated a quantum ahead for that."""
     begins = is_first(voice)
     for turn in range(2 if begins else 1):
         _generate(voice, heard, rate_hz, out, scratch)
@@ -76,7 +76,7 @@ def _velocity(
 
 @njit(**COMPILED)
 def is_first(voice: np.ndarray) -> bool:
-    """Whether a voice is not yet ahead of what was heard of it."""
+    """Return True if a voice is not yet ahead of what was heard of it."""
     counts = voice.view(np.int64)
     return counts[at.GENERATED] == counts[at.FRAME]
 
@@ -127,7 +127,7 @@ def differentiate(voice: np.ndarray, out: np.ndarray, taps: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def take_over(voice: np.ndarray, now: int, scratch: np.ndarray) -> None:
-    """The string of the voice before is this one's as it begins: its motion is stopped, or this pluck added to it.
+    """Take over the string of the voice before: stop its motion as this one begins, or add this pluck to it.
 
     One that is to begin later, or is stopped before it has begun, is not heard at all; then the string is that of
     the voice before that one, which is left as what is to be taken over.
@@ -258,7 +258,10 @@ def is_heard(voice: np.ndarray) -> bool:
 
 @njit(**COMPILED)
 def begin(voice: np.ndarray, mixer: np.ndarray) -> int:
-    """What comes before a voice's next quantum is generated; its state, where none is: it waits, or is over."""
+    """Begin a voice's next quantum before it is generated.
+
+    Returns its state where none is: it waits, or is over.
+    """
     counts, quantum = voice.view(np.int64), at.QUANTUM
     mix = mixer[at.M_MIX : at.M_MIX + 2 * quantum].reshape(quantum, 2)
     now = mixer.view(np.int64)[at.M_FRAMES]
@@ -347,7 +350,7 @@ def end(voice: np.ndarray, mixer: np.ndarray, now_s: float, out: np.ndarray, mov
 
 @njit(**COMPILED)
 def note_gap(mixer: np.ndarray, frame: int, milliseconds: float, cause: int) -> None:
-    """One more silence that nobody asked for."""
+    """Note one more silence that nobody asked for."""
     counts = mixer.view(np.int64)
     slot = at.M_GAP_LIST + (counts[at.M_GAPS] % at.GAPS) * at.GAP_FIELDS
     mixer[slot], mixer[slot + 1], mixer[slot + 2] = frame, milliseconds, cause

@@ -1,4 +1,4 @@
-"""What averaging over a period knows of the tension-modulated string: frequencies and amplitudes follow its energies.
+"""The tension-modulated string averaged over a period: frequencies and amplitudes follow its energies.
 
 Lindstedt's first order in closed form (`averaged_*`), and the mean tension to all orders (`stiffening`,
 `adiabatic_change`). Amplitudes are in a model's normalised units, time is in samples.
@@ -62,7 +62,7 @@ def averaged_amplitude(physics: Physics) -> Tensor:
 
 
 def averaged_modulation(physics: Physics) -> tuple[Tensor, Tensor]:
-    """What the swinging tension adds within a period, to first order: float64 (modes, modes) each.
+    """The modulation by the swinging tension within a period, to first order: float64 (modes, modes) each.
 
     -k_n q_n η_m² q_m² swings at ω_n ± 2ω_m, where mode n answers with α z_m² z_n + β z̄_m² z_n,
     α = k_n η_m²/(16 ω_m (ω_n + ω_m)) and β = -k_n η_m²/(16 ω_m (ω_n - ω_m)); n = m has no β, its part is in K.

@@ -1,4 +1,4 @@
-"""What the models with diagonal linear dynamics share: z_k = λᵏ z₀, frames decoded from z_k alone.
+"""The base of models with diagonal linear dynamics: z_k = λᵏ z₀, frames decoded from z_k alone.
 
 Any frame can be had in any order. A state keeps z₀ with an integer step instead of z_k: that is what keeps phases
 exact after millions of samples and every splitting into blocks the same motion.

@@ -71,7 +71,10 @@ def advance_frnn(
     pointwise: Pair,
     out: Pair,
 ) -> None:
-    """As `advance_fgru`, with `depth` convolutions, and pointwise: (depth, width in, width out), (depth, width)."""
+    """Advance an FRNN, as `advance_fgru`, with `depth` convolutions and pointwise layers.
+
+    Their weights are (depth, width in, width out), their biases (depth, width).
+    """
     points, width = hidden.shape
     forward, inverse = transforms
     weights, biases = convolutions

@@ -1,4 +1,4 @@
-"""What a file of `koopman_tension` holds, in NumPy: a preset of many strings is read and played without torch."""
+"""The arrays of a `koopman_tension` file, in NumPy: a preset of many strings is read and played without torch."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ LINEAR_STRING = "the modes of the string at rest"  # given to a start "physics"
 
 @dataclass(frozen=True)
 class Physics:
-    """What an initialisation may know of the resonator whose motion a model shall learn.
+    """The knowledge that an initialisation may have of the resonator whose motion a model shall learn.
 
     Attributes:
         scale_m: the model's unit of displacement.
@@ -94,7 +94,7 @@ class StringModel(nn.Module, ABC, Generic[State]):
 
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
-        """What it learned of frequency and decay: log λ a sample, complex128, a tensor each layer.
+        """The learned frequencies and decays: log λ a sample, complex128, a tensor each layer.
 
         Both of a conjugate pair where a layer has them. Empty where nothing of a model moves by itself.
         """
@@ -114,7 +114,7 @@ class AnyFrameModel(StringModel[State]):
 
     @abstractmethod
     def sample(self, state: State, frames: Tensor, steps: int) -> tuple[Tensor, State]:
-        """As `advance` on the grid, of which only some frames are computed.
+        """Sample the motion on the grid, as `advance`, computing only some frames.
 
         Args:
             frames: their numbers, ascending, of 1 … steps; int64 (frames,).

@@ -36,7 +36,10 @@ def powers(log_eigenvalues: Tensor, steps: Tensor) -> Tensor:
 
 
 def slope_at_rest(log_eigenvalues: Tensor) -> Tensor:
-    """b, float64 (n,), with which q Re[(1 + ib) λᵏ] sets out at rest from q: 0 = Re[(1 + ib) log λ], b = -σ/ω."""
+    """The b, float64 (n,), with which q Re[(1 + ib) λᵏ] sets out at rest from q.
+
+    0 = Re[(1 + ib) log λ], so that b = -σ/ω.
+    """
     return log_eigenvalues.real / log_eigenvalues.imag
 
 

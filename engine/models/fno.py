@@ -68,7 +68,7 @@ class FourierConvolution(nn.Module):
 
 
 class _FourierRecurrent(StringModel[FieldState]):
-    """What both cells share: the maps in and out, and the choice of the roll-out or the kernel."""
+    """The parts that both cells share: the maps in and out, and the choice of the roll-out or the kernel."""
 
     initialisations: ClassVar = {"paper": ""}
     mapped: ClassVar = False  # its training calls compiled code

@@ -108,7 +108,7 @@ class _Rates(NamedTuple):
 
 
 class _Motion(NamedTuple):
-    """Beside the decay e^{-σt}: float64 (batch, times, state_size) each."""
+    """The motion beside the decay e^{-σt}: float64 (batch, times, state_size) each."""
 
     gain: Tensor  # b tanh(Re I / b), in nepers
     phase: Tensor  # ωt + Im I
@@ -280,7 +280,7 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
     def _integrate_higher_orders(
         self, state: IntegratedPhaseState, rates: _Rates, energy: Tensor, times: Tensor, end: int
     ) -> tuple[Tensor, Tensor, Tensor]:
-        """What f has beside K E, integrated from where the state's integral ends.
+        """Integrate what f has beside K E, from where the state's integral ends.
 
         Returns:
             to each of `times`, and the slopes there, float64 (batch, times, 2 state_size); to where the integral of a
@@ -314,7 +314,7 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
 
     @property
     def _rate_units(self) -> Tensor:
-        """Of f, in radians and nepers a sample, float64 (2 state_size,)."""
+        """The units of f, in radians and nepers a sample, float64 (2 state_size,)."""
         return self.rate_units.repeat(2)
 
     def _displacement(self, real: Tensor, imag: Tensor, readout: Tensor | None, alive: Tensor | slice) -> Tensor:
@@ -343,12 +343,15 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
 
     @property
     def _modulation_units(self) -> Tensor:
-        """Of M, half of them of A: radians and nepers for squares of normalised displacement, (2 state_size,)."""
+        """The units of M, half of them of A: radians and nepers for squares of normalised displacement.
+
+        Its shape is (2 state_size,).
+        """
         return self.energy_units.to(self.K.dtype).repeat(2)
 
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
-        """Those of a quiet string: they change with the energy."""
+        """The log eigenvalues of a quiet string: they change with the energy."""
         return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
 
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
@@ -438,7 +441,10 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
 
 
 def _integrated_nodes(time: int, spacing: int) -> int:
-    """The node at which the integral of a state ends: one is kept back for the segment that `time` lies in."""
+    """The node at which the integral of a state ends.
+
+    One is kept back for the segment that `time` lies in.
+    """
     return max(0, time // spacing - 1)
 
 

@@ -65,7 +65,7 @@ LEAST_GROWTH = 1e-9  # of A in a quotient: gradients stay finite
 
 @dataclass(frozen=True)
 class KoopmanTensionState:
-    """Where the latents are.
+    """The state of the latents.
 
     Attributes:
         x, y: z before the kick at the present node, float64 (batch, modes); before the first frame, the mode itself:
@@ -84,7 +84,7 @@ class KoopmanTensionState:
     begun: bool = False
 
     def rows(self, index: Tensor) -> KoopmanTensionState:
-        """Of some of the strings."""
+        """The state of some of the strings."""
         x, y, energy, stretch, nodes = (getattr(self, name)[index] for name in OF_STRINGS)
         return KoopmanTensionState(x, y, energy, stretch, nodes, self.begun)
 
@@ -93,7 +93,7 @@ OF_STRINGS = ("x", "y", "largest_energy", "largest_stretch", "nodes")
 
 
 class Step(NamedTuple):
-    """What a step from node to node takes, `nodes` of them to a frame; float64 (modes,) each."""
+    """The factors of a step from node to node, `nodes` of them to a frame; float64 (modes,) each."""
 
     nodes: int
     decay: float  # of the largest energy, a frame
@@ -107,7 +107,7 @@ class Step(NamedTuple):
 
     @property
     def rows(self) -> Tensor:
-        """For `engine.kernels.tension`, (7, modes)."""
+        """The rows for `engine.kernels.tension`, (7, modes)."""
         return torch.stack(self[2:])
 
 
@@ -153,7 +153,7 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
 
     @torch.no_grad()
     def for_resonator(self, physics: Physics) -> KoopmanTension:
-        """What was learned, with another resonator, rate or scale."""
+        """The learned model with another resonator, rate or scale."""
         resonator = physics.resonator
         sizes = replace(self.configuration, modes=resonator.modes, grid_points=resonator.points)
         other = KoopmanTension(sizes)
@@ -172,7 +172,7 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         return self.encode_modes(displacement.double() @ self.analysis, v)
 
     def encode_modes(self, q: Tensor, v: Tensor | None = None) -> KoopmanTensionState:
-        """As `encode`, of amplitudes and speeds of the modes, (batch, modes): a blow, or a surface of few points."""
+        """Encode amplitudes and speeds of the modes, (batch, modes): as `encode`, for a blow or few points."""
         sigma, omega = self._rates()
         x, y = q, -sigma * q / omega
         if v is not None:
@@ -236,11 +236,11 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
 
     @torch.no_grad()
     def advance_modes(self, state: KoopmanTensionState, steps: int) -> tuple[Tensor, KoopmanTensionState]:
-        """As `amplitudes`, and the state after them."""
+        """The frames of `amplitudes`, and the state after them."""
         return self._by_nodes(state, lambda part, step: self._compiled(part, step, steps))
 
     def _nodes(self, state: KoopmanTensionState) -> Tensor:
-        """Of a frame, for strings as they set out, (batch,)."""
+        """The number of nodes in a frame, for strings as they set out, (batch,)."""
         c, (_, omega) = self.configuration, self._rates()
         fastest = max(float(omega[0]) / c.node_phase, float(omega[-1]) / c.highest_phase)
         swings = (state.x.square() + self._swing(state).square()).detach()
@@ -249,7 +249,7 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
         return closest.ceil().clamp(min=1).long()
 
     def step(self, nodes: int) -> Step:
-        """From node to node."""
+        """The step from node to node."""
         sigma, omega = self._rates()
         h = 1 / nodes
         phase = h * omega
@@ -341,6 +341,6 @@ class KoopmanTension(AnyFrameModel[KoopmanTensionState]):
 
     @torch.no_grad()
     def log_eigenvalues(self) -> list[Tensor]:
-        """Those of a quiet string."""
+        """The log eigenvalues of a quiet string."""
         sigma, omega = self._rates()
         return [torch.complex(-sigma, omega)]

@@ -17,7 +17,7 @@ from engine.models.ssm import DiagonalSSM, SSMString
 
 
 class LRULayer(DiagonalSSM):
-    """One linear recurrent unit."""
+    """A linear recurrent unit."""
 
     conjugates: ClassVar = 1
 

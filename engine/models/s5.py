@@ -35,7 +35,7 @@ def hippo_normal(size: int) -> tuple[Tensor, Tensor]:
 
 
 class S5Layer(DiagonalSSM):
-    """One S5 layer with `states` stored states."""
+    """An S5 layer with `states` stored states."""
 
     conjugates: ClassVar = 2
 

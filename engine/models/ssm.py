@@ -1,4 +1,4 @@
-"""What the state-space strings (LRU, S5) share: the recurrence, the block, the stack and its streaming state.
+"""The base of the state-space strings (LRU, S5): the recurrence, the block, the stack and its streaming state.
 
 Source: the paper, §3.2. A first linear layer takes the initial displacement u₀ as an impulse,
 x_{k+1} = Ā x_k + B̄ u_k δ_k, y_k = C̄ x_k, where y is one sample late. Blocks follow: batch norm, a diagonal
@@ -190,7 +190,7 @@ class DiagonalSSM(nn.Module, ABC):
         return torch.view_as_complex(linear(inputs, matrix.flatten(0, 1)).unflatten(-1, (-1, 2)))
 
     def diagonal(self) -> tuple[Tensor, Tensor]:
-        """Around the diagonal recurrence: B̄ (2 states, inputs), and the matrix of Re(C̄ x) (outputs, 2 states).
+        """The matrices around the diagonal recurrence: B̄ (2 states, inputs) and Re(C̄ x) (outputs, 2 states).
 
         All real parts come before all imaginary ones.
         """
@@ -228,7 +228,7 @@ class Block(nn.Module):
         return inputs + gated, last
 
     def fold(self) -> FoldedBlock:
-        """This block in evaluation."""
+        """The folded block that equals this one in evaluation."""
         norm = self.normalization
         assert norm.running_mean is not None and norm.running_var is not None
         scale = norm.weight * torch.rsqrt(norm.running_var + norm.eps)
@@ -253,7 +253,9 @@ class Block(nn.Module):
 
 @dataclass(frozen=True)
 class FoldedBlock:
-    """A block in evaluation for rendering on a CPU: batch norm is in the matrices, and what is left is few calls.
+    """A block in evaluation for rendering on a CPU.
+
+    Batch norm is in the matrices, and what is left is few calls.
 
     Attributes:
         input, input_bias: what is added to the states, (2 states, features), all real parts first.
@@ -272,7 +274,7 @@ class FoldedBlock:
     gate: nn.Linear
 
     def __call__(self, frames: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
-        """As the block; `frames` may be overwritten."""
+        """Compute the block's output and state; `frames` may be overwritten."""
         from engine.models import _ssm_kernel as kernel  # Numba only when it is needed
 
         last = state.clone()
@@ -292,7 +294,7 @@ class FoldedBlock:
 
 @dataclass(frozen=True)
 class SSMState:
-    """Every layer's x, complex128 (batch, states) each, the first layer's first.
+    """The state x of every layer, complex128 (batch, states) each, the first layer's first.
 
     Double precision keeps the carried phases exact; the layers themselves run in the precision of the weights.
 

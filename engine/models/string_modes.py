@@ -1,4 +1,4 @@
-"""What a model can be started from that stands for no known string: modes as its motions show them.
+"""The modes of an unknown string as its motions show them, from which a model can be started.
 
 Where they come from is the caller's: `training.fitting.phases` finds them in displacement alone.
 """
@@ -13,7 +13,7 @@ from torch import Tensor
 
 @dataclass(frozen=True)
 class StringModes:
-    """Of a string in normalised units, float64; times are in samples.
+    """The modes of a string in normalised units, float64; times are in samples.
 
     A mode n that starts at rest at q moves as q Re s exp[(log λ) t + i Σ_m κ_nm ∫ E_m], where E_m(t) is the square of
     mode m's start, decaying twice as fast as its motion.

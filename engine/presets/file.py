@@ -261,7 +261,7 @@ Form = tuple[tuple[int, ...], str]  # shape, and type by its name in safetensors
 
 
 def _forms(path: Path, info: PresetInfo) -> dict[str, Form]:
-    """What a preset's tensors must be, by name."""
+    """The shapes and types that a preset's tensors must have, by name."""
     if info.of_many_strings:
         return {name: (shape, "F64") for name, shape in shapes_of_arrays(_configuration(info)).items()}
     import torch

@@ -1,4 +1,4 @@
-"""Which preset files there are: the shipped ones, or those of any folder."""
+"""The list of preset files: the shipped ones, or those of any folder."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def preset_files(*folders: Path) -> list[Path]:
 
 
 def unreadable(folder: Path) -> str:
-    """Why a folder that is there cannot be looked into, in one line; empty where it can, or is not there."""
+    """The reason, in one line, why a folder cannot be looked into; empty where it can, or is not there."""
     try:
         next(folder.iterdir(), None)
     except FileNotFoundError:

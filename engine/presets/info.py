@@ -1,4 +1,4 @@
-"""What a preset says of itself."""
+"""The description of a preset, as its file has it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _WIDEST = {"gaussian": 0.2}
 
 @dataclass(frozen=True)
 class TrainedRange:
-    """What the initial displacements of the training set covered; None: not a parameter of that kind.
+    """The ranges of the training set's initial displacements; None: not a parameter of that kind.
 
     Attributes:
         width: by shape, as `Pluck` counts it; a shape that was not drawn, or has no width, is absent.
@@ -50,7 +50,7 @@ class TrainedRange:
 
 @dataclass(frozen=True)
 class PresetInfo:
-    """What a preset says of itself.
+    """The description of a preset, as its file has it.
 
     Attributes:
         horizon_steps: number of frames after the initial one that the model was trained on.
@@ -103,7 +103,7 @@ class PresetInfo:
 
     @property
     def of_many_strings(self) -> bool:
-        """Whether its model takes any string."""
+        """Return True if its model takes any string."""
         return self.model in OF_MANY_STRINGS
 
     @property
@@ -112,7 +112,7 @@ class PresetInfo:
 
     @cached_property
     def resonator(self) -> Resonator:
-        """What its model learned, at rest and with the tension that it knows."""
+        """The resonator that its model learned, at rest and with the tension that it knows."""
         return self.resonator_of(self.string, self.modes)
 
     def resonator_of(self, string: StringParameters, modes: int) -> Resonator:
@@ -123,7 +123,7 @@ class PresetInfo:
         return string.resonator(modes, tension_modulated=modulated, grid_points=points)
 
     def modes_of(self, partials: int) -> int:
-        """How many modes it plays so many partials with: of a recorded string two for each, if its grid allows."""
+        """The number of modes for so many partials: of a recorded string two for each, if its grid allows."""
         return min(partials * (2 if self.recorded is not None else 1), self.grid_points - 2)
 
     def tension_rise(self, pluck: Pluck) -> float:
@@ -158,7 +158,7 @@ class PresetInfo:
 
 
 def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
-    """How a pluck differs from what the preset was trained on, in plain words; empty where it does not.
+    """The differences of a pluck from the preset's training, in plain words; empty where there are none.
 
     Of a preset of many strings only where its error is known to grow: see `docs/many-strings.md`.
     """

@@ -1,4 +1,4 @@
-"""From what earlier versions wrote to what this one reads: a step for each version of the metadata.
+"""The steps from metadata of earlier versions to those that this one reads, one for each version.
 
 Every preset that was ever shipped loads for ever; weights are never changed on the way.
 """
@@ -50,7 +50,7 @@ def _displacement_alone(data: Metadata) -> Metadata:
 
 
 def _range_of_training(data: Metadata) -> Metadata:
-    """4 → 5: widths by shape; no peak of plucks that were scaled to a rise of tension, as those of a family are."""
+    """Migrate 4 → 5: widths by shape, and no peak of plucks scaled to a rise of tension, as a family's are."""
     trained, family = data.get("trained_range"), data.get("family")
     if not isinstance(trained, dict):
         return data
@@ -70,7 +70,7 @@ _WITH_A_WIDTH = ("gaussian", "raised_cosine")
 
 
 def _pair(data: object) -> tuple[float, float]:
-    """Two numbers; of anything else two zeros, for the family itself is refused."""
+    """The two numbers of a pair; of anything else two zeros, for the family itself is refused."""
     if isinstance(data, list) and len(data) == 2 and all(type(each) in (int, float) for each in data):
         return data[0], data[1]
     return 0.0, 0.0
@@ -86,7 +86,7 @@ FORMAT_VERSION = max(MIGRATIONS) + 1
 
 
 class UnknownVersion(ValueError):
-    """No version that this program reads; the message says what to do."""
+    """A version that this program does not read; the message says what to do."""
 
 
 def migrated(data: Metadata) -> Metadata:

@@ -100,7 +100,7 @@ def of_string(
 def info_of_string(
     info: PresetInfo, string: StringParameters | None = None, rate_hz: int | None = None, modes: int | None = None
 ) -> PresetInfo:
-    """What a preset of many strings says of one; arguments as of `of_string`.
+    """The description that a preset of many strings has for one; arguments as of `of_string`.
 
     Raises:
         ValueError: the string has no such modes, or its motion is beyond what is computed.

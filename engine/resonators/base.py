@@ -1,4 +1,4 @@
-"""What rings: modes with their frequencies, decays, shapes, and how they share one tension.
+"""The resonator: modes with their frequencies, decays and shapes, and how they share one tension.
 
 The seam between physics and everything that learns from it or solves it: models, truth, data sets and presets take
 these numbers and know no string. A mode n of amplitude q_n moves as
@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Resonator:
-    """One resonator.
+    """A resonator, by its modes.
 
     Attributes:
         omega: undamped angular frequencies ω in rad/s, ascending, float64 (modes,).
@@ -72,7 +72,7 @@ class Resonator:
 
     @property
     def points(self) -> int:
-        """Of the grid."""
+        """The number of points of the grid."""
         return self.shapes.shape[1]
 
     @property
@@ -95,7 +95,7 @@ class Resonator:
 
     @property
     def tension_modulated(self) -> bool:
-        """Whether any amplitude moves another mode's frequency."""
+        """Return True if any amplitude moves another mode's frequency."""
         return bool(self.coupling.any())
 
     def eigenvalues(self) -> NDArray[np.complex128]:
@@ -111,7 +111,7 @@ class Resonator:
         return -self.sigma + 1j * np.sqrt(squared)
 
     def falls_s(self, db: float) -> float:
-        """How long its slowest mode takes to fall by so many dB, as a free one; inf where it never does."""
+        """The time in s in which its slowest mode, free, falls by so many dB; inf where it never does."""
         slowest = float(self.sigma.min())
         return db * math.log(10) / 20 / slowest if slowest > 0 else math.inf
 

@@ -129,11 +129,11 @@ class DrumParameters:
 
     @cached_property
     def numbers(self) -> Array:
-        """As the kernels have it."""
+        """The drum's numbers, as the kernels have them."""
         return np.array([SHAPES.index(self.shape), *astuple(self)[1:]], np.float64)
 
     def around(self, highest_hz: float, most: int = MOST_MODES) -> kernel.Around:
-        """What the kernels compute modes from: the surface's list, the air's table, and ka up to which it goes."""
+        """The kernels' input for modes: the surface's list, the air's table, and ka up to which it goes."""
         size_m = kernel.size(self.numbers)
         low = 1.2 * kernel.LOW_HZ * kernel.lowest(self.numbers) * size_m  # for its pitch
         needed = (
@@ -147,7 +147,7 @@ class DrumParameters:
         return surface.modes_below(self.shape, self.aspect, reach), air, ka
 
     def modes(self, highest_hz: float, most: int = MOST_MODES) -> DrumModes:
-        """Its lowest modes below a frequency, so many at most.
+        """The lowest modes below a frequency, so many at most.
 
         Raises:
             ValueError: there is none, or far too many; the message names the remedy.
@@ -222,7 +222,10 @@ class DrumModes:
         return replace(self, drum=replace(self.drum, damping_d1_kg_m2_s=d1_kg_m2_s, damping_d3_kg_s=d3_kg_s))
 
     def resonator(self, places: Array, *, tension_modulated: bool = True) -> Resonator:
-        """For truth and models; its points are a few places (places, 2), from which amplitudes do not follow."""
+        """The resonator for truth and models, with the shapes at a few places (places, 2).
+
+        Amplitudes do not follow from these.
+        """
         coupling = self.drum.stretching_n_m / self.drum.mass_kg_m2 * self.stretch
         first = float(self.surface.wavenumber.min())
         return Resonator(
@@ -241,7 +244,7 @@ class DrumModes:
         return float(kernel.mass_kg(self.drum.numbers))
 
     def struck(self, place: tuple[float, float], radius_m: float) -> Array:
-        """Speeds (modes,) in m/s that a sudden blow of 1 N s gives, spread over a disc at a place."""
+        """The speeds (modes,) in m/s from a sudden blow of 1 N s, spread over a disc at a place."""
         found = np.empty(len(self))
         kernel.struck(self.drum.numbers, self.rows, *map(float, place), radius_m, tools(), found)
         return found

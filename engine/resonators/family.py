@@ -1,4 +1,4 @@
-"""Which strings a model of many has learned, and how far another is from them."""
+"""The family of strings that a model of many has learned, and the distance of others from it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Bounds = tuple[float, float]
 
 
 class Beyond(NamedTuple):
-    """One way in which a string differs from a family; `error_grows`: it is known to be played less well."""
+    """A difference of a string from a family; `error_grows`: it is known to be played less well."""
 
     words: str
     error_grows: bool
@@ -44,12 +44,12 @@ class StringFamily:
 
     @property
     def width(self) -> dict[str, Bounds]:
-        """By shape, as a pluck counts it."""
+        """The width by shape, as a pluck counts it."""
         low, high = self.half_width
         return {"gaussian": (low, high), "raised_cosine": (2 * low, 2 * high)}
 
     def outside(self, string: StringParameters) -> list[Beyond]:
-        """How a string differs from these; empty where it does not.
+        """The differences of a string from these; empty where there are none.
 
         The error of a model grows where high modes ring longer than in the training. With pitch, inharmonicity and
         the decay of the first mode it does not, as measured in `docs/many-strings.md`.
@@ -75,7 +75,7 @@ class StringFamily:
         ]
 
     def warnings(self, string: StringParameters) -> list[str]:
-        """As `outside`, in words, where the error of a model is known to grow."""
+        """The differences of `outside` in words, where the error of a model is known to grow."""
         return [one.words for one in self.outside(string) if one.error_grows]
 
 

@@ -1,4 +1,6 @@
-"""Decay by mode as physics gives it, beside the two numbers d₁ and d₃ of a string, which may be 0 then.
+"""The decay by mode as physics gives it.
+
+A string's two numbers d₁ and d₃ stand beside it, and may be 0 then.
 
     σ_n = a π (ν + d √(π ν ρ f_n)) / ρA  +  ω_n/2 · (T δ + E I η_n² β) / (T + E I η_n²)
 
@@ -23,7 +25,7 @@ from engine.resonators.string import StringParameters
 
 @dataclass(frozen=True)
 class Losses:
-    """How much of each.
+    """The strength of each loss.
 
     Attributes:
         air: factor of the losses to the air, a; 1 is that of physics.

@@ -29,7 +29,7 @@ PAIRS = MOST_PAIRS  # lowest partials that have two modes; an estimate: above th
 
 @dataclass(frozen=True)
 class Polarisations:
-    """Two directions, the first normal to the board.
+    """The two directions of polarisation, the first normal to the board.
 
     Attributes:
         angle_deg: of the pluck, from the first direction.
@@ -56,7 +56,7 @@ class Polarisations:
 
     @property
     def heard(self) -> tuple[float, float]:
-        """What both are heard with: a pluck is heard as high as it is pulled."""
+        """The weights with which both are heard: a pluck is heard as high as it is pulled."""
         first, second = self.pulled
         whole = first + self.second_heard * second
         return 1 / whole, self.second_heard / whole
@@ -113,12 +113,12 @@ class Polarisations:
 
 
 def layout(partials: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Of each mode its partial, from 0, and its direction, 0 or 1."""
+    """The partial, from 0, and the direction, 0 or 1, of each mode."""
     mode, pairs = np.arange(partials + min(PAIRS, partials)), min(PAIRS, partials)
     paired = mode < 2 * pairs
     return np.where(paired, mode // 2, mode - pairs), np.where(paired, mode % 2, 0)
 
 
 def partials_of(modes: int) -> int:
-    """How many partials so many modes are: the inverse of `layout`."""
+    """The number of partials of so many modes: the inverse of `layout`."""
     return modes - min(PAIRS, modes // 2)

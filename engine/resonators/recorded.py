@@ -100,7 +100,7 @@ class RecordedNote:
 
 @dataclass(frozen=True)
 class RecordedAttack:
-    """What a recording has at its attack and the modes have not, as it drives the body.
+    """The attack of a recording without the modes' part, as it drives the body.
 
     Attributes:
         rows: samples, of a full scale of `ATTACK_PEAK`: at most 1000 in a row, as lists in files are bounded.
@@ -121,7 +121,7 @@ class RecordedAttack:
 
     @staticmethod
     def of(samples: Array, rate_hz: int) -> RecordedAttack:
-        """Of samples (frames,) of any level."""
+        """The attack from samples (frames,) of any level."""
         whole = np.rint(samples / np.abs(samples).max() * ATTACK_PEAK).astype(int).tolist()
         return RecordedAttack(
             rate_hz,
@@ -133,14 +133,14 @@ class RecordedAttack:
 
     @property
     def samples(self) -> Array:
-        """With an energy of 1 s of full scale squared, (frames,)."""
+        """The samples with an energy of 1 s of full scale squared, (frames,)."""
         samples = np.array([each for row in self.rows for each in row], float)
         return np.asarray(samples / math.sqrt(float(samples @ samples) / self.rate_hz))
 
 
 @dataclass(frozen=True)
 class RecordedString:
-    """What a recording adds to a string's law.
+    """The additions of a recording to a string's law.
 
     Attributes:
         pitch_hz: of the recorded note.
@@ -223,7 +223,7 @@ class RecordedString:
         )
 
     def rest(self, name: str) -> float:
-        """To what a value of `OF_PARTIALS` fades with the distance in pitch where the note has no such frequency."""
+        """The value to which one of `OF_PARTIALS` fades with distance in pitch, if the note has no such frequency."""
         shared = _SHARED.get(name)
         return float(np.median(np.asarray(getattr(self, name)))) if shared is None else shared
 

@@ -1,4 +1,4 @@
-"""Between displacement on the grid, modal amplitudes, and displacement at a listening point.
+"""The transforms between displacement on the grid, modal amplitudes, and displacement at a listening point.
 
 The modes of the simply supported string are sines (the paper's Eq. 2). On a grid with both ends, held at
 zero, the transform is a DST-I and exact for up to `grid_points - 2` modes. A modal amplitude here is the

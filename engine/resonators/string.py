@@ -89,7 +89,9 @@ class StringParameters:
         return self.tension_n * eta + self.youngs_modulus_pa * self.second_moment_m4 * eta**3
 
     def resonator(self, modes: int, *, tension_modulated: bool = True, grid_points: int = 101) -> Resonator:
-        """Its first modes, on a grid of so many points with both ends; linear, or with the tension that stretch adds.
+        """The string's first modes, on a grid of so many points with both ends.
+
+        They are linear, or have the tension that stretch adds.
 
         Raises:
             ValueError: the grid does not hold so many modes.

@@ -63,7 +63,7 @@ class Surface:
 
     @property
     def n(self) -> NDArray[np.int64]:
-        """Half-waves across a rectangle; of a circle 1 for a sine."""
+        """The half-waves across a rectangle; of a circle 1 for a sine."""
         return self.rows[kernel.N].astype(np.int64)
 
     def shapes(self, places: Array) -> Array:
@@ -73,7 +73,7 @@ class Surface:
         return found
 
     def inside(self, places: Array) -> bool:
-        """Whether all places lie within the edge."""
+        """Return True if all places lie within the edge."""
         away = np.hypot(places[:, 0], places[:, 1]) if self.round else np.abs(places).max(1)
         return bool((away < 1).all())
 
@@ -83,7 +83,7 @@ class Surface:
 
 
 def tools() -> kernel.Tools:
-    """Without a table of Bessel functions."""
+    """The kernels' tools without a table of Bessel functions."""
     return np.zeros((0, 0)), np.empty(kernel.ORDERS)
 
 
@@ -112,7 +112,7 @@ def modes_below(shape: str, aspect: float, reach: float) -> Array:
 
 @lru_cache(maxsize=64)
 def air_below(shape: str, aspect: float, reach: float, points: int) -> Array:
-    """What the air adds to the low modes that differ, for ka up to `reach`, to a part in 10¹²: (2, modes, terms).
+    """The effect of the air on the low modes that differ, for ka up to `reach`, to a part in 10¹²: (2, modes, terms).
 
     Chebyshev polynomials of the square of ka; see `kernel.air_at`.
     """

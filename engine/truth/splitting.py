@@ -81,7 +81,10 @@ class SplittingSolver:
 
     @property
     def constants(self) -> tuple[Tensor, ...]:
-        """What compiled kernels take: flows, kicks, coupling, η², sub-steps, levels, ω⁻²; see `_splitting_kernel`."""
+        """The constants for compiled kernels: flows, kicks, coupling, η², sub-steps, levels, ω⁻².
+
+        See `_splitting_kernel`.
+        """
         of_flow = (self._flows, self._kicks, self._coupling, self._eta_squared)
         return (*of_flow, self._substeps, self._levels, self._inverse_omega_squared)
 
@@ -90,7 +93,7 @@ class SplittingSolver:
         return self.sample(state, torch.arange(1, steps + 1), steps)
 
     def sample(self, state: ModalState, frames: Tensor, steps: int) -> tuple[Tensor, ModalState]:
-        """As `advance`, of which only some frames are kept: (batch, frames, modes).
+        """Sample the motion, as `advance`, keeping only some frames: (batch, frames, modes).
 
         Args:
             frames: their numbers, ascending, of 1 … steps; int64 (frames,).

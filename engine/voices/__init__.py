@@ -1,4 +1,6 @@
-"""Voices: plucks of a model or of the truth as they ring, and the mixer that sums them; compiled in `engine.kernels`.
+"""The voices, plucks of a model or of the truth as they ring, and the mixer that sums them.
+
+They are compiled in `engine.kernels`.
 
 program    what all voices of a source share at one sample rate
 programs   those of a preset, and of the truth

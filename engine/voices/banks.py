@@ -31,7 +31,7 @@ def bank_program(model: StringModel[Any], info: PresetInfo, rate_hz: int) -> Pro
 @bank_program.register
 @torch.no_grad()
 def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz: int) -> Program | None:
-    """None where there are more latents or layers than the kernel holds."""
+    """The program of an integrated-phase model; None: it has more latents or layers than the kernel holds."""
     c, n = model.configuration, model.configuration.state_size
     widths = (n, *c.eigenvalue_widths)
     if max(widths) > at.MOST_MODES or len(widths) > 7:
@@ -105,7 +105,7 @@ def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz:
 @bank_program.register
 @torch.no_grad()
 def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program | None:
-    """None where no eigenvalue is left, or there are more than the kernel holds."""
+    """The program of a DMD model; None: no eigenvalue is left, or there are more than the kernel holds."""
     present = model.magnitude_log > -600
     sigma, omega = -model.magnitude_log[present].double(), model.angle[present].double()
     n = int(present.sum())

@@ -1,4 +1,4 @@
-"""Where and how a string is heard."""
+"""The listening to a string: the points, and the pick-up."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Ear:
 
     @property
     def full_scale(self) -> float:
-        """What is 0 dBFS, in m, m/s or N."""
+        """The value of 0 dBFS, in m, m/s or N."""
         return FULL_SCALES[self.pickup]
 
     def weights(self, grid_points: int, force: Array | None = None) -> Array:
@@ -75,7 +75,7 @@ class Ear:
         return max(peak, tension * steepest * (FULL_SCALE_M / FULL_SCALE_N))
 
     def is_on_node(self, point: float) -> bool:
-        """Whether nothing can be heard there: a fixed end, or a node of the mode that is heard alone."""
+        """Return True if nothing can be heard there: a fixed end, or a node of the only mode heard."""
         if self.pickup == "bridge":
             return False
         return point in (0.0, 1.0) or (self.solo > 0 and abs(math.sin(math.pi * self.solo * point)) < 1e-3)

@@ -30,7 +30,10 @@ CAUSES = {at.CAUSE_DEVICE: "device", at.CAUSE_STARVED: "rendering", at.CAUSE_RUN
 
 @dataclass(frozen=True)
 class Gap:
-    """A silence that nobody asked for: when, as seconds of sound since the mixer began, why, and 0 ms if unknown."""
+    """A silence that nobody asked for: its time in s of sound since the mixer began, cause and length.
+
+    0 ms: unknown.
+    """
 
     time_s: float
     cause: str
@@ -38,7 +41,9 @@ class Gap:
 
 
 class Mixer:
-    """Its memory is what the kernels work on; commands come from any thread, frames are taken by one.
+    """The mixer of voices, on memory that the kernels use.
+
+    Commands come from any thread, frames are taken by one.
 
     Args:
         limited: whether the safety limiter is at work: for ears, not for files. It delays by `layout.AHEAD` frames.
@@ -176,7 +181,7 @@ class Mixer:
 
     @property
     def voices(self) -> list[Voice]:
-        """Those that have been handed over and are not over."""
+        """The voices that have been handed over and are not over."""
         with self._lock:
             return [voice for voice in self._voices if not voice.over]
 
@@ -195,7 +200,7 @@ class Mixer:
         return out.reshape(frames, channels)
 
     def set_volume(self, factor: float) -> None:
-        """Of everything; 1 leaves the samples as they are."""
+        """Set the volume of everything; 1 leaves the samples as they are."""
         self.memory[at.M_WANTED_VOLUME] = factor
 
     def sound_tone(self, side: str) -> None:
@@ -207,17 +212,17 @@ class Mixer:
 
     @property
     def frames(self) -> int:
-        """Of sound, given so far."""
+        """The frames of sound given so far."""
         return int(self._counts[at.M_FRAMES])
 
     @property
     def seconds(self) -> float:
-        """Of sound, given so far."""
+        """The seconds of sound given so far."""
         return float(self._counts[at.M_FRAMES]) / self.rate_hz
 
     @property
     def calls(self) -> int:
-        """Of the device's callback."""
+        """The number of calls of the device's callback."""
         return int(self._counts[at.M_CALLS])
 
     @property
@@ -226,7 +231,7 @@ class Mixer:
 
     @property
     def output_latency_s(self) -> float:
-        """From a voice to the loudspeaker: the limiter's delay, and from a callback to its first sample.
+        """The latency from a voice to the loudspeaker: the limiter's delay, and from a callback to its first sample.
 
         The latter is what the device said last; 0 where it says nothing, or what cannot be.
         """
@@ -246,7 +251,7 @@ class Mixer:
         return -20 * math.log10(gain)
 
     def new_gaps(self) -> list[Gap]:
-        """Those since this was asked for the last time; of very many only the latest."""
+        """The gaps since this was asked for the last time; of very many only the latest."""
         found, total = [], int(self._counts[at.M_GAPS])
         for number in range(max(self._gaps_read, total - at.GAPS), total):
             slot = at.M_GAP_LIST + number % at.GAPS * at.GAP_FIELDS

@@ -78,7 +78,7 @@ def render_voice(
     advanced: Callable[[float], None] = lambda share: None,
     until_db: float | None = None,
 ) -> NDArray[np.float32]:
-    """All of `voice_blocks` at once, (frames, points)."""
+    """The whole of `voice_blocks` at once, (frames, points)."""
     return np.concatenate(list(voice_blocks(program, source, info, pluck, ear, seconds, advanced, until_db)))
 
 

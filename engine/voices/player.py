@@ -58,7 +58,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Report:
-    """What became of a note.
+    """The report of what became of a note.
 
     Attributes:
         kind: BEGAN, ENDED or REFUSED of `constants`; for others than BEGAN only the first five count.
@@ -110,7 +110,7 @@ class Ringing:
 
 @dataclass(frozen=True)
 class Playing:
-    """How far a note is that was begun.
+    """The progress of a note that was begun.
 
     Attributes:
         began_frame: of the mixer; 0 until its voices have begun.
@@ -124,7 +124,7 @@ class Playing:
 
 @dataclass(frozen=True)
 class Channel:
-    """Where the wheels and pedals of a channel stand; `slide` and `range_semitones`: None where never moved.
+    """The wheels and pedals of a channel; `slide` and `range_semitones`: None where never moved.
 
     Tuning is in semitones and in 1/8192 of one.
     """
@@ -265,17 +265,17 @@ class CompiledPlayer:
             self.record["source_gains"][source] = gain
 
     def set_spares(self, spares: bool) -> None:
-        """Whether notes begin without voices of sources that are not heard: they cost nothing, and stay silent."""
+        """Set if notes begin without voices of sources that are not heard: these cost nothing, and stay silent."""
         self.record["spares"] = spares
 
     def source_gain(self, source: int) -> float:
-        """As it was set."""
+        """The gain of a source as it was set."""
         return float(self.record["source_gains"][source])
 
     # What there is
 
     def reports(self) -> list[Report]:
-        """Those since this was asked for the last time; of very many only the latest. One thread asks."""
+        """The reports since this was asked for the last time; of very many only the latest. One thread asks."""
         with self._lock:
             self._flush()
         total, found = int(self.record["reported"]), []
@@ -310,7 +310,10 @@ class CompiledPlayer:
         return found
 
     def _length_m(self, note: np.void, voice: NDArray[np.float64]) -> float | None:
-        """Of a note's string: where it glides to, times how far the first mode of a voice has still to go."""
+        """The length of a note's string in m.
+
+        It is its goal, times how far a voice's first mode has still to go.
+        """
         if note["drum"]:
             return None
         own = _string(note["string_now"])
@@ -322,7 +325,10 @@ class CompiledPlayer:
         return own.length_m * (own.undamped_frequency(1) / math.sqrt(present) if present > 0.0 else 1.0)
 
     def missing(self, ids: Iterable[int]) -> list[int]:
-        """Which of these notes have ended, where reports were missed; empty while events wait, or where none were."""
+        """The notes of these that have ended, where reports were missed.
+
+        Empty while events wait, or where none were missed.
+        """
         if not self.missed or self.waiting:
             return []
         self.missed = False
@@ -330,7 +336,7 @@ class CompiledPlayer:
         return [id for id in ids if id not in rings]
 
     def playing(self, report: Report) -> Playing | None:
-        """How far a note is that `report` says to have begun; None: it has ended. Any thread."""
+        """The progress of a note that `report` says to have begun; None: it has ended. Any thread."""
         note = self.record["notes"][report.note].copy()
         if note["state"] != of.RINGS or note["id"] != report.id:
             return None
@@ -344,13 +350,13 @@ class CompiledPlayer:
 
     @property
     def rests(self) -> bool:
-        """Whether it has nothing to play, and nothing rings."""
+        """Return True if it has nothing to play, and nothing rings."""
         rings = any(self.record["notes"]["state"] == of.RINGS)
         return not (rings or self.record["sympathy"]["rings"] or self.waiting)
 
     @property
     def over(self) -> bool:
-        """Whether all its voices are, also where no mixer plays its events any more."""
+        """Return True if all its voices are over, also where no mixer plays its events any more."""
         return not any(_alive(self._voices(number, note)) for number, note in enumerate(self._notes()))
 
     def release(self, seconds: float) -> None:
@@ -379,7 +385,7 @@ class CompiledPlayer:
         return int(self.record["wheel"]), int(self.record["wheel_by"])
 
     def channel(self, number: int) -> Channel:
-        """Where wheels and pedals of a channel stand."""
+        """The positions of a channel's wheels and pedals."""
         own = self.record["channels"][number].copy()
         slide, wide = int(own["slide"]), float(own["range_semitones"])
         legato, slides, harmonics, tremolo, strums = map(bool, own["switches"])
@@ -420,5 +426,5 @@ def _drawn(pluck: Pluck) -> tuple[float, float, float, int]:
 
 
 def _alive(voices: Iterable[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """Those that are not over."""
+    """The voices that are not over."""
     return [voice for voice in voices if voice.view(np.int64)[at.STATE] in (at.WAITING, at.SOUNDING)]

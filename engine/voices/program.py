@@ -48,7 +48,7 @@ class Program:
     _known: dict[Ear, tuple[Array, Array]] = field(default_factory=dict)
 
     def weights(self, ear: Ear) -> tuple[Array, Array]:
-        """As `read`, of a pair of listening points; remembered. Any thread may ask."""
+        """The weights of a pair of listening points, as `read`; remembered. Any thread may ask."""
         found = self._known.get(ear)
         if found is None:
             found = self.read(self.grid_weights(ear))
@@ -58,12 +58,12 @@ class Program:
         return found
 
     def grid_weights(self, ear: Ear) -> Array:
-        """As `Ear.weights`, for its string; displacement @ weights is the signal."""
+        """The weights on the grid for its string, as `Ear.weights`; displacement @ weights is the signal."""
         return ear.weights(self.grid_points, self.force)
 
     @property
     def rendered(self) -> bool:
-        """Whether somebody renders the samples of its voices."""
+        """Return True if somebody renders the samples of its voices."""
         return self.kind == at.RENDERED
 
     @property
@@ -72,7 +72,9 @@ class Program:
 
 
 def voice_ends_s(info: PresetInfo) -> float:
-    """When a pluck of a preset's model has ended for certain, in s; inf where its string has no losses.
+    """The time in s until a pluck of a preset's model has ended for certain.
+
+    It is inf where its string has no losses.
 
     The string itself is silent by then. A model need not be: one that was trained on a part of a second may settle to
     a hum of its own, and nothing it has learned makes it end. Latents that share a tension need no such end: their
@@ -89,7 +91,7 @@ def fits(omega: Array) -> Array:
 def packed(
     header_slots: int, reals: dict[int, float], wholes: dict[int, int], parts: dict[int, NDArray[np.generic]]
 ) -> Array:
-    """One array of a header and its parts, whose places the header gives."""
+    """Pack a header and its parts, whose places the header gives, in one array."""
     arrays: Sequence[NDArray[np.generic]] = [np.asarray(part).ravel() for part in parts.values()]
     first = header(header_slots, reals, wholes)
     memory = np.concatenate([first, np.zeros(sum(len(array) for array in arrays))])

@@ -35,7 +35,7 @@ FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
 def tension_program(
     weights: Mapping[str, Array], c: KoopmanTensionConfiguration, resonator: Resonator, rate_hz: int
 ) -> Program:
-    """What the model of many strings learned (its curves), for a resonator of any kind at any rate."""
+    """The program of what the model of many strings learned (its curves), for any kind of resonator at any rate."""
     return _with_modes(at.TENSION, tension_memory(weights, c, rate_hz), resonator, rate_hz)
 
 
@@ -46,7 +46,7 @@ def tension_memory(
     silence: float = HEARD_SILENCE,
     unheard: float = 0.0,
 ) -> Array:
-    """What the kernels read of the model, whatever the resonator.
+    """The memory that the kernels read of the model, whatever the resonator.
 
     Args:
         silence: of a mode, of all together, from which on the highest are laid to rest.
@@ -85,7 +85,7 @@ def solver_program(
 
 
 def solver_memory(rate_hz: int, coarser: int = HEARD_COARSER, silence: float = HEARD_SILENCE) -> Array:
-    """What the kernels read of the solver, as `tension_memory`."""
+    """The memory that the kernels read of the solver, as `tension_memory`."""
     reals = {
         at.T_SUBSTEPS: SUBSTEPS_IN_A_PERIOD / coarser,
         at.T_SILENCE: silence,
@@ -98,7 +98,7 @@ def solver_memory(rate_hz: int, coarser: int = HEARD_COARSER, silence: float = H
 
 
 def _with_modes(kind: int, memory: Array, resonator: Resonator, rate_hz: int, aliased: bool = False) -> Program:
-    """Of a kind whose voices move amplitudes of the resonator's modes."""
+    """The program of a kind whose voices move amplitudes of the resonator's modes."""
     omega = resonator.eigenvalues().imag  # it swings
     shapes, n = resonator.shapes, resonator.modes
     if not aliased:
@@ -127,14 +127,14 @@ def model_program(preset: Preset, rate_hz: int) -> Program:
 
 
 def rendered_program(info: PresetInfo, rate_hz: int) -> Program:
-    """For samples that are rendered ahead at the preset's own rate."""
+    """The program for samples that are rendered ahead at the preset's own rate."""
     force = info.resonator.force_weights
     return _samples_program(info.rate_hz, rate_hz, info.grid_points, voice_ends_s(info), force)
 
 
 @lru_cache(maxsize=4)
 def plain_program(rate_hz: int) -> Program:
-    """For samples of the device's own rate, which are played as they are."""
+    """The program for samples of the device's own rate, which are played as they are."""
     return _samples_program(rate_hz, rate_hz, 0, math.inf)
 
 

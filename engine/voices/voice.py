@@ -1,4 +1,4 @@
-"""One pluck of a program, as it rings."""
+"""A pluck of a program, as it rings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def possible_s(seconds: float) -> float | None:
 
 
 class Voice:
-    """Made and commanded by one thread, rendered by another: a command is heard within a quantum.
+    """A voice, made and commanded by one thread, rendered by another: a command is heard within a quantum.
 
     Args:
         displacement_m: at its release, (grid_points,), projected on the modes in use.
@@ -82,7 +82,7 @@ class Voice:
 
     @classmethod
     def of_samples(cls, program: Program, samples: NDArray[np.float32]) -> Voice:
-        """Of samples (frames, points) of full scale at the program's own rate, all of which are there."""
+        """The voice of samples (frames, points) of full scale at the program's own rate, all of which are there."""
         ear = Ear((0.5,) * samples.shape[1])
         voice = cls(program, np.full(3, FULL_SCALE_M), ear, 1.0, len(samples) / program.rate_hz, program.rate_hz)
         voice.append(samples)
@@ -95,11 +95,14 @@ class Voice:
 
     @property
     def over(self) -> bool:
-        """Whether it sounds no more and its memory may go."""
+        """Return True if it sounds no more and its memory may go."""
         return bool(self._counts[at.STATE] in (at.OVER, at.RUNAWAY))
 
     def refuse(self) -> None:
-        """It is over, and no mixer has it: it was not handed over, or its mixer is not in use any more."""
+        """End a voice that no mixer has.
+
+        It was not handed over, or its mixer is not in use any more.
+        """
         self._counts[at.STATE] = at.OVER
 
     @property
@@ -112,24 +115,24 @@ class Voice:
 
     @property
     def seconds(self) -> float:
-        """How long it has been ringing, as far as the device was given it."""
+        """The time for which it has been ringing, as far as the device was given it."""
         return float(self._counts[at.FRAME]) / self.program.rate_hz
 
     @property
     def starved_s(self) -> float:
-        """How long it had nothing to play."""
+        """The time for which it had nothing to play."""
         return float(self._counts[at.STARVED]) / self.program.rate_hz
 
     @property
     def struck_to_began_s(self) -> float | None:
-        """From the gesture to the callback that gave its first samples to the device; None: not known."""
+        """The time from the gesture to the callback that gave the device its first samples; None: not known."""
         if self._counts[at.BEGAN_FRAME] < 0 or not self.memory[at.STRUCK_S]:
             return None
         return possible_s(self.memory[at.BEGAN_S] - self.memory[at.STRUCK_S])
 
     @property
     def level_db(self) -> float:
-        """Of the loudest latent, or all of the string, in dB of full scale."""
+        """The level of the loudest latent, or of all of the string, in dB of full scale."""
         return float(self.memory[at.LOUDNESS]) * 20 / math.log(10)
 
     def set_struck(self, time_s: float) -> None:
@@ -141,20 +144,23 @@ class Voice:
         self.memory[at.WANTED_GAIN] = gain
 
     def start_with_gain(self, gain: float) -> None:
-        """Before it is handed over: it begins with this gain, without a fade."""
+        """Set the gain with which it begins, without a fade, before it is handed over."""
         self.memory[at.WANTED_GAIN] = self.memory[at.GAIN] = gain
         self.memory[at.GAIN_FROM] = self.memory[at.GAIN_TO] = gain
 
     def begin_at(self, frame: int) -> None:
-        """Before it is handed over: it begins at this frame of the mixer, or at once if that is past."""
+        """Set the frame of the mixer at which it begins; if that is past, at once.
+
+        Call this before it is handed over.
+        """
         self._counts[at.BEGIN_AT] = frame
 
     def release_at(self, frame: int) -> None:
-        """It fades out from the first quantum on that begins at this frame of the mixer or later; 0: it does not."""
+        """Fade it out from the first quantum that begins at this frame of the mixer or later; 0: do not."""
         self._counts[at.RELEASE_AT] = frame
 
     def fade_out_by(self, seconds: float) -> None:
-        """Before it is handed over: it has faded to silence by then, where it does not end earlier."""
+        """Fade it to silence by then, where it does not end earlier; call this before it is handed over."""
         end, fade = (round(each * self.program.rate_hz) for each in (seconds, FADE_S))
         if self._counts[at.ENDS_AT] + self._counts[at.ENDS_IN] > end:
             self._counts[at.ENDS_AT] = max(0, min(int(self._counts[at.ENDS_AT]), end - fade))
@@ -162,12 +168,12 @@ class Voice:
 
     @property
     def waits(self) -> bool:
-        """Whether it has not begun."""
+        """Return True if it has not begun."""
         return bool(self._counts[at.STATE] == at.WAITING)
 
     @property
     def began_frame(self) -> int:
-        """Of the mixer; 0 until then."""
+        """The frame of the mixer at which it began; 0 until then."""
         return max(0, int(self._counts[at.BEGAN_FRAME]))
 
     def release(self, seconds: float) -> None:
@@ -192,7 +198,7 @@ class Voice:
         return True
 
     def append(self, samples: NDArray[np.floating]) -> None:
-        """More of what a rendered voice reads, (frames, points) of full scale at its own rate."""
+        """Append samples that a rendered voice reads, (frames, points) of full scale at its own rate."""
         assert self._samples is not None
         ready = int(self._counts[at.READY])
         count = min(len(samples), len(self._samples) - ready)
@@ -215,15 +221,15 @@ class Voice:
         self._counts[at.LOOPED] = 1
 
     def begin_at_once(self) -> None:
-        """Before it is handed over: without the fade-in, as the string moves."""
+        """Begin it without the fade-in, as the string moves; call this before it is handed over."""
         self._counts[at.ATTACK] = 0
 
     def sound_through_effects(self) -> None:
-        """Before it is handed over: it sounds through the mixer's amplifier, body and room, as an instrument's do."""
+        """Send it through the mixer's effects: amplifier, body and room. Call this before it is handed over."""
         self._counts[at.OF_INSTRUMENT] = 1
 
     def never_ends(self) -> None:
-        """It continues when it has become silent: its renderer knows how long."""
+        """Let it continue when it has become silent: its renderer knows how long."""
         self.memory[at.SILENT] = -math.inf
 
     def end_here(self) -> None:
@@ -231,7 +237,7 @@ class Voice:
         self._counts[at.LENGTH] = max(1, self._counts[at.READY])
 
     def skip(self, seconds: float, mixer_memory: NDArray[np.float64]) -> None:
-        """Before it is handed over: lets it ring unheard for so long."""
+        """Let it ring unheard for so long; call this before it is handed over."""
         from engine.kernels.voice import forward
 
         forward(self.memory, mixer_memory, round(seconds * self.program.rate_hz))

@@ -90,7 +90,7 @@ def open_preset_of_string(
 
 
 def open_preset_to_render(name_or_path: str, string: str | None, rate_hz: int | None, modes: int | None) -> Preset:
-    """As `open_preset_of_string`, for a sound file of `rate_hz`: presets of one string keep their own rate.
+    """Open a preset as `open_preset_of_string`, to render at `rate_hz`: presets of one string keep their own rate.
 
     Raises:
         As `open_preset_of_string`.

@@ -18,7 +18,7 @@ WIDTH_WITHOUT_TERMINAL = 1000  # characters: no row of a table is wrapped
 
 
 class Report(Protocol):
-    """Called with the progress of a piece of work."""
+    """The report that receives the progress of a piece of work."""
 
     def __call__(self, share: float, text: str = "", left_s: float | None = None) -> None:
         """`share`: done, 0 … 1; `left_s`: the time left; None: it is estimated from the time taken so far."""

@@ -179,7 +179,7 @@ class _Measurement:
     report: Shares
 
     def of(self, split: str) -> dict[str, Any]:
-        """All figures of a split, by name."""
+        """The figures of a split, all by name."""
         from training.evaluate import errors_by_rise, evaluate_past_horizon
         from training.results import SHORT_HORIZON
 
@@ -302,7 +302,10 @@ def _on(preset: Preset, run: str) -> Preset:
 
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
-    """The data set of a preset, or of a run; for a string of many, of plucks as hard as the family's."""
+    """The data set of a preset, or of a run.
+
+    For a string of many, its plucks are as hard as the family's.
+    """
     from training.cell import load
     from training.configuration import DatasetConfiguration
     from training.row_errors import data_of

@@ -235,7 +235,7 @@ def print_column(column: str, of_column: dict[str, Any], strings: int, rate_hz: 
 
 
 def _tenth_second(first: Sequence[StringError], tenth: Sequence[StringError]) -> dict[str, Any]:
-    """Of those strings that still sound then."""
+    """The errors in the tenth second, of those strings that still sound then."""
     from training.family.errors import FamilyErrors
 
     pairs = [(early, late) for early, late in zip(first, tenth, strict=True) if late.sounds]

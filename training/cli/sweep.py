@@ -211,7 +211,7 @@ class Shown:
         say(f"{row.name}: {row.status}, {result} ({self.summary()})")
 
     def seconds_left(self) -> float | None:
-        """Until all runs have ended, if each takes as long as those so far; None: unknown."""
+        """The time until all runs have ended, if each takes as long as those so far; None: unknown."""
         under_way = self._last.values()
         whole = self._seconds + [progress.seconds + progress.seconds_left for progress in under_way]
         if not whole:

@@ -30,7 +30,7 @@ class Batch:
     target: Tensor
 
     def split(self, count: int) -> Iterator[Batch]:
-        """At most `count` trajectories at a time."""
+        """Split the batch into parts of at most `count` trajectories."""
         for initial, target in zip(self.initial.split(count), self.target.split(count), strict=True):
             yield Batch(initial, self.frames, target)
 
@@ -63,7 +63,7 @@ class TrainingData:
 
 
 def flips(count: int, generator: torch.Generator, device: torch.device) -> tuple[Tensor, Tensor]:
-    """Which trajectories are turned over, as a sign, and which are mirrored: (count, 1) each."""
+    """The random flips of trajectories: signs of those turned over, and True where mirrored, (count, 1) each."""
     coin = torch.randint(0, 2, (2, count, 1), generator=generator).to(device)
     return 1 - 2 * coin[0], coin[1] == 1
 
@@ -78,7 +78,7 @@ def batches(recipe: Recipe, count: int, epoch: int) -> tuple[Tensor, ...]:
 
 
 def _frames(recipe: Recipe, horizon: int, generator: torch.Generator) -> Tensor:
-    """Kept frames 1 … horizon, all or a random choice, ascending."""
+    """The frames that are kept of 1 … horizon, all or a random choice, ascending."""
     if not recipe.steps_per_batch or recipe.steps_per_batch >= horizon:
         return torch.arange(1, horizon + 1)
     count = recipe.steps_per_batch

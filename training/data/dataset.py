@@ -1,4 +1,4 @@
-"""Simulated trajectories, kept as modal amplitudes in a cache keyed by all that determines them.
+"""The simulated trajectories, kept as modal amplitudes in a cache keyed by all that determines them.
 
 The kept modes make the data band-limited, so 10 or 25 amplitudes hold a frame of 101 points exactly.
 """
@@ -74,7 +74,7 @@ def dataset_key(configuration: DatasetConfiguration) -> str:
 
 
 def dataset_folder(configuration: DatasetConfiguration, cache: Path | None = None) -> Path:
-    """Where the data set lies, or will."""
+    """The folder in which the data set lies, or will."""
     return (cache or default_cache()) / "datasets" / dataset_key(configuration)
 
 

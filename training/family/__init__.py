@@ -1,4 +1,4 @@
-"""One model, many strings: a distribution of strings, what is learned from them, and how well on others.
+"""The learning of one model from many strings: their distribution, what is learned, and how well on others.
 
 strings     which strings there are, and plucks of them
 motions     their true motions, cached

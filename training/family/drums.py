@@ -1,4 +1,6 @@
-"""Drums that no model has seen, and how well models of many strings play them: the same equation in two dimensions.
+"""The drums that no model has seen, and how well models of many strings play them.
+
+It is the same equation in two dimensions.
 
 Drums differ in kind, size, pitch, decay and blow. Half of the membranes are loaded by air. Decay rates scatter by
 20 % from mode to mode. Half of the blows are those of a mallet (speeds alone), half begin pressed down, at rest.
@@ -161,12 +163,12 @@ DrumPlayer = Callable[[StruckDrum, int], Blocks]
 
 
 def true_motion(struck: StruckDrum, rate_hz: int) -> Blocks:
-    """By the solver."""
+    """The true motion, by the solver."""
     return _solved(struck.resonator, struck, rate_hz)
 
 
 def linear_drum(struck: StruckDrum, rate_hz: int) -> Blocks:
-    """Without tension modulation, exactly."""
+    """The motion without tension modulation, exactly."""
     return _solved(replace(struck.resonator, coupling=np.zeros_like(struck.resonator.coupling)), struck, rate_hz)
 
 
@@ -183,7 +185,10 @@ def _solved(resonator: Resonator, struck: StruckDrum, rate_hz: int) -> Blocks:
 
 
 def model_player(model: StringModel[Any]) -> DrumPlayer:
-    """What was learned of strings, on drums. Raises ValueError: it learned one string, which its weights are."""
+    """The player of drums by what was learned of strings.
+
+    Raises ValueError: it learned one string, which its weights are.
+    """
     if not isinstance(model, KoopmanTension):
         raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
 
@@ -219,7 +224,7 @@ def untrained_player(how: str) -> DrumPlayer:
 
 @dataclass(frozen=True)
 class DrumError:
-    """Of one drum and player: relative squared errors over the surface in the first second and in the tenth.
+    """The errors of one drum and player over the surface: relative squared, in the first second and in the tenth.
 
     Attributes:
         tenth: None: not measured, or the drum is silent by then.
@@ -382,7 +387,10 @@ class DrumsRow:
 
 
 def summary(errors: Iterable[DrumError], player: str, rate_hz: int, seed: int) -> DrumsRow:
-    """Of one player's errors; `tenth_first` is the first second's mean of the drums that sound in the tenth."""
+    """The summary of one player's errors.
+
+    `tenth_first` is the first second's mean of the drums that sound in the tenth.
+    """
     of_player = [one for one in errors if one.player == player]
     own, slow = ([one for one in of_player if one.slow == kind] for kind in (False, True))
     worst = max(own, key=lambda one: one.first)

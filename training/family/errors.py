@@ -1,4 +1,4 @@
-"""How well models play strings of the family: the error on each string, over the whole of it."""
+"""The errors of models on strings of the family: on each string, over the whole of it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SCALE_M = 1e-3
 
 @dataclass(frozen=True)
 class StringError:
-    """Of one string and pluck.
+    """The error of one string and pluck.
 
     Attributes:
         rel_mse: relative squared error over the grid.
@@ -46,7 +46,7 @@ class StringError:
 
 @dataclass(frozen=True)
 class FamilyErrors:
-    """Of many strings, one at least."""
+    """The errors of many strings, one at least."""
 
     strings: tuple[StringError, ...]
 
@@ -60,12 +60,12 @@ class FamilyErrors:
 
     @property
     def processor_s(self) -> float:
-        """For a second of the middle one of the strings."""
+        """The processor's time for a second of motion: the median of the strings."""
         return statistics.median(one.processor_s for one in self.strings)
 
     @property
     def share_large(self) -> float:
-        """Of the strings, above `LARGE`."""
+        """The share of the strings with errors above `LARGE`."""
         return sum(one.rel_mse > LARGE for one in self.strings) / len(self.strings)
 
 
@@ -127,7 +127,10 @@ def rollout(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tens
 
 
 def by_rise(errors: Sequence[StringError], edges: Sequence[float]) -> list[tuple[tuple[float, float], FamilyErrors]]:
-    """Errors in ranges of the rise of tension; the last has both ends, and ranges without a string are left out."""
+    """The errors in ranges of the rise of tension.
+
+    The last has both ends, and ranges without a string are left out.
+    """
     found = []
     for low, high in pairwise(edges):
         inside = tuple(

@@ -36,7 +36,7 @@ class Case:
 
 @dataclass(frozen=True)
 class FitProgress:
-    """After a step: the geometric means of the errors in training and validation, frames in reach, time left."""
+    """The progress after a step: geometric means of training and validation errors, frames in reach, time left."""
 
     step: int
     steps: int

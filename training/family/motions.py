@@ -20,5 +20,5 @@ def solve(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
 
 
 def substeps_of(resonator: Resonator, rate_hz: int) -> int:
-    """Of the true motion in a frame."""
+    """The number of sub-steps of the true motion in a frame."""
     return max(1, -(-default_substeps(resonator, rate_hz) // SUBSTEP_DIVISOR))

@@ -25,7 +25,7 @@ CONFIGURATION = Path(__file__).parent / "studio_any_string.toml"
 
 @dataclass(frozen=True)
 class FamilyConfiguration:
-    """What a run is, all of it.
+    """The complete configuration of a run.
 
     Attributes:
         string: that the preset plays by default, with `modes`.

@@ -1,4 +1,7 @@
-"""The shelf: the strings that are shipped as files, each as a preset of its own with what was learned of many."""
+"""The shelf: the strings that are shipped as files.
+
+Each is a preset of its own with what was learned of many.
+"""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ FAMILY: dict[Column, StringFamily] = {
 
 @dataclass(frozen=True)
 class PluckedString:
-    """One string with all its modes below 20 kHz, and one pluck of it.
+    """A string with all its modes below 20 kHz, and a pluck of it.
 
     Attributes:
         amplitudes_m: at its release, float64 (modes,).
@@ -109,7 +109,7 @@ def string_of(pitch_hz: float, inharmonicity: float, t60_s: float, bright_t60_s:
 
 
 def displacement_m(plucked: PluckedString) -> Tensor:
-    """At its release, float64 (grid_points,)."""
+    """The displacement at its release, float64 (grid_points,)."""
     return torch.from_numpy(plucked.resonator.to_grid(plucked.amplitudes_m.numpy()))
 
 

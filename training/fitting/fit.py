@@ -45,7 +45,7 @@ class Diverged(RuntimeError):
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is: reported at the end of every epoch, and within long ones.
+    """The progress of a run, reported at the end of every epoch, and within long ones.
 
     Attributes:
         step, steps: optimiser's steps, done and in all.
@@ -117,7 +117,7 @@ def fit(
 
 @dataclass(frozen=True)
 class Seed:
-    """One of the trainings of `fit_seeds`; the arguments are those of `fit`."""
+    """A training of `fit_seeds`; the arguments are those of `fit`."""
 
     configuration: TrainingConfiguration
     run_folder: Path
@@ -210,7 +210,10 @@ class _UnderWay:
 
 
 def learning_rate_at(recipe: Recipe, share: float) -> float:
-    """Constant, or one cycle: a linear warm-up to the peak, then a cosine to zero. `share`: of the run, 0 … 1."""
+    """The learning rate: constant, or one cycle of a linear warm-up to the peak, then a cosine to zero.
+
+    `share`: of the run, 0 … 1.
+    """
     if recipe.schedule == "constant":
         return recipe.peak_learning_rate
     if share < recipe.warm_up:
@@ -284,7 +287,7 @@ class _Run:
 
     @property
     def _latent_steps(self) -> int:
-        """Those in which the encoder learns the fitted latents; until their end there is no prediction."""
+        """The number of steps in which the encoder learns the fitted latents; until then there is no prediction."""
         return min(self.recipe.latent_epochs, self.recipe.epochs) * self._per_epoch
 
     @property
@@ -450,7 +453,7 @@ class _Run:
 def _fit_at_once(
     configuration: TrainingConfiguration, dataset: Dataset, report: Callable[[Progress], None]
 ) -> FitResult:
-    """Of a model whose start is all there is."""
+    """Fit a model whose start is all there is."""
     started = time.monotonic()
     model, _ = begin(configuration, dataset)
     sums = evaluate_model(model, dataset, "validation", configuration.steps)

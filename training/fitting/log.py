@@ -28,7 +28,9 @@ class Epoch:
 
 
 def read_log(path: Path) -> list[Epoch]:
-    """The epochs of a log; a line that is not whole, or holds a figure that is not finite, is left out.
+    """The epochs of a log.
+
+    A line that is not whole, or holds a figure that is not finite, is left out.
 
     Raises:
         SchemaError: it is not a log.

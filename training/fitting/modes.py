@@ -28,7 +28,7 @@ AT_ONCE = 50  # trajectories
 
 @dataclass(frozen=True)
 class Modes:
-    """Of a data set's training split, in normalised units.
+    """The modes of a data set's training split, in normalised units.
 
     Attributes:
         shapes: (modes, grid_points), of mean square one half where they do not vanish.
@@ -44,7 +44,7 @@ class Modes:
 
 
 def known_modes(dataset: Dataset, steps: int) -> Modes:
-    """Those of the string: prior knowledge that the paper's models do not have."""
+    """The modes of the string: prior knowledge that the paper's models do not have."""
     c = dataset.configuration
     amplitudes = dataset.split("train")[:, : steps + 1].double() / dataset.scale_m
     linear = torch.from_numpy(c.resonator.eigenvalues() / c.rate_hz)
@@ -62,7 +62,7 @@ def known_modes(dataset: Dataset, steps: int) -> Modes:
 
 
 def found_modes(dataset: Dataset, steps: int) -> Modes:
-    """Those that the displacement shows, and nothing else.
+    """The modes that the displacement shows, and nothing else.
 
     Raises:
         ValueError: the motions are no sum of vibrating shapes, or not every frame is there.

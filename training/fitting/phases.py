@@ -76,7 +76,7 @@ def fit_phases(modes: Modes, seed: int) -> StringModes:
 
 
 def mean_motions(modes: Modes) -> StringModes:
-    """Of each mode the one exponential that is nearest to all its motions, each by its own start; no coupling."""
+    """Fit to each mode the one exponential nearest to all its motions, each by its own start; no coupling."""
     motions = modes.motions.numpy()
     frames, count = motions.shape[1:]
     mean = np.einsum("rtn,rn->tn", motions, motions[:, 0]) / np.sum(motions[:, 0] ** 2, axis=0)
@@ -94,7 +94,7 @@ def mean_motions(modes: Modes) -> StringModes:
 
 
 def _string_modes(found: list[Floats], slowest: float, modes: Modes) -> StringModes:
-    """As fitted; uncoupled where there is no κ."""
+    """The modes as fitted; uncoupled where there is no κ."""
     omega, sigma, real, imag = np.array(found)[:, :4].T
     count = len(found)
     coupling = np.array(found)[:, 4:] if len(found[0]) > 4 else np.zeros((count, count))
@@ -108,7 +108,10 @@ def _string_modes(found: list[Floats], slowest: float, modes: Modes) -> StringMo
 
 
 def _first_guess(motions: Floats, count: int) -> Floats:
-    """ω, σ, Re s, Im s and κ (count,) of the first frames: the frequency at which u(t+1) + u(t-1) = 2 cos ω u(t)."""
+    """The guess of ω, σ, Re s, Im s and κ (count,) from the first frames.
+
+    ω is the frequency at which u(t+1) + u(t-1) = 2 cos ω u(t).
+    """
     first = motions[:, : 4 * FIRST_FRAMES]
     now = first[:, 1:-1]
     cosine = np.sum(now * (first[:, 2:] + first[:, :-2])) / (2 * np.sum(now**2))

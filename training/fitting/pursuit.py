@@ -32,7 +32,7 @@ APART = 1e-3  # share of an exponential that no chosen one explains, at least
 
 @dataclass(frozen=True)
 class LatentFit:
-    """What the encoder shall yield for the training split.
+    """The goal of the encoder on the training split.
 
     Attributes:
         initial: displacement (count, grid_points) in normalised units.
@@ -104,7 +104,10 @@ class LatentFit:
         return self._of_prediction(errors[0])
 
     def _of_prediction(self, error: Tensor) -> Tensor:
-        """From the coordinates' mean square error: a mode's over the string is half its amplitude's."""
+        """The prediction's error, from the coordinates' mean square error.
+
+        A mode's error over the string is half its amplitude's.
+        """
         return (error * self.targets.shape[1] * self.unit**2 / 2).detach()
 
     @torch.no_grad()
@@ -209,7 +212,7 @@ def _pursuit(grid: Tensor, motions: Tensor, most: int) -> _Chain:
 
 
 def _share_out(gains: list[list[float]], size: int) -> list[int]:
-    """How many of its exponentials each mode gets, the greatest gains first: `size` in all, or all there are."""
+    """Share out exponentials to the modes, the greatest gains first: `size` in all, or all there are."""
     lengths = [0] * len(gains)
     for _ in range(min(size, sum(map(len, gains)))):
         open_modes = [mode for mode, chain in enumerate(gains) if lengths[mode] < len(chain)]

@@ -52,7 +52,7 @@ def _matrix(tensor: Tensor) -> Tensor:
 
 
 def _direction(state: dict[str, Tensor], gradient: Tensor) -> Tensor:
-    """What is subtracted for a learning rate of 1, of the gradient's shape."""
+    """The direction of a step at a learning rate of 1, to be subtracted, of the gradient's shape."""
     if not state:
         if not bool(gradient.isfinite().all()):  # it has no eigenvectors
             return torch.zeros_like(gradient)
@@ -86,7 +86,7 @@ def _covariances(gradient: Tensor) -> tuple[tuple[str, Tensor], tuple[str, Tenso
 
 
 def _refresh(state: dict[str, Tensor]) -> None:
-    """One step of the orthogonal iteration towards the eigenvectors of today's covariances."""
+    """Take one step of the orthogonal iteration towards the eigenvectors of today's covariances."""
     for axis, side in enumerate(("left", "right")):
         covariance, vectors = state[f"{side}_covariance"], state[f"{side}_vectors"]
         images = covariance @ vectors

@@ -1,4 +1,4 @@
-"""From a recording of one plucked note to its string: gate, partials, poles, physics, preset, report.
+"""The way from a recording of one plucked note to its string: gate, partials, poles, physics, preset, report.
 
     samples ─► Note (note) ─► reasons (gate) ─► Series (numbering) ─► Glide (glide)
             ─► LearnedNote (fit: poles, refine) ─► string and preset (physics, preset)

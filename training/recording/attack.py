@@ -1,4 +1,4 @@
-"""What a recording has at its attack and the learned note has not: contact, knock, and all that is no free vibration.
+"""The attack of a recording beyond the learned note: contact, knock, and all that is no free vibration.
 
 An instrument plays it as the noise of a stroke, before the body. So the body is taken out of it, by Wiener's filter.
 No error against the recording is stated with it.

@@ -40,7 +40,7 @@ class PoleState:
 
 @dataclass(frozen=True)
 class TakeState:
-    """What one take has of its own."""
+    """The part of the state that one take has of its own."""
 
     glide: tuple[float, ...]
     pitch: float

@@ -1,4 +1,4 @@
-"""From a note and its series to poles, amplitudes and glide."""
+"""The fit of poles, amplitudes and glide to a note and its series."""
 
 from __future__ import annotations
 
@@ -185,7 +185,7 @@ def _fit_of(note: Note, series: Series, first: Series, hz: Array, edges: Array, 
 
 
 def _learned(note: Note, series: Series, fit: Fit, intervals: dict[int, Spread]) -> LearnedNote:
-    """With its own pitch in its poles."""
+    """The learned note, with its own pitch in its poles."""
     higher = 1 + fit.glide.pitch
     poles = (replace(pole, s=pole.s * higher) if pole.partial else pole for pole in fit.every())
     glide = Glide(fit.glide.shares / higher)
@@ -264,7 +264,7 @@ def _add_pole(takes: Takes, number: int, residuals: Sequence[NDArray[np.complex1
 
 
 def _add_free(takes: Takes) -> None:
-    """One more pole that does not glide, where it takes most from what is left of one take."""
+    """Add a pole that does not glide, where it takes most from one take's residual."""
     tried = []
     for fit, weight in zip(takes.fits, takes.weights, strict=True):
         residual = fit.data - fit.model()

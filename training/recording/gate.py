@@ -53,7 +53,7 @@ LEAST_FILLED_DB = 20.0  # between partials, below them, half a second after the 
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that speaks against a recording, and the remedy.
+    """A reason against a recording, and the remedy.
 
     Attributes:
         kind: a short name for tables.
@@ -67,7 +67,7 @@ class Finding:
 
 
 def examine(samples: Array, note: Note, series: Series | None) -> tuple[Finding, ...]:
-    """All that speaks against a recording; empty: nothing does."""
+    """The findings against a recording; empty: nothing speaks against it."""
     found = [
         clipped(samples, note),
         already_playing(note),
@@ -157,7 +157,7 @@ def reverberant(note: Note, series: Series | None) -> Finding | None:
 
 
 def too_short(note: Note, series: Series | None) -> Finding | None:
-    """How long it stands out of its noise, and by how much."""
+    """The finding that a note rings too briefly, or stands too little above its noise; None: neither."""
     remedy = "let the note ring for two seconds or more"
     level = envelope(note.samples[note.onset :], note.rate_hz, 0.03)
     noise = np.sqrt(note.noise_power)

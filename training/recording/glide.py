@@ -50,7 +50,7 @@ class Glide:
         return t
 
     def cents(self, t: Array) -> Array:
-        """By how much the pitch lies above that of the end."""
+        """The pitch above that of the end, in cents."""
         return np.log1p(rate_basis(t) @ self.shares) / CENTS
 
 
@@ -77,7 +77,7 @@ def warped(samples: Array, rate_hz: int, glide: Glide) -> tuple[Array, Array]:
 
 
 def glide_of_phases(bands: list[tuple[float, float, NDArray[np.complex128]]]) -> Glide:
-    """From the phases of partials.
+    """The glide from the phases of partials.
 
     Args:
         bands: of each partial its frequency in Hz, the step in s, and its complex envelope at equal steps.

@@ -35,7 +35,10 @@ DRAWS = 400
 
 @dataclass(frozen=True)
 class Spread:
-    """95 % intervals of a partial: Hz at rest, σ in 1/s, dB of its level; `rest_cents`: of Hz, above its poles'."""
+    """The 95 % intervals of a partial: Hz at rest, σ in 1/s, dB of its level.
+
+    `rest_cents`: of Hz, above its poles'.
+    """
 
     hz: tuple[float, float]
     decay: tuple[float, float]
@@ -44,7 +47,7 @@ class Spread:
 
 
 def spreads(fit: Fit) -> dict[int, Spread]:
-    """By the number of each partial that has poles."""
+    """The spreads by the number of each partial that has poles."""
     residual = fit.data - fit.model()
     random = np.random.default_rng(0)
     own = {number + 1: polarisations([pole for pole in poles if pole.a]) for number, poles in enumerate(fit.poles)}
@@ -81,7 +84,7 @@ def _spread(
 
 
 def covariance(columns: Complex, residual: Complex) -> Array:
-    """Of the poles' numbers (n,), from their columns (bins, n), with what is left where it lies."""
+    """The covariance of the poles' numbers (n,), from their columns (bins, n), with what is left where it lies."""
     rows = real_rows(columns)
     scale = np.linalg.norm(rows, axis=0) + 1e-300
     inverse = np.linalg.pinv((rows / scale).T @ (rows / scale), rcond=1e-10, hermitian=True)
@@ -96,7 +99,10 @@ def covariance(columns: Complex, residual: Complex) -> Array:
 
 
 def figures_of(a: Complex, decay: Array, omega: Array) -> tuple[Array, Array, Array]:
-    """Of draws (draws, poles): mean frequency over the energy, σ of the same centre of energy, level in dB."""
+    """The figures of draws (draws, poles): mean frequency over the energy, σ, level in dB.
+
+    σ is that of one exponential with the same centre of energy.
+    """
     s = -decay + 1j * omega
     sums = s[:, :, None] + s[:, None].conj()
     pairs = a[:, :, None] * a[:, None].conj()

@@ -1,4 +1,4 @@
-"""Several recordings of one instrument: what they share, and what each adds.
+"""The combination of several recordings of one instrument: what they share, and what each adds.
 
 The first gives the string and the recorded note. Takes of its pitch share their poles (`fit.fit_takes`),
 and the medians of their partials' levels. Notes of every pitch share the smooth decay. So one take's accident does
@@ -23,7 +23,7 @@ from training.recording.report import figures
 
 
 def combined(learned: Sequence[Learned], settings: dict[str, Any]) -> RecordedString:
-    """What recordings add to the string of the first."""
+    """The additions of all recordings to the string of the first."""
     first = learned[0]
     note = recorded_note(first.note, first.fitted, first.source)
     own = recorded_string(note, first.physics, first.strung, first.source, settings, figures(first.report))

@@ -43,7 +43,7 @@ class NotFound(RecordingError):
 
 @dataclass(frozen=True)
 class Learned:
-    """All that is learned of one recording.
+    """The results learned from one recording.
 
     Attributes:
         findings: what speaks against the recording: warnings, and refusals that were overruled.
@@ -146,7 +146,7 @@ def _part(progress: Progress, done: float, share: float, of_part: float) -> None
 
 
 def usable(found: Examined, anyway: bool, name: str) -> tuple[Note, Series]:
-    """Its note and series. Raises Refused or RecordingError, which name its file."""
+    """The note and series of what was examined. Raises Refused or RecordingError, which name its file."""
     if found.refusals and not anyway:
         raise Refused(name, found.refusals)
     if found.series is None or not found.series.present:

@@ -1,4 +1,4 @@
-"""One recorded note: mono samples, where they begin, and their noise."""
+"""A recorded note: mono samples, where they begin, and their noise."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Note:
 
     @property
     def seconds(self) -> float:
-        """From the onset to the end."""
+        """The time from the onset to the end."""
         return (len(self.samples) - self.onset) / self.rate_hz
 
     def part(self, begin_s: float, end_s: float) -> Array:

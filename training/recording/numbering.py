@@ -1,4 +1,4 @@
-"""Which peaks of a spectrum are the partials of one stiff string: f_k = k f0 √(1 + B k²).
+"""The numbering of a spectrum's peaks as partials of one stiff string: f_k = k f0 √(1 + B k²).
 
 A global search over f0 and B, blind from 27 Hz to 4 kHz. Each candidate is scored by the peaks that it explains,
 and pays for partials that it predicts and the spectrum lacks; so neither an octave above nor one below wins.
@@ -82,7 +82,7 @@ class Peaks:
 
     @property
     def strength(self) -> Array:
-        """From 0 for one that barely stands out to 1."""
+        """The strength of each peak, from 0 for one that barely stands out to 1."""
         return np.clip((self.above_db - PRESENT_DB / 2) / (FULL_DB - PRESENT_DB / 2), 0.0, 1.0)
 
     @property
@@ -108,7 +108,7 @@ class Peaks:
 
 
 def distances(hz: Array, f0_hz: float, stiffness: float) -> Array:
-    """From each frequency to the nearest partial, in Hz."""
+    """The distances from each frequency to the nearest partial, in Hz."""
     k = np.maximum(1, np.round(_number(hz, f0_hz, stiffness)))
     return hz - k * f0_hz * np.sqrt(1 + stiffness * k**2)
 
@@ -122,7 +122,10 @@ def _number(hz: Array, f0_hz: float, stiffness: float) -> Array:
 
 
 def tolerance(hz: Array, f0_hz: float, width_hz: float) -> Array:
-    """How far a peak may lie from its partial: the resolution, and a share of the frequency, below the spacing."""
+    """The farthest that a peak may lie from its partial: the resolution, and a share of the frequency.
+
+    It stays below the spacing.
+    """
     return np.minimum(np.maximum(1.2 * width_hz, 0.006 * hz), 0.2 * f0_hz)
 
 

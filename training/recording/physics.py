@@ -1,4 +1,4 @@
-"""From a note's poles to its string: f0, B, decay over frequency, one product of glide, two polarisations.
+"""The physics of a note from its poles: f0, B, decay over frequency, one product of glide, two polarisations.
 
 A sound gives these and no more. Length, density and millimetres are a gauge: any of them may be chosen, and tension,
 area, moduli and amplitude follow. They are asked for, else assumed and marked.
@@ -36,7 +36,7 @@ LEAST_SHARE = 1e-8  # of the strongest partial's energy, for a partial whose dec
 
 @dataclass(frozen=True)
 class Build:
-    """What is assumed of a string that is only heard: its length, tension, and material."""
+    """The assumptions on a string that is only heard: its length, tension, and material."""
 
     length_m: float
     tension_n: float
@@ -54,7 +54,7 @@ BUILDS: dict[Kind, Build] = {
 
 @dataclass(frozen=True)
 class Partial:
-    """One partial of the note.
+    """A partial of the note.
 
     Attributes:
         hz: mean over its energy.
@@ -74,7 +74,7 @@ class Partial:
 
 @dataclass(frozen=True)
 class Physics:
-    """What the sound gives.
+    """The physics that the sound gives.
 
     Attributes:
         f0_hz, stiffness: with standard errors.
@@ -152,7 +152,10 @@ def _of_string(learned: LearnedNote, number: int) -> list[Pole]:
 
 
 def physics_of(learned: LearnedNote) -> Physics:
-    """Fits f0, B and the decay over frequency to a note's partials; those pulled by the body count little for it."""
+    """Fit f0, B and the decay over frequency to a note's partials.
+
+    Those pulled by the body count little for it.
+    """
     partials = partials_of(learned)
     k = np.array([each.number for each in partials], float)
     hz = np.array([each.hz for each in partials])
@@ -251,7 +254,7 @@ def _damping(physics: Physics, mass: float, length: float) -> tuple[float, float
 
 
 def pluck_place(physics: Physics) -> float:
-    """Where a triangle was pulled, below one half, by the comb of the partials' amplitudes; it is a guess.
+    """The place of a triangle's pluck, below one half, by the comb of the partials' amplitudes; it is a guess.
 
     Of places that fit nearly alike, that whose nodes cost the instrument least: it cannot make up for a node.
     """
@@ -274,7 +277,7 @@ def pluck_place(physics: Physics) -> float:
 
 
 def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[float, ...]]:
-    """What the note's partials add to the law of its string, as `engine.resonators.recorded` keeps it."""
+    """The corrections by the note's partials to the law of its string, as `engine.resonators.recorded` keeps them."""
     count = max(each.number for each in physics.partials)
     omega = string.undamped_frequencies(count)
     sigma = string.decay_rates(count)

@@ -29,7 +29,7 @@ BODY_RANGE_DB = 70.0
 
 @dataclass(frozen=True)
 class Source:
-    """Where a note comes from.
+    """The source of a note.
 
     Attributes:
         rate_hz, frames: of the file, before any conversion.
@@ -69,7 +69,7 @@ def recorded_string(
     settings: dict[str, Any],
     errors: dict[str, float],
 ) -> RecordedString:
-    """What the recording adds to the law of its string."""
+    """The additions of the recording to the law of its string."""
     own: dict[str, Any] = corrections(physics, strung.string)
     return RecordedString(
         pitch_hz=float(strung.string.undamped_frequency(1) / (2 * math.pi)),

@@ -41,7 +41,7 @@ MOST_DECAYS_APART = 8.0
 
 @dataclass(frozen=True)
 class Pole:
-    """One pole s = -σ + iω in 1/s with its amplitude: Re(a exp(s τ)); partial 0: free, Re(a exp(s t))."""
+    """A pole s = -σ + iω in 1/s with its amplitude: Re(a exp(s τ)); partial 0: free, Re(a exp(s t))."""
 
     s: complex
     a: complex = 0j
@@ -105,7 +105,7 @@ class Fit:
     # Spectra
 
     def spectra(self, pole: Pole, bins: slice, slope: bool = True) -> tuple[Complex, Complex]:
-        """Of exp(sτ) or exp(st), and of its derivative by s; each with that of the conjugate, (2, bins)."""
+        """The spectra of exp(sτ) or exp(st), and of its derivative by s, each with the conjugate's, (2, bins)."""
         if pole.partial == 0:
             return self._bent(pole, bins)
         both = np.array([[pole.s], [pole.s.conjugate()]]) / self.rate_hz
@@ -150,7 +150,7 @@ class Fit:
         return self.gliding() + self.free
 
     def free_bins(self) -> slice:
-        """Where the poles that do not glide are fitted."""
+        """The bins in which the poles that do not glide are fitted."""
         reach = max((pole.hz + 4 * pole.decay + 30 for pole in self.free), default=0.0)
         return slice(1, min(self.highest, max(2, round(reach / self.step_hz))))
 
@@ -191,7 +191,7 @@ class Fit:
         return float(np.vdot(residual, residual).real), solved, residual
 
     def columns(self, poles: list[Pole], where: slice) -> tuple[Complex, Complex]:
-        """Of Re a, Im a of each pole, and of log σ, ω: (bins, 2 poles) each."""
+        """The columns of Re a, Im a of each pole, and of log σ, ω: (bins, 2 poles) each."""
         linear, bent = [], []
         for pole in poles:
             value, slope = self.spectra(pole, where)

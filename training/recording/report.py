@@ -1,4 +1,4 @@
-"""How near a learned note is to its recording, in numbers that anybody can compute again.
+"""The errors of a learned note against its recording, in numbers that anybody can compute again.
 
 All are of the note as `render NAME out.wav --as-recorded` gives it, without any remainder of the attack.
 """
@@ -28,7 +28,7 @@ BANDS_HZ = (31.5, 63.0, 125.0, 250.0, 500.0, 1_000.0, 2_000.0, 4_000.0, 8_000.0)
 
 @dataclass(frozen=True)
 class Errors:
-    """Of one sound against another.
+    """The errors of one sound against another.
 
     Attributes:
         esr, late_esr: error-to-signal ratio after one gain and one delay, from 8 ms and from 50 ms after the onset.
@@ -47,7 +47,10 @@ class Errors:
 
 @dataclass(frozen=True)
 class Band:
-    """Decay of an octave: T60 of the recording and of the learned note, in s; nan where it does not decay."""
+    """The decay of an octave: T60 of the recording and of the learned note, in s.
+
+    It is nan where it does not decay.
+    """
 
     hz: float
     recorded_s: float
@@ -56,7 +59,7 @@ class Band:
 
 @dataclass(frozen=True)
 class PartialReport:
-    """One partial: at rest, with 95 % intervals.
+    """A partial at rest, with 95 % intervals.
 
     Attributes:
         cents: from the law of f0 and B.
@@ -78,7 +81,7 @@ class PartialReport:
 
 @dataclass(frozen=True)
 class Report:
-    """Of one learned note."""
+    """The report on one learned note."""
 
     errors: Errors
     noise_esr: float
@@ -119,7 +122,7 @@ def partials_in(learned: LearnedNote, physics: Physics) -> tuple[PartialReport, 
 
 
 def errors_of(truth: Array, found: Array, rate_hz: int, noise_power: float = 0.0) -> Errors:
-    """Of sounds of one length that begin 8 ms after the onset."""
+    """The errors between sounds of one length that begin 8 ms after the onset."""
     moved, gain, delay = aligned(truth, found, rate_hz)
     wrong = truth - moved
     late = round((LATE_S - FIT_BEGINS_S) * rate_hz)
@@ -134,7 +137,10 @@ def errors_of(truth: Array, found: Array, rate_hz: int, noise_power: float = 0.0
 
 
 def aligned(truth: Array, found: Array, rate_hz: float) -> tuple[Array, float, float]:
-    """`found` with the gain and the delay, below 2 ms, that leave the least; the gain, and the delay in s."""
+    """The sound `found` with the gain and the delay, below 2 ms, that leave the least.
+
+    Beside it the gain, and the delay in s.
+    """
     size = fft.next_fast_len(2 * len(truth), real=True)
     theirs, ours = fft.rfft(truth, size), fft.rfft(found, size)
     cross = fft.irfft(theirs * ours.conj(), size)
@@ -195,7 +201,10 @@ def bands_of(truth: Array, found: Array, rate_hz: int, noise_power: float) -> tu
 
 
 def _t60(sound: Array, rate_hz: int, noise_power: float) -> float:
-    """From the slope of the backward integral (Schroeder 1965) between -2 and -22 dB, or as far as its noise lets."""
+    """The T60 from the slope of the backward integral (Schroeder 1965).
+
+    It is taken between -2 and -22 dB, or as far as its noise lets.
+    """
     power = np.maximum(sound**2 - noise_power, -noise_power)
     left = np.cumsum(power[::-1])[::-1]
     if left[0] <= 0 or left[0] < 30 * noise_power * rate_hz * 0.05:

@@ -38,14 +38,14 @@ OWN = 0.5  # what a partial adds to its own glide, of what it adds to all
 
 @dataclass(frozen=True)
 class Rest:
-    """How far a partial's frequency at rest lies above that of its poles, in cents, and the standard error of it."""
+    """The interval from a partial's poles up to its frequency at rest, in cents, and its standard error."""
 
     cents: float
     error: float
 
 
 def at_rest(glide: Glide, poles: dict[int, list[Pole]]) -> dict[int, Rest]:
-    """By the number of each partial.
+    """The interval up to the frequency at rest, by the number of each partial.
 
     Args:
         poles: of each partial, with amplitudes.
@@ -79,7 +79,9 @@ def at_rest(glide: Glide, poles: dict[int, list[Pole]]) -> dict[int, Rest]:
 
 @lru_cache(maxsize=128)
 def share_of_tension(number: int) -> tuple[float, float]:
-    """Of a partial of a plucked string: mean and standard deviation over places of the pluck.
+    """The share that a plucked string's partial has of the tension.
+
+    Its mean and standard deviation are over places of the pluck.
 
     A triangle's partials have amplitudes ∝ sin(π k p)/k² and shares of the tension ∝ the squares of k times these.
     """

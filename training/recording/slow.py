@@ -1,4 +1,6 @@
-"""Decays that hardly show while they are fitted: what lies beyond the end of the fit must not ring for ever.
+"""The decays that hardly show while they are fitted.
+
+What lies beyond the end of the fit must not ring for ever.
 
 Two poles of a band can follow a slow change, of level or of pitch, with one of them that does not decay at all. Its
 decay is then unknown: its standard error is as large as itself. So each slow pole's log σ is averaged with that of a

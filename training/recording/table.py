@@ -1,4 +1,4 @@
-"""What is learned of a recording as plain data and as text."""
+"""The results learned from a recording, as plain data and as text."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from training.recording.report import figures
 
 
 def as_data(learned: Learned) -> dict[str, Any]:
-    """For JSON: file, gate, string with what is assumed, errors, partials, bands."""
+    """The data for JSON: file, gate, string with what is assumed, errors, partials, bands."""
     physics, report = learned.physics, learned.report
     return {
         "file": learned.source.name,
@@ -49,7 +49,7 @@ def as_data(learned: Learned) -> dict[str, Any]:
 
 
 def as_text(learned: Learned) -> list[str]:
-    """For people: a few lines, the most important first."""
+    """The text for people: a few lines, the most important first."""
     physics, errors = learned.physics, learned.report.errors
     lines = [
         f"{learned.source.name}: {physics.f0_hz:.2f} Hz, inharmonicity {physics.stiffness:.2e}, "

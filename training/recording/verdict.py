@@ -49,7 +49,7 @@ class Verdict:
 
     @property
     def words(self) -> str:
-        """One line for people."""
+        """The verdict for people, in one line."""
         errors = f"error {self.esr:.3f}, of two linear poles a partial {self.linear_esr:.3f}"
         partials = f"{self.near:.0%} of the loud partials on its law"
         if self.found:

@@ -1,4 +1,6 @@
-"""Weights with which the Fourier cells of `fno` are a string of known modes: where a training may set out from.
+"""The weights that make the Fourier cells of `fno` a string of known modes.
+
+A training may start from them.
 
 A Fourier convolution of a zero-padded field is any map that looks the same from every point: a kernel of lags for
 each pair of channels. A string is not the same at every point, so that its state is kept as numbers at single points
@@ -108,7 +110,7 @@ class Kernels:
 
     @torch.no_grad()
     def store(self, weight: Tensor, bias: Tensor) -> None:
-        """As the parameters of a `FourierConvolution`."""
+        """Store the kernels as the parameters of a `FourierConvolution`."""
         product = self._transformed(self.lags)
         weight.copy_(torch.stack([product.real, product.imag], dim=2))
         constant = self._transformed(torch.cat([self.bias, torch.zeros_like(self.bias)]))
@@ -125,7 +127,7 @@ class Kernels:
 
 
 def ends(modes: int, points: int, first: int) -> list[tuple[int, int]]:
-    """For each mode a channel, from `first` on, and an end of the grid."""
+    """The channel, from `first` on, and the end of the grid for each mode."""
     return [(first + mode // ENDS, (points - 1) * (mode % ENDS)) for mode in range(modes)]
 
 
@@ -139,7 +141,7 @@ HELD_DOWN = -300.0
 
 
 def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
-    """Its pointwise maps are 0. Couplings are left out.
+    """Wire an FRNN for the modes: its pointwise maps are 0, and couplings are left out.
 
     The state of a mode are its amplitude, which the field holds, and a number that is 0 at rest. Pairs of modes that
     share a channel are kept as sum and difference, so that one kernel turns both.
@@ -271,7 +273,7 @@ def wire_fgru(modes: StringModes, width: int) -> Wiring:
 
 @dataclass(frozen=True)
 class _Channels:
-    """What an FGRU's channels hold; `start` and all after it, the initial field.
+    """The channels of an FGRU by their contents; `start` and all after it, the initial field.
 
     `states` are copies of all modes' complex amplitudes, mode n's at point n: three of the real parts, which r shows
     by the cosine, the sine, and by one half, and three of the imaginary ones. From two copies of their amplitudes
@@ -304,7 +306,7 @@ def _turn(h: Kernels, own: tuple[int, ...], other: tuple[int, ...], sign: int, t
 def _follow_squares(
     h: Kernels, r: Kernels, modes: StringModes, channels: _Channels, at_end: list[tuple[int, int]]
 ) -> None:
-    """How far each mode turns in a sample: 2 Σ κ_nm q_m², whose mean over a period is Σ κ_nm |c_m|²."""
+    """Turn each mode in a sample by 2 Σ κ_nm q_m², whose mean over a period is Σ κ_nm |c_m|²."""
     count, points = modes.shapes.shape
     squares = modes.squares.mean(0)
     everyone, others, excess = shared_coupling(modes.coupling, modes.squares)
@@ -392,7 +394,10 @@ def _gates(modes: StringModes) -> tuple[Tensor, Tensor]:
 
 
 def _release(h: Kernels, r: Kernels, modes: StringModes, channels: _Channels, at_end: list[tuple[int, int]]) -> None:
-    """What the initial fields, which r shows through different windows, become in the one step that they last."""
+    """Start the states from the initial fields, in the one step that these last.
+
+    r shows these fields through different windows.
+    """
     count, points = modes.shapes.shape
     start = slice(channels.start, None)
     generator = torch.Generator().manual_seed(0)  # any windows do that have nothing in common

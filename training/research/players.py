@@ -1,4 +1,4 @@
-"""What plays strings of the family by the physics alone, untrained: rows beside those of learned models."""
+"""The untrained players of the family's strings, by the physics alone: rows beside those of learned models."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def untrained(how: str) -> Player:
 
 
 def knowing_physics() -> dict[str, Player]:
-    """By name what is untrained: it knows the string, and more or less of what its tension does."""
+    """The untrained players by name: each knows the string, and more or less of what its tension does."""
     return {
         "kicks without corrections": untrained("kicks"),
         "backward error analysis (1/12)": untrained("series"),

@@ -1,4 +1,4 @@
-"""What a sweep runs, as committed data: `plans/NAME.toml`.
+"""The plan of a sweep, as committed data: `plans/NAME.toml`.
 
 Blocks stand in the order of their value. Within one the seeds come first, so that every cell is there once before any
 is there twice; then the non-linear string before the linear one, and the short horizon before the long.
@@ -46,12 +46,12 @@ class Block:
 
     @property
     def count(self) -> int:
-        """Of its cells."""
+        """The number of its cells."""
         lists = (self.models, self.strings, self.initials, self.rates_hz, self.horizons, self.seeds)
         return math.prod(map(len, lists))
 
     def cells(self) -> Iterator[Cell]:
-        """In order of value; see the module."""
+        """The cells in order of value; see the module."""
         for seed in self.seeds:
             for string in sorted(self.strings, reverse=True):  # non-linear, linear
                 for horizon in sorted(self.horizons):

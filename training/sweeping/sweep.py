@@ -27,7 +27,7 @@ POLL_S = 1.0  # for workers that came or went
 
 @dataclass(frozen=True)
 class Options:
-    """How a plan is run.
+    """The options for the run of a plan.
 
     Attributes:
         results: the file; None: the plan's own, see `results_of`.
@@ -84,7 +84,7 @@ class Watch(Protocol):
         """An epoch is over."""
 
     def noted(self, event: Noted) -> None:
-        """Something worth a line."""
+        """A note is worth a line."""
 
     def finished(self, row: Row) -> None:
         """A run has ended, and its row is in the results file."""
@@ -101,7 +101,7 @@ def results_of(plan: Plan, runs: Path | None = None) -> Path:
 
 
 def is_finished(row: Row | None) -> bool:
-    """Whether a run needs no further work. One that diverged would do so again."""
+    """Return True if a run needs no further work. One that diverged would do so again."""
     return row is not None and row.status in ("done", "diverged")
 
 
@@ -112,7 +112,7 @@ def unfinished(plan: Plan, rows: Iterable[Row]) -> list[Run]:
 
 
 def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[Row]:
-    """Does what is unfinished of a plan, the most valuable first.
+    """Run what is unfinished of a plan, the most valuable first.
 
     Where it ends in time, runs under way are left with their checkpoints.
 

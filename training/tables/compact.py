@@ -1,4 +1,4 @@
-"""One table per horizon as Markdown: our error, the paper's, their ratio, and where training starts."""
+"""The table of each horizon as Markdown: our error, the paper's, their ratio, and where training starts."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def as_compact(rows: Sequence[Row], recipe: RecipeChoice = "all", metric: str = 
 
 
 def given(line: Line) -> str:
-    """What the start of a line's runs was given of the string, in words."""
+    """The knowledge of the string that a line's runs started from, in words."""
     if line.model == "dmd":
         return "fitted"
     words = STARTS.get(line.initialisation, line.initialisation) if line.structured else "displacement only"

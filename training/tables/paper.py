@@ -54,7 +54,7 @@ class Figure(NamedTuple):
 
     @property
     def total(self) -> float | None:
-        """Both together, as the root of the sum of their squares; None where neither is known."""
+        """The sum of both, as the root of the sum of their squares; None where neither is known."""
         known = [part for part in (self.deviation, self.split) if part is not None]
         return math.hypot(*known) if known else None
 
@@ -72,7 +72,7 @@ class Errors:
 
 @cache
 def paper_errors() -> dict[tuple[str, int, str, Column], Errors]:
-    """All that the paper has, by string, horizon, model and column."""
+    """The paper's errors, by string, horizon, model and column."""
     found = {}
     with PAPER.open(newline="", encoding="utf-8") as file:
         for line in csv.DictReader(file):
@@ -83,7 +83,10 @@ def paper_errors() -> dict[tuple[str, int, str, Column], Errors]:
 
 
 def mark(ours: Figure, paper: Figure) -> Mark:
-    """Equal: within one standard deviation of their difference, and never finer than the paper prints."""
+    """The mark of ours against the paper's.
+
+    Equal: within one standard deviation of their difference, and never finer than the paper prints.
+    """
     tolerance = max(math.hypot(ours.total or 0.0, paper.total or 0.0), PRINTED) * (1 + 1e-9)
     if abs(ours.mean - paper.mean) <= tolerance:
         return "equal"

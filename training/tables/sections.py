@@ -87,7 +87,7 @@ class Section:
         return self.string, self.horizon
 
     def paper(self, model: str, column: Column, metric: str) -> Figure | None:
-        """What the paper has there; None where it has nothing."""
+        """The paper's figure there; None where it has nothing."""
         found = paper_errors().get((self.string, self.horizon, model, column))
         return found.figure(metric) if found else None
 

@@ -29,7 +29,7 @@ def as_csv(rows: Sequence[Row], recipe: RecipeChoice = "all") -> str:
 
 
 def _lines(section: Section, model: str) -> Sequence[Line | None]:
-    """Those of a model; a single None where nothing was run."""
+    """The lines of a model; a single None where nothing was run."""
     return [line for line in section.lines if line.model == model] or [None]
 
 

@@ -20,7 +20,9 @@ LANDS = 0.03  # strength of what lands on a string at rest: an estimate
 
 @njit(**COMPILED)
 def landing(table: Table, note: Note) -> float:
-    """Strength of the noise of what lands on a note's string: its motion, over that of a stroke of the reference.
+    """The strength of the noise of what lands on a note's string.
+
+    It is the string's motion, over that of a stroke of the reference.
 
     A mechanism, whose noise follows nothing, falls alike on every string.
     """

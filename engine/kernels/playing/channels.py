@@ -93,19 +93,22 @@ def loudness_db(player: Player, mode: int, channel: int) -> float:
 
 @njit(**COMPILED)
 def is_master(mode: int, channel: int, other: int) -> bool:
-    """Whether "all notes off" and "reset all controllers" on a channel are meant for another: MPE's master's."""
+    """Return True if the channel is the other's master in MPE, or the other itself.
+
+    "All notes off" and "reset all controllers" on the channel are then meant for the other.
+    """
     return channel == other or (mode == of.MPE and channel == of.FIRST and other != of.ON_SCREEN)
 
 
 @njit(**COMPILED)
 def acts_on(mode: int, channel: int, other: int) -> bool:
-    """Whether wheel and pedal of a channel hold for what was struck on another."""
+    """Return True if wheel and pedal of a channel hold for what was struck on another."""
     return channel == other or (channel == of.FIRST and (mode == of.MPE or other == of.ON_SCREEN))
 
 
 @njit(**COMPILED)
 def pedal_down(player: Player, mode: int, channel: int) -> bool:
-    """Whether a pedal holds what was struck on a channel."""
+    """Return True if a pedal holds what was struck on a channel."""
     down = False
     for each in range(of.CHANNELS):
         down = down or (player.channels[each].pedal != 0 and acts_on(mode, each, channel))
@@ -114,7 +117,7 @@ def pedal_down(player: Player, mode: int, channel: int) -> bool:
 
 @njit(**COMPILED)
 def semitones(player: Player, mode: int, channel: int) -> float:
-    """How far pitch wheels bend what was struck on a channel, and how far it is tuned."""
+    """The bend by pitch wheels of what was struck on a channel, plus its tuning, in semitones."""
     total = 0.0
     for each in range(of.CHANNELS):
         if acts_on(mode, each, channel):
@@ -186,7 +189,7 @@ def set_parameter(player: Player, mode: int, number: int, controller: int, value
 
 @njit(**COMPILED)
 def _is_string(player: Player, table: Table, channel: int) -> bool:
-    """Whether a channel is one string of a guitar. The first one is, once another string has played."""
+    """Return True if a channel is one string of a guitar. The first one is, once another string has played."""
     if table.mode != of.GUITAR:
         return False
     count = of.GUITAR_STRINGS
@@ -200,7 +203,10 @@ def _is_string(player: Player, table: Table, channel: int) -> bool:
 
 @njit(**COMPILED)
 def place_of(player: Player, table: Table, event: Event) -> int:
-    """Which string of the instrument the note of an event has; 256 (n + 1): string n of a set, which was given."""
+    """The string of the instrument that an event's note has.
+
+    256 (n + 1): string n of a set, which was given.
+    """
     channel, string = event.channel, event.string
     if _is_string(player, table, channel):
         return 256 * (channel + 1)
@@ -243,14 +249,14 @@ def release_key(player: Player, channel: int, key: int) -> None:
 
 @njit(**COMPILED)
 def release_keys(player: Player, channel: int) -> None:
-    """No key of a channel is down."""
+    """Release all keys of a channel."""
     for key in range(of.KEYS):
         release_key(player, channel, key)
 
 
 @njit(**COMPILED)
 def switched(player: Player, mode: int, channel: int, which: int) -> bool:
-    """Whether a footswitch, by its number, holds for a channel."""
+    """Return True if a footswitch, by its number, holds for a channel."""
     down = False
     for each in range(of.CHANNELS):
         down = down or (player.channels[each].switches[which] != 0 and acts_on(mode, each, channel))

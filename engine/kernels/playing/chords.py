@@ -28,7 +28,7 @@ def _height(player: Player, table: Table, event: Event) -> int:
 
 @njit(**COMPILED)
 def _strums_in(player: Player, table: Table, event: Event) -> int:
-    """Frames from string to string of a chord that the note of an event is in; 0: notes begin as they come."""
+    """The frames from string to string of the chord of an event's note; 0: notes begin as they come."""
     note_on = event.kind == of.NOTE_ON and event.value > 0.0
     channel = event.channel
     by_hand = event.position > 0.0
@@ -41,14 +41,14 @@ def _strums_in(player: Player, table: Table, event: Event) -> int:
 
 @njit(**COMPILED)
 def _continues(player: Player, frame: int) -> bool:
-    """Whether a note that comes at a frame belongs to the latest chord."""
+    """Return True if a note that comes at a frame belongs to the latest chord."""
     since = frame - player.chord_began
     return player.chord != 0 and 0 <= since <= slots.frames(player, CHORD_S)
 
 
 @njit(**COMPILED)
 def _goes_up(player: Player, table: Table) -> bool:
-    """Whether the next strum goes from the highest note to the lowest."""
+    """Return True if the next strum goes from the highest note to the lowest."""
     strokes = round(keys.value_of(player, table, of.STROKES))
     return strokes == of.UP or (strokes == of.ALTERNATE and player.next_up != 0)
 
@@ -131,7 +131,10 @@ def strum(player: Player, table: Table, event: Event, now: int) -> bool:
 
 @njit(**COMPILED)
 def waits(player: Player, event: Event, now: int) -> bool:
-    """Puts what is meant for a note behind it where that waits for its turn in a chord; whether it does."""
+    """Put what is meant for a note behind it where that waits for its turn in a chord.
+
+    Returns True if it does.
+    """
     id, channel, key = event.id, event.channel, event.key
     by_id = id != 0 and event.kind in (of.TUNE, of.CHOKE)
     for place in range(player.queued):

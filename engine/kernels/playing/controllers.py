@@ -1,4 +1,4 @@
-"""What controllers of MIDI do."""
+"""The effects of MIDI controllers."""
 
 from __future__ import annotations
 

@@ -130,7 +130,7 @@ def _handle(player: Player, mixers: np.ndarray, event: Event) -> None:
 
 @njit(**COMPILED)
 def _superseded(event: Event, following: Event) -> bool:
-    """Whether an event moves a wheel, and the one that follows it at once moves the same: a burst costs one glide."""
+    """Return True if an event and the next move the same wheel: a burst costs one glide."""
     kind, key = event.kind, event.key
     same = kind == following.kind and key == following.key
     if not same or event.channel != following.channel:

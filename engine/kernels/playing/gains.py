@@ -1,4 +1,4 @@
-"""How loud a key is: the gain that makes all keys equally loud, found from the sound of each."""
+"""The gains that make all keys equally loud, found from the sound of each."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ def forget_gains(player: Player) -> None:
 
 @njit(**COMPILED)
 def _sound(player: Player, table: Table, key: int, string: int) -> int:
-    """Fills the sound of a key at the reference velocity, see `loudness`; how many modes it has, 0: it is silent.
+    """Fill the sound of a key at the reference velocity, see `loudness`.
+
+    Returns how many modes it has; 0: it is silent.
 
     The modulation wheel and the mute do not count: what they change is heard as louder or softer.
     """
@@ -122,7 +124,9 @@ def _look_at_peaks(player: Player, table: Table) -> None:
 
 @njit(**COMPILED)
 def gain_of(player: Player, table: Table, key: int, string: int) -> float:
-    """The factor that makes a key as loud as others on a string of a set, -1: the one that it chooses.
+    """The factor that makes a key as loud as others on a string of a set.
+
+    -1: the string that the key chooses.
 
     Beside it is kept how far that string swings.
     """

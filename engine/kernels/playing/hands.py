@@ -95,7 +95,9 @@ def _move_others(
 
 @njit(**COMPILED)
 def hammer_on(player: Player, table: Table, event: Event, frame: int, now: int) -> bool:
-    """Lets a key have the latest note that is held on its channel, where legato is on; whether it has one.
+    """Give a key the latest note that is held on its channel, where legato is on.
+
+    Returns True if it has one.
 
     Where the event gives a string, only a note on that string.
     """
@@ -140,7 +142,10 @@ def _pull_off(
     frame: int,
     now: int,
 ) -> bool:
-    """Gives the note of a released key to the highest key that is down and has none; whether there is one."""
+    """Give the note of a released key to the highest key that is down and has none.
+
+    Returns True if there is one.
+    """
     channel, before = note.channel, note.key
     if not channels.switched(player, table.mode, channel, of.LEGATO):
         return False
@@ -183,7 +188,10 @@ def note_off(
 
 @njit(**COMPILED)
 def _is_meant(event: Event, note: Note) -> bool:
-    """Whether an event is for a note: of its number, channel and key, as far as they are given."""
+    """Return True if an event is for a note.
+
+    Its number, channel and key count as far as they are given.
+    """
     id, channel, key = event.id, event.channel, event.key
     if note.state != of.RINGS or (id != 0 and note.id != id):
         return False

@@ -16,7 +16,7 @@ USUAL_HARMONIC = 2.0  # of its footswitch where the parameter is off: an estimat
 
 @njit(**COMPILED)
 def value_of(player: Player, table: Table, which: int) -> float:
-    """One of the instrument's values, as the modulation wheel turns it."""
+    """The instrument's value of that number, as the modulation wheel turns it."""
     value, wheel = player.values[which], player.wheel
     if wheel != 0 and table.wheel == which:
         return value + wheel / 127 * (table.wheel_goal - value)
@@ -25,7 +25,7 @@ def value_of(player: Player, table: Table, which: int) -> float:
 
 @njit(**COMPILED)
 def mute_of(player: Player, table: Table, channel: int) -> float:
-    """How far a hand mutes what was struck on a channel, 0 … 1."""
+    """The strength of a hand's mute on what was struck on a channel, 0 … 1."""
     share = value_of(player, table, of.MUTE)
     for each in range(of.CHANNELS):
         if channels.acts_on(table.mode, each, channel):
@@ -42,7 +42,10 @@ def technique_of(
     switch: int,
     usual: float,
 ) -> float:
-    """The value of a technique for a channel; the usual one where its footswitch is down and the value is off."""
+    """The value of a technique for a channel.
+
+    It is the usual one where its footswitch is down and the value is off.
+    """
     value, off = value_of(player, table, which), 1.0 if which == of.HARMONIC else 0.0
     if value <= off and channels.switched(player, table.mode, channel, switch):
         return usual
@@ -51,7 +54,7 @@ def technique_of(
 
 @njit(**COMPILED)
 def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
-    """At 1 over how much of its length a string is touched as it is plucked; 0: it is not."""
+    """The n of a string that is touched at 1/n of its length as it is plucked; 0: it is not."""
     switch = of.HARMONICS
     node = round(technique_of(player, table, channel, of.HARMONIC, switch, USUAL_HARMONIC))
     return node if 1 < node <= partials else 0
@@ -59,7 +62,10 @@ def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
 
 @njit(**COMPILED)
 def chosen(table: Table, count: int, key: int) -> int:
-    """Which string of a set, from the highest, 0, a key chooses: the highest at or below it, else the lowest."""
+    """The string of a set, from the highest, 0, that a key chooses.
+
+    It is the highest at or below the key, else the lowest.
+    """
     for number in range(count):
         if table.open[number].note <= key:
             return number
@@ -76,7 +82,9 @@ def string_of(
     wheeled: bool,
     out: np.ndarray,
 ) -> tuple[int, float]:
-    """The string of a key, before bends: its partials, 0 where there is none, and its share of the whole string.
+    """The string of a key, before bends.
+
+    Returns its partials, 0 where there is none, and its share of the whole string.
 
     Args:
         number: on which of a set it is played, from the highest, 0; -1, or one that would have to be slackened too
@@ -111,14 +119,17 @@ def string_of(
 
 @njit(**COMPILED)
 def has_octave(table: Table, key: int, number: int) -> bool:
-    """Whether the course of a key has octave strings, on a string of a set; -1: on the one that the key chooses."""
+    """Return True if a key's course has octave strings, on a string of a set.
+
+    -1: on the string that the key chooses.
+    """
     count, octaves = table.strings, table.octaves
     return octaves > 0 and (number if number >= 0 else chosen(table, count, key)) >= count - octaves
 
 
 @njit(**COMPILED)
 def pitch_of(table: Table, key: int) -> float:
-    """Of a note; 0: its key is silent."""
+    """The pitch of a key in Hz; 0: it is silent."""
     if not table.low <= key <= table.high:
         return 0.0
     return table.pitches_hz[key]
@@ -126,7 +137,10 @@ def pitch_of(table: Table, key: int) -> float:
 
 @njit(**COMPILED)
 def string_now(player: Player, table: Table, note: Note, out: np.ndarray) -> None:
-    """The string of a note with the present knobs, wheels and damper; where there is none, it stays as it is."""
+    """Write the string of a note with the present knobs, wheels and damper.
+
+    Where there is none, it stays as it is.
+    """
     key, mode = note.key, table.mode
     pitch_hz, fits = pitch_of(table, key), True
     if pitch_hz > 0.0:

@@ -36,7 +36,7 @@ COURSES_VARY = 0.5  # by how much detuning varies from key to key, at most
 
 @njit(**COMPILED)
 def report(player: Player, kind: int, id: int, channel: int, key: int, frame: int, velocity: float) -> Report:
-    """One more report, for what else is in it. `reported` publishes it."""
+    """The next report, for the caller to complete. `reported` publishes it."""
     made = player.reports[player.reported % of.REPORTS]
     made.kind = kind
     made.id = id
@@ -191,7 +191,7 @@ def note_on(player: Player, table: Table, mixers: np.ndarray, event: Event, memb
 
 @njit(**COMPILED)
 def _identify(player: Player, table: Table, event: Event, member: int, note: Note) -> None:
-    """Whose note it is, and on which string it is played."""
+    """Set the note's identity, and the string that it is played on."""
     note.state, note.held = of.RINGS, 1
     note.id, note.channel, note.key = event.id, event.channel, event.key
     note.velocity, note.frame, note.member = event.value, event.frame, member
@@ -273,7 +273,7 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
 
 @njit(**COMPILED)
 def _keep_of_table(player: Player, table: Table, note: Note) -> None:
-    """What a note keeps of the table that it was struck by."""
+    """Keep in a note what it needs of the table that it was struck by."""
     key, member = note.key, note.member
     note.detuning, note.aperture_m = table.detuning, table.aperture_m
     note.points, note.solo = table.points, table.solo
@@ -328,7 +328,10 @@ def _take_place(player: Player, table: Table, note: Note) -> None:
 
 @njit(**COMPILED)
 def _begin_voices(player: Player, mixers: np.ndarray, event: Event, note: Note) -> None:
-    """Hands the voices of a note to the mixer; those that have no room there, or that nobody hears, are over."""
+    """Hand the voices of a note to the mixer.
+
+    Those that have no room there, or that nobody hears, are over.
+    """
     for source in range(of.MOST_SOURCES):
         address = note.voices[source]
         if address == 0:

@@ -32,7 +32,9 @@ def pull(
     peak_m: float,
     width: float,
 ) -> float:
-    """The amplitudes of the modes of a pluck, and its highest point in m: its shape on the grid, then sines.
+    """The amplitudes of the modes of a pluck, and its highest point in m.
+
+    They come from its shape on the grid, then sines.
 
     Those of a blow are divided by its width, the shape's area over its height; `release_pluck` does the rest.
     """

@@ -33,7 +33,7 @@ def voice_over(address: int) -> bool:
 
 @njit(**COMPILED)
 def over(note: Note) -> bool:
-    """Whether all voices of a note are."""
+    """Return True if all voices of a note are over."""
     for source in range(of.MOST_SOURCES):
         address = note.voices[source]
         if address != 0 and not voice_over(address):
@@ -43,7 +43,7 @@ def over(note: Note) -> bool:
 
 @njit(**COMPILED)
 def sounds(note: Note) -> bool:
-    """Whether a note has its place and rings."""
+    """Return True if a note has its place and rings."""
     return note.state == of.RINGS and note.has_place == 1 and not over(note)
 
 

@@ -20,7 +20,7 @@ from engine.levels import FULL_SCALE_M, FULL_SCALE_N, LEAST_PEAK_M, RUNAWAY_FACT
 
 @njit(**COMPILED)
 def weight_of(own: np.ndarray, partial: int, place: float, aperture_m: float) -> float:
-    """What an amplitude of 1 m of a partial is at a listening point, re full scale, averaged over an aperture."""
+    """The level at a listening point of a partial's amplitude of 1 m, re full scale, averaged over an aperture."""
     if place == of.BRIDGE:
         return strings.bridge_force(own, partial) / FULL_SCALE_N
     half = math.pi * partial * aperture_m / (2 * own[of.LENGTH])
@@ -30,7 +30,10 @@ def weight_of(own: np.ndarray, partial: int, place: float, aperture_m: float) ->
 
 @njit(**COMPILED)
 def _weigh(player: Player, voice: np.ndarray, which: int, note: Note) -> None:
-    """Sets one of the two sets of weights of a voice for the points of its note; modes too high are not heard."""
+    """Set one of the two sets of weights of a voice for the points of its note.
+
+    Modes too high are not heard.
+    """
     n, solo, pairs = note.modes, note.solo, note.pairs
     own, highest = note.own, TOO_HIGH * player.rate_hz
     for mode in range(n):
@@ -96,7 +99,10 @@ def make_voice(
     note: Note,
     source: int,
 ) -> None:
-    """A voice of the modes of a note's own string, which sets out with the amplitudes of a pluck: as `Voice`."""
+    """A voice of the modes of a note's own string: as `Voice`.
+
+    It sets out with the amplitudes of a pluck.
+    """
     voice, counts, rate_hz, n = reals(address), wholes(address), player.rate_hz, note.modes
     for slot in range(at.state(n) + at.TRUTH_ROWS * n):
         voice[slot] = 0.0
@@ -135,7 +141,7 @@ def make_voice(
 
 @njit(**COMPILED)
 def swing_m(note: Note) -> float:
-    """How far a note's string swings now: the root of its modes' summed squares. 0: it is over."""
+    """The swing of a note's string now: the root of its modes' summed squares. 0: it is over."""
     for source in range(of.MOST_SOURCES):
         address = note.voices[source]
         if address == 0 or slots.voice_over(address):
@@ -248,7 +254,7 @@ def take_out(mixers: np.ndarray, address: int) -> None:
 
 @njit(**COMPILED)
 def lag_of(player: Player, table: Table, member: int) -> int:
-    """Frames from the stroke of a string of a course to its beginning, in step with the first; 0: at once."""
+    """The frames from the stroke of a course's string to its beginning, in step with the first; 0: at once."""
     later = round(member * table.apart_s * player.rate_hz)
     return -later % at.QUANTUM if table.bridge > 0.0 else 0
 

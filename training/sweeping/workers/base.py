@@ -1,4 +1,4 @@
-"""What workers are given, what they tell, and the contract of all of them."""
+"""The contract of all workers: what they are given, and what they report."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ DEATHS = 3  # of processes that a task survives; Dask's own default
 
 
 class WorkersError(RuntimeError):
-    """No workers can be had, or they are gone; the message says which and the remedy."""
+    """A lack of workers: none can be had, or they are gone; the message says which and the remedy."""
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,7 @@ class Progressed:
 
 @dataclass(frozen=True)
 class Noted:
-    """Something that a person may want to know of a run."""
+    """A note on a run for a person."""
 
     name: str
     text: str
@@ -89,18 +89,18 @@ Event = Progressed | Noted | Ended
 
 
 class Workers(Protocol):
-    """What carries out tasks."""
+    """The workers that carry out tasks."""
 
     description: str
 
     def capacity(self) -> int:
-        """How many tasks can be under way at present."""
+        """The number of tasks that can be under way at present."""
 
     def start(self, task: Task) -> None:
         """Begins a task, or lets it wait for the next worker that is free."""
 
     def next(self, timeout_s: float) -> Event | None:
-        """What happened next; None where nothing did in time.
+        """The next event; None where nothing happened in time.
 
         Raises:
             WorkersError: the workers are gone.
@@ -108,5 +108,5 @@ class Workers(Protocol):
 
 
 def given_up(times: int) -> str:
-    """Why a task is given up."""
+    """The reason for giving up a task."""
     return f"its worker died {times} times; too little memory, or a fault in a library"

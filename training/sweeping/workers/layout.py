@@ -1,4 +1,4 @@
-"""How many workers fit this machine, and how each process is set up."""
+"""The number of workers that fit this machine, and the set-up of each process."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def fitted(
 
 
 def _memory_bytes() -> int:
-    """Of this machine; without bound where it is unknown."""
+    """The memory of this machine; without bound where it is unknown."""
     try:
         return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):

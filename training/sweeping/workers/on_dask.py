@@ -24,7 +24,7 @@ CONNECT_S = 10.0  # to a scheduler
 
 
 def open_to_anybody(address: str) -> bool:
-    """Whether a scheduler's address says that it neither encrypts nor asks who is there."""
+    """Return True if a scheduler's address says that it neither encrypts nor asks who is there."""
     return not address.startswith("tls://")
 
 

@@ -1,4 +1,4 @@
-"""What a worker does with a task, in its own process, and how the sweep's process reads its report."""
+"""The work on a task in a worker's own process, and the reading of its report by the sweep's."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _one_at_a_time = threading.Lock()  # a worker of several threads still trains on
 
 
 def perform(plain: Mapping[str, Any], tell: Callable[[dict[str, Any]], None]) -> dict[str, Any]:
-    """Does a written `Task` in this process: {"rows": …}, its own first, or {"error": text} where it failed.
+    """Perform a written `Task` in this process: {"rows": …}, its own first, or {"error": text} where it failed.
 
     Args:
         tell: is given plain data that `event_of` reads.
@@ -97,7 +97,7 @@ def _runs(task: Task) -> Path:
 
 
 def _leave_if_broken(device: str) -> None:
-    """Ends this process if its CUDA device has faulted: nothing later would work in it, and a new one replaces it."""
+    """End this process if its CUDA device has faulted: nothing later would work, and a new process replaces it."""
     if device == "cpu":
         return
     import torch

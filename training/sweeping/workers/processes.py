@@ -20,7 +20,7 @@ from training.sweeping.workers.performing import end_of, event_of, perform
 
 @dataclass
 class _Place:
-    """Where one process works after another."""
+    """A place where one process works after another."""
 
     environment: Mapping[str, str]
     process: Any = None  # a spawned one; its class has no public name
