@@ -40,7 +40,7 @@ class Picture:
 
     @property
     def signed(self) -> bool:
-        """Whether it shows displacements with their signs, and not magnitudes."""
+        """Return True if it shows displacements with their signs, and not magnitudes."""
         return self.detail != "envelope"
 
     def at(self, time_s: float, place: float) -> float | None:
@@ -125,7 +125,7 @@ def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], c
 
 
 def detail_for(take: Take, times_s: tuple[float, float], columns: int) -> Detail:
-    """What a column shows where `times_s` is drawn in so many columns."""
+    """The detail of a column where `times_s` is drawn in so many columns."""
     column_s = (times_s[1] - times_s[0]) / columns
     if column_s * take.picture_hz <= 1:
         return "frames"

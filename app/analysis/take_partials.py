@@ -29,7 +29,7 @@ WINDOWS = {"trained": "as trained", "past": "past it", "all": "all of it"}
 
 @dataclass(frozen=True)
 class PartialRow:
-    """One mode in one window; None: there is no such figure. Differences are the model's minus the truth's.
+    """A mode in a window. None: there is no such figure. Differences are the model's minus the truth's.
 
     Attributes:
         mode: from 1.

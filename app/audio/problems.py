@@ -20,7 +20,7 @@ class ProblemKind(StrEnum):
 
 @dataclass(frozen=True)
 class AudioProblem:
-    """One fault: what happened, the remedy, and the system's own words (`detail`, "" where there are none)."""
+    """A fault: what happened, the remedy, and the system's own words (`detail`, "" where there are none)."""
 
     kind: ProblemKind
     message: str
@@ -32,7 +32,7 @@ class AudioProblem:
 
 
 class AudioUnavailable(Exception):
-    """No sound output can be used at present; pictures and export continue."""
+    """The error that no sound output can be used at present; pictures and export continue."""
 
     def __init__(self, problem: AudioProblem) -> None:
         super().__init__(str(problem))

@@ -239,7 +239,10 @@ def _next_chunk(file: BinaryIO, after: int, size: int, byte_order: str) -> int:
 
 
 def _likelihood(file: BinaryIO, place: int, byte_order: str) -> int:
-    """How likely a chunk begins at a place: 0, without a name; by its size and what follows; 4, of a known name."""
+    """The likelihood, 0 … 4, that a chunk begins at a place.
+
+    It is 0 without a name, 4 with a known one, else by its size and what follows.
+    """
     header = _bytes_at(file, place, 8)
     if len(header) < 8 or not _is_name(header[:4]):
         return 0
@@ -257,7 +260,7 @@ def _is_name(name: bytes) -> bool:
 
 
 def _chunks_follow(file: BinaryIO, at: int, end: int, byte_order: str) -> bool:
-    """Whether the rest of a file is chunks, so that there are no samples."""
+    """Return True if the rest of a file is chunks, so that there are no samples."""
     for _ in range(_MOST_CHUNKS):
         header = _bytes_at(file, at, 8)
         if len(header) < 8 or not _is_name(header[:4]):

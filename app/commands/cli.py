@@ -116,7 +116,7 @@ def carry_out(commands: typer.Typer, arguments: Sequence[str] | None, name: str)
 
 
 def is_file_name(word: str) -> bool:
-    """Whether a word has a folder or an ending, as no command and no option has."""
+    """Return True if a word has a folder or an ending, as no command and no option has."""
     separators = {os.sep, os.altsep or os.sep}
     return not word.startswith("-") and bool(Path(word).suffix or separators & set(word))
 

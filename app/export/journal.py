@@ -152,7 +152,7 @@ class Journal:
 
 
 def left_journals(folder: Path) -> list[Journal]:
-    """Those of processes that are no more, the oldest first; this process has them from now on."""
+    """The journals of processes that are no more, the oldest first; this process has them from now on."""
     try:
         paths = sorted(path for path in folder.glob(f"*{SUFFIX}") if path.is_file())
     except OSError:
@@ -178,7 +178,7 @@ def _changes(before: Any, after: Any, *path: str) -> Iterator[tuple[list[str], A
 
 @dataclass
 class _Read:
-    """What the lines so far say. Each is checked, as of any file."""
+    """The content of the lines so far. Each is checked, as of any file."""
 
     where: str
     recorded: datetime | None = None

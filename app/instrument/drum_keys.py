@@ -60,7 +60,7 @@ class DrumKey:
 
     @property
     def pitch_hz(self) -> float:
-        """Of its first mode, at rest."""
+        """The pitch of its first mode, at rest."""
         return float(math.sqrt(self.modes.omega[0] ** 2 - self.modes.sigma[0] ** 2) / math.tau)
 
     def rise(self, velocity: float, curve: float = 0.0) -> float:
@@ -70,7 +70,7 @@ class DrumKey:
         return float(resonator.relative_tension_rise(speeds / self.modes.omega)) / 2
 
     def drop_cents(self, velocity: float, curve: float = 0.0) -> float:
-        """By how much the pitch of the first mode falls after a blow."""
+        """The cents by which the pitch of the first mode falls after a blow."""
         return 600 * math.log2(1 + self.rise(velocity, curve))
 
 
@@ -82,7 +82,7 @@ def on_the_drum(played: PlayedDrum, place: tuple[float, float]) -> tuple[float, 
 
 
 class DrumKeys:
-    """Of one patch of drums, heard at `ear`; see `StringKeys`. Modes of a drum are remembered."""
+    """The keys of a patch of drums, heard at `ear`; see `StringKeys`. Modes of a drum are remembered."""
 
     polarisations = None
 

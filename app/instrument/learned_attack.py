@@ -79,13 +79,13 @@ def with_attack(patch: Patch, preset: Preset, note: Note, f0_hz: float, level_db
 
 
 def _body_impulse(patch: Patch) -> Array | None:
-    """Of the body alone, (frames,) at RESPONSE_HZ; None: it has none."""
+    """The impulse response of the body alone, (frames,) at RESPONSE_HZ; None: it has none."""
     effects = effects_of(patch)
     return None if effects is None else replace(effects, room=None).impulse(RESPONSE_HZ)[:, 0]
 
 
 def _mean_square(sound: Array, rate_hz: int) -> float:
-    """After K-weighting."""
+    """The mean square of a sound after K-weighting."""
     hz = np.fft.rfftfreq(2 * len(sound), 1 / rate_hz)
     heard = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(sound, 2 * len(sound))) ** 2
     return float(heard.sum()) / len(sound) / len(sound)

@@ -58,7 +58,7 @@ class MidiFileError(ValueError):
 
 @dataclass(frozen=True)
 class Song:
-    """What a patch plays of a MIDI file.
+    """The part of a MIDI file that a patch plays.
 
     Attributes:
         left_out: what it does not play, in one line; "" for nothing.
@@ -130,7 +130,7 @@ def _events_of(path: Path, messages: MidiMessages) -> list[TimedEvent]:
 
 
 def _ignored(messages: MidiMessages) -> list[str]:
-    """In words, which messages change nothing here."""
+    """The messages that change nothing here, in words."""
     found = []
     if messages.missing_tracks:
         found.append(f"{_count(messages.missing_tracks, 'track')} that its header counts")
@@ -155,7 +155,9 @@ def _count(count: int, noun: str) -> str:
 
 
 def read_song(path: Path, patch: Patch | None) -> Song:
-    """What a patch plays of a MIDI file: strings leave drums out, and drums on pads all else; and keys without sound.
+    """Read the events of a MIDI file that a patch plays.
+
+    Strings leave out drums, and drums on pads all else. Keys without sound are left out too.
 
     In MPE channel 10 is one as the others. In guitar mode a file whose notes are all on one channel is no guitar's,
     whichever channel that is: it plays any key.
@@ -202,7 +204,7 @@ def _listed(words: Sequence[str]) -> str:
 
 
 def _silent(patch: Patch, keys: Sequence[int]) -> int:
-    """For how many of these keys a patch has no string."""
+    """The number of these keys for which a patch has no string."""
     strings, known = Strings(patch), dict.fromkeys(keys, False)
     for key in known:
         with contextlib.suppress(ValueError):  # an impossible string is reported when it is struck

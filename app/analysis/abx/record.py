@@ -87,7 +87,7 @@ class AbxRecord(BaseModel):
 
     @property
     def verdict(self) -> str:
-        """What follows from the result, in a sentence."""
+        """The conclusion from the result, in a sentence."""
         if self.p_value is None:
             return "The test was not completed, so no p-value can be given."
         if self.p_value < LEVEL:

@@ -32,7 +32,7 @@ class PluginExport:
         return self.path.parent
 
     def replaces(self) -> str:
-        """What is there and would be replaced, in words; "": nothing. Raises PluginError: it must not be."""
+        """The plug-in that would be replaced, in words; "": nothing. Raises PluginError: it must not be."""
         if not self.path.exists():
             return ""
         lost = lost_with(self.path, {identifier(self.patch.name)})
