@@ -17,7 +17,7 @@ from engine.voices import Ear
 
 
 class StringKeys:
-    """Of one patch, heard at `ear`, played by a preset. The compiled player computes their gains.
+    """The keys of a patch, heard at `ear`, played by a preset. The compiled player computes their gains.
 
     Args:
         near: keys of nearly the same patch, of which the body's curves are taken instead, in no time.
@@ -52,7 +52,7 @@ class StringKeys:
 
 
 def polarisations_of(patch: Patch, preset: PresetInfo) -> Polarisations | None:
-    """Those of a patch; None: its strings move in one direction, or as a recording says."""
+    """The polarisations of a patch. None: its strings move in one direction, or as a recording says."""
     chosen = patch.polarisations
     return None if chosen is None or preset.recorded is not None else Polarisations(**chosen.model_dump())
 

@@ -61,7 +61,7 @@ class PluckRange:
 
     @classmethod
     def of(cls, info: PresetInfo | None) -> PluckRange:
-        """What a preset was trained on, so that every key sounds as learned."""
+        """The range that a preset was trained on, so that every key sounds as learned."""
         if info is None:
             return cls()
         low, high = info.trained_range.position or ANYWHERE

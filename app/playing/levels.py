@@ -21,7 +21,7 @@ MOST_WAITING = 8
 
 
 class Levels:
-    """For any thread.
+    """The levels of notes' sources, for any thread.
 
     Args:
         in_background: does work in another thread.
@@ -34,7 +34,7 @@ class Levels:
         self._waiting: set[tuple[object, ...]] = set()
 
     def of(self, note: Note) -> Mapping[str, float] | None:
-        """By source, the gain; None: not known yet."""
+        """The gain by source; None: not known yet."""
         return self._known.get(note.matching_key) if note.match is None else note.match
 
     def ask(self, note: Note, rate_hz: int, found: Callable[[tuple[object, ...], Mapping[str, float]], None]) -> None:

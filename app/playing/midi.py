@@ -46,12 +46,12 @@ class MidiChoices(BaseModel):
         return {field: number for field, number in controllers.items() if not fixed_function(number)}
 
     def learned(self, field: str, controller: int) -> MidiChoices:
-        """These choices with `controller`, which has no `fixed_function`, assigned to `field`, and to no other."""
+        """Assign `controller`, which has no `fixed_function`, to `field` and to no other, in a copy of these choices."""
         others = {f: c for f, c in self.controllers.items() if f != field and c != controller}
         return MidiChoices.model_validate({**self.model_dump(), "controllers": {**others, field: controller}})
 
     def forgotten(self, field: str) -> MidiChoices:
-        """These choices with no controller assigned to `field`."""
+        """Copy these choices with no controller assigned to `field`."""
         others = {f: c for f, c in self.controllers.items() if f != field}
         return self.model_copy(update={"controllers": others})
 

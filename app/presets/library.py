@@ -48,22 +48,25 @@ class PresetEntry:
 
     @cached_property
     def parameters(self) -> int:
-        """How many the model has. Raises PresetError: the description is of an impossible model."""
+        """The number of the model's parameters. Raises PresetError: the description is of an impossible model."""
         return described_parameters(self.path, self.info)
 
     @property
     def own(self) -> bool:
-        """Whether it is the user's, not shipped with the program."""
+        """Return True if it is the user's, not shipped with the program."""
         return self.path.parent == user_folder()
 
     @property
     def studio(self) -> bool:
-        """Whether it is a studio preset (full bandwidth, for playing), which are listed before research presets."""
+        """Return True if it is a studio preset (full bandwidth, for playing).
+
+        Those are listed before research presets.
+        """
         return self.name.startswith(STUDIO)
 
     @property
     def title(self) -> str:
-        """As listed, in one line; the user's own are marked, so that a copy differs from the shipped one."""
+        """The title as listed, in one line. The user's own are marked, so that a copy differs from the shipped one."""
         title = one_line(self.info.title, LONGEST_TITLE)
         return f"{title} (yours)" if self.own else title
 

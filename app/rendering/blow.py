@@ -52,7 +52,7 @@ class BlowRequest:
     ear: Ear
 
     def same_motion(self, other: object) -> bool:
-        """Whether model and truth move alike: only listening points may differ."""
+        """Return True if model and truth move alike: only listening points may differ."""
         if not isinstance(other, BlowRequest):
             return False
         own, others = (
@@ -137,7 +137,7 @@ class ModalMotion:
 
 
 class BlowErrors:
-    """How far the model is from the truth over the whole surface, in windows of two periods of the lowest mode.
+    """The errors of the model over the whole surface, in windows of two periods of the lowest mode.
 
     Attributes:
         ready: windows so far.
@@ -161,7 +161,7 @@ class BlowErrors:
 
     @property
     def rel_mse(self) -> float:
-        """Of all frames so far; not a number where the truth rests."""
+        """The relative error of all frames so far; not a number where the truth rests."""
         wrong, true = self._total
         return float(wrong / true) if true > 0 else math.nan
 
@@ -190,7 +190,7 @@ class BlowErrors:
 
 
 class BlowTake:
-    """One blow: motion, sound and errors of model and truth, which grow while they are rendered.
+    """The motion, sound and errors of model and truth of a blow, which grow while they are rendered.
 
     Attributes:
         head: the drum's shapes on a grid.
@@ -231,12 +231,12 @@ class BlowTake:
 
     @property
     def partials_hz(self) -> Array:
-        """At rest, (modes,)."""
+        """The frequencies of the partials at rest, (modes,)."""
         return np.asarray(self.request.modes.omega / math.tau)
 
     @property
     def full_scale(self) -> float:
-        """What is 0 dB, in Pa."""
+        """The pressure of 0 dB, in Pa."""
         return FULL_SCALE_PA
 
     @property

@@ -1,4 +1,4 @@
-"""One pluck that the worker renders: the motions and signals of its sources, block by block."""
+"""A pluck that the worker renders: the motions and signals of its sources, block by block."""
 
 from __future__ import annotations
 

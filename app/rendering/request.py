@@ -1,4 +1,4 @@
-"""What the render worker is asked to do, and the listener that it reports to."""
+"""Requests to the render worker, and the listener that it reports to."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class RenderRequest:
     others: tuple[Path, ...] = ()
 
     def same_motion(self, other: object) -> bool:
-        """Whether model and truth move alike: only listening points, slow motion or other presets may differ."""
+        """Return True if model and truth move alike. Only listening points, slow motion or other presets may differ."""
         return isinstance(other, RenderRequest) and (self.preset, self.pluck, self.seconds) == (
             other.preset,
             other.pluck,
@@ -48,7 +48,7 @@ class RenderListener(Protocol):
         """A new pluck or blow has its first block."""
 
     def take_finished(self, take: Take | BlowTake) -> None:
-        """Its motion, signals and errors are complete."""
+        """Report that its motion, signals and errors are complete."""
 
     def other_failed(self, preset: str, message: str) -> None:
         """Another preset's model cannot be rendered beside this one; as a source it is at rest."""
