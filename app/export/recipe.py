@@ -74,7 +74,7 @@ class InstrumentSound(BaseModel):
 
     @property
     def words(self) -> str:
-        """Its description, for people."""
+        """The description for people."""
         what, when = ("rendering", "") if self.recorded is None else ("recording", f", {self.recorded[:10]}")
         return f"a {what} of {self.instrument} ({source_words(self.source, self.difference_gain_db)}{when})"
 

@@ -81,7 +81,10 @@ class Tuning:
         return float(2 ** np.interp(note, *self._table))
 
     def mapped(self, key: int) -> bool:
-        """Return True if the keyboard mapping gives the key a pitch of its own. Keys that are left out stay silent."""
+        """Return True if the keyboard mapping gives the key a pitch of its own.
+
+        Keys that are left out stay silent.
+        """
         import numpy as np
 
         return self._table is None or bool(np.isin(key + self._transpose, self._table[0]))

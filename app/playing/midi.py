@@ -46,7 +46,7 @@ class MidiChoices(BaseModel):
         return {field: number for field, number in controllers.items() if not fixed_function(number)}
 
     def learned(self, field: str, controller: int) -> MidiChoices:
-        """Assign `controller`, which has no `fixed_function`, to `field` and to no other, in a copy of these choices."""
+        """Copy these choices with `controller`, which has no `fixed_function`, assigned to `field` alone."""
         others = {f: c for f, c in self.controllers.items() if f != field and c != controller}
         return MidiChoices.model_validate({**self.model_dump(), "controllers": {**others, field: controller}})
 

@@ -66,7 +66,10 @@ class PresetEntry:
 
     @property
     def title(self) -> str:
-        """The title as listed, in one line. The user's own are marked, so that a copy differs from the shipped one."""
+        """The title as listed, in one line.
+
+        The user's own are marked, so that a copy differs from the shipped one.
+        """
         title = one_line(self.info.title, LONGEST_TITLE)
         return f"{title} (yours)" if self.own else title
 

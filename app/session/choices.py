@@ -91,7 +91,7 @@ class Choices(Monitor, Listener, PluckedString):
 
     @property
     def plays_patch(self) -> bool:
-        """Return True if the instrument is a patch, whose keys are pitches; otherwise they are places along a string."""
+        """Return True if the instrument is a patch, whose keys are pitches; else keys are places along a string."""
         return isinstance(self.instrument, Patch)
 
     @property

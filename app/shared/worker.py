@@ -31,7 +31,7 @@ class Progress(Protocol):
 
 
 class Job:
-    """One piece of work under way.
+    """A piece of work under way.
 
     Args:
         say: is called in the worker's thread with the job, a signal's name and its arguments.

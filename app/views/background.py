@@ -40,7 +40,7 @@ class Background(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether the latest job has been started and its end has not arrived yet."""
+        """Return True if the latest job has been started and its end has not arrived yet."""
         return self._job is not None
 
     def start(self, work: Work) -> None:

@@ -31,7 +31,7 @@ class Blows:
 
     @property
     def settled(self) -> bool:
-        """Whether motion and signals are complete, so that views need not look for more."""
+        """Return True if motion and signals are complete, so that views need not look for more."""
         asked, take = self._asked, self.shown.take
         return asked is None or (
             take is not None and take.complete and take.request.same_motion(asked[0]) and take.listened.complete

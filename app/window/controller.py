@@ -1,4 +1,4 @@
-"""Where everything is connected: session, performance, sound, panels and window.
+"""The controller, which connects everything: session, performance, sound, panels and window.
 
     widgets ── intents ──► session ── changed ──► controller ──► performance, sound, panels, widgets
     a timer ── 60 times a second, 10 when all is still ──► the panels that can be seen, meter
@@ -239,7 +239,7 @@ class Controller(QObject):
             self.session.play_patch()
 
     def _connect_actions(self) -> None:
-        """What the menu and its shortcuts do; the window itself does the rest."""
+        """Connect the actions of the menu and its shortcuts; the window itself does the rest."""
         window, session = self.window, self.session
         does: dict[str, Callable[[], object]] = {
             "record": self.patches.recordings.record,

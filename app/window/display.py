@@ -1,4 +1,4 @@
-"""Whether there is a screen to open a window on: Qt would end the process where there is none."""
+"""A check for a screen to open a window on: Qt would end the process where there is none."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import suppress
 
 
 class NoDisplay(RuntimeError):
-    """There is no screen. The message says what to do."""
+    """The error that there is no screen. The message says what to do."""
 
 
 def check_display() -> None:

@@ -176,7 +176,7 @@ class Instruments(QObject):
         return min(max(drums.drums[0].note, low), high)
 
     def shown_key(self, patch: Patch) -> tuple[int, int | None]:
-        """Whose string is shown: the key that was struck last, on its string, or the middle of the patch's range."""
+        """The key whose string is shown: the one struck last, on its string, or the middle of the patch's range."""
         (low, high), latest = patch.range, self.latest_key
         return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
 
@@ -333,5 +333,5 @@ def _key_of(patch: Patch, string: StringParameters) -> tuple[int, int | None] | 
 
 
 def _same(value: float, other: float) -> bool:
-    """Within rounding, for the player computes strings too."""
+    """Return True if values are equal within rounding, for the player computes strings too."""
     return math.isclose(value, other, rel_tol=1e-6)

@@ -43,7 +43,7 @@ class PresetDesk(BrowserDesk):
         self.show()
 
     def choice_changed(self) -> None:
-        """To be called when another preset is chosen."""
+        """Show the chosen preset; to be called when another one is chosen."""
         self._show_bar()
         self.show_chosen()
 

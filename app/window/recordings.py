@@ -1,4 +1,4 @@
-"""What is played through the patch is recorded; what is not saved yet is kept, in memory and on disk."""
+"""Recordings of what is played through the patch. Unsaved ones are kept, in memory and on disk."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Recordings(QObject):
 
     @property
     def unsaved(self) -> bool:
-        """Whether anything was played that is not saved, or is being recorded."""
+        """Return True if anything was played that is not saved, or is being recorded."""
         return bool(self._unsaved) or self._keys.recorder.recording
 
     def record(self) -> None:
@@ -83,7 +83,7 @@ class Recordings(QObject):
             self.forget(latest)
 
     def forget(self, played: Played) -> None:
-        """It is written, or not wanted."""
+        """Forget a recording that is written, or not wanted."""
         if played in self._unsaved:
             journal = self._unsaved.pop(played)
             if journal is not None:

@@ -13,7 +13,7 @@ _BEGUN = re.compile(r"([A-Ga-g][#♯b♭]?-?\d?|\d{0,3})", re.ASCII)
 
 
 class NoteBox(CountBox):
-    """Its value is the MIDI number of the key."""
+    """A number box whose value is the MIDI number of the key."""
 
     def __init__(self, name: str, tip: str) -> None:
         super().__init__()

@@ -69,7 +69,7 @@ def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object =
 
 
 def faint(text: str = "") -> QLabel:
-    """One line of text in the faint colour."""
+    """A line of text in the faint colour."""
     made = Label(text)
     made.setObjectName("faint")
     return made
@@ -121,7 +121,7 @@ def lay_out_view(
 
 
 def lay_out_alone(view: QWidget, part: QWidget) -> None:
-    """One part that takes all room."""
+    """Lay out one part that takes all room."""
     column = QVBoxLayout(view)
     column.setContentsMargins(0, 0, 0, 0)
     column.addWidget(part)

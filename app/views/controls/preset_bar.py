@@ -1,4 +1,4 @@
-"""Which preset: previous, next, its name, which opens the browser, and its facts in a line.
+"""The choice of a preset: previous, next, its name, which opens the browser, and its facts in a line.
 
 Previous and next go through the browser's list. While that is filtered, a button beside them says so and clears it.
 """

@@ -129,7 +129,7 @@ class TransportBar(QFrame):
         self._play.setText(words[0] if self._tight else words)
 
     def _show_verb(self, verb: str) -> None:
-        """What the button does with string or drum."""
+        """Show the action of the button on string or drum."""
         if verb != self._verb:
             self._verb = verb
             self._play.setAccessibleName(f"{verb} or stop")

@@ -282,7 +282,7 @@ class LearnDialog(GrowingDialog):
         self.state.setText(words)
 
     def may_close(self) -> bool:
-        """Whether nothing would be lost, or the user agrees to that."""
+        """Return True if nothing would be lost, or the user agrees to that."""
         if self._background.busy and self._against is not None:
             question = "The string is being learned. A learning that is stopped continues the next time."
             return ask(self, "Stop learning?", question, CONTINUE, STOP) == STOP

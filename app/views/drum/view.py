@@ -70,7 +70,7 @@ class DrumView(StageView):
             self.update()
 
     def set_place(self, place: Place) -> None:
-        """Where Enter strikes, and where it was struck last."""
+        """Set the place where Enter strikes, and where it was struck last."""
         self._place = place
         self._describe()
         self.update()
@@ -104,7 +104,7 @@ class DrumView(StageView):
 
     @property
     def frame(self) -> HeadFrame | None:
-        """What is drawn; None: the drum at rest."""
+        """The frame that is drawn; None: the drum at rest."""
         return self._frame
 
     @property

@@ -76,7 +76,7 @@ class UprightTicks:
 
 
 def sparse(ticks: Sequence[tuple[float, str]], room: float) -> list[tuple[float, str]]:
-    """Those of `ticks` that are at least `room` apart, the first and the last before the others."""
+    """Select the `ticks` that are at least `room` apart, the first and the last before the others."""
     kept: list[tuple[float, str]] = []
     for tick in (*ticks[:1], *ticks[:0:-1][:1], *ticks[1:-1]):
         if all(abs(tick[0] - other) >= room for other, _ in kept):

@@ -70,7 +70,7 @@ class KeptPlot(pg.PlotWidget):
         return picture
 
     def _line_strip(self) -> QRect:
-        """In pixels of the viewport; empty where the line is out of view."""
+        """The strip of the line in pixels of the viewport; empty where the line is out of view."""
         box = self.getPlotItem().vb
         low, high = box.viewRange()[0]
         if not low <= self._line_at <= high:

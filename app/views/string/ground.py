@@ -1,4 +1,4 @@
-"""What lies behind the string: grid, scale, and hatching outside the training range."""
+"""The ground behind the string: grid, scale, and hatching outside the training range."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is drawn of the string itself: its motion, the pluck with its handle, the ends, and where it is heard."""
+"""The picture of the string itself: its motion, the pluck with its handle, the ends, and the listening points."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, 
 
 
 def paint_ends(painter: QPainter, axes: StringAxes) -> None:
-    """Where the string is fixed."""
+    """Paint the places where the string is fixed."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(theme.FAINT))
     for x in (axes.x(0), axes.x(1)):

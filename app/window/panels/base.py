@@ -35,7 +35,7 @@ UNSEEN_S = 1.0  # a panel for which `look` was not called for so long is hidden
 
 @dataclass(frozen=True)
 class Moment:
-    """What is to be shown now.
+    """The moment that is to be shown now.
 
     Attributes:
         take: the motion, or None before the first.
@@ -59,12 +59,15 @@ class Moment:
         return self.take or self.blow
 
     def standing(self, choices: Choices) -> tuple[object, ...]:
-        """What a picture of the take depends on: while it is equal and nothing plays, the picture is the same."""
+        """The state that a picture of the take depends on.
+
+        While it is equal and nothing plays, the picture is the same.
+        """
         sounding = self.sounding
         return sounding, sounding.progress if sounding is not None else (), self.position_s, self.audible, choices
 
     def in_motion(self, choices: Choices) -> bool:
-        """Whether a picture shows the motion, not the state of rest: in Play as long as its note rings."""
+        """Return True if a picture shows the motion, not rest: in Play as long as its note rings."""
         shown = self.audible or choices.face != "play"
         return choices.motion and (self.playing or (self.position_s > 0 and shown))
 
@@ -143,7 +146,10 @@ class Panel(QWidget):
         self.background.start(on_one_core)
 
     def look(self) -> None:
-        """To be called while the panel is visible; UNSEEN_S after the last call jobs rest."""
+        """Note that the panel is looked at; to be called while it is visible.
+
+        UNSEEN_S after the last call jobs rest.
+        """
         self._seen_s = time.monotonic()
 
     def solo(self, mode: int) -> None:
@@ -151,7 +157,7 @@ class Panel(QWidget):
         self.session.update(solo=0 if mode == self.session.choices.solo else mode)
 
     def _rests(self) -> bool:
-        """Whether jobs rest; called in their thread."""
+        """Return True if jobs rest; called in their thread."""
         now_s, take = time.monotonic(), self._growing
         if now_s - self._seen_s > UNSEEN_S:
             return True
@@ -191,7 +197,7 @@ _usual = [1]
 
 @contextmanager
 def _one_core() -> Iterator[None]:
-    """While any job is under way, torch computes on one core; then on the usual number again.
+    """Limit torch to one core while any job is under way; then restore the usual number.
 
     PyTorch's number of threads belongs partly to the calling thread and partly to the process, so the last job to end
     restores it.

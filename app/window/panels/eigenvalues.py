@@ -107,7 +107,7 @@ class EigenvaluesPanel(Panel):
 
     @property
     def _modes(self) -> NDArray[np.int64]:
-        """Of all points that are shown, the learned ones first."""
+        """The modes of all points that are shown, the learned ones first."""
         assert self._figure is not None
         return np.concatenate([self._figure.learned.mode[self._shown], self._figure.string.mode])
 
@@ -141,7 +141,7 @@ class EigenvaluesPanel(Panel):
             self._words.say(figure.note)
 
     def _describe(self, figure: PoleFigure, point: int) -> list[str]:
-        """In several wordings, the longest first."""
+        """The description of a point in several wordings, the longest first."""
         count = len(self._shown)
         learned = point < count
         poles, place = (figure.learned, self._shown[point]) if learned else (figure.string, point - count)

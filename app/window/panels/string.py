@@ -136,7 +136,7 @@ class StringPanel(StagePanel):
         view.set_warning(*self._pluck_warning())
 
     def _pluck_warning(self) -> tuple[str, bool]:
-        """Why nothing is heard, or what lies outside the training; and whether that is a warning."""
+        """The reason why nothing is heard, or what lies outside the training; and True if that is a warning."""
         choices, entry = self.session.choices, self.library.find(self.session.choices.preset)
         silent = why_silent(choices, self.library)
         if not silent and choices.source_heard == DIFFERENCE and self._take is not None:

@@ -1,4 +1,4 @@
-"""What the slots hold over the whole take, as it is heard at the listening point."""
+"""The waveforms of the slots over the whole take, as heard at the listening point."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class _Drawn:
 
 
 class WaveformPanel(Panel):
-    """One curve a source; the heard source is on top."""
+    """A panel with a curve for each source; the heard source is on top."""
 
     of_strings = False
     key = "waveform"
@@ -161,7 +161,10 @@ class WaveformPanel(Panel):
         self._label.set(f"{quantity} ({unit})", unit)
 
     def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
-        """What is drawn, the heard source on top; `part` says which part of the sound where it is not all."""
+        """Set the sources that are drawn, the heard one on top.
+
+        `part` says which part of the sound where it is not all.
+        """
         set_curves(self.plot.getPlotItem(), self._curves, sources, faint_alpha=130)
         self.legend.show_sources(sources, part)
 
