@@ -1,4 +1,4 @@
-"""The partials of a take, mode by mode, as rows of a table; a note says why a row has no figures."""
+"""The partials of a take, mode by mode, as rows of a table. A note says why a row has no figures."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ def internal(detail: str) -> AudioProblem:
 
 
 def unexpected(error: Exception, device_name: str) -> AudioUnavailable:
-    """Returns what became of a device while it was looked for or opened, where that is no known fault of devices."""
+    """Returns the problem of a device that was looked for or opened, where that is no known fault."""
     return AudioUnavailable(
         AudioProblem(
             ProblemKind.OTHER,

@@ -221,7 +221,7 @@ def _format(given: bytes, byte_order: str) -> tuple[bytes, int, bool]:
 
 
 def _whole_texts(given: bytes, byte_order: str) -> bytes:
-    """A list of texts up to the first that is cut off, from which libsndfile would read on into the samples."""
+    """A list of texts up to the first that is cut off. From that one libsndfile would read on into the samples."""
     end = 4  # of "INFO"
     while len(given) >= end + 8:
         size = struct.unpack(byte_order + "I", given[end + 4 : end + 8])[0]
@@ -232,7 +232,7 @@ def _whole_texts(given: bytes, byte_order: str) -> bytes:
 
 
 def _next_chunk(file: BinaryIO, after: int, size: int, byte_order: str) -> int:
-    """The place of the chunk behind one that ends at `after`; an odd one should have a padding byte, and may not."""
+    """The place of the chunk behind one that ends at `after`. An odd one should have a padding byte, and may not."""
     places = (after + size % 2, after + 1 - size % 2)
     likely = [_likelihood(file, place, byte_order) for place in places]
     return places[1] if likely[1] > likely[0] else places[0]

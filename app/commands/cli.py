@@ -122,7 +122,7 @@ def is_file_name(word: str) -> bool:
 
 
 def open_files(words: Sequence[str]) -> int:
-    """Opens the app with files, as if they were dropped on its window; returns its exit status, or 2 for no file."""
+    """Opens the app with files, as if they were dropped on its window. Returns its exit status, or 2 for no file."""
     files = [Path(word).absolute() for word in words]
     for word, file in zip(words, files, strict=True):
         if not file.is_file():

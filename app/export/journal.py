@@ -1,4 +1,4 @@
-"""A recording on disk while it is made and until it is saved: a line of JSON for each event, appended.
+"""A recording on disk while it is made and until it is saved. Each event is a line of JSON, appended.
 
 A process that is killed leaves its journal. The next start finds it, for the lock beside it is no living process's.
 Lines are short: after the first, an instrument that is turned is the fields that changed. A torn last line is left

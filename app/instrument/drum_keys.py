@@ -1,4 +1,4 @@
-"""The keys of a patch of drums before anybody plays them: modes, and what a blow and an ear make of them.
+"""The keys of a patch of drums before anybody plays them: modes, and what blow and ear make of them.
 
 What `StringKeys` is for strings; the compiled player computes gains.
 """
@@ -70,7 +70,7 @@ class DrumKey:
         return float(resonator.relative_tension_rise(speeds / self.modes.omega)) / 2
 
     def drop_cents(self, velocity: float, curve: float = 0.0) -> float:
-        """The cents by which the pitch of the first mode falls after a blow."""
+        """The fall of the pitch of the first mode after a blow, in cents."""
         return 600 * math.log2(1 + self.rise(velocity, curve))
 
 

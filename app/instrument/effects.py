@@ -1,4 +1,4 @@
-"""The body and the room of a patch, as the mixer takes them, and what the body does to the loudness of a key."""
+"""The body and room of a patch, as the mixer takes them, and the body's effect on a key's loudness."""
 
 from __future__ import annotations
 

@@ -71,7 +71,10 @@ class NoteOff:
 
 @dataclass(frozen=True)
 class Bend:
-    """The pitch wheel moves to -1 … 1, in ranges of the channel: the patch's, unless messages set another (RPN 0)."""
+    """The pitch wheel moves to -1 … 1, in ranges of the channel.
+
+    The range is the patch's, unless messages set another (RPN 0).
+    """
 
     value: float
     channel: int = 0
@@ -153,7 +156,10 @@ def bend_range(semitones: float, channel: int) -> list[Event]:
 
 
 def releases_for(events: Iterable[Event]) -> list[Event]:
-    """The events that release the keys and pedals that are down after these events: one for each stroke of a key."""
+    """The events that release the keys and pedals that are down after these events.
+
+    There is one for each stroke of a key.
+    """
     down: dict[NoteOff | Controller, int] = {}  # strokes without a release, in the order of the latest
     for event in events:
         if isinstance(event, NoteOn | NoteOff):

@@ -1,4 +1,4 @@
-"""A key's string in figures, in the units of those who make strings; and from such a figure back to its knob."""
+"""A key's string in figures, in string makers' units; and the way from such a figure back to its knob."""
 
 from __future__ import annotations
 

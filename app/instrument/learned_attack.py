@@ -1,4 +1,6 @@
-"""The attack of a learned instrument: the noise of its strokes, on where it brings the own key nearer to the note.
+"""The attack of a learned instrument: the noise of its strokes.
+
+It is on where it brings the own key nearer to the note.
 
 Nearness is measured over the first 30 ms of the own key, as the instrument plays it, through its body.
 """
@@ -32,7 +34,7 @@ LEAST_GAIN_DB = 0.2  # of distance, for an attack that is on
 
 
 def attack_of(patch: Patch, note: Note, recorded: RecordedNote) -> tuple[RecordedAttack, float] | None:
-    """The attack of a note and its energy, in dB re that of the note's first 0.4 s; None: there is nothing."""
+    """The attack of a note and its energy, in dB re that of the note's first 0.4 s. None: there is nothing."""
     body = _body_impulse(patch)
     if body is None:
         return None

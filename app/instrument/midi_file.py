@@ -217,7 +217,7 @@ def _on_keys(event: Event) -> Event:
 
 
 def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes:
-    """The bytes of a MIDI file of one track; times are rounded to 1/1920 s, and changes of the patch left out.
+    """The bytes of a MIDI file of one track. Times are rounded to 1/1920 s, and changes of the patch left out.
 
     Args:
         patch: with which it was played; each channel has its range of bends (RPN 0). None: no range is written.
@@ -242,7 +242,7 @@ def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes
 
 
 def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
-    """The events with messages for the range of bends, where a channel has the patch's and not one of its own."""
+    """The events with messages for the range of bends, where a channel has the patch's and not its own."""
     channels, own, found = sorted(channels_in(each.event for each in timed)), set[int](), list[TimedEvent]()
 
     def set_ranges(time_s: float, of: Iterable[int]) -> None:

@@ -148,7 +148,10 @@ class _Reader:
         return kind == b"MTrk" or (named and place + 8 + length <= len(self._raw))
 
     def _read_track(self, place: int, end: int) -> int:
-        """Reads a track of a length that may be wrong; the place at which the next chunk is to be looked for."""
+        """Reads a track of a length that may be wrong.
+
+        Returns the place at which the next chunk is to be looked for.
+        """
         raw, known = self._raw, end == len(self._raw) or self._begins_chunk(end)
         limit = end if known else len(raw)
         tick = running = 0

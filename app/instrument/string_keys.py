@@ -1,4 +1,4 @@
-"""The keys of an instrument of strings before anybody plays them: each one's string, and what is the same for all."""
+"""The keys of an instrument of strings before anybody plays them: each one's string, and their common values."""
 
 from __future__ import annotations
 

@@ -183,7 +183,10 @@ def _row(string: StringParameters) -> NDArray[np.float64]:
 
 
 def decay_rates(patch: Patch, string: StringParameters, modes: int) -> NDArray[np.float64]:
-    """σ of the modes of a patch's string in 1/s, (modes,), by its own losses: d₁, d₃, and those by mode."""
+    """The decay rates σ of the modes of a patch's string in 1/s, (modes,).
+
+    They follow from its own losses: d₁, d₃, and those by mode.
+    """
     rates, knobs = string.decay_rates(modes), patch.knobs
     if patch.losses is not None:
         by_mode = Losses(**patch.losses.model_dump())

@@ -329,7 +329,7 @@ class Amp(Value):
 
 
 class Body(Value):
-    """The body of the instrument: the name of an impulse response ("": none), its mix, its size (1: as it is)."""
+    """The body of the instrument: the name of an impulse response ("": none), mix and size (1: as it is)."""
 
     name: Reference = ""
     mix: float = parameter("body.mix")
@@ -497,7 +497,7 @@ class Patch(Value):
         return patch.model_copy(update={"macros": macros})
 
     def turned(self, macro: int, value: float) -> Patch:
-        """The patch with a macro (by number, from 0) turned to `value`, 0 … 1, and the fields of its targets set.
+        """The patch with a macro (by number, from 0) turned to `value`, 0 … 1, and its targets' fields set.
 
         A target stays where the others forbid its value: the softest pluck does not pass the hardest.
         """

@@ -146,7 +146,7 @@ def octaves_of(low: int, high: int) -> tuple[int, int]:
 
 
 def turn(press: KeyPress, octave: int, velocity: int) -> tuple[int, int] | None:
-    """Octave and velocity after a key that changes them: Z and X, 1 … 9, C and V; None for another."""
+    """Octave and velocity after a key that changes them. The keys are Z and X, 1 … 9, C and V; None for another."""
     letter = press.letter.upper()
     if letter in OCTAVE_STEPS:
         return min(max(octave + OCTAVE_STEPS[letter], LOWEST_OCTAVE), HIGHEST_OCTAVE), velocity

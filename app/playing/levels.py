@@ -1,4 +1,7 @@
-"""The level match: gains that bring all sources of a note to the level of the truth, computed in the background."""
+"""The level match: gains that bring all sources of a note to the level of the truth.
+
+They are computed in the background.
+"""
 
 from __future__ import annotations
 
@@ -64,7 +67,7 @@ class Levels:
         return gains
 
     def _level(self, note: Note, source: str, seconds: float, rate_hz: int) -> float:
-        """Root mean square of the first `seconds`; 0 where it is not known, so that the source stays as it is."""
+        """Root mean square of the first `seconds`. 0 where it is not known, so that the source stays as it is."""
         subject, ear = note.subject(source), note.request.ear
         program = self._sources.program(subject, source, rate_hz)
         if program.rendered:

@@ -57,7 +57,10 @@ class MidiChoices(BaseModel):
 
 
 def turned(patch: Patch, field: str, value: float) -> Patch:
-    """The patch with a parameter or a macro turned; as it is where it has none, or the value is impossible in it."""
+    """The patch with a parameter or a macro turned.
+
+    Where it has none, or the value is impossible in it, the patch stays as it is.
+    """
     try:
         if field in MACROS:
             number = list(MACROS).index(field)

@@ -1,4 +1,4 @@
-"""Plays a MIDI file: a thread of its own hands each event over before its time, with the frame at which it counts."""
+"""Plays a MIDI file. A thread of its own hands each event over before its time, with the frame at which it counts."""
 
 from __future__ import annotations
 

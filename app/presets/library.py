@@ -156,7 +156,7 @@ def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
 
 
 def display_title(name: str, info: PresetInfo) -> str:
-    """The title of the cell of the paper's tables that a preset belongs to, by name and content; else its own title.
+    """The title of a preset's cell of the paper's tables, by name and content; else its own title.
 
     A file from before a title was changed has the old one in it.
     """

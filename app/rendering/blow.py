@@ -1,4 +1,4 @@
-"""A blow on a drum as it is drawn: how model and truth move, their error, and their sound, which grow.
+"""A blow on a drum as it is drawn: motion of model and truth, error, and sound, which grow.
 
 A string's take has pictures of points. A drum's has its lowest modes at flashes: amplitude, and the angle that the
 mode has turned through since the blow. A picture at any speed of slow motion follows from these: each mode turns more

@@ -67,7 +67,7 @@ class Line:
 
     @property
     def ends_s(self) -> float | None:
-        """The time of the last valid frame where the source ran away, and is at rest since; None: it did not."""
+        """The time of the last valid frame where the source ran away, and is at rest since. None: it did not."""
         ends = self._pictures.ends
         return None if ends is None else ends / self.rate_hz
 

@@ -137,7 +137,7 @@ class Sounding(Protocol):
 
     @property
     def horizon_s(self) -> float:
-        """The end of the time that the model was trained for, or of the motion where it was trained on none."""
+        """The end of the time that the model was trained for. Where it was trained on none, the end of the motion."""
 
     @property
     def partials_hz(self) -> NDArray[np.float64]:

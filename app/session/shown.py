@@ -1,4 +1,4 @@
-"""The sources in the slots A and B as the plots of a sound show them, and the words of their legends and axes."""
+"""The sources in the slots A and B in plots of a sound, with the words of legends and axes."""
 
 from __future__ import annotations
 
@@ -75,7 +75,10 @@ def full_scale_words(choices: Choices) -> str:
 
 
 def readable_unit(peak: float, pickup: str) -> tuple[float, str]:
-    """Factor and name of a unit in which `peak`, in m, m/s, N or Pa, has few digits; a displacement at most mm."""
+    """Factor and name of a unit in which `peak`, in m, m/s, N or Pa, has few digits.
+
+    A displacement has mm at most.
+    """
     unit = {"displacement": "m", "velocity": "m/s", "pressure": "Pa"}.get(pickup, "N")
     prefixes = _PREFIXES[1:] if pickup == "displacement" else _PREFIXES
     factor, prefix = next((pair for pair in prefixes if peak * pair[0] >= 0.1), prefixes[-1] if peak else prefixes[0])

@@ -67,7 +67,7 @@ class Job:
             self.wait(LOOK_AGAIN_S)
 
     def report(self, share: float, text: str = "", so_far: object = None) -> None:
-        """Reports the share that is done, 0 … 1, what is being done, and a result that can be shown already.
+        """Reports the share that is done, 0 … 1, the present step, and a result that can be shown already.
 
         Raises:
             Cancelled: see `wait`.

@@ -1,4 +1,4 @@
-"""The blow that is shown: of the latest note of a drum, rendered by the worker, at the note's own time."""
+"""The blow that is shown: of a drum's latest note, rendered by the worker, at the note's own time."""
 
 from __future__ import annotations
 

@@ -219,7 +219,7 @@ class Controller(QObject):
         panel.reported.connect(self.window.notices.report)
 
     def _fill_decks(self) -> None:
-        """Makes the views of the Lab when they are first needed: they and their plots take a fifth of a second."""
+        """Makes the views of the Lab when they are first needed. They and their plots take a fifth of a second."""
         if any(not panel.on_stage for panel in self.panels):
             return
         from app.window.panels.rack import decks

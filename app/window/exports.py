@@ -137,7 +137,7 @@ class Exports(QObject):
 
 
 def heard_note(choices: Choices, library: Library, struck: Struck | None = None) -> HeardNote | None:
-    """The chosen pluck as it is heard, of another preset where that is heard; or the key, which an instrument plays.
+    """The chosen pluck as it is heard, of another preset where that is heard; or an instrument's key.
 
     None: there is no preset.
     """

@@ -181,7 +181,7 @@ class Instruments(QObject):
         return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
 
     def _by_hand(self, pluck: Pluck) -> NoteOn | PluckAt:
-        """A pluck as a note of the key whose string is shown; of the string alone where keys do not play it so.
+        """A pluck as a note of the key whose string is shown. It is of the string alone where keys do not play it so.
 
         These are a single string, and one beside another preset.
         """
@@ -318,7 +318,7 @@ class Instruments(QObject):
 
 
 def _key_of(patch: Patch, string: StringParameters) -> tuple[int, int | None] | None:
-    """The key with the pitch of a string, and on which of a set it has its length; None: there is no such key."""
+    """The key with the pitch of a string, and the string of a set on which it has its length. None: there is none."""
     strings, pitch_hz = Strings(patch), pitch_hz_of(string)
     low, high = patch.range
     key = next((key for key in range(low, high + 1) if _same(strings.pitch_hz(key) or 0.0, pitch_hz)), None)

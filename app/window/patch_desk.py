@@ -214,7 +214,7 @@ class PatchDesk(QObject):
         self._session.update(patch=changed)
 
     def turn_to(self, field: str, figure: float) -> None:
-        """Turns a knob of the string to a figure of the string that is shown, or as near to it as the knob goes."""
+        """Turns a knob of the string to a figure of the shown string, or as near as it goes."""
         patch = self.patch
         if patch is None:
             return

@@ -102,7 +102,7 @@ class Performance(QObject):
 
     @property
     def playable(self) -> bool:
-        """Return True if a pluck and, where there is a patch, its key would sound at once; of drums a key alone."""
+        """Return True if a pluck and the patch's key, if any, would sound at once; of drums a key alone."""
         if self._of_drums:
             return self._sound.status().changes_done > 0 and self.notes.keys.player is not None
         return self.at_hand and (self._session.choices.patch is None or self.notes.keys.player is not None)

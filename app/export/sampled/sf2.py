@@ -118,7 +118,7 @@ def write_sf2(
 
 
 def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, int]:
-    """The attenuation by zone: the cB by which a velocity of 0 would be softer than one of 128.
+    """The attenuation by zone, in cB, that a velocity of 0 would have against one of 128.
 
     So the level continues within a layer as it does from layer to layer; less where a soft layer, which has to be
     raised for it, would be much louder than the hardest.

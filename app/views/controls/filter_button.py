@@ -1,4 +1,4 @@
-"""A button that is there while a browser's list is filtered: previous and next go through what is left of it."""
+"""A button that is there while a browser's list is filtered. Previous and next go through what is left of it."""
 
 from __future__ import annotations
 

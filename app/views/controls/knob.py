@@ -57,7 +57,7 @@ class _Editor(QLineEdit):
             self.editingFinished.emit()
 
     def _is_alien(self, event: QKeyEvent) -> bool:
-        """Return True if a key is a letter or the like that makes no number after the text before the cursor."""
+        """Return True if a key, as a letter, makes no number with the text before the cursor."""
         held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier)
         if held or not event.text().isprintable() or event.text() in SIGNS:  # "" is in it
             return False

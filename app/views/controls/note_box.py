@@ -1,4 +1,4 @@
-"""A spin box for a key, shown as a note (E2, F♯3); typed also as F#3, Gb3 or a MIDI number."""
+"""A spin box for a key, shown as a note (E2, F♯3). It is typed also as F#3, Gb3 or a MIDI number."""
 
 from __future__ import annotations
 

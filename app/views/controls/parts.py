@@ -84,7 +84,10 @@ def words_label() -> ElidedLabel:
 
 
 def keeps_keys(event: QEvent, *keys: Qt.Key) -> bool:
-    """Accepts the override of a shortcut on one of these, so that the widget gets the key; whether it was one."""
+    """Accepts the override of a shortcut on one of these, so that the widget gets the key.
+
+    Returns True if it was one.
+    """
     if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and event.key() in keys:
         event.accept()
         return True

@@ -1,4 +1,4 @@
-"""A faint line that says what the mouse points at; it takes the room it is given and never asks for more."""
+"""A faint line that says what the mouse points at. It takes the room it is given and never asks for more."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Presets in their browser: a row each, and a card on what it is, how good it is and where it comes from."""
+"""Presets in their browser: a row each, and a card on their nature, quality and origin."""
 
 from __future__ import annotations
 

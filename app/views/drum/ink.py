@@ -141,7 +141,7 @@ def paint_listening(painter: QPainter, axes: HeadAxes, points: Mapping[str, floa
 
 
 def angle_words(point: float) -> str:
-    """A listening point as an angle from the axis of the drum: the point is the sine of it, from 0 to 1."""
+    """A listening point as an angle from the axis of the drum. The point is the sine of it, from 0 to 1."""
     degrees = round(math.degrees(math.asin(min(max(2 * point - 1, -1.0), 1.0))))
     if degrees == 0:
         return "above"

@@ -1,4 +1,4 @@
-"""A drum seen from above: what the slots hold in motion, in colours, and where it is struck and heard from.
+"""A drum seen from above: the slots' content in motion, in colours, and the places of strike and listening.
 
 A click on the drum strikes it there with the velocity of the keys, with Shift as hard as it goes. Dragging a mark
 beneath it moves a listening point. Arrow keys move the place, Enter strikes there.

@@ -52,7 +52,9 @@ def fret_share(fret: float, frets: int) -> float:
 
 
 class Neck(Playable):
-    """A click plays the string that was clicked; keys of others, the highest string at or below them, as patches do.
+    """A neck, or a fan of strings.
+
+    A click plays the string that was clicked. Keys of others play the highest string at or below them, as patches do.
 
     Fingers stay where they were put, and make no sound. While there are any, strings sound as these stop them, and
     those without a finger sound open, wherever they are clicked: so chords can be strummed with one mouse.

@@ -1,4 +1,4 @@
-"""Base of the piano keys and the neck: a surface of keys that are played with the mouse or with Enter."""
+"""Base of the piano keys and the neck: a surface of keys played with the mouse or with Enter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A plot with a vertical line that moves over it; its picture is cached, so that only two strips are painted then."""
+"""A plot with a vertical line that moves over it. Its picture is cached, so that only two strips are painted then."""
 
 from __future__ import annotations
 

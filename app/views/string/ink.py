@@ -131,7 +131,10 @@ def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
 
 
 def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, grabbed: bool, right: float) -> None:
-    """The handle: `full` on a string at rest, a ring while it moves; with its values where it is full or grabbed."""
+    """The handle: `full` on a string at rest, a ring while it moves.
+
+    It has its values where it is full or grabbed.
+    """
     painter.setPen(Qt.PenStyle.NoPen)
     if grabbed:
         painter.setBrush(theme.translucent(theme.TEXT, 50))

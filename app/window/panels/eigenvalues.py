@@ -301,7 +301,7 @@ class _Plane(PointedPlot):
             super().keyPressEvent(event)
 
     def _nearest(self, at: QPointF) -> int:
-        """The point nearest to a place of the widget, a learned one where both lie there; -1 where none is near."""
+        """The point nearest to a place of the widget, a learned one where both lie there; -1: none is near."""
         if not len(self._places):
             return -1
         here, (wide, high) = self._place_at(at), self.getPlotItem().vb.viewPixelSize()

@@ -1,4 +1,4 @@
-"""The string in motion, the pluck that is being drawn, and why a pluck is silent or outside the training range."""
+"""The string in motion, the pluck being drawn, and why a pluck is silent or outside the training range."""
 
 from __future__ import annotations
 

@@ -169,7 +169,7 @@ class WaveformPanel(Panel):
         self.legend.show_sources(sources, part)
 
     def show_signal(self, source: str, signal: NDArray[np.float32], rate_hz: int) -> None:
-        """The samples so far, (frames,) from time 0, in the unit of the axis; draws those in view, none left out."""
+        """The samples so far, (frames,) from time 0, in the unit of the axis. Draws those in view, none left out."""
         (low_s, high_s), columns = self.plot.times_s, self.plot.columns
         # A smoothed line that goes to and fro within a pixel takes ten times as long as a stroke for each, and a key
         # that is played waits for the painting.
