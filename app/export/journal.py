@@ -189,7 +189,7 @@ class _Read:
     _patch: dict[str, Any] | None = None
 
     def take(self, line: bytes) -> bool:
-        """False: this line is damaged, so that nothing after it counts.
+        """Take a line; return False where it is damaged or fills the recording: nothing after it counts.
 
         Raises:
             ValueError: it is the first, and no journal's.

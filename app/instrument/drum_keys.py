@@ -95,7 +95,7 @@ class DrumKeys:
         self._known: dict[int, DrumKey | None] = {}
 
     def of_key(self, key: int, string: int | None = None) -> DrumKey | None:
-        """None for a key that is silent; remembered. Raises ValueError: the key has no possible drum."""
+        """The drum of a key, remembered; None for a silent key. Raises ValueError: the key has no possible drum."""
         if key not in self._known:
             self._known[key] = self._of_key(key)
         return self._known[key]

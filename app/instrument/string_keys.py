@@ -33,7 +33,9 @@ class StringKeys:
         self.body: Array | None = body_curves(patch) if near is None else near.body
 
     def string_of(self, key: int, string: int | None = None) -> KeyString | None:
-        """None for a key that is silent. `string`: on which of a set it is played, as in `Strings.of_key`.
+        """The string of a key; None for a silent key.
+
+        `string`: on which of a set it is played, as in `Strings.of_key`.
 
         Raises:
             ValueError: the key has no possible string.

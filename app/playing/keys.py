@@ -116,7 +116,7 @@ class Keys:
 
     @property
     def player(self) -> InstrumentPlayer | None:
-        """None: no patch, or its preset is not loaded yet."""
+        """The player of the keys; None: no patch, or its preset is not loaded yet."""
         return self._player
 
     def set_patch(self, patch: Patch | None, ear: Ear) -> None:

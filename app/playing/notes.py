@@ -257,7 +257,7 @@ class Notes:
     # Ahead of events
 
     def in_background(self, work: Callable[[], None], note: Note | None = None) -> None:
-        """Does `work` in the helper's thread, after what waits there; its errors are reported, and cut the note."""
+        """Do `work` in the helper's thread, after what waits there. Its errors are reported, and cut the note."""
         if not self._closed:
             self._helper.submit(self._guarded(work, note))
 
@@ -344,7 +344,7 @@ class Notes:
     # How it is done
 
     def _each(self, notes: Sequence[MadeNote], work: Callable[[MadeNote], None]) -> None:
-        """Does `work` with each note; one with which it fails is dropped, and the others continue."""
+        """Do `work` with each note. One with which it fails is dropped, and the others continue."""
         for note in notes:
             try:
                 work(note)

@@ -149,7 +149,7 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
 
 @functools.lru_cache(maxsize=512)
 def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
-    """Cached by time and size of the file, because the browser lists all presets whenever it opens."""
+    """Read an entry, cached by time and size of the file: the browser lists all presets whenever it opens."""
     info = read_info(path)
     listed = replace(info, title=display_title(name_text(path.stem), info))
     return PresetEntry(name_text(path.stem), path, listed, size_bytes)

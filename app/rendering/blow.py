@@ -100,7 +100,7 @@ def grid_of(surface: Surface, sides: tuple[float, float], points: int = GRID) ->
 
 
 def head_of(modes: DrumModes) -> Head:
-    """Made once for each drum, whatever its damping; half a second of work at most."""
+    """The head of a drum, made once for each, whatever its damping; half a second of work at most."""
     drum, rows = modes.drum, modes.rows
     for known, head in _heads:
         if known is rows:

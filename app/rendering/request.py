@@ -45,7 +45,7 @@ class RenderRequest:
 
 
 class RenderListener(Protocol):
-    """Called with the worker's results, in the worker's thread."""
+    """The listener to the worker's results, called in the worker's thread."""
 
     def take_started(self, take: Take | BlowTake) -> None:
         """A new pluck or blow has its first block."""
@@ -54,7 +54,7 @@ class RenderListener(Protocol):
         """Report that its motion, signals and errors are complete."""
 
     def other_failed(self, preset: str, message: str) -> None:
-        """Another preset's model cannot be rendered beside this one; as a source it is at rest."""
+        """Report that another preset's model cannot be rendered beside this one; as a source it is at rest."""
 
     def render_failed(self, message: str, detail: str) -> None:
-        """Nothing can be rendered. `detail`: the traceback of an unexpected error, else ""."""
+        """Report that nothing can be rendered. `detail`: the traceback of an unexpected error, else ""."""

@@ -85,7 +85,7 @@ class History:
         self._restore(self._undo, self._redo)
 
     def redo(self) -> None:
-        """Does the step that was last undone again; does nothing where there is none."""
+        """Do the step that was last undone again; do nothing where there is none."""
         self._restore(self._redo, self._undo)
 
     def _restore(self, source: deque[Values] | list[Values], target: deque[Values] | list[Values]) -> None:

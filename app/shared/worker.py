@@ -24,7 +24,7 @@ class Cancelled(Exception):
 
 
 class Progress(Protocol):
-    """Called by long work; may raise `Cancelled`, which ends the work. `Job.progress` is one."""
+    """A function that long work calls; it may raise `Cancelled`, which ends the work. `Job.progress` is one."""
 
     def __call__(self, share: float, text: str = "", left_s: float | None = None, /) -> None:
         """`share`: done, 0 … 1; `text`: what is being done; `left_s`: seconds left, None where not known."""
@@ -95,7 +95,7 @@ Work = Callable[[Job], Any]
 
 
 class Worker:
-    """Does one job at a time, the latest; its thread starts with the first.
+    """A worker that does one job at a time, the latest; its thread starts with the first.
 
     Args:
         name: of the thread.
@@ -120,7 +120,7 @@ class Worker:
         self._thread: threading.Thread | None = None
 
     def start(self, work: Work) -> Job:
-        """Does `work` as soon as the job under way has given up."""
+        """Do `work` as soon as the job under way has given up."""
         self.cancel()
         job = Job(self._say, self._rests)
         with self._mailbox:

@@ -11,7 +11,9 @@ from engine.presets import PresetError
 
 
 class Background(QObject):
-    """Does one job at a time, the latest. Methods belong to the thread that made it, where its signals arrive too.
+    """A worker of one job at a time, the latest.
+
+    Methods belong to the thread that made it, where its signals arrive too.
 
     Args: see `Worker`.
     """
@@ -44,7 +46,7 @@ class Background(QObject):
         return self._job is not None
 
     def start(self, work: Work) -> None:
-        """Does `work` as soon as the job under way has given up; `finished` has its return value."""
+        """Do `work` as soon as the job under way has given up; `finished` has its return value."""
         self._job = self._worker.start(work)
 
     def stop(self) -> None:

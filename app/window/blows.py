@@ -81,5 +81,5 @@ class Blows:
         return True
 
     def forget(self) -> None:
-        """Another instrument is played."""
+        """Forget the blow, as another instrument is played."""
         self._asked, self.shown = None, Playhead()

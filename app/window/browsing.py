@@ -13,7 +13,7 @@ from app.views.controls.browser_rows import Row
 
 
 class BrowserDesk(QObject):
-    """Lives in the window's thread, as long as the window.
+    """A desk that lives in the window's thread, as long as the window.
 
     Args:
         rows: what there is now.

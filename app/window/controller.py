@@ -81,7 +81,7 @@ class _AudioMail(QObject):
 
 
 class Controller(QObject):
-    """Lives as long as the window."""
+    """A controller that lives as long as the window."""
 
     def __init__(
         self,
@@ -511,7 +511,7 @@ class Controller(QObject):
             self.drum.show_key(latest.event.key, latest.event.place or played.place)
 
     def _wake(self) -> None:
-        """Something may move: runs the timer at its full rate for LIVELY_S."""
+        """Run the timer at its full rate for LIVELY_S, as something may move."""
         self._lively_until_s = time.monotonic() + LIVELY_S
         if self._timer.interval() != FRAME_MS:
             self._timer.setInterval(FRAME_MS)

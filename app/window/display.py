@@ -27,7 +27,7 @@ def check_display() -> None:
 
 
 def _answers() -> bool:
-    """Asked in the way that Qt will ask. True where that cannot be known."""
+    """Return True if a display answers, asked in the way that Qt will ask. True where that cannot be known."""
     with suppress(OSError, AttributeError):
         xcb = ctypes.CDLL("libxcb.so.1")
         xcb.xcb_connect.restype = ctypes.c_void_p

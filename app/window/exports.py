@@ -32,7 +32,7 @@ HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", 
 
 
 class Exports(QObject):
-    """Lives as long as the window; `reported` has notices for the user.
+    """The exports, which live as long as the window; `reported` has notices for the user.
 
     Args:
         struck: the key of the instrument that an export plays; None: a string is plucked by itself.

@@ -519,6 +519,6 @@ def _local_file(url: QUrl) -> Path:
 
 
 def _copy(event: QDropEvent) -> None:
-    """Never a move, after which a file manager would delete the user's file."""
+    """Copy the dropped file, never move it: after a move a file manager would delete the user's file."""
     event.setDropAction(Qt.DropAction.CopyAction)
     event.accept()

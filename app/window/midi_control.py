@@ -23,7 +23,7 @@ LOOK_MS = 1_000  # between two looks at the input
 
 
 class MidiControl(QObject):
-    """Lives in the window's thread; notes are played in the input's.
+    """MIDI control, which lives in the window's thread; notes are played in the input's.
 
     Args:
         handle: plays an event; called in the input's thread.

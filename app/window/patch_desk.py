@@ -74,7 +74,7 @@ TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES)
 
 
 class PatchDesk(QObject):
-    """Lives in the window's thread, as long as the window.
+    """A desk that lives in the window's thread, as long as the window.
 
     Attributes:
         desk: the browser's.

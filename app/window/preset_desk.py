@@ -14,7 +14,7 @@ from engine.folders import user_folder
 
 
 class PresetDesk(BrowserDesk):
-    """See `BrowserDesk`."""
+    """A desk of presets; see `BrowserDesk`."""
 
     def __init__(
         self,

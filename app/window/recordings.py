@@ -25,7 +25,9 @@ RECOVER, LATER, DISCARD = "Recover", "Later", "Discard"
 
 
 class Recordings(QObject):
-    """Lives in the window's thread, as long as the window. The button of `bar` records, ends, saves and discards.
+    """Recordings, which live in the window's thread, as long as the window.
+
+    The button of `bar` records, ends, saves and discards.
 
     A recording is kept until it is written or discarded; while one is, no other begins. Its journal on disk is kept
     as long, also past the end of the process, and `offer_left` finds it.
@@ -91,7 +93,7 @@ class Recordings(QObject):
             self._show_unsaved()
 
     def forget_all(self) -> None:
-        """None of what is not saved is wanted, nor what is being recorded."""
+        """Forget all that is not saved, and what is being recorded."""
         self.end()
         for played in list(self._unsaved):
             self.forget(played)

@@ -39,7 +39,7 @@ class PluginExport:
         return f"The plug-in that is there {holding(lost)}: replaced." if lost else "Replaces the one before."
 
     def run(self, progress: Progress) -> str:
-        """See `ExportJob`."""
+        """Build the plug-in; see `ExportJob`."""
         check_compiler()
         from app.export.plugin.build import build_plugin  # brings LLVM
         from app.export.plugin.image import image_of

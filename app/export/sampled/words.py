@@ -11,7 +11,7 @@ _LINES_BYTES = 512  # of a sample at most: its lines of the SFZ and its file's h
 
 
 def number_of(count: int, thing: str) -> str:
-    """Such as "1 key", "2 keys"."""
+    """A count with its noun, such as "1 key", "2 keys"."""
     return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
 
 

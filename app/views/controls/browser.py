@@ -45,7 +45,7 @@ _ALT_GR = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier 
 
 
 class Browser(QFrame):
-    """Hidden at first; closing gives the focus back to the widget that had it.
+    """A browser that is hidden at first; closing gives the focus back to the widget that had it.
 
     One row of the list is selected, loaded or not: card and keys are for it.
 

@@ -162,7 +162,7 @@ class Knob(QWidget):
         self.update()
 
     def set_low(self, low: bool) -> None:
-        """Smaller, for rows of many knobs."""
+        """Make the knob smaller, for rows of many knobs, or of its usual size."""
         self._low = low
         self.updateGeometry()
         self.update()

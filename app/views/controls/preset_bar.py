@@ -52,7 +52,7 @@ class PresetBar(QWidget):
         row.addStretch(1)
 
     def set_chosen(self, entry: PresetEntry | None, favourite: bool = False) -> None:
-        """None: there is no preset."""
+        """Show the chosen preset; None: there is no preset."""
         from app.views.dialogs.preset_card import (  # brings the engine, which the first paint does not wait for
             preset_card,
             preset_summary,

@@ -80,7 +80,7 @@ class TransportBar(QFrame):
         self._row.insertWidget(self._row.indexOf(self._space), group)
 
     def set_compact(self, compact: bool, tight: bool = False) -> None:
-        """Narrower by a fifth, for a window with little room; `tight`: with very little, symbols for words."""
+        """Narrow the bar by a fifth, for a window with little room. `tight`: with very little, symbols for words."""
         if (compact, tight, theme.present.scale) == self._fitted:
             return
         self._fitted = compact, tight, theme.present.scale

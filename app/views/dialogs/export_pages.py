@@ -341,7 +341,7 @@ class SamplerPage(ExportPage):
         self.file.changed.connect(self.changed)
 
     def show_subject(self, subject: HeardInstrument | None) -> None:
-        """Another patch, or the same that was turned: chosen keys stay as far as it has them."""
+        """Show another patch, or the same that was turned: chosen keys stay as far as it has them."""
         keys, self._subject = self.keys(), subject
         if subject is None:
             return
@@ -358,7 +358,7 @@ class SamplerPage(ExportPage):
         self._suggest_name()
 
     def keys(self) -> tuple[int, int] | None:
-        """None for all of the patch."""
+        """The chosen keys; None for all of the patch."""
         if self._subject is None:
             return self._chosen_keys
         keys = self.lowest.value(), self.highest.value()

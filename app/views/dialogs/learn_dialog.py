@@ -54,7 +54,9 @@ HEARD: tuple[tuple[Literal["recording", "learned"], str], ...] = (
 
 
 class LearnDialog(GrowingDialog):
-    """Nothing is written before "Keep and play". Errors are stated without anything copied from the recording.
+    """A dialog that writes nothing before "Keep and play".
+
+    Errors are stated without anything copied from the recording.
 
     Attributes:
         state: what is found, or how far it is.

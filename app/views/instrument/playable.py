@@ -143,7 +143,7 @@ class Playable(QWidget):
             self.rest_changed()
 
     def lay_out(self) -> None:
-        """Called when the range has changed."""
+        """Lay the keys out; called when the range has changed."""
 
     def rest_changed(self) -> None:
         """Discards the picture of `paint_rest`."""
@@ -405,7 +405,7 @@ class Playable(QWidget):
         self.released.emit(spot.key, spot.string)
 
     def repaint_spot(self, spot: Spot) -> None:
-        """Called when it is pressed, released, or the cursor's."""
+        """Repaint a spot; called when it is pressed, released, or the cursor's."""
         self._repaint(spot.key)
 
     def _repaint(self, key: int) -> None:

@@ -119,20 +119,20 @@ class Panel(QWidget):
         self._cover.setGeometry(self.rect())
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        """Called with the fields of `Choices` that have new values; at the start with all of them."""
+        """Take the fields of `Choices` that have new values; at the start all of them."""
 
     def take_started(self, take: Take | BlowTake) -> None:
-        """Called with another motion, of which nothing is rendered yet; of a drum where it is not `of_strings`."""
+        """Take another motion, of which nothing is rendered yet; of a drum where it is not `of_strings`."""
         self._growing, self._grown = take, (-1, time.monotonic())
 
     def take_finished(self, take: Take) -> None:
-        """Called when all of it is rendered, with its errors."""
+        """Take a motion when all of it is rendered, with its errors."""
 
     def show_moment(self, moment: Moment) -> None:
-        """Called while the panel is visible: for the string 60 times a second, for the others 30, less at rest."""
+        """Show a moment while the panel is visible. The string has 60 a second, the others 30, and fewer at rest."""
 
     def end(self) -> None:
-        """Called when the window closes: ends the panel's thread."""
+        """End the panel's thread; called when the window closes."""
         self.background.close()
 
     def compute(self, work: Work) -> None:
