@@ -142,7 +142,7 @@ def parse(words: list[str]) -> tuple[str, list[str]]:
 
 
 def is_file_name(word: str) -> bool:
-    """Whether a word has a folder or an ending, as nothing else that is understood here."""
+    """Return True if a word has a folder or an ending, as nothing else that is understood here."""
     return not word.startswith("-") and bool(Path(word).suffix or {os.sep, os.altsep or os.sep} & set(word))
 
 
@@ -205,7 +205,7 @@ def prepare(action: str, window: bool) -> None:
 
 
 def compiled() -> bool:
-    """Whether what makes the sound has been compiled as it is now, for this .venv."""
+    """Return True if what makes the sound has been compiled as it is now, for this .venv."""
     try:
         return COMPILED.read_text("utf-8") == kernels()
     except OSError:
@@ -310,7 +310,7 @@ def environment(absent: list[str]) -> None:
 
 
 def sound() -> bool:
-    """Whether .venv was made in this place, by a Python that still runs, as does its pip."""
+    """Return True if .venv was made in this place, by a Python that still runs, as does its pip."""
     try:
         made = settings()
         numbers = made["version"].split(".")[:2]
@@ -332,7 +332,7 @@ def mend() -> None:
 
 
 def whole(package: Path) -> bool:
-    """Whether every file in a package's RECORD is there in its full size; compiled ones come and go."""
+    """Return True if every file in a package's RECORD is there in its full size; compiled ones come and go."""
     try:
         with (package / "RECORD").open(newline="", encoding="utf-8") as rows:
             sizes = {package.parent / name: int(size) for name, _, size in csv.reader(rows) if size}
@@ -380,7 +380,7 @@ def torch_source() -> list[str]:
 
 
 def reachable(address: str) -> bool:
-    """Whether a server has the page; one that is silent for ANSWER_S has not, nor has a slow name server."""
+    """Return True if a server has the page. One that is silent for ANSWER_S has not, nor has a slow name server."""
     import urllib.request  # tens of milliseconds, which only a set-up spends
 
     answers = []
@@ -448,7 +448,7 @@ def missing(table: dict[str, str]) -> list[str]:
 
 
 def present(sign: str) -> bool:
-    """Whether a library loads, a module or a file exists, or a program is on the path; starts no process."""
+    """Return True if a library loads, a module or file exists, or a program is on the path. No process is started."""
     if sign.startswith("import "):
         return importlib.util.find_spec(sign.removeprefix("import ")) is not None
     if sign.startswith("/"):

@@ -27,7 +27,7 @@ WARM_UP_FRAMES = 64  # rendered before time is taken, so that compilation and ca
 
 @dataclass(frozen=True)
 class ComparedRow:
-    """One preset; None: no such figure, or not yet.
+    """The figures of a preset; None: no such figure, or not yet.
 
     Attributes:
         mse, mae: relative, over the whole string and the trained horizon.
@@ -60,7 +60,7 @@ class ComparedRow:
 
 @dataclass(frozen=True)
 class Basis:
-    """What the presets are compared on.
+    """The conditions that the presets are compared on.
 
     Attributes:
         listen: the listening point, 0 … 1.
@@ -87,7 +87,7 @@ def compare(entries: list[PresetEntry], basis: Basis, job: Job) -> None:
 
 
 def same_string(info: PresetInfo, other: PresetInfo) -> bool:
-    """Whether two presets have learned the same string, at whatever rate."""
+    """Return True if two presets have learned the same string, at any rate."""
     return (info.string, info.tension_modulated) == (other.string, other.tension_modulated)
 
 

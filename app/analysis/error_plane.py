@@ -38,7 +38,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class PlanePicture:
-    """What can be shown of a plane so far.
+    """The picture of a plane, as far as it can be shown.
 
     Attributes:
         error: relative MAE over the trained horizon, (positions, amplitudes) of the finest grid. Its logarithm is
@@ -78,7 +78,7 @@ class ErrorPlane:
         return whole[-1] if whole else None
 
     def picture(self) -> PlanePicture | None:
-        """What can be shown so far; None before the coarsest level is complete."""
+        """The picture so far; None before the coarsest level is complete."""
         spacing = self.spacing
         if spacing is None:
             return None

@@ -1,4 +1,4 @@
-"""What is computed from a take while it is rendered, a little at a time."""
+"""Results that are computed from a take while it is rendered, a little at a time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Growing(Protocol):
 
     @property
     def complete(self) -> bool:
-        """Whether all results are ready."""
+        """Return True if all results are ready."""
 
     def advance(self) -> bool:
         """Computes the next few results; returns False where the take has nothing new for them yet."""

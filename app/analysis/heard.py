@@ -25,7 +25,7 @@ Each = TypeVar("Each", Motion, Signal)
 
 @dataclass(frozen=True)
 class _Heard(Generic[Owner, Each]):
-    """One source of a take, times `gain`."""
+    """A source of a take, times `gain`."""
 
     of: Owner
     source: str
@@ -41,7 +41,7 @@ class _Heard(Generic[Owner, Each]):
 
     @property
     def there(self) -> bool:
-        """Whether any of it has been rendered; another preset's model may begin after the take."""
+        """Return True if any of it has been rendered; another preset's model may begin after the take."""
         return all(name in self._by_source for name in _parts(self.source)) and self.ready > 0
 
     @property
@@ -85,7 +85,7 @@ class HeardMotion(_Heard[Take, Motion]):
 
 
 class HeardSignal(_Heard[Listened, Signal]):
-    """What a pick-up senses of a source at the listening points, in m or m/s."""
+    """The signal that a pick-up senses of a source at the listening points, in m or m/s."""
 
     @property
     def _by_source(self) -> Mapping[str, Signal]:
@@ -96,7 +96,7 @@ class HeardSignal(_Heard[Listened, Signal]):
         return self._series[0].rate_hz
 
     def read(self, first: int, stop: int) -> NDArray[np.float32]:
-        """As `read_all`, at the first listening point, (frames,)."""
+        """Read as `read_all`, at the first listening point, (frames,)."""
         return self.read_all(first, stop)[:, 0]
 
 

@@ -1,4 +1,4 @@
-"""The string at the playhead: its shape in slow motion, the blur of its motion, and the range of the last second."""
+"""The string at the playhead: its shape in slow motion, its motion's blur, and the range of the last second."""
 
 from __future__ import annotations
 
@@ -49,7 +49,10 @@ class StringFrame:
 
 
 class Envelope:
-    """The range of motion within the last second of a take, kept by blocks, so that each frame is read only once."""
+    """The range of motion within the last second of a take.
+
+    It is kept by blocks, so that each frame is read only once.
+    """
 
     def __init__(self) -> None:
         self._ranges: dict[str, _Range] = {}
@@ -111,7 +114,9 @@ def frame_at(
     speed: float,
     envelope: Envelope | None = None,
 ) -> StringFrame:
-    """The string of each motion at the playhead, as slow motion shows it, with its blur and, if given, its envelope.
+    """The string of each motion at the playhead, as slow motion shows it.
+
+    It comes with its blur and, if given, its envelope.
 
     Args:
         position_s: the playhead.

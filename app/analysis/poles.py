@@ -59,7 +59,7 @@ class Poles:
 
 @dataclass(frozen=True)
 class PoleFigure:
-    """What the view shows of a preset; `learned` is empty where the model has no eigenvalues, and `note` says why."""
+    """The poles of a preset. `learned` is empty where the model has no eigenvalues, and `note` says why."""
 
     rate_hz: int
     learned: Poles
@@ -98,7 +98,7 @@ def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:
 
 
 def _upper_half(log: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    """One of each pair λ, λ̄."""
+    """Select one of each pair λ, λ̄."""
     turned = np.angle(np.exp(1j * log.imag))
     upper = log.real + 1j * np.abs(turned)
     lower = turned < 0

@@ -40,11 +40,11 @@ class Picture:
 
     @property
     def signed(self) -> bool:
-        """Whether it shows displacements with their signs, and not magnitudes."""
+        """Return True if it shows displacements with their signs, and not magnitudes."""
         return self.detail != "envelope"
 
     def at(self, time_s: float, place: float) -> float | None:
-        """The displacement in m drawn at a time and a place of the string, 0 … 1; None outside the image."""
+        """The displacement in m drawn at a time and a place, 0 … 1, of the string. None: outside the image."""
         places, columns = self.displacement_m.shape
         if not (self.start_s <= time_s < self.stop_s and 0 <= place <= 1):
             return None
@@ -94,7 +94,7 @@ class Envelopes:
         return self._largest_m[quantity][: self.ready]
 
     def typical_m(self, quantity: str, times_s: tuple[float, float]) -> float:
-        """1.5 times the median, over these times, of the string's peak, as far as it is ready; 0 where nothing is."""
+        """1.5 times the median, over these times, of the string's peak, as far as it is ready. 0 where nothing is."""
         column_s = self.stride / self.take.picture_hz
         first, last = int(times_s[0] / column_s), int(times_s[1] / column_s) + 1
         peaks_m = self._peaks_m[quantity][first : min(last, self.ready)]
@@ -125,7 +125,7 @@ def picture(envelopes: Envelopes, quantity: str, times_s: tuple[float, float], c
 
 
 def detail_for(take: Take, times_s: tuple[float, float], columns: int) -> Detail:
-    """What a column shows where `times_s` is drawn in so many columns."""
+    """The detail of a column where `times_s` is drawn in so many columns."""
     column_s = (times_s[1] - times_s[0]) / columns
     if column_s * take.picture_hz <= 1:
         return "frames"

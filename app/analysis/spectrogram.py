@@ -67,7 +67,7 @@ class Spectrogram:
         return True
 
     def _possible(self) -> int:
-        """How many columns have a window that is rendered to its end."""
+        """The number of columns whose window is rendered to its end."""
         return self._columns_of(min(heard.ready for heard in self._heard.values()))
 
     def _columns_of(self, frames: int) -> int:

@@ -1,4 +1,4 @@
-"""The partials of a take, mode by mode, as rows of a table; a note says why a row has no figures."""
+"""The partials of a take, mode by mode, as rows of a table. A note says why a row has no figures."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ WINDOWS = {"trained": "as trained", "past": "past it", "all": "all of it"}
 
 @dataclass(frozen=True)
 class PartialRow:
-    """One mode in one window; None: there is no such figure. Differences are the model's minus the truth's.
+    """A mode in a window. None: there is no such figure. Differences are the model's minus the truth's.
 
     Attributes:
         mode: from 1.

@@ -19,7 +19,7 @@ class DeviceChoice(BaseModel):
 
 
 class SoundChoice(BaseModel):
-    """How a device is opened. `rate_hz`: 0 for the device's own rate."""
+    """The settings that a device is opened with. `rate_hz`: 0 for the device's own rate."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

@@ -46,7 +46,7 @@ def read_impulse(path: Path) -> Impulse:
 
 
 def cut_words(path: Path) -> str:
-    """Which parts of this file `read_impulse` leaves out, in a sentence; "" where it takes all of it."""
+    """The parts of this file that `read_impulse` leaves out, in a sentence; "" where it takes all of it."""
     samples, rate_hz = _read(path)
     silent, longest_s = _onset(samples, rate_hz), bounds.LONGEST_IMPULSE_S
     begins = f"without {1000 * silent / rate_hz:.0f} ms of silence before it" if silent else ""

@@ -36,7 +36,9 @@ class NoteFile:
 
 
 def read_note(path: Path) -> NoteFile:
-    """The sound of a file: WAV, FLAC, AIFF or Ogg, 8 bits to floating point, any number of channels up to 8.
+    """The sound of a WAV, FLAC, AIFF or Ogg file.
+
+    Samples have 8 bits to floating point, in any number of channels up to 8.
 
     Raises:
         NoteFileError: it cannot be read, or is too long, too large or empty.

@@ -1,4 +1,4 @@
-"""What takes the mixer's frames: a device, or, where there is none, a clock that drops them."""
+"""The output that takes the mixer's frames: a device, or, where there is none, a clock that drops them."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LONGEST_LAG_S = 0.1  # further behind than this, the clock skips what it has mis
 
 
 class Output(Protocol):
-    """What takes the mixer's frames.
+    """An output that takes the mixer's frames.
 
     Attributes:
         device: None for the clock.
@@ -40,10 +40,10 @@ class Output(Protocol):
         """The share of the output's time that the mixer takes, 0 … 1."""
 
     def stalled(self) -> bool:
-        """Whether it has taken no frames for a while, and may recover."""
+        """Return True if it has taken no frames for a while, and may recover."""
 
     def lost(self) -> bool:
-        """Whether it has gone and must be opened again."""
+        """Return True if it has gone and must be opened again."""
 
     def close(self) -> None: ...
 

@@ -20,7 +20,7 @@ class ProblemKind(StrEnum):
 
 @dataclass(frozen=True)
 class AudioProblem:
-    """One fault: what happened, the remedy, and the system's own words (`detail`, "" where there are none)."""
+    """A fault: what happened, the remedy, and the system's own words (`detail`, "" where there are none)."""
 
     kind: ProblemKind
     message: str
@@ -32,7 +32,7 @@ class AudioProblem:
 
 
 class AudioUnavailable(Exception):
-    """No sound output can be used at present; pictures and export continue."""
+    """The error that no sound output can be used at present; pictures and export continue."""
 
     def __init__(self, problem: AudioProblem) -> None:
         super().__init__(str(problem))
@@ -106,7 +106,7 @@ def internal(detail: str) -> AudioProblem:
 
 
 def unexpected(error: Exception, device_name: str) -> AudioUnavailable:
-    """Returns what became of a device while it was looked for or opened, where that is no known fault of devices."""
+    """Returns the problem of a device that was looked for or opened, where that is no known fault."""
     return AudioUnavailable(
         AudioProblem(
             ProblemKind.OTHER,

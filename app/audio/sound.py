@@ -216,7 +216,7 @@ class Sound:
             self._close()
 
     def _carry_on(self, work: Callable[[], None]) -> bool:
-        """Does `work`; whether it could. A fault of it is reported once, and all else continues."""
+        """Do `work`; return True if it could be done. A fault of it is reported once, and all else continues."""
         try:
             work()
             return True

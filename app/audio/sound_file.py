@@ -221,7 +221,7 @@ def _format(given: bytes, byte_order: str) -> tuple[bytes, int, bool]:
 
 
 def _whole_texts(given: bytes, byte_order: str) -> bytes:
-    """A list of texts up to the first that is cut off, from which libsndfile would read on into the samples."""
+    """A list of texts up to the first that is cut off. From that one libsndfile would read on into the samples."""
     end = 4  # of "INFO"
     while len(given) >= end + 8:
         size = struct.unpack(byte_order + "I", given[end + 4 : end + 8])[0]
@@ -232,14 +232,17 @@ def _whole_texts(given: bytes, byte_order: str) -> bytes:
 
 
 def _next_chunk(file: BinaryIO, after: int, size: int, byte_order: str) -> int:
-    """The place of the chunk behind one that ends at `after`; an odd one should have a padding byte, and may not."""
+    """The place of the chunk behind one that ends at `after`. An odd one should have a padding byte, and may not."""
     places = (after + size % 2, after + 1 - size % 2)
     likely = [_likelihood(file, place, byte_order) for place in places]
     return places[1] if likely[1] > likely[0] else places[0]
 
 
 def _likelihood(file: BinaryIO, place: int, byte_order: str) -> int:
-    """How likely a chunk begins at a place: 0, without a name; by its size and what follows; 4, of a known name."""
+    """The likelihood, 0 … 4, that a chunk begins at a place.
+
+    It is 0 without a name, 4 with a known one, else by its size and what follows.
+    """
     header = _bytes_at(file, place, 8)
     if len(header) < 8 or not _is_name(header[:4]):
         return 0
@@ -257,7 +260,7 @@ def _is_name(name: bytes) -> bool:
 
 
 def _chunks_follow(file: BinaryIO, at: int, end: int, byte_order: str) -> bool:
-    """Whether the rest of a file is chunks, so that there are no samples."""
+    """Return True if the rest of a file is chunks, so that there are no samples."""
     for _ in range(_MOST_CHUNKS):
         header = _bytes_at(file, at, 8)
         if len(header) < 8 or not _is_name(header[:4]):

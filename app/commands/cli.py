@@ -116,13 +116,13 @@ def carry_out(commands: typer.Typer, arguments: Sequence[str] | None, name: str)
 
 
 def is_file_name(word: str) -> bool:
-    """Whether a word has a folder or an ending, as no command and no option has."""
+    """Return True if a word has a folder or an ending, as no command and no option has."""
     separators = {os.sep, os.altsep or os.sep}
     return not word.startswith("-") and bool(Path(word).suffix or separators & set(word))
 
 
 def open_files(words: Sequence[str]) -> int:
-    """Opens the app with files, as if they were dropped on its window; returns its exit status, or 2 for no file."""
+    """Opens the app with files, as if they were dropped on its window. Returns its exit status, or 2 for no file."""
     files = [Path(word).absolute() for word in words]
     for word, file in zip(words, files, strict=True):
         if not file.is_file():

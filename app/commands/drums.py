@@ -237,7 +237,7 @@ class _Blow:
     strike: Strike
 
     def struck(self, linear: bool = False) -> StruckDrum:
-        """Its start; `linear`: of the drum without tension modulation."""
+        """The struck drum at its start; `linear`: without tension modulation."""
         import numpy as np
 
         from training.family.drums import StruckDrum
@@ -249,7 +249,7 @@ class _Blow:
         return StruckDrum("tom", found.drum, resonator, np.zeros_like(speeds), speeds, found.scale**2, rise)
 
     def player(self) -> DrumPlayer:
-        """Of the instrument's preset. Raises Failure: its model learned one string."""
+        """The player of the instrument's preset. Raises Failure: its model learned one string."""
         from training.family.drums import model_player
 
         try:

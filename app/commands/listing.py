@@ -84,7 +84,7 @@ def instruments(
 
 
 def _parameters(patch: Patch) -> Iterator[dict[str, Any]]:
-    """What the table says of the parameters that an instrument has, and its own values."""
+    """The table's rows: the parameters that an instrument has, with its own values."""
     from app.shared.parameters import OF_PATCHES
 
     for id, parameter in OF_PATCHES.items():

@@ -138,7 +138,7 @@ def predict(
 
 
 def _outside_family(info: PresetInfo, initial: Array) -> list[str]:
-    """How a string and its displacements differ from those of a preset of many where the error grows."""
+    """The deviations of a string and its displacements from a preset of many strings, where the error grows."""
     if info.family is None:
         return []
     found = info.family.warnings(info.string)

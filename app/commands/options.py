@@ -17,7 +17,7 @@ DEFAULT_LISTEN = OF_CHOICES["listen"].default
 
 
 def _option(id: str, metavar: str) -> Any:
-    """With the parameter's tip and range."""
+    """An option with the parameter's tip and range."""
     parameter = OF_CHOICES[id]
     low, high = parameter.limits
     return typer.Option(metavar=metavar, help=f"{parameter.tip}: {low:g} … {high:g} {parameter.unit}".rstrip() + ".")

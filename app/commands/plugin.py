@@ -96,7 +96,7 @@ def _bank_name(names: Sequence[str]) -> str:
 
 
 def _print_sizes(images: Sequence[Image]) -> None:
-    """What each adds to the code, of which every plug-in has a third of a megabyte."""
+    """Print the size that each adds to the code. The code is a third of a megabyte in every plug-in."""
     for image in images:
         print(f"{one_line(image.name)}: {image.bytes / 1e6:.2f} MB, {len(image.content) / 1e6:.2f} MB in a bank")
 

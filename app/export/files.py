@@ -34,7 +34,7 @@ DECAY_FADE_S = 0.05  # the fade-out where a sound ends by its decay
 
 @dataclass(frozen=True)
 class WavReport:
-    """What was written.
+    """The report of a WAV file that was written.
 
     Attributes:
         peak_db: the largest sample in dBFS before any clipping; -inf for silence.
@@ -144,7 +144,7 @@ def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -
 
 
 def _digits(value: float, least: int) -> str:
-    """With at least so many decimals, and more, up to six, where they are needed to give the value exactly."""
+    """Write a value with at least so many decimals; up to six where its exact value needs them."""
     return next((text for places in range(least, 6) if float(text := f"{value:.{places}f}") == value), f"{value:.6f}")
 
 

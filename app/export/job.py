@@ -1,4 +1,4 @@
-"""What every export is for the window: work with progress, which can be cancelled, and its result in words."""
+"""The window's view of every export: work with progress, which can be cancelled, and its result in words."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class ExportJob(Protocol):
 
     @property
     def folder(self) -> Path:
-        """Where the files are written."""
+        """The folder where the files are written."""
 
     def run(self, progress: Progress) -> str:
         """Writes the files and returns the result in words, a line each. Any thread.
@@ -30,4 +30,4 @@ class ExportJob(Protocol):
         """
 
     def cancelled(self) -> str:
-        """What is there after it was cancelled, in words. Raises WriteError: what is there is damaged."""
+        """The files that are left after it was cancelled, in words. Raises WriteError: what is there is damaged."""

@@ -1,4 +1,4 @@
-"""A recording on disk while it is made and until it is saved: a line of JSON for each event, appended.
+"""A recording on disk while it is made and until it is saved. Each event is a line of JSON, appended.
 
 A process that is killed leaves its journal. The next start finds it, for the lock beside it is no living process's.
 Lines are short: after the first, an instrument that is turned is the fields that changed. A torn last line is left
@@ -152,7 +152,7 @@ class Journal:
 
 
 def left_journals(folder: Path) -> list[Journal]:
-    """Those of processes that are no more, the oldest first; this process has them from now on."""
+    """The journals of processes that are no more, the oldest first; this process has them from now on."""
     try:
         paths = sorted(path for path in folder.glob(f"*{SUFFIX}") if path.is_file())
     except OSError:
@@ -178,7 +178,7 @@ def _changes(before: Any, after: Any, *path: str) -> Iterator[tuple[list[str], A
 
 @dataclass
 class _Read:
-    """What the lines so far say. Each is checked, as of any file."""
+    """The content of the lines so far. Each is checked, as of any file."""
 
     where: str
     recorded: datetime | None = None
@@ -189,7 +189,7 @@ class _Read:
     _patch: dict[str, Any] | None = None
 
     def take(self, line: bytes) -> bool:
-        """False: this line is damaged, so that nothing after it counts.
+        """Take a line; return False where it is damaged or fills the recording: nothing after it counts.
 
         Raises:
             ValueError: it is the first, and no journal's.

@@ -51,7 +51,7 @@ class Note:
 
     @property
     def can_be_alone(self) -> bool:
-        """Whether an instrument plays it, whose string can be heard without that."""
+        """Return True if an instrument plays it, and its string can be heard without that instrument."""
         return self.struck is not None and not self.struck.of_drum
 
     def request(
@@ -63,7 +63,7 @@ class Note:
         difference_gain_db: float = 0.0,
         decay_db: float | None = None,
     ) -> SoundRequest:
-        """What is rendered of it.
+        """The request to render it.
 
         Args:
             rate_hz: of the sound; 0: the preset's own.
@@ -99,7 +99,7 @@ class Note:
         return {source: sound[:].astype(np.float32) for source, sound in voices.sounds.items()}
 
     def file_name(self, source: Source) -> str:
-        """Its name, and the source where that is not the model."""
+        """The name of its file, with the source where that is not the model."""
         kind = "" if source == "model" else f" {source}"
         return f"{self.name or self.preset.stem}{kind}.wav"
 
@@ -120,7 +120,7 @@ def musical_name(title: str, first_hz: float, softest_mm: float, hardest_mm: flo
 
 
 def struck_name(struck: Struck) -> str:
-    """As `musical_name`, of a key; soft and hard are the outer thirds of velocities."""
+    """A name as `musical_name`, of a key; soft and hard are the outer thirds of velocities."""
     return _named(struck.patch.name, note_name(struck.event.key), struck.event.velocity / 127)
 
 
@@ -175,7 +175,7 @@ class NoteExport:
         return "\n".join(_words(self.written(progress), of_family))
 
     def written(self, progress: Progress) -> list[WavReport]:
-        """As `run`, with reports in place of words."""
+        """Write the files as `run`, with reports in place of words."""
         choices, decays = self.choices, self.choices.until_decayed
         request = self.note.request(
             next(iter(self.paths)),

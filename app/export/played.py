@@ -1,4 +1,4 @@
-"""What is played through a patch, as files: a WAV file rendered from the events, and the events as a MIDI file."""
+"""The files of what is played through a patch: a WAV file rendered from the events, and their MIDI file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ DEFAULT = WavSettings("24", RATE_HZ)
 
 @dataclass(frozen=True)
 class PlayedFile:
-    """What was written: its duration and its level."""
+    """The duration and the level of a file that was written."""
 
     seconds: float
     level: Level
@@ -36,7 +36,7 @@ class PlayedFile:
 
 @dataclass(frozen=True, eq=False)
 class Played:
-    """What was played through a patch, and not yet written to a file.
+    """A performance through a patch that is not yet written to a file.
 
     Attributes:
         patch: with which it began.

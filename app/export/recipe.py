@@ -1,5 +1,7 @@
-"""What a WAV file is, as JSON in its comment tag: a pluck, with all choices that its sound follows from (its recipe),
-or what was played on an instrument, whose notes are in a MIDI file.
+"""The origin of a WAV file, as JSON in its comment tag.
+
+A pluck has all choices that its sound follows from (its recipe). A performance on an instrument has its notes in a
+MIDI file.
 """
 
 from __future__ import annotations
@@ -40,11 +42,11 @@ class NoRecipe(RecipeError):
 
 
 class NotesElsewhere(RecipeError):
-    """What was played on an instrument: its notes are in a MIDI file."""
+    """The error that a file was played on an instrument: its notes are in a MIDI file."""
 
 
 class InstrumentSound(BaseModel):
-    """What was played on an instrument: recorded in the window, or rendered from a MIDI file.
+    """A performance on an instrument: recorded in the window, or rendered from a MIDI file.
 
     Attributes:
         instrument: the name of the patch, of a recording the one with which it began.
@@ -72,7 +74,7 @@ class InstrumentSound(BaseModel):
 
     @property
     def words(self) -> str:
-        """What it is, for people."""
+        """The description for people."""
         what, when = ("rendering", "") if self.recorded is None else ("recording", f", {self.recorded[:10]}")
         return f"a {what} of {self.instrument} ({source_words(self.source, self.difference_gain_db)}{when})"
 
@@ -176,7 +178,7 @@ class Recipe(BaseModel):
 
 
 def read_origin(path: Path) -> Recipe | InstrumentSound:
-    """What a WAV file is, as it carries it.
+    """Read the origin that a WAV file carries.
 
     Raises:
         NoRecipe: it is a sound file without that.

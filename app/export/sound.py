@@ -40,7 +40,7 @@ Samples = NDArray[np.float64]
 
 
 class Through(BaseModel):
-    """What an instrument added to a string that was plucked by hand, in recipes of earlier versions.
+    """The parts that an instrument added to a string plucked by hand, in recipes of earlier versions.
 
     Attributes:
         instrument: its name.
@@ -71,7 +71,7 @@ class Through(BaseModel):
 
 @dataclass(frozen=True)
 class SoundRequest:
-    """What is to be rendered.
+    """A request to render a sound.
 
     Attributes:
         listen: the listening point, as a fraction of the string's length.
@@ -173,7 +173,7 @@ class Mixed:
 
 
 def voices_of(source: Source) -> tuple[Voice, ...]:
-    """Which of model and truth must be rendered for a source."""
+    """The voices, of model and truth, that must be rendered for a source."""
     return ("model",) if source == "model" else ("truth",) if source == "truth" else VOICES
 
 
@@ -232,7 +232,7 @@ def render_voices(
 
 
 def decayed_frames(sound: Sound, rate_hz: int, decay_db: float) -> int:
-    """How many frames of a sound pass until its level stays `decay_db` below its maximum.
+    """The number of frames of a sound until its level stays `decay_db` below its maximum.
 
     The level is the mean square over windows of 50 ms and all points. Returns all frames where it does not fall so
     far, and one window for silence.

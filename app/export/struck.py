@@ -86,7 +86,7 @@ class Struck:
 
     @property
     def words(self) -> str:
-        """For people."""
+        """The description for people."""
         stroke = f"at velocity {self.event.velocity}" if self.event.pluck is None else "plucked by hand"
         return f"{self.patch.name}, {note_name(self.event.key)} {stroke}"
 

@@ -31,7 +31,7 @@ _DITHER_SEED = 0  # the same sound makes the same file
 
 @dataclass(frozen=True)
 class WavSettings:
-    """How samples become a file.
+    """The settings of a WAV file.
 
     Attributes:
         bits: integers of 16 (with TPDF dither) or 24 bits, or 32-bit floating point, which never clips.

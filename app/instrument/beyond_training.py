@@ -1,4 +1,4 @@
-"""What of a note lies outside the training of the model that plays it, also after a knob was turned."""
+"""The parts of a note outside the training of the model that plays it, also after a knob was turned."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from engine.resonators.string import StringParameters
 
 
 def outside_of_key(info: PresetInfo, patch: Patch, event: NoteOn, string: int | None = None) -> list[str]:
-    """As `outside_of_string`, of what a key would sound with; empty for a key without a possible string.
+    """The warnings as of `outside_of_string`, for a key's sound; empty for a key without a possible string.
 
     Wheels and slides are left out.
 
@@ -35,7 +35,7 @@ def outside_of_key(info: PresetInfo, patch: Patch, event: NoteOn, string: int | 
 
 
 def outside_of_string(info: PresetInfo, string: StringParameters, pluck: Pluck) -> list[str]:
-    """How a string and its pluck differ from what a preset was trained on, in plain words; empty where not."""
+    """The differences of a string and its pluck from a preset's training, in plain words; empty where none."""
     if info.family is not None:
         with contextlib.suppress(ValueError):  # it cannot play that one; its own string is judged
             info = info_of_string(info, string)

@@ -1,4 +1,4 @@
-"""The bodies that a patch may name: those of the engine, and impulse responses of the user's own, by their files.
+"""The bodies that a patch may name: those of the engine, and the user's own impulse responses, by their files.
 
 The user's lie in a folder beside the patches. A body is known by its file's name without the ending, never by a path.
 """

@@ -120,12 +120,12 @@ class InstrumentPlayer:
 
     @property
     def of_drums(self) -> bool:
-        """Whether it can hold drums; else it holds strings."""
+        """Return True if it can hold drums; else it holds strings."""
         return self._of_drums
 
     @property
     def ear(self) -> Ear:
-        """Where strings are heard that are struck now."""
+        """The place where strings are heard that are struck now."""
         return self._keys.ear
 
     @property
@@ -134,7 +134,7 @@ class InstrumentPlayer:
 
     @property
     def heard_through(self) -> Patch:
-        """With the body and the room as the modulation wheel turns them."""
+        """The patch with body and room as the modulation wheel turns them."""
         return wheeled(self.patch, self._wheel[0], "body.", "room.")
 
     @property
@@ -186,7 +186,9 @@ class InstrumentPlayer:
         self.compiled.set_spares(not compared)
 
     def keys_of(self, patch: Patch, ear: Ear | None = None, nearly: bool = False) -> StringKeys | DrumKeys:
-        """What `tabled` needs of a patch. Another body takes milliseconds, in which keys are played.
+        """Prepare the keys of a patch, as `tabled` needs them.
+
+        Another body takes milliseconds, in which keys are played.
 
         Args:
             nearly: whether keys may be as loud as through the body of the present patch, which takes no time.
@@ -226,7 +228,7 @@ class InstrumentPlayer:
     # Events
 
     def silent(self, key: int) -> bool:
-        """Whether a key has nothing that sounds. Raises ValueError: it has an impossible string."""
+        """Return True if a key has nothing that sounds. Raises ValueError: it has an impossible string."""
         if isinstance(self._keys, DrumKeys):
             return self._keys.of_key(key) is None
         return self._keys.strings.pitch_hz(key) is None
@@ -284,7 +286,7 @@ class InstrumentPlayer:
         keys.string_of(event.key)
 
     def _struck(self, event: NoteOn) -> NDArray[np.float64] | None:
-        """What a blow at a place of its own gives a drum's modes; None: its own place."""
+        """The effect of a blow at a place of its own on a drum's modes; None: the drum's own place."""
         if event.place is None or not isinstance(self._keys, DrumKeys):
             return None
         found = self._keys.of_key(event.key)
@@ -314,7 +316,7 @@ class InstrumentPlayer:
     # What became of them
 
     def reports(self) -> list[Report]:
-        """What became of notes since this was asked for the last time. One thread asks."""
+        """Reports of what became of notes since the last call. One thread asks."""
         return self.compiled.reports()
 
     def ringing(self) -> list[Ringing]:
@@ -322,7 +324,7 @@ class InstrumentPlayer:
         return self.compiled.ringing()
 
     def slid(self, note: Ringing) -> float:
-        """How many semitones above its key a note's string is stopped now, as while it slides."""
+        """The semitones above its key where a note's string is stopped now, as while it slides."""
         keys = self._keys
         if note.length_m is None or isinstance(keys, DrumKeys):
             return 0.0
@@ -333,5 +335,5 @@ class InstrumentPlayer:
 
 
 def is_another(patch: Patch, than: Patch) -> bool:
-    """Whether a patch is another instrument: neither the same with a knob turned, nor the same under a new name."""
+    """Return True if a patch is another instrument. The same with a knob turned, or under a new name, is not."""
     return patch.name != than.name and patch.model_copy(update={"name": than.name}) != than

@@ -1,4 +1,4 @@
-"""The keys of a patch of drums before anybody plays them: modes, and what a blow and an ear make of them.
+"""The keys of a patch of drums before anybody plays them: modes, and what blow and ear make of them.
 
 What `StringKeys` is for strings; the compiled player computes gains.
 """
@@ -60,7 +60,7 @@ class DrumKey:
 
     @property
     def pitch_hz(self) -> float:
-        """Of its first mode, at rest."""
+        """The pitch of its first mode, at rest."""
         return float(math.sqrt(self.modes.omega[0] ** 2 - self.modes.sigma[0] ** 2) / math.tau)
 
     def rise(self, velocity: float, curve: float = 0.0) -> float:
@@ -70,7 +70,7 @@ class DrumKey:
         return float(resonator.relative_tension_rise(speeds / self.modes.omega)) / 2
 
     def drop_cents(self, velocity: float, curve: float = 0.0) -> float:
-        """By how much the pitch of the first mode falls after a blow."""
+        """The fall of the pitch of the first mode after a blow, in cents."""
         return 600 * math.log2(1 + self.rise(velocity, curve))
 
 
@@ -82,7 +82,7 @@ def on_the_drum(played: PlayedDrum, place: tuple[float, float]) -> tuple[float, 
 
 
 class DrumKeys:
-    """Of one patch of drums, heard at `ear`; see `StringKeys`. Modes of a drum are remembered."""
+    """The keys of a patch of drums, heard at `ear`; see `StringKeys`. Modes of a drum are remembered."""
 
     polarisations = None
 
@@ -95,7 +95,7 @@ class DrumKeys:
         self._known: dict[int, DrumKey | None] = {}
 
     def of_key(self, key: int, string: int | None = None) -> DrumKey | None:
-        """None for a key that is silent; remembered. Raises ValueError: the key has no possible drum."""
+        """The drum of a key, remembered; None for a silent key. Raises ValueError: the key has no possible drum."""
         if key not in self._known:
             self._known[key] = self._of_key(key)
         return self._known[key]

@@ -1,4 +1,4 @@
-"""The body and the room of a patch, as the mixer takes them, and what the body does to the loudness of a key."""
+"""The body and room of a patch, as the mixer takes them, and the body's effect on a key's loudness."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def effects_of(patch: Patch) -> Effects | None:
 
 
 def effects_from(chosen: ChosenBody, room: ChosenRoom, amp: ChosenAmp, level_db: float) -> Effects | None:
-    """As `effects_of`; the level is behind the amplifier, and changes no drive."""
+    """Build effects as `effects_of`; the level is behind the amplifier, and changes no drive."""
     body = _body(chosen)[0]
     made = Room(room.mix, room.t60_s) if room.mix > 0 else None
     driven = Amp(amp.drive_db, amp.tone_db, level_db) if amp.drive_db > 0 else None
@@ -31,7 +31,7 @@ def effects_from(chosen: ChosenBody, room: ChosenRoom, amp: ChosenAmp, level_db:
 
 
 def added_words(patch: Patch) -> str:
-    """What an instrument adds to the sound of its strings or drums, for people."""
+    """The parts that an instrument adds to the sound of its strings or drums, for people."""
     parts = {
         "amplifier": patch.amp.drive_db > 0,
         "body": bool(patch.body.name) and patch.body.mix > 0,
@@ -44,13 +44,13 @@ def added_words(patch: Patch) -> str:
 
 
 def body_problem(patch: Patch) -> str:
-    """Why its body is not heard, in one line; "" where nothing is wrong."""
+    """The reason why its body is not heard, in one line; "" where nothing is wrong."""
     problem = _body(patch.body)[1]
     return problem and f"{patch.name} is played without its body: {problem}"
 
 
 def channels_of(patch: Patch, wheeled: bool = False) -> int:
-    """How many channels a patch sounds in: 2 with two listening points, a room, or a body of two channels, else 1.
+    """The channels of a patch: 2 with two listening points, a room, or a body of two channels, else 1.
 
     All of the engine's bodies have two.
 

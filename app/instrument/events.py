@@ -1,4 +1,4 @@
-"""What a player does, as values. Keys are MIDI keys, 0 … 127; channels are MIDI's, counted from 0, or `KEYS`."""
+"""The actions of a player, as values. Keys are MIDI keys, 0 … 127; channels are MIDI's, counted from 0, or `KEYS`."""
 
 from __future__ import annotations
 
@@ -71,7 +71,10 @@ class NoteOff:
 
 @dataclass(frozen=True)
 class Bend:
-    """The pitch wheel moves to -1 … 1, in ranges of the channel: the patch's, unless messages set another (RPN 0)."""
+    """The pitch wheel moves to -1 … 1, in ranges of the channel.
+
+    The range is the patch's, unless messages set another (RPN 0).
+    """
 
     value: float
     channel: int = 0
@@ -101,17 +104,17 @@ class PluckAt:
 
 
 def fixed_function(number: int) -> str:
-    """What a controller does whatever the patch, as "is the sustain pedal"; "" for one that may be assigned."""
+    """The function of a controller in every patch, as "is the sustain pedal"; "" for one that may be assigned."""
     return _FIXED.get(number, "")
 
 
 def is_obeyed(number: int) -> bool:
-    """Whether a controller does anything without being assigned."""
+    """Return True if a controller does anything without being assigned."""
     return bool(fixed_function(number)) or number in (MOD_WHEEL, VOLUME, EXPRESSION, SLIDE)
 
 
 def moves_effects(event: object, patch: Patch) -> bool:
-    """Whether it changes a patch's body or room."""
+    """Return True if an event changes a patch's body or room."""
     if isinstance(event, Controller):
         return event.number in (MOD_WHEEL, RESET) and patch.mod_wheel.startswith(("body.", "room."))
     return isinstance(event, PatchTurned)
@@ -126,7 +129,7 @@ def channels_in(events: Iterable[Event]) -> set[int]:
 
 
 def release_all(channels: Iterable[int]) -> list[Event]:
-    """What leaves channels as if nobody had played on them: pedal up, wheels at rest, no key held."""
+    """Events that leave channels as if nobody had played on them: pedal up, wheels at rest, no key held."""
     events: list[Event] = []
     for channel in sorted(channels):
         events += [Controller(SUSTAIN, 0, channel), Bend(0.0, channel)]
@@ -153,7 +156,10 @@ def bend_range(semitones: float, channel: int) -> list[Event]:
 
 
 def releases_for(events: Iterable[Event]) -> list[Event]:
-    """The events that release the keys and pedals that are down after these events: one for each stroke of a key."""
+    """The events that release the keys and pedals that are down after these events.
+
+    There is one for each stroke of a key.
+    """
     down: dict[NoteOff | Controller, int] = {}  # strokes without a release, in the order of the latest
     for event in events:
         if isinstance(event, NoteOn | NoteOff):
@@ -180,7 +186,7 @@ class TimedEvent:
 
 
 def played_from(recorded: Iterable[TimedEvent], end_s: float) -> list[TimedEvent]:
-    """What was played until `end_s`, with times in s from the first note on; empty where there was no note.
+    """The events until `end_s`, with times in s from the first note on; empty where there was no note.
 
     Keys and pedals that are down are released at its end.
     """

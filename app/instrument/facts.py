@@ -1,4 +1,4 @@
-"""A key's string in figures, in the units of those who make strings; and from such a figure back to its knob."""
+"""A key's string in figures, in string makers' units; and the way from such a figure back to its knob."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SLOWEST = 1e-9  # decay rate in 1/s, shown for a string without damping
 
 @dataclass(frozen=True)
 class Figure:
-    """What a knob of the string changes, as it is measured on one.
+    """A figure that a knob of the string changes, measured on a string.
 
     Attributes:
         of: the figure of a string of a patch.
@@ -37,7 +37,7 @@ def bright_mode(string: StringParameters) -> int:
 
 
 def t60_s(string: StringParameters, mode: int, patch: Patch) -> float:
-    """How long a mode takes to fall by 60 dB, by the string's own losses."""
+    """The time in which a mode falls by 60 dB, by the string's own losses."""
     return math.log(1000) / max(float(decay_rates(patch, string, mode)[-1]), SLOWEST)
 
 
@@ -66,7 +66,7 @@ FIGURES: Mapping[str, Figure] = {  # by the field of the patch
 
 
 def facts_of(string: KeyString) -> dict[str, str]:
-    """What no knob shows of a key's string: values with their units, by name."""
+    """The facts of a key's string that no knob shows: values with their units, by name."""
     parameters = string.parameters
     return {
         "key": note_name(string.key),
@@ -104,7 +104,7 @@ def reported(figure: float, unit: str) -> str:
 
 
 def knob_for(patch: Patch, key: tuple[int, int | None], field: str, wanted: float) -> float:
-    """Where a knob makes a figure of a key's string what is wanted, or as near to it as it goes.
+    """Find the knob value where a figure of a key's string is as wanted, or as near as it goes.
 
     Args:
         key: and on which string of the set it is played, as in `Strings.of_key`.

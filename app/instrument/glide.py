@@ -67,7 +67,7 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
 
 
 def _of_drums(patch: Patch) -> NDArray[np.float64]:
-    """As `glides_cents`, by the mean tension of a blow's first swing."""
+    """Compute the glides as `glides_cents`, by the mean tension of a blow's first swing."""
     keys = DrumKeys(patch, Ear(tuple(patch.pickup.points)))
     found = np.full((HIGHEST_KEY + 1, VELOCITIES[1] + 1), np.nan)
     low, high = patch.range

@@ -1,4 +1,4 @@
-"""From recordings to an instrument: preset, body and patch in the user's folders.
+"""Instruments made from recordings: preset, body and patch in the user's folders.
 
 `learn_files` and `keep` are what the command calls, and what a dialog of the window calls in a worker's thread.
 """
@@ -93,20 +93,20 @@ def learn_files(
 
 
 def unfinished_folder() -> Path:
-    """Of checkpoints of recordings that are being learned; they are deleted at the end."""
+    """The folder of checkpoints of recordings that are being learned; they are deleted at the end."""
     return user_folder() / "unfinished"
 
 
 @dataclass(frozen=True)
 class Reasons:
-    """Against a recording, in words with the remedy; a refusal says that no string can be fitted to it."""
+    """Reasons against a recording, in words with the remedy; a refusal says that no string can be fitted to it."""
 
     refusals: list[str]
     warnings: list[str]
 
 
 def reasons_against(path: Path) -> Reasons:
-    """What speaks against a file as a note of a string; empty lists: nothing does.
+    """List the reasons against a file as a note of a string; empty lists: there are none.
 
     Raises:
         NoteFileError, RecordingError: nothing can be learned from it in any case.

@@ -1,4 +1,6 @@
-"""The attack of a learned instrument: the noise of its strokes, on where it brings the own key nearer to the note.
+"""The attack of a learned instrument: the noise of its strokes.
+
+It is on where it brings the own key nearer to the note.
 
 Nearness is measured over the first 30 ms of the own key, as the instrument plays it, through its body.
 """
@@ -32,7 +34,7 @@ LEAST_GAIN_DB = 0.2  # of distance, for an attack that is on
 
 
 def attack_of(patch: Patch, note: Note, recorded: RecordedNote) -> tuple[RecordedAttack, float] | None:
-    """The attack of a note and its energy, in dB re that of the note's first 0.4 s; None: there is nothing."""
+    """The attack of a note and its energy, in dB re that of the note's first 0.4 s. None: there is nothing."""
     body = _body_impulse(patch)
     if body is None:
         return None
@@ -79,13 +81,13 @@ def with_attack(patch: Patch, preset: Preset, note: Note, f0_hz: float, level_db
 
 
 def _body_impulse(patch: Patch) -> Array | None:
-    """Of the body alone, (frames,) at RESPONSE_HZ; None: it has none."""
+    """The impulse response of the body alone, (frames,) at RESPONSE_HZ; None: it has none."""
     effects = effects_of(patch)
     return None if effects is None else replace(effects, room=None).impulse(RESPONSE_HZ)[:, 0]
 
 
 def _mean_square(sound: Array, rate_hz: int) -> float:
-    """After K-weighting."""
+    """The mean square of a sound after K-weighting."""
     hz = np.fft.rfftfreq(2 * len(sound), 1 / rate_hz)
     heard = k_weight(np.maximum(hz, 1.0)) * np.abs(np.fft.rfft(sound, 2 * len(sound))) ** 2
     return float(heard.sum()) / len(sound) / len(sound)

@@ -58,7 +58,7 @@ class MidiFileError(ValueError):
 
 @dataclass(frozen=True)
 class Song:
-    """What a patch plays of a MIDI file.
+    """The part of a MIDI file that a patch plays.
 
     Attributes:
         left_out: what it does not play, in one line; "" for nothing.
@@ -130,7 +130,7 @@ def _events_of(path: Path, messages: MidiMessages) -> list[TimedEvent]:
 
 
 def _ignored(messages: MidiMessages) -> list[str]:
-    """In words, which messages change nothing here."""
+    """The messages that change nothing here, in words."""
     found = []
     if messages.missing_tracks:
         found.append(f"{_count(messages.missing_tracks, 'track')} that its header counts")
@@ -155,7 +155,9 @@ def _count(count: int, noun: str) -> str:
 
 
 def read_song(path: Path, patch: Patch | None) -> Song:
-    """What a patch plays of a MIDI file: strings leave drums out, and drums on pads all else; and keys without sound.
+    """Read the events of a MIDI file that a patch plays.
+
+    Strings leave out drums, and drums on pads all else. Keys without sound are left out too.
 
     In MPE channel 10 is one as the others. In guitar mode a file whose notes are all on one channel is no guitar's,
     whichever channel that is: it plays any key.
@@ -202,7 +204,7 @@ def _listed(words: Sequence[str]) -> str:
 
 
 def _silent(patch: Patch, keys: Sequence[int]) -> int:
-    """For how many of these keys a patch has no string."""
+    """The number of these keys for which a patch has no string."""
     strings, known = Strings(patch), dict.fromkeys(keys, False)
     for key in known:
         with contextlib.suppress(ValueError):  # an impossible string is reported when it is struck
@@ -215,7 +217,7 @@ def _on_keys(event: Event) -> Event:
 
 
 def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes:
-    """The bytes of a MIDI file of one track; times are rounded to 1/1920 s, and changes of the patch left out.
+    """The bytes of a MIDI file of one track. Times are rounded to 1/1920 s, and changes of the patch left out.
 
     Args:
         patch: with which it was played; each channel has its range of bends (RPN 0). None: no range is written.
@@ -240,7 +242,7 @@ def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes
 
 
 def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
-    """The events with messages for the range of bends, where a channel has the patch's and not one of its own."""
+    """The events with messages for the range of bends, where a channel has the patch's and not its own."""
     channels, own, found = sorted(channels_in(each.event for each in timed)), set[int](), list[TimedEvent]()
 
     def set_ranges(time_s: float, of: Iterable[int]) -> None:

@@ -27,7 +27,7 @@ class NotMidi(ValueError):
 
 @dataclass(frozen=True)
 class MidiMessages:
-    """What a file holds.
+    """The messages that a file holds.
 
     Attributes:
         timed: times in s and channel messages, in the order in which they are played.
@@ -142,13 +142,16 @@ class _Reader:
                 place = raw.find(b"MTrk", place + 1)
 
     def _begins_chunk(self, place: int) -> bool:
-        """Whether a track begins at a place, or another whole chunk, whose kind is four characters of ASCII."""
+        """Return True if a track begins at a place, or another whole chunk with a kind of four ASCII characters."""
         kind, length = self._raw[place : place + 4], int.from_bytes(self._raw[place + 4 : place + 8], "big")
         named = len(kind) == 4 and all(0x20 <= byte < 0x7F for byte in kind)
         return kind == b"MTrk" or (named and place + 8 + length <= len(self._raw))
 
     def _read_track(self, place: int, end: int) -> int:
-        """Reads a track of a length that may be wrong; the place at which the next chunk is to be looked for."""
+        """Reads a track of a length that may be wrong.
+
+        Returns the place at which the next chunk is to be looked for.
+        """
         raw, known = self._raw, end == len(self._raw) or self._begins_chunk(end)
         limit = end if known else len(raw)
         tick = running = 0

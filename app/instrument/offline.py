@@ -86,7 +86,7 @@ class OfflinePlayer:
 
     @property
     def silent(self) -> bool:
-        """Whether nothing rings any more."""
+        """Return True if nothing rings any more."""
         return not self.mixer.active
 
 
@@ -173,7 +173,7 @@ def _sounds(event: Event) -> bool:
 
 
 def channels_played(patch: Patch, timed: Iterable[TimedEvent]) -> int:
-    """How many channels `render_events` gives: 2 where the patch, or what it is turned to, sounds in two."""
+    """The channels that `render_events` gives: 2 where the patch, or what it is turned to, sounds in two."""
     events = [each.event for each in timed]
     turned = (event.patch for event in events if isinstance(event, PatchTurned))
     wheeled = any(isinstance(event, Controller) and event.number == MOD_WHEEL for event in events)
@@ -201,7 +201,7 @@ def render_note(
     source: str = "model",
     advanced: Callable[[float], None] = lambda seconds: None,
 ) -> NDArray[np.float32]:
-    """One key that is held for `held_s`, (frames, channels), `seconds` long, without a limiter and without variation.
+    """Render a key held for `held_s`, (frames, channels), `seconds` long, without a limiter and without variation.
 
     Args:
         advanced: as in `render_events`.

@@ -1,4 +1,4 @@
-"""The keys of an instrument of strings before anybody plays them: each one's string, and what is the same for all."""
+"""The keys of an instrument of strings before anybody plays them: each one's string, and their common values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from engine.voices import Ear
 
 
 class StringKeys:
-    """Of one patch, heard at `ear`, played by a preset. The compiled player computes their gains.
+    """The keys of a patch, heard at `ear`, played by a preset. The compiled player computes their gains.
 
     Args:
         near: keys of nearly the same patch, of which the body's curves are taken instead, in no time.
@@ -33,7 +33,9 @@ class StringKeys:
         self.body: Array | None = body_curves(patch) if near is None else near.body
 
     def string_of(self, key: int, string: int | None = None) -> KeyString | None:
-        """None for a key that is silent. `string`: on which of a set it is played, as in `Strings.of_key`.
+        """The string of a key; None for a silent key.
+
+        `string`: on which of a set it is played, as in `Strings.of_key`.
 
         Raises:
             ValueError: the key has no possible string.
@@ -52,7 +54,7 @@ class StringKeys:
 
 
 def polarisations_of(patch: Patch, preset: PresetInfo) -> Polarisations | None:
-    """Those of a patch; None: its strings move in one direction, or as a recording says."""
+    """The polarisations of a patch. None: its strings move in one direction, or as a recording says."""
     chosen = patch.polarisations
     return None if chosen is None or preset.recorded is not None else Polarisations(**chosen.model_dump())
 

@@ -103,13 +103,13 @@ class Strings:
 
 
 def chosen_string(strings: StringSet, key: int) -> int:
-    """Which string of a set, from the highest, 0, a key chooses: the highest at or below it, else the lowest."""
+    """The string that a key chooses, from the highest, 0: the highest at or below the key, else the lowest."""
     ordered = strings.strings[::-1]
     return next((number for number, string in enumerate(ordered) if string.note <= key), len(ordered) - 1)
 
 
 def has_octave(patch: Patch, key: int, number: int | None) -> bool:
-    """Whether the course of a key has an octave string.
+    """Return True if the course of a key has an octave string.
 
     Args:
         number: on which string of a set it is played, from the highest, 0; None: on the one that it chooses.
@@ -178,12 +178,15 @@ def damped(string: StringParameters, t60_s: float) -> StringParameters:
 
 
 def _row(string: StringParameters) -> NDArray[np.float64]:
-    """As the kernels take it."""
+    """The row of a string as the kernels take it."""
     return np.array([getattr(string, name) for name in STRING])
 
 
 def decay_rates(patch: Patch, string: StringParameters, modes: int) -> NDArray[np.float64]:
-    """σ of the modes of a patch's string in 1/s, (modes,), by its own losses: d₁, d₃, and those by mode."""
+    """The decay rates σ of the modes of a patch's string in 1/s, (modes,).
+
+    They follow from its own losses: d₁, d₃, and those by mode.
+    """
     rates, knobs = string.decay_rates(modes), patch.knobs
     if patch.losses is not None:
         by_mode = Losses(**patch.losses.model_dump())

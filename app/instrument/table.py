@@ -87,7 +87,7 @@ def wheeled(patch: Patch, wheel: int, *parts: str) -> Patch:
 
 
 def programs_of(preset: Preset, rate_hz: int, sources: Iterable[str], drums: bool) -> tuple[NDArray[np.float64], ...]:
-    """What the kernels read of each source; `drums`: of drums in place of strings."""
+    """The program of each source as the kernels read it; `drums`: of drums in place of strings."""
     model_silence, unheard, silence = HEARD_SILENCE, 0.0, HEARD_SILENCE
     if drums:
         model_silence, unheard, silence = DRUM_STILL, DRUM_UNHEARD, DRUM_SILENCE
@@ -159,7 +159,7 @@ def table_of(
 
 
 class Tail:
-    """What a table points to, which follows its record."""
+    """The data that a table points to, which follow its record."""
 
     def __init__(self) -> None:
         self.parts: list[NDArray[np.float64]] = []
@@ -224,7 +224,7 @@ def _put_drums(tail: Tail, loud: DrumKeys) -> int:
 
 
 def strings_of(patch: Patch) -> int:
-    """How many strings of a set channels of a guitar may choose."""
+    """The number of strings of a set that channels of a guitar may choose."""
     chosen = patch.mode == "guitar" and isinstance(patch.strings, StringSet)
     return min(of.GUITAR_STRINGS, len(patch.strings.strings)) if chosen else 0  # type: ignore[union-attr]
 

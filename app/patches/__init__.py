@@ -1,1 +1,1 @@
-"""What an instrument is: a patch and all its choices, where patches lie, and how their keys are tuned."""
+"""Instruments: a patch and all its choices, the places of patches, and the tuning of their keys."""

@@ -56,7 +56,7 @@ class PhysicalDrum(Value):
 
 
 class PhysicalMallet(Value):
-    """What strikes, as `Mallet`."""
+    """The mallet of a drum, as `Mallet`."""
 
     mass_kg: Annotated[float, ranged(*bounds.MALLET["mass_kg"])] = 0.015
     radius_m: Annotated[float, ranged(*bounds.MALLET["radius_m"])] = 0.005
@@ -71,7 +71,7 @@ class PhysicalMallet(Value):
 
 
 class PlayedDrum(Value):
-    """One drum and how it is struck.
+    """A drum and how it is struck.
 
     Attributes:
         note: of the MIDI key that plays it as it is.

@@ -1,4 +1,4 @@
-"""What is played: a patch, whose keys are pitches, or a single string, whose keys are places along it."""
+"""The instrument that is played: a patch, whose keys are pitches, or a string, whose keys are places along it."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ class PatchEntry:
 
     @property
     def own(self) -> bool:
-        """Whether it is the user's, not shipped with the program."""
+        """Return True if it is the user's, not shipped with the program."""
         return self.path.parent != SHIPPED
 
 

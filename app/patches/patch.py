@@ -62,14 +62,14 @@ class PhysicalString(Value):
 
 
 class Fretted(Value):
-    """One string, shortened for each key to the length of its pitch."""
+    """A string that is shortened for each key to the length of its pitch."""
 
     kind: Literal["fretted"] = "fretted"
     string: PhysicalString
 
 
 class OpenString(Value):
-    """One string of a set, and the MIDI key of its whole length."""
+    """A string of a set, and the MIDI key of its whole length."""
 
     note: Key
     string: PhysicalString
@@ -118,7 +118,7 @@ class Knobs(Value):
 
 
 class PluckChoices(Value):
-    """How a key plucks its string. Widths are as in `engine.pluck.Pluck`; a triangle has none.
+    """The pluck of a string by a key. Widths are as in `engine.pluck.Pluck`; a triangle has none.
 
     Attributes:
         width, width_hard: of the softest and of the hardest pluck; between them a step of velocity is a ratio.
@@ -173,7 +173,7 @@ class PluckChoices(Value):
 
     @property
     def is_blow(self) -> bool:
-        """Whether strings set out with speeds."""
+        """Return True if strings set out with speeds."""
         return self.strikes and self.shape in ("gaussian", "raised_cosine")
 
     def release_s(self, velocity: float) -> float:
@@ -188,7 +188,7 @@ class PluckChoices(Value):
 
 
 class Pickup(Value):
-    """Where the string is heard, one point or left and right, and whether as displacement or its velocity.
+    """The place where the string is heard, one point or left and right, as displacement or velocity.
 
     Attributes:
         aperture_mm: of a magnetic pick-up, the length of string over which it averages.
@@ -291,7 +291,7 @@ class Noise(Value):
 
 
 class Damping(Value):
-    """What a released key does: nothing (`let_ring`), or all partials decay by 60 dB in `release_t60_s`.
+    """The effect of releasing a key: none (`let_ring`), or all partials decay by 60 dB in `release_t60_s`.
 
     Attributes:
         mute: how far a hand at the bridge mutes the strings, 0 … 1.
@@ -303,7 +303,7 @@ class Damping(Value):
 
 
 class Technique(Value):
-    """How keys are played. MIDI's footswitches 80, 81 and 82 switch on what is off here.
+    """The technique that keys are played with. MIDI's footswitches 80, 81 and 82 switch on what is off here.
 
     Attributes:
         harmonic: which partial is the lowest that a finger leaves, which touches the string there as it is plucked.
@@ -329,7 +329,7 @@ class Amp(Value):
 
 
 class Body(Value):
-    """The body of the instrument: the name of an impulse response ("": none), its mix, its size (1: as it is)."""
+    """The body of the instrument: the name of an impulse response ("": none), mix and size (1: as it is)."""
 
     name: Reference = ""
     mix: float = parameter("body.mix")
@@ -352,7 +352,7 @@ class Target(Value):
 
 
 class Macro(Value):
-    """One knob that changes several fields; `value` is its position."""
+    """A knob that changes several fields; `value` is its position."""
 
     name: Annotated[str, Field(min_length=1, max_length=24), AfterValidator(plain)]
     value: Share = 0.5
@@ -458,7 +458,7 @@ class Patch(Value):
         return self
 
     def has(self, field: str) -> bool:
-        """Whether it has a parameter by this id; instruments in mono lack the second point."""
+        """Return True if it has a parameter by this id; instruments in mono lack the second point."""
         return field in OF_PATCHES and (field != "pickup.points.1" or len(self.pickup.points) > 1)
 
     def value(self, field: str) -> float:
@@ -486,7 +486,7 @@ class Patch(Value):
         return patch
 
     def with_knob(self, field: str, value: float) -> Patch:
-        """As `with_value`; macros that turn this field follow it."""
+        """Set a value as `with_value`; macros that turn this field follow it."""
         patch = self.with_value(field, value)
         macros = tuple(
             macro.model_copy(update={"value": macro.nearest(patch)})
@@ -497,7 +497,7 @@ class Patch(Value):
         return patch.model_copy(update={"macros": macros})
 
     def turned(self, macro: int, value: float) -> Patch:
-        """The patch with a macro (by number, from 0) turned to `value`, 0 … 1, and the fields of its targets set.
+        """The patch with a macro (by number, from 0) turned to `value`, 0 … 1, and its targets' fields set.
 
         A target stays where the others forbid its value: the softest pluck does not pass the hardest.
         """

@@ -1,4 +1,4 @@
-"""Which pitch each key has: twelve equal steps, or a Scala scale and keyboard mapping."""
+"""The pitch of each key: twelve equal steps, or a Scala scale and keyboard mapping."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NOTES = (-128, 255)  # all keys, with any transposition and bend
 
 
 class TuningChoice(Value):
-    """Which pitch each key has.
+    """The choice of the pitch of each key.
 
     Attributes:
         a4_hz: pitch of key 69; a keyboard mapping has a reference pitch of its own.
@@ -40,7 +40,7 @@ class TuningChoice(Value):
 
     @property
     def has_reference(self) -> bool:
-        """Whether a mapping gives all keys their pitch, so that `a4_hz` changes nothing."""
+        """Return True if a mapping gives all keys their pitch, so that `a4_hz` changes nothing."""
         if not self.keymap.strip():
             return False
         mapping = parse_keymap(self.keymap)
@@ -81,7 +81,10 @@ class Tuning:
         return float(2 ** np.interp(note, *self._table))
 
     def mapped(self, key: int) -> bool:
-        """Whether the keyboard mapping gives the key a pitch of its own; a key that is left out stays silent."""
+        """Return True if the keyboard mapping gives the key a pitch of its own.
+
+        Keys that are left out stay silent.
+        """
         import numpy as np
 
         return self._table is None or bool(np.isin(key + self._transpose, self._table[0]))

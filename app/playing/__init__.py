@@ -1,4 +1,4 @@
-"""From events to sound: keys, MIDI and plucks at places become notes that ring.
+"""Sound from events: keys, MIDI and plucks at places become notes that ring.
 
 keyboard, midi, midi_port   what keys and controllers mean
 midi_backend                the system's MIDI

@@ -72,14 +72,14 @@ class AheadVoice:
 
     @property
     def wanted_s(self) -> float:
-        """How much must be rendered before it begins."""
+        """The seconds that must be rendered before it begins."""
         total_s = self.done / self.source.rate_hz + self.voice.room / self.source.rate_hz
         least_s = min(self.from_s + LEAST_S, total_s)
         return max(least_s, total_s - (total_s - self.from_s) * CARE * self.speed) if self.speed else least_s
 
     @property
     def waits_s(self) -> float:
-        """How long that will still take; 0 where it has begun, or the speed is not known yet."""
+        """The seconds until it begins; 0 where it has begun, or the speed is not known yet."""
         if self.begun or not self.speed:
             return 0.0
         return max(0.0, (self.wanted_s - self.rendered_s) / self.speed)
@@ -90,7 +90,7 @@ class AheadVoice:
 
     @property
     def lead_s(self) -> float:
-        """How far the rendering is ahead of playback."""
+        """The lead of the rendering ahead of playback, in s."""
         return self.rendered_s - (self.voice.seconds if self.begun else -1.0)
 
     def advance(self) -> None:
@@ -125,7 +125,7 @@ class AheadVoice:
 
     @property
     def samples(self) -> NDArray[np.float32]:
-        """What was rendered so far, (frames, channels)."""
+        """The samples that were rendered so far, (frames, channels)."""
         return np.concatenate(self._frames)
 
     def _take(self, samples: NDArray[np.float32]) -> None:

@@ -1,4 +1,4 @@
-"""When an event is due that is handed over before its time."""
+"""The time at which an event is due that is handed over before its time."""
 
 from __future__ import annotations
 

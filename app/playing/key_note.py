@@ -21,7 +21,7 @@ AS_THEY_ARE: Mapping[str, float] = dict.fromkeys(SOURCES, 1.0)
 
 
 class KeyNote:
-    """What is known of it, as of the latest `take` and `look`.
+    """The state of a key's note, as known from the latest `take` and `look`.
 
     Args:
         player: whose voices it has, in `mixer`.
@@ -79,27 +79,27 @@ class KeyNote:
 
     @property
     def parameters(self) -> StringParameters | None:
-        """Of its string as its key had it; None before it began, and of a drum."""
+        """The parameters of its string as its key had it; None before it began, and of a drum."""
         return None if self._begun is None else self._begun.parameters
 
     @property
     def pluck(self) -> Pluck | None:
-        """How its string was plucked; None as for `parameters`."""
+        """The pluck of its string; None as for `parameters`."""
         return None if self.request is None else self.request.pluck
 
     @property
     def of_drum(self) -> bool:
-        """Whether it is a drum's."""
+        """Return True if it is a drum's."""
         return isinstance(self.patch.strings, Drums)
 
     @property
     def known(self) -> bool:
-        """Whether the player has reported it."""
+        """Return True if the player has reported it."""
         return self._begun is not None or self.over
 
     @property
     def over(self) -> bool:
-        """Whether it has ended: nothing of it will be heard any more."""
+        """Return True if it has ended: nothing of it will be heard any more."""
         return self._ended or self.cut
 
     @property
@@ -110,7 +110,7 @@ class KeyNote:
 
     @property
     def began(self) -> bool:
-        """Whether the device has any of its samples, or it was cut."""
+        """Return True if the device has any of its samples, or it was cut."""
         return self.cut or self.seconds > 0
 
     @property
@@ -121,7 +121,7 @@ class KeyNote:
 
     @property
     def latency_s(self) -> float | None:
-        """From the gesture to the callback that gave the device its first samples; None: not known."""
+        """The seconds from the gesture to the callback that gave the device its first samples; None: not known."""
         self.look()
         return self._playing.struck_to_began_s
 

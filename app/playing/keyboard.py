@@ -61,7 +61,7 @@ class PluckRange:
 
     @classmethod
     def of(cls, info: PresetInfo | None) -> PluckRange:
-        """What a preset was trained on, so that every key sounds as learned."""
+        """The range that a preset was trained on, so that every key sounds as learned."""
         if info is None:
             return cls()
         low, high = info.trained_range.position or ANYWHERE
@@ -146,7 +146,7 @@ def octaves_of(low: int, high: int) -> tuple[int, int]:
 
 
 def turn(press: KeyPress, octave: int, velocity: int) -> tuple[int, int] | None:
-    """Octave and velocity after a key that changes them: Z and X, 1 … 9, C and V; None for another."""
+    """Octave and velocity after a key that changes them. The keys are Z and X, 1 … 9, C and V; None for another."""
     letter = press.letter.upper()
     if letter in OCTAVE_STEPS:
         return min(max(octave + OCTAVE_STEPS[letter], LOWEST_OCTAVE), HIGHEST_OCTAVE), velocity

@@ -1,4 +1,4 @@
-"""What the keys of a patch sound with, prepared in the background: the patch's preset, its table, body and room.
+"""The sound of a patch's keys, prepared in the background: the patch's preset, its table, body and room.
 
 Events go to the compiled player as numbers, which the device's next quantum takes up; its reports come back.
 """
@@ -63,7 +63,7 @@ class SoundingNote:
 
 @dataclass(frozen=True, eq=False)
 class _Wanted:
-    """What keys are to play, and where it is heard."""
+    """The patch that keys are to play, and where it is heard."""
 
     patch: Patch
     ear: Ear
@@ -116,11 +116,13 @@ class Keys:
 
     @property
     def player(self) -> InstrumentPlayer | None:
-        """None: no patch, or its preset is not loaded yet."""
+        """The player of the keys; None: no patch, or its preset is not loaded yet."""
         return self._player
 
     def set_patch(self, patch: Patch | None, ear: Ear) -> None:
-        """What keys play from now on, and where it is heard. Strings that ring follow, if the preset is the same.
+        """Set the patch that keys play from now on, and where it is heard.
+
+        Strings that ring follow, if the preset is the same.
 
         Another preset, and drums after strings, are loaded in the background; until then keys are silent. None: no
         patch.
@@ -133,7 +135,7 @@ class Keys:
         self._follow_wish()
 
     def listen(self, ear: Ear) -> None:
-        """Where keys are heard from now on."""
+        """Set the place where keys are heard from now on."""
         with self._lock:
             if self._wanted is None:
                 return
@@ -220,7 +222,7 @@ class Keys:
         return found
 
     def cancel(self) -> None:
-        """What was handed over and is not due yet is not played."""
+        """Cancel the events that were handed over and are not due yet."""
         with self._lock:
             if self._player is not None:
                 self._player.cancel()
@@ -270,7 +272,7 @@ class Keys:
             self.recorder.begin([] if player is None else [_turned(player), *player.at_hand])
 
     def hear_dry(self, dry: bool) -> None:
-        """Whether body and room are left out, as while models are compared with the truth."""
+        """Leave out body and room, or not, as while models are compared with the truth."""
         if dry != self._dry:
             self._dry = dry
             self._in_background(self._set_present_effects)  # an impulse response takes milliseconds
@@ -382,11 +384,11 @@ class Keys:
 
 
 def _holds(player: InstrumentPlayer, patch: Patch) -> bool:
-    """Whether a player can play a patch too."""
+    """Return True if a player can play a patch too."""
     return player.patch.preset == patch.preset and player.of_drums == isinstance(patch.strings, Drums)
 
 
 def _turned(player: InstrumentPlayer) -> PatchTurned:
-    """With the pick-up through which it is heard, which is not its own where a single string is played."""
+    """The patch with the pick-up it is heard through. That is not its own where a single string is played."""
     heard = {"points": player.ear.points, "kind": player.ear.pickup}
     return PatchTurned(player.patch.model_copy(update={"pickup": player.patch.pickup.model_copy(update=heard)}))

@@ -1,4 +1,7 @@
-"""The level match: gains that bring all sources of a note to the level of the truth, computed in the background."""
+"""The level match: gains that bring all sources of a note to the level of the truth.
+
+They are computed in the background.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ MOST_WAITING = 8
 
 
 class Levels:
-    """For any thread.
+    """The levels of notes' sources, for any thread.
 
     Args:
         in_background: does work in another thread.
@@ -34,7 +37,7 @@ class Levels:
         self._waiting: set[tuple[object, ...]] = set()
 
     def of(self, note: Note) -> Mapping[str, float] | None:
-        """By source, the gain; None: not known yet."""
+        """The gain by source; None: not known yet."""
         return self._known.get(note.matching_key) if note.match is None else note.match
 
     def ask(self, note: Note, rate_hz: int, found: Callable[[tuple[object, ...], Mapping[str, float]], None]) -> None:
@@ -64,7 +67,7 @@ class Levels:
         return gains
 
     def _level(self, note: Note, source: str, seconds: float, rate_hz: int) -> float:
-        """Root mean square of the first `seconds`; 0 where it is not known, so that the source stays as it is."""
+        """Root mean square of the first `seconds`. 0 where it is not known, so that the source stays as it is."""
         subject, ear = note.subject(source), note.request.ear
         program = self._sources.program(subject, source, rate_hz)
         if program.rendered:

@@ -46,18 +46,21 @@ class MidiChoices(BaseModel):
         return {field: number for field, number in controllers.items() if not fixed_function(number)}
 
     def learned(self, field: str, controller: int) -> MidiChoices:
-        """These choices with `controller`, which has no `fixed_function`, assigned to `field`, and to no other."""
+        """Copy these choices with `controller`, which has no `fixed_function`, assigned to `field` alone."""
         others = {f: c for f, c in self.controllers.items() if f != field and c != controller}
         return MidiChoices.model_validate({**self.model_dump(), "controllers": {**others, field: controller}})
 
     def forgotten(self, field: str) -> MidiChoices:
-        """These choices with no controller assigned to `field`."""
+        """Copy these choices with no controller assigned to `field`."""
         others = {f: c for f, c in self.controllers.items() if f != field}
         return self.model_copy(update={"controllers": others})
 
 
 def turned(patch: Patch, field: str, value: float) -> Patch:
-    """The patch with a parameter or a macro turned; as it is where it has none, or the value is impossible in it."""
+    """The patch with a parameter or a macro turned.
+
+    Where it has none, or the value is impossible in it, the patch stays as it is.
+    """
     try:
         if field in MACROS:
             number = list(MACROS).index(field)

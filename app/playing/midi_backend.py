@@ -18,14 +18,14 @@ PERIOD_S = 0.001
 
 
 class MidiUnavailable(Exception):
-    """Why there is no MIDI, in plain words with the remedy."""
+    """The error that there is no MIDI, in plain words with the remedy."""
 
 
 class OpenPort(Protocol):
     def close(self) -> None: ...
 
     def connected(self) -> bool:
-        """Whether its device is still there."""
+        """Return True if its device is still there."""
 
 
 class Backend(Protocol):
@@ -61,7 +61,7 @@ def load_backend() -> RtMidi:
 
 
 class RtMidi:
-    """One system for MIDI: ALSA, JACK, CoreMIDI or Windows'.
+    """A system for MIDI: ALSA, JACK, CoreMIDI or Windows'.
 
     Args:
         library: the package `supriya_midi`.
@@ -106,7 +106,7 @@ class RtMidi:
 
     @contextlib.contextmanager
     def _faults(self) -> Iterator[None]:
-        """Within, what RtMidi and its binding raise becomes an OSError."""
+        """Turn what RtMidi and its binding raise within it into an OSError."""
         try:
             yield
         except (self._library.RtMidiError, RuntimeError, ValueError) as error:
@@ -147,7 +147,7 @@ class RtMidiInput:
         self._client.delete()
 
     def connected(self) -> bool:
-        """Whether its device is still there, asked without another client of the system."""
+        """Return True if its device is still there. No other client of the system is needed to ask."""
         try:
             return self._name in _distinct(self._client.get_ports())
         except Exception:  # the system itself is gone

@@ -11,7 +11,7 @@ from app.playing.midi_backend import Backend, MidiUnavailable, OpenPort, load_ba
 
 
 class MidiInput:
-    """At most one open input. All is called by one thread.
+    """A MIDI input with at most one open port. All is called by one thread.
 
     Args:
         on_message: is called with what comes, in the input's thread.
@@ -112,7 +112,7 @@ class MidiInput:
 
 
 def same_device(one: str, other: str) -> bool:
-    """Whether two names differ in ALSA's numbers alone, which change with each connection ("Keys:Keys 20:0")."""
+    """Return True if two names differ only in ALSA's numbers. They change with each connection ("Keys:Keys 20:0")."""
     return _without_numbers(one) == _without_numbers(other)
 
 

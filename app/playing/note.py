@@ -13,7 +13,7 @@ from engine.voices import Mixer, Voice
 
 
 class Note:
-    """Its voices begin with the same frame, so that a switch between them stays in time.
+    """A note whose voices begin with the same frame, so that a switch between them stays in time.
 
     Args:
         request: the string, how it is plucked, where it is heard, and other presets for the same pluck.
@@ -58,13 +58,13 @@ class Note:
 
     @property
     def matching_key(self) -> tuple[object, ...]:
-        """What the levels of its sources depend on."""
+        """The values that the levels of its sources depend on."""
         asked = self.request
         return asked.preset, asked.pluck, asked.ear, asked.others, self.sources
 
     @property
     def over(self) -> bool:
-        """Whether it has ended: nothing of it will be heard any more."""
+        """Return True if it has ended: nothing of it will be heard any more."""
         if self.cut or self.pending:
             return self.cut or self.released
         return all(voice.over for voice in self.voices.values())
@@ -78,12 +78,12 @@ class Note:
 
     @property
     def began(self) -> bool:
-        """Whether the device has any of its samples, or it was cut after it was handed over."""
+        """Return True if the device has any of its samples, or it was cut after it was handed over."""
         return not self.pending and (self.cut or any(each.sounding or each.over for each in self.voices.values()))
 
     @property
     def waits_s(self) -> float:
-        """For how many seconds it will still be rendered before it sounds; 0: it does not wait, or not known."""
+        """The seconds that it will still be rendered before it sounds; 0: it does not wait, or not known."""
         waits = self.pending and not self.over
         return max((each.waits_s for each in self.ahead), default=0.0) if waits else 0.0
 
@@ -94,7 +94,10 @@ class Note:
 
     @property
     def latency_s(self) -> float | None:
-        """From the gesture to the callback that gave the device its first samples; None: not known, or not begun."""
+        """The seconds from the gesture to the callback that gave the device its first samples.
+
+        None: not known, or not begun.
+        """
         return next(iter(self.voices.values())).struck_to_began_s if self.voices else None
 
     def frame_at(self, seconds: float) -> int:

@@ -105,7 +105,7 @@ class Notes:
     # What is played
 
     def set_instrument(self, instrument: Instrument, ear: Ear, patch: Patch | None = None) -> None:
-        """What events play from now on, and where all notes are heard.
+        """Set what events play from now on, and where all notes are heard.
 
         Args:
             patch: one that is loaded while a single string is played, so that its keys sound at once when it is.
@@ -153,7 +153,7 @@ class Notes:
                 self._ask_match(note)
 
     def hear_dry(self, dry: bool) -> None:
-        """Whether body and room are left out; beside a single string, nothing rings on in them."""
+        """Leave out body and room, or not; beside a single string, nothing rings on in them."""
         self._dry = dry
         self._hear_effects()
 
@@ -241,7 +241,7 @@ class Notes:
         return self.keys.handle(event, due, 0.0, self._adopt)
 
     def cancel(self) -> None:
-        """What was handed over and is not due yet is not played."""
+        """Cancel what was handed over and is not due yet."""
         self.keys.cancel()
         with self._lock:
             for note in self._plucks():
@@ -257,13 +257,13 @@ class Notes:
     # Ahead of events
 
     def in_background(self, work: Callable[[], None], note: Note | None = None) -> None:
-        """Does `work` in the helper's thread, after what waits there; its errors are reported, and cut the note."""
+        """Do `work` in the helper's thread, after what waits there. Its errors are reported, and cut the note."""
         if not self._closed:
             self._helper.submit(self._guarded(work, note))
 
     @property
     def at_hand(self) -> bool:
-        """Whether the chosen pluck would sound at once: nothing needs to be loaded for it."""
+        """Return True if the chosen pluck would sound at once: nothing needs to be loaded for it."""
         with self._lock:
             chosen = self._chosen
             return chosen is not None and self._loaded(Note(chosen, self._voices_of(chosen)))
@@ -289,7 +289,7 @@ class Notes:
         self.in_background(work)
 
     def compute(self, work: Callable[[int], Made], rate_hz: int) -> Future[Made]:
-        """What `work` makes at a rate, in the helper's thread, after what waits there."""
+        """Compute what `work` makes at a rate, in the helper's thread, after what waits there."""
         return self._helper.submit(work, rate_hz)
 
     # What there is
@@ -306,7 +306,7 @@ class Notes:
 
     @property
     def match(self) -> Mapping[str, float] | None:
-        """By source, the factor that brings the chosen pluck to the level of the truth; None: not known yet."""
+        """The factor by source that brings the chosen pluck to the level of the truth. None: not known yet."""
         with self._lock:
             chosen = self._chosen
             return None if chosen is None else self._levels.of(Note(chosen, self._voices_of(chosen)))
@@ -323,7 +323,7 @@ class Notes:
         return tuple(self._latencies_s)
 
     def forget_latencies(self) -> None:
-        """For another device or buffer: those measured before do not hold for it."""
+        """Forget the measured latencies, which do not hold for another device or buffer."""
         self._latencies_s.clear()
 
     def poll(self) -> None:
@@ -344,7 +344,7 @@ class Notes:
     # How it is done
 
     def _each(self, notes: Sequence[MadeNote], work: Callable[[MadeNote], None]) -> None:
-        """Does `work` with each note; one with which it fails is dropped, and the others continue."""
+        """Do `work` with each note. One with which it fails is dropped, and the others continue."""
         for note in notes:
             try:
                 work(note)
@@ -396,7 +396,7 @@ class Notes:
         return tuple(source for source in self._monitor.voices if source in here) or ("model",)
 
     def _loaded(self, note: Note) -> bool:
-        """Whether nothing needs to be loaded for it."""
+        """Return True if nothing needs to be loaded for it."""
         rate_hz = self._sound.rate_hz
         return all(self._sources.has(note.subject(source), rate_hz) for source in note.sources)
 
@@ -417,7 +417,7 @@ class Notes:
         return guarded
 
     def _move_to_new_mixer(self) -> None:
-        """When the device has changed its rate, the latest plucks ring on in its new mixer; keys' notes end."""
+        """Let the latest plucks ring on in the new mixer of a device that has changed its rate. Keys' notes end."""
         mixer = self._sound.mixer
         left = [note for note in self._notes if note.mixer not in (None, mixer) and not note.over]
         plucks = [note for note in left if isinstance(note, Note) and note.seconds and not note.released]
@@ -504,7 +504,7 @@ class Notes:
         self._report(f"This pluck cannot be rendered: {error}", "")
 
     def _hand_over(self, note: Note, mixer: Mixer) -> bool:
-        """Whether it could; False where the device has another mixer by now."""
+        """Hand a note over to a mixer; return False where the device has another mixer by now."""
         with self._lock:
             if note.over:
                 return True

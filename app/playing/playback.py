@@ -1,4 +1,4 @@
-"""Plays a MIDI file: a thread of its own hands each event over before its time, with the frame at which it counts."""
+"""Plays a MIDI file. A thread of its own hands each event over before its time, with the frame at which it counts."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ JOIN_S = 2.0
 
 
 class Clock(Protocol):
-    """By what events are timed: the frames that a device has taken."""
+    """The clock that events are timed by: the frames that a device has taken."""
 
     @property
     def mixer(self) -> Mixer:
@@ -25,7 +25,7 @@ class Clock(Protocol):
 
     @property
     def buffer_s(self) -> float:
-        """How much the device takes at once."""
+        """The seconds that the device takes at once."""
 
 
 class Playback:
@@ -101,7 +101,7 @@ class _Beginning:
         self._began_s = time.monotonic() + ahead_s
 
     def due(self, time_s: float) -> Due:
-        """When an event is due, `time_s` after the beginning."""
+        """The time when an event is due, `time_s` after the beginning."""
         mixer = self._clock.mixer
         if mixer is not self._mixer:
             played_s = (self._mixer.frames - self._frame) / self._mixer.rate_hz

@@ -15,7 +15,7 @@ FULL = (
 
 
 class EventRecorder:
-    """For any thread.
+    """A recorder of events, for any thread.
 
     Args:
         report: is called with a message and its details where a recording is full.

@@ -25,7 +25,10 @@ Array = NDArray[np.float64]
 
 
 class Sources:
-    """For any thread. The first caller loads what is missing; callers who need nothing of it do not wait."""
+    """Presets in memory, with their programs, for any thread.
+
+    The first caller loads what is missing; callers who need nothing of it do not wait.
+    """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()  # of the dictionaries, for a moment
@@ -35,7 +38,7 @@ class Sources:
         self._kept_begin = lru_cache(maxsize=KEPT_PLUCKS)(self._begin)
 
     def has(self, subject: Subject, rate_hz: int) -> bool:
-        """Whether it is loaded with both programs at this rate, so that a strike would not wait."""
+        """Return True if it is loaded with both programs at this rate, so that a strike would not wait."""
         with self._lock:
             return subject in self._presets and all((subject, kind, rate_hz) in self._programs for kind in KINDS)
 

@@ -23,7 +23,10 @@ class InstallError(Exception):
 
 @dataclass(frozen=True)
 class Installed:
-    """Where the preset is. `was_there`: nothing was copied, as a preset with the same bytes was there already."""
+    """The place of an installed preset.
+
+    `was_there`: nothing was copied, as a preset with the same bytes was there already.
+    """
 
     name: str
     path: Path

@@ -48,22 +48,28 @@ class PresetEntry:
 
     @cached_property
     def parameters(self) -> int:
-        """How many the model has. Raises PresetError: the description is of an impossible model."""
+        """The number of the model's parameters. Raises PresetError: the description is of an impossible model."""
         return described_parameters(self.path, self.info)
 
     @property
     def own(self) -> bool:
-        """Whether it is the user's, not shipped with the program."""
+        """Return True if it is the user's, not shipped with the program."""
         return self.path.parent == user_folder()
 
     @property
     def studio(self) -> bool:
-        """Whether it is a studio preset (full bandwidth, for playing), which are listed before research presets."""
+        """Return True if it is a studio preset (full bandwidth, for playing).
+
+        Those are listed before research presets.
+        """
         return self.name.startswith(STUDIO)
 
     @property
     def title(self) -> str:
-        """As listed, in one line; the user's own are marked, so that a copy differs from the shipped one."""
+        """The title as listed, in one line.
+
+        The user's own are marked, so that a copy differs from the shipped one.
+        """
         title = one_line(self.info.title, LONGEST_TITLE)
         return f"{title} (yours)" if self.own else title
 
@@ -143,14 +149,14 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
 
 @functools.lru_cache(maxsize=512)
 def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
-    """Cached by time and size of the file, because the browser lists all presets whenever it opens."""
+    """Read an entry, cached by time and size of the file: the browser lists all presets whenever it opens."""
     info = read_info(path)
     listed = replace(info, title=display_title(name_text(path.stem), info))
     return PresetEntry(name_text(path.stem), path, listed, size_bytes)
 
 
 def display_title(name: str, info: PresetInfo) -> str:
-    """The title of the cell of the paper's tables that a preset belongs to, by name and content; else its own title.
+    """The title of a preset's cell of the paper's tables, by name and content; else its own title.
 
     A file from before a title was changed has the old one in it.
     """

@@ -32,7 +32,7 @@ def model_word(model: str) -> str:
 
 
 def model_meaning(model: str) -> str:
-    """What such a model does, in one phrase; "" where none is written here."""
+    """The behaviour of such a model, in one phrase; "" where none is written here."""
     return _MODELS.get(model, ("", ""))[1]
 
 
@@ -63,7 +63,7 @@ def error_word(info: PresetInfo) -> str:
 
 
 def judged(outside: str, error: float) -> tuple[str, bool]:
-    """What lies outside the training, after what the error says of it; and whether that is a warning.
+    """The part outside the training, in words that its error decides; and True if that is a warning.
 
     Args:
         outside: as of `outside_training`, joined; "": nothing.

@@ -1,4 +1,4 @@
-"""From a pluck or a blow to pictures and signals: the take, and the worker thread that renders it."""
+"""The rendering of plucks and blows to pictures and signals: the take, and the worker thread that renders it."""
 
 from app.rendering.blow import BlowRequest, BlowTake
 from app.rendering.request import RenderListener, RenderRequest

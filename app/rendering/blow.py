@@ -1,4 +1,4 @@
-"""A blow on a drum as it is drawn: how model and truth move, their error, and their sound, which grow.
+"""A blow on a drum as it is drawn: motion of model and truth, error, and sound, which grow.
 
 A string's take has pictures of points. A drum's has its lowest modes at flashes: amplitude, and the angle that the
 mode has turned through since the blow. A picture at any speed of slow motion follows from these: each mode turns more
@@ -52,7 +52,7 @@ class BlowRequest:
     ear: Ear
 
     def same_motion(self, other: object) -> bool:
-        """Whether model and truth move alike: only listening points may differ."""
+        """Return True if model and truth move alike: only listening points may differ."""
         if not isinstance(other, BlowRequest):
             return False
         own, others = (
@@ -100,7 +100,7 @@ def grid_of(surface: Surface, sides: tuple[float, float], points: int = GRID) ->
 
 
 def head_of(modes: DrumModes) -> Head:
-    """Made once for each drum, whatever its damping; half a second of work at most."""
+    """The head of a drum, made once for each, whatever its damping; half a second of work at most."""
     drum, rows = modes.drum, modes.rows
     for known, head in _heads:
         if known is rows:
@@ -137,7 +137,7 @@ class ModalMotion:
 
 
 class BlowErrors:
-    """How far the model is from the truth over the whole surface, in windows of two periods of the lowest mode.
+    """The errors of the model over the whole surface, in windows of two periods of the lowest mode.
 
     Attributes:
         ready: windows so far.
@@ -161,7 +161,7 @@ class BlowErrors:
 
     @property
     def rel_mse(self) -> float:
-        """Of all frames so far; not a number where the truth rests."""
+        """The relative error of all frames so far; not a number where the truth rests."""
         wrong, true = self._total
         return float(wrong / true) if true > 0 else math.nan
 
@@ -190,7 +190,7 @@ class BlowErrors:
 
 
 class BlowTake:
-    """One blow: motion, sound and errors of model and truth, which grow while they are rendered.
+    """The motion, sound and errors of model and truth of a blow, which grow while they are rendered.
 
     Attributes:
         head: the drum's shapes on a grid.
@@ -231,12 +231,12 @@ class BlowTake:
 
     @property
     def partials_hz(self) -> Array:
-        """At rest, (modes,)."""
+        """The frequencies of the partials at rest, (modes,)."""
         return np.asarray(self.request.modes.omega / math.tau)
 
     @property
     def full_scale(self) -> float:
-        """What is 0 dB, in Pa."""
+        """The pressure of 0 dB, in Pa."""
         return FULL_SCALE_PA
 
     @property

@@ -1,4 +1,4 @@
-"""The render worker's job for a blow on a drum: motion, sound and errors of model and truth, block by block."""
+"""The worker's job for a blow on a drum: motion, sound and errors of model and truth, block by block."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
 
 
 class _Mover:
-    """The amplitudes of all modes of one source from the blow on, block by block, and its lowest modes at flashes."""
+    """The amplitudes of a source's modes from the blow on, block by block, and its lowest modes at flashes."""
 
     def __init__(self, more: Advance) -> None:
         self._more, self._begun = more, False

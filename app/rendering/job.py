@@ -1,4 +1,4 @@
-"""One pluck that the worker renders: the motions and signals of its sources, block by block."""
+"""A pluck that the worker renders: the motions and signals of its sources, block by block."""
 
 from __future__ import annotations
 
@@ -124,7 +124,10 @@ class Job(Rendering[RenderRequest, Take]):
         return Strobe(self.request.speed, take.fundamental_hz, take.seconds)
 
     def _advance_lines(self, take: Take) -> None:
-        """Renders a block of model and truth, and others up to its end; the model here, the rest in the helper."""
+        """Renders a block of model and truth, and others up to its end.
+
+        The model is rendered here, the rest in the helper.
+        """
         model, truth = (self._lines[name] for name in SOURCES)
         first = truth.done
         most = BLOCK_FRAMES * truth.stride

@@ -1,4 +1,4 @@
-"""One source of a take while it is rendered: its pictures, its flashes and its signal, block by block."""
+"""A source of a take while it is rendered: its pictures, its flashes and its signal, block by block."""
 
 from __future__ import annotations
 
@@ -62,17 +62,17 @@ class Line:
 
     @property
     def behind(self) -> bool:
-        """Whether flashes that were requested after the pictures are still being rendered."""
+        """Return True if flashes that were requested after the pictures are still being rendered."""
         return self._shown is not None
 
     @property
     def ends_s(self) -> float | None:
-        """The time of the last valid frame where the source ran away, and is at rest since; None: it did not."""
+        """The time of the last valid frame where the source ran away, and is at rest since. None: it did not."""
         ends = self._pictures.ends
         return None if ends is None else ends / self.rate_hz
 
     def until(self, time_s: float) -> int:
-        """How many samples are left to be rendered before a time."""
+        """The number of samples left to be rendered before a time."""
         return max(0, min(self.frames, int(np.ceil(time_s * self.rate_hz))) - self.done)
 
     def show(self, strobe: Strobe) -> None:

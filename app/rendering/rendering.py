@@ -61,7 +61,7 @@ class Rendering(ABC, Generic[Request, Made]):
 
     @property
     def idle(self) -> bool:
-        """Whether there is nothing left to do."""
+        """Return True if there is nothing left to do."""
         return self.take is not None and self._finished and self._satisfied(self.take)
 
     def advance(self) -> None:
@@ -82,7 +82,7 @@ class Rendering(ABC, Generic[Request, Made]):
 
     @abstractmethod
     def _begin(self) -> Made:
-        """What grows from now on."""
+        """Begin what grows from now on."""
 
     @abstractmethod
     def _continue(self, take: Made) -> None:
@@ -90,12 +90,12 @@ class Rendering(ABC, Generic[Request, Made]):
 
     @abstractmethod
     def _complete(self, take: Made) -> bool:
-        """Whether motion, signals and errors are all there, for the first time."""
+        """Return True if motion, signals and errors are all there, for the first time."""
 
     @abstractmethod
     def _satisfied(self, take: Made) -> bool:
-        """Whether a complete one is as the latest request has it."""
+        """Return True if a complete one is as the latest request has it."""
 
     @abstractmethod
     def _seconds_of(self, take: Made) -> float:
-        """How much of the motion is rendered."""
+        """The seconds of the motion that are rendered."""

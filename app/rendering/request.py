@@ -1,4 +1,4 @@
-"""What the render worker is asked to do, and the listener that it reports to."""
+"""Requests to the render worker, and the listener that it reports to."""
 
 from __future__ import annotations
 
@@ -33,7 +33,10 @@ class RenderRequest:
     others: tuple[Path, ...] = ()
 
     def same_motion(self, other: object) -> bool:
-        """Whether model and truth move alike: only listening points, slow motion or other presets may differ."""
+        """Return True if model and truth move alike.
+
+        Only listening points, slow motion or other presets may differ.
+        """
         return isinstance(other, RenderRequest) and (self.preset, self.pluck, self.seconds) == (
             other.preset,
             other.pluck,
@@ -42,16 +45,16 @@ class RenderRequest:
 
 
 class RenderListener(Protocol):
-    """Called with the worker's results, in the worker's thread."""
+    """The listener to the worker's results, called in the worker's thread."""
 
     def take_started(self, take: Take | BlowTake) -> None:
         """A new pluck or blow has its first block."""
 
     def take_finished(self, take: Take | BlowTake) -> None:
-        """Its motion, signals and errors are complete."""
+        """Report that its motion, signals and errors are complete."""
 
     def other_failed(self, preset: str, message: str) -> None:
-        """Another preset's model cannot be rendered beside this one; as a source it is at rest."""
+        """Report that another preset's model cannot be rendered beside this one; as a source it is at rest."""
 
     def render_failed(self, message: str, detail: str) -> None:
-        """Nothing can be rendered. `detail`: the traceback of an unexpected error, else ""."""
+        """Report that nothing can be rendered. `detail`: the traceback of an unexpected error, else ""."""

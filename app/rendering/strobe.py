@@ -69,7 +69,7 @@ class Flashes:
         return self._shapes_m.nbytes
 
     def needed(self, first: int, stop: int) -> NDArray[np.int64]:
-        """Which of the frames first … stop - 1 are needed for flashes, ascending."""
+        """The frames of first … stop - 1 that are needed for flashes, ascending."""
         return self._needed[np.searchsorted(self._needed, first) : np.searchsorted(self._needed, stop)]
 
     def take(self, stop: int, numbers: NDArray[np.int64], frames_m: NDArray[np.float32]) -> None:

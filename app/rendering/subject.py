@@ -1,4 +1,4 @@
-"""What is plucked: a preset as it is, or a preset of many strings as a given one."""
+"""The subject that is plucked: a preset as it is, or a preset of many strings as a given one."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ class Listened:
 
     @property
     def complete(self) -> bool:
-        """Whether the signals of model and truth are."""
+        """Return True if the signals of model and truth are complete."""
         return all(name in self.signals and self.signals[name].complete for name in SOURCES)
 
 
@@ -137,15 +137,15 @@ class Sounding(Protocol):
 
     @property
     def horizon_s(self) -> float:
-        """The end of the time that the model was trained for, or of the motion where it was trained on none."""
+        """The end of the time that the model was trained for. Where it was trained on none, the end of the motion."""
 
     @property
     def partials_hz(self) -> NDArray[np.float64]:
-        """At rest, (modes,), rising."""
+        """The frequencies of the partials at rest, (modes,), rising."""
 
     @property
     def full_scale(self) -> float:
-        """What is 0 dB, in the unit of the signals."""
+        """The level of 0 dB, in the unit of the signals."""
 
     @property
     def progress(self) -> tuple[object, ...]:
@@ -229,7 +229,7 @@ class Take:
 
     @property
     def complete(self) -> bool:
-        """Whether all pictures of model and truth are ready."""
+        """Return True if all pictures of model and truth are ready."""
         return self.ready_frames == self.frames
 
     @property

@@ -119,5 +119,5 @@ class RenderWorker:
         return BlowJob(request, self._load, self._listener, self._helper)
 
     def _in_step(self, job: Job | BlowJob) -> bool:
-        """Whether the motion is far enough ahead of its sound for now."""
+        """Return True if the motion is far enough ahead of its sound for now."""
         return job.age_s < IN_STEP_S and job.rendered_s > job.age_s + LEAD_S and self._hurried()

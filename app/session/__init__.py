@@ -1,4 +1,4 @@
-"""What the user has chosen, and what follows from it.
+"""The user's choices, and what follows from them.
 
 Nothing is imported here: the window is painted before torch is loaded.
 """

@@ -91,7 +91,7 @@ class Choices(Monitor, Listener, PluckedString):
 
     @property
     def plays_patch(self) -> bool:
-        """Whether the instrument is a patch, whose keys are pitches; otherwise they are places along a string."""
+        """Return True if the instrument is a patch, whose keys are pitches; else keys are places along a string."""
         return isinstance(self.instrument, Patch)
 
     @property
@@ -101,7 +101,9 @@ class Choices(Monitor, Listener, PluckedString):
         return patch.strings if isinstance(patch, Patch) and isinstance(patch.strings, Drums) else None
 
     def changed(self, changes: Mapping[str, Any]) -> Choices:
-        """These choices with other values: the one way to change them. Another preset resets `string`, unless given.
+        """Copy these choices with other values: the one way to change them.
+
+        Another preset resets `string`, unless given.
 
         Args:
             changes: fields; also `preset`, the name of one whose single string becomes the instrument, and `patch`,
@@ -138,14 +140,17 @@ def migrated(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _without_slots(data: dict[str, Any]) -> dict[str, Any]:
-    """Before there were slots, `heard` named the source itself."""
+    """Convert choices from before there were slots, when `heard` named the source itself."""
     if data.get("heard") in ("model", "truth") and not {"a", "b"} & data.keys():
         return {**data, "a": "model", "b": "truth", "heard": "a" if data["heard"] == "model" else "b"}
     return data
 
 
 def _with_instrument(data: dict[str, Any]) -> dict[str, Any]:
-    """Before there were instruments, `keys_play` said whether `patch` was played or the string of `preset`."""
+    """Convert choices from before there were instruments.
+
+    Then `keys_play` said if `patch` was played or the string of `preset`.
+    """
     old = {name: data[name] for name in ("preset", "patch", "keys_play") if name in data}
     if not old or "instrument" in data:
         return data

@@ -55,13 +55,13 @@ class History:
 
     @property
     def undo_words(self) -> str:
-        """What `undo` would take back, in words; "" where there is nothing."""
+        """The step that `undo` would take back, in words; "" where there is nothing."""
         step = self._next(self._undo)
         return "" if step is None else step_words(step, {name: self._present[name] for name in step})
 
     @property
     def redo_words(self) -> str:
-        """What `redo` would do again, in words; "" where there is nothing."""
+        """The step that `redo` would do again, in words; "" where there is nothing."""
         step = self._next(self._redo)
         return "" if step is None else step_words({name: self._present[name] for name in step}, step)
 
@@ -85,7 +85,7 @@ class History:
         self._restore(self._undo, self._redo)
 
     def redo(self) -> None:
-        """Does the step that was last undone again; does nothing where there is none."""
+        """Do the step that was last undone again; do nothing where there is none."""
         self._restore(self._redo, self._undo)
 
     def _restore(self, source: deque[Values] | list[Values], target: deque[Values] | list[Values]) -> None:

@@ -36,12 +36,12 @@ class Listener(BaseModel):
 
     @property
     def points(self) -> tuple[float, ...]:
-        """One a channel."""
+        """The listening points, one a channel."""
         return (self.listen, self.listen_right) if self.stereo else (self.listen,)
 
     @property
     def ear(self) -> Ear:
-        """As the engine takes it; the first point, in stereo the left, is drawn."""
+        """The ear as the engine takes it; the first point, in stereo the left, is drawn."""
         from engine.voices import Ear  # brings Numba
 
         return Ear(self.points, self.pickup, self.solo)

@@ -62,7 +62,7 @@ class Monitor(BaseModel):
         return match.get(source, 1.0) if self.level_match and match else 1.0
 
     def gain_db(self, slot: str, match: Mapping[str, float] | None) -> float | None:
-        """The gain with which the source of slot "a" or "b" is heard, in dB; None while it is not known."""
+        """The gain of the source of slot "a" or "b" as heard, in dB; None while it is not known."""
         source = self.a if slot == "a" else self.b
         if source == DIFFERENCE:
             return self.difference_gain_db

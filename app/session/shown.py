@@ -1,4 +1,4 @@
-"""The sources in the slots A and B as the plots of a sound show them, and the words of their legends and axes."""
+"""The sources in the slots A and B in plots of a sound, with the words of legends and axes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class ShownSource:
 
     @property
     def remark(self) -> str:
-        """What a legend says behind the title: the gain, and whether it is heard."""
+        """The remark behind the title in a legend: the gain, and whether it is heard."""
         gain = f" {self.gain_db:+.0f} dB" if self.gain_db else ""
         return f"{gain}{' · heard' if self.heard else ''}"
 
@@ -63,19 +63,22 @@ def _sources(choices: Choices, library: Library) -> Iterator[ShownSource]:
 
 
 def part_words(choices: Choices) -> str:
-    """Which part of the sound is drawn: the soloed mode, and in stereo the left side; "" where it is all of it."""
+    """The drawn part of the sound: the soloed mode, and in stereo the left side; "" for all of it."""
     parts = (f"mode {choices.solo}" if choices.solo else "", "left" if choices.stereo else "")
     return ", ".join(part for part in parts if part)
 
 
 def full_scale_words(choices: Choices) -> str:
-    """Which displacement, velocity or force 0 dB stands for."""
+    """The displacement, velocity or force that 0 dB stands for."""
     words = {"displacement": f"{1000 * FULL_SCALE_M:g} mm", "velocity": f"{FULL_SCALE_M_S:g} m/s"}
     return words.get(choices.pickup, f"{FULL_SCALE_N:g} N")
 
 
 def readable_unit(peak: float, pickup: str) -> tuple[float, str]:
-    """Factor and name of a unit in which `peak`, in m, m/s, N or Pa, has few digits; a displacement at most mm."""
+    """Factor and name of a unit in which `peak`, in m, m/s, N or Pa, has few digits.
+
+    A displacement has mm at most.
+    """
     unit = {"displacement": "m", "velocity": "m/s", "pressure": "Pa"}.get(pickup, "N")
     prefixes = _PREFIXES[1:] if pickup == "displacement" else _PREFIXES
     factor, prefix = next((pair for pair in prefixes if peak * pair[0] >= 0.1), prefixes[-1] if peak else prefixes[0])

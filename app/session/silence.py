@@ -1,4 +1,4 @@
-"""Why a pluck is silent, in words for the user; every function returns "" where it found no reason."""
+"""Reasons why a pluck is silent, in words for the user; every function returns "" where it found none."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def why_silent(choices: Choices, library: Library) -> str:
 
 
 def why_ran_away(take: Take) -> str:
-    """When the model of a take was silenced because its output grew without bound, and the remedy."""
+    """The time when a take's model was silenced, because its output grew without bound, and the remedy."""
     if take.model_ends_s is None:
         return ""
     title, outside = take.info.title, "; ".join(outside_training(take.info, take.pluck))
@@ -47,7 +47,7 @@ def why_ran_away(take: Take) -> str:
 
 
 def why_difference_silent(choices: Choices, take: Take) -> str:
-    """Why the difference of model and truth of a take cannot be heard; "" also until its signals are complete."""
+    """The reason why a take's difference cannot be heard; "" also until its signals are complete."""
     ear, listened = choices.ear, take.listened
     if listened.ear != ear or not listened.complete:
         return ""

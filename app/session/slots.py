@@ -1,4 +1,4 @@
-"""What the two slots of the A/B comparison hold, and what is known of it for the string that is plucked."""
+"""The contents of the two slots of the A/B comparison, and what is known of them for the plucked string."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def info_of(choices: Choices, entry: PresetEntry) -> PresetInfo:
 
 
 def missing_presets(choices: Choices, library: Library) -> dict[str, str]:
-    """By slot, the name of the preset that it holds, for those that are not in the library (any more)."""
+    """The names, by slot, of presets that slots hold and that are not in the library (any more)."""
     held = {"a": other_preset(choices.a), "b": other_preset(choices.b)}
     return {slot: name for slot, name in held.items() if name and library.find(name) is None}
 

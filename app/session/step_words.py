@@ -1,4 +1,4 @@
-"""What a step of undo changed, in words: fields of the pluck, fields of the patch, or which patch was chosen."""
+"""The change by a step of undo, in words: fields of pluck or patch, or the chosen patch."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mappin
 
 
 def _of_ears(changed: list[str], before: Patch, after: Patch) -> str:
-    """Where and how the patch is heard, if nothing else of it has changed; else ""."""
+    """The change of where and how the patch is heard, if nothing else of it has changed; else ""."""
     if not set(_changed(before, after)) <= PICKUP:
         return ""
     return _together([CHOICES[name] for name in changed if name in Listener.model_fields])

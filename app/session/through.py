@@ -10,7 +10,10 @@ from app.shared.vocabulary import DIFFERENCE
 
 
 def through_words(choices: Choices) -> tuple[str, ...]:
-    """What keys sound through, in words, the longest wording first; one empty text where a string sounds alone."""
+    """The instrument that keys sound through, in words, the longest wording first.
+
+    A string that sounds alone has one empty text.
+    """
     patch = choices.instrument
     if not isinstance(patch, Patch):
         return ("",)

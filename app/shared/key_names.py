@@ -16,7 +16,7 @@ def note_name(key: int) -> str:
 
 
 def key_named(text: str) -> int | None:
-    """The MIDI key of a note's name, such as F♯3, F#3 or Gb3, or of a number; None where `text` is neither."""
+    """The MIDI key of a note's name, such as F♯3, F#3 or Gb3, or of a number. None where `text` is neither."""
     text = text.strip()
     if _NUMBER.fullmatch(text):
         return int(text)

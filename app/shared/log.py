@@ -40,7 +40,7 @@ def log_file() -> Path:
 
 @contextmanager
 def faults_logged(reported: Callable[[str], None]) -> Iterator[None]:
-    """Within, uncaught exceptions of any thread are written to the log, each different one once.
+    """Write uncaught exceptions of any thread to the log while it is open, each different one once.
 
     A log that cannot be opened is done without.
 
@@ -82,7 +82,7 @@ def faults_logged(reported: Callable[[str], None]) -> Iterator[None]:
 
 @contextmanager
 def crashes_written() -> Iterator[None]:
-    """Within, a crash writes the stack of each thread to a file beside the log, with the suffix `.crash`."""
+    """Write the stack of each thread at a crash to a file beside the log, with the suffix `.crash`."""
     path = log_file().with_suffix(".crash")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

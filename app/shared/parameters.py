@@ -32,7 +32,7 @@ NOISE, TECHNIQUE = "NOISE", "TECHNIQUE"
 
 @dataclass(frozen=True)
 class Taper:
-    """How a value moves and reads.
+    """The way in which a value moves and reads.
 
     Attributes:
         step: of an arrow key or a wheel notch: of the value; a ratio above 1 where it is logarithmic; a share of the
@@ -102,7 +102,7 @@ class Parameter:
 
     @property
     def curve(self) -> float:
-        """As of its taper; a logarithmic one is curved by the ratio of its limits."""
+        """The curve of its taper; a logarithmic one is curved by the ratio of its limits."""
         return self.limits[1] / self.limits[0] if self.taper.logarithmic else self.taper.curve
 
     def share(self, value: float) -> float:
@@ -151,16 +151,16 @@ class Parameter:
 
     @property
     def prefix(self) -> str:
-        """As `shown` begins: "×", or ""."""
+        """The beginning of `shown`: "×", or ""."""
         return self.taper.text.partition("{")[0].strip()
 
     @property
     def unit(self) -> str:
-        """As `shown` ends; "" for a bare number."""
+        """The unit at the end of `shown`; "" for a bare number."""
         return self.taper.text.rpartition("}")[2].strip()
 
     def allows(self, modulation: Modulation) -> bool:
-        """Whether this kind of modulation may change it."""
+        """Return True if this kind of modulation may change it."""
         return _ORDER.index(self.modulation) >= _ORDER.index(modulation)
 
 

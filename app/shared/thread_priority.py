@@ -17,7 +17,7 @@ REAL_TIME_PRIORITY = 4  # below the sound server itself
 
 
 class Rank(IntEnum):
-    """By how much a thread's niceness is above the window's."""
+    """The rank of a thread: its niceness above the window's."""
 
     RENDERING = 5
     BACKGROUND = 10

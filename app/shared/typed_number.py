@@ -45,7 +45,7 @@ def typed_number(text: str, unit: str = "", prefix: str = "") -> float | None:
 
 
 def begins_number(text: str, unit: str = "", prefix: str = "") -> bool:
-    """Whether more characters could make a number of a text, or it is one."""
+    """Return True if more characters could make a number of a text, or it is one."""
     text, unit, prefix = _plain(text), _plain(unit).casefold(), _plain(prefix)
     if prefix.startswith(text):
         return True
@@ -58,5 +58,5 @@ def begins_number(text: str, unit: str = "", prefix: str = "") -> bool:
 
 
 def _plain(text: str) -> str:
-    """With one kind of space, minus and apostrophe, and none around it; ³ as 3, µ as μ."""
+    """Normalise a text: one kind of space, minus and apostrophe, no space around it; ³ as 3, µ as μ."""
     return " ".join(unicodedata.normalize("NFKC", text).translate(_MINUS).split())

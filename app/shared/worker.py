@@ -24,14 +24,14 @@ class Cancelled(Exception):
 
 
 class Progress(Protocol):
-    """Called by long work; may raise `Cancelled`, which ends the work. `Job.progress` is one."""
+    """A function that long work calls; it may raise `Cancelled`, which ends the work. `Job.progress` is one."""
 
     def __call__(self, share: float, text: str = "", left_s: float | None = None, /) -> None:
         """`share`: done, 0 … 1; `text`: what is being done; `left_s`: seconds left, None where not known."""
 
 
 class Job:
-    """One piece of work under way.
+    """A piece of work under way.
 
     Args:
         say: is called in the worker's thread with the job, a signal's name and its arguments.
@@ -67,7 +67,7 @@ class Job:
             self.wait(LOOK_AGAIN_S)
 
     def report(self, share: float, text: str = "", so_far: object = None) -> None:
-        """Reports the share that is done, 0 … 1, what is being done, and a result that can be shown already.
+        """Reports the share that is done, 0 … 1, the present step, and a result that can be shown already.
 
         Raises:
             Cancelled: see `wait`.
@@ -95,7 +95,7 @@ Work = Callable[[Job], Any]
 
 
 class Worker:
-    """Does one job at a time, the latest; its thread starts with the first.
+    """A worker that does one job at a time, the latest; its thread starts with the first.
 
     Args:
         name: of the thread.
@@ -120,7 +120,7 @@ class Worker:
         self._thread: threading.Thread | None = None
 
     def start(self, work: Work) -> Job:
-        """Does `work` as soon as the job under way has given up."""
+        """Do `work` as soon as the job under way has given up."""
         self.cancel()
         job = Job(self._say, self._rests)
         with self._mailbox:

@@ -11,7 +11,9 @@ from engine.presets import PresetError
 
 
 class Background(QObject):
-    """Does one job at a time, the latest. Methods belong to the thread that made it, where its signals arrive too.
+    """A worker of one job at a time, the latest.
+
+    Methods belong to the thread that made it, where its signals arrive too.
 
     Args: see `Worker`.
     """
@@ -40,11 +42,11 @@ class Background(QObject):
 
     @property
     def busy(self) -> bool:
-        """Whether the latest job has been started and its end has not arrived yet."""
+        """Return True if the latest job has been started and its end has not arrived yet."""
         return self._job is not None
 
     def start(self, work: Work) -> None:
-        """Does `work` as soon as the job under way has given up; `finished` has its return value."""
+        """Do `work` as soon as the job under way has given up; `finished` has its return value."""
         self._job = self._worker.start(work)
 
     def stop(self) -> None:

@@ -1,4 +1,4 @@
-"""What the pictures of a string and of a drum share: backdrop, legend, buttons, and marks of listening points."""
+"""The parts that pictures of string and drum share: backdrop, legend, buttons, and marks of listening points."""
 
 from __future__ import annotations
 
@@ -72,7 +72,10 @@ class StageView(QWidget):
     # State
 
     def set_warning(self, text: str, grave: bool = True) -> None:
-        """Why there is no sound, or what is wrong with it; "" for neither. `grave`: in the colour of warnings."""
+        """Set the reason why there is no sound, or what is wrong with it.
+
+        "" is for neither; `grave`: in the colour of warnings.
+        """
         self._warning, self._grave = text, grave
         self.update()
 
@@ -84,14 +87,14 @@ class StageView(QWidget):
         self.update()
 
     def set_sources(self, sources: tuple[ShownSource, ...]) -> None:
-        """What the slots hold; the frames given to `show_frame` should have these motions."""
+        """Set the sources that the slots hold; the frames given to `show_frame` should have these motions."""
         self._sources = sources
         self.update()
 
     # Marks of listening points
 
     def _mark_x(self, point: float) -> float:
-        """Where the mark of a listening point is, in pixels."""
+        """The x of the mark of a listening point, in pixels."""
         raise NotImplementedError
 
     def _mark_under(self, at: QPointF) -> str | None:
@@ -127,12 +130,12 @@ class StageView(QWidget):
 
     @property
     def _heard_remark(self) -> str:
-        """What sounds instead of the model, for a picture without a legend."""
+        """The source that sounds instead of the model, in words, for a picture without a legend."""
         others = (each.title for each in self._sources if each.heard and each.source != "model")
         return next((f"You hear: {title}" for title in others), "")
 
     def _paint_ground(self, painter: QPainter) -> None:
-        """What lies behind the motion, on the backdrop."""
+        """Paint the ground behind the motion, on the backdrop."""
 
     def _ground_of(self, *chosen: object) -> QPixmap:
         """The picture behind the motion, painted again only when something in it changes, as `chosen`."""
@@ -226,7 +229,7 @@ def paint_labels(painter: QPainter, marks: Sequence[tuple[float, str]], width: f
 def label_places(
     metrics: QFontMetrics, marks: Sequence[tuple[float, str]], width: float, bottom: float
 ) -> list[tuple[QRectF, str]]:
-    """Where each label is written: under its mark, but within `width` and clear of its neighbour."""
+    """The place of each label: under its mark, but within `width` and clear of its neighbour."""
     texts = sorted(marks)
     widths = [metrics.horizontalAdvance(text) + 2 for _, text in texts]
     lefts = [x - own / 2 for (x, _), own in zip(texts, widths, strict=True)]

@@ -104,7 +104,7 @@ def __getattr__(name: str) -> str:
 
 
 def is_dark() -> bool:
-    """Whether the present theme is the dark one, at any size of text."""
+    """Return True if the present theme is the dark one, at any size of text."""
     return present.background == DARK.background
 
 

@@ -1,4 +1,4 @@
-"""The blow that is shown: of the latest note of a drum, rendered by the worker, at the note's own time."""
+"""The blow that is shown: of a drum's latest note, rendered by the worker, at the note's own time."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Blows:
 
     @property
     def settled(self) -> bool:
-        """Whether motion and signals are complete, so that views need not look for more."""
+        """Return True if motion and signals are complete, so that views need not look for more."""
         asked, take = self._asked, self.shown.take
         return asked is None or (
             take is not None and take.complete and take.request.same_motion(asked[0]) and take.listened.complete
@@ -81,5 +81,5 @@ class Blows:
         return True
 
     def forget(self) -> None:
-        """Another instrument is played."""
+        """Forget the blow, as another instrument is played."""
         self._asked, self.shown = None, Playhead()

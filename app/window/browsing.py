@@ -1,4 +1,4 @@
-"""What both browsers have in common in the window: rows, favourites, previous and next, the user's folder."""
+"""The parts that both browsers share in the window: rows, favourites, previous and next, the user's folder."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from app.views.controls.browser_rows import Row
 
 
 class BrowserDesk(QObject):
-    """Lives in the window's thread, as long as the window.
+    """A desk that lives in the window's thread, as long as the window.
 
     Args:
         rows: what there is now.
@@ -49,7 +49,7 @@ class BrowserDesk(QObject):
         self.browser.show_rows(self._rows(), self.favourites, self._chosen(), str(self._folder()))
 
     def show_chosen(self) -> None:
-        """To be called when another one is loaded."""
+        """Show the chosen one; to be called when another one is loaded."""
         self.browser.set_chosen(self._chosen())
 
     def toggle(self) -> None:
@@ -60,7 +60,10 @@ class BrowserDesk(QObject):
             self.browser.show_over()
 
     def step(self, step: int) -> None:
-        """To the next or previous one of the filtered list, going round; from outside, to its first or last."""
+        """Step to the next or previous one of the filtered list, going round.
+
+        A step from outside leads to its first or last.
+        """
         names, chosen = self.browser.listed, self._chosen()
         if names:
             here = names.index(chosen) if chosen in names else -1

@@ -1,4 +1,4 @@
-"""Where everything is connected: session, performance, sound, panels and window.
+"""The controller, which connects everything: session, performance, sound, panels and window.
 
     widgets ── intents ──► session ── changed ──► controller ──► performance, sound, panels, widgets
     a timer ── 60 times a second, 10 when all is still ──► the panels that can be seen, meter
@@ -81,7 +81,7 @@ class _AudioMail(QObject):
 
 
 class Controller(QObject):
-    """Lives as long as the window."""
+    """A controller that lives as long as the window."""
 
     def __init__(
         self,
@@ -219,7 +219,7 @@ class Controller(QObject):
         panel.reported.connect(self.window.notices.report)
 
     def _fill_decks(self) -> None:
-        """Makes the views of the Lab when they are first needed: they and their plots take a fifth of a second."""
+        """Makes the views of the Lab when they are first needed. They and their plots take a fifth of a second."""
         if any(not panel.on_stage for panel in self.panels):
             return
         from app.window.panels.rack import decks
@@ -239,7 +239,7 @@ class Controller(QObject):
             self.session.play_patch()
 
     def _connect_actions(self) -> None:
-        """What the menu and its shortcuts do; the window itself does the rest."""
+        """Connect the actions of the menu and its shortcuts; the window itself does the rest."""
         window, session = self.window, self.session
         does: dict[str, Callable[[], object]] = {
             "record": self.patches.recordings.record,
@@ -511,7 +511,7 @@ class Controller(QObject):
             self.drum.show_key(latest.event.key, latest.event.place or played.place)
 
     def _wake(self) -> None:
-        """Something may move: runs the timer at its full rate for LIVELY_S."""
+        """Run the timer at its full rate for LIVELY_S, as something may move."""
         self._lively_until_s = time.monotonic() + LIVELY_S
         if self._timer.interval() != FRAME_MS:
             self._timer.setInterval(FRAME_MS)

@@ -1,4 +1,4 @@
-"""Whether there is a screen to open a window on: Qt would end the process where there is none."""
+"""A check for a screen to open a window on: Qt would end the process where there is none."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from contextlib import suppress
 
 
 class NoDisplay(RuntimeError):
-    """There is no screen. The message says what to do."""
+    """The error that there is no screen. The message says what to do."""
 
 
 def check_display() -> None:
@@ -27,7 +27,7 @@ def check_display() -> None:
 
 
 def _answers() -> bool:
-    """Asked in the way that Qt will ask. True where that cannot be known."""
+    """Return True if a display answers, asked in the way that Qt will ask. True where that cannot be known."""
     with suppress(OSError, AttributeError):
         xcb = ctypes.CDLL("libxcb.so.1")
         xcb.xcb_connect.restype = ctypes.c_void_p

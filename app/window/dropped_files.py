@@ -1,4 +1,7 @@
-"""What a dropped file means: a preset is installed, a WAV's recipe restored, another sound is a string or a body."""
+"""The meaning of a dropped file: a preset is installed, a WAV's recipe restored.
+
+Another sound is a string or a body.
+"""
 
 from __future__ import annotations
 
@@ -22,9 +25,12 @@ from engine.result_file import WriteError
 
 @dataclass(frozen=True)
 class Dropped:
-    """What follows: new values of `Choices`, a notice for the user ("": none), the name of a body for the patch.
+    """The results of a dropped file: new values of `Choices`, a notice for the user, a body for the patch.
 
-    `sound`: it is a string or a body, and the user chooses.
+    Attributes:
+        notice: "" for none.
+        body: its name; "" for none.
+        sound: it is a string or a body, and the user chooses.
     """
 
     choices: dict[str, Any] = field(default_factory=dict)

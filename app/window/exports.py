@@ -32,7 +32,7 @@ HEARD_FIELDS = {"listen", "listen_right", "stereo", "pickup", "solo", "a", "b", 
 
 
 class Exports(QObject):
-    """Lives as long as the window; `reported` has notices for the user.
+    """The exports, which live as long as the window; `reported` has notices for the user.
 
     Args:
         struck: the key of the instrument that an export plays; None: a string is plucked by itself.
@@ -83,13 +83,13 @@ class Exports(QObject):
             self.refresh()
 
     def refresh(self) -> None:
-        """What can be exported may have changed."""
+        """Renew the subjects, as what can be exported may have changed."""
         if self.dialog is not None:
             self.dialog.show_subjects(self._subjects())
 
     @property
     def busy(self) -> bool:
-        """Whether an export is under way."""
+        """Return True if an export is under way."""
         return self.dialog is not None and self.dialog.job is not None
 
     def close(self) -> None:
@@ -111,7 +111,7 @@ class Exports(QObject):
         return False
 
     def _subjects(self) -> dict[Kind, Any]:
-        """By kind, what can be exported now; None: nothing."""
+        """The subjects that can be exported now, by kind; None: nothing."""
         choices, played = self._session.choices, self._recordings.latest
         patch = choices.patch
         preset = None if played is None else self._library.find(played.patch.preset)
@@ -137,7 +137,7 @@ class Exports(QObject):
 
 
 def heard_note(choices: Choices, library: Library, struck: Struck | None = None) -> HeardNote | None:
-    """The chosen pluck as it is heard, of another preset where that is heard; or the key, which an instrument plays.
+    """The chosen pluck as it is heard, of another preset where that is heard; or an instrument's key.
 
     None: there is no preset.
     """
@@ -168,7 +168,7 @@ def note_of(choices: Choices, entry: PresetEntry, struck: Struck | None) -> Note
 
 
 def _name(choices: Choices, entry: PresetEntry) -> str:
-    """For a file: of the instrument whose key was played, else of the preset."""
+    """The name for a file: of the instrument whose key was played, else of the preset."""
     string = entry.info.string if choices.string is None else choices.string.parameters
     title, amplitudes_mm = entry.info.title, PluckRange.of(entry.info).amplitude_mm
     if isinstance(choices.instrument, Patch):
@@ -192,5 +192,5 @@ def note_words(title: str, choices: Choices) -> str:
 
 
 def all_modes_words(choices: Choices) -> str:
-    """That files and listening tests have all modes; "" where none is soloed."""
+    """The remark that files and listening tests have all modes; "" where none is soloed."""
     return f". All modes, although mode {choices.solo} is soloed" if choices.solo else ""

@@ -176,12 +176,12 @@ class Instruments(QObject):
         return min(max(drums.drums[0].note, low), high)
 
     def shown_key(self, patch: Patch) -> tuple[int, int | None]:
-        """Whose string is shown: the key that was struck last, on its string, or the middle of the patch's range."""
+        """The key whose string is shown: the one struck last, on its string, or the middle of the patch's range."""
         (low, high), latest = patch.range, self.latest_key
         return latest if latest is not None and low <= latest[0] <= high else ((low + high) // 2, None)
 
     def _by_hand(self, pluck: Pluck) -> NoteOn | PluckAt:
-        """A pluck as a note of the key whose string is shown; of the string alone where keys do not play it so.
+        """A pluck as a note of the key whose string is shown. It is of the string alone where keys do not play it so.
 
         These are a single string, and one beside another preset.
         """
@@ -318,7 +318,7 @@ class Instruments(QObject):
 
 
 def _key_of(patch: Patch, string: StringParameters) -> tuple[int, int | None] | None:
-    """The key with the pitch of a string, and on which of a set it has its length; None: there is no such key."""
+    """The key with the pitch of a string, and the string of a set on which it has its length. None: there is none."""
     strings, pitch_hz = Strings(patch), pitch_hz_of(string)
     low, high = patch.range
     key = next((key for key in range(low, high + 1) if _same(strings.pitch_hz(key) or 0.0, pitch_hz)), None)
@@ -333,5 +333,5 @@ def _key_of(patch: Patch, string: StringParameters) -> tuple[int, int | None] | 
 
 
 def _same(value: float, other: float) -> bool:
-    """Within rounding, for the player computes strings too."""
+    """Return True if values are equal within rounding, for the player computes strings too."""
     return math.isclose(value, other, rel_tol=1e-6)

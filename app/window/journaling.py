@@ -1,4 +1,7 @@
-"""A recording is written to disk while it is made, in a thread of its own: a crash loses a fraction of a second."""
+"""The writing of recordings to disk while they are made, in a thread of its own.
+
+A crash loses a fraction of a second.
+"""
 
 from __future__ import annotations
 

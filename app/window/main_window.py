@@ -92,7 +92,10 @@ PLAYED_KEYS = (  # see `app/playing/keyboard.py`
 
 
 class MainWindow(QMainWindow):
-    """Its parts are public: `presets`, `left`, `right`, `transport`, `instrument`, `notices`, `menu`."""
+    """The main window.
+
+    Its parts are public: `presets`, `left`, `right`, `transport`, `instrument`, `notices`, `menu`.
+    """
 
     pluck_asked = Signal()
     face_asked = Signal(str)
@@ -315,7 +318,7 @@ class MainWindow(QMainWindow):
 
     @property
     def shows_keys(self) -> bool:
-        """Whether the keys are shown in the Lab; in Play they always are."""
+        """Return True if the keys are shown in the Lab; in Play they always are."""
         return self._keys_button.isChecked()
 
     def show_keys(self, shown: bool) -> None:
@@ -382,7 +385,7 @@ class MainWindow(QMainWindow):
         self.through_label.setVisible(bool(text))
 
     def show_outside(self, text: str, of_shown: bool = True) -> None:
-        """What of the latest note lies outside the training; "" for nothing.
+        """Show the parts of the latest note that lie outside the training; "" for nothing.
 
         Args:
             of_shown: whether that note is the pluck that is shown; else a knob was turned since.
@@ -404,7 +407,7 @@ class MainWindow(QMainWindow):
         label.style().polish(label)
 
     def show_growth(self, text: str) -> None:
-        """That the error of the latest pluck grew; "" where it did not."""
+        """Show that the error of the latest pluck grew; "" where it did not."""
         self.growth_sign.setToolTip(plain_tip(text))
         self.growth_sign.setAccessibleDescription(text)
         self._show_growth()
@@ -516,6 +519,6 @@ def _local_file(url: QUrl) -> Path:
 
 
 def _copy(event: QDropEvent) -> None:
-    """Never a move, after which a file manager would delete the user's file."""
+    """Copy the dropped file, never move it: after a move a file manager would delete the user's file."""
     event.setDropAction(Qt.DropAction.CopyAction)
     event.accept()

@@ -23,7 +23,7 @@ LOOK_MS = 1_000  # between two looks at the input
 
 
 class MidiControl(QObject):
-    """Lives in the window's thread; notes are played in the input's.
+    """MIDI control, which lives in the window's thread; notes are played in the input's.
 
     Args:
         handle: plays an event; called in the input's thread.
@@ -159,7 +159,9 @@ class MidiControl(QObject):
     # Messages
 
     def _receive(self, event: Event) -> None:
-        """In the input's thread. Notes are played at once; an assigned controller waits for the window's thread.
+        """Receive an event in the input's thread.
+
+        Notes are played at once; an assigned controller waits for the window's thread.
 
         While a controller is waited for, one with a function of its own goes both ways.
         """
@@ -175,7 +177,7 @@ class MidiControl(QObject):
             self._play_note(event, self.choices.notes)
 
     def _answer(self, event: Controller) -> None:
-        """In the window's thread: assigns a controller that is waited for, and applies its value."""
+        """Assign, in the window's thread, a controller that is waited for, and apply its value."""
         if self._learning is not None:
             if does := fixed_function(event.number):
                 if self._dialog is not None:

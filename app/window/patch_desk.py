@@ -74,7 +74,7 @@ TAKEN_FILES = (*MIDI_FILES, SUFFIX, *SCALA_FILES)
 
 
 class PatchDesk(QObject):
-    """Lives in the window's thread, as long as the window.
+    """A desk that lives in the window's thread, as long as the window.
 
     Attributes:
         desk: the browser's.
@@ -214,7 +214,7 @@ class PatchDesk(QObject):
         self._session.update(patch=changed)
 
     def turn_to(self, field: str, figure: float) -> None:
-        """Turns a knob of the string to a figure of the string that is shown, or as near to it as the knob goes."""
+        """Turns a knob of the string to a figure of the shown string, or as near as it goes."""
         patch = self.patch
         if patch is None:
             return
@@ -313,7 +313,7 @@ class PatchDesk(QObject):
         self._panel.bar.show_comparing(entry is not None)
 
     def take_file(self, file: Path) -> None:
-        """One of TAKEN_FILES that was dropped: a patch is added and chosen, a MIDI file played, a scale tunes."""
+        """Take a dropped file of TAKEN_FILES: add and choose a patch, play a MIDI file, tune by a scale."""
         try:
             if file.suffix.lower() in MIDI_FILES:
                 self._play_file(file)
@@ -383,7 +383,7 @@ class PatchDesk(QObject):
 
     @property
     def playing(self) -> bool:
-        """Whether a MIDI file is played."""
+        """Return True if a MIDI file is played."""
         return self._playback.playing
 
     # What is shown
@@ -429,7 +429,10 @@ class PatchDesk(QObject):
         self._panel.bar.say_octave(f"{end if asked else 'Octave moved'}: {patch.name} has {low} to {high}")
 
     def _show_source(self) -> None:
-        """In whose colour keys are lit; says once that keys do not play another preset which a slot holds."""
+        """Light keys in the colour of their source.
+
+        Say once that keys do not play another preset which a slot holds.
+        """
         choices, heard = self._session.choices, self._session.choices.source_heard
         other = heard if choices.plays_patch and other_preset(heard) else ""
         if self._reported_other not in (choices.a, choices.b):
@@ -474,7 +477,7 @@ class PatchDesk(QObject):
         self._panel.bar.show_note("" if self.patch is not None else NO_PATCH)
 
     def _outside(self) -> list[str]:
-        """What of the latest note, with the present knobs, lies outside the training of its model."""
+        """The parts of the latest note, with the present knobs, that lie outside the training of its model."""
         choices, latest, patch = self._session.choices, self._instruments.latest, self.patch
         entry = self._library.find(choices.preset)
         if entry is None:
@@ -549,13 +552,13 @@ class PatchDesk(QObject):
         self._instruments.play(NoteOn(key, velocity, KEYS, string=string))
 
     def _choose_touch(self, touch: str) -> None:
-        """What a key on the screen or of the computer does while another is held."""
+        """Choose the effect of a key on the screen or of the computer while another is held."""
         for number, down in ((LEGATO, touch != "pluck"), (PORTAMENTO, touch == "slide")):
             self._instruments.play(Controller(number, 127 * down, KEYS))
         self._instruments.play(Controller(SLIDE_TIME, SCREEN_SLIDE, KEYS))
 
     def _switch_technique(self, name: str, on: bool) -> None:
-        """Whether keys of the screen and of the computer are played with a technique."""
+        """Switch a technique on or off for keys of the screen and of the computer."""
         number = {"strum": STRUM, "tremolo": TREMOLO, "harmonics": HARMONICS}[name]
         self._instruments.play(Controller(number, 127 * on, KEYS))
 

@@ -87,29 +87,29 @@ class Performance(QObject):
 
     @property
     def _playhead(self) -> Playhead[Take] | Playhead[BlowTake]:
-        """That of the motion that is shown."""
+        """The playhead of the motion that is shown."""
         return self._blows.shown if self._of_drums else self._shown
 
     @property
     def ready(self) -> bool:
-        """Whether the motion that is shown is that of the chosen pluck."""
+        """Return True if the motion that is shown is that of the chosen pluck."""
         return self.take is not None and self._is_of_chosen(self.take)
 
     @property
     def at_hand(self) -> bool:
-        """Whether the chosen pluck would sound at once: its sources are loaded, and the output is open."""
+        """Return True if the chosen pluck would sound at once: its sources are loaded, and the output is open."""
         return self._sound.status().changes_done > 0 and self.notes.at_hand
 
     @property
     def playable(self) -> bool:
-        """Whether a pluck would sound at once, and a key of the patch if there is one; of drums a key alone."""
+        """Return True if a pluck and the patch's key, if any, would sound at once; of drums a key alone."""
         if self._of_drums:
             return self._sound.status().changes_done > 0 and self.notes.keys.player is not None
         return self.at_hand and (self._session.choices.patch is None or self.notes.keys.player is not None)
 
     @property
     def playing(self) -> bool:
-        """Whether a note rings that was not released."""
+        """Return True if a note rings that was not released."""
         return self.notes.ringing > 0
 
     @property
@@ -119,25 +119,25 @@ class Performance(QObject):
 
     @property
     def moving(self) -> bool:
-        """Whether the playhead moves."""
+        """Return True if the playhead moves."""
         return self._playhead.moving
 
     @property
     def settled(self) -> bool:
-        """Whether motion and signals are complete, so that views need not look for more."""
+        """Return True if motion and signals are complete, so that views need not look for more."""
         if self._of_drums:
             return self._blows.settled
         return self.take is None or (self.take.complete and self.take.listened.complete)
 
     @property
     def match(self) -> Mapping[str, float] | None:
-        """By source, the factor that brings what is chosen to the level of the truth; None: not known yet."""
+        """The factor by source that brings what is chosen to the level of the truth; None: not known yet."""
         latest = self.notes.latest
         keys = isinstance(latest, KeyNote) and self._session.choices.plays_patch
         return latest.match if latest is not None and keys else self.notes.match
 
     def moment(self, elapsed_s: float) -> Moment:
-        """What panels show now; `elapsed_s`: since they were shown the last one."""
+        """The moment that panels show now; `elapsed_s`: since they were shown the last one."""
         blow = self._blows.shown.take if self._of_drums else None
         return Moment(self.take, self.position_s, self.moving, elapsed_s, blow, self._playhead.audible)
 
@@ -251,7 +251,7 @@ class Performance(QObject):
             self._show_words()
 
     def _waiting(self) -> str:
-        """When a model that is rendered before it is heard will sound; "" where none waits."""
+        """The time until a model that is rendered ahead will sound, in words; "" where none waits."""
         latest = self.notes.latest
         if not isinstance(latest, Note) or not latest.waits_s:
             return ""
@@ -335,11 +335,11 @@ class Performance(QObject):
         self._show_words()
 
     def _show_words(self) -> None:
-        """In the header: how long a model is still waited for, or the error."""
+        """Show in the header how long a model is still waited for, or the error."""
         self._window.error_label.setText(self._waiting_words or self._error_words)
 
     def _is_chosen(self, note: Note | KeyNote) -> bool:
-        """Whether a note is of the chosen pluck."""
+        """Return True if a note is of the chosen pluck."""
         asked, request = self._asked, note.request
         return (
             asked is not None
@@ -348,7 +348,7 @@ class Performance(QObject):
         )
 
     def _is_of_chosen(self, take: Take) -> bool:
-        """Whether a take is of the chosen pluck."""
+        """Return True if a take is of the chosen pluck."""
         asked, entry = self._asked, self.entry
         if asked is None or entry is None:
             return False
@@ -358,7 +358,7 @@ class Performance(QObject):
 
 
 def growth_words(errors: Sequence[float], own: float | None) -> str:
-    """That the error of a pluck has grown, for people; "" where it has not.
+    """The words for people that the error of a pluck has grown; "" where it has not.
 
     Args:
         errors: relative mean absolute errors within the training range and beyond, as far as there are.

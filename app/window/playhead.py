@@ -35,16 +35,16 @@ class Playhead(Generic[Shown]):
         return min(max(heard_s, 0.0), self.take.seconds)
 
     def park(self, position_s: float) -> None:
-        """It stands at a time of the motion from now on."""
+        """Park the playhead: it stands at a time of the motion from now on."""
         self.note, self.parked_s = None, position_s
 
     @property
     def moving(self) -> bool:
-        """Whether it moves."""
+        """Return True if it moves."""
         note, take = self.note, self.take
         return note is not None and take is not None and not note.over and note.seconds < take.seconds
 
     @property
     def audible(self) -> bool:
-        """Whether the note of the motion rings, which may be longer than the motion."""
+        """Return True if the note of the motion rings, which may be longer than the motion."""
         return self.note is not None and self.take is not None and not self.note.over

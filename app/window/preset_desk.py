@@ -14,7 +14,7 @@ from engine.folders import user_folder
 
 
 class PresetDesk(BrowserDesk):
-    """See `BrowserDesk`."""
+    """A desk of presets; see `BrowserDesk`."""
 
     def __init__(
         self,
@@ -43,7 +43,7 @@ class PresetDesk(BrowserDesk):
         self.show()
 
     def choice_changed(self) -> None:
-        """To be called when another preset is chosen."""
+        """Show the chosen preset; to be called when another one is chosen."""
         self._show_bar()
         self.show_chosen()
 

@@ -1,4 +1,4 @@
-"""What is played through the patch is recorded; what is not saved yet is kept, in memory and on disk."""
+"""Recordings of what is played through the patch. Unsaved ones are kept, in memory and on disk."""
 
 from __future__ import annotations
 
@@ -25,7 +25,9 @@ RECOVER, LATER, DISCARD = "Recover", "Later", "Discard"
 
 
 class Recordings(QObject):
-    """Lives in the window's thread, as long as the window. The button of `bar` records, ends, saves and discards.
+    """Recordings, which live in the window's thread, as long as the window.
+
+    The button of `bar` records, ends, saves and discards.
 
     A recording is kept until it is written or discarded; while one is, no other begins. Its journal on disk is kept
     as long, also past the end of the process, and `offer_left` finds it.
@@ -58,7 +60,7 @@ class Recordings(QObject):
 
     @property
     def unsaved(self) -> bool:
-        """Whether anything was played that is not saved, or is being recorded."""
+        """Return True if anything was played that is not saved, or is being recorded."""
         return bool(self._unsaved) or self._keys.recorder.recording
 
     def record(self) -> None:
@@ -83,7 +85,7 @@ class Recordings(QObject):
             self.forget(latest)
 
     def forget(self, played: Played) -> None:
-        """It is written, or not wanted."""
+        """Forget a recording that is written, or not wanted."""
         if played in self._unsaved:
             journal = self._unsaved.pop(played)
             if journal is not None:
@@ -91,7 +93,7 @@ class Recordings(QObject):
             self._show_unsaved()
 
     def forget_all(self) -> None:
-        """None of what is not saved is wanted, nor what is being recorded."""
+        """Forget all that is not saved, and what is being recorded."""
         self.end()
         for played in list(self._unsaved):
             self.forget(played)

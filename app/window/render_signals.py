@@ -8,7 +8,7 @@ from app.rendering import BlowTake, Take
 
 
 class RenderSignals(QObject):
-    """Its methods are called in other threads; see `RenderListener`."""
+    """Signals of the rendering, whose methods are called in other threads; see `RenderListener`."""
 
     started = Signal(object)  # Take or BlowTake
     finished = Signal(object)  # the same

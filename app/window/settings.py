@@ -1,4 +1,4 @@
-"""What is remembered between two starts: one validated JSON file.
+"""The settings that are remembered between two starts: one validated JSON file.
 
 A broken one is set aside, not fatal; where only some fields are wrong, the others are kept.
 """
@@ -32,7 +32,7 @@ FIRST_FAVOURITES = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "
 
 
 class InstrumentChoice(BaseModel):
-    """How the instrument's strip is shown: in the Lab too, as keys or strings, with the string's knobs."""
+    """The look of the instrument's strip: in the Lab too, as keys or strings, with the string's knobs."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

@@ -15,7 +15,7 @@ SIGNALS = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP", "SIGINT", "SI
 
 @contextmanager
 def asked_to_end(end: Callable[[], None]) -> Iterator[None]:
-    """Within, the first of SIGNALS calls `end` in Qt's event loop; a second one has its usual effect.
+    """Let the first of SIGNALS call `end` in Qt's event loop; a second one has its usual effect.
 
     Python alone would not notice it before the next line of Python is run.
     """

@@ -13,7 +13,7 @@ from app.views.controls.song_strip import SongStrip
 
 
 class Song(QObject):
-    """Lives in the window's thread. Times are in s from the beginning of the file."""
+    """A song, which lives in the window's thread. Times are in s from the beginning of the file."""
 
     def __init__(self, playback: Playback, strip: SongStrip) -> None:
         super().__init__(strip)

@@ -78,7 +78,7 @@ class AbxRecord(BaseModel):
     @computed_field  # type: ignore[prop-decorator]
     @property
     def p_value(self) -> float | None:
-        """None unless the test is complete: stopping early would bias it."""
+        """The p-value; None unless the test is complete: stopping early would bias it."""
         return p_value(self.correct, self.planned_trials) if self.complete else None
 
     @property
@@ -87,7 +87,7 @@ class AbxRecord(BaseModel):
 
     @property
     def verdict(self) -> str:
-        """What follows from the result, in a sentence."""
+        """The conclusion from the result, in a sentence."""
         if self.p_value is None:
             return "The test was not completed, so no p-value can be given."
         if self.p_value < LEVEL:

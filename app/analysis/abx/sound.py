@@ -41,7 +41,9 @@ class Stimuli:
 
 
 def make_stimuli(sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, volume_db: float = 0.0) -> Stimuli:
-    """Model (A) and truth (B) of a pluck or a blow with equal RMS, and faded at their ends, because they are looped.
+    """Model (A) and truth (B) of a pluck or a blow with equal RMS.
+
+    They are faded at their ends, because they are looped.
 
     Args:
         sounds: samples by source, (frames, channels), of one length; ±1 is full scale.

@@ -31,7 +31,7 @@ class AbxChoices(BaseModel):
 
 
 def draw_order(seed: int, trials: int) -> tuple[Identity, ...]:
-    """Whether X is A or B in each trial. The same seed gives the same order in every version of Python."""
+    """Draw for each trial if X is A or B. The same seed gives the same order in every version of Python."""
     coin = random.Random(seed)  # Python guarantees the sequence of random() alone
     return tuple("A" if coin.random() < 0.5 else "B" for _ in range(trials))
 
@@ -50,7 +50,7 @@ def needed_correct(trials: int, level: float = LEVEL) -> int | None:
 
 
 class Trial(BaseModel):
-    """One trial that has been answered; `x`: which of the two X was."""
+    """An answered trial; `x`: which of the two X was."""
 
     model_config = ConfigDict(frozen=True)  # versions that kept times have more fields
 
@@ -82,7 +82,7 @@ class Run:
         return len(self.trials) == self.planned
 
     def heard_as(self, sound: Sound) -> Identity:
-        """Whether A or B is to be played for a choice of A, B or X."""
+        """The sound, A or B, that is to be played for a choice of A, B or X."""
         return draw_order(self.seed, self.planned)[len(self.trials)] if sound == "X" else sound
 
     def auditioned(self, sound: Sound) -> Run:

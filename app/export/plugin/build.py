@@ -173,7 +173,7 @@ def _images(images: Sequence[Image], folder: Path) -> str:
 
 
 def _stubs() -> str:
-    """What error paths of compiled code refer to, and what no plug-in has: they return nothing."""
+    """Stubs of names that error paths of compiled code refer to, and no plug-in has: they return nothing."""
     lines = ["void *PyExc_RuntimeError = 0;"]
     lines += [f"void *{name}(void) {{ return 0; }}" for name in sorted(STUBS - {"PyExc_RuntimeError"})]
     return "\n".join(lines) + "\n"

@@ -93,7 +93,7 @@ def this_target() -> str:
 
 
 def install_folder(form: str, target: str) -> Path:
-    """Where the hosts of this user look for plug-ins of a format."""
+    """The folder where the hosts of this user look for plug-ins of a format."""
     return Path.home() / FORMATS[form].folders[target.partition("-")[0]]
 
 

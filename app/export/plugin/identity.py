@@ -72,7 +72,7 @@ def check_kept(path: Path, ids: Collection[str]) -> None:
 
 
 def holding(ids: frozenset[str]) -> str:
-    """In words, which other instruments a plug-in holds."""
+    """The other instruments that a plug-in holds, in words."""
     first, *rest = sorted(id.removeprefix(PREFIX) for id in ids)
     return f"holds {f'{len(ids)} other instruments, as' if rest else 'another instrument,'} {first}"
 

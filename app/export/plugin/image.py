@@ -176,7 +176,7 @@ class Image:
 
     @property
     def bytes(self) -> int:
-        """With the noise of rooms, which instruments of a bank share."""
+        """The size in bytes, with the noise of rooms, which instruments of a bank share."""
         return len(self.content) + NOISE_FRAMES * NOISE_BYTES
 
 

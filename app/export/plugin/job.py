@@ -32,14 +32,14 @@ class PluginExport:
         return self.path.parent
 
     def replaces(self) -> str:
-        """What is there and would be replaced, in words; "": nothing. Raises PluginError: it must not be."""
+        """The plug-in that would be replaced, in words; "": nothing. Raises PluginError: it must not be."""
         if not self.path.exists():
             return ""
         lost = lost_with(self.path, {identifier(self.patch.name)})
         return f"The plug-in that is there {holding(lost)}: replaced." if lost else "Replaces the one before."
 
     def run(self, progress: Progress) -> str:
-        """See `ExportJob`."""
+        """Build the plug-in; see `ExportJob`."""
         check_compiler()
         from app.export.plugin.build import build_plugin  # brings LLVM
         from app.export.plugin.image import image_of

@@ -48,7 +48,7 @@ class ObjectError(ValueError):
 
 
 def digest() -> str:
-    """Of the kernels and of what compiles them: it changes with either."""
+    """The digest of the kernels and of what compiles them: it changes with either."""
     kernels = Path(sys.modules["engine"].__file__ or "").parent / "kernels"
     found = hashlib.sha256()
     for source in (*sorted(kernels.glob("*.py")), Path(__file__), Path(texts.__file__)):
@@ -126,7 +126,7 @@ def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Call
 
 
 def reason_of(code: int, said: str) -> str:
-    """Why a process failed, in a line: its first line that names an error, else its last; else its exit status."""
+    """The reason why a process failed: its first line with an error, else its last; else its exit status."""
     lines = [line.strip() for line in said.splitlines() if line.strip()]
     named = [line for line in lines if "error:" in line.lower()]
     return next(iter(named or lines[-1:]), f"its process ended with status {code}; free some memory and try again")

@@ -1,4 +1,4 @@
-"""What the shell computes sounds from beyond the table of strings: body and room, and drums."""
+"""Parts beyond the table of strings that the shell computes sounds from: body and room, and drums."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ AMP = ("amp.drive_db", "amp.tone_db")
 
 @dataclass(frozen=True, eq=False)
 class Parts:
-    """What the shell computes responses of the body from, at a size of 1.
+    """The parts that the shell computes responses of the body from, at a size of 1.
 
     Attributes:
         modes: (4, modes): Hz, decay in 1/s, amplitudes left and right; None: it has no modes.
@@ -47,7 +47,7 @@ class Parts:
 
 
 def parts_of(patch: Patch) -> Parts:
-    """Of a patch's body, as far as it has one."""
+    """The parts of a patch's body, as far as it has one."""
     effects = effects_of(patch.with_value("body.mix", 1.0))
     body = None if effects is None else effects.body
     if body is None:
@@ -84,7 +84,7 @@ class Kit:
 
 
 def kit_of(own: DrumKeys) -> Kit:
-    """Of the keys of an instrument of drums; keys that are silent at any modulus have none."""
+    """The kit of an instrument of drums; keys that are silent at any modulus have no drum in it."""
     patch, drums, highest_hz, most = own.patch, own.drums.drums, own.drums.highest_hz, kernel.LOW_MODES
     slack = DrumKeys(patch.with_value("knobs.modulus", OF_PATCHES["knobs.modulus"].limits[0]), own.ear, own)
     possible = [played.drum.parameters for played in drums]

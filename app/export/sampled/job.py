@@ -36,7 +36,7 @@ _OURS = re.compile(r"key\d{3}_vel\d{3}\.(flac|wav)|\.?index\.(json|lock)")  # an
 
 @dataclass(frozen=True)
 class SampledReport:
-    """What was written.
+    """The report of an instrument that was written.
 
     Attributes:
         samples: how many the instrument has.
@@ -61,7 +61,7 @@ def plain_stem(text: str) -> str:
 
 
 def sample_folder(out: Path) -> Path:
-    """Where the samples of an SFZ lie."""
+    """The folder of the samples of an SFZ."""
     return out.with_name(f"{plain_stem(out.stem)}_samples")
 
 

@@ -44,7 +44,7 @@ def velocity_levels(patch: Patch, layers: list[Zone], stored: list[StoredSample]
 
 
 def headroom_db(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, float]:
-    """By zone: how much louder its loudest velocity is than the one it was rendered at."""
+    """The headroom by zone, in dB: the level of its loudest velocity above that of the rendered one."""
     found = {}
     for layers, stored in by_key(samples):
         levels_db = velocity_levels(patch, layers, stored)

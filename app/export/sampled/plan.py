@@ -1,4 +1,4 @@
-"""What is sampled of a patch: which keys, at which velocities, for how long, and what that takes."""
+"""The plan of the samples of a patch: which keys, at which velocities, for how long, and what that takes."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class NoteRenderer(Protocol):
 
 @dataclass(frozen=True)
 class Zone:
-    """One sample: the key and the velocity that it is rendered at, and those that it sounds for (both ends count)."""
+    """A sample: the key and velocity that it is rendered at, and those it sounds for (both ends count)."""
 
     key: int
     velocity: int
@@ -65,7 +65,7 @@ class Zone:
 
 @dataclass(frozen=True)
 class SampledPlan:
-    """What is rendered.
+    """The plan of what is rendered.
 
     Attributes:
         keys: the lowest and the highest MIDI key; None: all of the patch's range.
@@ -119,7 +119,7 @@ class SampledPlan:
 
     @cached_property
     def zones(self) -> tuple[Zone, ...]:
-        """By key, then by velocity. Keys that the patch's tuning leaves out are silent, and have none."""
+        """The zones by key, then by velocity. Keys that the patch's tuning leaves out are silent, and have none."""
         return tuple(self._zone(keys, velocities) for keys in self._key_spans() for velocities in self._layers())
 
     @property
@@ -141,13 +141,13 @@ class SampledPlan:
         return f"{zone.stem}.{self.format}"
 
     def _zone(self, keys: tuple[int, int], velocities: tuple[int, int]) -> Zone:
-        """Of equally good velocities the hardest is rendered."""
+        """The zone of such keys and velocities. It is rendered at the hardest of equally good velocities."""
         hardest = Zone(keys[0] + (keys[1] - keys[0]) // 2, velocities[1], keys, velocities)
         errors = self._glide_errors_cents(hardest)
         return replace(hardest, velocity=velocities[1] - int(errors[::-1].argmin()))
 
     def _glide_errors_cents(self, zone: Zone) -> NDArray[np.float64]:
-        """By velocity that the zone may be rendered at: the largest error of the glides of all its notes.
+        """The largest error of the glides of all notes of a zone, by velocity that it may be rendered at.
 
         Zeros where the string of its key is impossible, as rendering it then reports.
         """

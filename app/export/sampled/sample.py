@@ -1,4 +1,4 @@
-"""One note as a sample file: cut where it is silent, faded out, raised to full level, as FLAC or WAV."""
+"""A note as a FLAC or WAV file: cut where it is silent, faded out and raised to full level."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class StoredSample:
 
     @property
     def peak_db(self) -> float:
-        """Of the note as rendered, relative to full scale."""
+        """The peak of the note as rendered, relative to full scale."""
         return PEAK_DBFS - self.gain_db if self.level_db > INAUDIBLE_DBFS else INAUDIBLE_DBFS
 
 

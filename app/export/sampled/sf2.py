@@ -118,7 +118,7 @@ def write_sf2(
 
 
 def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, int]:
-    """By how many cB a velocity of 0 would be softer than one of 128, by zone.
+    """The attenuation by zone, in cB, that a velocity of 0 would have against one of 128.
 
     So the level continues within a layer as it does from layer to layer; less where a soft layer, which has to be
     raised for it, would be much louder than the hardest.
@@ -136,12 +136,15 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
 
 
 def _raised_db(attenuation_cb: int, zone: Zone) -> float:
-    """By how much a zone is raised to make up for the velocity's attenuation at its hardest velocity."""
+    """The dB that a zone is raised by, to make up for the velocity's attenuation at its hardest velocity."""
     return attenuation_cb / 10 * (1 - zone.velocities[1] / 128)
 
 
 def release_timecents(patch: Patch) -> int:
-    """Of the volume envelope: 60 dB in the damping time; for strings that ring on, the longest release there is."""
+    """The release of the volume envelope: 60 dB in the damping time.
+
+    Strings that ring on have the longest release there is.
+    """
     if patch.damping.let_ring:
         return TIMECENTS_RANGE[1]
     seconds = patch.damping.release_t60_s * RELEASE_SPAN_DB / 60
@@ -226,7 +229,10 @@ def _preset(name: bytes, bag: int) -> bytes:
 
 
 def _header(plan: SampledPlan, one: _Channel) -> bytes:
-    """Where a sample lies, in frames, and its key (7.10). Its loop is not played, but has to lie within it."""
+    """The header of a sample: its place, in frames, and its key (7.10).
+
+    Its loop is not played, but has to lie within it.
+    """
     end = one.start + one.frames
     places = (one.start, end, one.start + 8, end - 8)
     return struct.pack("<20sIIIIIBbHH", _name(one.name), *places, plan.rate_hz, one.zone.key, 0, one.link, one.kind)
@@ -243,12 +249,12 @@ def _ascii(text: str) -> bytes:
 
 
 def _name(text: str) -> bytes:
-    """At most 19 characters and the zero behind them."""
+    """Encode a name: at most 19 characters and the zero behind them."""
     return _ascii(text)[:19]
 
 
 def _text(text: str) -> bytes:
-    """With one or two zeros behind, to an even length (5)."""
+    """Encode a text with one or two zeros behind, to an even length (5)."""
     data = _ascii(text)[:254]
     return data + bytes(2 - len(data) % 2)
 

@@ -26,7 +26,7 @@ def sfz_text(plan: SampledPlan, samples: Mapping[Zone, StoredSample], folder: st
 
 
 def sfz_gain_db(patch: Patch, samples: Mapping[Zone, StoredSample]) -> float:
-    """By how much the whole is raised: 0, or less where a note would clip, so that no volume is above 0 dB."""
+    """The dB that the whole is raised by: 0, or less where a note would clip. No volume is above 0 dB."""
     headrooms_db = headroom_db(patch, samples)
     return min(0.0, *(sample.gain_db - headrooms_db[zone] for zone, sample in samples.items()))
 

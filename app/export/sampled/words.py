@@ -11,7 +11,7 @@ _LINES_BYTES = 512  # of a sample at most: its lines of the SFZ and its file's h
 
 
 def number_of(count: int, thing: str) -> str:
-    """Such as "1 key", "2 keys"."""
+    """A count with its noun, such as "1 key", "2 keys"."""
     return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
 
 
@@ -56,7 +56,7 @@ def megabytes(size: int) -> str:
 
 
 def notes(plan: SampledPlan, report: SampledReport, dry: str) -> list[str]:
-    """What a musician should know of what was written. `dry`: what takes the room out, as in "--dry leaves"."""
+    """Notes for a musician on what was written. `dry`: what takes the room out, as in "--dry leaves"."""
     reported = []
     if plan.patch.room.mix > 0 and not plan.patch.damping.let_ring:
         reported.append(f"a released key ends the room's tail as well; {dry} the room to the sampler")

@@ -20,7 +20,7 @@ KEY_NAMES = {"Return": "Enter", "PgUp": "Page up", "PgDown": "Page down"}  # as 
 
 @dataclass(frozen=True)
 class Entry:
-    """One action: its name in the code, its words in the menu, its shortcut, and what it does, for the help."""
+    """An action: its name in the code, its words in the menu, its shortcut, and its effect for the help."""
 
     name: str
     text: str
@@ -118,7 +118,7 @@ class AppMenu(QMenu):
             action.setChecked(getattr(look, field) == value)
 
     def show_steps(self, undo: str, redo: str) -> None:
-        """What undo and redo would change; "" where there is nothing to."""
+        """Show the steps that undo and redo would change; "" where there is nothing to."""
         for name, step in (("undo", undo), ("redo", redo)):
             words = f": {one_line(step, LONGEST_STEP)}".replace("&", "&&") if step else ""
             self.action[name].setText(f"{ENTRIES[name].text}{words}")

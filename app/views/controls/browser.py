@@ -45,7 +45,7 @@ _ALT_GR = Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier 
 
 
 class Browser(QFrame):
-    """Hidden at first; closing gives the focus back to the widget that had it.
+    """A browser that is hidden at first; closing gives the focus back to the widget that had it.
 
     One row of the list is selected, loaded or not: card and keys are for it.
 
@@ -293,7 +293,7 @@ class Browser(QFrame):
 
     @property
     def top(self) -> int:
-        """Its upper edge in the window: under the notice, if one is shown."""
+        """The upper edge of the browser in the window: under the notice, if one is shown."""
         notices = self.window().findChild(NoticeBar)
         if notices is None:
             return TOP
@@ -306,9 +306,9 @@ class Browser(QFrame):
 
     @property
     def best_hit(self) -> str:
-        """Of the entries with all the words in their titles, else of all listed ones, the loaded one, else the first.
+        """The name of the best hit: of entries with all the words in their titles, else of all listed.
 
-        "" where none is listed.
+        The loaded one of these is taken, else the first. "" where none is listed.
         """
         rows, words = self.list.rows, self.words
         hits = [row.name for row in rows if all(word in row.title.casefold() for word in words)]
@@ -427,7 +427,7 @@ class Browser(QFrame):
         return watched is not self.search and self.take_typed(event)
 
     def _is_ours(self, watched: QObject, event: QKeyEvent) -> bool:
-        """Whether a key is one of `press`; buttons and boxes keep all of these but Escape."""
+        """Return True if a key is one of `press`; buttons and boxes keep all of these but Escape."""
         control = event.modifiers() == Qt.KeyboardModifier.ControlModifier
         if watched not in (self.search, self.list):
             return event.key() == KEYS.Key_Escape
@@ -447,7 +447,7 @@ def _button(text: str, tip: str, act: Callable[[], object]) -> QPushButton:
 
 
 def _refill(box: QComboBox, kinds: Sequence[tuple[object, str]]) -> None:
-    """What can be filtered by, after the entry for no filter; what is chosen stays."""
+    """Refill a box with the kinds to filter by, after the entry for no filter; what is chosen stays."""
     with QSignalBlocker(box):
         chosen = box.currentData()
         while box.count() > 1:

@@ -1,4 +1,4 @@
-"""What a browser lists: rows under headings, filtered and sorted."""
+"""The rows of a browser, under headings, filtered and sorted."""
 
 from __future__ import annotations
 
@@ -121,13 +121,13 @@ class RowList(QTreeWidget):
 
     @property
     def rows(self) -> list[Row]:
-        """In the order that is shown, without the headings."""
+        """The rows in the order that is shown, without the headings."""
         return [line for line in self._lines if isinstance(line, Row)]
 
     def line(self, index: QModelIndex) -> Row | str:
         return self._lines[index.row()]
 
     def index_of(self, name: str) -> QModelIndex:
-        """Of a listed row's title; the invalid one for any other."""
+        """The index of a listed row's title; the invalid one for any other."""
         names = [line.name if isinstance(line, Row) else "" for line in self._lines]
         return self.model().index(names.index(name), TITLE) if name and name in names else QModelIndex()

@@ -11,7 +11,7 @@ MARGIN = 12  # pixels
 
 
 class DropSign(Label):
-    """Hidden at first; covers its window, and lets the mouse through."""
+    """A sign that is hidden at first, covers its window, and lets the mouse through."""
 
     def __init__(self, window: QWidget) -> None:
         super().__init__("", window)

@@ -8,7 +8,10 @@ from PySide6.QtWidgets import QLabel, QStyle, QStyleOption, QWidget
 
 
 class ElidedLabel(QLabel):
-    """Its least width is 0: its text never moves other widgets. `text()` is whole, `shown` what is painted."""
+    """A label whose least width is 0: its text never moves other widgets.
+
+    `text()` is whole, `shown` what is painted.
+    """
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

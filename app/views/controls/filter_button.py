@@ -1,4 +1,4 @@
-"""A button that is there while a browser's list is filtered: previous and next go through what is left of it."""
+"""A button that is there while a browser's list is filtered. Previous and next go through what is left of it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class FilterButton(QToolButton):
         self.hide()
 
     def show_listed(self, listed: int, total: int) -> None:
-        """How many rows pass the filter."""
+        """Show the number of rows that pass the filter."""
         self.setVisible(listed < total)
         self.setText(f"{listed} of {total}  ✕")
         self.setAccessibleName(f"Filtered: {listed} of {total} {self._what}; clear the filter")

@@ -10,7 +10,7 @@ from app.views import theme
 
 
 class FocusRing(QWidget):
-    """Lies over its parent and lets every gesture through."""
+    """A ring that lies over its parent and lets every gesture through."""
 
     def __init__(self, parent: QWidget) -> None:
         super().__init__(parent)

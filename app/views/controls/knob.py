@@ -57,7 +57,7 @@ class _Editor(QLineEdit):
             self.editingFinished.emit()
 
     def _is_alien(self, event: QKeyEvent) -> bool:
-        """Whether a key is a letter, or the like, that makes no number of the text before the cursor."""
+        """Return True if a key, as a letter, makes no number with the text before the cursor."""
         held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier)
         if held or not event.text().isprintable() or event.text() in SIGNS:  # "" is in it
             return False
@@ -148,7 +148,7 @@ class Knob(QWidget):
             self.updateGeometry()
 
     def set_narrow(self, narrow: bool) -> None:
-        """For a window with little room."""
+        """Set the width for a window with little room, or the usual one."""
         width = NARROW_WIDTH if narrow else WIDTH
         if width != self._width:
             self._width = width
@@ -156,13 +156,13 @@ class Knob(QWidget):
             self.update()
 
     def set_width(self, pixels: int) -> None:
-        """For long names and values."""
+        """Set the width in pixels, for long names and values."""
         self._width = pixels
         self.updateGeometry()
         self.update()
 
     def set_low(self, low: bool) -> None:
-        """Smaller, for rows of many knobs."""
+        """Make the knob smaller, for rows of many knobs, or of its usual size."""
         self._low = low
         self.updateGeometry()
         self.update()

@@ -1,4 +1,4 @@
-"""A spin box for a key, shown as a note (E2, F♯3); typed also as F#3, Gb3 or a MIDI number."""
+"""A spin box for a key, shown as a note (E2, F♯3). It is typed also as F#3, Gb3 or a MIDI number."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _BEGUN = re.compile(r"([A-Ga-g][#♯b♭]?-?\d?|\d{0,3})", re.ASCII)
 
 
 class NoteBox(CountBox):
-    """Its value is the MIDI number of the key."""
+    """A number box whose value is the MIDI number of the key."""
 
     def __init__(self, name: str, tip: str) -> None:
         super().__init__()

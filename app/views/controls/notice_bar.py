@@ -19,7 +19,9 @@ INFORMED_MS = 8000  # a notice that is no error hides by itself
 
 
 class NoticeBar(QFrame):
-    """Hidden while there is no notice. A notice that is repeated raises its count instead of being listed twice.
+    """A bar that is hidden while there is no notice.
+
+    A repeated notice raises its count instead of being listed twice.
 
     It lies over its parent, of which it takes no room.
     """

@@ -14,7 +14,7 @@ from app.views.controls.plain import Label
 
 @dataclass(frozen=True)
 class Notice:
-    """Something went wrong, or is worth knowing: a message, how often it was shown, and when last."""
+    """A notice of a fault or a fact worth knowing: a message, how often it was shown, and when last."""
 
     message: str
     details: str = ""
@@ -28,7 +28,7 @@ class Notice:
 
 
 class NoticeList(QDialog):
-    """Does not block the window, and shows new notices while it is open."""
+    """A list that does not block the window, and shows new notices while it is open."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

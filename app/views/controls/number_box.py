@@ -25,12 +25,12 @@ def say_above(widget: QWidget, words: str) -> None:
 
 
 def refusal(text: str, example: str) -> str:
-    """Why a typed text changed nothing; the example is the value that is kept, as it is shown."""
+    """The reason why a typed text changed nothing; the example is the value that is kept, as it is shown."""
     return f"“{text.strip()[:30]}” is no number here, as {example} is, which is kept"
 
 
 class _Typed(QAbstractSpinBox if TYPE_CHECKING else object):  # type: ignore[misc]
-    """What both kinds of number boxes share, before the widget's class."""
+    """The parts that both kinds of number boxes share, before the widget's class."""
 
     if TYPE_CHECKING:  # of the widget's class
         value: Callable[[], Any]

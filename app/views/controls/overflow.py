@@ -1,4 +1,4 @@
-"""The controls of a row that have no room: a button that is there with them, whose menu has each of them."""
+"""The controls of a row that have no room. A button is there with them, whose menu has each of them."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Overflow(QToolButton):
         self.hide()
 
     def hold(self, *parts: QWidget) -> None:
-        """Has these from now on, in place of those before."""
+        """Hold these from now on, in place of those before."""
         self.parts = parts
         self.setVisible(bool(parts))
 

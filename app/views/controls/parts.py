@@ -69,7 +69,7 @@ def combo_box(name: str, entries: Iterable[tuple[str, object]], chosen: object =
 
 
 def faint(text: str = "") -> QLabel:
-    """One line of text in the faint colour."""
+    """A line of text in the faint colour."""
     made = Label(text)
     made.setObjectName("faint")
     return made
@@ -84,7 +84,10 @@ def words_label() -> ElidedLabel:
 
 
 def keeps_keys(event: QEvent, *keys: Qt.Key) -> bool:
-    """Accepts the override of a shortcut on one of these, so that the widget gets the key; whether it was one."""
+    """Accepts the override of a shortcut on one of these, so that the widget gets the key.
+
+    Returns True if it was one.
+    """
     if event.type() == QEvent.Type.ShortcutOverride and isinstance(event, QKeyEvent) and event.key() in keys:
         event.accept()
         return True
@@ -121,7 +124,7 @@ def lay_out_view(
 
 
 def lay_out_alone(view: QWidget, part: QWidget) -> None:
-    """One part that takes all room."""
+    """Lay out one part that takes all room."""
     column = QVBoxLayout(view)
     column.setContentsMargins(0, 0, 0, 0)
     column.addWidget(part)

@@ -23,7 +23,7 @@ class Label(QLabel):
 
 
 class SteadyLabel(Label):
-    """A label with room for `widest`, so that what stands beside it stays where it is; a longer text has its room."""
+    """A label with room for `widest`, so that what stands beside it stays where it is. A longer text has its room."""
 
     def __init__(self, widest: str) -> None:
         super().__init__(widest)

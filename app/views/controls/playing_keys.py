@@ -128,7 +128,7 @@ def _number(event: QKeyEvent) -> int:
 
 
 def _letter(event: QKeyEvent) -> str:
-    """What is printed on the key; "" for a key without a character."""
+    """The character that is printed on the key; "" for a key without one."""
     key = event.key()
     return chr(key) if 0x21 <= key < 0x7F else ""
 

@@ -1,4 +1,4 @@
-"""Which preset: previous, next, its name, which opens the browser, and its facts in a line.
+"""The choice of a preset: previous, next, its name, which opens the browser, and its facts in a line.
 
 Previous and next go through the browser's list. While that is filtered, a button beside them says so and clears it.
 """
@@ -52,7 +52,7 @@ class PresetBar(QWidget):
         row.addStretch(1)
 
     def set_chosen(self, entry: PresetEntry | None, favourite: bool = False) -> None:
-        """None: there is no preset."""
+        """Show the chosen preset; None: there is no preset."""
         from app.views.dialogs.preset_card import (  # brings the engine, which the first paint does not wait for
             preset_card,
             preset_summary,

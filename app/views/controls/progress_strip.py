@@ -9,7 +9,7 @@ from app.views import theme
 
 
 class ProgressStrip(QWidget):
-    """Empty, but of the same height, while nothing is computed."""
+    """A strip that is empty, but of the same height, while nothing is computed."""
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)

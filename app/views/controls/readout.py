@@ -1,4 +1,4 @@
-"""A faint line that says what the mouse points at; it takes the room it is given and never asks for more."""
+"""A faint line that says what the mouse points at. It takes the room it is given and never asks for more."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class Readout(ElidedLabel):
         self.report(*self._reported)
 
     def report(self, text: str, *shorter: str) -> None:
-        """What the mouse points at; "" for nothing. `shorter` as in `ElidedLabel.say`."""
+        """Show the thing that the mouse points at; "" for nothing. `shorter` as in `ElidedLabel.say`."""
         self._reported = (text, *shorter)
         wordings = self._reported if text else self._resting
         if wordings[0] != self.text():

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QFrame, QScrollArea, QSizePolicy, QWidget
 
 
 class Sideways(QScrollArea):
-    """As high as its part, and higher by the scroll bar while there is one."""
+    """A scroll area as high as its part, and higher by the scroll bar while there is one."""
 
     def __init__(self, part: QWidget, parent: QWidget | None = None) -> None:
         super().__init__(parent)

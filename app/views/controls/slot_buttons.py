@@ -64,7 +64,7 @@ class SlotButtons(QWidget):
         self._show()
 
     def set_narrow(self, narrow: bool, tight: bool = False) -> None:
-        """For a window with little room; `tight`: with very little."""
+        """Set the width for a window with little room; `tight`: with very little."""
         self._width = TIGHT_WIDTH if tight else NARROW_WIDTH if narrow else WIDTH
         for button in self._buttons.values():
             button.setFixedWidth(theme.px(self._width))
@@ -75,7 +75,7 @@ class SlotButtons(QWidget):
         self._show()
 
     def show_gains(self, gains_db: dict[str, float | None]) -> None:
-        """By slot, the gain in dB with which it is heard; None: not known yet."""
+        """Show the gain in dB with which each slot is heard; None: not known yet."""
         if gains_db != self._gains_db:
             self._gains_db = gains_db
             self._show()
@@ -101,7 +101,7 @@ class SlotButtons(QWidget):
                 button.setChecked(self._choices.heard == slot)
 
     def _title(self, source: str) -> tuple[str, str]:
-        """In full, and as a button shows it."""
+        """The title of a source in full, and as a button shows it."""
         for entry in self._entries:
             if source == f"preset:{entry.name}":
                 return entry.title, entry.title

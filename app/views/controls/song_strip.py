@@ -14,7 +14,7 @@ NARROWEST_NAME = 80  # pixels
 
 
 class SongStrip(QWidget):
-    """Hidden while there is no file. Gestures emit signals; setters show what became of them."""
+    """A strip that is hidden while there is no file. Gestures emit signals; setters show what became of them."""
 
     play_asked = Signal()  # or stop
     seek_asked = Signal(float)  # to a time in s

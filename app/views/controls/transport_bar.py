@@ -80,7 +80,7 @@ class TransportBar(QFrame):
         self._row.insertWidget(self._row.indexOf(self._space), group)
 
     def set_compact(self, compact: bool, tight: bool = False) -> None:
-        """Narrower by a fifth, for a window with little room; `tight`: with very little, symbols for words."""
+        """Narrow the bar by a fifth, for a window with little room. `tight`: with very little, symbols for words."""
         if (compact, tight, theme.present.scale) == self._fitted:
             return
         self._fitted = compact, tight, theme.present.scale
@@ -129,7 +129,7 @@ class TransportBar(QFrame):
         self._play.setText(words[0] if self._tight else words)
 
     def _show_verb(self, verb: str) -> None:
-        """What the button does with string or drum."""
+        """Show the action of the button on string or drum."""
         if verb != self._verb:
             self._verb = verb
             self._play.setAccessibleName(f"{verb} or stop")

@@ -98,7 +98,7 @@ class AbxDialog(QDialog):
 
     @property
     def testing(self) -> bool:
-        """Whether a test is under way."""
+        """Return True if a test is under way."""
         return self._run is not None
 
     def choices(self) -> AbxChoices:
@@ -247,7 +247,7 @@ class AbxDialog(QDialog):
         self._prepare()
 
     def _obstacle(self, status: SoundStatus) -> str:
-        """Why the test cannot start now, or nothing."""
+        """The reason why the test cannot start now, or nothing."""
         if status.device is None:
             return NO_DEVICE
         if self._stimuli is None:

@@ -165,7 +165,10 @@ class TrialPage(QWidget):
         self.show_sounding(None, x_heard=False)
 
     def show_sounding(self, sound: str | None, x_heard: bool) -> None:
-        """Which of "A", "B" and "X" sounds (None: none), and whether X was heard, so that it can be answered."""
+        """Show the one of "A", "B" and "X" that sounds (None: none).
+
+        `x_heard`: X was heard, so that it can be answered.
+        """
         for name, button in self._sounds.items():
             button.setChecked(name == sound)
         for button in self._answers.values():
@@ -174,7 +177,7 @@ class TrialPage(QWidget):
 
 
 class ResultPage(QWidget):
-    """One result, and whether it has been saved; `save` is to save it elsewhere after a failure."""
+    """The page of a result, and of its saving; `save` is to save it elsewhere after a failure."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -200,7 +203,7 @@ class ResultPage(QWidget):
         self.close_button.setFocus()
 
     def show_saved(self, text: str, failed: bool) -> None:
-        """Where the result was saved; or why it was not, with a button to save it elsewhere."""
+        """Show where the result was saved; or why it was not, with a button to save it elsewhere."""
         self._saved.setObjectName("warning" if failed else "faint")
         self._saved.style().polish(self._saved)
         self._saved.setText(text)

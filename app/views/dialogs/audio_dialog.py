@@ -44,7 +44,7 @@ ADVICE = (
 
 @dataclass(frozen=True)
 class AudioState:
-    """What the dialog says of the present output."""
+    """The state of the present output, as the dialog reports it."""
 
     playing_on: str  # a device with its host API; "": none
     facts: str  # its rate, its buffer, and the latency that was measured
@@ -88,7 +88,7 @@ class AudioDialog(QDialog):
 
     @property
     def device(self) -> DeviceChoice | None:
-        """As chosen in the list; None: the system's default."""
+        """The device as chosen in the list; None: the system's default."""
         key = self._device.currentData()
         return DeviceChoice(name=key[0], host_api=key[1]) if key else None
 

@@ -115,7 +115,7 @@ class ExportDialog(GrowingDialog):
         return self._job if self._background.busy else None
 
     def choices(self) -> ExportChoices:
-        """Of notes and performances, to be remembered."""
+        """The choices of notes and performances, to be remembered."""
         return ExportChoices.model_validate({**self.note.choices(), **self.wav.choices()})
 
     def sampled_choices(self) -> SampledChoices:
@@ -131,7 +131,7 @@ class ExportDialog(GrowingDialog):
         self.activateWindow()
 
     def show_subjects(self, subjects: Mapping[Kind, Any]) -> None:
-        """What there is now, by kind; an export that has begun keeps its own."""
+        """Show the subjects that there are now, by kind; an export that has begun keeps its own."""
         self._subjects = subjects
         if self.job is None:
             for kind, page in self.pages.items():
@@ -147,7 +147,7 @@ class ExportDialog(GrowingDialog):
         self.adjustSize()
 
     def _update(self) -> None:
-        """What would be written. Nothing is, until it begins."""
+        """Show what would be written. Nothing is, until it begins."""
         self._settled.stop()
         if self.job is not None:
             return

@@ -68,7 +68,7 @@ MIDI_NOTE = "The notes are saved in the same folder, as a MIDI file."
 
 @dataclass(frozen=True)
 class HeardPerformance:
-    """What was played, and the file of the preset that plays its patch; None: that is gone."""
+    """A performance, and the file of the preset that plays its patch; None: that is gone."""
 
     played: Played
     preset: Path | None
@@ -115,7 +115,7 @@ class WavForm(QWidget):
 
 
 class ExportPage(QWidget):
-    """What is exported, and how; a further kind is a further subclass.
+    """A page with the subject and the settings of an export; a further kind is a further subclass.
 
     Attributes:
         title, window_title: of its tab, and of the dialog while it is shown.
@@ -135,7 +135,7 @@ class ExportPage(QWidget):
         raise NotImplementedError
 
     def job(self) -> ExportJob:
-        """What would be done. Raises ValueError: the choices cannot be; the message names the field."""
+        """The job that would be done. Raises ValueError: the choices cannot be; the message names the field."""
         raise NotImplementedError
 
     def offer(self) -> tuple[str, str]:
@@ -144,7 +144,7 @@ class ExportPage(QWidget):
 
 
 class NotePage(ExportPage):
-    """One pluck to one file, or two."""
+    """The export of a pluck to one file, or two."""
 
     title, missing = "Note", "There is no preset to export: choose one first."
 
@@ -253,7 +253,7 @@ class NotePage(ExportPage):
 
 
 class PerformancePage(ExportPage):
-    """What was played, to a WAV and a MIDI file of one name."""
+    """The export of what was played, to a WAV and a MIDI file of one name."""
 
     title, missing = "Recording", "Nothing was recorded: click Record, play, and click it again."
     window_title = "Save the recording"
@@ -341,7 +341,7 @@ class SamplerPage(ExportPage):
         self.file.changed.connect(self.changed)
 
     def show_subject(self, subject: HeardInstrument | None) -> None:
-        """Another patch, or the same that was turned: chosen keys stay as far as it has them."""
+        """Show another patch, or the same that was turned: chosen keys stay as far as it has them."""
         keys, self._subject = self.keys(), subject
         if subject is None:
             return
@@ -358,7 +358,7 @@ class SamplerPage(ExportPage):
         self._suggest_name()
 
     def keys(self) -> tuple[int, int] | None:
-        """None for all of the patch."""
+        """The chosen keys; None for all of the patch."""
         if self._subject is None:
             return self._chosen_keys
         keys = self.lowest.value(), self.highest.value()
@@ -481,13 +481,13 @@ def _this_system() -> str:
 
 
 def _note_words(heard: HeardNote, alone: bool) -> str:
-    """What is exported: a key as the instrument plays it, or a pluck."""
+    """The subject of an export: a key as the instrument plays it, or a pluck."""
     struck = None if alone else heard.note.struck
     return heard.words if struck is None else f"Note: {struck.words}, held, with the present settings"
 
 
 def _through_words(note: Note, alone: bool, source: Chosen) -> str:
-    """What of an instrument is in the file."""
+    """The parts of an instrument that are in the file."""
     if note.struck is None:
         return "None: the string alone, as it is heard"
     if alone:

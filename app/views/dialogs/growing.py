@@ -9,7 +9,7 @@ CHANGES = (QEvent.Type.LayoutRequest, QEvent.Type.Resize, QEvent.Type.Show)
 
 
 class GrowingDialog(QDialog):
-    """Is always as high as its texts need at its width, as far as the screen is."""
+    """A dialog that is always as high as its texts need at its width, as far as the screen is."""
 
     def event(self, event: QEvent) -> bool:
         handled = super().event(event)

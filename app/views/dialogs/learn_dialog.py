@@ -54,7 +54,9 @@ HEARD: tuple[tuple[Literal["recording", "learned"], str], ...] = (
 
 
 class LearnDialog(GrowingDialog):
-    """Nothing is written before "Keep and play". Errors are stated without anything copied from the recording.
+    """A dialog that writes nothing before "Keep and play".
+
+    Errors are stated without anything copied from the recording.
 
     Attributes:
         state: what is found, or how far it is.
@@ -282,7 +284,7 @@ class LearnDialog(GrowingDialog):
         self.state.setText(words)
 
     def may_close(self) -> bool:
-        """Whether nothing would be lost, or the user agrees to that."""
+        """Return True if nothing would be lost, or the user agrees to that."""
         if self._background.busy and self._against is not None:
             question = "The string is being learned. A learning that is stopped continues the next time."
             return ask(self, "Stop learning?", question, CONTINUE, STOP) == STOP

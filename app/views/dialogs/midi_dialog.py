@@ -132,7 +132,7 @@ class MidiDialog(QDialog):
         self.show_problem(problem)
 
     def show_patch(self, mode: str, bend_semitones: float, bend_by: str, mod_wheel: str) -> None:
-        """What the patch that is played makes of channels and wheels."""
+        """Show the use that the played patch makes of channels and wheels."""
         if self._bends.findData(bend_semitones) < 0:
             self._bends.addItem(_semitones(bend_semitones), bend_semitones)
         for box, value in (
@@ -144,7 +144,7 @@ class MidiDialog(QDialog):
             box.setCurrentIndex(max(0, box.findData(value)))
 
     def set_patch_turnable(self, turnable: bool) -> None:
-        """Whether there is a patch to play."""
+        """Enable the controls of the patch if there is one to play."""
         for box in (self._channels, self._bends, self._bends_by, self._wheel):
             box.setEnabled(turnable)
 
@@ -159,7 +159,7 @@ class MidiDialog(QDialog):
         self._problem.setVisible(bool(text))
 
     def show_choices(self, notes: str, controllers: Mapping[str, int], learning: str | None) -> None:
-        """What notes do, the numbers of controllers by field, and the field that waits for one."""
+        """Show what notes do, the numbers of controllers by field, and the field that waits for one."""
         self._notes.setCurrentIndex(max(0, self._notes.findData(notes)))
         for field, (taught, learn, forget) in self._rows.items():
             waits, number = field == learning, controllers.get(field)

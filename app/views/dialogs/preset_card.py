@@ -1,4 +1,4 @@
-"""Presets in their browser: a row each, and a card on what it is, how good it is and where it comes from."""
+"""Presets in their browser: a row each, and a card on their nature, quality and origin."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def preset_browser(parent: QWidget | None = None) -> Browser:
 
 
 def preset_row(entry: PresetEntry) -> Row:
-    """In the browser: studio presets before research ones; unknown errors come last."""
+    """The row of a preset in the browser: studio presets before research ones; unknown errors come last."""
     info, heard = entry.info, heard_word(entry.heard)
     model, rate = model_word(info.model), rate_word(info.rate_hz)
     kind = string_word(info.tension_modulated)
@@ -141,7 +141,7 @@ def _place(entry: PresetEntry) -> str:
 
 
 def _can_be_remade(name: str) -> bool:
-    """Whether the command line knows a training of this name."""
+    """Return True if the command line knows a training of this name."""
     try:
         load(name)
     except (SchemaError, ValueError, OSError):

@@ -1,1 +1,1 @@
-"""The picture of a drum: its motion in two dimensions, where it is struck, and the directions it is heard from."""
+"""The picture of a drum: its motion in two dimensions, its strike, and the directions it is heard from."""

@@ -37,11 +37,11 @@ class HeadAxes:
 
     @property
     def bottom(self) -> float:
-        """Where the feet of listening points stand."""
+        """The height at which the feet of listening points stand."""
         return self.height - MARGIN_BOTTOM
 
     def rect(self, head: int) -> QRectF:
-        """Where a picture lies."""
+        """The place of a picture."""
         count = max(1, self.heads)
         room_x = (self.width - 2 * MARGIN_X - (count - 1) * GAP) / count
         room_y = self.bottom - MARGIN_TOP - 8
@@ -76,13 +76,13 @@ class HeadAxes:
         return None
 
     def holds(self, place: Place) -> bool:
-        """Whether a drum can be struck at a place."""
+        """Return True if a drum can be struck at a place."""
         x, y = place
         away = math.hypot(x, y) if self.shape == "circle" else max(abs(x), abs(y))
         return away <= RIM
 
     def x(self, head: int, point: float) -> float:
-        """Of a listening point."""
+        """The horizontal position of a listening point, in pixels."""
         area = self.rect(head)
         return area.left() + point * area.width()
 

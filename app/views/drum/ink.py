@@ -1,4 +1,4 @@
-"""What is drawn of a drum: its displacement in colours, its edge, where it is struck, and where it is heard from."""
+"""The picture of a drum: its displacement in colours, its edge, its strike, and its listening points."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def fitting_scale_m(largest_m: float, air: float = 1.0) -> float:
 
 
 def kept_scale_m(largest_m: float, before_m: float) -> float:
-    """As `fitting_scale_m`; one that is only a little too large stays."""
+    """The scale as `fitting_scale_m`; one that is only a little too large stays."""
     return max(fitting_scale_m(largest_m), min(before_m, fitting_scale_m(largest_m, LOOSE)))
 
 
@@ -104,7 +104,7 @@ def paint_edge(painter: QPainter, axes: HeadAxes, head: int, source: ShownSource
 
 
 def paint_scale(painter: QPainter, axes: HeadAxes, head: int, scale_m: float) -> None:
-    """What the strongest colours stand for, below a picture."""
+    """Paint the value of the strongest colours below a picture."""
     factor, unit = readable_unit(scale_m, "displacement")
     area = axes.rect(head)
     painter.setFont(theme.small_font(10))
@@ -114,7 +114,10 @@ def paint_scale(painter: QPainter, axes: HeadAxes, head: int, scale_m: float) ->
 
 
 def paint_place(painter: QPainter, at: QPointF, clear: bool) -> None:
-    """Where the drum is struck: a ring with a dot, `clear` with the keyboard or the pointer on the drum."""
+    """Paint the place of the strike: a ring with a dot.
+
+    It is `clear` with the keyboard or the pointer on the drum.
+    """
     painter.setBrush(Qt.BrushStyle.NoBrush)
     painter.setPen(QPen(QColor(theme.BACKGROUND), 3.5))
     painter.drawEllipse(at, PLACE_RADIUS, PLACE_RADIUS)
@@ -138,7 +141,7 @@ def paint_listening(painter: QPainter, axes: HeadAxes, points: Mapping[str, floa
 
 
 def angle_words(point: float) -> str:
-    """A listening point as an angle from the axis of the drum: the point is the sine of it, from 0 to 1."""
+    """A listening point as an angle from the axis of the drum. The point is the sine of it, from 0 to 1."""
     degrees = round(math.degrees(math.asin(min(max(2 * point - 1, -1.0), 1.0))))
     if degrees == 0:
         return "above"
@@ -154,7 +157,7 @@ def paint_caption(painter: QPainter, axes: HeadAxes, text: str) -> None:
 
 
 def paint_name(painter: QPainter, axes: HeadAxes, text: str, points: Mapping[str, float]) -> None:
-    """Which drum it is, in the lower left corner, as far as the words of the listening points."""
+    """Paint the drum's name in the lower left corner, as far as the words of the listening points."""
     painter.setFont(theme.small_font(12))
     painter.setPen(QColor(theme.FAINT))
     first = min((axes.x(0, point) for point in points.values()), default=float(axes.width))

@@ -1,4 +1,4 @@
-"""A drum seen from above: what the slots hold in motion, in colours, and where it is struck and heard from.
+"""A drum seen from above: the slots' content in motion, in colours, and the places of strike and listening.
 
 A click on the drum strikes it there with the velocity of the keys, with Shift as hard as it goes. Dragging a mark
 beneath it moves a listening point. Arrow keys move the place, Enter strikes there.
@@ -70,7 +70,7 @@ class DrumView(StageView):
             self.update()
 
     def set_place(self, place: Place) -> None:
-        """Where Enter strikes, and where it was struck last."""
+        """Set the place where Enter strikes, and where it was struck last."""
         self._place = place
         self._describe()
         self.update()
@@ -104,7 +104,7 @@ class DrumView(StageView):
 
     @property
     def frame(self) -> HeadFrame | None:
-        """What is drawn; None: the drum at rest."""
+        """The frame that is drawn; None: the drum at rest."""
         return self._frame
 
     @property

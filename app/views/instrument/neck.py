@@ -52,7 +52,9 @@ def fret_share(fret: float, frets: int) -> float:
 
 
 class Neck(Playable):
-    """A click plays the string that was clicked; keys of others, the highest string at or below them, as patches do.
+    """A neck, or a fan of strings.
+
+    A click plays the string that was clicked. Keys of others play the highest string at or below them, as patches do.
 
     Fingers stay where they were put, and make no sound. While there are any, strings sound as these stop them, and
     those without a finger sound open, wherever they are clicked: so chords can be strummed with one mouse.
@@ -95,7 +97,7 @@ class Neck(Playable):
 
     @property
     def in_rows(self) -> bool:
-        """Whether it is a neck, not a fan."""
+        """Return True if it is a neck, not a fan."""
         return 1 < len(self._strings) <= MOST_ROWS
 
     # Where keys are
@@ -107,16 +109,19 @@ class Neck(Playable):
         return min(max(self._high - highest, 12), MOST_FRETS)
 
     def string_of(self, key: int) -> int:
-        """Which string sounds a key, counted from the lowest."""
+        """The string that sounds a key, counted from the lowest."""
         below = [number for number, (_, open_key) in enumerate(self._strings) if open_key <= key]
         return below[-1] if below else 0
 
     def fret_x(self, fret: float) -> float:
-        """In pixels."""
+        """The x of a fret, in pixels."""
         return theme.px(_NAMES_WIDTH) + fret_share(fret, self.frets) * (self.width() - theme.px(_NAMES_WIDTH) - 6)
 
     def cell(self, string: int, fret: int) -> QRectF:
-        """Where a finger stops the string: from the fret before to this one; fret 0: the name of the open string."""
+        """The cell where a finger stops the string: from the fret before to this one.
+
+        Fret 0: the name of the open string.
+        """
         height = (self.height() - theme.px(_FOOT)) / len(self._strings)
         top = (len(self._strings) - 1 - string) * height
         left = 0.0 if fret <= 0 else self.fret_x(fret - 1)
@@ -159,14 +164,14 @@ class Neck(Playable):
         return Spot(key, len(self._strings) - 1 - string)
 
     def _row_of(self, spot: Spot) -> int:
-        """Which string, counted from the lowest, a spot is on."""
+        """The string that a spot is on, counted from the lowest."""
         return self.string_of(spot.key) if spot.string is None else len(self._strings) - 1 - spot.string
 
     def _fret_of(self, spot: Spot) -> int:
         return min(max(spot.key - self._strings[self._row_of(spot)][1], 0), self.frets)
 
     def stepped(self, arrow: Qt.Key) -> Spot:
-        """On a neck: along the string by a fret, or to the same fret of the next string."""
+        """The next spot; on a neck a fret along the string, or the same fret of the next string."""
         if not self.in_rows:
             return super().stepped(arrow)
         along, across = _ARROWS[arrow]
@@ -175,7 +180,7 @@ class Neck(Playable):
         return Spot(self._strings[string][1] + fret, len(self._strings) - 1 - string)
 
     def place_words(self, spot: Spot) -> str:
-        """With the string and the fret where it is a neck."""
+        """The words of a spot, with the string and the fret where it is a neck."""
         if not self.in_rows:
             return super().place_words(spot)
         string, fret = self._strings[self._row_of(spot)][0], self._fret_of(spot)
@@ -193,7 +198,7 @@ class Neck(Playable):
         return min(max(len(self._strings) - 1 - int(at.y() / height), 0), len(self._strings) - 1)
 
     def spots_between(self, before: QPointF, at: QPointF) -> list[Spot]:
-        """Where it is a neck, with the strings that lie between the two points: the mouse is seen at few places."""
+        """The spots between two points; on a neck with the strings between them. The mouse is seen at few places."""
         met = super().spots_between(before, at)
         if not self.in_rows:
             return met
@@ -345,7 +350,7 @@ class Neck(Playable):
             self._paint_stopped(painter, string, fret, step / LEVEL_STEPS)
 
     def _stop_x(self, fret: float, size: float) -> float:
-        """Where the dot of a fret is drawn: before the fret, and between two of them in proportion."""
+        """The x where the dot of a fret is drawn: before the fret, and between two of them in proportion."""
         whole = int(fret)
         if fret > whole:
             left, right = self._stop_x(whole, size), self._stop_x(whole + 1, size)
@@ -388,7 +393,7 @@ class Neck(Playable):
         painter.drawEllipse(middle, *(2 * [size / 2 * (0.6 + 0.4 * level)]))
 
     def _paint_swing(self, painter: QPainter, stop: QPointF, level: float) -> None:
-        """How far a string swings, from where it is stopped to the bridge."""
+        """Paint the swing of a string, from where it is stopped to the bridge."""
         far, reach = self.fret_x(self.frets), SWING * level * (self.height() - theme.px(_FOOT)) / len(self._strings)
         swing = QPainterPath(stop)
         for side in (-1, 1):

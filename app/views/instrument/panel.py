@@ -83,7 +83,7 @@ _TECHNIQUES = (  # that keys are played with; their amounts have knobs
 
 
 class InstrumentPanel(QFrame):
-    """Its parts are public: `bar`, `keys`, `neck`, `knobs`."""
+    """The panel of an instrument, whose parts are public: `bar`, `keys`, `neck`, `knobs`."""
 
     pressed = Signal(int, int, object)  # key, velocity, string as of `Playable`
     released = Signal(int, object)
@@ -158,7 +158,7 @@ class InstrumentPanel(QFrame):
         theme.changes.theme_changed.connect(self._fit)  # with the size of text
 
     def _build_plays(self) -> None:
-        """What the computer's keys play: a menu of the two, under what it is."""
+        """Build the menu of the two things that the computer's keys play, under the present one."""
         self.plays = tool_button("")
         self.plays.setObjectName("chip")
         self.plays.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
@@ -192,7 +192,7 @@ class InstrumentPanel(QFrame):
         self._show_lift()
 
     def set_drums(self, drums: bool) -> None:
-        """For drums, which have no strings to show: their keys are shown, whatever the surface is."""
+        """Set the panel for drums, which have no strings. Their keys are shown, whatever the surface is."""
         if drums != self._drums:
             self._drums = drums
             self._choice.setEnabled(not drums)
@@ -204,7 +204,7 @@ class InstrumentPanel(QFrame):
 
     @property
     def unfolded(self) -> bool:
-        """Whether the string's knobs are shown."""
+        """Return True if the string's knobs are shown."""
         return self._fold.isChecked()
 
     def set_unfolded(self, unfolded: bool) -> None:
@@ -219,7 +219,7 @@ class InstrumentPanel(QFrame):
         self._share_room()
 
     def set_low(self, low: bool) -> None:
-        """For a window with little height: the knobs of the string then take the place of the keys."""
+        """Set the panel for a window with little height: the string's knobs then take the place of the keys."""
         if low != self._low:
             self._low = low
             self._share_room()
@@ -262,7 +262,7 @@ class InstrumentPanel(QFrame):
         self.bar.show_octave(octave, lowest, highest)
 
     def show_keys_play(self, plays: str, possible: bool) -> None:
-        """What the computer's keys play, of KEYS_PLAY; `possible`: whether there is a patch for pitches."""
+        """Show what the computer's keys play, of KEYS_PLAY. `possible`: there is a patch for pitches."""
         words, tip = KEYS_PLAY[plays]
         self._plays[plays].setChecked(True)
         self.plays.setText(f"{words}  ▾")
@@ -274,11 +274,14 @@ class InstrumentPanel(QFrame):
         self.bar.show_pitches(plays == "pitch")
 
     def show_letters(self, letters: Mapping[int, str]) -> None:
-        """What is printed on the computer's keys, by the MIDI key that each plays."""
+        """Show the characters printed on the computer's keys, by the MIDI key that each plays."""
         self.keys.show_letters(letters)
 
     def show_sounding(self, levels: Mapping[int, float], notes: Iterable[SoundingNote] = ()) -> None:
-        """How loud each key sounds, 0 … 1, and the notes with their strings; hides the hint once one does."""
+        """Show the loudness of each key, 0 … 1, and the notes with their strings.
+
+        The hint is hidden once one sounds.
+        """
         if levels:
             self.hide_hint()
         self.keys.show_sounding(levels)

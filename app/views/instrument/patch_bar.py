@@ -1,7 +1,7 @@
-"""Which patch: previous, next, its name, which opens the browser; save, rename, revert; its macros, body and room.
+"""The choice of a patch: previous, next, its name, which opens the browser.
 
-Below them is its state: a Scala scale, octave and velocity of the computer's keys, the number of voices, and
-recording.
+Beside it are save, rename and revert, its macros, body and room. Below them is its state: a
+Scala scale, octave and velocity of the computer's keys, the number of voices, and recording.
 """
 
 from __future__ import annotations
@@ -226,7 +226,7 @@ class PatchBar(QFrame):
     # What is shown
 
     def set_compact(self, compact: bool, tight: bool = False) -> None:
-        """For a window with little room; `tight`: with very little."""
+        """Set the bar for a window with little room; `tight`: with very little."""
         self._compact, self._tight = compact, tight
         self._share_width()
 
@@ -286,7 +286,7 @@ class PatchBar(QFrame):
             self._show_body(patch.body.name)
 
     def show_comparing(self, comparing: bool) -> None:
-        """Whether keys play the patch as it was saved."""
+        """Show if keys play the patch as it was saved."""
         self.compare.setChecked(comparing)
         self._share_width()
 
@@ -317,7 +317,7 @@ class PatchBar(QFrame):
             knob.setVisible(not (self._shows_macros and (field in alone or field in AMP)))
 
     def _show_scala(self, tuning: TuningChoice) -> None:
-        """What of Scala tunes the patch; a click removes it."""
+        """Show the part of Scala that tunes the patch; a click removes it."""
         scale, keymap = bool(tuning.scale.strip()), bool(tuning.keymap.strip())
         self.scala.setVisible(scale or keymap)
         self._share_width()
@@ -351,21 +351,24 @@ class PatchBar(QFrame):
             QToolTip.showText(place, plain_tip(text), self.octave, QRect(), SAID_MS)
 
     def show_velocity(self, velocity: int) -> None:
-        """With which the computer's keys strike."""
+        """Show the velocity with which the computer's keys strike."""
         self.velocity.setText(f"velocity {velocity}")
 
     def show_pitches(self, pitches: bool) -> None:
-        """Whether the computer's keys play pitches, so that octave and velocity are shown."""
+        """Show octave and velocity if the computer's keys play pitches."""
         for widget in (self._lower, self.octave, self._higher, self.velocity):
             widget.setVisible(pitches)
 
     def show_recording(self, seconds: float | None) -> None:
-        """For how many seconds it has been recording; None: it is not."""
+        """Show the seconds that it has been recording; None: it is not."""
         self._recorded_s = seconds
         self._show_record()
 
     def show_unsaved(self, recordings: int) -> None:
-        """How many recordings wait to be saved; while any does, the button saves or discards the latest."""
+        """Show the number of recordings that wait to be saved.
+
+        While any does, the button saves or discards the latest.
+        """
         self._unsaved = recordings
         self._show_record()
 
@@ -389,17 +392,20 @@ class PatchBar(QFrame):
         button.setMenu(self._unsaved_menu if waits else None)  # type: ignore[arg-type]
 
     def show_note(self, text: str) -> None:
-        """What is missing; "" for nothing."""
+        """Show the thing that is missing; "" for nothing."""
         self.note.say(text)
         self.note.setToolTip(plain_tip(text))
 
 
 def _scale_name(scale: str) -> str:
-    """What a scale is called: the first line of a .scl file's text that is no comment; "" where that is empty."""
+    """The name of a scale: the first line of a .scl file's text that is no comment.
+
+    It is "" where that line is empty.
+    """
     lines = (line for line in scale.splitlines() if not line.startswith("!"))
     return one_line(next(lines, ""), LONGEST_SCALE_NAME)
 
 
 def _named(macro: Macro) -> tuple[str, list[str]]:
-    """Its name, and its targets in words."""
+    """The name of a macro, and its targets in words."""
     return macro.name, [OF_PATCHES[target.field].name for target in macro.targets]

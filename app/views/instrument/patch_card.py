@@ -30,7 +30,7 @@ def patch_browser(parent: QWidget | None = None) -> Browser:
 
 
 def patch_row(entry: PatchEntry) -> Row:
-    """In the browser, under its category."""
+    """The row of a patch in the browser, under its category."""
     patch = entry.patch
     bank = ("user", "User") if entry.own else ("factory", "Factory")
     return Row(

@@ -49,7 +49,7 @@ class PianoKeys(Playable):
         self._set_cursor(Spot(60))
 
     def show_letters(self, letters: Mapping[int, str]) -> None:
-        """What is printed on the computer's keys, by the MIDI key that each plays."""
+        """Show the characters printed on the computer's keys, by the MIDI key that each plays."""
         if dict(letters) != self._letters:
             self._letters = dict(letters)
             self.rest_changed()
@@ -70,7 +70,7 @@ class PianoKeys(Playable):
 
     @property
     def _letter_size(self) -> int:
-        """In pixels: as large as a black key is wide."""
+        """The size of letters in pixels: as large as a black key is wide."""
         return min(max(round(0.9 * BLACK_WIDTH * self._pitch), SMALLEST_LETTER), theme.px(LARGEST_LETTER))
 
     def key_rect(self, key: int) -> QRectF:

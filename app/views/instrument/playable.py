@@ -1,4 +1,4 @@
-"""Base of the piano keys and the neck: a surface of keys that are played with the mouse or with Enter."""
+"""Base of the piano keys and the neck: a surface of keys played with the mouse or with Enter."""
 
 from __future__ import annotations
 
@@ -36,7 +36,10 @@ _MOVES = {Qt.Key.Key_Right: 1, Qt.Key.Key_Left: -1, Qt.Key.Key_Up: 12, Qt.Key.Ke
 
 
 class Spot(NamedTuple):
-    """What a finger presses: a key, and on a neck its string, from the highest, 0; None: the key chooses it."""
+    """The spot that a finger presses: a key, and on a neck its string.
+
+    Strings count from the highest, 0; None: the key chooses it.
+    """
 
     key: int
     string: int | None = None
@@ -91,25 +94,25 @@ class Playable(QWidget):
         """The key under a point, whether it can sound or not."""
 
     def spot_at(self, at: QPointF) -> Spot | None:
-        """What a click there presses."""
+        """The spot that a click there presses."""
         key = self.key_at(at)
         return None if key is None else Spot(key)
 
     def spots_between(self, before: QPointF, at: QPointF) -> list[Spot]:
-        """What the mouse meets on its way, without the first, and with where it is."""
+        """The spots that the mouse meets on its way, without the first, and with where it is."""
         spot = self.spot_at(at)
         return [] if spot is None else [spot]
 
     def stepped(self, arrow: Qt.Key) -> Spot:
-        """Where an arrow of the keyboard moves the cursor."""
+        """The spot that an arrow of the keyboard moves the cursor to."""
         return Spot(self._cursor.key + _MOVES[arrow])
 
     def place_words(self, spot: Spot) -> str:
-        """What is there, in words."""
+        """The words of what is there."""
         return note_name(spot.key)
 
     def typed(self, all_strings: bool) -> list[Spot]:
-        """What Enter plays; `all_strings`: with Ctrl."""
+        """The spots that Enter plays; `all_strings`: with Ctrl."""
         return [self._cursor]
 
     @abstractmethod
@@ -118,7 +121,7 @@ class Playable(QWidget):
 
     @abstractmethod
     def share_at(self, key: int, at: QPointF) -> float:
-        """How far down on a key a point lies, 0 … 1."""
+        """The share of the way down a key where a point lies, 0 … 1."""
 
     @abstractmethod
     def paint_rest(self, painter: QPainter) -> None:
@@ -140,7 +143,7 @@ class Playable(QWidget):
             self.rest_changed()
 
     def lay_out(self) -> None:
-        """Called when the range has changed."""
+        """Lay the keys out; called when the range has changed."""
 
     def rest_changed(self) -> None:
         """Discards the picture of `paint_rest`."""
@@ -148,7 +151,7 @@ class Playable(QWidget):
         self.update()
 
     def show_sounding(self, levels: Mapping[int, float]) -> None:
-        """How loud each key sounds, 0 … 1; keys that are left out are silent."""
+        """Show the loudness of each key, 0 … 1; keys that are left out are silent."""
         steps = {key: round(min(max(level, 0.0), 1.0) * LEVEL_STEPS) for key, level in levels.items()}
         steps = {key: step for key, step in steps.items() if step > 0}
         if steps == self._levels:
@@ -178,7 +181,7 @@ class Playable(QWidget):
             self._release(spot)
 
     def sounds(self, key: int | None) -> bool:
-        """Whether a key has a string."""
+        """Return True if a key has a string."""
         return key is not None and self._low <= key <= self._high
 
     # For painting
@@ -215,16 +218,16 @@ class Playable(QWidget):
         self.rest_changed()
 
     def level(self, key: int) -> float:
-        """How loud a key sounds, 0 … 1."""
+        """The loudness of a key, 0 … 1."""
         return self._levels.get(key, 0) / LEVEL_STEPS
 
     def is_down(self, key: int) -> bool:
-        """Whether a key is pressed here, or stays down by itself."""
+        """Return True if a key is pressed here, or stays down by itself."""
         return any(spot.key == key for spot in self.down)
 
     @property
     def down(self) -> frozenset[Spot]:
-        """What is pressed here, or stays down by itself."""
+        """The spots that are pressed here, or stay down by themselves."""
         mouse = {self._down} if self._down is not None else set()
         return frozenset(mouse | self._held | {*self._typed, *self._strummed})
 
@@ -244,7 +247,7 @@ class Playable(QWidget):
         return self._figure
 
     def _show_velocity(self, at: QPointF, velocity: int | None) -> None:
-        """Beside the mouse, where it covers neither the mouse nor what is clicked."""
+        """Show the velocity beside the mouse, where it covers neither the mouse nor what is clicked."""
         before, self._figure = self._figure_at, "" if velocity is None else f"velocity {velocity}"
         metrics = QFontMetricsF(theme.small_font(10))
         width, height = metrics.horizontalAdvance("velocity 127") + 12, metrics.height() + 4
@@ -370,12 +373,12 @@ class Playable(QWidget):
 
     @property
     def chosen(self) -> Spot:
-        """What Enter plays."""
+        """The spot that Enter plays."""
         return self._cursor
 
     @property
     def shows_cursor(self) -> bool:
-        """Whether the cursor is drawn: after it was reached or moved with the keyboard, not with the mouse."""
+        """Return True if the cursor is drawn: after the keyboard reached or moved it, not the mouse."""
         return self._by_keys and self.hasFocus()
 
     def _set_cursor(self, spot: Spot) -> None:
@@ -402,7 +405,7 @@ class Playable(QWidget):
         self.released.emit(spot.key, spot.string)
 
     def repaint_spot(self, spot: Spot) -> None:
-        """Called when it is pressed, released, or the cursor's."""
+        """Repaint a spot; called when it is pressed, released, or the cursor's."""
         self._repaint(spot.key)
 
     def _repaint(self, key: int) -> None:
@@ -410,6 +413,6 @@ class Playable(QWidget):
 
 
 def is_second(event: QMouseEvent) -> bool:
-    """Whether it is the right button, or the left one with Shift."""
+    """Return True if it is the right button, or the left one with Shift."""
     shift = bool(event.modifiers() & Qt.KeyboardModifier.ShiftModifier)
     return event.button() == Qt.MouseButton.RightButton or (event.button() == Qt.MouseButton.LeftButton and shift)

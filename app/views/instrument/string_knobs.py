@@ -166,13 +166,16 @@ class StringKnobs(QWidget):
         self.facts.show_facts(facts)
 
     def show_figures(self, figures: Mapping[str, str]) -> None:
-        """What knobs amount to in that string, by field ("knobs.tension": "72.3 N"); the others show their values."""
+        """Show the figures that knobs amount to in that string, by field ("knobs.tension": "72.3 N").
+
+        The others show their values.
+        """
         for field, knob in self.knobs.items():
             knob.show_figure(figures.get(field, ""))
 
 
 def _why_barred(patch: Patch, field: str) -> str:
-    """Why a field means nothing in this patch; "" where it does."""
+    """The reason why a field means nothing in this patch; "" where it means something."""
     if (
         patch.strings.kind == "drums"
         and field.startswith(("knobs.", "pluck.", "damping.mute", "technique."))

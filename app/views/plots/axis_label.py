@@ -50,7 +50,10 @@ def fit_foot(plot: pg.PlotWidget) -> None:
 
 
 class UprightTicks:
-    """The numbers of a vertical axis: of a given list as many as there is room for, its ends before the others."""
+    """The numbers of a vertical axis.
+
+    Of a given list it has as many as there is room for, its ends before the others.
+    """
 
     def __init__(self, axis: pg.AxisItem, box: pg.ViewBox) -> None:
         self._axis, self._box = axis, box
@@ -76,7 +79,7 @@ class UprightTicks:
 
 
 def sparse(ticks: Sequence[tuple[float, str]], room: float) -> list[tuple[float, str]]:
-    """Those of `ticks` that are at least `room` apart, the first and the last before the others."""
+    """Select the `ticks` that are at least `room` apart, the first and the last before the others."""
     kept: list[tuple[float, str]] = []
     for tick in (*ticks[:1], *ticks[:0:-1][:1], *ticks[1:-1]):
         if all(abs(tick[0] - other) >= room for other, _ in kept):
@@ -90,6 +93,6 @@ def frequency_ticks() -> list[tuple[float, str]]:
 
 
 def keep_axes(plot: pg.PlotItem) -> None:
-    """Paints axes again only when they change: they are most of a painting, and a key that is played waits for it."""
+    """Paints axes again only when they change. They are most of a painting, and a key that is played waits for it."""
     for side in ("left", "bottom"):
         plot.getAxis(side).setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)

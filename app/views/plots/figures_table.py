@@ -118,7 +118,7 @@ class FiguresTable(QTableWidget):
 
     @property
     def rows(self) -> list[TableRow]:
-        """In the order in which they are shown."""
+        """The rows in the order in which they are shown."""
         return [self._row(place) for place in range(self.rowCount())]
 
     @property
@@ -213,7 +213,7 @@ def lay_out_table(
     progress: QWidget,
     table: FiguresTable,
 ) -> None:
-    """As `lay_out_view`, with a button that copies the table."""
+    """Lay out a table as `lay_out_view`, with a button that copies the table."""
     copy = tool_button("Copy", "Copy the table", "Copy the table as text with tabs (Ctrl+C)")
     copy.clicked.connect(table.copy)
     for control in (*before, *behind, copy):

@@ -1,4 +1,4 @@
-"""A plot with a vertical line that moves over it; its picture is cached, so that only two strips are painted then."""
+"""A plot with a vertical line that moves over it. Its picture is cached, so that only two strips are painted then."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class KeptPlot(pg.PlotWidget):
         return picture
 
     def _line_strip(self) -> QRect:
-        """In pixels of the viewport; empty where the line is out of view."""
+        """The strip of the line in pixels of the viewport; empty where the line is out of view."""
         box = self.getPlotItem().vb
         low, high = box.viewRange()[0]
         if not low <= self._line_at <= high:

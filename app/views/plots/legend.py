@@ -35,7 +35,7 @@ def paint_sources(painter: QPainter, sources: Sequence[ShownSource], x: float, m
 
 
 class Legend(QWidget):
-    """Over a plot, in its upper right corner; mouse events pass through it."""
+    """A legend over a plot, in its upper right corner; mouse events pass through it."""
 
     def __init__(self, plot: pg.PlotWidget) -> None:
         super().__init__(plot)

@@ -1,4 +1,4 @@
-"""What all plots over the time of a take share: the end of training, the playhead, gestures and keys.
+"""The parts of all plots over the time of a take: the end of training, the playhead, gestures and keys.
 
 A click or a drag moves the playhead, the wheel zooms in time, the middle or right button pans. The keyboard does the
 same: arrows, + and -, Home.

@@ -1,4 +1,4 @@
-"""What lies behind the string: grid, scale, and hatching outside the training range."""
+"""The ground behind the string: grid, scale, and hatching outside the training range."""
 
 from __future__ import annotations
 
@@ -49,7 +49,10 @@ def paint_grid(painter: QPainter, axes: StringAxes) -> None:
 
 
 def scale(axes: StringAxes) -> tuple[float, ...]:
-    """The displacements that have a line and a figure, as shares of the span: as many as the height has room for."""
+    """The displacements that have a line and a figure, as shares of the span.
+
+    There are as many as the height has room for.
+    """
     return next(marks for marks in SCALES if 2 * axes.half_height >= SCALE_LINE * (len(marks) - 1))
 
 

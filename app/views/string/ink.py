@@ -1,4 +1,4 @@
-"""What is drawn of the string itself: its motion, the pluck with its handle, the ends, and where it is heard."""
+"""The picture of the string itself: its motion, the pluck with its handle, the ends, and the listening points."""
 
 from __future__ import annotations
 
@@ -131,7 +131,10 @@ def paint_pluck(painter: QPainter, axes: StringAxes, pluck: ShownPluck) -> None:
 
 
 def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, grabbed: bool, right: float) -> None:
-    """The handle: `full` on a string at rest, a ring while it moves; with its values where it is full or grabbed."""
+    """The handle: `full` on a string at rest, a ring while it moves.
+
+    It has its values where it is full or grabbed.
+    """
     painter.setPen(Qt.PenStyle.NoPen)
     if grabbed:
         painter.setBrush(theme.translucent(theme.TEXT, 50))
@@ -159,7 +162,7 @@ def paint_handle(painter: QPainter, at: QPointF, pluck: ShownPluck, full: bool, 
 
 
 def paint_ends(painter: QPainter, axes: StringAxes) -> None:
-    """Where the string is fixed."""
+    """Paint the places where the string is fixed."""
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(theme.FAINT))
     for x in (axes.x(0), axes.x(1)):

@@ -94,7 +94,10 @@ class StringView(StageView):
         self.update()
 
     def set_listening_points(self, left: float | None, right: float | None = None) -> None:
-        """Where the string is heard; `right` is None in mono, both at the bridge, which has no marker."""
+        """Set the points where the string is heard.
+
+        `right` is None in mono, both at the bridge, which has no marker.
+        """
         points = {"left": left, "right": right}
         self._listening = {side: position for side, position in points.items() if position is not None}
         self.update()
@@ -253,7 +256,7 @@ class StringView(StageView):
             self.update()
 
     def _under(self, at: QPointF) -> str | None:
-        """What can be grabbed there: "pluck", a side, or None for the bare string."""
+        """The part that can be grabbed there: "pluck", a side, or None for the bare string."""
         axes = self._axes()
         if at.y() > axes.bottom - 6:
             return self._mark_under(at)
@@ -266,7 +269,7 @@ class StringView(StageView):
         return StringAxes(self.width(), self.height(), self._span_mm)
 
     def _handle(self, axes: StringAxes) -> QPointF:
-        """Where the handle is; at the upper edge where the scale of a decayed motion is less than the pluck."""
+        """The place of the handle. It is at the upper edge where a decayed motion's scale is less than the pluck."""
         return axes.at(self._pluck.position, min(self._pluck.amplitude_mm, self._span_mm))
 
     def _fit_span(self) -> None:
@@ -337,7 +340,7 @@ class StringView(StageView):
 
     @property
     def _shown_pluck(self) -> int | None:
-        """On which side words would be in the way of the pluck, with the words at its handle."""
+        """The side on which words would be in the way of the pluck, with the words at its handle."""
         return int(self._pluck.position > 0.4) if self._shows_pluck else None
 
     def _paint_ground(self, painter: QPainter) -> None:

@@ -35,7 +35,7 @@ UNSEEN_S = 1.0  # a panel for which `look` was not called for so long is hidden
 
 @dataclass(frozen=True)
 class Moment:
-    """What is to be shown now.
+    """The moment that is to be shown now.
 
     Attributes:
         take: the motion, or None before the first.
@@ -59,12 +59,15 @@ class Moment:
         return self.take or self.blow
 
     def standing(self, choices: Choices) -> tuple[object, ...]:
-        """What a picture of the take depends on: while it is equal and nothing plays, the picture is the same."""
+        """The state that a picture of the take depends on.
+
+        While it is equal and nothing plays, the picture is the same.
+        """
         sounding = self.sounding
         return sounding, sounding.progress if sounding is not None else (), self.position_s, self.audible, choices
 
     def in_motion(self, choices: Choices) -> bool:
-        """Whether a picture shows the motion, not the state of rest: in Play as long as its note rings."""
+        """Return True if a picture shows the motion, not rest: in Play as long as its note rings."""
         shown = self.audible or choices.face != "play"
         return choices.motion and (self.playing or (self.position_s > 0 and shown))
 
@@ -116,20 +119,20 @@ class Panel(QWidget):
         self._cover.setGeometry(self.rect())
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        """Called with the fields of `Choices` that have new values; at the start with all of them."""
+        """Take the fields of `Choices` that have new values; at the start all of them."""
 
     def take_started(self, take: Take | BlowTake) -> None:
-        """Called with another motion, of which nothing is rendered yet; of a drum where it is not `of_strings`."""
+        """Take another motion, of which nothing is rendered yet; of a drum where it is not `of_strings`."""
         self._growing, self._grown = take, (-1, time.monotonic())
 
     def take_finished(self, take: Take) -> None:
-        """Called when all of it is rendered, with its errors."""
+        """Take a motion when all of it is rendered, with its errors."""
 
     def show_moment(self, moment: Moment) -> None:
-        """Called while the panel is visible: for the string 60 times a second, for the others 30, less at rest."""
+        """Show a moment while the panel is visible. The string has 60 a second, the others 30, and fewer at rest."""
 
     def end(self) -> None:
-        """Called when the window closes: ends the panel's thread."""
+        """End the panel's thread; called when the window closes."""
         self.background.close()
 
     def compute(self, work: Work) -> None:
@@ -143,7 +146,10 @@ class Panel(QWidget):
         self.background.start(on_one_core)
 
     def look(self) -> None:
-        """To be called while the panel is visible; UNSEEN_S after the last call jobs rest."""
+        """Note that the panel is looked at; to be called while it is visible.
+
+        UNSEEN_S after the last call jobs rest.
+        """
         self._seen_s = time.monotonic()
 
     def solo(self, mode: int) -> None:
@@ -151,7 +157,7 @@ class Panel(QWidget):
         self.session.update(solo=0 if mode == self.session.choices.solo else mode)
 
     def _rests(self) -> bool:
-        """Whether jobs rest; called in their thread."""
+        """Return True if jobs rest; called in their thread."""
         now_s, take = time.monotonic(), self._growing
         if now_s - self._seen_s > UNSEEN_S:
             return True
@@ -191,7 +197,7 @@ _usual = [1]
 
 @contextmanager
 def _one_core() -> Iterator[None]:
-    """While any job is under way, torch computes on one core; then on the usual number again.
+    """Limit torch to one core while any job is under way; then restore the usual number.
 
     PyTorch's number of threads belongs partly to the calling thread and partly to the process, so the last job to end
     restores it.

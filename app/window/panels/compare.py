@@ -147,7 +147,7 @@ class ComparePanel(Panel):
 
     @property
     def _entries(self) -> list[PresetEntry]:
-        """Those in the table."""
+        """The presets in the table."""
         if self._names is not None:
             return [entry for entry in self.library.entries if entry.name in self._names]
         present = self.library.find(self.session.choices.preset)

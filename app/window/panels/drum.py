@@ -46,7 +46,7 @@ class DrumPanel(StagePanel):
 
     @property
     def place(self) -> Place:
-        """Where the keyboard strikes: as chosen, or where the drum was struck last."""
+        """The place where the keyboard strikes: as chosen, or where the drum was struck last."""
         return self._place
 
     def choices_changed(self, names: frozenset[str]) -> None:
@@ -108,7 +108,7 @@ class DrumPanel(StagePanel):
         self.view.show_frame(HeadFrame(pictures, f"{position_s:.3f} s{slow}"))
 
     def _looks_like(self, blow: BlowTake) -> bool:
-        """Whether a blow is on a drum of the shape that is shown: another pad may just have been struck."""
+        """Return True if a blow is on a drum of the shown shape: another pad may just have been struck."""
         if (played := self._drum) is None:
             return False
         own, shown = blow.request.modes.drum, played.drum

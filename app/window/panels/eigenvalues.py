@@ -107,7 +107,7 @@ class EigenvaluesPanel(Panel):
 
     @property
     def _modes(self) -> NDArray[np.int64]:
-        """Of all points that are shown, the learned ones first."""
+        """The modes of all points that are shown, the learned ones first."""
         assert self._figure is not None
         return np.concatenate([self._figure.learned.mode[self._shown], self._figure.string.mode])
 
@@ -141,7 +141,7 @@ class EigenvaluesPanel(Panel):
             self._words.say(figure.note)
 
     def _describe(self, figure: PoleFigure, point: int) -> list[str]:
-        """In several wordings, the longest first."""
+        """The description of a point in several wordings, the longest first."""
         count = len(self._shown)
         learned = point < count
         poles, place = (figure.learned, self._shown[point]) if learned else (figure.string, point - count)
@@ -301,7 +301,7 @@ class _Plane(PointedPlot):
             super().keyPressEvent(event)
 
     def _nearest(self, at: QPointF) -> int:
-        """The point nearest to a place of the widget, a learned one where both lie there; -1 where none is near."""
+        """The point nearest to a place of the widget, a learned one where both lie there; -1: none is near."""
         if not len(self._places):
             return -1
         here, (wide, high) = self._place_at(at), self.getPlotItem().vb.viewPixelSize()

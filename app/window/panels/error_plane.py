@@ -165,7 +165,7 @@ class _Planes:
 
 
 def _form(pluck: Pluck) -> tuple[object, ...]:
-    """What a plane belongs to beside its preset: shape and width, where there is one."""
+    """The properties that a plane belongs to beside its preset: shape and width, where there is one."""
     return (pluck.shape, None if pluck.shape == "triangular" else pluck.width)
 
 

@@ -25,7 +25,7 @@ def seconds(value: float) -> str:
 
 
 def signed(value: float, digits: int = 1) -> str:
-    """With its sign, and so many digits after the point."""
+    """Format a value with its sign, and so many digits after the point."""
     if math.isinf(value):
         return "+∞" if value > 0 else "−∞"
     rounded = round(value, digits) or 0.0  # no minus before a zero

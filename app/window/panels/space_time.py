@@ -133,7 +133,7 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         return [] if here_m is None else self._wordings(time_s, place, here_m)
 
     def _wordings(self, time_s: float, place: float, here_m: float) -> list[str]:
-        """What is drawn there, in the unit of the colour bar."""
+        """The displacement that is drawn there, in the unit of the colour bar."""
         factor, unit = readable_unit(self.scale_mm / MM, "displacement")
         what = f"{factor * here_m:+.4g} {unit}" if self._signed else f"peak {factor * here_m:.4g} {unit}"
         return [f"{time_s:.4f} s   position {place:.2f}   {what}", what]
@@ -180,7 +180,7 @@ def _colour_map(kind: str, signed: bool) -> pg.ColorMap:
 
 
 def _captions(made: Picture) -> list[str]:
-    """What a column shows, in words and in fewer."""
+    """The caption of a column's content, in words and in fewer."""
     column_ms = 1000 * (made.stop_s - made.start_s) / made.displacement_m.shape[1]
     return {
         "frames": ["every frame"],

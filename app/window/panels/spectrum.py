@@ -204,7 +204,7 @@ class SpectrumPanel(Panel):
             self._fit()
 
     def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
-        """As `WaveformPanel.set_sources`; slot B's curve is filled."""
+        """Set the sources as `WaveformPanel.set_sources`; slot B's curve is filled."""
         set_curves(self.plot.getPlotItem(), self._curves, sources, faint_alpha=150)
         self._area_of = next((s.source for s in sources if "B" in s.slots and len(sources) > 1), None)
         if self._area_of:

@@ -1,4 +1,4 @@
-"""The string in motion, the pluck that is being drawn, and why a pluck is silent or outside the training range."""
+"""The string in motion, the pluck being drawn, and why a pluck is silent or outside the training range."""
 
 from __future__ import annotations
 
@@ -136,7 +136,7 @@ class StringPanel(StagePanel):
         view.set_warning(*self._pluck_warning())
 
     def _pluck_warning(self) -> tuple[str, bool]:
-        """Why nothing is heard, or what lies outside the training; and whether that is a warning."""
+        """The reason why nothing is heard, or what lies outside the training; and True if that is a warning."""
         choices, entry = self.session.choices, self.library.find(self.session.choices.preset)
         silent = why_silent(choices, self.library)
         if not silent and choices.source_heard == DIFFERENCE and self._take is not None:

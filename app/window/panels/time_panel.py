@@ -41,7 +41,7 @@ class TimePanel(Panel, Generic[G]):
 
     @abstractmethod
     def _begin(self, take: Sounding) -> G:
-        """What is to be computed from a take, or from a blow where the panel draws drums."""
+        """Begin what is to be computed from a take, or from a blow where the panel draws drums."""
 
     @abstractmethod
     def _draw(self, made: G) -> None:
@@ -49,10 +49,10 @@ class TimePanel(Panel, Generic[G]):
 
     @abstractmethod
     def _words(self, made: G, time_s: float, place: float) -> Iterable[str]:
-        """What is there, in one or more wordings, the longest first; none where nothing is."""
+        """The words for a point, in one or more wordings, the longest first; none where nothing is."""
 
     def _is_of(self, made: G, take: Sounding) -> bool:
-        """Whether it shows the take as it is heard now."""
+        """Return True if it shows the take as it is heard now."""
         return True
 
     def take_started(self, take: Take | BlowTake) -> None:

@@ -1,4 +1,4 @@
-"""What the slots hold over the whole take, as it is heard at the listening point."""
+"""The waveforms of the slots over the whole take, as heard at the listening point."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class _Drawn:
 
 
 class WaveformPanel(Panel):
-    """One curve a source; the heard source is on top."""
+    """A panel with a curve for each source; the heard source is on top."""
 
     of_strings = False
     key = "waveform"
@@ -161,12 +161,15 @@ class WaveformPanel(Panel):
         self._label.set(f"{quantity} ({unit})", unit)
 
     def set_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
-        """What is drawn, the heard source on top; `part` says which part of the sound where it is not all."""
+        """Set the sources that are drawn, the heard one on top.
+
+        `part` says which part of the sound where it is not all.
+        """
         set_curves(self.plot.getPlotItem(), self._curves, sources, faint_alpha=130)
         self.legend.show_sources(sources, part)
 
     def show_signal(self, source: str, signal: NDArray[np.float32], rate_hz: int) -> None:
-        """The samples so far, (frames,) from time 0, in the unit of the axis; draws those in view, none left out."""
+        """The samples so far, (frames,) from time 0, in the unit of the axis. Draws those in view, none left out."""
         (low_s, high_s), columns = self.plot.times_s, self.plot.columns
         # A smoothed line that goes to and fro within a pixel takes ten times as long as a stroke for each, and a key
         # that is played waits for the painting.
