@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import io
 import re
 import subprocess
@@ -36,6 +37,33 @@ AVOIDED = {
 }
 WORDS = re.compile("|".join(rf"\b({words})\b" for words in AVOIDED), re.IGNORECASE)
 NAMES = {"told", "tells", "anew", "whoever", "errs", "obey", "believed", "tired"}  # parts of names, avoided too
+# words with which a docstring begins as a clause, not as the noun of a thing or the verb of an action
+CLAUSES = set(
+    [
+        "What",
+        "Whether",
+        "Of",
+        "How",
+        "Where",
+        "As",
+        "Which",
+        "Those",
+        "By",
+        "One",
+        "For",
+        "From",
+        "In",
+        "With",
+        "To",
+        "When",
+        "On",
+        "If",
+        "Whose",
+        "Who",
+        "That",
+        "Until",
+    ]
+)
 LONGEST = 30  # words of a sentence
 LONGEST_SUBJECT = 72
 SINCE = "5d41648"  # the last commit before subjects were checked
@@ -105,6 +133,18 @@ def sentences(path: Path) -> Iterator[tuple[int, str]]:
 def test_sentences_are_short(path: Path) -> None:
     long = [(number, each) for number, each in sentences(path) if len(re.findall(r"\w[\w'’-]*", each)) > LONGEST]
     assert not long, "\n" + "\n".join(f"{path.name}:{number}: {each}" for number, each in long)
+
+
+@pytest.mark.parametrize("name", ["app", "engine", "training", "run.py"])
+def test_docstrings_begin_with_a_noun_or_a_verb(name: str) -> None:
+    found = []
+    for path in [path for path in CODE if path.is_relative_to(ROOT / name)]:
+        for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+                first = (ast.get_docstring(node) or "").split(maxsplit=1)
+                if first and first[0].rstrip(",") in CLAUSES:
+                    found.append(f"{path.relative_to(ROOT)}: {getattr(node, 'name', 'the module')}: {first[0]} …")
+    assert found == []
 
 
 def test_commit_subjects_name_their_area_and_are_short() -> None:
