@@ -38,31 +38,8 @@ AVOIDED = {
 WORDS = re.compile("|".join(rf"\b({words})\b" for words in AVOIDED), re.IGNORECASE)
 NAMES = {"told", "tells", "anew", "whoever", "errs", "obey", "believed", "tired"}  # parts of names, avoided too
 # words with which a docstring begins as a clause, not as the noun of a thing or the verb of an action
-CLAUSES = set(
-    [
-        "What",
-        "Whether",
-        "Of",
-        "How",
-        "Where",
-        "As",
-        "Which",
-        "Those",
-        "By",
-        "One",
-        "For",
-        "From",
-        "In",
-        "With",
-        "To",
-        "When",
-        "On",
-        "If",
-        "Whose",
-        "Who",
-        "That",
-        "Until",
-    ]
+CLAUSES = re.compile(
+    r"(What|Whether|Of|How|Where|As|Which|Those|By|One|For|From|In|With|To|When|On|If|Whose|Who|That|Until)\b"
 )
 LONGEST = 30  # words of a sentence
 LONGEST_SUBJECT = 72
@@ -141,8 +118,7 @@ def test_docstrings_begin_with_a_noun_or_a_verb(name: str) -> None:
     for path in [path for path in CODE if path.is_relative_to(ROOT / name)]:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-                first = (ast.get_docstring(node) or "").split(maxsplit=1)
-                if first and first[0].rstrip(",") in CLAUSES:
+                if first := CLAUSES.match(ast.get_docstring(node) or ""):
                     found.append(f"{path.relative_to(ROOT)}: {getattr(node, 'name', 'the module')}: {first[0]} …")
     assert found == []
 
