@@ -117,9 +117,9 @@ def test_docstrings_begin_with_a_noun_or_a_verb(name: str) -> None:
     found = []
     for path in [path for path in CODE if path.is_relative_to(ROOT / name)]:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-                if first := CLAUSES.match(ast.get_docstring(node) or ""):
-                    found.append(f"{path.relative_to(ROOT)}: {getattr(node, 'name', 'the module')}: {first[0]} …")
+            documented = isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
+            if documented and (first := CLAUSES.match(ast.get_docstring(node) or "")):
+                found.append(f"{path.relative_to(ROOT)}: {getattr(node, 'name', 'the module')}: {first[0]} …")
     assert found == []
 
 
