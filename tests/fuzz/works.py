@@ -24,7 +24,7 @@ from engine.presets import SHIPPED, load_preset
 from training.cell import load
 from training.data.dataset import load_dataset
 from training.results import read_results
-from training.run import run_row
+from training.run import NamedRun, run_rows
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 CONFIGURATION = """title = "Tiny"
@@ -142,15 +142,8 @@ def _content(path: Path) -> object:
 
 def _train(folder: Path, model: str, sizes: str) -> None:
     configuration = load(str(_configuration(folder, model, sizes, 40)))
-    run_row(
-        "tiny",
-        "",
-        configuration,
-        folder / "runs",
-        cache=folder / "cache",
-        preset=folder / "tiny.safetensors",
-        checkpoint_every_s=0.0,
-    )
+    run = NamedRun("tiny", "", configuration, folder / "tiny.safetensors")
+    run_rows([run], folder / "runs", cache=folder / "cache", checkpoint_every_s=0.0)
 
 
 def _configuration(folder: Path, model: str, sizes: str, count: int) -> Path:
