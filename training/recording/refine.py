@@ -92,7 +92,8 @@ class Fit:
         self._look()
 
     def _look(self) -> None:
-        data, self.times = warped(self.samples, self.rate_hz, self.glide)
+        data, times = warped(self.samples, self.rate_hz, self.glide)
+        data, self.times = data[: self.size], times[: self.size]  # a large glide stretches time beyond the spectrum's
         self.count = len(data)
         self.data = fft.rfft(data, self.size)[: self.highest]
         self.last_turn = np.exp(-1j * self.omega * (self.count / self.rate_hz))

@@ -137,7 +137,7 @@ def test_where_no_string_is_found_only_the_option_keeps_it(
 ) -> None:
     own = folder / "own"
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(own))
-    samples, rate_hz = membrane(np.random.default_rng(15))
+    samples, rate_hz = membrane(np.random.default_rng(30))
     soundfile.write(folder / "drum.wav", samples[:rate_hz], rate_hz, subtype="FLOAT")
     assert "drum.wav: no string found" in run("learn", folder / "drum.wav", "--name", "Drum").failure
     assert [path for path in own.rglob("*") if path.is_file()] == []

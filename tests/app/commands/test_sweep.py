@@ -162,7 +162,9 @@ def test_a_dry_run_lists_the_order_and_what_is_finished(run, words: list[Any], t
 
 
 def test_a_plan_that_is_not_there_is_reported(run) -> None:
-    assert "no plan 'nothing'; give a .toml file or one of: tables, tiny" in run("sweep", "nothing").failure
+    assert (
+        "no plan 'nothing'; give a .toml file or one of: published, tables, tiny" in run("sweep", "nothing").failure
+    )
 
 
 def test_an_unknown_name_in_a_plan_is_reported(run, words: list[Any], plan: Path) -> None:
