@@ -6,7 +6,11 @@ from PySide6.QtWidgets import QToolButton, QWidget
 
 
 class FilterButton(QToolButton):
-    """`what`: the rows of the list, such as presets. A click asks to clear the filter."""
+    """The number of rows that pass a filter; a click asks to clear it.
+
+    Args:
+        what: the rows, such as presets.
+    """
 
     def __init__(self, what: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
