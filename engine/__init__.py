@@ -1,8 +1,8 @@
 """The engine: string physics, its reference solutions, learned models, metrics and presets.
 
-It needs torch, numpy, scipy, numba and safetensors only, and knows no window and no sound device. What a notebook
-needs is named here (README, "From Python"), and loaded when it is first asked for: the window imports from here
-before torch.
+It needs torch, numpy, scipy, numba, pydantic and safetensors only, and knows no window and no sound device. What a
+notebook needs is named here (README, "From Python"), and loaded when it is first asked for: the window imports from
+here before torch.
 """
 
 from __future__ import annotations
@@ -14,16 +14,18 @@ if TYPE_CHECKING:
     from engine.metrics import relative_error
     from engine.pluck import Pluck
     from engine.presets import find_preset, load_preset
-    from engine.resonators import Resonator, StringParameters
+    from engine.resonators import Resonator
     from engine.sources import ModelSource, TruthSource
-    from engine.voices import Ear, model_program, render_voice, truth_program
+    from engine.values.ear import Ear
+    from engine.values.string import StringParameters
+    from engine.voices import model_program, render_voice, truth_program
 
 _HOMES = {
-    "Ear": "engine.voices",
+    "Ear": "engine.values.ear",
     "ModelSource": "engine.sources",
     "Pluck": "engine.pluck",
     "Resonator": "engine.resonators",
-    "StringParameters": "engine.resonators",
+    "StringParameters": "engine.values.string",
     "TruthSource": "engine.sources",
     "find_preset": "engine.presets",
     "load_preset": "engine.presets",

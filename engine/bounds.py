@@ -7,7 +7,7 @@ number has a bound here. The bounds lie far beyond every string and model that a
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 # Files
 LARGEST_PRESET_BYTES = 64 * 2**20
@@ -52,13 +52,13 @@ STRING: Mapping[str, tuple[float, float]] = {
     "tension_n": (1e-3, 1e6),
 }
 
-# Two polarisations: parameter -> least and most, and the unit
-POLARISATIONS: Mapping[str, tuple[tuple[float, float], str]] = {
-    "angle_deg": ((0.0, 80.0), "°"),
-    "second_heard": ((0.0, 1.0), ""),
-    "second_cents": ((0.0, 20.0), "cents"),
-    "conductance_s_kg": ((0.0, 0.5), "s/kg"),
-    "second_conductance_s_kg": ((0.0, 0.5), "s/kg"),
+# Two polarisations: likewise
+POLARISATIONS: Mapping[str, tuple[float, float]] = {
+    "angle_deg": (0.0, 80.0),
+    "second_heard": (0.0, 1.0),
+    "second_cents": (0.0, 20.0),
+    "conductance_s_kg": (0.0, 0.5),
+    "second_conductance_s_kg": (0.0, 0.5),
 }
 
 LOSSES: Mapping[str, tuple[float, float]] = {"air": (0.0, 20.0), "friction": (0.0, 0.1), "bending": (0.0, 1.0)}
@@ -122,7 +122,21 @@ def check(name: str, value: float, limits: tuple[float, float], unit: str = "") 
     low, high = limits
     if not low <= value <= high:
         reported = f" {unit}" if unit else ""
-        raise ValueError(f"{name} must lie in {low:.10g} … {high:.10g}{reported}, not {brief(value)}")
+        shown = f"{value:.10g}" if isinstance(value, float) else brief(value)
+        raise ValueError(f"{name} must lie in {low:.10g} … {high:.10g}{reported}, not {shown}")
+
+
+def check_all(value: object, limits: Mapping[str, tuple[float, float]], of: str = "") -> None:
+    """Raises ValueError as `check`, for fields of a value that have limits and are not None; `of` precedes names."""
+    for name, low_high in limits.items():
+        if (found := getattr(value, name)) is not None:
+            check(f"{of}{name}", found, low_high)
+
+
+def check_choice(name: str, value: object, known: Collection[str]) -> None:
+    """Raises ValueError, naming the field and what there is, where a value is none of those that are known."""
+    if value not in known:
+        raise ValueError(f"{name} {brief(value)} is not one of {', '.join(known)}")
 
 
 def check_sizes(configuration: object) -> None:
@@ -162,3 +176,8 @@ POSITION_RANGE = (0.02, 0.98)
 WIDTH_RANGE = (0.02, 1.0)
 LARGEST_AMPLITUDE_MM = 20.0
 AMPLITUDE_MM_RANGE = (0.0, LARGEST_AMPLITUDE_MM)
+PLUCK: Mapping[str, tuple[float, float]] = {
+    "position": POSITION_RANGE,
+    "width": WIDTH_RANGE,
+    "amplitude_mm": AMPLITUDE_MM_RANGE,
+}

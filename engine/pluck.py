@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal, get_args
 
-from engine.bounds import AMPLITUDE_MM_RANGE, POSITION_RANGE, WIDTH_RANGE
+from engine import bounds
 
 if TYPE_CHECKING:
     import numpy as np
@@ -36,15 +36,8 @@ class Pluck:
     width: float = 0.06
 
     def __post_init__(self) -> None:
-        for name, value, (low, high), unit in (
-            ("position", self.position, POSITION_RANGE, ""),
-            ("width", self.width, WIDTH_RANGE, ""),
-            ("amplitude", self.amplitude_mm, AMPLITUDE_MM_RANGE, " mm"),
-        ):
-            if not low <= value <= high:
-                raise ValueError(f"{name} must lie in {low:g} … {high:g}{unit}, not {value:g}{unit}")
-        if self.shape not in SHAPES:
-            raise ValueError(f"shape {self.shape!r} is not one of {', '.join(SHAPES)}")
+        bounds.check_all(self, bounds.PLUCK)
+        bounds.check_choice("shape", self.shape, SHAPES)
 
     def moved(self, **changes: float | str) -> Pluck:
         """A copy with some values changed."""
@@ -52,9 +45,9 @@ class Pluck:
 
     def nearest(self, **changes: float) -> Pluck:
         """A copy with some values changed, each to the nearest within its range; not a number is the lowest."""
-        ranges = {"position": POSITION_RANGE, "width": WIDTH_RANGE, "amplitude_mm": AMPLITUDE_MM_RANGE}
+        limits = bounds.PLUCK
         return self.moved(
-            **{name: min(max(ranges[name][0], value), ranges[name][1]) for name, value in changes.items()}
+            **{name: min(max(limits[name][0], value), limits[name][1]) for name, value in changes.items()}
         )
 
     def displacement(self, grid_points: int) -> NDArray[np.float64]:

@@ -1,7 +1,7 @@
 """The checked reading of plain data (JSON, TOML) into frozen dataclasses, and back.
 
-Every error names the place, the field and the remedy. Types are read from the annotations; supported are
-bool, int, float, str, Literal, None unions, tuples of one type, string-keyed mappings and nested dataclasses.
+Pydantic reads the types from the annotations. Here are the bounds on what any file may hold, and errors in one line
+that name the place and the field, and what was found.
 """
 
 from __future__ import annotations
@@ -12,10 +12,11 @@ import json
 import math
 import re
 import tomllib
-import types
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
+from typing import Any, TypeVar, get_args, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
 
 from engine import bounds
 from engine.plain_text import one_line
@@ -98,26 +99,82 @@ def read(kind: type[T], data: object, where: str) -> T:
         SchemaError: a field is unknown, missing, of another type, or refused by the dataclass itself.
     """
     if not isinstance(data, Mapping):
-        raise SchemaError(f"{where}: expected a table of fields, found {_describe(data)}")
-    fields = {f.name: f for f in dataclasses.fields(kind) if f.init}  # type: ignore[arg-type]
-    unknown = sorted(set(data) - set(fields))
-    if unknown:
-        raise SchemaError(f"{where}: unknown field {unknown[0]!r}; known are {', '.join(fields)}")
-    hints = _type_hints(kind)  # type: ignore[arg-type]
-    values = {}
-    for name, field in fields.items():
-        if name in data:
-            values[name] = _convert(hints[name], data[name], f"{where}.{name}")
-        elif field.default is dataclasses.MISSING and field.default_factory is dataclasses.MISSING:
-            raise SchemaError(f"{where}: field {name!r} is missing")
-    try:
-        return kind(**values)
-    except SchemaError:
-        raise
-    except (ValueError, TypeError) as error:
+        raise SchemaError(f"{where}: must be a table of fields, found {_describe(data)}")
+    _check_bounds(data, where)
+    try:  # as JSON: in Python's own data a strict reader takes no list for a tuple
+        found: T = _adapter(kind).validate_json(  # type: ignore[arg-type]
+            json.dumps(data), strict=True, extra="forbid"
+        )
+        return found
+    except ValidationError as error:
+        raise SchemaError(explained(error, where, kind)) from error
+    except (TypeError, OverflowError) as error:
         raise SchemaError(f"{where}: {error}") from error
-    except OverflowError as error:
-        raise SchemaError(f"{where}: a number is too large ({error})") from error
+
+
+@functools.cache
+def _adapter(kind: Any) -> TypeAdapter[Any]:
+    return TypeAdapter(kind)
+
+
+def explained(error: ValueError, where: str = "", kind: object = None) -> str:
+    """The first fault of data that were refused: its place, what is wrong there, and what was found.
+
+    Args:
+        where: the name of the data.
+        kind: the dataclass that they were read into; of an unknown field, those that it knows are listed.
+    """
+    if not isinstance(error, ValidationError):
+        return str(error)
+    first, *others = error.errors(include_url=False)
+    if first["type"] == "missing":  # maybe because it is misspelled
+        first = next((each for each in others if each["type"] in _UNKNOWN), first)
+    path, found = list(first["loc"]), first["input"]
+    if first["type"] == "missing":
+        words = f"field {path.pop()!r} is missing"
+    elif first["type"] in _UNKNOWN:
+        words = f"unknown field {bounds.brief(path.pop())}"
+        words += f"; known are {', '.join(_names(kind, path))}" if kind else ""
+    elif first["type"] == "value_error":
+        words = str(first["ctx"]["error"])
+    else:
+        shown = f", found {bounds.brief(found)}" if isinstance(found, str | float | int | None) else ""
+        words = first["msg"].replace("Input should be", "must be").replace("an object", "a table") + shown
+    place = where + _place(path) if where else _place(path).removeprefix(".")
+    return f"{place}: {words}" if place else words
+
+
+def _place(path: Iterable[str | int]) -> str:
+    """A path of fields and of numbers of entries as in ".block[0].name"."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part[:100]}" for part in path)
+
+
+_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+
+
+def _names(kind: Any, path: Iterable[str | int]) -> list[str]:
+    """The names of the fields of the dataclass at a path in another."""
+    for part in path:
+        inner = get_type_hints(kind)[part] if isinstance(part, str) else kind
+        kind = next((each for each in (inner, *get_args(inner)) if dataclasses.is_dataclass(each)), inner)
+    return [field.name for field in dataclasses.fields(kind)]
+
+
+def _check_bounds(data: object, where: str) -> None:
+    """Raises SchemaError for what no field holds: a long list or text, a number that is not finite, a date."""
+    if isinstance(data, Mapping | list | tuple):
+        if not isinstance(data, Mapping) and len(data) > bounds.MOST_ENTRIES:
+            raise SchemaError(f"{where}: has {len(data)} entries, at most {bounds.MOST_ENTRIES} may be given")
+        for key, entry in data.items() if isinstance(data, Mapping) else enumerate(data):
+            _check_bounds(entry, f"{where}{_place([key])}")
+    elif isinstance(data, str) and len(data) > bounds.LONGEST_STRING:
+        raise SchemaError(f"{where}: has {len(data)} characters, at most {bounds.LONGEST_STRING} may be given")
+    elif isinstance(data, float) and not math.isfinite(data):
+        raise SchemaError(f"{where}: must be a finite number, not {data}")
+    elif isinstance(data, int) and abs(data) > bounds.LARGEST_INTEGER:
+        raise SchemaError(f"{where}: must be a number of at most 64 bits, not {bounds.brief(data)}")
+    elif not isinstance(data, str | float | int | None):
+        raise SchemaError(f"{where}: must be a number or a text, found {_describe(data)}")
 
 
 def without_retired(data: object, retired: Mapping[str, Any], where: str) -> Any:
@@ -134,11 +191,6 @@ def without_retired(data: object, retired: Mapping[str, Any], where: str) -> Any
     return {name: value for name, value in data.items() if name not in retired}
 
 
-@functools.cache
-def _type_hints(kind: type) -> dict[str, Any]:
-    return get_type_hints(kind)
-
-
 def write(value: Any) -> Any:
     """Plain data (dicts, lists, numbers, strings, None) for a dataclass instance: the inverse of `read`."""
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
@@ -148,57 +200,6 @@ def write(value: Any) -> Any:
     if isinstance(value, tuple | list):
         return [write(entry) for entry in value]
     return value
-
-
-def _convert(hint: Any, data: Any, where: str) -> Any:
-    origin, arguments = get_origin(hint), get_args(hint)
-    if hint is Any:
-        return data
-    if dataclasses.is_dataclass(hint):
-        return read(hint, data, where)  # type: ignore[arg-type]
-    if origin in (Union, types.UnionType):
-        if data is None and type(None) in arguments:
-            return None
-        return _convert(next(a for a in arguments if a is not type(None)), data, where)
-    if origin is Literal:
-        if data not in arguments:
-            raise SchemaError(f"{where}: {bounds.brief(data)} is not one of {', '.join(map(repr, arguments))}")
-        return data
-    if origin is tuple:
-        if not isinstance(data, list | tuple):
-            raise SchemaError(f"{where}: expected a list, found {_describe(data)}")
-        if len(data) > bounds.MOST_ENTRIES:
-            raise SchemaError(f"{where}: has {len(data)} entries, at most {bounds.MOST_ENTRIES} may be given")
-        if arguments[-1] is not Ellipsis and len(data) != len(arguments):
-            raise SchemaError(f"{where}: expected {len(arguments)} entries, found {len(data)}")
-        return tuple(_convert(arguments[0], entry, f"{where}[{i}]") for i, entry in enumerate(data))
-    if origin in (dict, Mapping):
-        if not isinstance(data, Mapping) or not all(isinstance(key, str) for key in data):
-            raise SchemaError(f"{where}: expected a table, found {_describe(data)}")
-        return {key: _convert(arguments[1], entry, f"{where}.{key}") for key, entry in data.items()}
-    return _convert_scalar(hint, data, where)
-
-
-def _convert_scalar(hint: type, data: Any, where: str) -> Any:
-    if hint is float and isinstance(data, int | float) and not isinstance(data, bool):
-        try:
-            value = float(data)
-        except OverflowError:
-            value = math.inf
-        if not math.isfinite(value):
-            raise SchemaError(f"{where}: must be a finite number, not {bounds.brief(data)}")
-        return value
-    if hint is int and isinstance(data, int) and not isinstance(data, bool):
-        if abs(data) > bounds.LARGEST_INTEGER:
-            raise SchemaError(f"{where}: must be a number of at most 64 bits, not {bounds.brief(data)}")
-        return data
-    if hint is bool and isinstance(data, bool):
-        return data
-    if hint is str and isinstance(data, str):
-        if len(data) > bounds.LONGEST_STRING:
-            raise SchemaError(f"{where}: has {len(data)} characters, at most {bounds.LONGEST_STRING} may be given")
-        return data
-    raise SchemaError(f"{where}: expected {hint.__name__}, found {_describe(data)}")
 
 
 def _describe(data: object) -> str:

@@ -13,7 +13,7 @@ J = v / (e + 1/2m), where e J² is the energy of the modes. It rebounds from wha
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,37 +21,10 @@ import numpy as np
 from engine import bounds
 from engine.levels import MOST_PERIODS
 from engine.resonators.base import Array
+from engine.values.drum import Mallet
 
 if TYPE_CHECKING:
     from engine.resonators.drum import DrumModes
-
-HERTZ = -0.2  # power of the speed in the time of contact
-
-
-@dataclass(frozen=True)
-class Mallet:
-    """The mallet that strikes. Default: a drumstick, of wood.
-
-    Attributes:
-        radius_m: of the face that touches.
-        mass_kg: as it is felt at the tip; of a drumstick a third.
-        contact_s: time of contact at 1 m/s: hardness.
-
-    Raises:
-        ValueError: a value is out of its range; the message names it.
-    """
-
-    mass_kg: float = 0.015
-    radius_m: float = 0.005
-    contact_s: float = 0.004
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            bounds.check(f"mallet {field.name}", getattr(self, field.name), bounds.MALLET[field.name])
-
-    def contact_at(self, speed_m_s: float) -> float:
-        """Time of contact in s at a speed."""
-        return float(self.contact_s * max(speed_m_s, 1e-3) ** HERTZ)
 
 
 @dataclass(frozen=True)
@@ -67,7 +40,7 @@ class Strike:
 
     place: tuple[float, float] = (0.3, 0.1)
     speed_m_s: float = 2.0
-    mallet: Mallet = Mallet()
+    mallet: Mallet = field(default_factory=Mallet)
 
     def __post_init__(self) -> None:
         bounds.check("strike speed_m_s", self.speed_m_s, bounds.STRIKE_SPEED_M_S, "m/s")

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from engine.effects import Effects, Room
+from engine.effects import Effects
 from engine.kernels import cache, layout
 from engine.models._tension_arrays import CURVES
 from engine.pluck import Pluck
@@ -24,8 +24,11 @@ from engine.presets import Preset, PresetInfo, TrainedRange
 from engine.python_process import python_command, python_environment
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import listening_weights, project
-from engine.resonators.string import StringParameters
-from engine.voices import CompiledPlayer, Ear, Mixer, Program, Voice, model_program, plain_program, truth_program
+from engine.values.drum import DrumParameters
+from engine.values.ear import Ear
+from engine.values.effects import Room
+from engine.values.string import StringParameters
+from engine.voices import CompiledPlayer, Mixer, Program, Voice, model_program, plain_program, truth_program
 
 if TYPE_CHECKING:
     from engine.models.base import StringModel
@@ -149,11 +152,11 @@ def _drum() -> None:
     """Compile what makes modes of a drum, and a picture of it."""
     from engine.kernels import drum_modes
     from engine.kernels.records import DRUM_ROWS
-    from engine.resonators.drum import DrumParameters
+    from engine.resonators.drum import modes_of, numbers_of, tune
     from engine.resonators.surface import tools
 
-    drum = DrumParameters(air_kg_m3=1.2).tuned(1.1, 400)
-    found, blow = drum.modes(400), np.append(drum.numbers, np.zeros(drum_modes.DRUM - drum_modes.X))
+    drum = tune(DrumParameters(air_kg_m3=1.2), 1.1, 400)
+    found, blow = modes_of(drum, 400), np.append(numbers_of(drum), np.zeros(drum_modes.DRUM - drum_modes.X))
     found.struck((0.0, 0.0), 0.01)
     found.radiated((0.0, 0.0))
     found.resonator(np.zeros((1, 2)))

@@ -15,8 +15,9 @@ from engine.models.base import Physics
 from engine.models.configurations import KoopmanVarConfiguration
 from engine.models.koopman_var import KoopmanVar
 from engine.presets import PresetInfo, TrainedRange, save_preset
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.schema import write
+from engine.values.string import StringParameters
 from engine.voices.derivative import REACH_FRAMES, differentiator_taps
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")  # windows need no screen, however pytest is started
@@ -43,7 +44,7 @@ def small_preset(tmp_path_factory: pytest.TempPathFactory) -> Path:
     configuration = KoopmanVarConfiguration(state_size=16, multiplier_widths=(8,))
     model = KoopmanVar(configuration)
     string = StringParameters()
-    model.initialise("physics", Physics(string.resonator(10), 4000), torch.Generator().manual_seed(0))
+    model.initialise("physics", Physics(resonator_of(string, 10), 4000), torch.Generator().manual_seed(0))
     info = PresetInfo(
         title="A small string",
         model="koopman_var",

@@ -14,6 +14,8 @@ import pytest
 import torch
 import typer
 
+from engine.resonators.string import resonator_of
+
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/*.md")])
 NOTEBOOKS = sorted(ROOT.glob("docs/notebooks/*.ipynb"))
@@ -106,12 +108,12 @@ def test_the_table_of_the_readme_is_of_the_results() -> None:
 
 def test_the_model_of_the_worked_example_is_a_linear_string() -> None:
     from engine.models.base import Physics
-    from engine.resonators import StringParameters
+    from engine.values.string import StringParameters
 
     (example,) = re.findall(r"```python\n(.*?)```", text("docs/models.md"), re.DOTALL)
     names: dict[str, Any] = {"__name__": "damped_modes"}
     exec(compile(example, "docs/models.md", "exec", dont_inherit=True), names)
-    resonator = StringParameters(0.65, 5.188e-07, 1.41e-13, 1140.0, 5.4e9, 8e-05, 1.4e-05, 60.97).resonator(25)
+    resonator = resonator_of(StringParameters(0.65, 5.188e-07, 1.41e-13, 1140.0, 5.4e9, 8e-05, 1.4e-05, 60.97), 25)
     model = names["DampedModes"](names["DampedModesConfiguration"]())
     model.initialise("physics", Physics(resonator, 16_000), torch.Generator().manual_seed(0))
     start = torch.zeros(1, 101)
@@ -123,7 +125,7 @@ def test_the_model_of_the_worked_example_is_a_linear_string() -> None:
     assert torch.allclose(last, end)
     expected = torch.exp(300 * Physics(resonator, 16_000).log_eigenvalues)
     assert torch.allclose(last / model.encode(start), expected, atol=1e-9)
-    lossless = StringParameters(0.65, 5.188e-07, 1.41e-13, 1140.0, 5.4e9, 0.0, 0.0, 60.97).resonator(10)
+    lossless = resonator_of(StringParameters(0.65, 5.188e-07, 1.41e-13, 1140.0, 5.4e9, 0.0, 0.0, 60.97), 10)
     model.initialise("physics", Physics(lossless, 16_000), torch.Generator().manual_seed(0))
     assert torch.isfinite(model.nu_log).all(), "of fewer modes, without losses"
 

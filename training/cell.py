@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from engine import bounds
 from engine.models import MODELS, OF_MANY_STRINGS
 from engine.schema import SchemaError, read, read_toml, write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
@@ -66,8 +67,7 @@ class Cell:
     seed: int = 0
 
     def __post_init__(self) -> None:
-        if self.model not in MODELS:
-            raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        bounds.check_choice("model", self.model, MODELS)
         if self.model in OF_MANY_STRINGS:
             raise ValueError(f"model {self.model!r} learns many strings, no cell's one; `family train` trains it")
         if self.rate_hz not in MODES:
@@ -150,8 +150,7 @@ class Case:
 
     def __post_init__(self) -> None:
         for model in self.model:
-            if model not in MODELS:
-                raise ValueError(f"model {model!r} is not one of {', '.join(MODELS)}")
+            bounds.check_choice("model", model, MODELS)
 
     def matches(self, cell: Cell) -> bool:
         wanted = (

@@ -12,8 +12,9 @@ from engine import bounds
 from engine.models import MODELS, read_model_configuration
 from engine.models import RETIRED as RETIRED_SIZES
 from engine.resonators.base import Resonator
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.schema import SchemaError, read, without_retired, write
+from engine.values.string import StringParameters
 from training.start import BLIND_PURSUIT, COUNT, PHASES, PURSUIT, SYMMETRIES, given_to, starts_of
 
 DIGEST_VERSION = 3  # of the rule that distinguishes runs
@@ -61,8 +62,8 @@ class DatasetConfiguration:
     @cached_property
     def resonator(self) -> Resonator:
         """The resonator whose motion is learned."""
-        return self.string.resonator(
-            self.modes, tension_modulated=self.tension_modulated, grid_points=self.grid_points
+        return resonator_of(
+            self.string, self.modes, tension_modulated=self.tension_modulated, grid_points=self.grid_points
         )
 
 
@@ -131,8 +132,7 @@ class TrainingConfiguration:
     horizon: int | None = None  # frames that are trained and measured; None: all of the data's
 
     def __post_init__(self) -> None:
-        if self.model not in MODELS:
-            raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        bounds.check_choice("model", self.model, MODELS)
         try:
             model = read_model_configuration(self.model, self.model_configuration, "model_configuration")
         except SchemaError as error:
@@ -141,8 +141,7 @@ class TrainingConfiguration:
             raise ValueError(
                 f"model_configuration.grid_points is {model.grid_points}, the data's are {self.data.grid_points}"
             )
-        if self.start not in starts_of(self.model):
-            raise ValueError(f"start {self.start!r} is not one of {', '.join(starts_of(self.model))}")
+        bounds.check_choice("start", self.start, starts_of(self.model))
         if (self.start in (PURSUIT, BLIND_PURSUIT)) != (self.recipe.latent_epochs > 0):
             raise ValueError(
                 f"latent_epochs is {self.recipe.latent_epochs} with the start {self.start!r}; a pursuit needs some, "

@@ -13,7 +13,8 @@ from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import Preset, PresetInfo, preset_digest
 from engine.sources import ModelSource, Runaway
-from engine.voices import Ear, Program, model_program, render_voice, truth_program, voice_blocks
+from engine.values.ear import Ear
+from engine.voices import Program, model_program, render_voice, truth_program, voice_blocks
 from engine.voices.voice import SILENT_DB
 from training.heard_file import Heard
 

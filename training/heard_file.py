@@ -13,6 +13,7 @@ from pathlib import Path
 
 from filelock import FileLock
 
+from engine import bounds
 from engine.schema import SchemaError
 from engine.table import columns_of, read_table, write_table
 
@@ -68,10 +69,7 @@ class Heard:
             raise ValueError("sha256 must be 64 hexadecimal digits")
         if not self.name or len(self.name) > LONGEST_NAME or not self.name.isprintable():
             raise ValueError(f"name must be printable, of 1 … {LONGEST_NAME} characters")
-        for field, (low, high) in _BOUNDS.items():
-            value = getattr(self, field)
-            if value is not None and not low <= value <= high:
-                raise ValueError(f"{field} must lie in {low:g} … {high:g}, not {value:g}")
+        bounds.check_all(self, _BOUNDS)
 
 
 COLUMNS = columns_of(Heard)

@@ -17,8 +17,8 @@ from engine.metrics import NULL_FLOOR_DB, ErrorSums
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.sine_transform import listening_weights, project, synthesis_matrix, to_modes
-from engine.resonators.string import StringParameters
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource
+from engine.values.string import StringParameters
 
 Floats = NDArray[np.floating]
 FRAMES_AT_ONCE = BLOCK_FRAMES  # as the window renders

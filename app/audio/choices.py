@@ -4,24 +4,20 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
+from app.shared.value import Value
 
 Buffer = Literal["low", "medium", "high", 128, 256, 512, 1024, 2048]  # a latency, or a number of frames
 
 
-class DeviceChoice(BaseModel):
+class DeviceChoice(Value):
     """An output device by name and host API; its index changes when devices come and go."""
-
-    model_config = ConfigDict(extra="forbid")
 
     name: str
     host_api: str
 
 
-class SoundChoice(BaseModel):
+class SoundChoice(Value):
     """The settings that a device is opened with. `rate_hz`: 0 for the device's own rate."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     rate_hz: Literal[0, 44_100, 48_000, 96_000] = 0
     buffer: Buffer = "medium"

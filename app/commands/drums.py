@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -289,7 +289,7 @@ def drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
     from app.instrument.drum_keys import DrumKeys
     from app.patches.drums import Drums
     from app.patches.library import find_patch
-    from engine.voices import Ear
+    from engine.values.ear import Ear
 
     if name.endswith(".toml"):
         patch, key = _with_file(Path(name)), FILE_KEY
@@ -310,11 +310,11 @@ def drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
 
 def _with_file(path: Path) -> Patch:
     """An instrument of one drum, struck by a stick."""
-    from app.patches.drums import Drums, PhysicalDrum, PlayedDrum
+    from app.patches.drums import Drums, PlayedDrum
     from app.patches.patch import Patch
     from engine.presets.of_string import read_drum
 
-    drum = PlayedDrum(note=FILE_KEY, name="Drum", drum=PhysicalDrum(**asdict(read_drum(path)[0])))
+    drum = PlayedDrum(note=FILE_KEY, name="Drum", drum=read_drum(path)[0])
     return Patch(name="Drum", category="drums", strings=Drums(drums=(drum,), highest_hz=HIGHEST_HZ))
 
 

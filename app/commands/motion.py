@@ -21,7 +21,8 @@ if TYPE_CHECKING:
     from engine.metrics import ErrorSums
     from engine.pluck import Pluck
     from engine.presets import Preset, PresetInfo
-    from engine.resonators import Resonator, StringParameters
+    from engine.resonators import Resonator
+    from engine.values.string import StringParameters
 
 InputFile = Annotated[Path, typer.Argument(metavar="U0.npy", help="Initial displacement (batch, points) in m.")]
 OutputFile = Annotated[Path, typer.Argument(metavar="OUT.npy", help="Motion (batch, steps + 1, points) in m.")]
@@ -79,6 +80,7 @@ def simulate(
         )
     from app.commands import arrays
     from engine.presets.of_string import HIGHEST_HZ
+    from engine.resonators.string import resonator_of
 
     initial = arrays.read_displacements(u0)
     points = initial.shape[1]
@@ -96,7 +98,7 @@ def simulate(
         parameters.check_motion(modes, points, rate, tension_modulated)
     except ValueError as error:
         raise Failure(f"{string}: {error}") from error
-    resonator = parameters.resonator(modes, tension_modulated=tension_modulated, grid_points=points)
+    resonator = resonator_of(parameters, modes, tension_modulated=tension_modulated, grid_points=points)
     with progress("simulate") as report:
         if solver == "fast":
             motion = _fast(resonator, rate, steps, substeps)
@@ -241,7 +243,7 @@ def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
 def _string_of(kind_or_file: str) -> tuple[StringParameters, bool]:
     """A string, and whether its tension is modulated by its stretch. Raises typer.BadParameter."""
     from engine.presets import PresetError, find_string, read_string
-    from engine.resonators import StringParameters
+    from engine.values.string import StringParameters
 
     if kind_or_file in STRING_KINDS:
         return StringParameters(), kind_or_file == "nonlinear"

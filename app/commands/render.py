@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, TypeVar
 import typer
 
 from app.commands import options
-from app.shared.vocabulary import Bits, Pickup, Source
+from app.shared.vocabulary import Bits, Source
+from engine.values.ear import Pickup
 from training.cli import arguments
 from training.cli.console import Failure, progress, say
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.export.wav import WavSettings
 from app.shared.vocabulary import Bits
-
-if TYPE_CHECKING:
-    from app.export.wav import WavSettings
 
 Chosen = Literal["model", "truth", "difference", "files"]
 
@@ -39,6 +37,4 @@ class ExportChoices(BaseModel):
 
     @property
     def wav(self) -> WavSettings:
-        from app.export.wav import WavSettings  # brings NumPy
-
         return WavSettings(bits=self.bits, rate_hz=self.rate_hz or None, normalise=self.normalise)

@@ -22,7 +22,6 @@ from PySide6.QtCore import QLockFile
 
 from app.export.played import Played
 from app.instrument.events import (
-    KEYS,
     LONGEST_RECORDING,
     Bend,
     Controller,
@@ -53,9 +52,6 @@ KINDS: dict[str, type[NoteOn | NoteOff | Bend | Controller]] = {
 }
 _NAMES = {kind: name for name, kind in KINDS.items()}
 _CHECKED = {name: TypeAdapter(kind) for name, kind in KINDS.items()}
-_LIMITS = {"key": (0, 127), "velocity": (0, 127), "channel": (0, KEYS), "number": (0, 127), "string": (0, 127)}
-_VALUES = {Bend: (-1.0, 1.0), Controller: (0, 127)}
-_LARGEST_PLACE = 2.0  # half-lengths
 _RECORDED = TypeAdapter(datetime)
 
 
@@ -226,16 +222,7 @@ class _Read:
     def _event(self, kind: str, value: Any) -> Event:
         if kind in ("patch", "turned"):
             return PatchTurned(Patch.model_validate(self._turned(kind, value)))
-        event = _CHECKED[kind].validate_python(value)
-        for name, limits in _LIMITS.items():
-            if getattr(event, name, None) is not None:
-                _within(getattr(event, name), limits)
-        if isinstance(event, Bend | Controller):
-            _within(event.value, _VALUES[type(event)])
-        if isinstance(event, NoteOn) and event.place is not None:
-            for each in event.place:
-                _within(each, (-_LARGEST_PLACE, _LARGEST_PLACE))
-        return event
+        return _CHECKED[kind].validate_python(value)
 
     def _turned(self, kind: str, value: Any) -> dict[str, Any]:
         if kind == "patch":

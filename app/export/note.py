@@ -16,12 +16,13 @@ from app.export.files import WavReport, export_sounds
 from app.export.sound import VOICES, SoundRequest, render_voices
 from app.export.struck import Struck
 from app.shared.key_names import note_name
-from app.shared.vocabulary import Pickup, PlayedSource, Source
+from app.shared.vocabulary import PlayedSource, Source
 from app.shared.worker import Progress
 from engine.plain_text import duration
 from engine.pluck import Pluck
 from engine.presets import load_preset, of_string
-from engine.resonators.string import StringParameters
+from engine.values.ear import Pickup
+from engine.values.string import StringParameters
 
 LONGEST_NAME = 80  # characters of an instrument's name
 LEAST_MM = 0.05  # softer plucks count as this soft

@@ -10,21 +10,23 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import Field
 
 from app.audio.sound_file import UnreadableSound, open_sound
 from app.export.sound import LONGEST_S, SoundRequest, Through
 from app.export.struck import StruckKey
 from app.export.wav import RATE_RANGE_HZ, WavSettings
+from app.patches.fields import String
+from app.shared.value import Value
 from app.shared.version import PROGRAM, program_version
-from app.shared.vocabulary import DIFFERENCE, Bits, Pickup, PlayedSource, Source
+from app.shared.vocabulary import DIFFERENCE, Bits, PlayedSource, Source
 from engine.bounds import HIGHEST_RATE_HZ, SIZES
 from engine.levels import FULL_SCALE_M
 from engine.plain_text import name_text, one_line
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetError, of_string, preset_digest
-from engine.resonators.string import StringParameters
-from engine.schema import parse_json, read
+from engine.schema import explained, parse_json
+from engine.values.ear import Pickup
 
 # fields of `SoundRequest`
 REQUESTED = ("pluck", "listen", "listen_right", "pickup", "seconds", "decay_db", "source", "through")
@@ -45,7 +47,7 @@ class NotesElsewhere(RecipeError):
     """The error that a file was played on an instrument: its notes are in a MIDI file."""
 
 
-class InstrumentSound(BaseModel):
+class InstrumentSound(Value):
     """A performance on an instrument: recorded in the window, or rendered from a MIDI file.
 
     Attributes:
@@ -55,8 +57,6 @@ class InstrumentSound(BaseModel):
         midi: the name of the MIDI file with the notes.
         recorded: when the recording began, in ISO 8601; None: it is none.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     format: Literal[1] = 1
     kind: Literal["instrument"] = "instrument"
@@ -86,7 +86,7 @@ def source_words(source: str, difference_gain_db: float) -> str:
     return f"the difference of model and truth at {difference_gain_db:+g} dB"
 
 
-class Recipe(BaseModel):
+class Recipe(Value):
     """Fields as in `SoundRequest` and `WavSettings`; a field that is absent has its default.
 
     Attributes:
@@ -95,8 +95,6 @@ class Recipe(BaseModel):
         horizon_s: the training horizon, past which the model extrapolates.
         full_scale_m: the displacement that is 0 dBFS, of a string alone.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     format: Literal[1] = 1
     program: str
@@ -118,16 +116,10 @@ class Recipe(BaseModel):
     bits: Bits
     normalise: bool
     fade_out_s: float = Field(0.010, ge=0, le=LONGEST_S)
-    string: StringParameters | None = None
+    string: String | None = None
     modes: int | None = Field(None, ge=1, le=SIZES["grid_points"][1])
     through: Through | None = None
     struck: StruckKey | None = None
-
-    @field_validator("string", mode="before")
-    @classmethod
-    def _check_string(cls, data: object) -> object:
-        """Checks it as a string in a preset: no unknown field, no text for a number, all within their bounds."""
-        return data if data is None or isinstance(data, StringParameters) else read(StringParameters, data, "string")
 
     @classmethod
     def of(cls, request: SoundRequest, settings: WavSettings) -> Recipe:
@@ -199,11 +191,9 @@ def read_origin(path: Path) -> Recipe | InstrumentSound:
         data = parse_json(text, "the text")
         played = isinstance(data, dict) and "kind" in data
         return InstrumentSound.model_validate(data) if played else Recipe.model_validate(data)
-    except ValidationError as error:
-        first = error.errors(include_url=False, include_input=False)[0]
-        field = ".".join(map(str, first["loc"])) or "the text"
-        raise _unusable(path, f"{field}: {first['msg']}") from error
-    except (ValueError, OverflowError) as error:  # raised for numbers that are too long
+    except ValueError as error:
+        raise _unusable(path, explained(error)) from error
+    except OverflowError as error:  # raised for numbers that are too long
         raise _unusable(path, str(error)) from error
 
 

@@ -12,20 +12,24 @@ from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.export.recording import BLOCK_FRAMES, Recording, Sound, blocks
 from app.export.struck import Struck
 from app.instrument.bodies import body_digest
 from app.instrument.effects import channels_of, effects_from
-from app.patches.patch import Amp, Body, Room
-from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, PICKUPS, Pickup, Source
+from app.patches.patch import Body
+from app.shared.value import Value
+from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB, Source
 from app.shared.worker import Progress
+from engine import bounds
 from engine.effects import Effects
 from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.sources import ModelSource, Runaway
-from engine.voices import Ear, model_program, truth_program, voice_blocks
+from engine.values.ear import PICKUPS, Ear, Pickup
+from engine.values.effects import Amp, Room
+from engine.voices import model_program, truth_program, voice_blocks
 
 Voice = Literal["model", "truth"]
 VOICES: tuple[Voice, ...] = get_args(Voice)
@@ -39,7 +43,7 @@ LEVEL_WINDOW_S = 0.05  # several periods of a low string, so that its level does
 Samples = NDArray[np.float64]
 
 
-class Through(BaseModel):
+class Through(Value):
     """The parts that an instrument added to a string plucked by hand, in recipes of earlier versions.
 
     Attributes:
@@ -48,8 +52,6 @@ class Through(BaseModel):
         level_db: of the instrument, in `gain` too: its amplifier does not count it as drive.
         body_sha256: of the file of a body of the user's own.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     instrument: str
     gain: float = Field(ge=0, le=MOST_GAIN)
@@ -105,20 +107,18 @@ class SoundRequest:
 
     def __post_init__(self) -> None:
         for name, point in (("listening point", self.listen), ("right listening point", self.listen_right)):
-            if point is not None and not 0 <= point <= 1:
-                raise ValueError(f"{name} must lie in 0 … 1, not {point:g}")
+            if point is not None:
+                bounds.check(name, point, (0, 1))
         if not 1 / self.preset.info.rate_hz <= self.seconds <= LONGEST_S:
             raise ValueError(f"seconds must be above 0 and at most {LONGEST_S:g}, not {self.seconds:g}")
-        for name, value, known in (("source", self.source, SOURCES), ("pickup", self.pickup, PICKUPS)):
-            if value not in known:
-                raise ValueError(f"{name} {value!r} is not one of {', '.join(known)}")
+        bounds.check_choice("source", self.source, SOURCES)
+        bounds.check_choice("pickup", self.pickup, PICKUPS)
         stereo = self.listen_right is not None or self.effects is not None or self.struck is not None
         if self.source == "both" and stereo:
             raise ValueError("model and truth cannot share one file in stereo; choose two files, or mono")
         if self.through is not None and self.struck is not None:
             raise ValueError("an instrument plays a key, or is added to a pluck; leave out one of the two")
-        _check("decay_db", self.decay_db, DECAY_RANGE_DB)
-        _check("difference_gain_db", self.difference_gain_db, DIFFERENCE_GAIN_RANGE_DB)
+        bounds.check_all(self, {"decay_db": DECAY_RANGE_DB, "difference_gain_db": DIFFERENCE_GAIN_RANGE_DB})
 
     @property
     def effects(self) -> Effects | None:
@@ -280,8 +280,3 @@ def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Callabl
         recording.append(block)
     assert recording is not None
     return recording
-
-
-def _check(name: str, value: float | None, limits: tuple[float, float]) -> None:
-    if value is not None and not limits[0] <= value <= limits[1]:
-        raise ValueError(f"{name} must lie in {limits[0]:g} … {limits[1]:g}, not {value:g}")

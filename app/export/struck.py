@@ -9,7 +9,7 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.instrument.bodies import body_digest
 from app.instrument.events import KEYS, NoteOn, TimedEvent
@@ -19,6 +19,7 @@ from app.patches.fields import Name
 from app.patches.library import list_patches
 from app.patches.patch import Patch
 from app.shared.key_names import note_name
+from app.shared.value import Value
 from engine.pluck import Pluck
 from engine.presets import Preset
 
@@ -26,7 +27,7 @@ QUIET_FOR_S = 1.0  # longer than strings beat
 Side = Annotated[float, Field(ge=-1, le=1)]
 
 
-class StruckKey(BaseModel):
+class StruckKey(Value):
     """Names the instrument, as the library has it, and says how its key is struck.
 
     Attributes:
@@ -34,8 +35,6 @@ class StruckKey(BaseModel):
         channel: of MIDI, which chooses the string of a guitar; `KEYS`: none.
         place, pluck: of a drum and of a string, as in `NoteOn`.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     instrument: Name
     instrument_sha256: str

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from app.export.recording import Sound, blocks
 from app.shared.vocabulary import BITS, Bits
+from engine import bounds
 
 T = TypeVar("T")
 RATE_RANGE_HZ = (1_000, 384_000)
@@ -49,11 +50,8 @@ class WavSettings:
     fade_out_s: float = 0.010
 
     def __post_init__(self) -> None:
-        if self.bits not in BITS:
-            raise ValueError(f"bits {self.bits!r} is not one of {', '.join(BITS)}")
-        low, high = RATE_RANGE_HZ
-        if self.rate_hz is not None and not low <= self.rate_hz <= high:
-            raise ValueError(f"rate must lie in {low} … {high} Hz, not {self.rate_hz}")
+        bounds.check_choice("bits", self.bits, BITS)
+        bounds.check_all(self, {"rate_hz": RATE_RANGE_HZ})
         if not self.fade_out_s >= 0:
             raise ValueError(f"fade_out_s must not be negative, not {self.fade_out_s}")
 

@@ -12,7 +12,7 @@ from app.patches.patch import Patch
 from engine.pluck import Pluck
 from engine.presets import PresetInfo, outside_training
 from engine.presets.of_string import info_of_string
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 
 
 def outside_of_key(info: PresetInfo, patch: Patch, event: NoteOn, string: int | None = None) -> list[str]:

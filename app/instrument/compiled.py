@@ -33,7 +33,8 @@ from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.kernels import constants as of
 from engine.presets import Preset
-from engine.voices import CompiledPlayer, Ear
+from engine.values.ear import Ear
+from engine.voices import CompiledPlayer
 from engine.voices.player import Report, Ringing, Table
 
 STOP_S = 0.03

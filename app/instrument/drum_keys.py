@@ -8,7 +8,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,13 +16,14 @@ from app.patches.drums import Drums, PlayedDrum
 from app.patches.patch import VELOCITIES, Patch
 from app.patches.tuning import Tuning
 from engine.kernels import constants as of
+from engine.kernels import drum_modes as kernel
 from engine.kernels.records import DRUM, DRUM_ROWS
 from engine.resonators.base import Array
+from engine.resonators.drum import DrumModes, modes_of, numbers_of, tune
+from engine.resonators.surface import tools
 from engine.strike import Strike
-from engine.voices import Ear
-
-if TYPE_CHECKING:  # compiled functions that strings do without
-    from engine.resonators.drum import DrumModes, DrumParameters
+from engine.values.drum import DrumParameters
+from engine.values.ear import Ear
 
 NEAREST_RIM = 0.98  # of half a drum: at the rim itself nothing moves
 
@@ -56,7 +56,7 @@ class DrumKey:
         share = min(1.0, max(0.0, (velocity - low) / (high - low))) ** (4**-curve)
         played = self.played
         speed = played.softest_m_s * (played.hardest_m_s / played.softest_m_s) ** share
-        return Strike(played.place, speed, played.mallet.mallet)
+        return Strike(played.place, speed, played.mallet)
 
     @property
     def pitch_hz(self) -> float:
@@ -124,7 +124,7 @@ class DrumKeys:
         return DrumKey(key, played, modes, self.ear.points)
 
     def _modes(self, played: PlayedDrum, ratio: float) -> DrumModes:
-        knobs, drum = self.patch.knobs, played.drum.parameters
+        knobs, drum = self.patch.knobs, played.drum
         drum = replace(
             drum,
             damping_d1_kg_m2_s=drum.damping_d1_kg_m2_s * knobs.decay,
@@ -141,19 +141,16 @@ class DrumKeys:
 
 @lru_cache(maxsize=256)
 def tuned(drum: DrumParameters, ratio: float, highest_hz: float) -> DrumModes:
-    """The modes of a drum whose pitch is raised by a ratio; see `DrumParameters.tuned`.
+    """The modes of a drum whose pitch is raised by a ratio; see `engine.resonators.drum.tune`.
 
     Raises:
         ValueError: it is out of its bounds then, or has no mode.
     """
-    return drum.tuned(ratio, highest_hz).modes(highest_hz, of.MOST_DRUM_MODES)
+    return modes_of(tune(drum, ratio, highest_hz), highest_hz, of.MOST_DRUM_MODES)
 
 
 def block_of(found: DrumKey) -> Array:
     """The drum of a key as the kernels read it: see `records.DRUM`."""
-    from engine.kernels import drum_modes as kernel
-    from engine.resonators.surface import tools
-
     modes = len(found.modes)
     block = np.zeros(DRUM.itemsize // 8 + DRUM_ROWS * modes)
     drum = struck_drum(found.played, found.modes.drum)
@@ -165,4 +162,4 @@ def struck_drum(played: PlayedDrum, drum: DrumParameters) -> Array:
     """A drum with its blow, as the kernels have it."""
     mallet, place = played.mallet, on_the_drum(played, played.place)
     blow = *place, mallet.mass_kg, mallet.radius_m, mallet.contact_s, played.softest_m_s, played.hardest_m_s
-    return np.concatenate([drum.numbers, blow])
+    return np.concatenate([numbers_of(drum), blow])

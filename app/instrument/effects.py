@@ -7,11 +7,10 @@ from numpy.typing import NDArray
 
 from app.audio.impulse_file import ImpulseError
 from app.instrument.bodies import own_impulse
-from app.patches.patch import Amp as ChosenAmp
 from app.patches.patch import Body as ChosenBody
 from app.patches.patch import Patch
-from app.patches.patch import Room as ChosenRoom
-from engine.effects import BODIES, Amp, Body, Effects, Room
+from engine.effects import BODIES, Body, Effects
+from engine.values.effects import Amp, Room
 
 
 def effects_of(patch: Patch) -> Effects | None:
@@ -22,12 +21,13 @@ def effects_of(patch: Patch) -> Effects | None:
     return effects_from(patch.body, patch.room, patch.amp, patch.level_db)
 
 
-def effects_from(chosen: ChosenBody, room: ChosenRoom, amp: ChosenAmp, level_db: float) -> Effects | None:
+def effects_from(chosen: ChosenBody, room: Room, amp: Amp, level_db: float) -> Effects | None:
     """Build effects as `effects_of`; the level is behind the amplifier, and changes no drive."""
-    body = _body(chosen)[0]
-    made = Room(room.mix, room.t60_s) if room.mix > 0 else None
-    driven = Amp(amp.drive_db, amp.tone_db, level_db) if amp.drive_db > 0 else None
-    return None if body is None and made is None and driven is None else Effects(body, made, driven)
+    driven = amp.drive_db > 0
+    made = Effects(
+        _body(chosen)[0], room if room.mix > 0 else None, amp if driven else None, level_db if driven else 0.0
+    )
+    return None if made == Effects() else made
 
 
 def added_words(patch: Patch) -> str:

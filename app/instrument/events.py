@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Annotated
 
+from app.patches.fields import ranged
 from app.patches.patch import Patch
 from engine.pluck import Pluck
 
@@ -39,6 +41,9 @@ _FIXED = {  # functions of controllers that no patch changes; those from 120 on 
 }
 LONGEST_RECORDING = 100_000  # events
 KEYS = 16  # what is played on the computer's keys and on the screen: no channel of MIDI's
+Number = Annotated[int, ranged(0, 127)]  # of MIDI
+Channel = Annotated[int, ranged(0, KEYS)]
+Side = Annotated[float, ranged(-2, 2)]  # in half-lengths of a drum, which a blow may miss
 
 
 @dataclass(frozen=True)
@@ -52,11 +57,11 @@ class NoteOn:
         string: on which string of a set, from the highest, 0; None: the channel or the key chooses.
     """
 
-    key: int
-    velocity: int
-    channel: int = 0
-    place: tuple[float, float] | None = None
-    string: int | None = None
+    key: Number
+    velocity: Number
+    channel: Channel = 0
+    place: tuple[Side, Side] | None = None
+    string: Number | None = None
     pluck: Pluck | None = None
 
 
@@ -64,9 +69,9 @@ class NoteOn:
 class NoteOff:
     """A key is released; with `string`, only on that string."""
 
-    key: int
-    channel: int = 0
-    string: int | None = None
+    key: Number
+    channel: Channel = 0
+    string: Number | None = None
 
 
 @dataclass(frozen=True)
@@ -76,17 +81,17 @@ class Bend:
     The range is the patch's, unless messages set another (RPN 0).
     """
 
-    value: float
-    channel: int = 0
+    value: Annotated[float, ranged(-1, 1)]
+    channel: Channel = 0
 
 
 @dataclass(frozen=True)
 class Controller:
     """A controller moves to 0 … 127."""
 
-    number: int
-    value: int
-    channel: int = 0
+    number: Number
+    value: Number
+    channel: Channel = 0
 
 
 @dataclass(frozen=True)

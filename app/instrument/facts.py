@@ -12,7 +12,7 @@ from app.patches.patch import Patch
 from app.shared.key_names import note_name
 from app.shared.parameters import OF_PATCHES
 from engine.resonators.family import BRIGHT_HZ, inharmonicity
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 
 HALVINGS = 40  # of a knob's range, until it stands at a wanted figure
 SLOWEST = 1e-9  # decay rate in 1/s, shown for a string without damping

@@ -25,7 +25,8 @@ from app.patches.patch import VELOCITIES, Patch
 from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.excitation import blow_factor
 from engine.resonators.sine_transform import analysis_matrix
-from engine.voices import Ear
+from engine.resonators.string import tension_coupling, undamped_frequencies, wavenumbers
+from engine.values.ear import Ear
 
 START_S = 0.1  # of a note, over which its pitch is averaged
 GRID_POINTS = 101
@@ -59,7 +60,7 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
             pulled = np.minimum(string.shortened, LARGEST_AMPLITUDE_MM / amplitudes_mm)
             sets_out_m = modal_m[:, : string.modes] * pulled[:, None]
             if patch.pluck.is_blow:
-                omega = string.parameters.undamped_frequencies(string.modes)
+                omega = undamped_frequencies(string.parameters, string.modes)
                 sets_out_m = sets_out_m * np.stack(blows) * (omega[0] / omega)
             found[key] = _of_string(patch, string, sets_out_m)
     found.setflags(write=False)
@@ -84,6 +85,6 @@ def _of_string(patch: Patch, string: KeyString, modal_m: NDArray[np.float64]) ->
     parameters, modes = string.parameters, string.modes
     decayed = 2 * START_S * decay_rates(patch, parameters, modes)
     decayed = np.maximum(decayed, 1e-9)  # a string may be without damping
-    squares = (modal_m[:, :modes] * parameters.wavenumbers(modes)) ** 2 * (-np.expm1(-decayed) / decayed)
-    coupling = float(parameters.tension_coupling(1)[0]) / parameters.undamped_frequency(1) ** 2
+    squares = (modal_m[:, :modes] * wavenumbers(parameters, modes)) ** 2 * (-np.expm1(-decayed) / decayed)
+    coupling = float(tension_coupling(parameters, 1)[0]) / parameters.undamped_frequency(1) ** 2
     return np.asarray(600 * np.log2(1 + coupling * (squares.sum(1) / 2 + squares[:, 0] / 4)))

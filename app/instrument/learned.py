@@ -9,7 +9,7 @@ import io
 import json
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,12 +21,12 @@ from scipy.signal import resample_poly
 from app.audio.note_file import NoteFileError, read_note
 from app.instrument.bodies import own_bodies
 from app.instrument.learned_attack import attack_of, with_attack
-from app.patches.fields import explained
 from app.patches.library import PatchError, file_stem, own_patches, save_patch
-from app.patches.patch import Body, Category, Fretted, Patch, PhysicalString, Pickup, PluckChoices
+from app.patches.patch import Body, Category, Fretted, Patch, Pickup, PluckChoices
 from engine.folders import usable_files, user_folder
 from engine.presets import load_preset
 from engine.result_file import WriteError, explain, whole_file
+from engine.schema import explained
 from training.recording.fit import FREE_POLES
 from training.recording.joint import combined
 from training.recording.learn import Learned, examined, learn
@@ -196,7 +196,7 @@ def _patch(name: str, stem: str, learned: Learned, partials: int, kind: Kind) ->
             category=CATEGORIES[kind],
             description=f"Learned from a recording of {learned.physics.f0_hz:.1f} Hz.",
             preset=stem,
-            strings=Fretted(string=PhysicalString(**asdict(learned.strung.string))),
+            strings=Fretted(string=learned.strung.string),
             range=(max(0, key - REACH_KEYS), min(127, key + REACH_KEYS)),
             pluck=PluckChoices(
                 shape="triangular",

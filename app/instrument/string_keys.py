@@ -12,8 +12,8 @@ from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
-from engine.resonators.polarised import Polarisations
-from engine.voices import Ear
+from engine.values.ear import Ear
+from engine.values.string import Polarisations
 
 
 class StringKeys:
@@ -56,7 +56,7 @@ class StringKeys:
 def polarisations_of(patch: Patch, preset: PresetInfo) -> Polarisations | None:
     """The polarisations of a patch. None: its strings move in one direction, or as a recording says."""
     chosen = patch.polarisations
-    return None if chosen is None or preset.recorded is not None else Polarisations(**chosen.model_dump())
+    return None if chosen is None or preset.recorded is not None else chosen
 
 
 def on_string(string: KeyString, pluck: Pluck) -> Pluck:

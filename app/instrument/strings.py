@@ -15,8 +15,9 @@ from app.patches.drums import Drums
 from app.patches.patch import Fretted, Knobs, Patch, StringSet
 from app.patches.tuning import Tuning
 from engine.kernels.constants import HIGHEST_HZ, MOST_MODES, MOST_SLACKENED
-from engine.resonators.losses import Losses
-from engine.resonators.string import StringParameters
+from engine.resonators import string as law
+from engine.resonators.losses import loss_rates
+from engine.values.string import StringParameters
 
 STRING = tuple(field.name for field in fields(StringParameters))
 KNOBS = tuple(Knobs.model_fields)  # in the order of the kernels
@@ -91,12 +92,12 @@ class Strings:
         strings = self._patch.strings
         assert not isinstance(strings, Drums)
         if isinstance(strings, Fretted):
-            return turned(strings.string.parameters, self._patch.knobs)
+            return turned(strings.string, self._patch.knobs)
         ordered = strings.strings[::-1]
         if number is None or number >= len(ordered) or key < ordered[number].note - MOST_SLACKENED:
             number = chosen_string(strings, key)
         chosen = ordered[number]
-        own = turned(chosen.string.parameters, self._patch.knobs)
+        own = turned(chosen.string, self._patch.knobs)
         if key >= chosen.note:
             return own
         return bent(own, self._tuning.hz(key) / self._tuning.hz(chosen.note))  # slackened
@@ -187,8 +188,7 @@ def decay_rates(patch: Patch, string: StringParameters, modes: int) -> NDArray[n
 
     They follow from its own losses: d₁, d₃, and those by mode.
     """
-    rates, knobs = string.decay_rates(modes), patch.knobs
+    rates, knobs = law.decay_rates(string, modes), patch.knobs
     if patch.losses is not None:
-        by_mode = Losses(**patch.losses.model_dump())
-        rates = rates + by_mode.rates(string, modes, knobs.decay, knobs.brightness_decay)
+        rates = rates + loss_rates(patch.losses, string, modes, knobs.decay, knobs.brightness_decay)
     return rates

@@ -2,72 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from app.patches.fields import Key, Name, Value, ranged
-from engine import bounds
-
-if TYPE_CHECKING:
-    from engine.resonators.drum import DrumParameters
-    from engine.strike import Mallet
+from app.patches.fields import Drum, Key, Name, ranged
+from app.shared.value import Value
+from engine.values.drum import Mallet
 
 MOST_DRUMS = 32
 HIGHEST_HZ = 6_000.0  # of a drum's modes, where the patch does not say
 Side = Annotated[float, ranged(-1, 1)]
-
-
-class PhysicalDrum(Value):
-    """The parameters of `DrumParameters`; this class does not need the engine to be loaded."""
-
-    shape: Literal["circle", "rectangle", "bar"]
-    length_m: Annotated[float, ranged(*bounds.DRUM["length_m"])]
-    width_m: Annotated[float, ranged(*bounds.DRUM["width_m"])]
-    thickness_m: Annotated[float, ranged(*bounds.DRUM["thickness_m"])]
-    density_kg_m3: Annotated[float, ranged(*bounds.DRUM["density_kg_m3"])]
-    youngs_modulus_pa: Annotated[float, ranged(*bounds.DRUM["youngs_modulus_pa"])]
-    poisson: Annotated[float, ranged(*bounds.DRUM["poisson"])]
-    tension_n_m: Annotated[float, ranged(*bounds.DRUM["tension_n_m"])]
-    damping_d1_kg_m2_s: Annotated[float, ranged(*bounds.DRUM["damping_d1_kg_m2_s"])]
-    damping_d3_kg_s: Annotated[float, ranged(*bounds.DRUM["damping_d3_kg_s"])]
-    uneven: Annotated[float, ranged(*bounds.DRUM["uneven"])] = 0.0
-    air_kg_m3: Annotated[float, ranged(*bounds.DRUM["air_kg_m3"])] = 0.0
-    cavity_m3: Annotated[float, ranged(*bounds.DRUM["cavity_m3"])] = 0.0
-    shell_m: Annotated[float, ranged(*bounds.DRUM["shell_m"])] = 0.0
-
-    @property
-    def parameters(self) -> DrumParameters:
-        """The same for the engine, which this loads. Raises ValueError: they do not go together."""
-        from engine.resonators.drum import DrumParameters  # brings NumPy and SciPy
-
-        return DrumParameters(**self.model_dump())
-
-    @model_validator(mode="after")
-    def _sides_fit(self) -> Self:
-        longer, shorter = max(self.length_m, self.width_m), min(self.length_m, self.width_m)
-        if self.shape == "circle" and longer > 1.2 * shorter:
-            raise ValueError("length_m and width_m of a circle are its two diameters; make them alike")
-        if self.thickness_m > (self.length_m if self.shape == "bar" else shorter) / 10:
-            raise ValueError("thickness_m must be below a tenth of the sides; choose a thinner one")
-        if self.shell_m and (self.cavity_m3 or not self.air_kg_m3):
-            raise ValueError("shell_m is of an open shell in air; set cavity_m3 to 0 and air_kg_m3, or shell_m to 0")
-        return self
-
-
-class PhysicalMallet(Value):
-    """The mallet of a drum, as `Mallet`."""
-
-    mass_kg: Annotated[float, ranged(*bounds.MALLET["mass_kg"])] = 0.015
-    radius_m: Annotated[float, ranged(*bounds.MALLET["radius_m"])] = 0.005
-    contact_s: Annotated[float, ranged(*bounds.MALLET["contact_s"])] = 0.004
-
-    @property
-    def mallet(self) -> Mallet:
-        """The same for the engine, which this loads."""
-        from engine.strike import Mallet
-
-        return Mallet(**self.model_dump())
 
 
 class PlayedDrum(Value):
@@ -81,8 +26,8 @@ class PlayedDrum(Value):
 
     note: Key
     name: Name
-    drum: PhysicalDrum
-    mallet: PhysicalMallet = PhysicalMallet()
+    drum: Drum
+    mallet: Mallet = Mallet()
     place: tuple[Side, Side] = (0.3, 0.1)
     softest_m_s: Annotated[float, ranged(0.001, 30)] = 0.2
     hardest_m_s: Annotated[float, ranged(0.001, 30)] = 8.0

@@ -1,13 +1,17 @@
-"""Fields of patches: checked numbers, names and texts, and why one was refused."""
+"""Fields of patches: checked numbers, names and texts."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import fields
+from functools import partial
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BeforeValidator, Field
 
-from app.shared.parameters import OF_PATCHES
-from engine import bounds
+from app.shared.parameters import OF_CHOICES, OF_PATCHES
+from engine.values.drum import DrumParameters
+from engine.values.string import StringParameters
 
 LONGEST_NAME = 60  # characters
 LONGEST_DESCRIPTION = 400
@@ -37,28 +41,16 @@ def _lines(text: str) -> str:
     return text
 
 
-def explained(error: ValueError) -> str:
-    """The first field that was refused, in words: its path, what it must be, and what was found."""
-    if not isinstance(error, ValidationError):
-        return str(error)
-    first = error.errors(include_url=False, include_context=False)[0]
-    field = ".".join(str(part) for part in first["loc"])[:100]
-    said = first["msg"].removeprefix("Value error, ")
-    found = first["input"]
-    shown = f", found {bounds.brief(found)}" if isinstance(found, str | float | int | None) else ""
-    return f"{field}: {said}{shown}" if field else said
-
-
 def ranged(low: float, high: float) -> Any:
     """A field with a range."""
     return Field(ge=low, le=high, strict=True, allow_inf_nan=False)
 
 
 def parameter(id: str) -> Any:
-    """A field with range and default of the table of parameters."""
-    declared = OF_PATCHES[id]
+    """A field with range and default of the table of parameters. In files of instruments a text is no number."""
+    declared = OF_PATCHES.get(id) or OF_CHOICES[id]
     low, high = declared.limits
-    return Field(declared.default, ge=low, le=high, strict=True, allow_inf_nan=False)
+    return Field(declared.default, ge=low, le=high, strict=id in OF_PATCHES, allow_inf_nan=False)
 
 
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_safe)]
@@ -70,7 +62,17 @@ Share = Annotated[float, ranged(0, 1)]
 Flag = Annotated[bool, Field(strict=True)]
 
 
-class Value(BaseModel):
-    """A part of a patch: immutable, without unknown fields."""
+def _given_whole(kind: type, data: Any) -> Any:
+    """The data of a string or a drum. Raises ValueError: a parameter is not given whose default is not 0.
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    The engine's default is a string or drum of its own, parts of which no other shall have.
+    """
+    if isinstance(data, Mapping):
+        missing = [each.name for each in fields(kind) if each.default != 0 and each.name not in data]
+        if missing:
+            raise ValueError(f"{', '.join(missing)} must be given; add what is missing")
+    return data
+
+
+String = Annotated[StringParameters, BeforeValidator(partial(_given_whole, StringParameters))]
+Drum = Annotated[DrumParameters, BeforeValidator(partial(_given_whole, DrumParameters))]

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Discriminator, Tag
+from pydantic import Discriminator, Tag
 
 from app.patches.patch import Patch
+from app.shared.value import Value
 
 
-class SingleString(BaseModel):
+class SingleString(Value):
     """A preset that is plucked at places along its string, which rings until it is silent.
 
     Attributes:
         preset: the name of its file without the suffix; "": none.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     preset: str = ""
 

@@ -11,14 +11,14 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 
-from app.patches.fields import LONGEST_NAME, explained
+from app.patches.fields import LONGEST_NAME
 from app.patches.patch import CATEGORIES, Patch
 from engine import bounds
 from engine.folders import user_folder
 from engine.plain_text import name_text, one_line
 from engine.read_file import read_bounded
 from engine.result_file import WriteError, explain, whole_file
-from engine.schema import SchemaError, parse_json
+from engine.schema import SchemaError, explained, parse_json
 
 SHIPPED = Path(__file__).parents[2] / "presets" / "patches"
 SUFFIX = ".json"

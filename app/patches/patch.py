@@ -9,21 +9,35 @@ from __future__ import annotations
 import contextlib
 import itertools
 import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
+from dataclasses import replace
+from typing import Annotated, Any, Literal, Self, get_args
 
-from pydantic import AfterValidator, Field, ValidationError, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
 from app.patches.drums import Drums
-from app.patches.fields import LONGEST_NAME, Flag, Key, Name, Reference, Share, Text, Value, parameter, plain, ranged
+from app.patches.fields import (
+    LONGEST_NAME,
+    Flag,
+    Key,
+    Name,
+    Reference,
+    Share,
+    String,
+    Text,
+    parameter,
+    plain,
+    ranged,
+)
 from app.patches.tuning import TuningChoice
 from app.shared.parameters import MOST_MACROS, OF_PATCHES, modulated_by
-from app.shared.vocabulary import Pickup as PickupKind
+from app.shared.value import Value
 from engine import bounds
 from engine.contact import Exciter
 from engine.pluck import DEFAULT_LISTEN, Pluck, Shape
-
-if TYPE_CHECKING:
-    from engine.resonators.string import StringParameters
+from engine.schema import explained
+from engine.values.ear import Pickup as PickupKind
+from engine.values.effects import Amp, Room
+from engine.values.string import Losses, Polarisations
 
 Category = Literal["guitar", "bass", "harp", "keys", "world", "drums", "experimental"]
 CATEGORIES: tuple[Category, ...] = get_args(Category)
@@ -36,43 +50,18 @@ MOST_TARGETS = 8
 VELOCITIES = (1, 127)
 
 
-class PhysicalString(Value):
-    """The eight parameters of `StringParameters`; this class does not need the engine to be loaded."""
-
-    length_m: Annotated[float, ranged(*bounds.STRING["length_m"])]
-    area_m2: Annotated[float, ranged(*bounds.STRING["area_m2"])]
-    second_moment_m4: Annotated[float, ranged(*bounds.STRING["second_moment_m4"])]
-    density_kg_m3: Annotated[float, ranged(*bounds.STRING["density_kg_m3"])]
-    youngs_modulus_pa: Annotated[float, ranged(*bounds.STRING["youngs_modulus_pa"])]
-    damping_d1_kg_m_s: Annotated[float, ranged(*bounds.STRING["damping_d1_kg_m_s"])]
-    damping_d3_kg_m_s: Annotated[float, ranged(*bounds.STRING["damping_d3_kg_m_s"])]
-    tension_n: Annotated[float, ranged(*bounds.STRING["tension_n"])]
-
-    @property
-    def parameters(self) -> StringParameters:
-        """The same for the engine, which this loads."""
-        from engine.resonators.string import StringParameters  # brings NumPy
-
-        return StringParameters(**self.model_dump())
-
-    @property
-    def first_hz(self) -> float:
-        """The frequency of its first mode, undamped."""
-        return self.parameters.undamped_frequency(1) / math.tau
-
-
 class Fretted(Value):
     """A string that is shortened for each key to the length of its pitch."""
 
     kind: Literal["fretted"] = "fretted"
-    string: PhysicalString
+    string: String
 
 
 class OpenString(Value):
     """A string of a set, and the MIDI key of its whole length."""
 
     note: Key
-    string: PhysicalString
+    string: String
 
 
 class StringSet(Value):
@@ -208,28 +197,6 @@ class Pickup(Value):
         return self
 
 
-def _polarisation(name: str) -> Any:
-    return ranged(*bounds.POLARISATIONS[name][0])
-
-
-class Polarisations(Value):
-    """Motion across the string in two directions, by `engine.resonators.polarised`.
-
-    Attributes:
-        angle_deg: of the pluck, from the direction that is normal to the soundboard.
-        second_heard: what motion along the board is heard with, of motion normal to it.
-        second_cents: pitch of motion along the board, above the other.
-        conductance_s_kg, second_conductance_s_kg: of the bridge in both directions: more lets them decay sooner.
-            The decay knob multiplies both.
-    """
-
-    angle_deg: Annotated[float, _polarisation("angle_deg")] = 45.0
-    second_heard: Annotated[float, _polarisation("second_heard")] = 0.3
-    second_cents: Annotated[float, _polarisation("second_cents")] = 1.0
-    conductance_s_kg: Annotated[float, _polarisation("conductance_s_kg")] = 0.01
-    second_conductance_s_kg: Annotated[float, _polarisation("second_conductance_s_kg")] = 0.001
-
-
 class Course(Value):
     """Strings of a key that sound together, each with its own voice.
 
@@ -261,19 +228,6 @@ class Javari(Value):
     gap_um: float = parameter("javari.gap_um")
     stiffness_n_m: Annotated[float, ranged(1e3, 1e6)] = 3e4
     loss_s_m: Annotated[float, ranged(0, 10)] = 0.2
-
-
-class Losses(Value):
-    """Decay by mode, by `engine.resonators.losses`, in addition to d₁ and d₃ of the strings, which may be 0 then.
-
-    Attributes:
-        air: factor of the losses to the air; the decay knob multiplies it.
-        friction, bending: loss factors inside the string; the knob HF loss multiplies them.
-    """
-
-    air: Annotated[float, ranged(*bounds.LOSSES["air"])] = 1.0
-    friction: Annotated[float, ranged(*bounds.LOSSES["friction"])] = 2e-4
-    bending: Annotated[float, ranged(*bounds.LOSSES["bending"])] = 0.02
 
 
 class Noise(Value):
@@ -321,26 +275,12 @@ class Technique(Value):
     vibrato_hz: float = parameter("technique.vibrato_hz")
 
 
-class Amp(Value):
-    """The amplifier, through which the strings sound before the body: its drive (0: none) and its tone."""
-
-    drive_db: float = parameter("amp.drive_db")
-    tone_db: float = parameter("amp.tone_db")
-
-
 class Body(Value):
     """The body of the instrument: the name of an impulse response ("": none), mix and size (1: as it is)."""
 
     name: Reference = ""
     mix: float = parameter("body.mix")
     size: float = parameter("body.size")
-
-
-class Room(Value):
-    """The room: its mix (0: none), and its reverberation time."""
-
-    mix: float = parameter("room.mix")
-    t60_s: float = parameter("room.t60_s")
 
 
 class Target(Value):
@@ -451,10 +391,8 @@ class Patch(Value):
                 for value in (target.low, target.high):
                     try:
                         self._replacement(target.field, value)
-                    except ValidationError as error:
-                        raise ValueError(f"{where}: {error.errors()[0]['msg']}, found {value:g}") from error
                     except ValueError as error:
-                        raise ValueError(f"{where}: {error}") from error
+                        raise ValueError(f"{where}: {explained(error)}") from error
         return self
 
     def has(self, field: str) -> bool:
@@ -523,7 +461,9 @@ class Patch(Value):
         if not inner:  # the level, which is the patch's own
             bounds.check(name, value, OF_PATCHES[name].limits, "dB")
             return name, value
-        section: Value = getattr(self, name)
+        section: Any = getattr(self, name)
+        if not isinstance(section, Value):
+            return name, replace(section, **{inner[0]: float(value)})
         changed: Any = value
         if len(inner) == 2:
             entries = list(getattr(section, inner[0]))

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
+import numpy as np
 from pydantic import model_validator
 
-from app.patches.fields import HIGHEST_KEY, ScalaText, Value, explained, parameter
+from app.patches.fields import HIGHEST_KEY, ScalaText, parameter
 from app.patches.scala import Keymap, equal_steps, parse_keymap, parse_scale
+from app.shared.value import Value
 from engine.plain_text import one_line
 from engine.read_file import UnusableFile, read_bounded
-
-if TYPE_CHECKING:
-    import numpy as np
+from engine.schema import explained
 
 A4_KEY, MIDDLE_KEY = 69, 60
 SCALA_FILES = (".scl", ".kbm")
@@ -73,8 +73,6 @@ class Tuning:
         A key that the mapping leaves out has a pitch between those of its neighbours, for slides; whether a key is to
         sound, `mapped` says.
         """
-        import numpy as np  # patches are read without
-
         note += self._transpose
         if self._table is None:
             return float(self._a4_hz * 2 ** ((note - A4_KEY) / 12))
@@ -85,8 +83,6 @@ class Tuning:
 
         Keys that are left out stay silent.
         """
-        import numpy as np
-
         return self._table is None or bool(np.isin(key + self._transpose, self._table[0]))
 
 
@@ -117,8 +113,6 @@ def read_scala(path: Path) -> str:
 
 
 def _table(choice: TuningChoice) -> tuple[np.ndarray, np.ndarray]:
-    import numpy as np
-
     remedy = "give the text of a Scala file, or none"
     scale, mapping = equal_steps(), Keymap(0, HIGHEST_KEY, MIDDLE_KEY, A4_KEY, choice.a4_hz, 0, ())
     try:

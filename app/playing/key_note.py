@@ -12,7 +12,7 @@ from app.rendering import RenderRequest
 from app.rendering.subject import StringOf
 from engine.kernels import constants as of
 from engine.pluck import Pluck
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 from engine.voices import Mixer
 from engine.voices.player import Playing, Report
 

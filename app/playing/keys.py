@@ -38,7 +38,8 @@ from app.playing.sources import Sources
 from engine.effects import Effects
 from engine.kernels.constants import BEGAN
 from engine.presets import PresetError
-from engine.voices import Ear, Mixer
+from engine.values.ear import Ear
+from engine.voices import Mixer
 
 RELEASES = (SUSTAIN, SOUND_OFF, NOTES_OFF)  # controllers that may end what rings
 SEEN_DB = 70.0  # below full scale: softer strings do not light their keys

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, field_validator
+from pydantic import AfterValidator, Field, field_validator
 
 from app.instrument.events import Controller, fixed_function
 from app.patches.patch import Patch
 from app.shared.parameters import LEARNABLE, MACROS, OF_CHOICES
+from app.shared.value import Value
 
 LARGEST_VALUE = 127
 
@@ -24,7 +25,7 @@ def _learnable(field: str) -> str:
     return field
 
 
-class MidiChoices(BaseModel):
+class MidiChoices(Value):
     """The MIDI settings, to be saved.
 
     Attributes:
@@ -34,11 +35,9 @@ class MidiChoices(BaseModel):
             function of their own are left out, which earlier versions let be assigned.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     port: str = ""
     notes: NoteMode = "pitch"
-    controllers: dict[Annotated[str, AfterValidator(_learnable)], ControllerNumber] = {}
+    controllers: dict[Annotated[str, AfterValidator(_learnable)], ControllerNumber] = Field(default_factory=dict)
 
     @field_validator("controllers")
     @classmethod

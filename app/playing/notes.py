@@ -41,7 +41,8 @@ from app.shared.vocabulary import OTHER
 from engine.effects import Effects
 from engine.pluck import Pluck
 from engine.presets import PresetError
-from engine.voices import Ear, Mixer, Voice
+from engine.values.ear import Ear
+from engine.voices import Mixer, Voice
 
 MOST_NOTES = 40  # that ring at once; the oldest makes room
 STOLEN_S = 0.03  # the fade of one that makes room

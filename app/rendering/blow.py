@@ -22,7 +22,7 @@ from app.rendering.take import SOURCES, Listened
 from engine.levels import FULL_SCALE_PA
 from engine.resonators.base import Array
 from engine.strike import Strike
-from engine.voices import Ear
+from engine.values.ear import Ear
 
 if TYPE_CHECKING:
     from engine.resonators.drum import DrumModes

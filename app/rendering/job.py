@@ -15,7 +15,7 @@ from app.rendering.take import SOURCES, Listened, Motion, Take, picture_stride
 from app.shared.vocabulary import OTHER
 from engine.presets import PresetError
 from engine.sources import ModelSource
-from engine.voices import Ear
+from engine.values.ear import Ear
 
 FIRST_FRAMES = 256  # samples: small, so that a pluck is seen at once
 BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next pluck may have to wait for

@@ -15,7 +15,8 @@ from engine.presets import PresetInfo
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import project
 from engine.sources import Runaway, SourceState, StringSource
-from engine.voices import Ear, Program
+from engine.values.ear import Ear
+from engine.voices import Program
 
 
 class Line:

@@ -14,7 +14,8 @@ from engine.kernels.layout import QUANTUM, REACH
 from engine.levels import FULL_SCALE_M
 from engine.resonators.base import Array
 from engine.sources import Runaway, SourceState, StringSource
-from engine.voices import Ear, OfflineVoice, Program
+from engine.values.ear import Ear
+from engine.voices import OfflineVoice, Program
 
 FIRST_FRAMES = 2_048  # of a compiled voice; blocks double from this length
 BLOCK_FRAMES = 32_768  # up to this one

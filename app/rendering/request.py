@@ -10,7 +10,7 @@ from app.rendering.blow import BlowTake
 from app.rendering.subject import Subject
 from app.rendering.take import Take
 from engine.pluck import Pluck
-from engine.voices import Ear
+from engine.values.ear import Ear
 
 
 @dataclass(frozen=True)

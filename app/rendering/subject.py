@@ -7,7 +7,7 @@ from pathlib import Path
 
 from engine.presets import Preset, load_preset
 from engine.presets.of_string import of_string
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from engine.metrics import ErrorSums
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.sources import StringSource
-from engine.voices import Ear
+from engine.values.ear import Ear
 
 SOURCES = ("model", "truth")
 PICTURE_HZ = 6_000  # of a motion, at most: 24 pictures in a period of a B at 247 Hz

@@ -9,25 +9,22 @@ from collections.abc import Collection, Mapping
 from typing import Any
 
 from psygnal import Signal
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from app.patches.drums import Drums
+from app.patches.fields import String, parameter
 from app.patches.instrument import Instrument, SingleString
-from app.patches.patch import Patch, PhysicalString
+from app.patches.patch import Patch
 from app.session.listener import Listener, points_of
 from app.session.monitor import Monitor
 from app.shared.parameters import OF_CHOICES
+from app.shared.value import Value
 from app.shared.vocabulary import Face
 from engine.pluck import Pluck, Shape
+from engine.schema import explained
 
 
-def _parameter(name: str) -> Any:
-    """A field with range and default of the table of parameters."""
-    low, high = OF_CHOICES[name].limits
-    return Field(OF_CHOICES[name].default, ge=low, le=high)
-
-
-class PluckedString(BaseModel):
+class PluckedString(Value):
     """The string that is shown and how it is plucked: of the latest note, or as drawn.
 
     Attributes:
@@ -36,13 +33,11 @@ class PluckedString(BaseModel):
         amplitude_mm: in mm.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    string: PhysicalString | None = None
-    position: float = _parameter("position")
-    amplitude_mm: float = _parameter("amplitude_mm")
+    string: String | None = None
+    position: float = parameter("position")
+    amplitude_mm: float = parameter("amplitude_mm")
     shape: Shape = "gaussian"
-    width: float = _parameter("width")
+    width: float = parameter("width")
 
     @property
     def pluck(self) -> Pluck:
@@ -62,10 +57,10 @@ class Choices(Monitor, Listener, PluckedString):
 
     instrument: Instrument = SingleString()
     kept: Patch | None = None
-    seconds: float = _parameter("seconds")
+    seconds: float = parameter("seconds")
     loop: bool = False
-    volume_db: float = _parameter("volume_db")
-    speed: float = _parameter("speed")
+    volume_db: float = parameter("volume_db")
+    speed: float = parameter("speed")
     face: Face = "play"
     left_view: str = "spectrum"  # names of panels
     right_view: str = "waveform"
@@ -122,8 +117,7 @@ class Choices(Monitor, Listener, PluckedString):
         try:  # of the other fields, which are valid, only the slots: without them `heard` is read as an old one
             checked = Choices.model_validate({"a": self.a, "b": self.b, **changes})
         except ValidationError as error:
-            first = error.errors()[0]
-            raise ValueError(f"{'.'.join(map(str, first['loc']))}: {first['msg']}") from error
+            raise ValueError(explained(error)) from error
         found = self.model_copy(update={name: getattr(checked, name) for name in changes})
         follow: dict[str, Any] = {"kept": None} if found.plays_patch else {}
         if found.preset != self.preset and "string" not in changes:

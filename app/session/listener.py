@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.patches.patch import Patch, Pickup
 from app.shared.parameters import OF_CHOICES
-from app.shared.vocabulary import Pickup as PickupKind
-
-if TYPE_CHECKING:
-    from engine.voices import Ear
+from app.shared.value import Value
+from engine.values.ear import Ear
+from engine.values.ear import Pickup as PickupKind
 
 HIGHEST_MODE = 9_999  # of any grid that a preset may have
 RIGHT_POINT = "pickup.points.1"  # of a patch in stereo
 
 
-class Listener(BaseModel):
+class Listener(Value):
     """Listening points, pick-up and soloed mode.
 
     Attributes:
@@ -25,8 +22,6 @@ class Listener(BaseModel):
         listen_right: used in stereo.
         solo: above 0: this mode is heard alone.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     listen: float = Field(OF_CHOICES["listen"].default, ge=0, le=1)
     listen_right: float = Field(OF_CHOICES["listen_right"].default, ge=0, le=1)
@@ -42,8 +37,6 @@ class Listener(BaseModel):
     @property
     def ear(self) -> Ear:
         """The ear as the engine takes it; the first point, in stereo the left, is drawn."""
-        from engine.voices import Ear  # brings Numba
-
         return Ear(self.points, self.pickup, self.solo)
 
     def picked_up(self, patch: Patch) -> Patch:

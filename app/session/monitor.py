@@ -6,16 +6,17 @@ import math
 from collections.abc import Collection, Mapping
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from app.shared.parameters import OF_CHOICES
+from app.patches.fields import parameter
+from app.shared.value import Value
 from app.shared.vocabulary import DIFFERENCE
 
 Slot = Literal["a", "b"]
 SLOT_PATTERN = r"^(model|truth|difference|preset:.+)$"
 
 
-class Monitor(BaseModel):
+class Monitor(Value):
     """Two slots to compare.
 
     Attributes:
@@ -23,17 +24,11 @@ class Monitor(BaseModel):
         level_match: whether each source is brought to the level of the truth, once its gain is known.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
     a: str = Field("model", pattern=SLOT_PATTERN)
     b: str = Field("truth", pattern=SLOT_PATTERN)
     heard: Slot = "a"
     level_match: bool = True
-    difference_gain_db: float = Field(
-        OF_CHOICES["difference_gain_db"].default,
-        ge=OF_CHOICES["difference_gain_db"].limits[0],
-        le=OF_CHOICES["difference_gain_db"].limits[1],
-    )
+    difference_gain_db: float = parameter("difference_gain_db")
 
     @property
     def source_heard(self) -> str:

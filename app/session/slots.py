@@ -31,7 +31,7 @@ def info_of(choices: Choices, entry: PresetEntry) -> PresetInfo:
     """The preset's info for the string that is plucked; for its own where it cannot play that one."""
     if choices.string is not None and entry.info.family is not None:
         with contextlib.suppress(ValueError):
-            return info_of_string(entry.info, choices.string.parameters)
+            return info_of_string(entry.info, choices.string)
     return entry.info
 
 
@@ -43,7 +43,7 @@ def missing_presets(choices: Choices, library: Library) -> dict[str, str]:
 
 def subject_of(choices: Choices, preset: Path) -> Subject:
     """The string that is shown: the preset's own, or the one that is chosen for a preset of many."""
-    return preset if choices.string is None else StringOf(preset, choices.string.parameters)
+    return preset if choices.string is None else StringOf(preset, choices.string)
 
 
 def request_of(choices: Choices, library: Library) -> RenderRequest | None:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any
-
-from pydantic import BaseModel
 
 from app.patches.patch import Patch
 from app.session.listener import Listener
 from app.shared.parameters import OF_CHOICES, OF_PATCHES
+from app.shared.value import Value
 
 MOST_NAMED = 2  # fields in one step's name
 SEVERAL = "several settings"
@@ -80,13 +80,13 @@ def _of_patch(before: Patch | None, after: Patch | None) -> str:
         return "no instrument"
     if before is None:
         return f"instrument {after.name}"
-    fields = list(_changed(before, after))
-    if "name" in fields and len(fields) > 1:
+    paths = list(_changed(before, after))
+    if "name" in paths and len(paths) > 1:
         return f"instrument {after.name}"
-    if "macros" in fields:
+    if "macros" in paths:
         turned = [new.name for old, new in zip(before.macros, after.macros, strict=False) if old != new]
         return _together(turned or ["macros"])
-    return _together([field_words(field) for field in fields])
+    return _together([field_words(field) for field in paths])
 
 
 def field_words(field: str) -> str:
@@ -96,16 +96,23 @@ def field_words(field: str) -> str:
     return PATCH.get(field, field.rpartition(".")[2].replace("_", " "))
 
 
-def _changed(before: BaseModel, after: BaseModel, path: str = "") -> Iterator[str]:
-    """The paths of fields that differ; a part that is a model itself is compared field by field, except strings."""
-    for name in type(after).model_fields:
+def _changed(before: object, after: object, path: str = "") -> Iterator[str]:
+    """The paths of fields that differ; a part that has fields itself is compared by these, except strings."""
+    for name in _names(after):
         old, new = getattr(before, name), getattr(after, name)
         if old == new:
             continue
-        if isinstance(new, BaseModel) and type(old) is type(new) and name != "strings":
+        if _names(new) and type(old) is type(new) and name != "strings":
             yield from _changed(old, new, f"{path}{name}.")
         else:
             yield f"{path}{name}"
+
+
+def _names(part: object) -> Collection[str]:
+    """The names of the fields of a part of a patch; none where it has no parts."""
+    if isinstance(part, Value):
+        return type(part).model_fields
+    return [each.name for each in fields(part)] if is_dataclass(part) else ()
 
 
 def _together(words: list[str]) -> str:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
+from engine.values.ear import Pickup
+
 Source = Literal["model", "truth", "difference", "both"]
 PlayedSource = Literal["model", "truth", "difference"]  # of an instrument
-Pickup = Literal["displacement", "velocity", "bridge"]
-PICKUPS: tuple[Pickup, ...] = get_args(Pickup)
 PICKUP_TITLES: dict[Pickup, str] = {"displacement": "Point", "velocity": "Magnetic", "bridge": "Bridge"}
 Face = Literal["play", "lab"]  # of the window
 Bits = Literal["16", "24", "32f"]  # of a WAV's samples; f: floating point

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import AliasChoices, BaseModel, ConfigDict, Field
+from pydantic import AliasChoices, Field
+
+from app.shared.value import Value
 
 
-class Look(BaseModel):
+class Look(Value):
     """`size_percent`: of text. Settings of version 0.1 call the theme `face`."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     theme: Literal["system", "dark", "light"] = Field("system", validation_alias=AliasChoices("theme", "face"))
     size_percent: Literal[100, 115, 125, 150] = 100

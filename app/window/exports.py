@@ -161,7 +161,7 @@ def note_of(choices: Choices, entry: PresetEntry, struck: Struck | None) -> Note
         choices.listen,
         choices.listen_right if choices.stereo else None,
         choices.pickup,
-        None if choices.string is None else choices.string.parameters,
+        choices.string,
         struck,
         _name(choices, entry) if struck is None else struck_name(struck),
     )
@@ -169,7 +169,7 @@ def note_of(choices: Choices, entry: PresetEntry, struck: Struck | None) -> Note
 
 def _name(choices: Choices, entry: PresetEntry) -> str:
     """The name for a file: of the instrument whose key was played, else of the preset."""
-    string = entry.info.string if choices.string is None else choices.string.parameters
+    string = choices.string or entry.info.string
     title, amplitudes_mm = entry.info.title, PluckRange.of(entry.info).amplitude_mm
     if isinstance(choices.instrument, Patch):
         pluck = choices.instrument.pluck
@@ -180,7 +180,7 @@ def _name(choices: Choices, entry: PresetEntry) -> str:
 def note_words(title: str, choices: Choices) -> str:
     """The pluck and where it is heard, for people."""
     width = "" if choices.shape == "triangular" else f" {choices.width:.3f} wide"
-    string = f", a string of {choices.string.first_hz:.1f} Hz" if choices.string else ""
+    string = f", a string of {choices.string.undamped_frequency(1) / math.tau:.1f} Hz" if choices.string else ""
     pluck = f"{shape_word(choices.shape)}{width}, at {choices.position:.2f}, {choices.amplitude_mm:.3g} mm"
     heard = f"heard at {choices.listen:.2f}"
     if choices.stereo:

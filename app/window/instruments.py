@@ -18,7 +18,7 @@ from app.instrument.string_keys import on_string
 from app.instrument.strings import Strings, pitch_hz_of
 from app.patches.drums import Drums
 from app.patches.instrument import SingleString
-from app.patches.patch import Patch, PhysicalString, StringSet
+from app.patches.patch import Patch, StringSet
 from app.playing.due import Due
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import LOWEST_C, LOWEST_PLACE, KeyPress, PluckRange, place_of, semitone_of, turn
@@ -33,7 +33,7 @@ from app.views.controls.playing_keys import PlayingKeys
 from app.window.main_window import MainWindow
 from app.window.midi_control import MidiControl
 from engine.pluck import Pluck
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 
 HIGHEST_KEY = 127
 OWN_MS = 60  # after another instrument, or the last turn of a knob, until its own pluck is shown
@@ -133,13 +133,13 @@ class Instruments(QObject):
         another = before is not None and is_another(patch, before)
         own = choices.string is None or (another and "string" not in chosen)
         if choices.string is not None and not own and (another or before is None):
-            self.latest_key = _key_of(patch, choices.string.parameters) or self.latest_key
+            self.latest_key = _key_of(patch, choices.string) or self.latest_key
         if not own and (before is None or patch.pluck == before.pluck or (another and chosen - {"string"})):
             return
         with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
             if (found := Strings(patch).of_key(*self.shown_key(patch))) is not None:
                 shown = asdict(on_string(found, patch.pluck.pluck(choices.velocity)))
-                self._session.play(**shown, **({"string": PhysicalString(**asdict(found.parameters))} if own else {}))
+                self._session.play(**shown, **({"string": found.parameters} if own else {}))
 
     def play(self, event: Event, due: Due | None = None, drawn: bool = False) -> None:
         """Plays an event, at once or when it is due. Any thread. `drawn`: its pluck is the one of the session."""
@@ -159,7 +159,7 @@ class Instruments(QObject):
     def _tell(self, request: RenderRequest, drawn: bool) -> None:
         """The session is to show this string and its pluck; the string alone where it has drawn the pluck itself."""
         string = string_of(request.preset)
-        shown: dict[str, Any] = {"string": None if string is None else PhysicalString(**asdict(string))}
+        shown: dict[str, Any] = {"string": string}
         shown |= {} if drawn else asdict(request.pluck)
         with self._lock:
             self._reported |= shown

@@ -29,7 +29,6 @@ from app.instrument.facts import by_two_numbers, facts_of, facts_of_drum, figure
 from app.instrument.midi_file import MidiFileError, read_song
 from app.instrument.strings import KeyString, Strings
 from app.patches.drums import Drums
-from app.patches.fields import explained
 from app.patches.library import (
     SUFFIX,
     PatchEntry,
@@ -62,6 +61,7 @@ from app.window.recordings import Recordings
 from app.window.song import Song
 from engine.plain_text import one_line
 from engine.result_file import WriteError
+from engine.schema import explained
 
 AUDITION_VELOCITY, AUDITION_S = 90, 0.6
 SHOWN_EVERY_S = 0.04
@@ -486,7 +486,7 @@ class PatchDesk(QObject):
             return outside_of_key(entry.info, patch, latest.event, latest.string)
         if choices.string is None:
             return []
-        string = choices.string.parameters
+        string = choices.string
         if patch is not None and choices.plays_patch:
             string = by_two_numbers(patch, string)
         return outside_of_string(entry.info, string, choices.pluck)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from platformdirs import user_config_path
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 
 from app.analysis.abx.trials import AbxChoices
 from app.audio.choices import DeviceChoice, SoundChoice
@@ -19,11 +19,12 @@ from app.export.sampled.choices import SampledChoices
 from app.patches.instrument import PATCH, SINGLE
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices, migrated
+from app.shared.value import Value
 from app.views.look import Look
 from engine import bounds
 from engine.plain_text import one_line
 from engine.read_file import read_bounded
-from engine.schema import SchemaError, parse_json
+from engine.schema import SchemaError, explained, parse_json
 from engine.whole_file import whole_file
 
 # at the top of the browser at a first start: strings at full bandwidth, trained on plucks anywhere
@@ -31,20 +32,16 @@ MOST_FAULTS = 50  # of a file that is kept for the rest of it
 FIRST_FAVOURITES = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "studio_steel_e4", "studio_steel_ds3")
 
 
-class InstrumentChoice(BaseModel):
+class InstrumentChoice(Value):
     """The look of the instrument's strip: in the Lab too, as keys or strings, with the string's knobs."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     shown: bool = False
     surface: Literal["keys", "neck"] = "keys"
     unfolded: bool = False
 
 
-class Settings(BaseModel):
+class Settings(Value):
     """The content of the file."""
-
-    model_config = ConfigDict(extra="forbid")
 
     version: Literal[1] = 1
     choices: Choices = Choices()
@@ -84,11 +81,8 @@ def load_settings(path: Path) -> tuple[Settings, str]:
             path.replace(aside)
         except OSError:
             aside = path
-        kept, why = None, "" if isinstance(error, ValidationError) else str(error)
-        if isinstance(error, ValidationError):
-            faults = error.errors(include_url=False, include_input=False)
-            why = f"{'.'.join(map(str, faults[0]['loc'])) or 'the file'}: {faults[0]['msg']}"
-            kept = _usable(text)
+        kept = _usable(text) if isinstance(error, ValidationError) else None
+        why = explained(error) if isinstance(error, ValueError) else str(error)
         reported = (
             f"{'Some' if kept else 'The'} settings were not usable ({why}) and have their defaults "
             f"again; the file was set aside as {aside}."

@@ -12,11 +12,9 @@ effects    the amplifier, then body and room as one response; the same for array
 partitions that response as the compiled convolver reads it
 """
 
-from engine.effects.amp import Amp
 from engine.effects.body import Body
 from engine.effects.body_table import BODIES
 from engine.effects.effects import Effects, apply
 from engine.effects.impulse import Impulse
-from engine.effects.room import Room
 
-__all__ = ["BODIES", "Amp", "Body", "Effects", "Impulse", "Room", "apply"]
+__all__ = ["BODIES", "Body", "Effects", "Impulse", "apply"]

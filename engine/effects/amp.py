@@ -6,48 +6,28 @@ Its cabinet is a body: `Body` of the names "cabinet" and "bass_cabinet", or a re
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine import bounds
+from engine.values.effects import Amp
 
 NOMINAL = 0.15  # of full scale: a tone of this peak keeps its level, whatever the drive
 
 
-@dataclass(frozen=True)
-class Amp:
-    """An amplifier for the sum of all strings, whose sound is in mono.
+def factors(amp: Amp | None, level_db: float = 0.0) -> tuple[float, float, float]:
+    """The mixer's factors: before the shape, behind it, and of the tone. All 0 without an amplifier.
 
-    Attributes:
-        drive_db: gain before the shape that bends peaks; 0: there is no amplifier.
-        tone_db: above 0 what lies above 700 Hz is raised by as much, and what lies below lowered; below 0 the
-            reverse.
+    Args:
         level_db: of its input, which its output has too: it changes no drive.
-
-    Raises:
-        ValueError: a value is out of its range; the message names it.
     """
-
-    drive_db: float = 0.0
-    tone_db: float = 0.0
-    level_db: float = 0.0
-
-    def __post_init__(self) -> None:
-        bounds.check("drive_db", self.drive_db, bounds.AMP_DRIVE_DB, "dB")
-        bounds.check("tone_db", self.tone_db, bounds.AMP_TONE_DB, "dB")
-
-    @property
-    def factors(self) -> tuple[float, float, float]:
-        """The mixer's factors: before the shape, behind it, and of the tone. All 0 without an amplifier."""
-        if self.drive_db == 0:
-            return 0.0, 0.0, 0.0
-        drive, level = 10 ** (self.drive_db / 20), 10 ** (self.level_db / 20)
-        return drive / level, level * math.sqrt(1 + (drive * NOMINAL) ** 2) / drive, 10 ** (self.tone_db / 20)
+    if amp is None or amp.drive_db == 0:
+        return 0.0, 0.0, 0.0
+    drive, level = 10 ** (amp.drive_db / 20), 10 ** (level_db / 20)
+    return drive / level, level * math.sqrt(1 + (drive * NOMINAL) ** 2) / drive, 10 ** (amp.tone_db / 20)
 
 
-def amplified(amp: Amp, sound: NDArray[np.float64], rate_hz: int) -> NDArray[np.float64]:
+def amplified(amp: Amp, sound: NDArray[np.float64], rate_hz: int, level_db: float = 0.0) -> NDArray[np.float64]:
     """The sound (frames, 2) through the amplifier of a mixer: its first frames, as many."""
     from engine.kernels import layout as at
     from engine.kernels.amplifier import amplify  # Numba only when it is needed
@@ -55,7 +35,7 @@ def amplified(amp: Amp, sound: NDArray[np.float64], rate_hz: int) -> NDArray[np.
     mixer = np.zeros(at.MIXER_SLOTS)
     counts, mix = mixer.view(np.int64), mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2)
     mixer[at.M_RATE] = rate_hz
-    mixer[at.M_AMPLIFIER : at.M_AMPLIFIER + 3] = amp.factors
+    mixer[at.M_AMPLIFIER : at.M_AMPLIFIER + 3] = factors(amp, level_db)
     found = np.zeros((-(-len(sound) // at.QUANTUM) * at.QUANTUM, 2))
     found[: len(sound)] = sound
     for first in range(0, len(found), at.QUANTUM):

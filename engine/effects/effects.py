@@ -8,10 +8,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.effects.amp import Amp, amplified
+from engine.effects.amp import amplified, factors
 from engine.effects.body import Body
 from engine.effects.impulse import as_loud, convolved
-from engine.effects.room import Room
+from engine.effects.room import room_response
+from engine.values.effects import Amp, Room
 
 
 @dataclass(frozen=True)
@@ -19,11 +20,15 @@ class Effects:
     """The strings sound through the amplifier, that through the body, and that in the room.
 
     What is None, or has a mix or a drive of 0, is not there.
+
+    Attributes:
+        level_db: of what the amplifier is given, which does not count as drive.
     """
 
     body: Body | None = None
     room: Room | None = None
     amp: Amp | None = None
+    level_db: float = 0.0
 
     @property
     def neutral(self) -> bool:
@@ -37,15 +42,15 @@ class Effects:
 
     @property
     def factors(self) -> tuple[float, float, float]:
-        """The factors of the amplifier, see `Amp.factors`."""
-        return Amp().factors if self.amp is None else self.amp.factors
+        """The mixer's factors of the amplifier."""
+        return factors(self.amp, self.level_db)
 
     def impulse(self, rate_hz: int) -> NDArray[np.float64]:
         """The impulse response of body and room, (frames, 1 or 2): the level of pink noise stays, at any mix.
 
         It is remembered, and not to be written.
         """
-        return _impulse(replace(self, amp=None), rate_hz)
+        return _impulse(replace(self, amp=None, level_db=0.0), rate_hz)
 
     def tail_s(self, rate_hz: int) -> float:
         """The longest time for which it sounds on after its input."""
@@ -57,7 +62,9 @@ def _impulse(effects: Effects, rate_hz: int) -> NDArray[np.float64]:
     found: NDArray[np.float64] | None = None
     for part in (effects.body, effects.room):
         if part is not None and part.mix > 0:
-            wet = part.mix * part.response(rate_hz)
+            wet = part.mix * (
+                part.response(rate_hz) if isinstance(part, Body) else room_response(part.t60_s, rate_hz)
+            )
             wet[0] += 1 - part.mix
             found = wet if found is None else convolved(found, wet)
     found = np.ones((1, 1)) if found is None else as_loud(found, rate_hz)
@@ -82,7 +89,7 @@ def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) ->
     stereo[wild] = 0.0
     stereo[np.abs(stereo) < at.SMALLEST] = 0.0
     if effects.amp is not None:
-        stereo = amplified(effects.amp, stereo, rate_hz)
+        stereo = amplified(effects.amp, stereo, rate_hz, effects.level_db)
     if not effects.rings:
         return stereo
     found: NDArray[np.float64] = oaconvolve(stereo, effects.impulse(rate_hz), axes=0)[: len(stereo)]

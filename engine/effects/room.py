@@ -12,7 +12,6 @@ same to the sample in a file, and rings on unchanged while it is exchanged.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -33,32 +32,9 @@ SUBSONIC_HZ = 40.0
 _SEED = 1
 
 
-@dataclass(frozen=True)
-class Room:
-    """A room and how much of it is heard.
-
-    Attributes:
-        mix: 0: none of it, 1: its reverberation alone.
-        t60_s: in which the reverberation at 500 Hz falls by 60 dB.
-
-    Raises:
-        ValueError: a value is out of its range; the message names it.
-    """
-
-    mix: float = 0.2
-    t60_s: float = 0.8
-
-    def __post_init__(self) -> None:
-        bounds.check("mix", self.mix, (0.0, 1.0))
-        bounds.check("t60_s", self.t60_s, bounds.ROOM_T60_S, "s")
-
-    def response(self, rate_hz: int) -> NDArray[np.float64]:
-        """The response of the reverberation alone, (frames, 2), as loud as what it is given."""
-        return _response(self.t60_s, rate_hz)
-
-
 @lru_cache(maxsize=8)
-def _response(t60_s: float, rate_hz: int) -> NDArray[np.float64]:
+def room_response(t60_s: float, rate_hz: int) -> NDArray[np.float64]:
+    """The response of the reverberation alone, (frames, 2), as loud as what it is given; not to be written."""
     sides_m = SIDES_M * math.sqrt(t60_s / 0.5)
     volume_m3 = float(sides_m.prod())
     mixing_s = MIXING_S * math.sqrt(volume_m3)

@@ -19,6 +19,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar, runtime_checkable
 import torch
 from torch import Tensor, nn
 
+from engine import bounds
 from engine.resonators.base import Resonator
 
 State = TypeVar("State")
@@ -135,8 +136,7 @@ class KoopmanModel(Protocol):
 
 def check_initialisation(model: StringModel[State], how: str) -> None:
     """Raises ValueError, naming what there is, where a model does not know `how`."""
-    if how not in model.initialisations:
-        raise ValueError(f"initialisation {how!r} is not one of {', '.join(model.initialisations)}")
+    bounds.check_choice("initialisation", how, model.initialisations)
 
 
 def count_parameters(model: nn.Module) -> int:

@@ -114,8 +114,7 @@ class KoopmanTensionConfiguration(_Sizes):
         if self.modes * self.grid_points > bounds.MOST_MATRIX_NUMBERS:
             raise ValueError(f"modes times grid_points must be at most {bounds.MOST_MATRIX_NUMBERS}")
         for name in ("node_phase", "highest_phase"):
-            if not LEAST_PHASE <= getattr(self, name) <= math.pi:
-                raise ValueError(f"{name} must lie in {LEAST_PHASE} … π, not {getattr(self, name)}")
+            bounds.check(name, getattr(self, name), (LEAST_PHASE, math.pi))
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,8 @@ from engine.presets.migrations import FORMAT_VERSION
 from engine.resonators.base import Resonator
 from engine.resonators.family import Bounds, StringFamily
 from engine.resonators.recorded import RecordedString
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 
 # A model of many strings plays wider plucks than the trained ones as well, until the ends cut a Gaussian off.
 _WIDEST = {"gaussian": 0.2}
@@ -92,8 +93,7 @@ class PresetInfo:
     format_version: int = FORMAT_VERSION
 
     def __post_init__(self) -> None:
-        if self.model not in MODELS:
-            raise ValueError(f"model {self.model!r} is not one of {', '.join(MODELS)}")
+        bounds.check_choice("model", self.model, MODELS)
         for name in ("rate_hz", "modes", "horizon_steps", "scale_m"):
             if not getattr(self, name) > 0:
                 raise ValueError(f"{name} must be above 0, not {getattr(self, name)}")
@@ -120,7 +120,7 @@ class PresetInfo:
         modulated, points = self.tension_modulated, self.grid_points
         if self.recorded is not None:
             return self.recorded.resonator(string, modes, tension_modulated=modulated, grid_points=points)
-        return string.resonator(modes, tension_modulated=modulated, grid_points=points)
+        return resonator_of(string, modes, tension_modulated=modulated, grid_points=points)
 
     def modes_of(self, partials: int) -> int:
         """The number of modes for so many partials: of a recorded string two for each, if its grid allows."""

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from engine.presets.file import Preset, PresetError, arrays_of
 from engine.presets.finding import SHIPPED
 from engine.presets.info import PresetInfo
-from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, read_toml
-
-if TYPE_CHECKING:
-    from engine.resonators.drum import DrumParameters
+from engine.values.drum import DrumParameters
+from engine.values.string import StringParameters
 
 HIGHEST_HZ = 20_000.0  # modes above are not heard
 STRINGS = SHIPPED / "strings"
@@ -27,8 +25,6 @@ def read_string(path: Path) -> StringParameters:
 
 def read_drum(path: Path) -> tuple[DrumParameters, str]:
     """The drum of a TOML file, and its `description`; as `read_described_string`."""
-    from engine.resonators.drum import DrumParameters  # with compiled functions that strings do without
-
     return _read_described(DrumParameters, path, "a drum")
 
 

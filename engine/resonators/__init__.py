@@ -1,6 +1,5 @@
-"""The resonators: the record that truth and models take (`base`), and the string that fills it (`string`)."""
+"""The resonators: the record that truth and models take (`base`), and what fills it: strings, drums, recordings."""
 
 from engine.resonators.base import Resonator
-from engine.resonators.string import StringParameters
 
-__all__ = ["Resonator", "StringParameters"]
+__all__ = ["Resonator"]

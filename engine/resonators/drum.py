@@ -26,148 +26,72 @@ rises; other pairs part with powers of ε. Computed by `engine.kernels.drum_mode
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, dataclass, fields, replace
+from dataclasses import astuple, dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
-from engine import bounds
 from engine.kernels import drum_modes as kernel
 from engine.resonators import surface
 from engine.resonators.base import Array, Resonator
-from engine.resonators.surface import SHAPES, DrumShape, Surface, tools
+from engine.resonators.surface import Surface, tools
+from engine.values.drum import SHAPES, DrumParameters
 
-MAY_BE_ZERO = frozenset(
-    {"tension_n_m", "damping_d1_kg_m2_s", "damping_d3_kg_s", "uneven", "air_kg_m3", "cavity_m3", "shell_m"}
-)
 MOST_MODES = 1_600
-LARGEST_ELLIPTICITY = 0.1
 
 
-@dataclass(frozen=True)
-class DrumParameters:
-    """Physical parameters of a membrane or a thin plate. Default: the head of a concert tom of 33 cm, of Mylar.
+def numbers_of(drum: DrumParameters) -> Array:
+    """The drum's numbers, as the kernels have them."""
+    return np.array([SHAPES.index(drum.shape), *astuple(drum)[1:]], np.float64)
 
-    Attributes:
-        length_m, width_m: sides of a rectangle; the two diameters of a circle, nearly the same. A bar is held at the
-            ends of its length alone, and moves alike across its width.
-        tension_n_m: at rest, per length of the edge; 0: a plate.
-        damping_d1_kg_m2_s, damping_d3_kg_s: σ = (d₁ + d₃κ²)/2μ, besides what is radiated.
-        uneven: by how much the frequencies of a circle's pairs differ, relatively: heads are never tuned evenly.
-        air_kg_m3: density of the air on both sides; 0: none.
-        cavity_m3: volume of a closed shell under the head, whose air is a spring for modes that move it; 0: open.
-        shell_m: depth of an open shell under the head, whose air is a mass for modes that move it; 0: a baffle.
+
+def stretching_n_m(drum: DrumParameters) -> float:
+    """C = Eh/2(1 - ν²); of a bar, which is free to widen, without ν."""
+    return float(kernel.stretching(numbers_of(drum)))
+
+
+def bending_nm(drum: DrumParameters) -> float:
+    """D = Eh³/12(1 - ν²); of a bar without ν."""
+    return stretching_n_m(drum) * drum.thickness_m**2 / 6
+
+
+def around(drum: DrumParameters, highest_hz: float, most: int = MOST_MODES) -> kernel.Around:
+    """The kernels' input for modes: the surface's list, the air's table, and ka up to which it goes."""
+    numbers = numbers_of(drum)
+    size_m = kernel.size(numbers)
+    low = 1.2 * kernel.LOW_HZ * kernel.lowest(numbers) * size_m  # for its pitch
+    needed = (
+        max(kernel.reach(numbers, highest_hz, most), low),
+        4 * math.pi * highest_hz / kernel.AIR_M_S * size_m,
+    )
+    reach, ka = (2 ** (math.ceil(4 * math.log2(1.05 * each)) / 4) for each in needed)  # for its like too
+    air = surface.air_below(drum.shape, drum.aspect, ka, surface.POINTS) if drum.air_kg_m3 else np.zeros((2, 0, 0))
+    return surface.modes_below(drum.shape, drum.aspect, reach), air, ka
+
+
+def modes_of(drum: DrumParameters, highest_hz: float, most: int = MOST_MODES) -> DrumModes:
+    """The lowest modes below a frequency, so many at most.
 
     Raises:
-        ValueError: a parameter is not finite, out of its bounds, or does not go with others.
+        ValueError: there is none, or far too many; the message names the remedy.
     """
+    known, rows = around(drum, highest_hz, most), np.empty((kernel.ROWS, most))
+    count = kernel.modes(numbers_of(drum), known, highest_hz, most, _work(known[0]), rows)
+    if count == 0:
+        raise ValueError(f"a drum has no mode below {highest_hz:g} Hz; tune it lower, or ask for higher modes")
+    return DrumModes(drum, rows[:, :count].copy())
 
-    shape: DrumShape = "circle"
-    length_m: float = 0.33
-    width_m: float = 0.33
-    thickness_m: float = 0.00019
-    density_kg_m3: float = 1390.0
-    youngs_modulus_pa: float = 3.5e9
-    poisson: float = 0.38
-    tension_n_m: float = 1500.0
-    damping_d1_kg_m2_s: float = 1.0
-    damping_d3_kg_s: float = 0.0005
-    uneven: float = 0.0
-    air_kg_m3: float = 0.0
-    cavity_m3: float = 0.0
-    shell_m: float = 0.0
 
-    def __post_init__(self) -> None:
-        if self.shape not in SHAPES:
-            raise ValueError(f"drum parameter shape must be one of {', '.join(SHAPES)}, not {self.shape!r}")
-        for field in fields(self):
-            if field.name == "shape":
-                continue
-            value = getattr(self, field.name)
-            if not math.isfinite(value) or value < 0 or (value == 0 and field.name not in MAY_BE_ZERO):
-                raise ValueError(f"drum parameter {field.name} must be positive and finite, not {value}")
-            bounds.check(f"drum parameter {field.name}", value, bounds.DRUM[field.name])
-        if self.shell_m and (self.cavity_m3 or not self.air_kg_m3):
-            raise ValueError(
-                "drum parameter shell_m is of an open shell in air: set cavity_m3 to 0 and air_kg_m3 to that of air, "
-                "or shell_m to 0"
-            )
-        if self.shape == "circle" and abs(self.ellipticity) > LARGEST_ELLIPTICITY:
-            raise ValueError(
-                f"drum parameters length_m and width_m of a circle are its two diameters, nearly the same, "
-                f"not {self.length_m:g} and {self.width_m:g}; make them alike, or choose a rectangle"
-            )
-        if self.thickness_m > (self.length_m if self.shape == "bar" else min(self.length_m, self.width_m)) / 10:
-            raise ValueError(
-                "drum parameter thickness_m must be below a tenth of the sides: a thick plate bends otherwise"
-            )
+def tune(drum: DrumParameters, ratio: float, highest_hz: float) -> DrumParameters:
+    """The drum whose pitch is higher by a ratio: a membrane's by its tension, a plate's by its size.
 
-    @property
-    def mass_kg_m2(self) -> float:
-        """μ = ρh."""
-        return self.density_kg_m3 * self.thickness_m
-
-    @property
-    def bending_nm(self) -> float:
-        """D = Eh³/12(1 - ν²); of a bar, which is free to widen, without ν."""
-        return self.stretching_n_m * self.thickness_m**2 / 6
-
-    @property
-    def stretching_n_m(self) -> float:
-        """C = Eh/2(1 - ν²); of a bar without ν."""
-        return float(kernel.stretching(self.numbers))
-
-    @property
-    def ellipticity(self) -> float:
-        """ε: the half-axes are a(1 ± ε)."""
-        return (self.length_m - self.width_m) / (self.length_m + self.width_m)
-
-    @property
-    def aspect(self) -> float:
-        """Length by width; 1 of a circle. The same at all sizes, which differ by rounding."""
-        return 1.0 if self.shape == "circle" else float(f"{self.length_m / self.width_m:.12g}")
-
-    @cached_property
-    def numbers(self) -> Array:
-        """The drum's numbers, as the kernels have them."""
-        return np.array([SHAPES.index(self.shape), *astuple(self)[1:]], np.float64)
-
-    def around(self, highest_hz: float, most: int = MOST_MODES) -> kernel.Around:
-        """The kernels' input for modes: the surface's list, the air's table, and ka up to which it goes."""
-        size_m = kernel.size(self.numbers)
-        low = 1.2 * kernel.LOW_HZ * kernel.lowest(self.numbers) * size_m  # for its pitch
-        needed = (
-            max(kernel.reach(self.numbers, highest_hz, most), low),
-            4 * math.pi * highest_hz / kernel.AIR_M_S * size_m,
-        )
-        reach, ka = (2 ** (math.ceil(4 * math.log2(1.05 * each)) / 4) for each in needed)  # for its like too
-        air = (
-            surface.air_below(self.shape, self.aspect, ka, surface.POINTS) if self.air_kg_m3 else np.zeros((2, 0, 0))
-        )
-        return surface.modes_below(self.shape, self.aspect, reach), air, ka
-
-    def modes(self, highest_hz: float, most: int = MOST_MODES) -> DrumModes:
-        """The lowest modes below a frequency, so many at most.
-
-        Raises:
-            ValueError: there is none, or far too many; the message names the remedy.
-        """
-        around, rows = self.around(highest_hz, most), np.empty((kernel.ROWS, most))
-        count = kernel.modes(self.numbers, around, highest_hz, most, _work(around[0]), rows)
-        if count == 0:
-            raise ValueError(f"a drum has no mode below {highest_hz:g} Hz; tune it lower, or ask for higher modes")
-        return DrumModes(self, rows[:, :count].copy())
-
-    def tuned(self, ratio: float, highest_hz: float) -> DrumParameters:
-        """The drum whose pitch is higher by a ratio: a membrane's by its tension, a plate's by its size.
-
-        Raises:
-            ValueError: it is out of its bounds then.
-        """
-        around, changed = self.around(highest_hz), self.numbers.copy()
-        kernel.tune(changed, ratio, around, _work(around[0]), np.empty((kernel.ROWS, kernel.LOW_MODES)))
-        length_m, width_m, tension_n_m = map(float, changed[[kernel.LENGTH, kernel.WIDTH, kernel.TENSION]])
-        return replace(self, length_m=length_m, width_m=width_m, tension_n_m=tension_n_m)
+    Raises:
+        ValueError: it is out of its bounds then.
+    """
+    known, changed = around(drum, highest_hz), numbers_of(drum)
+    kernel.tune(changed, ratio, known, _work(known[0]), np.empty((kernel.ROWS, kernel.LOW_MODES)))
+    length_m, width_m, tension_n_m = map(float, changed[[kernel.LENGTH, kernel.WIDTH, kernel.TENSION]])
+    return replace(drum, length_m=length_m, width_m=width_m, tension_n_m=tension_n_m)
 
 
 def _work(rows: Array) -> Array:
@@ -186,6 +110,11 @@ class DrumModes:
     drum: DrumParameters
     rows: Array
 
+    @cached_property
+    def numbers(self) -> Array:
+        """The drum's numbers, as the kernels have them."""
+        return numbers_of(self.drum)
+
     @property
     def omega(self) -> Array:
         return self.rows[kernel.OMEGA]
@@ -193,7 +122,7 @@ class DrumModes:
     @cached_property
     def sigma(self) -> Array:
         found = np.empty(len(self))
-        kernel.losses(self.drum.numbers, self.rows, found)
+        kernel.losses(self.numbers, self.rows, found)
         return found
 
     @property
@@ -203,7 +132,7 @@ class DrumModes:
 
     @cached_property
     def surface(self) -> Surface:
-        return Surface(self.drum.numbers[:3], self.rows[: kernel.SURFACE])
+        return Surface(self.numbers[:3], self.rows[: kernel.SURFACE])
 
     def __len__(self) -> int:
         return self.rows.shape[1]
@@ -226,14 +155,14 @@ class DrumModes:
 
         Amplitudes do not follow from these.
         """
-        coupling = self.drum.stretching_n_m / self.drum.mass_kg_m2 * self.stretch
+        coupling = stretching_n_m(self.drum) / self.drum.mass_kg_m2 * self.stretch
         first = float(self.surface.wavenumber.min())
         return Resonator(
             omega=self.omega,
             sigma=self.sigma,
             coupling=coupling if tension_modulated else np.zeros_like(coupling),
             stretch=self.stretch,
-            tension_rise=self.drum.stretching_n_m / (self.drum.tension_n_m + self.drum.bending_nm * first**2),
+            tension_rise=stretching_n_m(self.drum) / (self.drum.tension_n_m + bending_nm(self.drum) * first**2),
             shapes=self.shapes(places),
             analysis=None,
         )
@@ -241,12 +170,12 @@ class DrumModes:
     @property
     def mass_kg(self) -> float:
         """μA: of each mass-normalised mode."""
-        return float(kernel.mass_kg(self.drum.numbers))
+        return float(kernel.mass_kg(self.numbers))
 
     def struck(self, place: tuple[float, float], radius_m: float) -> Array:
         """The speeds (modes,) in m/s from a sudden blow of 1 N s, spread over a disc at a place."""
         found = np.empty(len(self))
-        kernel.struck(self.drum.numbers, self.rows, *map(float, place), radius_m, tools(), found)
+        kernel.struck(self.numbers, self.rows, *map(float, place), radius_m, tools(), found)
         return found
 
     def radiated(self, direction: tuple[float, float], distance_m: float = 1.0) -> Array:
@@ -259,5 +188,5 @@ class DrumModes:
             direction: cosines along the two axes of the surface; (0, 0) is above the centre.
         """
         found = np.empty(len(self))
-        kernel.radiated(self.drum.numbers, self.rows, *map(float, direction), tools(), found)
+        kernel.radiated(self.numbers, self.rows, *map(float, direction), tools(), found)
         return found / distance_m

@@ -13,46 +13,27 @@ weighted by the energies of tension and of bending. The bridge's share is in `en
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
-from engine import bounds
 from engine.kernels.constants import AIR_DENSITY_KG_M3, AIR_VISCOSITY_PA_S
 from engine.resonators.base import Array
-from engine.resonators.string import StringParameters
+from engine.resonators.string import undamped_frequencies, wavenumbers
+from engine.values.string import Losses, StringParameters
 
 
-@dataclass(frozen=True)
-class Losses:
-    """The strength of each loss.
+def loss_rates(
+    losses: Losses, string: StringParameters, partials: int, decay: float = 1.0, brightness_decay: float = 1.0
+) -> Array:
+    """σ of each partial in 1/s, float64 (partials,), without d₁ and d₃.
 
-    Attributes:
-        air: factor of the losses to the air, a; 1 is that of physics.
-        friction: loss factor 1/Q of the string's tension, δ.
-        bending: loss factor of bending, β.
+    Args:
+        decay, brightness_decay: factors of the losses to the air, and of those inside the string.
     """
-
-    air: float = 1.0
-    friction: float = 2e-4
-    bending: float = 0.02
-
-    def __post_init__(self) -> None:
-        for name, limits in bounds.LOSSES.items():
-            bounds.check(name, getattr(self, name), limits)
-
-    def rates(
-        self, string: StringParameters, partials: int, decay: float = 1.0, brightness_decay: float = 1.0
-    ) -> Array:
-        """σ of each partial in 1/s, float64 (partials,), without d₁ and d₃.
-
-        Args:
-            decay, brightness_decay: factors of the losses to the air, and of those inside the string.
-        """
-        omega, eta = string.undamped_frequencies(partials), string.wavenumbers(partials)
-        diameter_m = 2 * math.sqrt(string.area_m2 / math.pi)
-        drag = np.sqrt(math.pi * AIR_VISCOSITY_PA_S * AIR_DENSITY_KG_M3 * omega / (2 * math.pi))
-        air = math.pi * (AIR_VISCOSITY_PA_S + diameter_m * drag) / string.mass_per_length_kg_m
-        bent = string.youngs_modulus_pa * string.second_moment_m4 * eta**2
-        inside = (string.tension_n * self.friction + bent * self.bending) / (string.tension_n + bent)
-        return decay * self.air * air + brightness_decay * 0.5 * omega * inside
+    omega, eta = undamped_frequencies(string, partials), wavenumbers(string, partials)
+    diameter_m = 2 * math.sqrt(string.area_m2 / math.pi)
+    drag = np.sqrt(math.pi * AIR_VISCOSITY_PA_S * AIR_DENSITY_KG_M3 * omega / (2 * math.pi))
+    air = math.pi * (AIR_VISCOSITY_PA_S + diameter_m * drag) / string.mass_per_length_kg_m
+    bent = string.youngs_modulus_pa * string.second_moment_m4 * eta**2
+    inside = (string.tension_n * losses.friction + bent * losses.bending) / (string.tension_n + bent)
+    return decay * losses.air * air + brightness_decay * 0.5 * omega * inside

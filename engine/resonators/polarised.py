@@ -14,102 +14,63 @@ envelopes in stringed instruments", JASA 150, 2021). Slightly different frequenc
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine import bounds
 from engine.kernels.constants import HIGHEST_SIGMA, MOST_PAIRS
 from engine.resonators.base import Array, Resonator
-from engine.resonators.string import StringParameters
+from engine.resonators.string import decay_rates, resonator_of, undamped_frequencies
+from engine.values.string import Polarisations, StringParameters
 
 PAIRS = MOST_PAIRS  # lowest partials that have two modes; an estimate: above them neither beats nor stages are heard
 
 
-@dataclass(frozen=True)
-class Polarisations:
-    """The two directions of polarisation, the first normal to the board.
+def polarised_resonator(
+    moving: Polarisations,
+    string: StringParameters,
+    partials: int,
+    *,
+    losses: float = 1.0,
+    tension_modulated: bool = True,
+    grid_points: int = 101,
+) -> Resonator:
+    """The string's first partials: pairs of modes, then single ones.
 
-    Attributes:
-        angle_deg: of the pluck, from the first direction.
-        second_heard: what the second is heard with, of the first.
-        second_cents: pitch of the second, above the first.
-        conductance_s_kg, second_conductance_s_kg: real part of the bridge's admittance in both directions.
+    Args:
+        losses: factor of the bridge's conductances.
+
+    Raises:
+        ValueError: the grid does not hold so many partials.
     """
+    law = resonator_of(string, partials, tension_modulated=tension_modulated, grid_points=grid_points)
+    partial, second = layout(partials)
+    pulled, heard = (np.array(each)[second] for each in (moving.pulled, moving.heard))
+    single = np.arange(len(partial)) >= 2 * min(PAIRS, partials)
+    pulled = np.where(single, 1 / moving.heard[0], pulled)  # so that it is heard as the others are
+    omega, sigma = _rates(moving, string, partials, losses)
+    assert law.end_force is not None and law.mirror is not None and law.analysis is not None
+    return Resonator(
+        omega=omega,
+        sigma=sigma,
+        coupling=law.coupling[partial],
+        stretch=law.stretch[partial],
+        tension_rise=law.tension_rise,
+        shapes=law.shapes[partial] * heard[:, None],
+        analysis=law.analysis[:, partial] * pulled,
+        mirror=law.mirror[partial],
+        end_force=law.end_force[partial] * heard,
+    )
 
-    angle_deg: float = 45.0
-    second_heard: float = 0.3
-    second_cents: float = 1.0
-    conductance_s_kg: float = 0.01
-    second_conductance_s_kg: float = 0.001
 
-    def __post_init__(self) -> None:
-        for name, (low_high, unit) in bounds.POLARISATIONS.items():
-            bounds.check(name, getattr(self, name), low_high, unit)
-
-    @property
-    def pulled(self) -> tuple[float, float]:
-        """Parts of a pluck in both directions."""
-        angle = math.radians(self.angle_deg)
-        return math.cos(angle), math.sin(angle)
-
-    @property
-    def heard(self) -> tuple[float, float]:
-        """The weights with which both are heard: a pluck is heard as high as it is pulled."""
-        first, second = self.pulled
-        whole = first + self.second_heard * second
-        return 1 / whole, self.second_heard / whole
-
-    @property
-    def detuning(self) -> float:
-        """ω² of the second over that of the first."""
-        return float(2 ** (2 * self.second_cents / 1200))
-
-    def resonator(
-        self,
-        string: StringParameters,
-        partials: int,
-        *,
-        losses: float = 1.0,
-        tension_modulated: bool = True,
-        grid_points: int = 101,
-    ) -> Resonator:
-        """The string's first partials: pairs of modes, then single ones.
-
-        Args:
-            losses: factor of the bridge's conductances.
-
-        Raises:
-            ValueError: the grid does not hold so many partials.
-        """
-        law = string.resonator(partials, tension_modulated=tension_modulated, grid_points=grid_points)
-        partial, second = layout(partials)
-        pulled, heard = (np.array(each)[second] for each in (self.pulled, self.heard))
-        single = np.arange(len(partial)) >= 2 * min(PAIRS, partials)
-        pulled = np.where(single, 1 / self.heard[0], pulled)  # so that it is heard as the others are
-        omega, sigma = self._rates(string, partials, losses)
-        assert law.end_force is not None and law.mirror is not None and law.analysis is not None
-        return Resonator(
-            omega=omega,
-            sigma=sigma,
-            coupling=law.coupling[partial],
-            stretch=law.stretch[partial],
-            tension_rise=law.tension_rise,
-            shapes=law.shapes[partial] * heard[:, None],
-            analysis=law.analysis[:, partial] * pulled,
-            mirror=law.mirror[partial],
-            end_force=law.end_force[partial] * heard,
-        )
-
-    def _rates(self, string: StringParameters, partials: int, losses: float) -> tuple[Array, Array]:
-        """ω and σ of the modes."""
-        partial, second = layout(partials)
-        omega = string.undamped_frequencies(partials)[partial]
-        omega = np.where(second == 1, omega * math.sqrt(self.detuning), omega)
-        conductance = np.array([self.conductance_s_kg, self.second_conductance_s_kg])[second]
-        added = losses * string.tension_n / string.length_m * conductance
-        return omega, np.minimum(string.decay_rates(partials)[partial] + added, HIGHEST_SIGMA * omega)
+def _rates(moving: Polarisations, string: StringParameters, partials: int, losses: float) -> tuple[Array, Array]:
+    """ω and σ of the modes."""
+    partial, second = layout(partials)
+    omega = undamped_frequencies(string, partials)[partial]
+    omega = np.where(second == 1, omega * math.sqrt(moving.detuning), omega)
+    conductance = np.array([moving.conductance_s_kg, moving.second_conductance_s_kg])[second]
+    added = losses * string.tension_n / string.length_m * conductance
+    return omega, np.minimum(decay_rates(string, partials)[partial] + added, HIGHEST_SIGMA * omega)
 
 
 def layout(partials: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

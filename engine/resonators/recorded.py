@@ -23,7 +23,8 @@ import numpy as np
 from engine import bounds
 from engine.kernels.constants import FADES_SEMITONES
 from engine.resonators.base import Array, Resonator
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 
 MOST_CENTS = 60.0
 RATIOS = (0.05, 20.0)
@@ -198,7 +199,7 @@ class RecordedString:
             ValueError: the grid does not hold so many modes.
         """
         partials = (modes + 1) // 2
-        law = string.resonator(partials, tension_modulated=tension_modulated, grid_points=grid_points)
+        law = resonator_of(string, partials, tension_modulated=tension_modulated, grid_points=grid_points)
         omega, sigma = law.omega, law.sigma
         hz = omega / (2 * math.pi)
         own = {name: self._faded(name, partials, hz[0] / self.pitch_hz) for name in OF_PARTIALS}

@@ -12,16 +12,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels import drum_modes as kernel
 from engine.resonators.base import Array
+from engine.values.drum import SHAPES
 
-DrumShape = Literal["circle", "rectangle", "bar"]
-SHAPES: tuple[str, ...] = get_args(DrumShape)  # numbers of the kernels
 POINTS = 256  # of an integral; of a bar it converges to 0.1 %, of others to 3e-5
 
 

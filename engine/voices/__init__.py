@@ -4,14 +4,13 @@ They are compiled in `engine.kernels`.
 
 program    what all voices of a source share at one sample rate
 programs   those of a preset, and of the truth
-ear        where and how a string is heard
+ear        the signal of a string for who listens to it
 voice      one pluck of a program
 mixer      the sum: what a device plays
 derivative velocity from displacement
 offline    a voice for a file
 """
 
-from engine.voices.ear import Ear
 from engine.voices.mixer import Gap, Mixer
 from engine.voices.offline import OfflineVoice, render_voice, voice_blocks
 from engine.voices.player import CompiledPlayer
@@ -21,7 +20,6 @@ from engine.voices.voice import Voice
 
 __all__ = [
     "CompiledPlayer",
-    "Ear",
     "Gap",
     "Mixer",
     "OfflineVoice",

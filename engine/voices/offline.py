@@ -15,7 +15,7 @@ from engine.presets import PresetInfo
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import project
 from engine.sources import ModelSource, Runaway
-from engine.voices.ear import Ear
+from engine.values.ear import Ear
 from engine.voices.mixer import Mixer
 from engine.voices.program import Program
 from engine.voices.voice import Voice

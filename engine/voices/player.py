@@ -20,7 +20,7 @@ from engine.kernels import layout as at
 from engine.kernels.memory import publish
 from engine.kernels.records import EVENT, PLAYER, REPORT, TABLE, player_slots, slot, slots, voice_bytes
 from engine.pluck import SHAPES, Pluck
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 from engine.voices.voice import possible_s
 
 AT_HAND = 16  # notes whose memory is there from the start

@@ -13,7 +13,8 @@ from engine.kernels import layout as at
 from engine.kernels.modes import TOO_HIGH
 from engine.presets import PresetInfo
 from engine.resonators.base import Array, Resonator
-from engine.voices.ear import Ear
+from engine.values.ear import Ear
+from engine.voices.ear import weights_of
 
 STRING_SILENT_DB = 120.0  # its slowest mode, below its start
 KEPT_WEIGHTS = 32  # listening points of a program
@@ -59,7 +60,7 @@ class Program:
 
     def grid_weights(self, ear: Ear) -> Array:
         """The weights on the grid for its string, as `Ear.weights`; displacement @ weights is the signal."""
-        return ear.weights(self.grid_points, self.force)
+        return weights_of(ear, self.grid_points, self.force)
 
     @property
     def rendered(self) -> bool:

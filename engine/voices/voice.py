@@ -12,7 +12,8 @@ from engine.kernels.layout import ATTACK_S, END_FADE_S, FADE_S, LONGEST_S, SILEN
 from engine.kernels.memory import publish
 from engine.levels import FULL_SCALE_M, LEAST_PEAK_M, RUNAWAY_FACTOR
 from engine.resonators.base import Resonator
-from engine.voices.ear import Ear
+from engine.values.ear import Ear
+from engine.voices.ear import largest
 from engine.voices.program import Program
 
 SPARE_S = 0.1  # of samples that are rendered ahead, behind that fade
@@ -59,7 +60,7 @@ class Voice:
         counts[at.ENDS_IN] = round(END_FADE_S * program.rate_hz)
         memory[at.SILENT] = SILENT_DB * math.log(10) / 20
         memory[at.PEAK] = max(float(np.abs(displacement_m).max()), LEAST_PEAK_M)
-        memory[at.LIMIT] = RUNAWAY_FACTOR * ear.largest(displacement_m, program.force) / FULL_SCALE_M
+        memory[at.LIMIT] = RUNAWAY_FACTOR * largest(ear, displacement_m, program.force) / FULL_SCALE_M
         first, second = program.start(displacement_m) if begin is None else begin
         place = _state(n)
         memory[place : place + len(first)], memory[place + n : place + n + len(second)] = first, second

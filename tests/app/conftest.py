@@ -23,7 +23,9 @@ from app.audio.sound import Sound
 from app.rendering import Take
 from app.rendering.take import Listened, Signal
 from app.shared.vocabulary import Face
-from engine.voices import Ear, Mixer
+from engine.values.ear import Ear
+from engine.voices import Mixer
+from engine.voices.ear import weights_of
 from tests.app.questions import none_unanswered
 
 Hear = Callable[[Take, Ear], None]
@@ -39,7 +41,7 @@ def hear(derivative: Callable[[np.ndarray, int], np.ndarray]) -> Hear:
             motion = take.motions[name]
             frames_m, rate_hz = motion.read(), round(motion.rate_hz)
             signal = listened.signals[name] = Signal(rate_hz, len(ear.points), take.seconds)
-            samples = frames_m @ ear.weights(frames_m.shape[1]).astype(np.float32)
+            samples = frames_m @ weights_of(ear, frames_m.shape[1]).astype(np.float32)
             if ear.pickup == "velocity":
                 samples = derivative(samples, rate_hz).astype(np.float32)
             signal.append(samples)

@@ -21,11 +21,12 @@ from PySide6.QtGui import QPixmap
 
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import Event, NoteOn
-from app.patches.drums import Drums, PhysicalMallet
+from app.patches.drums import Drums
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import Patch
 from engine.presets import SHIPPED, load_preset
+from engine.values.drum import Mallet
 from engine.voices import Mixer
 from tests.bench.machine import Machine, one_thread
 
@@ -57,7 +58,7 @@ DRUM_FILES, MODES_COMPARED = Path(__file__).parents[2] / "presets" / "drums", 40
 # (docs/paper/references.bib). A kick drum: "around 10 percent" (Reid, Sound on Sound, January 2002).
 PUBLISHED_DROPS = {"Tom": (8.0, 9.7), "Floor tom": (8.0, 9.7), "Bass drum": (9.0, 11.0)}
 SIZES = (400, 800, 1500)  # modes
-HARD = PhysicalMallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)  # so that all modes move
+HARD = Mallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)  # so that all modes move
 STRINGS, STRING_PATCH = (40, 45, 50, 55, 59, 64, 67, 71), "classical_guitar"
 
 
@@ -175,7 +176,7 @@ def measured_modes() -> tuple[MeasuredMode, ...]:
 
 def _drops(kit: Patch) -> tuple[PitchDrop, ...]:
     from app.instrument.drum_keys import DrumKeys
-    from engine.voices import Ear
+    from engine.values.ear import Ear
 
     keys, found = DrumKeys(kit, Ear((0.5,))), []
     for drum in _drums(kit).drums:
@@ -190,7 +191,7 @@ def _drops(kit: Patch) -> tuple[PitchDrop, ...]:
 def _choice(name: str) -> ChoiceCost:
     from app.instrument.drum_keys import DrumKeys, tuned
     from engine.resonators import surface
-    from engine.voices import Ear
+    from engine.values.ear import Ear
 
     patch = read_patch(PATCHES / f"{name}.json")
     low, high = patch.range
@@ -217,7 +218,7 @@ def _picture(patch: str, key: int) -> PictureCost:
     from app.session.shown import DEFAULT_SOURCES
     from app.views.drum.ink import HeadFrame
     from app.views.drum.view import DrumView
-    from engine.voices import Ear
+    from engine.values.ear import Ear
 
     os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     application = QApplication.instance() or QApplication([])
@@ -288,7 +289,7 @@ def _drums(patch: Patch) -> Drums:
 def _of_size(modes: int) -> Patch:
     """The tom whose modes below a frequency are so many, about."""
     from app.instrument.drum_keys import DrumKeys
-    from engine.voices import Ear
+    from engine.values.ear import Ear
 
     patch = read_patch(PATCHES / "tuned_toms.json")
     low, high = 1_000.0, 19_000.0

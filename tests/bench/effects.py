@@ -16,8 +16,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.effects import Body, Effects, Room
+from engine.effects import Body, Effects
 from engine.kernels import layout as at
+from engine.values.effects import Room
 from engine.voices import Mixer, Voice, plain_program
 from tests.bench.machine import Machine, one_thread
 

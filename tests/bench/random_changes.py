@@ -8,12 +8,13 @@ from random import Random
 from typing import Any
 
 from app.patches.instrument import SingleString
-from app.patches.patch import Fretted, Patch, PhysicalString, StringSet
+from app.patches.patch import Fretted, Patch, StringSet
 from app.session.choices import Choices
 from app.shared.parameters import OF_CHOICES
 from app.shared.vocabulary import DIFFERENCE_GAIN_RANGE_DB
 from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 from engine.pluck import SHAPES
+from engine.values.string import StringParameters
 
 SECONDS_RANGE = (0.5, 4.0)
 VOLUME_RANGE_DB = (-40.0, 6.0)
@@ -35,7 +36,7 @@ def random_change(random: Random, choices: Choices, repertoire: Repertoire) -> M
     return random.choice(_CHANGES)(random, choices, repertoire)
 
 
-def _strings(patch: Patch) -> list[PhysicalString | None]:
+def _strings(patch: Patch) -> list[StringParameters | None]:
     found = patch.strings
     if isinstance(found, StringSet):
         return [None, *(each.string for each in found.strings)]

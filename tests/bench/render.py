@@ -21,7 +21,8 @@ from engine.models import build_model
 from engine.models.base import Physics, StringModel
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.resonators.sine_transform import listening_weights
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 from tests.bench.machine import Machine, median_s, one_thread, times_s
 
 FIRST_BLOCK = 256  # frames
@@ -125,7 +126,7 @@ def _measure(case: Case, products_per_s: float, written_per_s: float) -> RenderT
 
 def _untrained(case: Case) -> StringModel[Any]:
     model = build_model(case.model, dict(case.sizes))
-    physics = Physics(StringParameters().resonator(case.modes), case.rate_hz)
+    physics = Physics(resonator_of(StringParameters(), case.modes), case.rate_hz)
     # modes decay one by one, and the integrated phase skips those that have; random eigenvalues would decay at once
     how = "averaging" if "averaging" in model.initialisations else model.own_initialisation()
     model.initialise(how, physics, torch.Generator().manual_seed(0))

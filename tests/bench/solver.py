@@ -10,9 +10,10 @@ from dataclasses import dataclass, replace
 from torch import Tensor
 
 from engine.pluck import Pluck
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.sources import SILENCE
 from engine.truth import ModalState, SplittingSolver, solve_dop853
+from engine.values.string import StringParameters
 from tests.bench.machine import Machine, median_s, one_thread
 from training.configuration import DatasetConfiguration
 from training.data.dataset import draw_initial
@@ -142,7 +143,7 @@ def _solver(data: DatasetConfiguration, substeps: int | None) -> SplittingSolver
 def _measure_audio(substeps: int | None, silence: float = 0.0) -> AudioTiming:
     string = StringParameters()
     modes = string.modes_below(HIGHEST_AUDIBLE_HZ)
-    resonator = string.resonator(modes, grid_points=modes + 2)
+    resonator = resonator_of(string, modes, grid_points=modes + 2)
     state = ModalState.at_rest(resonator.to_modes(Pluck().displacement(modes + 2)[None]))
     samples = math.ceil(AUDIO_S * AUDIO_RATE_HZ)
     whole, solver = (

@@ -16,7 +16,7 @@ from app.rendering import RenderRequest
 from app.rendering.job import Job
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import SHIPPED
-from engine.voices import Ear
+from engine.values.ear import Ear
 from tests.bench.machine import Machine, one_thread
 
 PRESETS = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "studio_steel_ds3", "studio_steel_e4")

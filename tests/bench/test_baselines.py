@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from engine.resonators.string import resonator_of
 from tests.bench.baselines import fit as fitting
 from tests.bench.baselines.fit import BaselineProgress, checkpoint_file, fit_baseline, trained_baseline
 from tests.bench.baselines.models import BASELINES, ModalSynthesis, baseline_player, in_own_units, units
@@ -47,7 +48,7 @@ def test_strings_with_the_same_three_numbers_are_one_to_a_baseline() -> None:
         damping_d1_kg_m_s=4 * one.damping_d1_kg_m_s / slower,
         damping_d3_kg_m_s=16 * one.damping_d3_kg_m_s / slower,
     )
-    resonator = other.resonator(plucked.resonator.modes)
+    resonator = resonator_of(other, plucked.resonator.modes)
     amplitudes = plucked.amplitudes_m * (units(other)[1] / units(one)[1])
     rise = float(resonator.relative_tension_rise(amplitudes.numpy()))
     assert rise == pytest.approx(plucked.tension_rise, rel=1e-9)

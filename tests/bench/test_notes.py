@@ -13,9 +13,10 @@ from app.instrument.events import Controller, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Body, Noise, Patch, Room
+from app.patches.patch import Body, Noise, Patch
 from app.patches.tuning import Tuning
 from engine.presets import SHIPPED, load_preset
+from engine.values.effects import Room
 from tests.bench.play import hearing, score
 from tests.bench.play.hands import KeyHand
 from tests.bench.play.judgement import Judgement, judge

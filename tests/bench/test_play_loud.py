@@ -10,7 +10,8 @@ from engine.kernels.layout import QUANTUM
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
 from engine.resonators.sine_transform import project
-from engine.voices import Ear, Mixer, Voice, model_program
+from engine.values.ear import Ear
+from engine.voices import Mixer, Voice, model_program
 from tests.bench.play import analysis
 
 RATE_HZ = 48_000

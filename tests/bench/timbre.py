@@ -20,6 +20,7 @@ from app.patches.patch import Damping, Noise, Patch
 from app.shared.vocabulary import DIFFERENCE
 from engine.kernels.layout import QUANTUM
 from engine.presets import Preset
+from engine.resonators.string import undamped_frequencies
 
 RATE_HZ = 48_000
 VELOCITY = 100
@@ -161,7 +162,7 @@ def timbre(patch: Patch, preset: Preset, source: str = "model") -> Timbre:
     string = Strings(patch).of_key(key)
     if string is None:
         raise ValueError(f"{patch.name}: key {key} is silent in its tuning")
-    omega = string.parameters.undamped_frequencies(min(string.modes, 3 * PARTIALS))
+    omega = undamped_frequencies(string.parameters, min(string.modes, 3 * PARTIALS))
     partials_hz = np.asarray(omega, np.float64) / math.tau
 
     def played(seconds: float, *events: tuple[float, Event], by: Patch = patch) -> Array:

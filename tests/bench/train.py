@@ -11,7 +11,8 @@ from torch.utils._python_dispatch import TorchDispatchMode
 
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 from tests.bench.machine import Machine, median_s
 from training.configuration import Recipe
 from training.data.batches import Batch
@@ -96,7 +97,7 @@ class _Launches(TorchDispatchMode):
 
 def _model_and_batch(name: str, strings: int, frames: int) -> tuple[StringModel[Any], Batch]:
     model = build_model(name)
-    physics = Physics(StringParameters().resonator(10), 4_000)
+    physics = Physics(resonator_of(StringParameters(), 10), 4_000)
     model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(0))
     target = torch.randn(strings, frames, model.grid_points, generator=torch.Generator().manual_seed(0))
     return model, Batch(target[:, 0], torch.arange(1, frames + 1), target)

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from app.instrument.events import Bend, Event, NoteOff, NoteOn, TimedEvent
 from app.instrument.offline import render_events, render_note
 from app.instrument.strings import Strings
-from app.patches.patch import Body, Patch, Room
+from app.patches.patch import Body, Patch
 from engine.kernels.constants import PART_S, REFERENCE_VELOCITY
 from engine.kernels.loudness import k_weight
 from engine.presets import Preset
+from engine.values.effects import Room
 from tests.bench.machine import Machine
 
 RATE_HZ = 48_000

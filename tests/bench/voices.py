@@ -27,7 +27,9 @@ from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import SHIPPED, Preset, load_preset, preset_files
 from engine.resonators.sine_transform import project
 from engine.sources import ModelSource, StringSource, TruthSource
-from engine.voices import Ear, Mixer, Program, Voice, model_program, truth_program
+from engine.values.ear import Ear
+from engine.voices import Mixer, Program, Voice, model_program, truth_program
+from engine.voices.ear import weights_of
 from engine.voices.voice import ATTACK_S
 from tests.bench.machine import Machine, one_thread
 
@@ -227,7 +229,7 @@ def _error(program: Program, preset: Preset, source: StringSource) -> float:
     mixer.add(voice)
     found = mixer.render(frames)[first:, 0].astype(np.float64)
     initial_m = project(PLUCK.displacement(info.grid_points), info.modes)
-    blocks, _ = source.advance(source.start(initial_m[None]), frames - 1, EAR.weights(info.grid_points))
+    blocks, _ = source.advance(source.start(initial_m[None]), frames - 1, weights_of(EAR, info.grid_points))
     expected = blocks[0, first - 1 :, 0].astype(np.float64) / FULL_SCALE_M
     return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
 

@@ -17,8 +17,9 @@ from engine.pluck import Pluck
 from engine.presets import SHIPPED, Preset, PresetInfo, TrainedRange, load_preset
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import project
-from engine.resonators.string import StringParameters
-from engine.voices import Ear, Mixer, Program, Voice, model_program
+from engine.values.ear import Ear
+from engine.values.string import StringParameters
+from engine.voices import Mixer, Program, Voice, model_program
 
 PLUCK, EAR = Pluck(0.3), Ear((0.37,))
 

@@ -17,12 +17,13 @@ from engine.partials import (
     segment_frames,
     track_partials,
 )
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
+from engine.values.string import StringParameters
 
 RATE_HZ = 4000.0
 STRING = StringParameters()
-LINEAR_HZ = (STRING.resonator(10).eigenvalues().imag / (2 * math.pi)).tolist()  # 9 and 10 lie above half the rate
+LINEAR_HZ = (resonator_of(STRING, 10).eigenvalues().imag / (2 * math.pi)).tolist()  # 9 and 10 lie above half the rate
 RESOLVED = [0, 1, 2, 3, 4, 5, 6, 8, 9]  # mode 8 is at 1994 Hz
 
 
@@ -200,24 +201,24 @@ def test_too_short_for_a_segment() -> None:
 
 
 def test_the_phasors_of_the_linear_string_are_exact() -> None:
-    eigenvalues = STRING.resonator(10).eigenvalues()
+    eigenvalues = resonator_of(STRING, 10).eigenvalues()
     amplitude = np.linspace(1, 2, 10)
     spacing_s = 1 / 16_000
     expected = amplitude * np.exp(eigenvalues * np.linspace(0, 0.1, 50)[:, None])
     around = [(expected * np.exp(eigenvalues * offset)).real for offset in (-spacing_s, 0, spacing_s)]
-    found = phasors(*around, spacing_s, STRING.resonator(10, tension_modulated=False))
+    found = phasors(*around, spacing_s, resonator_of(STRING, 10, tension_modulated=False))
     assert np.allclose(found, expected, rtol=0, atol=1e-12)
 
 
 def test_the_phasors_of_a_tense_string_are_circles() -> None:
     """One mode alone, whose tension rises by 5 %: ellipses, if its frequency were taken to be that at rest."""
     state = ModalState.at_rest(torch.tensor([[0.0137]]))
-    assert STRING.resonator(1).relative_tension_rise(state.amplitude.numpy()) == pytest.approx(0.05, abs=0.01)
-    samples = SplittingSolver(STRING.resonator(1), 16_000).solve(state, 4000).numpy()
+    assert resonator_of(STRING, 1).relative_tension_rise(state.amplitude.numpy()) == pytest.approx(0.05, abs=0.01)
+    samples = SplittingSolver(resonator_of(STRING, 1), 16_000).solve(state, 4000).numpy()
     around = (samples[:, :-2], samples[:, 1:-1], samples[:, 2:])
     roundness = []
     for modulated in (True, False):
-        z = phasors(*around, 1 / 16_000, STRING.resonator(1, tension_modulated=modulated))
+        z = phasors(*around, 1 / 16_000, resonator_of(STRING, 1, tension_modulated=modulated))
         roundness.append(float(np.linalg.norm(z.imag) / np.linalg.norm(z.real)))
     assert roundness[0] == pytest.approx(1, abs=0.002)
     assert roundness[1] > 1.01

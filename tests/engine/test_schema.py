@@ -1,6 +1,7 @@
 """Plain data to dataclasses and back, and what is refused."""
 
 from dataclasses import dataclass, field
+from datetime import date
 from typing import Literal
 
 import pytest
@@ -41,19 +42,28 @@ def test_a_whole_number_serves_as_a_float() -> None:
 @pytest.mark.parametrize(
     ("data", "message"),
     [
-        ([], "here: expected a table of fields, found list"),
+        ([], "here: must be a table of fields, found list"),
         ({}, "here: field 'name' is missing"),
         ({"name": "x", "wide": 1}, "here: unknown field 'wide'; known are name"),
-        ({"name": 3}, "here.name: expected str, found int 3"),
-        ({"name": "x", "kind": "c"}, "here.kind: 'c' is not one of 'a', 'b'"),
-        ({"name": "x", "share": True}, "here.share: expected float, found bool"),
+        ({"name": 3}, "here.name: must be a valid string, found 3"),
+        ({"name": "x", "kind": "c"}, "here.kind: must be 'a' or 'b', found 'c'"),
+        ({"name": "x", "share": True}, "here.share: must be a valid number, found True"),
         ({"name": "x", "share": float("nan")}, "here.share: must be a finite number"),
         ({"name": "x", "share": 2.0}, "here: share must be at most 1"),
-        ({"name": "x", "on": 1}, "here.on: expected bool, found int"),
-        ({"name": "x", "sizes": [1, "2"]}, r"here.sizes\[1\]: expected int, found str"),
-        ({"name": "x", "sizes": 4}, "here.sizes: expected a list"),
-        ({"name": "x", "pair": [1.0]}, "here.pair: expected 2 entries, found 1"),
-        ({"name": "x", "inner": {"size": 1.5}}, "here.inner.size: expected int, found float"),
+        ({"name": "x", "on": 1}, "here.on: must be a valid boolean, found 1"),
+        ({"name": "x", "sizes": [1, "2"]}, r"here.sizes\[1\]: must be a valid integer, found '2'"),
+        ({"name": "x", "sizes": 4}, "here.sizes: must be a valid array"),
+        ({"name": "x", "pair": [1.0]}, "here.pair: field 1 is missing"),
+        ({"name": "x", "inner": {"sizes": 1}}, "here.inner: unknown field 'sizes'; known are size"),
+        ({"name": "x", "inner": 3}, "here.inner: must be a table, found 3"),
+        ({"name": "x", "pair": [1.0, 2.0, 3.0]}, "here.pair: Tuple should have at most 2 items"),
+        ({"nome": "x"}, "here: unknown field 'nome'; known are name"),
+        ({"name": "x", "share": 10**400}, "here.share: must be a number of at most 64 bits"),
+        ({"name": "x", "sizes": [1] * 1001}, "here.sizes: has 1001 entries"),
+        ({"name": "x", "sizes": [1, float("inf")]}, r"here.sizes\[1\]: must be a finite number"),
+        ({"name": "x" * 10_001}, "here.name: has 10001 characters"),
+        ({"name": date(2020, 1, 1)}, "here.name: must be a number or a text"),
+        ({"name": "x", "inner": {"size": 1.5}}, "here.inner.size: must be a valid integer"),
     ],
 )
 def test_what_does_not_fit_is_named(data: object, message: str) -> None:

@@ -11,6 +11,7 @@ from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import Preset, load_preset, read_info
 from engine.resonators.sine_transform import listening_weights, project, to_grid, to_modes
+from engine.resonators.string import resonator_of
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource
 from engine.truth import ModalState, solve_dop853
 
@@ -39,7 +40,7 @@ def test_truth_is_the_oracle(preset_file: Path) -> None:
     _, truth, initial = both(preset_file)
     info = read_info(preset_file)
     state = ModalState.at_rest(to_modes(initial, info.modes))
-    expected = to_grid(solve_dop853(info.string.resonator(state.modes), state, info.rate_hz, 200).numpy(), 101)
+    expected = to_grid(solve_dop853(resonator_of(info.string, state.modes), state, info.rate_hz, 200).numpy(), 101)
     found, _ = truth.advance(truth.start(initial), 200)
     assert float(np.linalg.norm(found - expected[:, 1:]) / np.linalg.norm(expected)) < 1e-8
 

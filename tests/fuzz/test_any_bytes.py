@@ -10,16 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from app.export.recipe import Recipe
-from app.patches.fields import explained
 from app.patches.patch import Patch
 from app.session.choices import Choices
 from app.window.settings import Settings, load_settings
 from engine import bounds
 from engine.plain_text import LONGEST_MESSAGE, one_line
 from engine.presets import PresetError, PresetInfo, load_preset
-from engine.resonators.string import StringParameters
-from engine.schema import SchemaError, parse_json, read, write
+from engine.resonators.string import resonator_of
+from engine.schema import SchemaError, explained, parse_json, read, write
 from engine.truth import SplittingSolver
+from engine.values.string import StringParameters
 from tests.fuzz.test_attack import TARGETS, Target
 from training.configuration import TrainingConfiguration
 
@@ -115,7 +115,7 @@ def test_a_string_within_bounds_can_be_computed(
         return
     if modes * points > 50_000:
         return  # it may take a moment
-    resonator = string.resonator(modes, grid_points=points)
+    resonator = resonator_of(string, modes, grid_points=points)
     resonator.eigenvalues()
     solver = SplittingSolver(resonator, rate_hz, silence=1e-9)
     assert solver.substeps <= bounds.MOST_SUBSTEPS

@@ -44,7 +44,8 @@ from engine.presets import (
 from engine.resonators.sine_transform import project
 from engine.schema import SchemaError, write
 from engine.sources import ModelSource, Runaway, TruthSource
-from engine.voices import Ear, model_program, render_voice, truth_program
+from engine.values.ear import Ear
+from engine.voices import model_program, render_voice, truth_program
 from tests.fuzz.costs import MOST_MB, Costs
 from tests.fuzz.mutations import HOSTILE, attacked, damaged_bytes, damaged_preset, damaged_text, damaged_value
 from training.cell import load

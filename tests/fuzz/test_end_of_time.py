@@ -17,7 +17,8 @@ from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset, read_info
 from engine.resonators.sine_transform import project
 from engine.sources import ModelSource
-from engine.voices import Ear, Mixer, Voice, model_program, voice_blocks
+from engine.values.ear import Ear
+from engine.voices import Mixer, Voice, model_program, voice_blocks
 from engine.voices.program import voice_ends_s
 from engine.voices.voice import END_FADE_S
 from tests.fuzz.conftest import LONG

@@ -9,6 +9,7 @@ import torch
 from engine.models import build_model
 from engine.models.base import Physics
 from engine.presets import Preset, PresetInfo, TrainedRange
+from engine.resonators.string import resonator_of
 from engine.schema import write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 
@@ -30,7 +31,7 @@ def preset(model: str = "koopman_var", name: str = "", horizon: int = HORIZON, *
     c = DatasetConfiguration(**fields)
     built = build_model(model, SIZES[model])
     how = "physics" if "physics" in built.initialisations else built.own_initialisation()
-    built.initialise(how, Physics(c.string.resonator(c.modes), c.rate_hz, 1e-3), torch.Generator().manual_seed(0))
+    built.initialise(how, Physics(resonator_of(c.string, c.modes), c.rate_hz, 1e-3), torch.Generator().manual_seed(0))
     training = TrainingConfiguration("Tiny", model, c, Recipe(1), model_configuration=SIZES[model])
     info = PresetInfo(
         title="Tiny",
@@ -60,6 +61,6 @@ def test_every_model_with_linear_dynamics_has_eigenvalues(model: str, layers: in
     one = preset(model)
     found = one.model.log_eigenvalues()
     assert [log.dtype for log in found] == [torch.complex128] * layers
-    linear = torch.from_numpy(one.info.string.resonator(5).eigenvalues() / 4000)
+    linear = torch.from_numpy(resonator_of(one.info.string, 5).eigenvalues() / 4000)
     nearest = (found[0].exp()[:, None] - linear.exp()).abs().amin(0)
     assert float(nearest.max()) < 1e-5  # all of them started from the string's

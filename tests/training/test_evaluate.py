@@ -15,6 +15,7 @@ from torch import Tensor, nn
 
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
+from engine.resonators.string import decay_rates, resonator_of
 from engine.truth import ModalState, SplittingSolver
 from tests.engine.tensors import to_grid, to_modes
 from training.configuration import DatasetConfiguration
@@ -152,7 +153,7 @@ def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path: Path) 
     c = replace(DATA, tension_modulated=False)
     data = load_dataset(c, tmp_path)
     model = build_model("koopman_integrated")
-    physics = Physics(c.string.resonator(c.modes, tension_modulated=False), c.rate_hz, data.scale_m)
+    physics = Physics(resonator_of(c.string, c.modes, tension_modulated=False), c.rate_hz, data.scale_m)
     model.initialise("physics", physics, torch.Generator().manual_seed(0))
     found = evaluate_past_horizon(model, data, "validation", 10, windows_s=[(0, HORIZON_S), (9, 10)])
     first, last = found.string.windows(c.rate_hz, [0, HORIZON_S, 9, 10])[::2]
@@ -167,7 +168,7 @@ def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path: Path) 
         (partials.t60_error_percent, 0.01),
     ):
         assert np.nanmax(np.abs(errors)) < most
-    sigma = c.string.decay_rates(c.modes)
+    sigma = decay_rates(c.string, c.modes)
     there = ~np.isnan(partials.t60_s[:, 0])
     expected = np.broadcast_to(3 * math.log(10) / sigma, there.shape)
     assert there.sum() > 10
@@ -177,7 +178,7 @@ def test_the_linear_string_in_closed_form_holds_for_ten_seconds(tmp_path: Path) 
 @torch.no_grad()
 def test_kept_frames_of_a_stride_are_measured_alone(tmp_path: Path) -> None:
     every, some = (load_dataset(replace(DATA, stride=stride), tmp_path) for stride in (1, 5))
-    physics = Physics(DATA.string.resonator(DATA.modes), DATA.rate_hz, every.scale_m)
+    physics = Physics(resonator_of(DATA.string, DATA.modes), DATA.rate_hz, every.scale_m)
     for name in ("koopman_integrated", "s5"):  # one knows any frame at once, one does not
         model = build_model(name, {"state_size": 16, "layers": 1, "hippo_blocks": 2} if name == "s5" else None)
         model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(0))

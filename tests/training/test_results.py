@@ -198,7 +198,7 @@ def test_what_is_no_results_file_is_refused_and_left_alone(path: Path, text: str
     [
         ("0.125", "0.1.25", "line 3, column rel_mae: '0.1.25' is not a number"),
         ("0.125", "nan", "line 3.rel_mae: must be a finite number"),
-        (",done,", ",perhaps,", "line 3.status: 'perhaps' is not one of 'done', 'diverged', 'failed'"),
+        (",done,", ",perhaps,", "line 3.status: must be 'done', 'diverged' or 'failed', found 'perhaps'"),
         (",4000,", ",4 kHz,", "line 3, column rate_hz: '4 kHz' is not a number"),
     ],
 )

@@ -21,6 +21,7 @@ import torch
 from filelock import FileLock
 from torch import Tensor
 
+from engine import bounds
 from engine.resonators.base import Array
 from engine.schema import write
 from engine.truth import ModalState, SplittingSolver
@@ -55,8 +56,7 @@ class Dataset:
 
 def split_rows(count: int, name: str) -> slice:
     """The trajectories of a split: 80/10/10 in order, or all."""
-    if name not in SPLITS:
-        raise ValueError(f"split {name!r} is not one of {', '.join(SPLITS)}")
+    bounds.check_choice("split", name, SPLITS)
     train, validation = count * 8 // 10, count // 10
     first = {"train": 0, "validation": train, "test": train + validation, "all": 0}[name]
     return slice(first, {"train": train, "validation": train + validation, "test": count, "all": count}[name])

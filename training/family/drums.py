@@ -26,10 +26,11 @@ from engine.models import build_model
 from engine.models.base import Physics, StringModel
 from engine.models.koopman_tension import KoopmanTension
 from engine.resonators.base import Array, Resonator
-from engine.resonators.drum import DrumModes, DrumParameters
+from engine.resonators.drum import DrumModes, bending_nm, modes_of
 from engine.strike import pulse_spectrum
 from engine.table import checked, read_table, write_table
 from engine.truth import ModalState, SplittingSolver
+from engine.values.drum import DrumParameters
 from training.family.errors import SCALE_M, UNHEARD
 from training.family.motions import substeps_of
 
@@ -90,7 +91,7 @@ def draw_drum(number: int, seed: int = 0) -> StruckDrum:
     while True:
         drum = _drawn(random, kind)
         try:
-            modes = drum.modes(HIGHEST_HZ)
+            modes = modes_of(drum, HIGHEST_HZ)
         except ValueError:
             continue  # a plate so stiff that none is so low
         if len(modes) >= LEAST_MODES:
@@ -127,7 +128,7 @@ def _drawn(random: np.random.Generator, kind: Kind) -> DrumParameters:
         drum = replace(drum, tension_n_m=drum.mass_kg_m2 * (2 * math.pi * pitch / kappa) ** 2)
     slow, fast = (math.log(1000) / _between(random, ends) for ends in (T60_S, BRIGHT_T60_S))
     fast = max(fast, 1.5 * slow)
-    stiff = drum.tension_n_m + drum.bending_nm * kappa**2
+    stiff = drum.tension_n_m + bending_nm(drum) * kappa**2
     bright = kappa * max(2.0, (2 * math.pi * BRIGHT_HZ) / (kappa * math.sqrt(stiff / drum.mass_kg_m2)))
     d3 = 2 * drum.mass_kg_m2 * (fast - slow) / (bright**2 - kappa**2)
     d1 = max(0.0, 2 * drum.mass_kg_m2 * slow - d3 * kappa**2)

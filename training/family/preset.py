@@ -9,12 +9,14 @@ from pathlib import Path
 
 import torch
 
+from engine import bounds
 from engine.models import build_model
 from engine.models.base import Physics
 from engine.models.koopman_tension import KoopmanTension
 from engine.presets import PresetInfo, TrainedRange, save_preset
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.schema import SchemaError, read, read_toml, write
+from engine.values.string import StringParameters
 from training.family.errors import SCALE_M, player
 from training.family.fit import Case, FitProgress, fit_curves
 from training.family.motions import solve
@@ -51,8 +53,7 @@ class FamilyConfiguration:
 
     def __post_init__(self) -> None:
         for name in ("strings", "validation_strings", "test_strings", "steps"):
-            if not 1 <= getattr(self, name) <= 10_000:
-                raise ValueError(f"{name} must lie in 1 … 10000, not {getattr(self, name)}")
+            bounds.check(name, getattr(self, name), (1, 10_000))
         if not 0 < self.first_s <= self.seconds <= 10:
             raise ValueError("first_s and seconds must be above 0, first_s at most seconds, and seconds at most 10")
 
@@ -89,7 +90,7 @@ def train_preset(
     sizes = {"grid_points": GRID_POINTS, "modes": c.modes, "degree": c.degree}
     model = build_model("koopman_tension", sizes)
     assert isinstance(model, KoopmanTension)
-    resonator = c.string.resonator(c.modes, grid_points=GRID_POINTS)
+    resonator = resonator_of(c.string, c.modes, grid_points=GRID_POINTS)
     model.initialise(c.initialisation, Physics(resonator, c.rate_hz, SCALE_M), torch.Generator().manual_seed(c.seed))
     model.eval()
     first = max(1, round(c.first_s * c.rate_hz))

@@ -19,7 +19,8 @@ from engine import excitation
 from engine.pluck import Shape
 from engine.resonators.base import Resonator
 from engine.resonators.family import BRIGHT_HZ, StringFamily
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 
 Column = Literal["inside", "beyond"]
 COLUMNS: tuple[Column, ...] = get_args(Column)
@@ -69,7 +70,7 @@ def draw_from(ranges: StringFamily, random: np.random.Generator, shape: Shape | 
         if bright_t60_s < t60_s:
             break
     string = string_of(pitch_hz, inharmonicity, t60_s, bright_t60_s)
-    resonator = string.resonator(min(MOST_MODES, string.modes_below(HIGHEST_HZ)), grid_points=GRID_POINTS)
+    resonator = resonator_of(string, min(MOST_MODES, string.modes_below(HIGHEST_HZ)), grid_points=GRID_POINTS)
     drawn, place = DRAWN_SHAPES[int(random.integers(3))], float(random.uniform(*ranges.position))
     half_width, rise = _log_uniform(random, ranges.half_width), _log_uniform(random, ranges.tension_rise)
     shape = shape or drawn

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from engine.resonators.recorded import OF_PARTIALS, RecordedString
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 from training.recording.learn import SAME_PITCH_CENTS, Learned
 from training.recording.physics import corrections
 from training.recording.preset import recorded_note, recorded_string

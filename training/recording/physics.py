@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy import optimize
 
 from engine.resonators.recorded import MOST_CENTS, RATIOS
-from engine.resonators.string import StringParameters
+from engine.resonators.string import decay_rates, undamped_frequencies
+from engine.values.string import StringParameters
 from training.recording.fit import LearnedNote
 from training.recording.refine import Pole, polarisations
 
@@ -279,8 +280,8 @@ def pluck_place(physics: Physics) -> float:
 def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[float, ...]]:
     """The corrections by the note's partials to the law of its string, as `engine.resonators.recorded` keeps them."""
     count = max(each.number for each in physics.partials)
-    omega = string.undamped_frequencies(count)
-    sigma = string.decay_rates(count)
+    omega = undamped_frequencies(string, count)
+    sigma = decay_rates(string, count)
     law = np.interp(np.log(physics.smooth_hz), np.log(omega / (2 * math.pi)), np.log(sigma))
     smooth_ratio = np.clip(np.array(physics.smooth_decay) / np.exp(law), *RATIOS)
     smooth = sigma * np.exp(

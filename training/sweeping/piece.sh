@@ -4,7 +4,7 @@
 set -e
 cd "$(dirname "$0")/../.."
 python=${PYTHON:-python3}
-packages="numba numpy safetensors typer"
+packages="numba numpy pydantic safetensors typer"
 "$python" -c "import $(echo $packages | tr ' ' ',')" 2>/dev/null || "$python" -m pip install $packages
 export LEARNED_STRINGS_COMMIT=$(cat COMMIT)
 [ $# -gt 0 ] || set -- published --device cuda --minutes 9

@@ -13,6 +13,8 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from app.shared.value import Value
+
 Identity = Literal["A", "B"]
 Sound = Literal["A", "B", "X"]
 
@@ -20,10 +22,8 @@ MOST_TRIALS = 200
 LEVEL = 0.05  # below it, luck is an unlikely explanation
 
 
-class AbxChoices(BaseModel):
+class AbxChoices(Value):
     """The last settings. `restart`: each switch starts the sound again; `folder`: "" for `record.default_folder`."""
-
-    model_config = ConfigDict(extra="forbid")
 
     trials: int = Field(16, ge=1, le=MOST_TRIALS)
     restart: bool = False

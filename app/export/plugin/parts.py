@@ -22,6 +22,7 @@ from engine.kernels import drum_modes as kernel
 from engine.kernels import kit
 from engine.kernels.records import DRUM, DRUM_ROWS, slots
 from engine.resonators.base import Array
+from engine.resonators.drum import around as around_of
 
 EFFECTS = ("body.mix", "room.mix", "body.size", "room.t60_s")  # in the shell's order
 MORE = 1.05  # of modes than the keys need
@@ -87,7 +88,7 @@ def kit_of(own: DrumKeys) -> Kit:
     """The kit of an instrument of drums; keys that are silent at any modulus have no drum in it."""
     patch, drums, highest_hz, most = own.patch, own.drums.drums, own.drums.highest_hz, kernel.LOW_MODES
     slack = DrumKeys(patch.with_value("knobs.modulus", OF_PATCHES["knobs.modulus"].limits[0]), own.ear, own)
-    possible = [played.drum.parameters for played in drums]
+    possible = [played.drum for played in drums]
     for each, key in product((slack, own), range(of.KEYS)):  # the softer, the more modes are below a frequency
         with contextlib.suppress(ValueError):
             if (found := each.of_key(key)) is not None:
@@ -95,7 +96,7 @@ def kit_of(own: DrumKeys) -> Kit:
                 most = max(most, len(found.modes))
     around = dict[tuple[str, float], kernel.Around]()  # what is longest of each kind
     for drum in possible:
-        kind, (rows, air, reach) = (drum.shape, drum.aspect), drum.around(highest_hz, of.MOST_DRUM_MODES)
+        kind, (rows, air, reach) = (drum.shape, drum.aspect), around_of(drum, highest_hz, of.MOST_DRUM_MODES)
         longest, known_air, known_reach = around.get(kind, (rows, air, reach))
         if air.size < known_air.size:
             air, reach = known_air, known_reach

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from app.export.sampled.plan import MOST_LAYERS, SECONDS_RANGE, WIDEST_STEP, SampleBits, SampledSource
 from app.patches.patch import Key
+from app.shared.value import Value
 
 SampledKind = Literal["flac", "wav", "sf2"]  # the former two are an SFZ's samples
 
 
-class SampledChoices(BaseModel):
+class SampledChoices(Value):
     """The last settings. `keys`: the lowest and the highest; None: all of the patch's range."""
-
-    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
 
     folder: str = ""
     form: SampledKind = "flac"

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from app.instrument.effects import channels_of
 from app.patches.patch import VELOCITIES, Patch
 from app.patches.tuning import Tuning
+from engine import bounds
 
 SampleFormat = Literal["flac", "wav"]
 SampleBits = Literal["16", "24"]
@@ -24,6 +25,12 @@ MOST_LAYERS = 32
 WIDEST_STEP = 12  # keys from one sample to the next
 SECONDS_RANGE = (0.1, 60.0)
 SAMPLED_RATE_RANGE_HZ = (8_000, 192_000)
+RANGES = {
+    "every": (1, WIDEST_STEP),
+    "layers": (1, MOST_LAYERS),
+    "seconds": SECONDS_RANGE,
+    "rate_hz": SAMPLED_RATE_RANGE_HZ,
+}
 
 
 class NoteRenderer(Protocol):
@@ -89,17 +96,9 @@ class SampledPlan:
     source: SampledSource = "model"
 
     def __post_init__(self) -> None:
-        for name, value, known in (("format", self.format, FORMATS), ("bits", self.bits, SAMPLE_BITS)):
-            if value not in known:
-                raise ValueError(f"{name} {value!r} is not one of {', '.join(known)}")
-        for name, number, (low, high) in (
-            ("every", self.every, (1, WIDEST_STEP)),
-            ("layers", self.layers, (1, MOST_LAYERS)),
-            ("seconds", self.seconds, SECONDS_RANGE),
-            ("rate_hz", self.rate_hz, SAMPLED_RATE_RANGE_HZ),
-        ):
-            if not low <= number <= high:
-                raise ValueError(f"{name} must lie in {low:g} … {high:g}, not {number:g}")
+        bounds.check_choice("format", self.format, FORMATS)
+        bounds.check_choice("bits", self.bits, SAMPLE_BITS)
+        bounds.check_all(self, RANGES)
         (low, high), (lowest, highest) = self.key_range, self.patch.range
         if not lowest <= low <= high <= highest:
             raise ValueError(

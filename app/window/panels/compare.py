@@ -142,7 +142,7 @@ class ComparePanel(Panel):
     @property
     def _basis(self) -> Basis:
         choices = self.session.choices
-        string = None if choices.string is None else choices.string.parameters
+        string = choices.string
         return Basis(choices.pluck, choices.seconds, choices.listen, string)
 
     @property

@@ -147,7 +147,7 @@ class StringPanel(StagePanel):
         patch, string = choices.patch, choices.string
         if patch is None or string is None or not choices.plays_patch:
             return judged("; ".join(outside_training(info_of(choices, entry), choices.pluck)), error)
-        heard = by_two_numbers(patch, string.parameters)  # as the head of the Lab reports it
+        heard = by_two_numbers(patch, string)  # as the head of the Lab reports it
         return judged("; ".join(outside_of_string(entry.info, heard, choices.pluck)), error)
 
     # Gestures

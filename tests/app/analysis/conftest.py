@@ -13,7 +13,7 @@ from app.rendering import Take
 from app.shared.worker import Cancelled
 from engine.pluck import Pluck
 from engine.presets import read_info
-from engine.voices import Ear
+from engine.values.ear import Ear
 from tests.app.takes import append_to
 
 MakeTake = Callable[..., Take]

@@ -11,8 +11,8 @@ from app.rendering.take import Motion
 from app.shared.vocabulary import DIFFERENCE
 from engine.pluck import Pluck
 from engine.presets import PresetInfo, TrainedRange
-from engine.resonators.string import StringParameters
-from engine.voices import Ear
+from engine.values.ear import Ear
+from engine.values.string import StringParameters
 from tests.app.takes import append_to
 
 INFO = PresetInfo("t", "koopman_var", {}, StringParameters(), True, "gaussian", 4_000, 10, 101, 400, 1e-3,

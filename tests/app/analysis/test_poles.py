@@ -14,6 +14,7 @@ from app.analysis.poles import pole_figure
 from engine.models import build_model
 from engine.models.base import Physics
 from engine.presets import Preset, load_preset
+from engine.resonators.string import decay_rates, resonator_of
 
 
 def of_family(path: Path, model: str) -> Preset:
@@ -22,7 +23,9 @@ def of_family(path: Path, model: str) -> Preset:
     made = build_model(model, {})
     how = "physics" if "physics" in made.initialisations else made.own_initialisation()
     info = preset.info
-    made.initialise(how, Physics(info.string.resonator(info.modes), info.rate_hz), torch.Generator().manual_seed(0))
+    made.initialise(
+        how, Physics(resonator_of(info.string, info.modes), info.rate_hz), torch.Generator().manual_seed(0)
+    )
     weights = {name: tensor.numpy() for name, tensor in made.state_dict().items()}
     return Preset(preset.name, path, replace(info, model=model, model_configuration={}), weights)
 
@@ -44,11 +47,11 @@ def test_a_model_that_starts_from_the_string_has_its_modes(small_preset: Path, m
 def test_modes_above_half_the_rate_keep_their_own_frequency_and_fold_where_they_are_heard(small_preset: Path) -> None:
     preset = load_preset(small_preset)
     figure = pole_figure(preset)
-    own_hz = preset.info.string.resonator(10).eigenvalues().imag / (2 * math.pi)
+    own_hz = resonator_of(preset.info.string, 10).eigenvalues().imag / (2 * math.pi)
     assert own_hz[-1] > 2000  # or the test tests nothing
     np.testing.assert_allclose(figure.string.mode_hz, own_hz)
     np.testing.assert_allclose(figure.string.folded_hz, np.minimum(own_hz, 4000 - own_hz))
-    sigma = preset.info.string.decay_rates(10)
+    sigma = decay_rates(preset.info.string, 10)
     np.testing.assert_allclose(figure.string.t60_s, math.log(1000) / sigma)
 
 

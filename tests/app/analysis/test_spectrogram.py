@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from app.analysis.spectrogram import FLOOR_DB, FrequencyRows, Spectrogram
 from app.rendering import Take
-from engine.voices import Ear
+from engine.values.ear import Ear
 
 RATE_HZ = 4000
 MIDDLE = Ear((0.5,))

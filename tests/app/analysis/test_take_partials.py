@@ -14,8 +14,9 @@ from app.shared.worker import Cancelled, Job
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, PresetInfo, load_preset, read_info
 from engine.resonators.sine_transform import project, to_grid, to_modes
+from engine.resonators.string import resonator_of
 from engine.sources import ModelSource, TruthSource
-from engine.voices import Ear
+from engine.values.ear import Ear
 from tests.app.takes import append_to
 
 
@@ -48,7 +49,7 @@ def test_levels_and_decay_times_mode_by_mode(info: PresetInfo, job: Job) -> None
     one, two = rows["all"][:2]
     assert one.level_db == pytest.approx(-6.02, abs=0.01)
     assert two.level_db == pytest.approx(0, abs=0.01)
-    own = info.string.resonator(10).eigenvalues()
+    own = resonator_of(info.string, 10).eigenvalues()
     assert two.truth_hz == pytest.approx(float(own[1].imag) / (2 * math.pi), rel=1e-4)
     assert two.cents == pytest.approx(0, abs=0.02)
     assert two.truth_t60_s == pytest.approx(math.log(1000) / -float(own[1].real), rel=1e-2)

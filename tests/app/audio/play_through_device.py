@@ -23,7 +23,8 @@ from app.audio.sound import Sound
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
 from engine.resonators.sine_transform import project
-from engine.voices import Ear, Mixer, Program, Voice, model_program, truth_program
+from engine.values.ear import Ear
+from engine.voices import Mixer, Program, Voice, model_program, truth_program
 
 PRESET = "nylon_nonlinear_gaussian_4k_koopman_integrated"
 EAR = Ear((0.37, 0.7))

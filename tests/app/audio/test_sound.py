@@ -14,8 +14,9 @@ from app.audio import sound as sound_module
 from app.audio.devices import AudioDevice
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, no_device, refused, vanished
 from app.audio.sound import BUFFER_S, Sound
-from engine.effects import Effects, Room
+from engine.effects import Effects
 from engine.kernels.layout import M_CALLS
+from engine.values.effects import Room
 from engine.voices import Mixer, Voice, plain_program
 
 TIMEOUT_S = 10.0  # a busy computer's; nothing here takes so long

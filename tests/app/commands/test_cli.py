@@ -11,7 +11,8 @@ import typer
 
 from app.commands import cli, render
 from app.export.sound import SOURCES
-from app.shared.vocabulary import BITS, PICKUPS
+from app.shared.vocabulary import BITS
+from engine.values.ear import PICKUPS
 from training.cli import arguments
 
 ROOT = Path(__file__).parents[3]

@@ -15,6 +15,7 @@ import torch
 from engine.models import build_model
 from engine.models.base import Physics
 from engine.presets import find_preset, load_preset, preset_digest, save_preset
+from engine.resonators.string import decay_rates, resonator_of
 from engine.schema import write
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.data.dataset import Dataset, load_dataset
@@ -34,7 +35,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> list[Any]:
 def preset(small_preset: Path, tmp_path: Path) -> Path:
     """The linear string in closed form, its decay rates too high by a tenth."""
     model = build_model("koopman_integrated")
-    physics = Physics(DATA.string.resonator(DATA.modes, tension_modulated=False), DATA.rate_hz, 1e-3)
+    physics = Physics(resonator_of(DATA.string, DATA.modes, tension_modulated=False), DATA.rate_hz, 1e-3)
     model.initialise("physics", physics, torch.Generator().manual_seed(0))
     with torch.no_grad():
         model.get_parameter("nu_log").add_(math.log(1.1))
@@ -144,7 +145,7 @@ def test_past_the_horizon_a_row_a_second(run, preset: Path, cache: list[Any]) ->
     assert all(0 < w["rel_mse_se"] < w["rel_mse"] and 0 < w["rel_mae_se"] < w["rel_mae"] for w in late)
     assert [(w["start_s"], w["stop_s"]) for w in late] == [(0.125, 1.125), (1.125, 2.125), (2.125, 2.625)]
     # the first mode is left, and exp(-0.1 σt) of it: so much is known of the error
-    sigma, middle_s = DATA.string.decay_rates(1).item(), 2.375
+    sigma, middle_s = decay_rates(DATA.string, 1).item(), 2.375
     assert late[2]["rel_mse"] == pytest.approx((1 - math.exp(-0.1 * sigma * middle_s)) ** 2, rel=0.1)
     # damped a tenth less, its error grows: the last second's figure lies between those of its windows
     assert late[1]["rel_mse"] < found["last_second"]["rel_mse"] < late[2]["rel_mse"]
@@ -170,7 +171,7 @@ def test_partials(run, preset: Path, cache: list[Any]) -> None:
     assert [mode["mode"] for mode in horizon["modes"]] == list(range(1, 11))
     third = past["modes"][2]
     assert third["frequency_hz"] == pytest.approx(741.9, abs=0.1)
-    assert third["t60_s"] == pytest.approx(3 * math.log(10) / float(DATA.string.decay_rates(3)[2]), rel=1e-5)
+    assert third["t60_s"] == pytest.approx(3 * math.log(10) / float(decay_rates(DATA.string, 3)[2]), rel=1e-5)
     assert third["t60_error_percent"] == pytest.approx(100 - 100 / 1.1, rel=1e-3)
     assert horizon["modes"][7]["level_db"] is None  # not resolved: at half the rate
     assert horizon["weighted"]["cents"] < 0.01

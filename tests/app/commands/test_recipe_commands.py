@@ -13,7 +13,7 @@ import pytest
 import soundfile
 
 from engine.presets import find_string, read_string
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 
 PLUCK = ("--position", 0.41, "--amplitude-mm", 3.3, "--seconds", 0.15)
 
@@ -108,7 +108,11 @@ def test_files_without_a_usable_recipe_are_reported_in_one_line(run, folder: Pat
     assert f"{path}: no sound file that can be read" in run("render", "--recipe", path).failure
     soundfile.write(path, np.zeros(10), 8000)
     assert f"{path}: has no recipe" in run("info", path).failure
-    for comment, field in (('{"format":2}', "format: "), ("{broken", "the text: "), ('{"program":"x"}', "version: ")):
+    for comment, field in (
+        ('{"format":2}', "format: "),
+        ("{broken", "the text: "),
+        ('{"program":"x"}', "field 'version' is missing"),
+    ):
         with soundfile.SoundFile(path, "w", 8000, 1) as file:
             file.comment = comment
             file.write(np.zeros(10))
@@ -230,7 +234,7 @@ def test_a_recipe_from_before_there_were_strings_is_rendered(run, installed: Pat
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"tension_n": -1.0}, "string: Value error, string: string parameter tension_n must be positive"),
+        ({"tension_n": -1.0}, "string: string parameter tension_n must lie in"),
         ({"tension_n": "60"}, "string.tension_n"),
         ({"length_m": 1e9}, "length_m must lie in"),
         ({"colour": 1.0}, "unknown field 'colour'"),

@@ -30,7 +30,9 @@ from engine.presets import SHIPPED, PresetError, load_preset
 from engine.resonators.sine_transform import listening_weights, project
 from engine.result_file import WriteError
 from engine.sources import ModelSource, TruthSource
-from engine.voices import Ear, Mixer, Voice, model_program, offline, truth_program
+from engine.values.ear import Ear
+from engine.voices import Mixer, Voice, model_program, offline, truth_program
+from engine.voices.ear import weights_of
 from engine.voices.voice import ATTACK_S
 
 PLAIN = WavSettings("32f", fade_out_s=0)
@@ -76,7 +78,7 @@ def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
     voice = Voice(program, initial_m, ear, 1.0, 0.4, info.rate_hz)
     if program.rendered:
         source = ModelSource(asked.preset)
-        ahead = AheadVoice(voice, source, initial_m, ear.weights(101), (), lambda: None, lambda error: None)
+        ahead = AheadVoice(voice, source, initial_m, weights_of(ear, 101), (), lambda: None, lambda error: None)
         while not ahead.finished:
             ahead.advance()
     mixer = Mixer(48_000)

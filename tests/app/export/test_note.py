@@ -24,7 +24,8 @@ from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
 from engine.resonators.sine_transform import project
 from engine.sources import ModelSource
-from engine.voices import Ear, Mixer, Voice, model_program, voice_blocks
+from engine.values.ear import Ear
+from engine.voices import Mixer, Voice, model_program, voice_blocks
 
 PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 GUITAR = read_patch(PATCHES / "classical_guitar.json")

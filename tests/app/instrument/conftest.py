@@ -1,19 +1,13 @@
 from __future__ import annotations
 
-from dataclasses import asdict
-
 import pytest
 
-from app.patches.patch import Damping, Fretted, OpenString, Patch, PhysicalString, PluckChoices, StringSet
+from app.patches.patch import Damping, Fretted, OpenString, Patch, PluckChoices, StringSet
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 
 STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
-
-
-def physical(string: StringParameters = STEEL) -> PhysicalString:
-    return PhysicalString(**asdict(string))
 
 
 @pytest.fixture(scope="session")
@@ -26,7 +20,7 @@ def patch() -> Patch:
     return Patch(
         name="test",
         category="guitar",
-        strings=Fretted(string=physical()),
+        strings=Fretted(string=STEEL),
         pluck=PluckChoices(softest_mm=0.05, hardest_mm=2.0),
         damping=Damping(release_t60_s=0.15),
     )
@@ -34,5 +28,5 @@ def patch() -> Patch:
 
 @pytest.fixture
 def guitar(patch: Patch) -> Patch:
-    strings = tuple(OpenString(note=note, string=physical()) for note in (40, 45, 50, 55, 59, 64))
+    strings = tuple(OpenString(note=note, string=STEEL) for note in (40, 45, 50, 55, 59, 64))
     return Patch.model_validate({**dict(patch), "strings": StringSet(strings=strings), "mode": "guitar"})

@@ -16,10 +16,11 @@ from engine.kernels import constants as of
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import PresetInfo
 from engine.resonators.base import Array, Resonator
-from engine.resonators.losses import Losses
-from engine.resonators.polarised import layout, partials_of
-from engine.resonators.string import StringParameters
-from engine.voices import Ear
+from engine.resonators.losses import loss_rates
+from engine.resonators.polarised import layout, partials_of, polarised_resonator
+from engine.values.ear import Ear
+from engine.values.string import StringParameters
+from engine.voices.ear import weights_of
 
 _NO_BODY = np.zeros(0)
 
@@ -94,7 +95,9 @@ class LoudKeys(StringKeys):
             amplitudes = amplitudes * blow_factor(resonator.omega, displacement_m / (pluck.amplitude_mm / 1000))
         if release_s := patch.pluck.release_s(of.REFERENCE_VELOCITY):
             amplitudes = amplitudes * release_factor(resonator.omega, release_s)
-        weights = resonator.shapes @ self._full_ear.weights(resonator.points, resonator.force_weights) / FULL_SCALE_M
+        weights = (
+            resonator.shapes @ weights_of(self._full_ear, resonator.points, resonator.force_weights) / FULL_SCALE_M
+        )
         if self.ear.pickup == "velocity":
             half = np.sqrt(resonator.stretch) * (patch.pickup.aperture_mm / 2000)
             weights = weights * np.sinc(half / np.pi)[:, None]
@@ -122,7 +125,8 @@ def resonator_of(string: KeyString, patch: Patch, preset: PresetInfo) -> Resonat
     if moving is None:
         found = preset.resonator_of(string.parameters, preset.modes_of(string.modes))
     else:
-        found = moving.resonator(
+        found = polarised_resonator(
+            moving,
             string.parameters,
             string.modes,
             losses=patch.knobs.decay,
@@ -137,8 +141,6 @@ def _with_losses(resonator: Resonator, string: StringParameters, patch: Patch, p
         return resonator
     modes, paired = resonator.modes, patch.polarisations is not None
     partial = layout(partials_of(modes))[0] if paired else np.arange(modes)
-    rates = Losses(**patch.losses.model_dump()).rates(
-        string, int(partial[-1]) + 1, patch.knobs.decay, patch.knobs.brightness_decay
-    )
+    rates = loss_rates(patch.losses, string, int(partial[-1]) + 1, patch.knobs.decay, patch.knobs.brightness_decay)
     sigma = np.minimum(resonator.sigma + rates[partial], of.HIGHEST_SIGMA * resonator.omega)
     return replace(resonator, sigma=sigma)

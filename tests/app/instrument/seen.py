@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from app.instrument.compiled import InstrumentPlayer
 from engine.kernels import constants as of
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 from engine.voices import Mixer
 
 

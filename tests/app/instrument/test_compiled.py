@@ -28,7 +28,7 @@ from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn
 from app.instrument.string_keys import StringKeys, on_string
 from app.instrument.table import PLAYED_PARAMETERS, Tail, put_recorded
 from app.patches.library import find_patch, read_patch
-from app.patches.patch import Losses, Noise, Patch, Pickup, Polarisations
+from app.patches.patch import Noise, Patch, Pickup
 from app.patches.tuning import TuningChoice
 from engine.kernels import constants as of
 from engine.kernels import layout as at
@@ -37,7 +37,8 @@ from engine.kernels.recorded import correct
 from engine.kernels.records import TABLE
 from engine.pluck import SHAPES, Pluck, Shape
 from engine.presets import Preset
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import Losses, Polarisations, StringParameters
 from engine.voices import Mixer
 from engine.voices.player import record_of
 from tests.app.instrument.loud import LoudKeys
@@ -219,7 +220,7 @@ def test_a_string_learned_from_a_recording_has_its_own_modes(
 def test_the_kernels_have_the_modes_of_a_recorded_string_at_every_pitch(semitones: int) -> None:
     own = replace(recorded(), smooth_hz=(50.0, 1e3, 5e3), smooth_ratio=(1.5, 2.5, 0.8))
     string = replace(StringParameters(), length_m=StringParameters().length_m / 2 ** (semitones / 12))
-    modes, law = own.resonator(string, 10), string.resonator(5)
+    modes, law = own.resonator(string, 10), resonator_of(string, 5)
     rows = np.concatenate([np.repeat(law.omega, 2) ** 2, np.repeat(law.sigma, 2), np.zeros(20)])
     header, tail = np.zeros(1, TABLE), Tail()
     put_recorded(header[0], tail, own, 101)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,7 +96,8 @@ def test_an_aperture_averages_over_its_length(patch: Patch, preset: Preset, sour
         )
         for each in (0.0, wide_mm)
     )
-    length_m = patch.strings.string.length_m * patch.strings.string.first_hz / hz_of(KEY)  # type: ignore[union-attr]
+    string = patch.strings.string  # type: ignore[union-attr]
+    length_m = string.length_m * string.undamped_frequency(1) / math.tau / hz_of(KEY)
 
     def ratio(number: int) -> float:
         return level(wide, 0.05, number * hz_of(KEY)) / level(narrow, 0.05, number * hz_of(KEY))
@@ -165,7 +167,7 @@ def test_a_slide_squeaks_at_the_windings_that_pass(patch: Patch, preset: Preset)
         )
         events += (0.0, NoteOn(KEY, 60)), (0.3, NoteOn(KEY + 7, 60))
         changes = {"density_kg_m3": heavier * string.density_kg_m3, "tension_n": heavier * string.tension_n}
-        plain = changed(patch, strings=Fretted(string=string.model_copy(update=changes)))
+        plain = changed(patch, strings=Fretted(string=replace(string, **changes)))
         noisy = changed(plain, noise=Noise(kind="finger", release_db=-12))
         noise = play(noisy, preset, 1.5, *events) - play(plain, preset, 1.5, *events)
         assert not noise[: round(0.3 * RATE_HZ)].any()

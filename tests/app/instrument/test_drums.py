@@ -16,15 +16,18 @@ from app.instrument.events import Bend, NoteOff, NoteOn, TimedEvent
 from app.instrument.glide import glides_cents
 from app.instrument.midi_file import midi_bytes, read_song
 from app.instrument.offline import render_events, render_note
-from app.patches.drums import Drums, PhysicalMallet
+from app.patches.drums import Drums
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, read_patch
-from app.patches.patch import Noise, Patch, Room
+from app.patches.patch import Noise, Patch
 from engine.kernels import constants as of
 from engine.kernels.records import PLAYER, slots
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
-from engine.voices import Ear, Mixer
+from engine.values.drum import Mallet
+from engine.values.ear import Ear
+from engine.values.effects import Room
+from engine.voices import Mixer
 
 PRESET = load_preset(SHIPPED / "studio_any_string.safetensors")
 KIT, TOM, TIMPANI = (read_patch(PATCHES / f"{name}.json") for name in ("concert_toms", "tuned_toms", "timpani"))
@@ -32,7 +35,7 @@ DRY_KIT = KIT.with_value("room.mix", 0.0)
 PADS = range(36, 52)
 RATE_HZ = 48_000
 CONTACT_FRAMES = 240  # after which a blow has begun
-HARD = PhysicalMallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)
+HARD = Mallet(mass_kg=0.015, radius_m=0.002, contact_s=0.0005)
 LARGEST_STEP = 2e-5  # twice: a step is then 100 dB below full scale
 
 
@@ -312,7 +315,7 @@ def test_a_harder_mallet_has_more_and_higher_noise() -> None:
     assert isinstance(TOM.strings, Drums)
     levels_db, centroids_hz = [], []
     for contact_s in (0.016, 0.008, 0.004, 0.002, 0.001):
-        mallet = TOM.strings.drums[0].mallet.model_copy(update={"contact_s": contact_s})
+        mallet = replace(TOM.strings.drums[0].mallet, contact_s=contact_s)
         drum = TOM.strings.drums[0].model_copy(update={"mallet": mallet})
         patch = TOM.model_copy(update={"strings": TOM.strings.model_copy(update={"drums": (drum,)})})
         noise = rendered(patch, 47) - rendered(without_noise(patch), 47)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 
 from app.instrument.facts import FIGURES, bright_mode, facts_of, figures_of, knob_for, reported, t60_s
 from app.instrument.strings import Strings
-from app.patches.patch import Fretted, Knobs, Losses, Patch, PhysicalString
+from app.patches.patch import Fretted, Knobs, Patch
 from app.shared.parameters import OF_PATCHES
-from engine.resonators.string import StringParameters
+from engine.values.string import Losses, StringParameters
 
 KEY = 57
 
@@ -75,7 +76,7 @@ def test_decay_by_mode_is_in_the_figure(patch: Patch, field: str) -> None:
 def test_a_figure_beyond_the_bounds_is_the_bound(patch: Patch) -> None:
     strings = patch.strings
     assert isinstance(strings, Fretted)
-    dense = PhysicalString(**{**strings.string.model_dump(), "density_kg_m3": 50_000.0})
+    dense = replace(strings.string, density_kg_m3=50_000.0)
     heavy = patch.model_copy(update={"strings": Fretted(string=dense)})
     turned = heavy.with_value("knobs.density", knob_for(heavy, (KEY, None), "knobs.density", 1e9))
     assert string_of(turned).density_kg_m3 == 1e5

@@ -9,9 +9,10 @@ from app.instrument.glide import START_S, glides_cents
 from app.instrument.offline import render_note
 from app.instrument.strings import Strings
 from app.patches.library import find_patch
-from app.patches.patch import Amp, Body, Patch, Room
+from app.patches.patch import Body, Patch
 from app.patches.tuning import TuningChoice
 from engine.presets import Preset
+from engine.values.effects import Amp, Room
 from tests.bench.tune import pitch_hz
 
 RATE_HZ = 48_000

@@ -46,7 +46,7 @@ from engine.kernels.playing.channels import WIDEST_SEMITONES
 from engine.presets import Preset
 from engine.voices import Mixer
 from engine.voices.player import Report
-from tests.app.instrument.conftest import STEEL, physical
+from tests.app.instrument.conftest import STEEL
 from tests.app.instrument.loud import LoudKeys
 from tests.app.instrument.seen import Seen, seen, sounding, taken_up
 
@@ -122,8 +122,7 @@ def strung(guitar: Patch) -> Patch:
     """Six strings that differ in thickness."""
     areas = [5e-7 * 1.1**number for number in range(6)]
     strings = [
-        OpenString(note=note, string=physical(replace(STEEL, area_m2=area)))
-        for note, area in zip(OPEN, areas, strict=True)
+        OpenString(note=note, string=replace(STEEL, area_m2=area)) for note, area in zip(OPEN, areas, strict=True)
     ]
     return changed(guitar, strings=StringSet(strings=tuple(strings)))
 

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from app.instrument.events import Bend, Event, NoteOff, NoteOn, PatchTurned
 from app.patches.library import SHIPPED, read_patch
-from app.patches.patch import Course, Javari, Patch, Pickup, Polarisations
+from app.patches.patch import Course, Javari, Patch, Pickup
 from engine.kernels import layout as at
 from engine.presets import Preset
+from engine.values.string import Polarisations
 from tests.app.instrument.test_techniques import KEY, RATE_HZ, play
 from tests.app.instrument.test_unisons import Watched, changed, linear
 

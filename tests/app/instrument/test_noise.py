@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -139,7 +141,7 @@ def test_a_mechanism_falls_alike_on_every_string(patch: Patch, preset: Preset) -
 
 def test_what_lands_on_a_string_at_rest_is_hardly_heard(patch: Patch, preset: Preset) -> None:
     string = patch.strings.string  # type: ignore[union-attr]
-    dull = string.model_copy(update={"damping_d1_kg_m_s": 400 * string.damping_d1_kg_m_s})
+    dull = replace(string, damping_d1_kg_m_s=400 * string.damping_d1_kg_m_s)
     patch = patch.model_copy(update={"strings": Fretted(string=dull)})
     at_once, late = (
         tick(patch, preset, "finger", (0.0, NoteOn(KEY, 127)), (time_s, NoteOff(KEY))) for time_s in (0.01, 0.4)
@@ -211,7 +213,7 @@ def test_many_strokes_at_once_keep_within_the_places_of_noises(patch: Patch, pre
 
 
 def test_a_solo_of_one_partial_is_without_noise(patch: Patch, preset: Preset) -> None:
-    from engine.voices import Ear
+    from engine.values.ear import Ear
 
     sounds = []
     for each in (noisy(patch, onset_db=6.0), patch):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ from app.instrument.events import (
 from app.instrument.offline import BLOCK_FRAMES, SILENT_DB, OfflinePlayer, channels_played, render_events, render_note
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, PluckChoices, Room
+from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, Pickup, PluckChoices
 from engine import bounds
 from engine.excitation import blow_factor, release_factor
 from engine.kernels import constants as of
@@ -37,18 +37,17 @@ from engine.kernels.playing.notes import PLUCK_STOPS_S
 from engine.levels import FULL_SCALE_M
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
-from engine.resonators.string import StringParameters
-from engine.voices import Ear, Mixer, Voice, plain_program
+from engine.values.ear import Ear
+from engine.values.effects import Room
+from engine.values.string import StringParameters
+from engine.voices import Mixer, Voice, plain_program
+from engine.voices.ear import weights_of
 from engine.voices.player import Report
 from tests.app.instrument.loud import LoudKeys
 from tests.app.instrument.seen import Seen, seen, sounding, taken_up
 
 RATE_HZ = 48_000
 STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
-
-
-def physical(string: StringParameters) -> PhysicalString:
-    return PhysicalString(**asdict(string))
 
 
 def changed(patch: Patch, **parts: object) -> Patch:
@@ -206,7 +205,7 @@ def test_a_hammer_starts_the_string_from_rest_with_speeds(patch: Patch, preset: 
     assert found is not None
     modes, shape = found.resonator, soft.pluck.pluck(64).displacement(preset.info.grid_points)
     amplitudes = modes.to_modes(shape) * found.string.shortened * blow_factor(modes.omega, shape / 1e-6)
-    amplitudes *= release_factor(modes.omega, 2e-3) * (modes.shapes @ Ear((0.37,)).weights(modes.points))[:, 0]
+    amplitudes *= release_factor(modes.omega, 2e-3) * (modes.shapes @ weights_of(Ear((0.37,)), modes.points))[:, 0]
     t = np.arange(9_600) / RATE_HZ
     turns = np.exp(np.outer(t, 1j * np.sqrt(modes.omega**2 - modes.sigma**2) - modes.sigma)).imag
     expected = found.gain / FULL_SCALE_M * turns @ amplitudes
@@ -463,7 +462,7 @@ def test_a_knob_turns_no_string_into_an_impossible_one(patch: Patch, preset: Pre
     """It goes as far as the bound, for what rings and for the next key."""
     stage = Stage(patch, preset)
     stage.play(NoteOn(57, 60))
-    heavy = changed(patch, strings=Fretted(string=physical(replace(STEEL, density_kg_m3=90_000.0))))
+    heavy = changed(patch, strings=Fretted(string=replace(STEEL, density_kg_m3=90_000.0)))
     stage.take(changed(heavy, knobs=Knobs(density=3.0)))
     (after,) = stage.play()
     assert after.now.density_kg_m3 == bounds.STRING["density_kg_m3"][1]
@@ -578,7 +577,7 @@ def test_a_ringing_string_stays_as_it_is_where_a_knob_would_overdamp_it(patch: P
     stage = Stage(patch, preset)
     (before,) = stage.play(NoteOn(45, 90))
     heavy = replace(STEEL, damping_d3_kg_m_s=2e-2)  # of its highest modes
-    stage.take(changed(patch, strings=Fretted(string=physical(heavy))))
+    stage.take(changed(patch, strings=Fretted(string=heavy)))
     (after,) = stage.play()
     assert after.now == before.now
     with pytest.raises(ValueError, match="overdamped"):

@@ -26,7 +26,8 @@ from engine.kernels.playing.plucks import vary
 from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.strike import Strike
-from engine.voices import Ear, Mixer
+from engine.values.ear import Ear
+from engine.voices import Mixer
 
 RATE_HZ = 48_000
 STROKES = 40

@@ -12,9 +12,10 @@ from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Knobs, OpenString, Patch, StringSet
 from app.patches.tuning import TuningChoice
 from app.shared.parameters import OF_PATCHES
+from engine.resonators import string as law
 from engine.resonators.family import inharmonicity
-from engine.resonators.string import StringParameters
-from tests.app.instrument.conftest import physical
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 
 STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
 
@@ -47,7 +48,7 @@ def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guit
 
 def test_a_set_may_be_reported_on_which_string(guitar: Patch) -> None:
     strings = [
-        OpenString(note=note, string=physical(replace(STEEL, tension_n=tension_n)))
+        OpenString(note=note, string=replace(STEEL, tension_n=tension_n))
         for note, tension_n in ((50, 60.0), (55, 70.0), (59, 80.0))
     ]
     found = Strings(Patch.model_validate({**dict(guitar), "strings": StringSet(strings=tuple(strings))}))
@@ -85,7 +86,7 @@ def test_a_bend_below_what_stiffness_alone_gives_is_refused() -> None:
 
 
 def test_a_damper_adds_its_decay_to_every_partial() -> None:
-    added = damped(STEEL, 0.2).decay_rates(20) - STEEL.decay_rates(20)
+    added = law.decay_rates(damped(STEEL, 0.2), 20) - law.decay_rates(STEEL, 20)
     assert added.tolist() == pytest.approx([math.log(1000) / 0.2] * 20)
 
 
@@ -121,17 +122,17 @@ def test_a_tight_string_rises_less_in_tension_when_it_is_plucked_hard(patch: Pat
     for played in (patch, patch.with_value("knobs.tension", 2.0)):
         found = Strings(played).of_key(57)
         assert found is not None
-        resonator = found.parameters.resonator(found.modes)
+        resonator = resonator_of(found.parameters, found.modes)
         pluck = on_string(found, played.pluck.pluck(127))
         rises.append(float(resonator.relative_tension_rise(resonator.to_modes(pluck.displacement(101)))))
     assert rises[0] / rises[1] == pytest.approx(4.0, rel=0.02)  # 1 / T₀ℓ²
 
 
 def test_an_impossible_key_is_named(patch: Patch) -> None:
-    from app.patches.patch import Fretted, PhysicalString
+    from app.patches.patch import Fretted
 
-    heavy = {**patch.strings.string.model_dump(), "tension_n": 1e-3, "second_moment_m4": 0.0}  # type: ignore[union-attr]
-    bad = Patch.model_validate({**dict(patch), "strings": Fretted(string=PhysicalString.model_validate(heavy))})
+    heavy = replace(patch.strings.string, tension_n=1e-3, second_moment_m4=0.0)  # type: ignore[union-attr]
+    bad = Patch.model_validate({**dict(patch), "strings": Fretted(string=heavy)})
     with pytest.raises(ValueError, match=r"key 88 of test.*length_m"):
         Strings(bad).of_key(88)
 

@@ -25,7 +25,7 @@ from app.instrument.events import (
     NoteOff,
     NoteOn,
 )
-from app.patches.patch import Fretted, Patch, Pickup, Polarisations, Technique
+from app.patches.patch import Fretted, Patch, Pickup, Technique
 from engine.kernels import constants as of
 from engine.kernels.layout import QUANTUM
 from engine.kernels.playing.chords import CHORD_S, USUAL_STRUM_MS
@@ -34,10 +34,9 @@ from engine.kernels.playing.keys import USUAL_HARMONIC
 from engine.kernels.playing.notes import TOUCH_PERIODS
 from engine.kernels.strings import TOUCH_RESISTANCE
 from engine.presets import Preset
-from engine.resonators.string import StringParameters
+from engine.values.string import Polarisations, StringParameters
 from engine.voices import Mixer
 from engine.voices.player import Report
-from tests.app.instrument.conftest import physical
 from tests.app.instrument.seen import sounding
 from tests.app.instrument.test_techniques import KEY, RATE_HZ, first_hz, hz_of, play
 
@@ -89,7 +88,7 @@ def level(sound: NDArray[np.float64], at_s: float, hz: float, frames: int = 3 * 
 def test_a_touch_leaves_the_partials_that_have_a_node_there(
     patch: Patch, preset: Preset, node: int, source: str
 ) -> None:
-    nylon = {"strings": Fretted(string=physical(StringParameters())), "pickup": Pickup(kind="bridge")}
+    nylon = {"strings": Fretted(string=StringParameters()), "pickup": Pickup(kind="bridge")}
     plucked = Patch.model_validate({**dict(patch), **nylon})
     touched = with_technique(plucked, harmonic=node)
     sound, plain = (play(each, preset, 1.2, (0.0, NoteOn(KEY, 60)), source=source) for each in (touched, plucked))

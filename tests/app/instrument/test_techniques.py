@@ -66,7 +66,7 @@ def test_a_palm_mute_adds_the_decay_of_a_hand_at_the_bridge(patch: Patch, preset
     plain = play(patch, preset, 0.6, (0.0, soft), source=source)
     muted = play(patch, preset, 0.6, (0.0, Controller(SOFT, 64)), (0.0, soft), source=source)
     length_m = patch.strings.string.length_m * hz_of(KEY) ** -1  # type: ignore[union-attr]
-    length_m *= patch.strings.string.first_hz  # type: ignore[union-attr]
+    length_m *= patch.strings.string.undamped_frequency(1) / math.tau  # type: ignore[union-attr]
     for number in (1, 2, 4):
         turn = 2 * math.pi * number * MUTED_M / length_m
         sigma = 64 / 127 * MUTED_SIGMA * (1 - math.sin(turn) / turn)

@@ -13,14 +13,16 @@ from numpy.typing import NDArray
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import Bend, NoteOff, NoteOn
 from app.patches.library import SHIPPED, read_patch
-from app.patches.patch import Course, Fretted, Patch, Pickup, PluckChoices, Polarisations, Technique
+from app.patches.patch import Course, Fretted, Patch, Pickup, PluckChoices, Technique
 from engine.kernels import constants as of
 from engine.kernels import layout as at
 from engine.kernels.records import PLAYER, slots, voice_bytes
 from engine.kernels.tension import physical as physical_of
 from engine.presets import Preset
+from engine.resonators.string import decay_rates, undamped_frequencies, wavenumbers
+from engine.values.string import Polarisations
 from engine.voices import Mixer
-from tests.app.instrument.conftest import STEEL, physical
+from tests.app.instrument.conftest import STEEL
 from tests.app.instrument.seen import Seen, seen
 from tests.app.instrument.test_techniques import KEY, RATE_HZ, play
 
@@ -39,7 +41,7 @@ def coupled(patch: Patch, strings: int = 2, bridge: float = 1.0, **course: float
 
 
 def linear(patch: Patch, **string: float) -> Patch:
-    return changed(patch, strings=Fretted(string=physical(replace(STEEL, youngs_modulus_pa=0.0, **string))))
+    return changed(patch, strings=Fretted(string=replace(STEEL, youngs_modulus_pa=0.0, **string)))
 
 
 class Watched:
@@ -91,9 +93,9 @@ def energy(states: NDArray[np.float64], notes: list[Seen]) -> NDArray[np.float64
     for string, note in enumerate(notes):
         q, v = states[:, 0, string], states[:, 1, string]
         partial, second = layout(q.shape[1])
-        squares = note.now.undamped_frequencies(int(partial[-1]) + 1)[partial] ** 2
+        squares = undamped_frequencies(note.now, int(partial[-1]) + 1)[partial] ** 2
         squares = np.where(second == 1, squares * 2 ** (2 * MOVING.second_cents / 1200), squares)
-        eta = note.now.wavenumbers(int(partial[-1]) + 1)[partial]
+        eta = wavenumbers(note.now, int(partial[-1]) + 1)[partial]
         stiffness = note.now.youngs_modulus_pa * note.now.area_m2 / (4 * note.now.mass_per_length_kg_m)
         total += 0.5 * (v**2 + squares * q**2).sum(axis=1) + stiffness / 4 * (eta**2 * q**2).sum(axis=1) ** 2
     return total
@@ -118,9 +120,9 @@ def test_modes_of_a_course_are_those_of_the_coupled_equations(
     worst = worst_decay = 0.0
     for mode in (0, 1, 2, 3, 6, 15, 30, 46):
         partial, second = mode // 2, mode % 2
-        omega = np.array([note.now.undamped_frequencies(partial + 1)[partial] for note in notes])
+        omega = np.array([undamped_frequencies(note.now, partial + 1)[partial] for note in notes])
         omega *= 2 ** (MOVING.second_cents / 1200) if second else 1.0
-        own = np.array([note.now.decay_rates(partial + 1)[partial] for note in notes])
+        own = np.array([decay_rates(note.now, partial + 1)[partial] for note in notes])
         conductance = MOVING.second_conductance_s_kg if second else MOVING.conductance_s_kg
         lost = np.sqrt([conductance * note.now.tension_n / note.now.length_m for note in notes])
         zero, one = np.zeros((strings, strings)), np.eye(strings)

@@ -21,7 +21,8 @@ from engine.presets import load_preset
 from engine.presets.finding import SHIPPED as PRESETS
 from engine.resonators.base import Resonator
 from engine.resonators.family import inharmonicity
-from engine.voices import Ear
+from engine.resonators.string import resonator_of
+from engine.values.ear import Ear
 
 ENTRIES, PROBLEMS = list_patches(SHIPPED)
 PATCHES = [entry.patch for entry in ENTRIES]
@@ -45,8 +46,8 @@ def strings_of(patch: Patch) -> list[KeyString]:
     return [string for string in found if string is not None]
 
 
-def resonator_of(string: KeyString) -> Resonator:
-    return string.parameters.resonator(string.modes, grid_points=GRID_POINTS)
+def made(string: KeyString) -> Resonator:
+    return resonator_of(string.parameters, string.modes, grid_points=GRID_POINTS)
 
 
 def test_there_are_many_and_none_is_broken() -> None:
@@ -91,7 +92,7 @@ def test_every_key_is_a_string_that_the_model_knows(patch: Patch) -> None:
 def test_no_pluck_raises_the_tension_beyond_training(patch: Patch) -> None:
     worst = 0.0
     for string in strings_of(patch):
-        resonator, rises = resonator_of(string), []
+        resonator, rises = made(string), []
         for velocity in (1, 64, 96, 127):
             pluck = patch.pluck.pluck(velocity)
             pulled = pluck.moved(amplitude_mm=pluck.amplitude_mm * string.shortened)  # as the player does

@@ -143,7 +143,7 @@ def test_one_bad_file_hides_no_other(make_patch: Make, own: Path) -> None:
     for name, words in (
         ("newer", "version: made by a newer version"),
         ("colour", "colour"),
-        ("high", "pluck.position: Input should be less than or equal to 0.98, found 3"),
+        ("high", "pluck.position: must be less than or equal to 0.98, found 3"),
         ("long", "author"),
         ("nan", "tuning.a4_hz"),
         ("big", "larger than"),

@@ -17,7 +17,8 @@ from app.playing.sources import Sources
 from app.rendering import RenderRequest
 from engine.pluck import Pluck
 from engine.presets import SHIPPED
-from engine.voices import Ear, Mixer
+from engine.values.ear import Ear
+from engine.voices import Mixer
 from tests.app.monitors import hears
 
 DEADLINE_S = 30.0

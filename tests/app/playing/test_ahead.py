@@ -17,7 +17,9 @@ from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
 from engine.resonators.sine_transform import project
 from engine.sources import ModelSource
-from engine.voices import Ear, Mixer, Voice
+from engine.values.ear import Ear
+from engine.voices import Mixer, Voice
+from engine.voices.ear import weights_of
 
 RATE_HZ = 4_000  # of the small preset and of the mixer: samples are heard as they are rendered
 EAR = Ear((0.37,))
@@ -63,7 +65,7 @@ def make(sources: Sources, small_preset: Path) -> Make:
             Voice(program, initial_m, EAR, 1.0, seconds, info.rate_hz),
             model,
             initial_m,
-            EAR.weights(info.grid_points),
+            weights_of(EAR, info.grid_points),
             (key or object(),),
             lambda: reported.begun_s.append(voice.rendered_s),
             reported.errors.append,

@@ -20,7 +20,7 @@ from app.playing.note import Note
 from app.playing.notes import Notes
 from app.playing.sources import Sources
 from app.rendering import RenderRequest
-from engine.voices import Ear
+from engine.values.ear import Ear
 from tests.app.monitors import find_shipped, hears
 
 Wait = Callable[[Callable[[], bool]], None]

@@ -15,7 +15,7 @@ from app.patches.patch import Body, Patch
 from app.playing.notes import Notes
 from app.playing.sources import Sources
 from engine.effects import Effects
-from engine.voices import Ear
+from engine.values.ear import Ear
 from tests.app.monitors import find_shipped
 
 Wait = Callable[[Callable[[], bool]], None]

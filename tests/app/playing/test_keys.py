@@ -45,7 +45,8 @@ from app.playing.sources import Sources
 from engine.effects import Effects
 from engine.kernels import constants as of
 from engine.pluck import Pluck
-from engine.voices import Ear, Mixer
+from engine.values.ear import Ear
+from engine.voices import Mixer
 from engine.voices.voice import FADE_S
 from tests.app.instrument.seen import Seen, seen, taken_up
 from tests.app.monitors import find_shipped, hears

@@ -24,7 +24,7 @@ from app.playing.midi_backend import Backend, MidiUnavailable, RtMidi, load_back
 from app.playing.midi_port import MidiInput
 from app.playing.notes import Notes
 from app.playing.sources import Sources
-from engine.voices import Ear
+from engine.values.ear import Ear
 from tests.app.monitors import find_shipped, hears
 
 RATE_HZ = 48_000

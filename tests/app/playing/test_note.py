@@ -10,7 +10,7 @@ import pytest
 from app.playing.note import Note
 from app.rendering import RenderRequest
 from engine.pluck import Pluck
-from engine.voices import Ear
+from engine.values.ear import Ear
 
 SOURCES = ("model", "truth", "preset:b")
 PLUCK = RenderRequest(Path("a"), Pluck(), 2.0, Ear((0.4,)), others=(Path("b.safetensors"),))

@@ -32,7 +32,8 @@ from engine.kernels.layout import AHEAD
 from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import load_preset, read_info, save_preset
-from engine.voices import Ear, Mixer, Voice
+from engine.values.ear import Ear
+from engine.voices import Mixer, Voice
 from tests.app.monitors import hears
 
 RATE_HZ = 48_000

@@ -17,15 +17,16 @@ from app.rendering.loaded import Loaded
 from app.rendering.strobe import FLASH_HZ
 from app.rendering.worker import RenderWorker
 from engine.presets import SHIPPED, PresetError, load_preset
-from engine.resonators.drum import DrumModes, DrumParameters
+from engine.resonators.drum import DrumModes, modes_of
 from engine.strike import Strike
 from engine.truth import ModalState, SplittingSolver
-from engine.voices import Ear
+from engine.values.drum import DrumParameters
+from engine.values.ear import Ear
 from training.family.drums import StruckDrum, model_player, motion_errors
 
 PRESET = SHIPPED / "studio_any_string.safetensors"
 LOADED = Loaded(load_preset(PRESET))
-TOM = DrumParameters(uneven=0.004, air_kg_m3=1.2).modes(1_500.0)
+TOM = modes_of(DrumParameters(uneven=0.004, air_kg_m3=1.2), 1_500.0)
 STEEL = DrumParameters(
     shape="rectangle",
     length_m=0.3,
@@ -36,8 +37,8 @@ STEEL = DrumParameters(
     poisson=0.3,
     tension_n_m=0.0,
 )
-PLATE = STEEL.modes(3_000.0)
-BAR = replace(STEEL, shape="bar", width_m=0.03, thickness_m=0.002).modes(4_000.0)
+PLATE = modes_of(STEEL, 3_000.0)
+BAR = modes_of(replace(STEEL, shape="bar", width_m=0.03, thickness_m=0.002), 4_000.0)
 HARD, SOFT = Strike((0.3, 0.1), 8.0), Strike((0.3, 0.1), 0.01)
 
 

@@ -19,7 +19,8 @@ from engine.pluck import Pluck
 from engine.presets import SHIPPED
 from engine.resonators.sine_transform import project
 from engine.sources import StringSource
-from engine.voices import Ear
+from engine.values.ear import Ear
+from engine.voices.ear import weights_of
 
 STUDIO = SHIPPED / "studio_nylon_b3.safetensors"  # a bank, of which any frame can be had
 ANY_STRING = SHIPPED / "studio_any_string.safetensors"  # steps that cost little
@@ -116,7 +117,7 @@ def test_a_signal_is_what_is_heard_of_the_motion(
     take, loaded = finished(job(preset, ear=ear)), sources.load(preset)
     rate_hz = take.info.rate_hz
     for name, source in (("model", loaded.model), ("truth", loaded.truth)):
-        expected = frames_m(source, take) @ ear.weights(source.grid_points)
+        expected = frames_m(source, take) @ weights_of(ear, source.grid_points)
         if ear.pickup == "velocity":
             expected = derivative(expected, rate_hz)
         found = take.listened.signals[name].read()

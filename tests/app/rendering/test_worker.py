@@ -22,7 +22,7 @@ from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
 from engine.resonators.sine_transform import project
 from engine.sources import StringSource
-from engine.voices import Ear
+from engine.values.ear import Ear
 
 DEADLINE_S = 30.0
 EAR = Ear((0.37,))

@@ -3,8 +3,9 @@
 import pytest
 
 from app.patches.instrument import SingleString
-from app.patches.patch import Fretted, Patch, PhysicalString, Pickup
+from app.patches.patch import Fretted, Patch, Pickup
 from app.session.choices import Choices, Session
+from engine.values.string import StringParameters
 
 STRING = {
     "length_m": 0.65,
@@ -84,7 +85,7 @@ def test_choices_from_before_the_slots_are_understood(source: str) -> None:
 
 
 def test_keys_play_what_was_chosen_last() -> None:
-    patch = Patch(name="p", category="harp", preset="many", strings=Fretted(string=PhysicalString(**STRING)))
+    patch = Patch(name="p", category="harp", preset="many", strings=Fretted(string=StringParameters(**STRING)))
     string = patch.strings.string  # type: ignore[union-attr]
     session = Session(Choices(instrument=patch, string=string))
     session.update(preset="one")
@@ -129,7 +130,7 @@ def test_what_a_note_changes_is_reported_as_played_before_it_is_reported_as_chan
 
 
 def played_patch(*points: float, kind: str = "displacement") -> Patch:
-    strings = Fretted(string=PhysicalString(**STRING))
+    strings = Fretted(string=StringParameters(**STRING))
     pickup = Pickup.model_validate({"points": points, "kind": kind})
     return Patch(name="p", category="harp", preset="many", strings=strings, pickup=pickup)
 

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from app.patches.instrument import SingleString
-from app.patches.patch import PhysicalString
 from app.presets.library import Library, list_presets
 from app.rendering import Take
 from app.session.choices import Choices
@@ -19,7 +17,7 @@ from engine.pluck import Pluck
 from engine.presets import find_string, read_info
 from engine.presets.finding import SHIPPED
 from engine.presets.of_string import read_string
-from engine.voices import Ear
+from engine.values.ear import Ear
 from tests.app.takes import append_to
 
 
@@ -33,7 +31,7 @@ def test_modes_are_those_of_the_string_that_is_plucked() -> None:
     """Not those of the string that a preset of many was measured with."""
     library = Library(list_presets(SHIPPED)[0])
     for name, solo, words in (("nylon_e2", 60, ""), ("piano_c4", 55, "this string has 53")):
-        string = PhysicalString(**asdict(read_string(find_string(name))))
+        string = read_string(find_string(name))
         many = SingleString(preset="studio_any_string")
         found = why_silent(Choices(instrument=many, string=string, solo=solo, position=0.113), library)
         assert words in found

@@ -13,6 +13,7 @@ from app.patches.tuning import TuningChoice
 from app.session.choices import Session
 from app.session.history import RECORDED, History
 from app.session.step_words import SEVERAL, step_words
+from app.shared.parameters import OF_PATCHES
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +64,7 @@ def test_whatever_a_knob_turns_has_words_without_marks(guitar: Patch) -> None:
             except ValueError:
                 continue
             assert reported and "_" not in reported and "." not in reported, field
+            assert reported == ("listening point" if field.startswith("pickup.") else OF_PATCHES[field].name)
 
 
 def test_a_macro_is_reported_by_its_name(guitar: Patch) -> None:

@@ -12,4 +12,4 @@ def key_is_shown(controller: Controller) -> bool:
     note, string = controller.instruments.latest, controller.session.choices.string
     if not isinstance(note, KeyNote) or note.request is None or string is None:
         return False
-    return string_of(note.request.preset) == string.parameters
+    return string_of(note.request.preset) == string

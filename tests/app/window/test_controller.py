@@ -20,7 +20,7 @@ from app.window.controller import FRAME_MS, IDLE_MS, Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings, load_settings
 from engine.kernels import layout as at
-from engine.voices import Ear
+from engine.values.ear import Ear
 
 LEFT = Qt.MouseButton.LeftButton
 

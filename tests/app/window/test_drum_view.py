@@ -16,7 +16,6 @@ from app.instrument.events import TimedEvent
 from app.instrument.offline import render_events
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Room
 from app.playing.key_note import KeyNote
 from app.rendering import BlowTake, blow
 from app.shared.vocabulary import Face
@@ -24,6 +23,7 @@ from app.window.controller import Controller
 from app.window.panels.base import Panel
 from app.window.panels.drum import DrumPanel
 from engine.presets import SHIPPED, load_preset
+from engine.values.effects import Room
 
 LEFT = Qt.MouseButton.LeftButton
 

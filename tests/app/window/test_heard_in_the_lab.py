@@ -25,12 +25,13 @@ from app.patches.patch import Patch
 from app.playing.key_note import KeyNote
 from app.playing.note import Note
 from app.session.choices import Choices
-from app.shared.vocabulary import PICKUPS, Source
+from app.shared.vocabulary import Source
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings
 from engine.kernels import layout as at
 from engine.presets import SHIPPED, load_preset, of_string
+from engine.values.ear import PICKUPS
 from engine.voices import Mixer
 
 RATE_HZ = 48_000
@@ -254,7 +255,7 @@ def test_a_string_of_the_instrument_that_is_plucked_by_itself_has_no_level_of_it
     qtbot.waitUntil(lambda: lab.performance.at_hand)
     while np.abs(take(lab, 0.1)).max() > 1e-8:
         pass
-    preset = of_string(load_preset(SHIPPED / "studio_any_string.safetensors"), string.parameters, RATE_HZ)
+    preset = of_string(load_preset(SHIPPED / "studio_any_string.safetensors"), string, RATE_HZ)
     choices = lab.session.choices
     right = choices.listen_right if choices.stereo else None
     for slot, source in SOURCES.items():

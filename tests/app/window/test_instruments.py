@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ from app.instrument.strings import Strings
 from app.patches.instrument import SingleString
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import PhysicalString
 from app.playing.key_note import KeyNote
 from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE, PLACES
 from app.rendering.subject import path_of, string_of
@@ -101,7 +99,7 @@ def test_a_pluck_by_hand_plays_the_string_that_was_restored(qtbot: QtBot, played
     patch = read_patch(PATCHES / "concert_harp.json")
     string = Strings(patch).of_key(43)
     assert string is not None
-    shown = PhysicalString(**asdict(string.parameters))
+    shown = string.parameters
     played.session.update(instrument=patch, string=shown, shape=patch.pluck.shape)
     qtbot.waitUntil(lambda: played.performance.playable)
     played.pluck()

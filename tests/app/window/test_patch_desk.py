@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -17,7 +16,7 @@ from app.instrument.string_keys import on_string
 from app.instrument.strings import Strings
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import own_patches, read_patch
-from app.patches.patch import Macro, Patch, PhysicalString, Pickup, Target
+from app.patches.patch import Macro, Patch, Pickup, Target
 from app.patches.tuning import TuningChoice
 from app.playing.key_note import KeyNote
 from app.playing.note import Note
@@ -661,7 +660,7 @@ def test_an_instrument_shows_its_own_string_before_it_is_played(qtbot: QtBot, pl
         key = sum(patch.range) // 2
         string = Strings(patch).of_key(key)
         assert string is not None
-        qtbot.waitUntil(lambda own=string: played.session.choices.string == PhysicalString(**asdict(own.parameters)))
+        qtbot.waitUntil(lambda own=string: played.session.choices.string == own.parameters)
         own = on_string(string, patch.pluck.pluck(played.session.choices.velocity))
         assert played.session.choices.pluck == own
     qtbot.waitUntil(lambda: played.performance.playable)
@@ -694,7 +693,7 @@ def test_the_pluck_that_is_shown_follows_the_knobs_of_the_pluck(qtbot: QtBot, pl
 
 def test_a_restored_string_stays(qtbot: QtBot, played: Controller) -> None:
     patch = read_patch(PATCHES / "concert_harp.json")
-    string = PhysicalString(**asdict(STEEL))
+    string = STEEL
     played.session.update(instrument=patch, string=string, position=0.2)
     qtbot.wait(2 * OWN_MS)
     assert (played.session.choices.string, played.session.choices.position) == (string, 0.2)

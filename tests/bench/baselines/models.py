@@ -23,7 +23,8 @@ from torch import Tensor, nn
 from engine.models._diagonal import dense_layers, perceptron
 from engine.models.eigenvalues import pack
 from engine.resonators.family import inharmonicity
-from engine.resonators.string import StringParameters
+from engine.resonators.string import decay_rates, undamped_frequencies
+from engine.values.string import StringParameters
 from training.family.errors import Player
 from training.family.strings import MOST_MODES, PluckedString
 
@@ -78,8 +79,8 @@ def _one(plucked: PluckedString) -> tuple[Tensor, ...]:
     present = (number <= modes).float()
     start = torch.zeros(MOST_MODES)
     start[:modes] = (plucked.amplitudes_m / amplitude_m).float()
-    sigma = torch.from_numpy(string.decay_rates(MOST_MODES) / frequency)
-    omega = torch.from_numpy(string.undamped_frequencies(MOST_MODES) / frequency)
+    sigma = torch.from_numpy(decay_rates(string, MOST_MODES) / frequency)
+    omega = torch.from_numpy(undamped_frequencies(string, MOST_MODES) / frequency)
     growth = float(sigma[1] - sigma[0]) / 3
     scaled = (
         math.log10(inharmonicity(string)) + 4,

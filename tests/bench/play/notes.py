@@ -20,10 +20,11 @@ import numpy as np
 
 from app.audio.choices import Buffer, SoundChoice
 from app.instrument.events import NoteOff, NoteOn, TimedEvent
-from app.patches.patch import Body, Noise, Patch, Room
+from app.patches.patch import Body, Noise, Patch
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
 from app.window.settings import Settings
+from engine.values.effects import Room
 from tests.bench.machine import Machine
 from tests.bench.play import analysis, hands, program, score
 from tests.bench.play.calibration import Holding, Transit, click_through, transit

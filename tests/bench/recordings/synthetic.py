@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.resonators.base import Resonator
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.truth.splitting import SplittingSolver
 from engine.truth.state import ModalState
+from engine.values.string import StringParameters
 from training.recording.note import FIT_BEGINS_S
 
 Array = NDArray[np.float64]
@@ -73,7 +74,7 @@ def synthetic_note(
     second = stiffness * tension * length**2 / (math.pi**2 * modulus)
     ratio = 2 ** (fretted / 12)
     string = StringParameters(length / ratio, area, second, mass / area, modulus, d1, d3, tension)
-    law = string.resonator(count, grid_points=count + 2)
+    law = resonator_of(string, count, grid_points=count + 2)
     split = 2 ** (random.uniform(0.4, 2.0, count) / 1200)
     slower = np.exp(random.uniform(-0.7, 0.7, count))  # than the first, or faster
     pair = np.arange(2 * count) // 2

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.effects import Amp, Body, Effects, Room, apply
+from engine.effects import Body, Effects, apply
 from engine.effects.impulse import LOUDNESS_HZ, Impulse
 from engine.kernels import layout as at
+from engine.values.effects import Amp, Room
 from engine.voices import Mixer, Voice, plain_program
 
 RATE_HZ = 48_000

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.effects.amp import NOMINAL, Amp, amplified
+from engine.effects.amp import NOMINAL, amplified, factors
 from engine.kernels import amplifier
 from engine.kernels import layout as at
+from engine.values.effects import Amp
 
 RATE_HZ = 48_000
 SIZE = 2**15
@@ -34,7 +35,7 @@ def test_harmonics_are_those_of_its_shape(drive_db: float) -> None:
     amp = Amp(drive_db)
     found = spectrum(amplified(amp, sound, RATE_HZ))
     hz = periods * RATE_HZ / SIZE
-    drive, gain, _ = amp.factors
+    drive, gain, _ = factors(amp)
     low = amplifier.COUPLING_HZ / hz
     angle = 2 * np.pi * np.arange(4096) / 4096
     x = amplifier.BIAS + drive * 0.1 / np.sqrt(1 + low**2) * np.sin(angle)
@@ -62,7 +63,7 @@ def test_a_tone_of_nominal_level_keeps_it(drive_db: float) -> None:
 
 def test_the_level_of_an_instrument_changes_no_drive() -> None:
     _, sound = tone(300, 0.1, 9_600)
-    louder = amplified(Amp(20.0, 3.0, level_db=6.0), sound * 10 ** (6 / 20), RATE_HZ)
+    louder = amplified(Amp(20.0, 3.0), sound * 10 ** (6 / 20), RATE_HZ, level_db=6.0)
     np.testing.assert_allclose(louder, amplified(Amp(20.0, 3.0), sound, RATE_HZ) * 10 ** (6 / 20), atol=1e-12)
 
 
@@ -80,7 +81,7 @@ def test_off_it_leaves_every_sample_and_is_switched_without_a_click() -> None:
     mixer[at.M_RATE] = RATE_HZ
     mix, found = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2), []
     for number, first in enumerate(range(0, len(sound), at.QUANTUM)):
-        mixer[at.M_AMPLIFIER : at.M_AMPLIFIER + 3] = Amp(6.0 if 10 <= number < 40 else 0.0).factors
+        mixer[at.M_AMPLIFIER : at.M_AMPLIFIER + 3] = factors(Amp(6.0 if 10 <= number < 40 else 0.0))
         mix[:] = sound[first : first + at.QUANTUM]
         amplifier.amplify(mixer)
         mixer.view(np.int64)[at.M_FRAMES] += at.QUANTUM

@@ -20,11 +20,14 @@ from engine.models.integrated_phase import IntegratedPhase
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
+from engine.resonators.string import resonator_of
 from engine.schema import write
 from engine.sources import ModelSource
 from engine.truth import ModalState, SplittingSolver, solve_linear
-from engine.voices import Ear, Mixer, Voice, model_program, render_voice
+from engine.values.ear import Ear
+from engine.voices import Mixer, Voice, model_program, render_voice
 from engine.voices.banks import bank_program
+from engine.voices.ear import weights_of
 
 KNOWING = "nylon_nonlinear_gaussian_4k_koopman_integrated"
 HINTED = f"{KNOWING}_hinted"
@@ -53,7 +56,7 @@ def test_at_the_presets_rate_it_is_the_models_own_rendering(
     rate_hz = preset.info.rate_hz
     found = rung(min(rate_hz, 6000), strike(name, pluck, rate_hz, ear), attack=False)[:, : len(ear.points)]
     source, let_go_m = ModelSource(preset), initial_m(preset.info, pluck)
-    weights = ear.weights(source.grid_points)
+    weights = weights_of(ear, source.grid_points)
     frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, weights)
     expected = frames_m[0] / FULL_SCALE_M
     assert relative(found[1:], expected) < 3e-5
@@ -72,7 +75,7 @@ def test_at_any_rate_it_is_the_model_at_those_times(
             torch.from_numpy(initial_m(preset.info, pluck)[None] / preset.info.scale_m).float()
         )
         times = frames.double() * preset.info.rate_hz / rate_hz
-        weights = torch.from_numpy(STEREO.weights(preset.info.grid_points))
+        weights = torch.from_numpy(weights_of(STEREO, preset.info.grid_points))
         expected = (
             (preset.model.decode(preset.model.latents(state.origin, times))[0].double() @ weights).numpy()
             * preset.info.scale_m
@@ -87,7 +90,7 @@ def test_a_dmd_of_the_linear_string_is_the_linear_string(
 ) -> None:
     info = small_info(False)
     noise_m = 5e-3 * torch.rand(4, info.grid_points, generator=torch.Generator().manual_seed(0)).double().numpy()
-    solver = SplittingSolver(info.string.resonator(info.modes, tension_modulated=False), info.rate_hz)
+    solver = SplittingSolver(resonator_of(info.string, info.modes, tension_modulated=False), info.rate_hz)
     start = ModalState.at_rest(to_modes(noise_m, info.modes))
     trajectories = torch.from_numpy(to_grid(solver.solve(start, 400).numpy(), info.grid_points) / info.scale_m)
     model = DMD.fit(trajectories, DMDConfiguration(info.grid_points, 2, 2 * info.modes))
@@ -97,7 +100,7 @@ def test_a_dmd_of_the_linear_string_is_the_linear_string(
     found = rung(rate_hz // 2, Voice(program, let_go_m, EAR), attack=False)[:, :1]
     times_s = torch.arange(len(found)).double() / rate_hz
     exact = solve_linear(info.resonator, ModalState(start.amplitude[:1], start.velocity[:1]), times_s)
-    expected = to_grid(exact[0].numpy(), info.grid_points) @ EAR.weights(info.grid_points) / FULL_SCALE_M
+    expected = to_grid(exact[0].numpy(), info.grid_points) @ weights_of(EAR, info.grid_points) / FULL_SCALE_M
     assert relative(found, expected) < 3e-5
 
 

@@ -9,8 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from engine.effects import Body, Effects, Impulse, Room, apply
+from engine.effects import Body, Effects, Impulse, apply
 from engine.kernels import layout as at
+from engine.values.effects import Room
 from engine.voices import Mixer, Voice, plain_program
 
 RATE_HZ = 48_000

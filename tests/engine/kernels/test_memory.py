@@ -8,14 +8,17 @@ import numpy as np
 import pytest
 from numba import njit
 
-from engine.effects import Effects, Room
+from engine.effects import Effects
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import publish
 from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
-from engine.resonators.string import StringParameters
-from engine.voices import Ear, Mixer, Voice, plain_program
+from engine.resonators.string import resonator_of
+from engine.values.ear import Ear
+from engine.values.effects import Room
+from engine.values.string import StringParameters
+from engine.voices import Mixer, Voice, plain_program
 from engine.voices import mixer as mixer_module
 from engine.voices import voice as voice_module
 from engine.voices.programs import solver_program
@@ -49,7 +52,7 @@ def published(monkeypatch: pytest.MonkeyPatch) -> Published:
 
 
 def string_voice() -> Voice:
-    program = solver_program(StringParameters().resonator(4), RATE_HZ)
+    program = solver_program(resonator_of(StringParameters(), 4), RATE_HZ)
     return Voice(program, Pluck().displacement(program.grid_points), Ear((0.37,)))
 
 

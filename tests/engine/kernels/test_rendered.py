@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from engine.kernels.layout import QUANTUM
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import PresetInfo
-from engine.voices import Ear, Mixer, Program, Voice, plain_program, rendered_program
+from engine.values.ear import Ear
+from engine.voices import Mixer, Program, Voice, plain_program, rendered_program
 
 RATE_HZ = 48_000
 MIDDLE = Ear((0.5,))

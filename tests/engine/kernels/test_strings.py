@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from engine.kernels import constants as of
 from engine.kernels import strings
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 
 STEEL = StringParameters(0.65, 5e-7, 2e-14, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
 BOTH = [StringParameters(), STEEL, replace(STEEL, youngs_modulus_pa=0.0, damping_d3_kg_m_s=0.0)]
@@ -24,7 +25,7 @@ def row(string: StringParameters) -> NDArray[np.float64]:
 def test_modes_are_those_of_the_parameters(string: StringParameters) -> None:
     found = np.empty(4 * 60)
     strings.rows(row(string), 60, 0, 1.0, *[0.0] * 5, found)
-    resonator = string.resonator(60)
+    resonator = resonator_of(string, 60)
     own = resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch
     np.testing.assert_allclose(found, np.concatenate(own), rtol=1e-13)
     for mode in (1, 7):

@@ -17,7 +17,9 @@ from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, of_string
 from engine.sources import ModelSource, TruthSource
 from engine.truth import ModalState, SplittingSolver
-from engine.voices import Ear, Mixer, Voice, model_program
+from engine.values.ear import Ear
+from engine.voices import Mixer, Voice, model_program
+from engine.voices.ear import weights_of
 from engine.voices.programs import truth_program
 from tests.engine.voices.changing import ChangingVoice
 
@@ -44,7 +46,7 @@ def test_a_voice_is_the_model_and_the_string(
     assert state.nodes.tolist() == [nodes]
     program = model_program(preset, rate_hz)
     found = rung(rate_hz // 4, Voice(program, let_go_m, STEREO), attack=False)
-    weights = STEREO.weights(info.grid_points)
+    weights = weights_of(STEREO, info.grid_points)
     for source in (ModelSource(preset), TruthSource(info)):
         frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, weights)
         expected = np.concatenate([(let_go_m @ weights)[None], frames_m[0]]) / FULL_SCALE_M
@@ -87,7 +89,7 @@ def test_a_voice_that_sets_out_from_a_ringing_string_is_the_model_and_the_string
     program = model_program(preset, 48_000)
     shape_m = info.resonator.to_grid(q)
     found = rung(48_000, Voice(program, shape_m, STEREO, begin=(q, v)), attack=False)
-    points = info.resonator.shapes @ STEREO.weights(info.grid_points)
+    points = info.resonator.shapes @ weights_of(STEREO, info.grid_points)
     steps = len(found) - 1
     true, _ = SplittingSolver(info.resonator, 48_000).advance(
         ModalState(torch.from_numpy(q)[None], torch.from_numpy(v)[None]), steps

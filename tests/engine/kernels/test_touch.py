@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from engine.kernels import strings
 from engine.kernels.strings import TOUCH_RESISTANCE
-from engine.resonators.string import StringParameters
+from engine.values.string import StringParameters
 
 STRING = StringParameters(second_moment_m4=0.0, damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)
 MODES = 80

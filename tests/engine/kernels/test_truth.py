@@ -17,7 +17,9 @@ from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import TruthSource
 from engine.truth import ModalState, solve_dop853, solve_linear
-from engine.voices import Ear, Voice, truth_program
+from engine.values.ear import Ear
+from engine.voices import Voice, truth_program
+from engine.voices.ear import weights_of
 
 STEREO = Ear((0.37, 0.8))
 Rung = Callable[..., NDArray[np.float64]]
@@ -37,7 +39,7 @@ def test_it_is_the_string_that_models_learn(
     voice = Voice(truth_program(info, info.rate_hz), initial_m(info, pluck), STEREO)
     found = rung(info.rate_hz // 4, voice, attack=False)
     source, let_go_m = TruthSource(info), initial_m(info, pluck)
-    weights = STEREO.weights(info.grid_points)
+    weights = weights_of(STEREO, info.grid_points)
     frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, weights)
     expected = np.concatenate([(let_go_m @ weights)[None], frames_m[0]]) / FULL_SCALE_M
     assert relative(found, expected) < 1e-4
@@ -49,7 +51,7 @@ def test_after_a_second_it_is_the_oracles(small_info: Info, initial_m: Initial, 
     found = rung(8000, Voice(truth_program(info, 8000), let_go_m, STEREO), attack=False)
     start = ModalState.at_rest(to_modes(let_go_m[None], info.modes))
     exact = solve_dop853(info.resonator, start, 8000, 7999, rtol=1e-7, atol=1e-10)
-    expected = to_grid(exact[0].numpy(), info.grid_points) @ STEREO.weights(info.grid_points) / FULL_SCALE_M
+    expected = to_grid(exact[0].numpy(), info.grid_points) @ weights_of(STEREO, info.grid_points) / FULL_SCALE_M
     assert relative(found[7000:], expected[7000:]) < 1e-4
 
 
@@ -61,7 +63,7 @@ def test_the_linear_string_is_exact(rate_hz: int, small_info: Info, initial_m: I
     found = rung(rate_hz // 2, Voice(truth_program(info, rate_hz), let_go_m, STEREO), attack=False)
     start = ModalState.at_rest(to_modes(let_go_m[None], info.modes))
     exact = solve_linear(info.resonator, start, torch.arange(len(found)).double() / rate_hz)
-    expected = to_grid(exact[0].numpy(), info.grid_points) @ STEREO.weights(info.grid_points) / FULL_SCALE_M
+    expected = to_grid(exact[0].numpy(), info.grid_points) @ weights_of(STEREO, info.grid_points) / FULL_SCALE_M
     assert relative(found, expected) < 1e-7
 
 

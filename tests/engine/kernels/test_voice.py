@@ -13,8 +13,10 @@ from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.models.integrated_phase import IntegratedPhase
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo
-from engine.resonators.string import StringParameters
-from engine.voices import Ear, Mixer, Voice, model_program, plain_program, truth_program
+from engine.resonators.string import resonator_of
+from engine.values.ear import Ear
+from engine.values.string import StringParameters
+from engine.voices import Mixer, Voice, model_program, plain_program, truth_program
 from engine.voices.derivative import REACH_FRAMES
 from engine.voices.programs import solver_program
 from engine.voices.voice import FADE_S
@@ -155,7 +157,7 @@ def slowest(rate_hz: int, ear: Ear) -> Voice:
     slow = StringParameters(
         length_m=2.0, density_kg_m3=20_000.0, tension_n=1e-3, youngs_modulus_pa=1e6, damping_d1_kg_m_s=0.0
     )
-    program = solver_program(slow.resonator(1, tension_modulated=False), rate_hz)
+    program = solver_program(resonator_of(slow, 1, tension_modulated=False), rate_hz)
     voice = Voice(program, Pluck(0.5).displacement(program.grid_points), ear)
     voice.begin_at_once()
     return voice

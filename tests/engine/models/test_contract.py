@@ -14,9 +14,10 @@ from engine.models.base import AnyFrameModel, Physics, StringModel, count_parame
 from engine.pluck import Pluck
 from engine.presets import load_preset, read_info, save_preset
 from engine.resonators.sine_transform import project
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.schema import SchemaError, write
 from engine.sources import ModelSource
+from engine.values.string import StringParameters
 from tests.engine.tensors import displacement_of, listening_weights
 
 PAPER_COUNTS = {
@@ -27,7 +28,7 @@ PAPER_COUNTS = {
     "fgru": 640_033,
     "frnn": 643_201,
 }
-PHYSICS = Physics(StringParameters().resonator(10), 4_000, 1e-3)
+PHYSICS = Physics(resonator_of(StringParameters(), 10), 4_000, 1e-3)
 
 
 def made(name: str, seed: int = 0) -> StringModel[Any]:
@@ -145,5 +146,5 @@ def test_sizes_are_checked_by_name() -> None:
 def test_a_string_without_losses_can_be_started_from(name: str, how: str) -> None:
     string = StringParameters(damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)
     model = build_model(name)
-    model.initialise(how, Physics(string.resonator(10), 16_000, 1e-3), torch.Generator().manual_seed(0))
+    model.initialise(how, Physics(resonator_of(string, 10), 16_000, 1e-3), torch.Generator().manual_seed(0))
     assert all(part.isfinite().all() for part in model.state_dict().values())

@@ -11,8 +11,9 @@ import torch
 from engine.models.base import Physics, count_parameters
 from engine.models.configurations import DMDConfiguration
 from engine.models.dmd import DMD
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
+from engine.values.string import StringParameters
 from tests.engine.tensors import listening_weights, to_grid, to_modes
 
 STRING, MODES, RATE_HZ = StringParameters(), 25, 16_000
@@ -25,7 +26,7 @@ as_pydmd_warns = pytest.mark.filterwarnings("ignore:Input data condition number"
 def trajectories(steps: int = 1000, tension_modulated: bool = False) -> torch.Tensor:
     """Two noise-plucked strings at 16 kHz in mm, float64 (2, steps + 1, 101)."""
     noise = torch.rand(2, 101, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
-    solver = SplittingSolver(STRING.resonator(MODES, tension_modulated=tension_modulated), RATE_HZ)
+    solver = SplittingSolver(resonator_of(STRING, MODES, tension_modulated=tension_modulated), RATE_HZ)
     return to_grid(solver.solve(ModalState.at_rest(to_modes(noise * 5.5e-3, MODES)), steps), 101) * 1e3
 
 
@@ -80,7 +81,7 @@ def test_many_trajectories_agree_with_pydmd() -> None:
 
 
 def test_finds_the_linear_strings_eigenvalues() -> None:
-    half = np.exp(STRING.resonator(MODES).eigenvalues() / RATE_HZ)
+    half = np.exp(resonator_of(STRING, MODES).eigenvalues() / RATE_HZ)
     assert_same_set(eigenvalues(fitted()), np.concatenate([half, half.conj()]), 1e-7)
 
 
@@ -137,7 +138,7 @@ def test_phases_stay_exact_after_a_million_steps() -> None:
 @torch.no_grad()
 def test_physics_initialisation_is_the_linear_string() -> None:
     model = DMD(DMDConfiguration(rank=60))
-    model.initialise("physics", Physics(STRING.resonator(MODES), RATE_HZ), torch.Generator())
+    model.initialise("physics", Physics(resonator_of(STRING, MODES), RATE_HZ), torch.Generator())
     truth = trajectories()
     assert relative_mse(model(truth[:, 0].float(), 1000), truth[:, 1:]) < 1e-9
 
@@ -177,7 +178,9 @@ def test_impossible_sizes_are_named() -> None:
     with pytest.raises(ValueError, match="rank must be at most lags times grid_points, 20, not 50"):
         DMDConfiguration(grid_points=10)
     with pytest.raises(ValueError, match="rank of at least 50, two a mode, not 20"):
-        DMD(DMDConfiguration(rank=20)).initialise("physics", Physics(STRING.resonator(25), 16_000), torch.Generator())
+        DMD(DMDConfiguration(rank=20)).initialise(
+            "physics", Physics(resonator_of(STRING, 25), 16_000), torch.Generator()
+        )
 
 
 def test_impossible_data_are_reported() -> None:

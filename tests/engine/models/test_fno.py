@@ -12,7 +12,8 @@ from engine.models._fno_transform import transform_matrices
 from engine.models.base import Physics, count_parameters
 from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
 from engine.models.fno import FGRU, FRNN, FieldState, FourierConvolution
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 from tests.engine.tensors import convolved, listening_weights
 
 REFERENCES = Path(__file__).parent / "references"
@@ -213,7 +214,7 @@ def test_listening_is_the_grid_at_that_point(make: Make) -> None:
 @both
 def test_the_gradient_reaches_every_weight_through_the_steps(make: Make) -> None:
     model = make()
-    model.initialise("paper", Physics(StringParameters().resonator(5), 4_000), torch.Generator().manual_seed(0))
+    model.initialise("paper", Physics(resonator_of(StringParameters(), 5), 4_000), torch.Generator().manual_seed(0))
     frames, _ = model.advance(model.encode(initial(2, 11)), 12)
     frames.square().mean().backward()
     for name, parameter in model.named_parameters():
@@ -250,20 +251,20 @@ def test_the_seed_decides_all(make: Make) -> None:
     for seed in (1, 1, 2):
         model = make()
         model.initialise(
-            "paper", Physics(StringParameters().resonator(5), 4_000), torch.Generator().manual_seed(seed)
+            "paper", Physics(resonator_of(StringParameters(), 5), 4_000), torch.Generator().manual_seed(seed)
         )
         states.append(model.state_dict())
     first, again, other = states
     assert all(torch.equal(first[name], again[name]) for name in first)
     assert not any(torch.equal(first[name], other[name]) for name in first)
     with pytest.raises(ValueError, match="'physics' is not one of paper"):
-        model.initialise("physics", Physics(StringParameters().resonator(5), 4_000), torch.Generator())
+        model.initialise("physics", Physics(resonator_of(StringParameters(), 5), 4_000), torch.Generator())
 
 
 @both
 def test_paper_initialisation_is_uniform_and_positive(make: Make) -> None:
     model = make()
-    model.initialise("paper", Physics(StringParameters().resonator(5), 4_000), torch.Generator().manual_seed(0))
+    model.initialise("paper", Physics(resonator_of(StringParameters(), 5), 4_000), torch.Generator().manual_seed(0))
     for name, tensor in model.state_dict().items():
         if name.startswith(("z_layer", "r_layer", "h_layer", "fourier_layers")):
             largest = 1 / 36 if name.endswith("weight") else 1 / 6

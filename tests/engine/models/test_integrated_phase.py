@@ -14,8 +14,9 @@ from engine.models.base import Physics, count_parameters
 from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.integrated_phase import GAIN_LIMIT, IntegratedPhase
 from engine.resonators.sine_transform import synthesis_matrix
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver, solve_linear
+from engine.values.string import StringParameters
 from tests.engine.tensors import draw, listening_weights, to_grid, to_modes
 
 SMALL = {"encoder_widths": (12,), "eigenvalue_widths": (12, 12)}
@@ -29,7 +30,9 @@ KINDS: tuple[dict, ...] = (
 
 def string_model(how: str = "averaging", seed: int = 0, **sizes: object) -> IntegratedPhase:
     model = IntegratedPhase(IntegratedPhaseConfiguration(**{"state_size": 12, **SMALL, **sizes}))  # type: ignore[arg-type]
-    model.initialise(how, Physics(StringParameters().resonator(10), 4_000, 1e-3), torch.Generator().manual_seed(seed))
+    model.initialise(
+        how, Physics(resonator_of(StringParameters(), 10), 4_000, 1e-3), torch.Generator().manual_seed(seed)
+    )
     return model.eval()
 
 
@@ -173,7 +176,7 @@ def test_physics_initialisation_is_the_linear_string() -> None:
     string, rate_hz = StringParameters(), 4_000
     state = ModalState.at_rest(torch.randn(1, 10, dtype=torch.float64, generator=torch.Generator().manual_seed(2)))
     times_s = torch.arange(401, dtype=torch.float64) / rate_hz
-    truth = to_grid(solve_linear(string.resonator(state.modes), state, times_s), 101)
+    truth = to_grid(solve_linear(resonator_of(string, state.modes), state, times_s), 101)
     model = string_model("physics").double()
     assert relative(model(truth[:, 0], 400), truth[:, 1:]) < 1e-4  # the logarithms were float32
 
@@ -182,12 +185,12 @@ def test_physics_initialisation_is_the_linear_string() -> None:
 def test_averaging_is_nearly_the_tension_modulated_string() -> None:
     string, rate_hz, steps = StringParameters(), 4_000, 4000
     amplitudes = draw("gaussian", 8, 10)
-    solver = SplittingSolver(string.resonator(10), rate_hz)
+    solver = SplittingSolver(resonator_of(string, 10), rate_hz)
     truth = solver.solve(ModalState.at_rest(amplitudes), steps) @ torch.from_numpy(synthesis_matrix(101, 10) / 1e-3)
     errors = {}
     for how in ("physics", "averaging"):
         model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=10))
-        model.initialise(how, Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0))
+        model.initialise(how, Physics(resonator_of(string, 10), rate_hz, 1e-3), torch.Generator().manual_seed(0))
         difference = model(truth[:, 0].float(), steps) - truth[:, 1:]
         errors[how] = float((difference.square().sum((1, 2)) / truth[:, 1:].square().sum((1, 2))).mean())
     assert errors["averaging"] < 2e-4
@@ -199,7 +202,7 @@ def test_in_its_units_all_numbers_are_of_the_order_of_one() -> None:
     model = string_model()
     assert 0.1 < model.K.abs().max() < 2 and 0.01 < model.M_out.abs().max() < 20
     assert float(model.energy_units[0]) == pytest.approx(
-        float(StringParameters().resonator(3).relative_tension_rise(np.array([1e-3, 0, 0]))), rel=1e-6
+        float(resonator_of(StringParameters(), 3).relative_tension_rise(np.array([1e-3, 0, 0]))), rel=1e-6
     )
 
 
@@ -212,11 +215,11 @@ def test_modulation_is_what_a_strong_low_mode_does_to_a_high_one_within_a_period
     for strength in (1.0, 0.5):
         amplitudes = torch.zeros(1, 10, dtype=torch.float64)
         amplitudes[0, 0], amplitudes[0, high] = 8e-3 * strength, 1e-5
-        truth = SplittingSolver(string.resonator(10), rate_hz).solve(ModalState.at_rest(amplitudes), steps)
+        truth = SplittingSolver(resonator_of(string, 10), rate_hz).solve(ModalState.at_rest(amplitudes), steps)
         for modulation in errors:
             model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=10)).double()
             model.initialise(
-                "averaging", Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0)
+                "averaging", Physics(resonator_of(string, 10), rate_hz, 1e-3), torch.Generator().manual_seed(0)
             )
             if not modulation:
                 model.M_in.zero_()
@@ -233,11 +236,13 @@ def test_the_action_keeps_the_phase_long_after_the_start() -> None:
     """Energies that decay from the first amplitudes, not from the actions, mistake the frequency for good."""
     string, rate_hz = StringParameters(), 4_000
     amplitudes = draw("noise", 8, 10)
-    truth, _ = SplittingSolver(string.resonator(10), rate_hz).advance(ModalState.at_rest(amplitudes), 5 * rate_hz)
+    truth, _ = SplittingSolver(resonator_of(string, 10), rate_hz).advance(ModalState.at_rest(amplitudes), 5 * rate_hz)
     errors = {}
     for adiabatic in (False, True):
         model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=10, adiabatic=adiabatic))
-        model.initialise("averaging", Physics(string.resonator(10), rate_hz, 1e-3), torch.Generator().manual_seed(0))
+        model.initialise(
+            "averaging", Physics(resonator_of(string, 10), rate_hz, 1e-3), torch.Generator().manual_seed(0)
+        )
         found, _ = model.advance(model.encode(to_grid(amplitudes / 1e-3, 101).float()), 5 * rate_hz)
         late = to_modes(found[:, -rate_hz:], 10) * 1e-3 - truth[:, -rate_hz:]
         errors[adiabatic] = float(late.square().sum() / truth[:, -rate_hz:].square().sum())
@@ -246,7 +251,7 @@ def test_the_action_keeps_the_phase_long_after_the_start() -> None:
 
 def test_averaging_of_the_linear_string_is_the_linear_string() -> None:
     model = IntegratedPhase(IntegratedPhaseConfiguration(state_size=10))
-    physics = Physics(StringParameters().resonator(10, tension_modulated=False), 4_000, 1e-3)
+    physics = Physics(resonator_of(StringParameters(), 10, tension_modulated=False), 4_000, 1e-3)
     model.initialise("averaging", physics, torch.Generator().manual_seed(0))
     assert not model.K.any()
 

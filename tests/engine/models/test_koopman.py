@@ -10,12 +10,13 @@ import torch
 from engine.models.base import Physics, count_parameters
 from engine.models.configurations import KoopmanConfiguration
 from engine.models.koopman import SHARPEST, Koopman
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.truth import ModalState, solve_linear
+from engine.values.string import StringParameters
 from tests.engine.tensors import listening_weights, to_grid
 
 REFERENCE = Path(__file__).parent / "references" / "koopman.npz"
-PHYSICS = Physics(StringParameters().resonator(10), 4_000)
+PHYSICS = Physics(resonator_of(StringParameters(), 10), 4_000)
 
 
 def reference_model() -> tuple[Koopman, torch.Tensor, torch.Tensor]:
@@ -121,7 +122,7 @@ def test_initialisations_lie_where_they_should() -> None:
     radius = torch.exp(-small_model().nu_log.detach().exp())
     assert 0.99 - 1e-6 <= float(radius.min()) <= float(radius.max()) <= 1
     physical = small_model(how="physics")
-    linear = torch.from_numpy(StringParameters().resonator(10).eigenvalues() / 4_000)
+    linear = torch.from_numpy(resonator_of(StringParameters(), 10).eigenvalues() / 4_000)
     torch.testing.assert_close(physical.nu_log.detach()[:10].exp().double(), -linear.real, rtol=1e-5, atol=0)
     raised = physical.theta_log.detach().exp().double() / linear.imag.repeat(4)[:32]
     torch.testing.assert_close(raised, 1 + SHARPEST * (torch.arange(32) // 10).double() / 3, rtol=1e-5, atol=0)

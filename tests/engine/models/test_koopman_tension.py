@@ -13,8 +13,9 @@ from engine.models import build_model, koopman_tension
 from engine.models.base import Physics
 from engine.models.koopman_tension import SERIES, KoopmanTension
 from engine.pluck import Pluck
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver
+from engine.values.string import StringParameters
 from tests.engine.tensors import displacement_of, of_tension_rise, to_grid, to_modes
 
 NYLON = StringParameters()
@@ -26,20 +27,20 @@ def made(
 ) -> KoopmanTension:
     model = build_model("koopman_tension", {"modes": modes})
     assert isinstance(model, KoopmanTension)
-    physics = Physics(string.resonator(modes, tension_modulated=not linear), rate_hz, 1e-3)
+    physics = Physics(resonator_of(string, modes, tension_modulated=not linear), rate_hz, 1e-3)
     model.initialise(how, physics, torch.Generator())
     return model.eval()
 
 
 def pluck_m(string: StringParameters, modes: int, rise: float) -> Tensor:
     """A displacement (1, 101) in m that raises the tension by `rise`."""
-    resonator = string.resonator(modes)
+    resonator = resonator_of(string, modes)
     amplitudes = to_modes(displacement_of(Pluck(0.3, 1.0, "triangular")), modes)
     return to_grid(of_tension_rise(resonator, amplitudes, rise), 101)[None]
 
 
 def true_motion(string: StringParameters, displacement_m: Tensor, modes: int, rate_hz: float, steps: int) -> Tensor:
-    resonator = string.resonator(modes)
+    resonator = resonator_of(string, modes)
     solver = SplittingSolver(resonator, rate_hz)
     state = ModalState.at_rest(to_modes(displacement_m, resonator.modes))
     return to_grid(solver.solve(state, steps)[:, 1:], 101)
@@ -65,7 +66,7 @@ def test_what_backward_error_analysis_knows_is_worth_two_orders(
 
 def test_a_linear_string_is_exact() -> None:
     displacement = pluck_m(NYLON, 25, 0.3)
-    resonator = NYLON.resonator(25, tension_modulated=False)
+    resonator = resonator_of(NYLON, 25, tension_modulated=False)
     solved = SplittingSolver(resonator, 4_000).solve(ModalState.at_rest(to_modes(displacement, resonator.modes)), 400)
     truth = to_grid(solved[:, 1:], 101)
     assert relative_error(made(NYLON, 25, "series", 4_000, linear=True), displacement, truth) < 1e-12
@@ -81,7 +82,7 @@ def test_a_quiet_string_is_the_linear_one() -> None:
 
 def test_another_string_takes_what_was_learned() -> None:
     model = made(NYLON, 25, "series")
-    other = model.for_resonator(Physics(STEEL.resonator(40), 48_000, 1e-3))
+    other = model.for_resonator(Physics(resonator_of(STEEL, 40), 48_000, 1e-3))
     displacement = pluck_m(STEEL, 40, 0.1)
     expected = made(STEEL, 40, "series")
     with torch.inference_mode():
@@ -92,7 +93,7 @@ def test_another_string_takes_what_was_learned() -> None:
 @pytest.mark.parametrize("rate_hz", [4_000, 16_000, 44_100, 96_000])
 def test_any_rate_is_the_truth_at_that_rate(rate_hz: int) -> None:
     displacement = pluck_m(NYLON, 25, 0.2)
-    model = made(NYLON, 25, "series").for_resonator(Physics(NYLON.resonator(25), rate_hz, 1e-3))
+    model = made(NYLON, 25, "series").for_resonator(Physics(resonator_of(NYLON, 25), rate_hz, 1e-3))
     steps = rate_hz // 20
     truth = true_motion(NYLON, displacement, 25, rate_hz, steps)
     with torch.inference_mode():
@@ -113,7 +114,7 @@ def test_the_compiled_loop_is_the_definition() -> None:
 
 def modes_alike_m(rise: float, modes: int = 25) -> Tensor:
     """A displacement (1, 101) in m to which all modes of the nylon string add alike, as no soft pluck's do."""
-    resonator = NYLON.resonator(modes)
+    resonator = resonator_of(NYLON, modes)
     amplitudes = torch.ones(modes, dtype=torch.float64)
     amplitudes[::2] = -1
     return to_grid(of_tension_rise(resonator, amplitudes, rise), 101)[None]
@@ -151,7 +152,7 @@ LOW = StringParameters(0.65, 5e-7, 7.4e-16, 1000.0, 2e10, 1.376e-3, 2.41e-7, 3.4
 
 def ringing(string: StringParameters, modes: int, pluck: Pluck, rise: float, frames: int) -> tuple[Tensor, Tensor]:
     """A string so long after a pluck that raises the tension by `rise`: amplitudes in m, speeds in m a frame."""
-    resonator = string.resonator(modes)
+    resonator = resonator_of(string, modes)
     amplitudes = of_tension_rise(resonator, to_modes(displacement_of(pluck), modes), rise)
     _, state = SplittingSolver(resonator, 48_000).advance(ModalState.at_rest(amplitudes[None]), frames)
     return state.amplitude, state.velocity / 48_000
@@ -170,7 +171,7 @@ def test_a_string_that_rings_sets_out_as_truly_as_one_at_rest(
     string: StringParameters, modes: int, pluck: Pluck, frames: int, allowed: float
 ) -> None:
     """Relative MSE of a second with a tension rise of 50 %; speeds as they are instead of w: 1e-7 to 1e-4."""
-    resonator, model = string.resonator(modes), made(string, modes, "series")
+    resonator, model = resonator_of(string, modes), made(string, modes, "series")
     amplitudes, speeds = ringing(string, modes, pluck, 0.5, frames)
     truth, _ = SplittingSolver(resonator, 48_000).advance(ModalState(amplitudes, speeds * 48_000), 48_000)
     state = model.encode(*(to_grid(each, 101) / 1e-3 for each in (amplitudes, speeds)))
@@ -189,7 +190,7 @@ def test_a_speed_of_nothing_is_rest_bit_for_bit() -> None:
 def test_a_string_struck_where_it_rests_takes_nodes_and_energy_of_its_speed() -> None:
     """It swings as far as one that was pulled so: what bounds it is the energy, not the displacement it begins at."""
     model = made(NYLON, 25, "series", 16_000)
-    resonator = NYLON.resonator(25)
+    resonator = resonator_of(NYLON, 25)
     amplitudes = to_modes(modes_alike_m(0.5), resonator.modes)
     speeds = amplitudes * torch.from_numpy(resonator.eigenvalues().imag) / 16_000
     pulled = model.encode(to_grid(amplitudes, 101) / 1e-3)
@@ -259,7 +260,7 @@ def test_any_weights_stay_bounded_and_fall_silent(seed: int) -> None:
 def test_phases_are_kept_where_the_curves_were_learned() -> None:
     learned = made(NYLON, 57, "series")
     for rate_hz in (48_000, 16_000, 4_000, 44_100):
-        model = learned.for_resonator(Physics(NYLON.resonator(57), rate_hz, 1e-3))
+        model = learned.for_resonator(Physics(resonator_of(NYLON, 57), rate_hz, 1e-3))
         with torch.no_grad():
             _, state = model.advance(model.encode(torch.zeros(1, 101)), 1)
         assert state.nodes is not None
@@ -278,7 +279,7 @@ def test_the_series_are_twelfths() -> None:
 def test_latents_to_spare_rest() -> None:
     displacement = (pluck_m(NYLON, 10, 0.3) / 1e-3).float()
     model = build_model("koopman_tension", {"modes": 25})
-    model.initialise("series", Physics(NYLON.resonator(10), 48_000, 1e-3), torch.Generator())
+    model.initialise("series", Physics(resonator_of(NYLON, 10), 48_000, 1e-3), torch.Generator())
     with torch.inference_mode():
         torch.testing.assert_close(model(displacement, 100), made(NYLON, 10, "series")(displacement, 100))
 
@@ -286,4 +287,4 @@ def test_latents_to_spare_rest() -> None:
 def test_fewer_modes_than_the_resonator_has_are_refused() -> None:
     model = build_model("koopman_tension", {"modes": 10})
     with pytest.raises(ValueError, match=r"model_configuration\.modes is 10"):
-        model.initialise("series", Physics(NYLON.resonator(25), 48_000), torch.Generator())
+        model.initialise("series", Physics(resonator_of(NYLON, 25), 48_000), torch.Generator())

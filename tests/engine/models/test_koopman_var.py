@@ -9,8 +9,9 @@ import torch
 from engine.models.base import Physics, count_parameters
 from engine.models.configurations import KoopmanVarConfiguration
 from engine.models.koopman_var import KoopmanVar
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.truth import ModalState, solve_linear
+from engine.values.string import StringParameters
 from tests.engine.tensors import listening_weights, to_grid
 
 REFERENCE = Path(__file__).parent / "references" / "koopman_var.npz"
@@ -37,7 +38,7 @@ def reference_model() -> tuple[KoopmanVar, torch.Tensor, torch.Tensor]:
 
 def small_model(seed: int = 0, how: str = "paper") -> KoopmanVar:
     model = KoopmanVar(KoopmanVarConfiguration(101, 32, (16, 16)))
-    model.initialise(how, Physics(StringParameters().resonator(10), 4_000), torch.Generator().manual_seed(seed))
+    model.initialise(how, Physics(resonator_of(StringParameters(), 10), 4_000), torch.Generator().manual_seed(seed))
     return model.eval()
 
 
@@ -113,7 +114,7 @@ def test_physics_initialisation_is_nearly_the_linear_string() -> None:
     amplitudes = torch.randn(1, modes, dtype=torch.float64, generator=torch.Generator().manual_seed(2))
     times_s = torch.arange(1, 401, dtype=torch.float64) / rate_hz
     truth = to_grid(
-        solve_linear(string.resonator(amplitudes.shape[1]), ModalState.at_rest(amplitudes), times_s), 101
+        solve_linear(resonator_of(string, amplitudes.shape[1]), ModalState.at_rest(amplitudes), times_s), 101
     ).float()
     found = model(to_grid(amplitudes, 101).float(), 400)
     assert float((found - truth).norm() / truth.norm()) < 0.1
@@ -152,6 +153,6 @@ def test_impossible_sizes_are_named(sizes: dict) -> None:
 def test_physics_initialisation_needs_a_state_for_each_mode() -> None:
     model = KoopmanVar(KoopmanVarConfiguration(101, 5, (4,)))
     with pytest.raises(ValueError, match="at least the 10 modes, not 5"):
-        model.initialise("physics", Physics(StringParameters().resonator(10), 4_000), torch.Generator())
+        model.initialise("physics", Physics(resonator_of(StringParameters(), 10), 4_000), torch.Generator())
     with pytest.raises(ValueError, match="'guess' is not one of paper, physics"):
-        model.initialise("guess", Physics(StringParameters().resonator(10), 4_000), torch.Generator())
+        model.initialise("guess", Physics(resonator_of(StringParameters(), 10), 4_000), torch.Generator())

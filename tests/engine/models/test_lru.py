@@ -9,7 +9,8 @@ import torch
 from engine.models.base import Physics, count_parameters
 from engine.models.configurations import LRUConfiguration
 from engine.models.lru import LRU, LRULayer
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 
 REFERENCE = Path(__file__).parent / "references" / "lru.npz"
 STORED = ("B_re", "B_im", "C_re", "C_im", "D", "nu_log", "theta_log", "gamma_log")
@@ -93,7 +94,7 @@ def test_agrees_with_a_plain_recurrence() -> None:
 
 def drawn_model() -> LRU:
     model = LRU(LRUConfiguration(21, state_size=24, layers=2))
-    model.initialise("paper", Physics(StringParameters().resonator(10), 4_000), torch.Generator().manual_seed(0))
+    model.initialise("paper", Physics(resonator_of(StringParameters(), 10), 4_000), torch.Generator().manual_seed(0))
     return model.eval()
 
 

@@ -9,7 +9,8 @@ import torch
 from engine.models.base import Physics, count_parameters
 from engine.models.configurations import S5Configuration
 from engine.models.s5 import S5, S5Layer, hippo_normal
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 
 REFERENCE = Path(__file__).parent / "references" / "s5.npz"
 STORED = ("B", "C", "D", "Lambda_re", "Lambda_im", "log_step")
@@ -92,7 +93,7 @@ def test_agrees_with_a_plain_recurrence() -> None:
 
 def drawn_model() -> S5:
     model = S5(S5Configuration(21, state_size=32, hippo_blocks=4, layers=2))
-    model.initialise("paper", Physics(StringParameters().resonator(10), 4_000), torch.Generator().manual_seed(0))
+    model.initialise("paper", Physics(resonator_of(StringParameters(), 10), 4_000), torch.Generator().manual_seed(0))
     return model.eval()
 
 

@@ -11,11 +11,12 @@ from engine.models.configurations import LRUConfiguration, S5Configuration
 from engine.models.lru import LRU
 from engine.models.s5 import S5
 from engine.models.ssm import Block, SSMString, evolve, recur
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.truth import ModalState, solve_linear
+from engine.values.string import StringParameters
 from tests.engine.tensors import listening_weights, to_grid
 
-PHYSICS = Physics(StringParameters().resonator(10, grid_points=21), 4_000)
+PHYSICS = Physics(resonator_of(StringParameters(), 10, grid_points=21), 4_000)
 NAMES = ("lru", "s5")
 
 
@@ -153,7 +154,7 @@ def test_models_can_be_built_without_memory(name: str) -> None:
 def test_physics_initialisation_needs_a_state_for_each_mode(name: str) -> None:
     model = small_model(name)
     with pytest.raises(ValueError, match="each of the 30 modes"):
-        model.initialise("physics", Physics(StringParameters().resonator(30), 4_000), torch.Generator())
+        model.initialise("physics", Physics(resonator_of(StringParameters(), 30), 4_000), torch.Generator())
     with pytest.raises(ValueError, match="'guess' is not one of paper, physics"):
         model.initialise("guess", PHYSICS, torch.Generator())
 

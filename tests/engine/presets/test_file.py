@@ -71,11 +71,14 @@ METADATA_FAULTS = {
     "no version": (lambda d: d.pop("format_version"), "format_version None is not known"),
     "unknown field": (lambda d: d.update(colour="red"), "unknown field 'colour'"),
     "missing field": (lambda d: d.pop("rate_hz"), "field 'rate_hz' is missing"),
-    "wrong type": (lambda d: d.update(rate_hz="fast"), "rate_hz: expected int, found str 'fast'"),
+    "wrong type": (lambda d: d.update(rate_hz="fast"), "rate_hz: must be a valid integer, found 'fast'"),
     "impossible rate": (lambda d: d.update(rate_hz=0), "rate_hz must be above 0"),
     "unknown model": (lambda d: d.update(model="oracle"), "model 'oracle' is not one of"),
-    "unknown choice": (lambda d: d.update(initial="hammer"), "'hammer' is not one of 'gaussian', 'noise'"),
-    "bad string": (lambda d: d["string"].update(length_m=-1), "length_m must be positive"),
+    "unknown choice": (
+        lambda d: d.update(initial="hammer"),
+        "must be 'gaussian', 'noise' or 'pluck'",
+    ),
+    "bad string": (lambda d: d["string"].update(length_m=-1), "length_m must lie in"),
     "too many modes": (lambda d: d.update(modes=100), "cannot hold 100 modes"),
     "absurd model": (lambda d: d["model_configuration"].update(state_size=10**18), "state_size must lie in 1"),
     "other grid": (lambda d: d.update(grid_points=51), "grid_points is 51, the model's grid has 101"),
@@ -282,7 +285,7 @@ RANGE_FAULTS = {
     "nothing": (lambda d: d.update(peak_m=None), "peak_m or tension_rise must be given"),
     "a shape": (lambda d: d.update(width={"square": [0.1, 0.2]}), "width is of 'square', not of one of gaussian"),
     "an order": (lambda d: d.update(width={"gaussian": [0.2, 0.1]}), r"width.gaussian must be a range from 0 on"),
-    "a table": (lambda d: d.update(width=[0.1, 0.2]), "width: expected a table"),
+    "a table": (lambda d: d.update(width=[0.1, 0.2]), "width: must be a table"),
 }
 
 

@@ -13,8 +13,10 @@ import torch
 
 from engine.models import build_model
 from engine.models.base import Physics
-from engine.resonators import Resonator, StringParameters
+from engine.resonators import Resonator
+from engine.resonators.string import resonator_of
 from engine.truth import ModalState, SplittingSolver, solve_dop853, solve_linear
+from engine.values.string import StringParameters
 
 SIDES_M = (0.30, 0.22)
 POINTS = (9, 7)  # of the grid, edges included
@@ -116,7 +118,7 @@ def test_averaging_follows_the_stiffening_of_a_membrane() -> None:
 
 
 def test_what_does_not_go_together_is_refused() -> None:
-    string = StringParameters().resonator(5, grid_points=9)
+    string = resonator_of(StringParameters(), 5, grid_points=9)
     with pytest.raises(ValueError, match="coupling has the shape"):
         replace(string, coupling=np.zeros(4))
     with pytest.raises(ValueError, match="sigma holds a number that is not finite"):

@@ -8,10 +8,10 @@ import pytest
 import torch
 
 from engine.resonators import surface
-from engine.resonators.drum import DrumParameters
-from engine.resonators.surface import DrumShape
-from engine.strike import Mallet, Strike, pulse_spectrum
+from engine.resonators.drum import bending_nm, modes_of, stretching_n_m
+from engine.strike import Strike, pulse_spectrum
 from engine.truth import ModalState, SplittingSolver, solve_dop853
+from engine.values.drum import DrumParameters, DrumShape, Mallet
 
 TOM = DrumParameters(uneven=0.004)
 PLATE = DrumParameters("rectangle", 0.3, 0.2, 6e-4, 7850, 2e11, 0.3, tension_n_m=0)
@@ -28,7 +28,7 @@ MEASURED_HZ = {(0, 1): 82, (1, 1): 155, (2, 1): 229, (3, 1): 297, (4, 1): 366, (
 
 def lowest(drum: DrumParameters) -> dict[tuple[int, int], float]:
     """Frequencies in Hz by nodal diameters and circles, of cosines."""
-    modes, found = drum.modes(800), {}
+    modes, found = modes_of(drum, 800), {}
     for m, sine, omega in zip(modes.surface.m, modes.surface.n, modes.omega, strict=True):
         if not sine:
             n = 1 + sum(key[0] == m for key in found)
@@ -40,11 +40,11 @@ def test_membrane_and_plate_in_closed_form() -> None:
     first = 2.404826 / (0.33 / 2) * math.sqrt(1500 / TOM.mass_kg_m2) / (2 * math.pi)
     assert lowest(TOM)[0, 1] == pytest.approx(first, rel=1e-3)
     kappa = (math.pi / 0.3) ** 2 + (math.pi / 0.2) ** 2
-    assert PLATE.modes(2000).omega[0] == pytest.approx(kappa * math.sqrt(PLATE.bending_nm / PLATE.mass_kg_m2))
+    assert modes_of(PLATE, 2000).omega[0] == pytest.approx(kappa * math.sqrt(bending_nm(PLATE) / PLATE.mass_kg_m2))
 
 
 def test_pairs_are_split() -> None:
-    omega = replace(TOM, length_m=0.332, width_m=0.328).modes(2000).omega
+    omega = modes_of(replace(TOM, length_m=0.332, width_m=0.328), 2000).omega
     epsilon = 0.004 / 0.66
     assert omega[2] / omega[1] == pytest.approx(1 + epsilon + 0.004, rel=1e-3)
     assert omega[4] / omega[3] == pytest.approx(1.004, rel=1e-4)
@@ -52,14 +52,14 @@ def test_pairs_are_split() -> None:
 
 def test_tension_of_the_stretch_is_bergers() -> None:
     """C (1/A) ∫|∇w|² dA, by differences on a grid."""
-    modes, side = PLATE.modes(1500), 201
+    modes, side = modes_of(PLATE, 1500), 201
     grid = np.stack(np.meshgrid(*(np.linspace(-1, 1, side),) * 2, indexing="ij"), axis=-1)
     q = 1e-3 * np.random.default_rng(1).standard_normal(len(modes))
     w = (q @ modes.shapes(grid.reshape(-1, 2))).reshape(side, side)
     along, across = np.gradient(w, 0.3 / (side - 1), 0.2 / (side - 1))
-    expected = PLATE.stretching_n_m * (along**2 + across**2).mean()
+    expected = stretching_n_m(PLATE) * (along**2 + across**2).mean()
     resonator = modes.resonator(np.zeros((1, 2)))
-    at_rest = PLATE.stretching_n_m / resonator.tension_rise
+    at_rest = stretching_n_m(PLATE) / resonator.tension_rise
     assert float(resonator.relative_tension_rise(q)) * at_rest == pytest.approx(expected, rel=0.02)
 
 
@@ -79,9 +79,9 @@ def test_air_shifts_ratios_as_measured() -> None:
 @pytest.mark.parametrize("shape", ["circle", "rectangle", "bar"])
 def test_the_integral_of_the_air_has_converged(shape: DrumShape, monkeypatch: pytest.MonkeyPatch) -> None:
     drum = replace(TOM, shape=shape, width_m=0.33 if shape == "circle" else 0.2, air_kg_m3=1.2)
-    few = drum.modes(1_000)
+    few = modes_of(drum, 1_000)
     monkeypatch.setattr(surface, "POINTS", 8 * surface.POINTS)
-    many = drum.modes(1_000)
+    many = modes_of(drum, 1_000)
     np.testing.assert_allclose(few.omega, many.omega, rtol=1e-6)
 
 
@@ -100,13 +100,13 @@ def test_a_shell_lowers_the_first_mode_to_that_of_a_measured_tom() -> None:
 def test_the_column_of_a_deep_shell_is_finite() -> None:
     """Also where a mode meets the column's resonance, it has a mass, and loses energy."""
     for shell_m in np.linspace(0.02, 2, 100):
-        modes = replace(TOM, air_kg_m3=1.2, shell_m=float(shell_m)).modes(2_000)
+        modes = modes_of(replace(TOM, air_kg_m3=1.2, shell_m=float(shell_m)), 2_000)
         assert np.isfinite(modes.omega).all()
         assert (modes.sigma > 0).all()
 
 
 def test_monopoles_radiate_most() -> None:
-    modes = replace(HEAD, damping_d1_kg_m2_s=0.0, damping_d3_kg_s=0.0).modes(500)
+    modes = modes_of(replace(HEAD, damping_d1_kg_m2_s=0.0, damping_d3_kg_s=0.0), 500)
     assert modes.sigma[0] > 2 * modes.sigma[1] > 4 * modes.sigma[3]
 
 
@@ -119,7 +119,7 @@ def test_a_kettle_raises_the_first_mode() -> None:
 @pytest.mark.parametrize("drum", [TOM, PLATE, replace(HEAD, length_m=0.3, width_m=0.3)])
 @pytest.mark.parametrize("blow", [True, False])
 def test_solver_against_the_oracle(drum: DrumParameters, blow: bool) -> None:
-    modes = drum.modes(900, most=24)
+    modes = modes_of(drum, 900, most=24)
     resonator = modes.resonator(np.zeros((1, 2)))
     v = Strike((0.3, 0.2), 4.0, Mallet(contact_s=0.002)).speeds(modes)
     q = v / resonator.omega
@@ -142,7 +142,7 @@ def test_a_pulse_is_a_kick_at_its_middle() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"thickness_m": -1.0}, "thickness_m must be positive"),
+        ({"thickness_m": -1.0}, "thickness_m must lie in"),
         ({"tension_n_m": 1e9}, "tension_n_m must lie in"),
         ({"width_m": 0.2}, "two diameters, nearly the same"),
         ({"shape": "square"}, "must be one of circle, rectangle"),
@@ -157,11 +157,11 @@ def test_impossible_drums_are_refused(change: dict[str, object], message: str) -
 
 
 def test_amplitudes_do_not_follow_from_a_few_places() -> None:
-    resonator = TOM.modes(500).resonator(np.zeros((2, 2)))
+    resonator = modes_of(TOM, 500).resonator(np.zeros((2, 2)))
     with pytest.raises(ValueError, match="do not follow from displacement at 2 places"):
         resonator.to_modes(np.zeros(2))
 
 
 def test_a_strike_beside_the_drum_is_refused() -> None:
     with pytest.raises(ValueError, match="not on the drum"):
-        Strike((0.8, 0.8)).speeds(TOM.modes(500))
+        Strike((0.8, 0.8)).speeds(modes_of(TOM, 500))

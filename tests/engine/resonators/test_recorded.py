@@ -9,8 +9,9 @@ import pytest
 
 from engine.kernels.constants import FADES_SEMITONES
 from engine.resonators.recorded import RecordedAttack, RecordedNote, RecordedString
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.schema import SchemaError, read, write
+from engine.values.string import StringParameters
 
 STRING = StringParameters()
 NOTE = RecordedNote(44_100, 44_100, 100, 453, (0.1,), (0.01,), (246.9,), (2.0,), (0.1,), (0.0,), (1,))
@@ -33,7 +34,7 @@ def recorded() -> RecordedString:
 
 
 def test_at_its_pitch_the_notes_own_modes() -> None:
-    resonator, law = recorded().resonator(STRING, 6), STRING.resonator(3)
+    resonator, law = recorded().resonator(STRING, 6), resonator_of(STRING, 3)
     cents = 1200 * np.log2(resonator.omega / np.repeat(law.omega, 2))
     assert np.allclose(cents, [5, 6, -3, -1, 2, 5], atol=1e-6)
     assert np.allclose(resonator.sigma / np.repeat(law.sigma, 2), [1, 2, 4, 4, 2, 1])
@@ -41,7 +42,7 @@ def test_at_its_pitch_the_notes_own_modes() -> None:
 
 def test_other_keys_have_the_decays_of_the_notes_partials_at_their_frequencies() -> None:
     octave = replace(STRING, length_m=STRING.length_m * 2)
-    resonator, law = recorded().resonator(octave, 8), octave.resonator(4)
+    resonator, law = recorded().resonator(octave, 8), resonator_of(octave, 4)
     ratios = resonator.sigma / np.repeat(law.sigma, 2)
     fade = np.exp(-((12 / FADES_SEMITONES) ** 2))
     assert fade < 1e-4
@@ -51,7 +52,7 @@ def test_other_keys_have_the_decays_of_the_notes_partials_at_their_frequencies()
 
 def test_two_octaves_away_the_smooth_decay_alone() -> None:
     far = replace(STRING, length_m=STRING.length_m / 4)
-    resonator, law = recorded().resonator(far, 6), far.resonator(3)
+    resonator, law = recorded().resonator(far, 6), resonator_of(far, 3)
     first = slice(0, None, 2)
     assert np.allclose(resonator.omega[first], law.omega, rtol=1e-9)
     assert np.allclose(resonator.sigma[first], 2 * law.sigma, rtol=1e-6)

@@ -7,8 +7,9 @@ import torch
 
 from engine.kernels.scheme import KICKS, ROTATIONS
 from engine.resonators.sine_transform import to_modes
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of, undamped_frequencies, wavenumbers
 from engine.truth import ModalState, SplittingSolver, default_substeps, solve_dop853, solve_linear
+from engine.values.string import StringParameters
 from training.data.draws import DRAWS, draw_noise
 
 STRING = StringParameters()
@@ -18,7 +19,7 @@ PROTOCOL = [("gaussian", 4_000, 10), ("noise", 4_000, 10), ("gaussian", 16_000, 
 def worst_of_protocol(initial: str, modes: int, seed: int = 0) -> ModalState:
     """The string with the largest tension rise among a thousand draws: the hardest to integrate."""
     amplitudes = to_modes(DRAWS[initial](1000, 101, torch.Generator().manual_seed(seed)), modes)
-    worst = int(STRING.resonator(amplitudes.shape[1]).relative_tension_rise(amplitudes).argmax())
+    worst = int(resonator_of(STRING, amplitudes.shape[1]).relative_tension_rise(amplitudes).argmax())
     return ModalState.at_rest(amplitudes[worst : worst + 1])
 
 
@@ -38,16 +39,16 @@ def random_state(batch: int, modes: int) -> ModalState:
 def test_default_accuracy_on_the_worst_of_the_protocol(initial: str, rate_hz: int, modes: int) -> None:
     """1e-7 over 4000 samples is the promise; a shorter stretch keeps the suite quick (`bench solver` has it all)."""
     state = worst_of_protocol(initial, modes)
-    truth = solve_dop853(STRING.resonator(state.modes), state, rate_hz, 600)
-    found = SplittingSolver(STRING.resonator(modes), rate_hz).solve(state, 600)
+    truth = solve_dop853(resonator_of(STRING, state.modes), state, rate_hz, 600)
+    found = SplittingSolver(resonator_of(STRING, modes), rate_hz).solve(state, 600)
     assert relative_l2(found, truth) < 1e-7
 
 
 @pytest.mark.parametrize(("initial", "rate_hz", "modes"), PROTOCOL)
 def test_modes_that_have_died_away_may_be_left_out(initial: str, rate_hz: int, modes: int) -> None:
     state = worst_of_protocol(initial, modes)
-    full, ended = SplittingSolver(STRING.resonator(modes), rate_hz).advance(state, 2 * rate_hz)
-    solver = SplittingSolver(STRING.resonator(modes), rate_hz, silence=1e-9)
+    full, ended = SplittingSolver(resonator_of(STRING, modes), rate_hz).advance(state, 2 * rate_hz)
+    solver = SplittingSolver(resonator_of(STRING, modes), rate_hz, silence=1e-9)
     found, rests = solver.advance(state, 2 * rate_hz)
     assert relative_l2(found, full) < 1e-7
     moving = rests.amplitude != 0
@@ -57,7 +58,7 @@ def test_modes_that_have_died_away_may_be_left_out(initial: str, rate_hz: int, m
 
 
 def test_what_is_left_out_does_not_depend_on_the_blocks() -> None:
-    solver = SplittingSolver(STRING.resonator(25), 16_000, silence=1e-9)
+    solver = SplittingSolver(resonator_of(STRING, 25), 16_000, silence=1e-9)
     state = worst_of_protocol("gaussian", 25)
     whole, _ = solver.advance(state, 4000)
     blocks = []
@@ -68,7 +69,7 @@ def test_what_is_left_out_does_not_depend_on_the_blocks() -> None:
 
 
 def test_a_string_at_rest_or_beyond_numbers_stays_so() -> None:
-    solver = SplittingSolver(STRING.resonator(5), 16_000, silence=1e-9)
+    solver = SplittingSolver(resonator_of(STRING, 5), 16_000, silence=1e-9)
     state = ModalState.at_rest(torch.stack([torch.zeros(5), torch.full((5,), torch.nan)]).double())
     rest, nan = solver.advance(state, 10)[0]
     assert (rest == 0).all()
@@ -78,9 +79,9 @@ def test_a_string_at_rest_or_beyond_numbers_stays_so() -> None:
 def test_order_of_convergence() -> None:
     """Order 4 in the perturbation at least: halving the step divides the error by 16 or more."""
     state = worst_of_protocol("noise", 25)
-    truth = SplittingSolver(STRING.resonator(25), 16_000, substeps=96).solve(state, 100)
+    truth = SplittingSolver(resonator_of(STRING, 25), 16_000, substeps=96).solve(state, 100)
     errors = [
-        relative_l2(SplittingSolver(STRING.resonator(25), 16_000, substeps=n).solve(state, 100), truth)
+        relative_l2(SplittingSolver(resonator_of(STRING, 25), 16_000, substeps=n).solve(state, 100), truth)
         for n in (12, 24)
     ]
     assert errors[0] / errors[1] > 14
@@ -95,29 +96,30 @@ def test_the_scheme_is_consistent_and_symmetric() -> None:
 
 def test_the_linear_string_is_exact() -> None:
     state = random_state(3, 25)
-    found = SplittingSolver(STRING.resonator(25, tension_modulated=False), 16_000).solve(state, 2000)
+    found = SplittingSolver(resonator_of(STRING, 25, tension_modulated=False), 16_000).solve(state, 2000)
     times_s = torch.arange(2001, dtype=torch.float64) / 16_000
-    assert relative_l2(found, solve_linear(STRING.resonator(state.modes), state, times_s)) < 1e-11
+    assert relative_l2(found, solve_linear(resonator_of(STRING, state.modes), state, times_s)) < 1e-11
 
 
 def test_the_linear_solution_agrees_with_the_oracle() -> None:
     state = random_state(1, 10)
-    truth = solve_dop853(STRING.resonator(state.modes, tension_modulated=False), state, 4_000, 200)
-    found = solve_linear(STRING.resonator(state.modes), state, torch.arange(201, dtype=torch.float64) / 4_000)
+    truth = solve_dop853(resonator_of(STRING, state.modes, tension_modulated=False), state, 4_000, 200)
+    found = solve_linear(resonator_of(STRING, state.modes), state, torch.arange(201, dtype=torch.float64) / 4_000)
     assert relative_l2(found, truth) < 1e-9
 
 
 def test_a_small_nonlinear_string_is_a_linear_one() -> None:
     state = ModalState.at_rest(torch.tensor([[1e-8, 0, 1e-8]]))
     linear, modulated = (
-        SplittingSolver(STRING.resonator(3, tension_modulated=on), 16_000).solve(state, 500) for on in (False, True)
+        SplittingSolver(resonator_of(STRING, 3, tension_modulated=on), 16_000).solve(state, 500)
+        for on in (False, True)
     )
     assert relative_l2(modulated, linear) < 1e-6
 
 
 @pytest.mark.parametrize("tension_modulated", [False, True])
 def test_the_kernel_is_the_scheme(tension_modulated: bool) -> None:
-    solver = SplittingSolver(STRING.resonator(25, tension_modulated=tension_modulated), 16_000, substeps=2)
+    solver = SplittingSolver(resonator_of(STRING, 25, tension_modulated=tension_modulated), 16_000, substeps=2)
     state = random_state(4, 25)
     compiled, last = solver.advance(state, 20)
     q, v = state.amplitude.clone(), state.velocity.clone()
@@ -133,7 +135,7 @@ def test_the_kernel_is_the_scheme(tension_modulated: bool) -> None:
 
 
 def test_some_frames_are_those_of_all() -> None:
-    solver, state = SplittingSolver(STRING.resonator(10), 16_000, substeps=2), random_state(3, 10)
+    solver, state = SplittingSolver(resonator_of(STRING, 10), 16_000, substeps=2), random_state(3, 10)
     every, last = solver.advance(state, 50)
     frames = torch.tensor([1, 2, 7, 31, 49])
     some, end = solver.sample(state, frames, 50)
@@ -145,7 +147,7 @@ def test_some_frames_are_those_of_all() -> None:
 
 
 def test_going_on_from_a_state_is_the_same_motion() -> None:
-    solver = SplittingSolver(STRING.resonator(25), 16_000, substeps=3)
+    solver = SplittingSolver(resonator_of(STRING, 25), 16_000, substeps=3)
     state = random_state(3, 25)
     before = state.amplitude.clone()
     whole, _ = solver.advance(state, 257)
@@ -160,7 +162,7 @@ def test_going_on_from_a_state_is_the_same_motion() -> None:
 def test_the_callers_state_is_not_touched() -> None:
     state = random_state(2, 5)
     kept = (state.amplitude.clone(), state.velocity.clone())
-    SplittingSolver(STRING.resonator(5), 8_000).advance(state, 10)
+    SplittingSolver(resonator_of(STRING, 5), 8_000).advance(state, 10)
     assert torch.equal(state.amplitude, kept[0])
     assert torch.equal(state.velocity, kept[1])
 
@@ -172,31 +174,33 @@ def test_energy_decays_as_the_damping_says() -> None:
 
     def energy(string: StringParameters, state: ModalState) -> float:
         q, v = state.amplitude, state.velocity
-        stretch = (torch.from_numpy(string.wavenumbers(10)) * q).square().sum(-1)
-        linear = (v.square() + (torch.from_numpy(string.undamped_frequencies(10)) * q).square()).sum(-1) / 2
+        stretch = (torch.from_numpy(wavenumbers(string, 10)) * q).square().sum(-1)
+        linear = (v.square() + (torch.from_numpy(undamped_frequencies(string, 10)) * q).square()).sum(-1) / 2
         tension = string.youngs_modulus_pa * string.area_m2 / (16 * string.mass_per_length_kg_m) * stretch**2
         return float(linear + tension)
 
     for string, low, high in ((free, 1 - 1e-7, 1 + 1e-7), (STRING, 0.0, 0.9)):
         state = ModalState.at_rest(amplitudes)
         before = energy(string, state)
-        _, state = SplittingSolver(string.resonator(10), 16_000).advance(state, 4000)
+        _, state = SplittingSolver(resonator_of(string, 10), 16_000).advance(state, 4000)
         assert low < energy(string, state) / before < high
 
 
 def test_default_substeps_follow_the_highest_mode() -> None:
-    assert default_substeps(STRING.resonator(25), 16_000) == 4 * default_substeps(STRING.resonator(25), 64_000)
-    assert default_substeps(STRING.resonator(50), 16_000) > default_substeps(STRING.resonator(25), 16_000)
+    assert default_substeps(resonator_of(STRING, 25), 16_000) == 4 * default_substeps(
+        resonator_of(STRING, 25), 64_000
+    )
+    assert default_substeps(resonator_of(STRING, 50), 16_000) > default_substeps(resonator_of(STRING, 25), 16_000)
 
 
 def test_bad_requests_are_named() -> None:
     with pytest.raises(ValueError, match="sample rate must be above 0"):
-        SplittingSolver(STRING.resonator(5), 0)
+        SplittingSolver(resonator_of(STRING, 5), 0)
     with pytest.raises(ValueError, match="silence"):
-        SplittingSolver(STRING.resonator(5), 16_000, silence=1.0)
+        SplittingSolver(resonator_of(STRING, 5), 16_000, silence=1.0)
     with pytest.raises(ValueError, match="substeps must lie in 1 … 1024"):
-        SplittingSolver(STRING.resonator(5), 4_000, substeps=0)
-    solver = SplittingSolver(STRING.resonator(5), 4_000)
+        SplittingSolver(resonator_of(STRING, 5), 4_000, substeps=0)
+    solver = SplittingSolver(resonator_of(STRING, 5), 4_000)
     with pytest.raises(ValueError, match="holds 5 modes, the state 4"):
         solver.advance(random_state(1, 4), 3)
     with pytest.raises(ValueError, match="one shape"):

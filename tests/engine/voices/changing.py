@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from engine.kernels import layout as at
 from engine.kernels.memory import publish
 from engine.resonators.base import Resonator
-from engine.voices import Ear, Program, Voice
+from engine.values.ear import Ear
+from engine.voices import Program, Voice
 from engine.voices.voice import _rows
 
 Array = NDArray[np.float64]

@@ -19,8 +19,10 @@ from engine.models.configurations import KoopmanTensionConfiguration
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
 from engine.resonators.base import Resonator
-from engine.resonators.string import StringParameters
-from engine.voices import Ear, Mixer, Program, Voice
+from engine.resonators.string import resonator_of
+from engine.values.ear import Ear
+from engine.values.string import StringParameters
+from engine.voices import Mixer, Program, Voice
 from engine.voices.programs import solver_program, tension_program
 from tests.engine.voices.changing import ChangingVoice
 
@@ -32,7 +34,7 @@ Changes = list[tuple[int, Resonator | Pluck, float]]  # the quantum, what change
 
 
 def modes_of(string: StringParameters, modes: int = 40) -> Resonator:
-    return string.resonator(modes)
+    return resonator_of(string, modes)
 
 
 def bent(semitones: float) -> Resonator:

@@ -11,15 +11,17 @@ from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, RUNAWAY_FA
 from engine.pluck import Pluck
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import listening_weights, to_grid
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
 from engine.truth import ModalState, solve_linear
-from engine.voices import Ear
+from engine.values.ear import Ear
+from engine.values.string import StringParameters
+from engine.voices.ear import largest, weights_of
 
 POINTS = 101
 
 
 def test_without_solo_it_is_the_engines_listening_point() -> None:
-    weights = Ear((0.37, 0.61)).weights(POINTS)
+    weights = weights_of(Ear((0.37, 0.61)), POINTS)
     np.testing.assert_array_equal(weights, listening_weights(np.array([0.37, 0.61]), POINTS))
 
 
@@ -27,11 +29,11 @@ def test_solo_reads_one_mode_at_the_listening_point() -> None:
     amplitudes = np.random.default_rng(0).normal(size=25)
     motion = to_grid(amplitudes, POINTS)
     for mode in (1, 7, 25):
-        heard = motion @ Ear((0.37,), solo=mode).weights(POINTS)[:, 0]
+        heard = motion @ weights_of(Ear((0.37,), solo=mode), POINTS)[:, 0]
         assert float(heard) == pytest.approx(float(amplitudes[mode - 1]) * np.sin(np.pi * mode * 0.37), abs=1e-12)
-    everything = sum(motion @ Ear((0.37,), solo=mode).weights(POINTS)[:, 0] for mode in range(1, POINTS - 1))
-    assert float(everything) == pytest.approx(float(motion @ Ear((0.37,)).weights(POINTS)[:, 0]), abs=1e-12)
-    assert not Ear((0.37,), solo=POINTS).weights(POINTS).any()
+    everything = sum(motion @ weights_of(Ear((0.37,), solo=mode), POINTS)[:, 0] for mode in range(1, POINTS - 1))
+    assert float(everything) == pytest.approx(float(motion @ weights_of(Ear((0.37,)), POINTS)[:, 0]), abs=1e-12)
+    assert not weights_of(Ear((0.37,), solo=POINTS), POINTS).any()
 
 
 def test_nodes_are_known() -> None:
@@ -51,8 +53,8 @@ BRIDGE = Ear((0.37, 0.61), "bridge")
 
 
 def newtons(displacement_m: Array, ear: Ear = BRIDGE, modes: int = POINTS - 2) -> Array:
-    force = STIFF.resonator(modes, grid_points=POINTS).force_weights
-    return displacement_m @ ear.weights(POINTS, force) * (FULL_SCALE_N / FULL_SCALE_M)
+    force = resonator_of(STIFF, modes, grid_points=POINTS).force_weights
+    return displacement_m @ weights_of(ear, POINTS, force) * (FULL_SCALE_N / FULL_SCALE_M)
 
 
 def test_the_force_of_a_mode_is_that_of_tension_and_stiffness_at_the_end() -> None:
@@ -79,23 +81,23 @@ def test_the_force_of_a_mode_is_that_of_tension_and_stiffness_at_the_end() -> No
 
 def test_the_bridge_bears_the_tension_times_the_slope_of_a_pull() -> None:
     flexible = StringParameters(0.65, 5e-7, 0.0, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
-    force = flexible.resonator(POINTS - 2, grid_points=POINTS).force_weights
+    force = resonator_of(flexible, POINTS - 2, grid_points=POINTS).force_weights
     pulled = Pluck(0.4, 3.0, "raised_cosine", 0.4).displacement(POINTS)  # it lies flat at the bridge
     wide = triangular(0.5, 3e-3, POINTS)
-    weights = BRIDGE.weights(POINTS, force)[:, 0] * (FULL_SCALE_N / FULL_SCALE_M)
+    weights = weights_of(BRIDGE, POINTS, force)[:, 0] * (FULL_SCALE_N / FULL_SCALE_M)
     assert float(wide @ weights) == pytest.approx(75.0 * 3e-3 / (0.5 * 0.65), rel=0.02)
     assert abs(float(pulled @ weights)) < 0.02
 
 
 @pytest.mark.parametrize("pluck", [Pluck(0.1, 3.0, "triangular"), Pluck(0.5, 3.0, width=0.03), Pluck(0.03, 3.0)])
 def test_no_motion_passes_the_bound_by_much(pluck: Pluck) -> None:
-    resonator = STIFF.resonator(60, grid_points=POINTS, tension_modulated=False)
+    resonator = resonator_of(STIFF, 60, grid_points=POINTS, tension_modulated=False)
     shape = resonator.to_grid(resonator.to_modes(pluck.displacement(POINTS)))
     times = torch.arange(2000, dtype=torch.float64) / 48_000
     assert resonator.end_force is not None
     moved = solve_linear(resonator, ModalState.at_rest(resonator.to_modes(shape)[None]), times)
     heard = moved[0].numpy() @ resonator.end_force
-    bound = BRIDGE.largest(shape, resonator.force_weights) * (FULL_SCALE_N / FULL_SCALE_M)
+    bound = largest(BRIDGE, shape, resonator.force_weights) * (FULL_SCALE_N / FULL_SCALE_M)
     assert 0.2 * bound < float(np.abs(heard).max()) < 0.2 * RUNAWAY_FACTOR * bound
 
 
@@ -103,4 +105,4 @@ def test_a_bridge_is_no_place_on_the_string_and_needs_a_string() -> None:
     assert not Ear((0.0,), "bridge").is_on_node(0.0)
     assert BRIDGE.full_scale == FULL_SCALE_N
     with pytest.raises(ValueError, match="another pick-up"):
-        BRIDGE.weights(POINTS)
+        weights_of(BRIDGE, POINTS)

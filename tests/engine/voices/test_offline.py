@@ -17,16 +17,9 @@ from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, load_preset
 from engine.sources import ModelSource, Runaway
-from engine.voices import (
-    Ear,
-    Mixer,
-    Program,
-    Voice,
-    model_program,
-    render_voice,
-    rendered_program,
-    truth_program,
-)
+from engine.values.ear import Ear
+from engine.voices import Mixer, Program, Voice, model_program, render_voice, rendered_program, truth_program
+from engine.voices.ear import weights_of
 from engine.voices.program import voice_ends_s
 from engine.voices.voice import END_FADE_S
 
@@ -63,7 +56,7 @@ def test_a_model_that_is_no_bank_is_rendered_and_converted(small_preset: Path, i
     info, source = preset.info, ModelSource(preset)
     assert model_program(preset, RATE_HZ).rendered
     found = render_voice(rendered_program(info, info.rate_hz), source, info, PLUCK, ear, SECONDS)
-    let_go_m, weights = initial_m(info, PLUCK), ear.weights(info.grid_points)
+    let_go_m, weights = initial_m(info, PLUCK), weights_of(ear, info.grid_points)
     frames_m, _ = source.advance(source.start(let_go_m[None]), len(found) - 1, weights)
     expected = np.concatenate([(let_go_m @ weights)[None], frames_m[0]]) / FULL_SCALE_M
     attack = round(0.002 * info.rate_hz)

@@ -13,6 +13,7 @@ from engine.models.base import Physics
 from engine.models.koopman_tension import KoopmanTension
 from engine.presets import load_preset
 from engine.resonators.family import inharmonicity
+from engine.resonators.string import resonator_of
 from training.family import errors as family_errors
 from training.family.errors import FamilyErrors, StringError
 from training.family.fit import Case, errors, fit_curves, geometric_mean
@@ -48,7 +49,7 @@ def test_strings_lie_in_their_column(column: Column) -> None:
 
 def test_a_string_sounds_as_it_is_reported() -> None:
     string = string_of(110.0, 1e-4, 8.0, 0.5)
-    eigenvalues = string.resonator(60).eigenvalues()
+    eigenvalues = resonator_of(string, 60).eigenvalues()
     assert math.isclose(float(eigenvalues[0].imag) / (2 * math.pi), 110.0, rel_tol=1e-9)
     assert math.isclose(math.log(1000) / -float(eigenvalues[0].real), 8.0, rel_tol=1e-9)
     bright = round(3000 / 110) - 1
@@ -70,7 +71,7 @@ def test_curves_are_found_from_nothing_and_hold_on_other_strings() -> None:
     model = build_model("koopman_tension", {"modes": 25, "degree": 2})
     assert isinstance(model, KoopmanTension)
     plucked = train[0].plucked
-    physics = Physics(plucked.string.resonator(25), RATE_HZ, 1e-3)
+    physics = Physics(resonator_of(plucked.string, 25), RATE_HZ, 1e-3)
     model.initialise("kicks", physics, torch.Generator())
     start = geometric_mean(errors(model, validation, RATE_HZ, STEPS))
     reported = []

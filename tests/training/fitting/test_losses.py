@@ -10,7 +10,8 @@ from engine.models import build_model
 from engine.models.base import Physics
 from engine.models.configurations import KoopmanVarConfiguration
 from engine.models.koopman_var import KoopmanVar
-from engine.resonators.string import StringParameters
+from engine.resonators.string import resonator_of
+from engine.values.string import StringParameters
 from training.configuration import Recipe
 from training.data.batches import Batch
 from training.fitting import losses
@@ -21,7 +22,7 @@ RECIPE = Recipe(epochs=1, consistency_weight=0.3)
 
 def model_and_batch() -> tuple[KoopmanVar, Batch]:
     model = KoopmanVar(KoopmanVarConfiguration(101, 6, (5,))).double()
-    model.initialise("paper", Physics(StringParameters().resonator(6), 4_000), torch.Generator().manual_seed(1))
+    model.initialise("paper", Physics(resonator_of(StringParameters(), 6), 4_000), torch.Generator().manual_seed(1))
     draw = torch.Generator().manual_seed(2)
     frames = torch.tensor([1, 3, 4])
     target = torch.randn(2, 3, 101, generator=draw, dtype=torch.float64)
@@ -78,7 +79,7 @@ def test_the_loss_is_the_weighted_sum_of_its_terms() -> None:
 def test_frames_that_were_drawn_twice_are_compared_with_themselves() -> None:
     """As many frames as the last one's number need not be all of them."""
     model = build_model("lru", {"layers": 0, "state_size": 4})
-    model.initialise("paper", Physics(StringParameters().resonator(6), 4_000), torch.Generator().manual_seed(1))
+    model.initialise("paper", Physics(resonator_of(StringParameters(), 6), 4_000), torch.Generator().manual_seed(1))
     model.eval()
     initial, frames = torch.randn(2, 101, generator=torch.Generator().manual_seed(2)), torch.tensor([1, 3, 3, 4])
     whole = model(initial, 4).detach()
@@ -93,7 +94,7 @@ def test_parts_of_a_batch_have_its_gradients_and_error(
     name: str, terms: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     model = build_model(name, {"grid_points": 101}).double()
-    physics = Physics(StringParameters().resonator(6), 4_000)
+    physics = Physics(resonator_of(StringParameters(), 6), 4_000)
     model.initialise(model.own_initialisation(), physics, torch.Generator().manual_seed(1))
     target = torch.randn(7, 4, 101, generator=torch.Generator().manual_seed(2), dtype=torch.float64)
     batch = Batch(target[:, 0], torch.tensor([1, 3, 4]), target[:, 1:])

@@ -13,6 +13,7 @@ from engine.models import build_model
 from engine.models.base import StringModel
 from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.integrated_phase import IntegratedPhase
+from engine.resonators.string import resonator_of
 from training.cell import Cell, configuration_of
 from training.configuration import DatasetConfiguration, Recipe, TrainingConfiguration
 from training.data.dataset import Dataset
@@ -95,7 +96,7 @@ def test_it_predicts_strings_that_the_fit_has_not_seen(small_dataset: Dataset, s
     model = integrated_phase(state_size)
     start_from_phases(model, found_modes(small_dataset, STEPS), seed=0)
     assert evaluate_model(model, small_dataset, "validation", STEPS).total().rel_mse < 1e-3
-    linear = small_dataset.configuration.string.resonator(5).eigenvalues() / small_dataset.configuration.rate_hz
+    linear = resonator_of(small_dataset.configuration.string, 5).eigenvalues() / small_dataset.configuration.rate_hz
     torch.testing.assert_close(model.theta_log[:5].exp(), torch.from_numpy(linear.imag), rtol=2e-3, atol=0)
 
 

@@ -11,6 +11,7 @@ from engine.models.configurations import KoopmanConfiguration, KoopmanVarConfigu
 from engine.models.koopman import Koopman
 from engine.models.koopman_var import KoopmanVar
 from engine.resonators.sine_transform import synthesis_matrix
+from engine.resonators.string import resonator_of
 from training.configuration import Recipe
 from training.data.dataset import Dataset
 from training.fitting.modes import found_modes, known_modes
@@ -76,7 +77,7 @@ def test_modes_are_known_or_found_in_the_displacement_alone(small_dataset: Datas
     truth = small_dataset.split("train")[:, : STEPS + 1].double() / small_dataset.scale_m @ sines
     torch.testing.assert_close(modes.motions @ modes.shapes, truth, rtol=0, atol=1e-5)
     assert modes.mirror == (1, -1, 1, -1, 1)
-    linear = small_dataset.configuration.string.resonator(5).eigenvalues() / small_dataset.configuration.rate_hz
+    linear = resonator_of(small_dataset.configuration.string, 5).eigenvalues() / small_dataset.configuration.rate_hz
     for grid, eigenvalue in zip(modes.grids, linear, strict=True):
         assert grid.imag.min() <= eigenvalue.imag < grid.imag.max()
         assert -float(grid.real.max()) == pytest.approx(-float(eigenvalue.real), rel=0.5, abs=3e-5)

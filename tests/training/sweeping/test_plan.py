@@ -88,8 +88,8 @@ def test_a_trial_differs_from_the_cells_that_it_is_named_after(path: Path) -> No
     ("old", "new", "message"),
     [
         ('"koopman_var"', '"koopmann"', "block[0]: model 'koopmann' is not one of dmd, koopman"),
-        ('"noise"', '"plucked"', "block[0].initials[0]: 'plucked' is not one of 'gaussian', 'noise'"),
-        ('"linear"', '"curved"', "block[0].strings[0]: 'curved' is not one of 'linear', 'nonlinear'"),
+        ('"noise"', '"plucked"', "block[0].initials[0]: must be 'gaussian' or 'noise', found 'plucked'"),
+        ('"linear"', '"curved"', "block[0].strings[0]: must be 'linear' or 'nonlinear', found 'curved'"),
         ("[4000]", "[8000]", "block[0]: rate_hz must be one of 4000, 16000"),
         ("4000, 400]", "0]", "block[0]: horizon must be at least 1 frame"),
         ("4000, 400]", "400_000]", "horizon must lie in 1 … 4000"),

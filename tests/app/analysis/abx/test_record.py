@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -10,11 +11,10 @@ from pydantic import ValidationError
 
 from app.analysis.abx.record import AbxRecord, material_of, p_text, save_record
 from app.patches.instrument import SingleString
-from app.patches.patch import PhysicalString
 from app.presets.library import list_presets
 from app.session.choices import Choices
-from engine.resonators.string import StringParameters
 from engine.result_file import WriteError
+from engine.values.string import StringParameters
 
 
 def read(path: Path) -> AbxRecord:
@@ -62,11 +62,10 @@ def test_the_smallest_p_values_are_a_bound() -> None:
 
 def test_the_chosen_pluck_and_string_are_kept(preset_folder: Path) -> None:
     entry = list_presets(preset_folder)[0][0]
-    own = StringParameters()
-    string = PhysicalString(**{name: getattr(own, name) for name in PhysicalString.model_fields})
+    string = StringParameters()
     for stereo, chosen in ((False, None), (True, string)):
         choices = Choices(instrument=SingleString(preset=entry.name), position=0.3, string=chosen, stereo=stereo)
         pluck = material_of(entry, choices, "").pluck
         assert pluck["position"] == 0.3
-        assert pluck["string"] == (chosen and chosen.model_dump(mode="json"))
+        assert pluck["string"] == (chosen and asdict(chosen))
         assert ("listen_right" in pluck) == stereo

@@ -11,6 +11,7 @@ import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from ctypes import c_double
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -399,7 +400,7 @@ def test_other_drums_are_computed_as_in_the_app(objects: Path, tmp_path: Path, f
         {"youngs_modulus_pa": 9e11},
     ]
     drums = [
-        one.model_copy(update={"note": 50 + place, "drum": type(one.drum)(**{**one.drum.model_dump(), **each})})
+        one.model_copy(update={"note": 50 + place, "drum": replace(one.drum, **each)})
         for place, each in enumerate(changed)
     ]
     strings = timpani.strings.model_copy(update={"drums": tuple(drums), "keys": "pads"})

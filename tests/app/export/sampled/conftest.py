@@ -14,8 +14,8 @@ import pytest
 import soundfile
 from numpy.typing import NDArray
 
-from app.patches.patch import Fretted, Patch, PhysicalString
-from engine.resonators.string import StringParameters
+from app.patches.patch import Fretted, Patch
+from engine.values.string import StringParameters
 
 T60_S = 2.0
 RATE_HZ = 48_000
@@ -26,10 +26,8 @@ def patch_of() -> Callable[..., Patch]:
     """A patch of keys 45 … 64; fields as given."""
 
     def made(**fields: object) -> Patch:
-        own = StringParameters()
-        string = PhysicalString(**{name: getattr(own, name) for name in PhysicalString.model_fields})
         defaults = {"name": "Any string", "category": "guitar", "range": (45, 64)}
-        return Patch.model_validate({**defaults, "strings": Fretted(string=string), **fields})
+        return Patch.model_validate({**defaults, "strings": Fretted(string=StringParameters()), **fields})
 
     return made
 

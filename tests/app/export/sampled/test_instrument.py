@@ -14,8 +14,9 @@ from app.export.sampled.job import export_sampled, note_renderer
 from app.export.sampled.plan import SampledPlan
 from app.instrument.offline import render_note
 from app.patches.library import find_patch
-from app.patches.patch import Amp, Body, Patch, Room
+from app.patches.patch import Body, Patch
 from engine.presets import find_preset, load_preset
+from engine.values.effects import Amp, Room
 from tests.bench.tune import pitch_hz
 
 RATE_HZ = 48_000

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,11 +11,11 @@ from hypothesis import strategies as st
 
 from app.export.sampled.plan import MOST_LAYERS, WIDEST_STEP, SampledPlan
 from app.instrument.glide import glides_cents
-from app.patches.patch import Fretted, Patch, PhysicalString
-from engine.resonators.string import StringParameters
+from app.patches.patch import Fretted, Patch
+from engine.values.string import StringParameters
 
 PatchOf = Callable[..., Patch]
-STRING = PhysicalString(**{name: getattr(StringParameters(), name) for name in PhysicalString.model_fields})
+STRING = StringParameters()
 WHOLE = Patch(name="Whole", category="keys", strings=Fretted(string=STRING), range=(0, 127))
 
 
@@ -57,7 +58,7 @@ def test_a_layer_is_rendered_where_its_largest_error_of_pitch_is_least(every: in
 
 
 def test_a_string_that_does_not_glide_is_rendered_at_its_hardest(patch: Patch) -> None:
-    string = patch.strings.string.model_copy(update={"youngs_modulus_pa": 0.0, "second_moment_m4": 0.0})
+    string = replace(patch.strings.string, youngs_modulus_pa=0.0, second_moment_m4=0.0)
     flexible = patch.model_copy(update={"strings": Fretted(string=string)})
     plan = SampledPlan(flexible, layers=3)
     assert [zone.velocity for zone in plan.zones if zone.key == 50] == [42, 84, 127]

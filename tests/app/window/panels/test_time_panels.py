@@ -28,7 +28,8 @@ from app.window.panels.spectrum import EVERY, SpectrumPanel
 from app.window.panels.waveform import WaveformPanel
 from engine.pluck import Pluck
 from engine.presets import read_info
-from engine.voices import Ear
+from engine.resonators.string import undamped_frequencies
+from engine.values.ear import Ear
 from tests.app.takes import append_to
 
 LEFT = Qt.MouseButton.LeftButton
@@ -291,7 +292,7 @@ def test_ten_seconds_are_asked_for_with_a_button(qtbot: QtBot, make: Make) -> No
 def test_the_spectrum_reports_level_and_nearest_partial(qtbot: QtBot, make: Make, take: Take) -> None:
     panel = make(SpectrumPanel)
     watch(qtbot, panel, take, lambda: bool(panel._levels_db))
-    second_hz = float(take.info.string.undamped_frequencies(2)[1]) / (2 * np.pi)
+    second_hz = float(undamped_frequencies(take.info.string, 2)[1]) / (2 * np.pi)
     panel.hover(second_hz * 2 ** (10 / 1200))
     assert f"partial 2: {second_hz:.1f} Hz (+10 cents)" in panel.readout.text()
     assert "A −" in panel.readout.text().replace("-", "−")

@@ -26,7 +26,7 @@ def test_a_plain_process_that_dies_is_replaced(monkeypatch: pytest.MonkeyPatch) 
         assert isinstance(event, Noted) and event.name == "a"
         ended = until_it_ends(workers)
         assert (ended.row, ended.final) == (None, False)
-        assert "task.threads: expected int" in ended.error
+        assert "task.threads: must be a valid integer" in ended.error
         # one that kills process after process is given up, and the next task has a new one
         monkeypatch.setattr(module, "DEATHS", 0)
         workers._places[0].process.kill()  # before the task, which it would end at once

@@ -1,0 +1,158 @@
+"""A string: the stiff string of physics, its two polarisations, and its losses by mode.
+
+Source: Diaz, De La Vega Martin, Sandler, "Towards Efficient Modelling of String Dynamics", DAFx24
+(below: the paper), Eq. 1-5 and Table 1.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from engine import bounds
+from engine.values.number import Number
+
+
+@dataclass(frozen=True)
+class StringParameters:
+    """Physical parameters of a simply supported stiff string. Default: the paper's Table 1, nylon, B3.
+
+    Raises:
+        ValueError: a parameter is out of its bounds; the message names it.
+    """
+
+    length_m: Number = 0.65
+    area_m2: Number = 0.5188e-6
+    second_moment_m4: Number = 0.141e-12
+    density_kg_m3: Number = 1140.0
+    youngs_modulus_pa: Number = 5.4e9
+    damping_d1_kg_m_s: Number = 8.0e-5
+    damping_d3_kg_m_s: Number = 1.4e-5
+    tension_n: Number = 60.97
+
+    def __post_init__(self) -> None:
+        bounds.check_all(self, bounds.STRING, "string parameter ")
+
+    @property
+    def mass_per_length_kg_m(self) -> float:
+        """ρA."""
+        return self.density_kg_m3 * self.area_m2
+
+    def decay_rate(self, mode: int) -> float:
+        """σ of one mode, as in `decay_rates`."""
+        eta = mode * math.pi / self.length_m
+        return (self.damping_d1_kg_m_s + self.damping_d3_kg_m_s * eta**2) / (2 * self.mass_per_length_kg_m)
+
+    def undamped_frequency(self, mode: int) -> float:
+        """ω of one mode, as in `undamped_frequencies`."""
+        eta = mode * math.pi / self.length_m
+        bending = self.youngs_modulus_pa * self.second_moment_m4
+        return math.sqrt((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m)
+
+    def modes_below(self, frequency_hz: float) -> int:
+        """The number of modes whose undamped frequency lies below `frequency_hz`."""
+        # EIη⁴ + T₀η² = ρAω², solved for η² without the difference of near numbers
+        omega = 2 * math.pi * max(0.0, frequency_hz)
+        load = self.mass_per_length_kg_m * omega**2
+        bending = self.youngs_modulus_pa * self.second_moment_m4
+        eta_squared = 2 * load / (self.tension_n + math.sqrt(self.tension_n**2 + 4 * bending * load))
+        count = math.floor(self.length_m / math.pi * math.sqrt(eta_squared))
+        # rounding may put it one beside the mode that lies at the frequency itself
+        while count > 0 and self.undamped_frequency(count) >= omega:
+            count -= 1
+        while self.undamped_frequency(count + 1) < omega:
+            count += 1
+        return count
+
+    def check_motion(self, modes: int, grid_points: int, rate_hz: float, tension_modulated: bool) -> None:
+        """Checks that its motion can be computed in ordinary memory and time, in closed form.
+
+        Raises:
+            ValueError: it cannot, or a mode does not oscillate; the message names the fields.
+        """
+        bounds.check("rate_hz", rate_hz, (1, bounds.HIGHEST_RATE_HZ), "Hz")
+        bounds.check("grid_points", grid_points, (3, bounds.SIZES["grid_points"][1]))
+        if not 1 <= modes <= grid_points - 2:
+            raise ValueError(f"a grid of {grid_points} points cannot hold {bounds.brief(modes)} modes")
+        if modes * grid_points > bounds.MOST_MATRIX_NUMBERS:
+            raise ValueError(
+                f"modes times grid_points must be at most {bounds.MOST_MATRIX_NUMBERS}, "
+                f"not {modes} times {grid_points}"
+            )
+        if grid_points * rate_hz > bounds.MOST_NUMBERS_A_SECOND:
+            raise ValueError(
+                f"grid_points times rate_hz must be at most {bounds.MOST_NUMBERS_A_SECOND}, "
+                f"not {grid_points} times {rate_hz:g}"
+            )
+        # σ² < ω² is a quadratic in η² that is not above 0 at η = 0: it holds for all modes if for first and last
+        for mode in (1, modes):
+            if not self.decay_rate(mode) < self.undamped_frequency(mode):
+                raise ValueError(f"mode {mode} is overdamped: lower its damping, or keep fewer modes")
+        if not tension_modulated:
+            return
+        highest_hz = self.undamped_frequency(modes) / (2 * math.pi)
+        substeps = math.ceil(bounds.SUBSTEPS_IN_A_PERIOD * highest_hz / rate_hz)
+        if substeps > bounds.MOST_SUBSTEPS:
+            raise ValueError(
+                f"mode {modes} at {highest_hz:.3g} Hz is too high for a rate_hz of {rate_hz:g}: the truth would take"
+                f" {substeps:.3g} sub-steps, at most {bounds.MOST_SUBSTEPS}; keep fewer modes"
+            )
+        if modes * min(modes, substeps) > bounds.MOST_FLOWS:
+            raise ValueError(f"{modes} modes with {substeps} sub-steps of the truth are too many; keep fewer modes")
+
+
+@dataclass(frozen=True)
+class Polarisations:
+    """Motion across the string in two directions, the first normal to the board: see `engine.resonators.polarised`.
+
+    Attributes:
+        angle_deg: of the pluck, from the first direction.
+        second_heard: what the second is heard with, of the first.
+        second_cents: pitch of the second, above the first.
+        conductance_s_kg, second_conductance_s_kg: real part of the bridge's admittance in both directions.
+    """
+
+    angle_deg: Number = 45.0
+    second_heard: Number = 0.3
+    second_cents: Number = 1.0
+    conductance_s_kg: Number = 0.01
+    second_conductance_s_kg: Number = 0.001
+
+    def __post_init__(self) -> None:
+        bounds.check_all(self, bounds.POLARISATIONS)
+
+    @property
+    def pulled(self) -> tuple[float, float]:
+        """Parts of a pluck in both directions."""
+        angle = math.radians(self.angle_deg)
+        return math.cos(angle), math.sin(angle)
+
+    @property
+    def heard(self) -> tuple[float, float]:
+        """The weights with which both are heard: a pluck is heard as high as it is pulled."""
+        first, second = self.pulled
+        whole = first + self.second_heard * second
+        return 1 / whole, self.second_heard / whole
+
+    @property
+    def detuning(self) -> float:
+        """ω² of the second over that of the first."""
+        return float(2 ** (2 * self.second_cents / 1200))
+
+
+@dataclass(frozen=True)
+class Losses:
+    """Decay by mode, besides d₁ and d₃ of the string, which may be 0 then: see `engine.resonators.losses`.
+
+    Attributes:
+        air: factor of the losses to the air, a; 1 is that of physics.
+        friction: loss factor 1/Q of the string's tension, δ.
+        bending: loss factor of bending, β.
+    """
+
+    air: Number = 1.0
+    friction: Number = 2e-4
+    bending: Number = 0.02
+
+    def __post_init__(self) -> None:
+        bounds.check_all(self, bounds.LOSSES)
