@@ -106,7 +106,7 @@ def evaluate(
     loaded = _open_preset_of_many(preset)
     players: dict[str, Player] = {loaded.name: player(loaded.model)}
     if baselines:
-        from training.research.players import knowing_physics
+        from training.family.untrained import knowing_physics
 
         players |= knowing_physics()
     with progress("family evaluate") as report:

@@ -14,12 +14,12 @@ from engine.models.koopman_tension import KoopmanTension
 from engine.presets import load_preset
 from engine.resonators.family import inharmonicity
 from training.family import errors as family_errors
+from training.family import untrained as players_of_physics
 from training.family.errors import FamilyErrors, StringError
 from training.family.fit import Case, errors, fit_curves, geometric_mean
 from training.family.motions import solve
 from training.family.preset import FamilyConfiguration, read_configuration, train_preset
 from training.family.strings import COLUMNS, FAMILY, Column, draw_string, string_of
-from training.research import players as players_of_physics
 
 RATE_HZ, STEPS = 48_000, 1_200
 
