@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from app.analysis.growing import BLOCK_FRAMES
 from app.rendering import Take
-from engine.metrics import ErrorSums
+from engine.compare.relative import ErrorSums
 
 WINDOW_PERIODS = 2.0  # of the fundamental: shorter windows would show its phase
 CURVES = ("rmse", "mae", "level_db")

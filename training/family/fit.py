@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from engine.compare.relative import error_to_signal
 from engine.models.base import Physics
 from engine.models.koopman_tension import KoopmanTension
 from training.family.strings import PluckedString, displacement_m
@@ -115,13 +116,8 @@ def fit_curves(
 
 def errors(model: KoopmanTension, cases: Sequence[Case], rate_hz: int, frames: int) -> Tensor:
     """Relative squared error of each string's first frames, over the whole grid, (strings,)."""
-    return torch.stack(
-        [
-            (_motion(model, case, rate_hz, frames) - case.truth[:frames]).square().sum()
-            / case.truth[:frames].square().sum()
-            for case in cases
-        ]
-    )
+    found = [error_to_signal(_motion(model, case, rate_hz, frames), case.truth[:frames]) for case in cases]
+    return torch.tensor(found, dtype=torch.float64)
 
 
 def geometric_mean(errors: Tensor) -> float:

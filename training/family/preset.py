@@ -6,9 +6,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import mean
 
 import torch
 
+from engine.compare.relative import relative_error
 from engine.models import build_model
 from engine.models.base import Physics
 from engine.models.koopman_tension import KoopmanTension
@@ -139,11 +141,9 @@ def train_preset(
 def mean_errors(model: KoopmanTension, cases: list[Case], rate_hz: int) -> tuple[float, float]:
     """Relative MSE and MAE of displacement on the grid, each string's own, and their mean over the strings."""
     play = player(model)
-    squared = absolute = 0.0
+    errors = []
     for case in cases:
         shapes = torch.from_numpy(case.plucked.resonator.shapes)
-        truth = case.truth @ shapes
-        wrong = play(case.plucked, rate_hz, len(truth)) @ shapes - truth
-        squared += float(wrong.square().sum() / truth.square().sum()) / len(cases)
-        absolute += float(wrong.abs().sum() / truth.abs().sum()) / len(cases)
-    return squared, absolute
+        found = play(case.plucked, rate_hz, len(case.truth)) @ shapes
+        errors.append(relative_error(found[None], (case.truth @ shapes)[None]))
+    return mean(each.rel_mse for each in errors), mean(each.rel_mae for each in errors)

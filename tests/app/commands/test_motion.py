@@ -13,7 +13,7 @@ import pytest
 import torch
 
 from app.commands import arrays, motion
-from engine.metrics import relative_error
+from engine.compare.relative import relative_error
 from engine.pluck import Pluck
 from engine.presets import find_string, load_preset, read_string
 from engine.resonators.sine_transform import project, to_grid, to_modes

@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 
-from engine.metrics import RelativeError
+from engine.compare.relative import RelativeError
 from engine.result_file import REMEDIES
 from engine.schema import read, write
 from tests.app.commands.conftest import FullDisk

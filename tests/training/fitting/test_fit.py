@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 import torch
 
-from engine.metrics import RelativeError
+from engine.compare.relative import RelativeError
 from engine.models.dmd import DMD
 from training.cell import Cell, configuration_of
 from training.configuration import Recipe, TrainingConfiguration

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 from filelock import FileLock
 
-from engine.metrics import RelativeError
+from engine.compare.relative import RelativeError
 from engine.schema import read, write
 from training.data.dataset import dataset_folder, load_dataset
 from training.fitting.fit import Progress

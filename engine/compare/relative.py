@@ -1,4 +1,4 @@
-"""Errors of a predicted motion, relative to the true one (the paper's §4.3)."""
+"""Errors of a predicted motion or sound, relative to the true one (the paper's §4.3)."""
 
 from __future__ import annotations
 
@@ -170,6 +170,18 @@ def relative_error(predicted: Motion, truth: Motion) -> RelativeError:
     sums = ErrorSums(truth.shape[1])
     sums.add(predicted, truth)
     return sums.total()
+
+
+def error_to_signal(found: Motion, truth: Motion, least: float = 1e-30) -> float:
+    """Σ(û - u)²/Σu² of two sounds or motions of one shape; infinite where it is not a number.
+
+    Args:
+        least: what the truth's Σu² counts as at least, so that silence has an error too.
+    """
+    error: Any = found - truth
+    squared: Any = truth**2
+    ratio = float((error**2).sum()) / max(float(squared.sum()), least)
+    return ratio if math.isfinite(ratio) else math.inf
 
 
 def _over_points(terms: Any) -> NDArray[np.float64]:
