@@ -66,7 +66,9 @@ def sweep(
     ] = None,
     runs: Runs = None,
     cache: Cache = None,
-    retries: Annotated[int, typer.Option(min=0, max=MOST_RETRIES, help="Further tries of a run that failed.")] = 1,
+    retries: Annotated[
+        int, typer.Option(min=0, max=MOST_RETRIES, help="Further tries of a run that failed or died.")
+    ] = 1,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="List the runs in their order, and train none.")] = False,
     json: Json = False,
 ) -> None:

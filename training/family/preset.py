@@ -18,7 +18,7 @@ from engine.presets import PresetInfo, TrainedRange, save_preset
 from engine.resonators.string import StringParameters
 from engine.schema import SchemaError, read, read_toml, write
 from training.family.errors import SCALE_M, player
-from training.family.fit import Case, FitProgress, fit_curves
+from training.family.fit import Case, fit_curves
 from training.family.motions import solve
 from training.family.strings import FAMILY, GRID_POINTS, draw_string
 
@@ -70,13 +70,12 @@ def train_preset(
     configuration: FamilyConfiguration,
     output: Path,
     *,
-    made: Callable[[float], None] = lambda share: None,
-    report: Callable[[FitProgress], None] = lambda progress: None,
+    report: Callable[[float, str, float | None], None] = lambda share, text, left_s: None,
 ) -> PresetInfo:
     """Makes the preset's file, in some minutes.
 
     Args:
-        made: receives the share of the true motions that are there.
+        report: receives the share that is done, what is being done, and the time left, where it is known.
     """
     c, started = configuration, time.monotonic()
     steps = round(c.seconds * c.rate_hz)
@@ -87,7 +86,7 @@ def train_preset(
             plucked = draw_string("inside", split, number, c.seed)
             # as a data set keeps them, in single precision: 4e-15 of the energy
             cases[split].append(Case(plucked, solve(plucked, c.rate_hz, steps).float().double()))
-            made(sum(map(len, cases.values())) / sum(counts.values()))
+            report(0.5 * sum(map(len, cases.values())) / sum(counts.values()), "true motions", None)
     sizes = {"grid_points": GRID_POINTS, "modes": c.modes, "degree": c.degree}
     model = build_model("koopman_tension", sizes)
     assert isinstance(model, KoopmanTension)
@@ -103,7 +102,7 @@ def train_preset(
         steps=c.steps,
         first_frames=first,
         seed=c.seed,
-        report=report,
+        report=lambda share, text, left_s: report(0.5 + 0.5 * share, text, left_s),
     )
     rel_mse, rel_mae = mean_errors(model, cases["validation"], c.rate_hz)
     test_rel_mse, test_rel_mae = mean_errors(model, cases["test"], c.rate_hz)

@@ -73,11 +73,11 @@ def test_curves_are_found_from_nothing_and_hold_on_other_strings() -> None:
     physics = Physics(plucked.string.resonator(25), RATE_HZ, 1e-3)
     model.initialise("kicks", physics, torch.Generator())
     start = geometric_mean(errors(model, validation, RATE_HZ, STEPS))
-    reported = []
+    shares = []
     best = fit_curves(
-        model, train, validation, RATE_HZ, steps=3, first_frames=600, seed=0, report=lambda p: reported.append(p.step)
+        model, train, validation, RATE_HZ, steps=3, first_frames=600, seed=0, report=lambda *of: shares.append(of[0])
     )
-    assert reported == [1, 2, 3]
+    assert shares == [1 / 3, 2 / 3, 1]
     assert best < start / 100
     assert math.isclose(best, geometric_mean(errors(model, validation, RATE_HZ, STEPS)), rel_tol=1e-9)
     with torch.no_grad():
