@@ -96,8 +96,10 @@ def perform(plain: Mapping[str, Any]) -> dict[str, Any]:
         try:
             task = read(Task, plain, "task")
             rows = _train(task)
-            with suppress(OSError):  # of an earlier try, or of a worker whose sweep was killed
-                (task.folder_of(task.runs[0].name) / FAILURE).unlink(missing_ok=True)
+            for run in task.runs:
+                for name in (PROGRESS, FAILURE):  # a failure of an earlier try, or of a worker whose sweep was killed
+                    with suppress(OSError):
+                        (task.folder_of(run.name) / name).unlink(missing_ok=True)
             return {"rows": [write(row) for row in rows], "error": ""}
         except Exception as error:
             if task is not None:

@@ -4,7 +4,7 @@ import multiprocessing
 import threading
 import time
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +13,7 @@ from unittest.mock import Mock
 
 import psutil
 import pytest
+from filelock import FileLock
 
 from engine.schema import SchemaError, read, write
 from tests.training.sweeping.conftest import row_of
@@ -312,8 +313,18 @@ def test_a_process_that_died_between_two_tasks_is_replaced() -> None:
         assert "task.threads" in workers.submit(wrong).result()["error"]
 
 
-def test_a_sweep_here_listens_to_nobody(plan, options: Options) -> None:
+def test_a_task_under_way_ends_with_its_workers(task: Task) -> None:
+    folder = task.folder_of(task.runs[0].name)
+    folder.mkdir(parents=True)
+    with FileLock(folder / "run.lock"), process_workers(here(1)) as workers:  # it would wait for ever
+        left = workers.submit(write(task))
+    assert isinstance(left.exception(), BrokenExecutor)
+    assert not multiprocessing.active_children()
+
+
+def test_a_sweep_here_listens_to_nobody(plan, options: Options, monkeypatch: pytest.MonkeyPatch) -> None:
     """What listens, even on the loopback, can be reached by every account of the computer."""
+    monkeypatch.setattr("training.sweeping.sweep.POLL_S", 0.02)
     made = plan(seeds="0")
     made = replace(made, runs=made.runs[:1])
     seen: list[Any] = []

@@ -16,6 +16,7 @@ from engine.compare.relative import RelativeError
 from engine.schema import read, write
 from training.data.dataset import dataset_folder, load_dataset
 from training.fitting.fit import Progress
+from training.fitting.log import TrainingLog
 from training.results import Row
 from training.sweeping.sweep import Options
 from training.sweeping.task import PROGRESS, Task, perform, read_progress
@@ -25,15 +26,21 @@ def folder_of(task: Task) -> Path:
     return task.folder_of(task.runs[0].name)
 
 
-def test_a_task_ends_with_its_row_and_reports_its_progress(task: Task) -> None:
+def test_a_task_ends_with_its_row_and_reports_its_progress(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    add = TrainingLog.add
+
+    def followed(log: TrainingLog, progress: Progress) -> None:
+        add(log, progress)
+        seen.append(read_progress(folder_of(task)))  # of the epoch before
+
+    monkeypatch.setattr(TrainingLog, "add", followed)
     outcome = perform(write(task))
     (row,) = (read(Row, row, "row") for row in outcome["rows"])
     assert (row.status, row.digest, row.threads) == ("done", task.runs[0].digest, 1)
-    progress = read_progress(folder_of(task))
-    assert progress is not None and (progress.epoch, progress.epochs) == (1, 4)
-    (folder_of(task) / PROGRESS).unlink()
+    assert seen[0] is None and seen[1] is not None and (seen[1].epoch, seen[1].epochs) == (1, 4)
+    assert not (folder_of(task) / PROGRESS).exists()
     assert perform(write(task)) == outcome  # from the run's folder
-    assert read_progress(folder_of(task)) is None
 
 
 def test_a_run_that_diverges_is_recorded_so(plan, options: Options) -> None:
