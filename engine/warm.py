@@ -48,9 +48,6 @@ INFO = PresetInfo(
     seed=0,
 )
 PRESET = Preset("", Path(), INFO, dict.fromkeys(CURVES, np.zeros(1)))
-LATENTS = {"grid_points": INFO.grid_points, "state_size": 4}
-MODULATED = {"modulation": True, "adiabatic": True, "physical_units": True}
-BANKS: tuple[dict[str, Any], ...] = ({}, MODULATED)
 EARS = (Ear((0.3,)), Ear((0.3, 0.7), "velocity"))
 FRAMES = 4 * layout.QUANTUM
 
@@ -108,7 +105,7 @@ def voices() -> None:
 
 
 def _each() -> Iterator[Voice]:
-    for program in (*map(_bank, BANKS), model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
+    for program in (model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
         for ear in EARS:
             yield _struck(program, ear)
 
@@ -170,14 +167,6 @@ def _loudness() -> None:
     loudness.gain(sound, 1, 1, no_body, 0.0)
     loudness.limit(loudness.peak(sound, 1, False, no_body, 0.0, 0.0))
     loudness.looked_at(0, 1, 0)
-
-
-def _bank(sizes: dict[str, Any]) -> Program:
-    from engine.voices.banks import bank_program
-
-    program = bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ)
-    assert program is not None
-    return program
 
 
 def _struck(program: Program, ear: Ear) -> Voice:

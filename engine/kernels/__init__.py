@@ -2,7 +2,6 @@
 
     memory     pointers, fences, and what is published to another thread
     layout     what lies where in a voice, a program and a mixer
-    bank       a voice of complex exponentials whose phases follow their energies: models with a linear decoder
     tension    a voice of latents that share one tension: the model of every string
     lanes      its inner loops, as vector instructions
     truth      a voice of the solved string

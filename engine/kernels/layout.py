@@ -24,7 +24,7 @@ BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 # A voice's state
 WAITING, SOUNDING, OVER, RUNAWAY = 0, 1, 2, 3
 # A voice's kind
-BANK, TRUTH, RENDERED, TENSION = 0, 1, 2, 3
+TRUTH, RENDERED, TENSION = 1, 2, 3
 
 # Slots of a voice (W: whole number, R: real)
 STATE = 0  # W
@@ -44,29 +44,23 @@ WEIGHTS_FADED = 13  # W frames of that fade
 STRUCK_S = 14  # R the device clock's time of the gesture
 BEGAN_S = 15  # R and of the callback that gave the device its first samples
 STARVED = 16  # W frames in which it should have sounded and had nothing to
-MODES = 17  # W latents, or modes, or 0
+MODES = 17  # W modes, 0 of a rendered voice
 MOVING = 18  # W modes of the truth, or latents that share a tension, up to the highest that is not silent
-NODE = 19  # W the node from which a bank's integral continues
-SEGMENT_VALID = 20  # W whether a bank knows where its last segment ended
 LOUDNESS = 21  # R nepers below full scale that the loudest latent, or all of the string, has now
 GAIN_FROM = 22  # R where the present change of gain began
 GAIN_TO = 23  # R and where it leads
 GAIN_DONE = 24  # W frames of it
 SILENT = 25  # R nepers of full scale: a voice whose loudness has fallen below is over
-MODULATED = 26  # W whether a bank's modulation can still be heard
 SAMPLES = 27  # W address of a rendered voice's samples, float32 (frames, points)
 READY = 28  # W of them, set by the renderer
 LENGTH = 29  # W of them in all; after the last the voice is over
 DRY = 30  # W whether it had nothing to play in the last quantum
 ATTACK = 31  # W frames of the fade-in at the pluck
 BEGAN_FRAME = 32  # W the mixer's frame at which it began, after any samples it waited for; -1 until then
-REFRESH = 33  # W quanta until it looks again: at a bank's modulation, at a drum's modes, at a string's nodes
-ROWS = 34  # W latents whose modulation can be heard
-COLUMNS = 35  # W latents that can be heard in others' modulation
+REFRESH = 33  # W quanta until it looks again: at a drum's modes, at a string's nodes
 BEGIN_AT = 36  # W the mixer's frame at which it begins; in the past: with the next quantum
 RELEASE_AT = 37  # W the mixer's frame from which it fades out; 0: none
 LOOPED = 38  # W whether a rendered voice, of the device's own rate, begins again after its last sample
-AUDIBLE_COUNT = 39  # W latents up to the last that can be heard
 WARM = 40  # W quanta of its own displacement that a velocity voice has behind it, without one that was unheard
 RESONATOR = 41  # W address of the latest of these that are due; the kernel glides there
 CURRENT_MODES = 42  # W the one that it is gliding to, or has reached
@@ -139,16 +133,6 @@ def state(modes: int) -> int:
     return HEADER + 8 * modes + 4 + 8 * QUANTUM
 
 
-# Rows (modes,) of a bank's state, from `state` on
-LEVEL_0, ANGLE_0, ENERGY_0 = 0, 1, 2
-CONSTANT = 3  # two: what the linear term adds up to in the end
-INTEGRAL = 5  # two: of the higher orders up to the node
-AT_LEFT, AT_MIDDLE, AT_RIGHT = 7, 9, 11  # two each: the higher orders at the node, half-way and at the next
-LEVEL, PHASE, LEVEL_RATE, PHASE_RATE = 13, 14, 15, 16  # where the last segment ended
-ROW_LIST, COLUMN_LIST = 17, 18  # whole numbers
-CHANGE = 19  # of the level by the amplitude's share of the action, at the segment's left and right end: two
-BANK_ROWS = 21
-
 # Rows of the state of a voice with modes (the truth, or latents that share a tension): two that move, amplitude and
 # speed or x and y; five of its resonator as it is now; and what follows from them
 OMEGA_SQUARED, SIGMA, COUPLING, STRETCH = 2, 3, 4, 5
@@ -167,36 +151,6 @@ B_QUANTA = 0  # W of the way there
 B_NEXT = 1  # W address of the modes that were wished for next; 0: none yet
 B_AT = 2  # W the mixer's frame from which they count
 B_HEADER = 3
-
-# Slots of a bank's program
-P_MODES = 0  # W
-P_RATIO = 1  # R trained samples a frame
-P_SPACING = 2  # R trained samples between nodes
-P_LIMIT = 3  # R the gain's limit in nepers
-P_SECOND_ORDER = 4  # W
-P_HIGHER = 5  # W whether there are higher orders at all
-P_ADIABATIC = 6  # W whether f follows the mean tension to all orders, and A is there
-P_LAYERS = 7  # W of the network g; 0: none
-P_MODULATION = 8  # W whether M is there
-P_LOUDNESS = 9  # R nepers: log of full scale's share of a latent of 1
-P_EARLY = 10  # W frames in which segments are short
-P_OFFSETS = 12  # W slots of the parts below
-(
-    O_SIGMA,
-    O_OMEGA,
-    O_COUPLING,
-    O_LARGEST,
-    O_SHARES,
-    O_ENERGY_UNITS,
-    O_RATE_UNITS,
-    O_AT_ZERO,
-    O_NETWORK,
-    O_M,
-    O_M_LARGEST,
-    O_A,
-) = range(P_OFFSETS, P_OFFSETS + 12)
-P_WIDTHS = P_OFFSETS + 12  # W sizes of the network's layers, from the input on, at most 8
-P_HEADER = P_WIDTHS + 8
 
 # Slots of the truth's program
 T_SUBSTEPS = 0  # R in a period of the highest mode

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numba import carray, njit
 
-from engine.kernels import bank, javari, rendered, tension, truth
+from engine.kernels import javari, rendered, tension, truth
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, pointer
@@ -30,9 +30,7 @@ def _generate(voice: np.ndarray, heard: bool, rate_hz: float, out: np.ndarray, s
         return
     fading = counts[at.NEXT_WEIGHTS] == 1
     fence()
-    if kind == at.BANK:
-        bank.generate(voice, program, fading, heard, out, scratch)
-    elif counts[at.JAVARI_STEPS] > 0:
+    if counts[at.JAVARI_STEPS] > 0:
         javari.generate(voice, program, fading, heard, out, scratch)
     elif kind == at.TENSION:
         tension.generate(voice, program, fading, heard, out, scratch)

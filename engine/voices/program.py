@@ -26,7 +26,7 @@ class Program:
     """See the module; the kernels read `memory`.
 
     Attributes:
-        modes: latents of a bank, modes of a solver, 0 where samples are rendered.
+        modes: of the string; 0 where samples are rendered.
         start: initial displacement (grid_points,) in m to the two rows (modes,) that a voice sets out from.
         read: weights (grid_points, points) of displacement to weights (points, 2 modes) and bias (points,), of full
             scale.

@@ -45,7 +45,7 @@ class Voice:
         begin: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         n = program.modes
-        rows = {at.BANK: at.BANK_ROWS, at.TRUTH: at.TRUTH_ROWS, at.TENSION: at.TENSION_ROWS}.get(program.kind, 0)
+        rows = {at.TRUTH: at.TRUTH_ROWS, at.TENSION: at.TENSION_ROWS}.get(program.kind, 0)
         self.program, self.ear = program, ear
         self.memory = memory = np.zeros(_state(n) + rows * n)
         self._counts = counts = memory.view(np.int64)
@@ -68,10 +68,6 @@ class Voice:
         if program.resonator is not None:
             counts[at.MOVING] = n
             memory[place + at.OMEGA_SQUARED * n : place + at.FOLLOWING * n] = _rows(program.resonator)
-        elif program.kind == at.BANK:
-            from engine.kernels.bank import strike
-
-            strike(memory, program.memory, np.empty(at.SCRATCH_ROWS * at.MOST_MODES))
         else:
             seconds = min(seconds, program.ends_s + END_FADE_S + SPARE_S)
             length = max(1, math.ceil(seconds * source_rate_hz) + 1)
@@ -132,7 +128,7 @@ class Voice:
 
     @property
     def level_db(self) -> float:
-        """The level of the loudest latent, or of all of the string, in dB of full scale."""
+        """The level of all of the string, in dB of full scale."""
         return float(self.memory[at.LOUDNESS]) * 20 / math.log(10)
 
     def set_struck(self, time_s: float) -> None:

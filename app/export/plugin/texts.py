@@ -66,10 +66,9 @@ def text(part: str) -> str:
 
     compiled.COMPILED["cache"] = False
     compiled.COMPILED["no_cpython_wrapper"] = compiled.COMPILED["no_cfunc_wrapper"] = True
-    from engine.kernels import bank, mixer, plugin, rendered
+    from engine.kernels import mixer, plugin, rendered
 
-    for kind in (bank, rendered):  # of voices, which the compiled player does not make
-        kind.generate = njit(lambda *_: None)  # type: ignore[attr-defined]
+    rendered.generate = njit(lambda *_: None)  # of voices that the compiled player does not make
     for name in (each for entries in PARTS.values() for each in entries if hasattr(mixer, each)):
         if name not in PARTS[part]:
             setattr(mixer, name, _elsewhere(name))
