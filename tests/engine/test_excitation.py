@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from engine.excitation import blow_factor, raised_cosine, release_factor, rounded, triangular
+from engine.excitation import blow_factor, raised_cosine, rounded, triangular
+from engine.kernels.pulses import spectrum
 from engine.pluck import SHAPES, Pluck
 from engine.resonators.sine_transform import to_grid, to_modes
 
@@ -56,7 +57,7 @@ def test_a_release_in_a_time_is_one_at_once_from_a_smaller_displacement(release_
     start = np.concatenate([np.ones(4), np.zeros(4)])
     most = {"rtol": 1e-11, "atol": 1e-13, "max_step": release_s / 50}
     found = solve_ivp(right_side, (0, end_s), start, "DOP853", **most)
-    left = release_factor(omega, release_s)
+    left = spectrum(omega * release_s / (2 * np.pi))
     np.testing.assert_allclose(found.y[:4, -1], left * np.cos(omega * (end_s - release_s / 2)), atol=1e-8)
 
 
@@ -76,7 +77,7 @@ def test_a_blow_is_the_force_of_a_hammer_for_a_time(contact_s: float) -> None:
     most = {"rtol": 1e-11, "atol": 1e-15, "max_step": contact_s / 50}
     end_s = contact_s + 0.003
     found = solve_ivp(right_side, (0, end_s), np.zeros(12), "DOP853", **most).y[:, -1]
-    after_s, left = end_s - contact_s / 2, release_factor(omega, contact_s)
+    after_s, left = end_s - contact_s / 2, spectrum(omega * contact_s / (2 * np.pi))
     np.testing.assert_allclose(found[:6], left * swings * np.sin(omega * after_s), atol=1e-10)
     np.testing.assert_allclose(found[6:], left * unit * np.cos(omega * after_s), atol=1e-6)
 

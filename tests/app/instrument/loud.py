@@ -9,17 +9,19 @@ from functools import cached_property
 import numpy as np
 
 from app.instrument.string_keys import StringKeys, on_string, polarisations_of
-from app.instrument.strings import KeyString, has_octave
-from app.patches.patch import Patch
-from engine.excitation import blow_factor, release_factor
+from app.instrument.strings import KeyString
+from app.patches.patch import Patch, StringSet
+from engine.excitation import blow_factor
 from engine.kernels import constants as of
+from engine.kernels.pulses import spectrum
+from engine.kernels.strings import chosen
+from engine.kernels.velocities import contact_s, share
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import PresetInfo
 from engine.resonators.base import Array, Resonator
 from engine.resonators.losses import Losses
-from engine.resonators.polarised import layout, partials_of
-from engine.resonators.string import StringParameters
 from engine.voices import Ear
+from tests.engine.polarised import layout, polarised
 
 _NO_BODY = np.zeros(0)
 
@@ -92,8 +94,9 @@ class LoudKeys(StringKeys):
         amplitudes = resonator.to_modes(displacement_m)
         if patch.pluck.is_blow:
             amplitudes = amplitudes * blow_factor(resonator.omega, displacement_m / (pluck.amplitude_mm / 1000))
-        if release_s := patch.pluck.release_s(of.REFERENCE_VELOCITY):
-            amplitudes = amplitudes * release_factor(resonator.omega, release_s)
+        hard = share(of.REFERENCE_VELOCITY, patch.pluck.curve)
+        release_s = contact_s(patch.pluck.release_ms, patch.pluck.release_hard_ms, hard)
+        amplitudes = amplitudes * spectrum(resonator.omega * release_s / (2 * np.pi))
         weights = resonator.shapes @ self._full_ear.weights(resonator.points, resonator.force_weights) / FULL_SCALE_M
         if self.ear.pickup == "velocity":
             half = np.sqrt(resonator.stretch) * (patch.pickup.aperture_mm / 2000)
@@ -108,7 +111,7 @@ class LoudKeys(StringKeys):
     def _first_decay(self, string: KeyString, resonator: Resonator, number: int | None) -> Array:
         """σ of the modes (modes,) while strings on one bridge are in phase, as they are at first."""
         patch, course, moving = self.patch, self.patch.course, self.polarisations
-        if moving is None or course.strings == 1 or course.bridge == 0 or has_octave(patch, string.key, number):
+        if moving is None or course.strings == 1 or course.bridge == 0 or _has_octave(patch, string.key, number):
             return resonator.sigma
         both = np.array([moving.conductance_s_kg, moving.second_conductance_s_kg])
         pull = patch.knobs.decay * string.parameters.tension_n / string.parameters.length_m
@@ -116,29 +119,37 @@ class LoudKeys(StringKeys):
         return np.minimum(resonator.sigma + shared, of.HIGHEST_SIGMA * resonator.omega)
 
 
+def _has_octave(patch: Patch, key: int, number: int | None) -> bool:
+    """Whether the course of a key has an octave string, on a string of a set or on the one that it chooses."""
+    if patch.course.octaves == 0 or not isinstance(patch.strings, StringSet):
+        return False
+    count = len(patch.strings.strings)
+    string = chosen(patch.strings.strings[::-1], count, key) if number is None else number
+    return string >= count - patch.course.octaves
+
+
 def resonator_of(string: KeyString, patch: Patch, preset: PresetInfo) -> Resonator:
     """The modes of a key's string, as the patch says that it moves and decays."""
-    moving = polarisations_of(patch, preset)
-    if moving is None:
-        found = preset.resonator_of(string.parameters, preset.modes_of(string.modes))
-    else:
-        found = moving.resonator(
+    moving, knobs = polarisations_of(patch, preset), patch.knobs
+    by_mode = None if patch.losses is None or preset.recorded is not None else patch.losses
+    if moving is not None:
+        losses = (0.0, 0.0, 0.0)
+        if by_mode is not None:
+            inside = knobs.brightness_decay
+            losses = knobs.decay * by_mode.air, inside * by_mode.friction, inside * by_mode.bending
+        points, modulated = preset.grid_points, preset.tension_modulated
+        return polarised(
+            moving,
             string.parameters,
             string.modes,
-            losses=patch.knobs.decay,
-            tension_modulated=preset.tension_modulated,
-            grid_points=preset.grid_points,
+            decay=knobs.decay,
+            losses=losses,
+            tension_modulated=modulated,
+            grid_points=points,
         )
-    return _with_losses(found, string.parameters, patch, preset)
-
-
-def _with_losses(resonator: Resonator, string: StringParameters, patch: Patch, preset: PresetInfo) -> Resonator:
-    if patch.losses is None or preset.recorded is not None:
-        return resonator
-    modes, paired = resonator.modes, patch.polarisations is not None
-    partial = layout(partials_of(modes))[0] if paired else np.arange(modes)
-    rates = Losses(**patch.losses.model_dump()).rates(
-        string, int(partial[-1]) + 1, patch.knobs.decay, patch.knobs.brightness_decay
-    )
-    sigma = np.minimum(resonator.sigma + rates[partial], of.HIGHEST_SIGMA * resonator.omega)
-    return replace(resonator, sigma=sigma)
+    modes = min(string.modes * (1 if preset.recorded is None else 2), preset.grid_points - 2)
+    found = replace(preset, string=string.parameters, modes=modes).resonator
+    if by_mode is None:
+        return found
+    rates = Losses(**by_mode.model_dump()).rates(string.parameters, found.modes, knobs.decay, knobs.brightness_decay)
+    return replace(found, sigma=np.minimum(found.sigma + rates, of.HIGHEST_SIGMA * found.omega))

@@ -28,12 +28,13 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, PhysicalString, Pickup, PluckChoices, Room
 from engine import bounds
-from engine.excitation import blow_factor, release_factor
+from engine.excitation import blow_factor
 from engine.kernels import constants as of
 from engine.kernels.constants import WANTED_DB
 from engine.kernels.layout import QUANTUM
 from engine.kernels.loudness import k_weight
 from engine.kernels.playing.notes import PLUCK_STOPS_S
+from engine.kernels.pulses import spectrum
 from engine.levels import FULL_SCALE_M
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
@@ -206,7 +207,7 @@ def test_a_hammer_starts_the_string_from_rest_with_speeds(patch: Patch, preset: 
     assert found is not None
     modes, shape = found.resonator, soft.pluck.pluck(64).displacement(preset.info.grid_points)
     amplitudes = modes.to_modes(shape) * found.string.shortened * blow_factor(modes.omega, shape / 1e-6)
-    amplitudes *= release_factor(modes.omega, 2e-3) * (modes.shapes @ Ear((0.37,)).weights(modes.points))[:, 0]
+    amplitudes *= spectrum(modes.omega * 1e-3 / np.pi) * (modes.shapes @ Ear((0.37,)).weights(modes.points))[:, 0]
     t = np.arange(9_600) / RATE_HZ
     turns = np.exp(np.outer(t, 1j * np.sqrt(modes.omega**2 - modes.sigma**2) - modes.sigma)).imag
     expected = found.gain / FULL_SCALE_M * turns @ amplitudes

@@ -22,9 +22,10 @@ from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.schema import write
 from engine.sources import ModelSource
-from engine.truth import ModalState, SplittingSolver, solve_linear
+from engine.truth import ModalState, SplittingSolver
 from engine.voices import Ear, Mixer, Voice, model_program, render_voice
 from engine.voices.banks import bank_program
+from tests.engine.tensors import solve_linear
 
 KNOWING = "nylon_nonlinear_gaussian_4k_koopman_integrated"
 HINTED = f"{KNOWING}_hinted"

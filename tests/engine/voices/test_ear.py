@@ -12,8 +12,9 @@ from engine.pluck import Pluck
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.resonators.string import StringParameters
-from engine.truth import ModalState, solve_linear
+from engine.truth import ModalState
 from engine.voices import Ear
+from tests.engine.tensors import solve_linear
 
 POINTS = 101
 
