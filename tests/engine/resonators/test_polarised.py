@@ -6,21 +6,48 @@ import numpy as np
 import pytest
 import torch
 
+from engine.kernels import strings
+from engine.kernels.constants import MOST_PAIRS
 from engine.models.base import Physics
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
 from engine.presets import load_preset
 from engine.presets.finding import SHIPPED
+from engine.resonators.base import Resonator
 from engine.resonators.polarised import Polarisations
 from engine.resonators.string import StringParameters
 from engine.truth.oracle import solve_dop853
 from engine.truth.splitting import SplittingSolver
 from engine.truth.state import ModalState
-from tests.engine.polarised import polarised
 
 STRING = StringParameters()
 MOVING = Polarisations(angle_deg=40, second_heard=0.25, second_cents=2.0, conductance_s_kg=0.02)
 PLUCK = Pluck(0.17, 3.0, "rounded", 0.08)
+
+
+def polarised(moving: Polarisations, string: StringParameters, partials: int, decay: float = 1.0) -> Resonator:
+    """Pairs of modes, then single ones; `decay`: of the bridge's conductances."""
+    law, pairs = string.resonator(partials), min(MOST_PAIRS, partials)
+    modes = range(partials + pairs)
+    partial = [strings.partial_of(mode, pairs) - 1 for mode in modes]
+    direction = [strings.direction_of(mode, pairs) for mode in modes]
+    conductances = decay * moving.conductance_s_kg, decay * moving.second_conductance_s_kg
+    rows = np.empty(4 * len(modes))
+    strings.rows(string.row, len(modes), pairs, moving.detuning, *conductances, 0.0, 0.0, 0.0, rows)
+    squares, sigma, coupling, stretch = rows.reshape(4, -1)
+    pulled, heard = (np.array(each)[direction] for each in (moving.pulled, moving.heard))
+    pulled[2 * pairs :] = 1 / moving.heard[0]  # so that it is heard as the others are
+    assert law.end_force is not None and law.analysis is not None
+    return Resonator(
+        omega=np.sqrt(squares),
+        sigma=sigma,
+        coupling=coupling,
+        stretch=stretch,
+        tension_rise=law.tension_rise,
+        shapes=law.shapes[partial] * heard[:, None],
+        analysis=law.analysis[:, partial] * pulled,
+        end_force=law.end_force[partial] * heard,
+    )
 
 
 def test_a_pluck_is_heard_as_high_as_it_is_pulled() -> None:
