@@ -13,33 +13,30 @@ from engine.resonators.base import Array
 from engine.resonators.sine_transform import grid_positions, to_grid
 
 
-def gaussian(position: float, width: float, peak_m: float, grid_points: int) -> Array:
-    """peak · exp(-((x - position)/width)²), float64 (grid_points,), with the ends held at zero."""
-    _check_pluck(position, width, peak_m)
-    return held(peak_m * pulses.gaussian((grid_positions(grid_points) - position) / width))
+def displacement(shape: str, position: float, width: float, peak_m: float, grid_points: int) -> Array:
+    """The displacement of a pluck by the name of its shape, float64 (grid_points,), with the ends held at zero.
 
+    A rounded triangle is the static shape under a force that is spread as a raised cosine of full width `width`; a
+    triangle has no width.
 
-def triangular(position: float, peak_m: float, grid_points: int) -> Array:
-    """A string pulled to a point: straight from both ends to `position`. float64 (grid_points,)."""
-    _check_pluck(position, 1.0, peak_m)
-    return peak_m * pulses.triangle(grid_positions(grid_points), position)
-
-
-def raised_cosine(position: float, width: float, peak_m: float, grid_points: int) -> Array:
-    """A smooth bump peak/2 · (1 + cos(2π(x - position)/width)) of full width `width`. float64 (grid_points,)."""
-    _check_pluck(position, width, peak_m)
-    return held(peak_m * pulses.raised_cosine((grid_positions(grid_points) - position) / width))
-
-
-def rounded(position: float, width: float, peak_m: float, grid_points: int) -> Array:
-    """A string pulled by something of a width: a triangle with a round corner. float64 (grid_points,).
-
-    The static shape under a force that is spread as a raised cosine of full width `width`: each mode of the triangle
-    times that force's Fourier transform.
+    Raises:
+        ValueError: a value is out of its range; the message names it.
     """
-    _check_pluck(position, width, peak_m)
-    shape = to_grid(pulses.corner(np.arange(1.0, grid_points - 1), position, width), grid_points)
-    return held(shape * (peak_m / shape.max()))
+    if not 0 < position < 1:
+        raise ValueError(f"position must lie between 0 and 1 (the fixed ends), not {position}")
+    if not width > 0:
+        raise ValueError(f"width must be above 0, not {width}")
+    if not abs(peak_m) < 1:
+        raise ValueError(f"peak displacement must be below 1 m, not {peak_m} m")
+    x = grid_positions(grid_points)
+    if shape == "rounded":
+        height = to_grid(pulses.corner(np.arange(1.0, grid_points - 1), position, width), grid_points)
+        height = height / height.max()
+    elif shape == "triangular":
+        height = pulses.triangle(x, position)
+    else:
+        height = (pulses.gaussian if shape == "gaussian" else pulses.raised_cosine)((x - position) / width)
+    return held(peak_m * height)
 
 
 def blow_factor(omega: Array, shape: Array) -> Array:
@@ -64,12 +61,3 @@ def held(displacement: Array) -> Array:
     """The displacement (..., grid_points) with the ends held at zero, in place."""
     displacement[..., 0] = displacement[..., -1] = 0
     return displacement
-
-
-def _check_pluck(position: float, width: float, peak_m: float) -> None:
-    if not 0 < position < 1:
-        raise ValueError(f"position must lie between 0 and 1 (the fixed ends), not {position}")
-    if not width > 0:
-        raise ValueError(f"width must be above 0, not {width}")
-    if not abs(peak_m) < 1:
-        raise ValueError(f"peak displacement must be below 1 m, not {peak_m} m")

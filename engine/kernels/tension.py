@@ -15,9 +15,8 @@ from engine.kernels import lanes
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.modes import damped, following, glide, gliding, rest_above, rest_silent, row
+from engine.kernels.scheme import ENERGY_BOUND, HARDEST_KICK, MOST_NODES
 
-ENERGY_BOUND = 1.5  # of the energy at the start, as in the model
-HARDEST_KICK, MOST_NODES = 0.3, 3  # as in the model
 NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller change is the last
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
 UNFELT = 5e-6  # of S, on average: a mode that adds less rests, and adds its average

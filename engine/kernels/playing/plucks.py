@@ -76,7 +76,7 @@ def pull(
 
 @njit(**COMPILED)
 def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_m: float, width: float) -> None:
-    """The amplitudes of the modes of a rounded triangle, as `engine.excitation.rounded`.
+    """The amplitudes of the modes of a rounded triangle, up to its height `pulses.corner`.
 
     It peaks where the force pulls: elsewhere it is straight.
     """
@@ -103,7 +103,7 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
 
 @njit(**COMPILED)
 def release_pluck(player: Player, table: Table, own: np.ndarray, partials: int, release_s: float) -> None:
-    """Releases a pluck's partials within a time, or strikes them for so long: as `excitation`.
+    """Releases a pluck's partials within a time, or strikes them for so long: see `engine.excitation.blow_factor`.
 
     What touches a string leaves it within a period of its lowest partial. So soft strokes of high keys are heard.
     """
