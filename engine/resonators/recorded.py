@@ -202,10 +202,13 @@ class RecordedString:
         """
         partials = (modes + 1) // 2
         law = string.resonator(partials, tension_modulated=tension_modulated, grid_points=grid_points)
-        partial, shares = np.arange(modes) // 2, np.ones(modes)
-        rows = np.concatenate([law.omega[partial] ** 2, law.sigma[partial]])
-        correct(self.additions, string.row, modes, rows)
-        split(self.additions, string.row, modes, shares)
+        partial, shares = np.arange(modes) // 2, [1.0] * modes
+        squares_and_sigma = np.concatenate([law.omega[partial] ** 2, law.sigma[partial]]).tolist()
+        pitch_hz, *parts = self.additions
+        own: Any = pitch_hz, *(part.tolist() for part in parts)  # lists are faster, number by number
+        correct(own, string.row, modes, squares_and_sigma)
+        split(own, string.row, modes, shares)
+        rows = np.array(squares_and_sigma)
         return Resonator(
             omega=np.sqrt(rows[:modes]),
             sigma=rows[modes:],
