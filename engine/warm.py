@@ -10,7 +10,6 @@ import os
 import subprocess
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import astuple
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,7 +79,6 @@ def playing() -> None:
     for each in (events.play, contact.sound, sympathy.sympathise):
         each.compile("void(int64, int64)")
     CompiledPlayer(RATE_HZ, INFO.modes)
-    _string()
     _drum()
     _loudness()
 
@@ -129,17 +127,6 @@ def models() -> None:
             model.advance(state, 2, readout)
     truth = TruthSource(INFO)
     truth.advance(truth.start(_initial_m()[None]), 2)
-
-
-def _string() -> None:
-    """Compile the changes of a string by a bend, a slide, a damper and a knob."""
-    from engine.kernels import strings
-
-    string = np.array(astuple(StringParameters()))
-    strings.turned(string, np.ones(len(string)), np.empty_like(string))
-    for change in (strings.fretted, strings.bent, strings.slid, strings.damped):
-        change(string, 1.5)
-    strings.pitch_hz(string)
 
 
 def _drum() -> None:

@@ -22,8 +22,7 @@ from engine.kernels.records import ATTACK, RECORDED, TABLE, slots
 from engine.levels import FULL_SCALE_M
 from engine.pluck import SHAPES
 from engine.presets import Preset
-from engine.resonators.polarised import PAIRS
-from engine.resonators.recorded import OF_PARTIALS, RecordedString
+from engine.resonators.recorded import RecordedString
 from engine.voices.player import Table
 from engine.voices.programs import (
     DRUM_SILENCE,
@@ -117,7 +116,7 @@ def table_of(
     table["points"], table["velocity"] = len(ear.points), ear.pickup == "velocity"
     table["solo"], table["grid"], table["detuning"] = ear.solo, grid_points, 1.0
     if (moving := loud.polarisations) is not None:
-        table["pairs"], table["detuning"] = PAIRS, moving.detuning
+        table["pairs"], table["detuning"] = of.MOST_PAIRS, moving.detuning
         table["pulled"], table["heard"] = moving.pulled, moving.heard
         table["conductance"] = moving.conductance_s_kg, moving.second_conductance_s_kg
     if patch.losses is not None:
@@ -201,11 +200,10 @@ def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int
 def put_recorded(table: np.void, tail: Tail, own: RecordedString, grid_points: int) -> None:
     """Puts what a recording adds to strings behind a table."""
     header = np.zeros(1, RECORDED)
-    header["pitch_hz"], header["rest"] = own.pitch_hz, [own.rest(name) for name in OF_PARTIALS]
-    header["smooth"], header["partials"] = len(own.smooth_hz), len(own.cents)
-    header["modes"] = grid_points - 2
-    rows = [np.asarray(getattr(own, name), float) for name in OF_PARTIALS]
-    table["recorded"] = tail.put(header.view(np.float64), np.log(own.smooth_hz), np.log(own.smooth_ratio), *rows)
+    pitch_hz, rest, hz, ratios, rows = own.additions
+    header["pitch_hz"], header["rest"], header["modes"] = pitch_hz, rest, grid_points - 2
+    header["smooth"], header["partials"] = len(hz), rows.shape[1]
+    table["recorded"] = tail.put(header.view(np.float64), hz, ratios, rows.ravel())
 
 
 def _put_drums(tail: Tail, loud: DrumKeys) -> int:

@@ -20,6 +20,7 @@ from app.shared.parameters import MOST_MACROS, OF_PATCHES, modulated_by
 from app.shared.vocabulary import Pickup as PickupKind
 from engine import bounds
 from engine.contact import Exciter
+from engine.kernels import velocities
 from engine.pluck import DEFAULT_LISTEN, Pluck, Shape
 
 if TYPE_CHECKING:
@@ -156,35 +157,21 @@ class PluckChoices(Value):
 
     def pluck(self, velocity: float) -> Pluck:
         """The pluck of a velocity in 1 … 127, which need not be an integer; others count as the nearest."""
-        share = self._share(velocity)
+        share = velocities.share(velocity, self.curve)
         return Pluck(shape=self.shape).nearest(  # a power of a ratio may miss its end
             position=self.position,
-            amplitude_mm=self.softest_mm * (self.hardest_mm / self.softest_mm) ** share,
-            width=self.width * (self.width_hard / self.width) ** share,
+            amplitude_mm=velocities.between(self.softest_mm, self.hardest_mm, share),
+            width=velocities.between(self.width, self.width_hard, share),
         )
 
     def velocity_of(self, amplitude_mm: float) -> int:
         """The velocity, 1 … 127, whose pluck is nearest in amplitude."""
-        if amplitude_mm <= self.softest_mm or self.hardest_mm == self.softest_mm:
-            return VELOCITIES[0]
-        share = min(math.log(amplitude_mm / self.softest_mm) / math.log(self.hardest_mm / self.softest_mm), 1.0)
-        low, high = VELOCITIES
-        return round(low + share ** (4**self.curve) * (high - low))
+        return velocities.velocity(self.softest_mm, self.hardest_mm, amplitude_mm, self.curve)
 
     @property
     def is_blow(self) -> bool:
         """Return True if strings set out with speeds."""
         return self.strikes and self.shape in ("gaussian", "raised_cosine")
-
-    def release_s(self, velocity: float) -> float:
-        """The time in which a pluck of a velocity releases the string; 0: at once."""
-        if self.release_ms == 0 or self.release_hard_ms == 0:
-            return 0.0
-        return self.release_ms / 1000 * (self.release_hard_ms / self.release_ms) ** self._share(velocity)
-
-    def _share(self, velocity: float) -> float:
-        low, high = VELOCITIES
-        return float(min(1.0, max(0.0, (velocity - low) / (high - low))) ** (4**-self.curve))
 
 
 class Pickup(Value):

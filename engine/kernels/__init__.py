@@ -2,6 +2,8 @@
 
     memory     pointers, fences, and what is published to another thread
     layout     what lies where in a voice, a program and a mixer
+    strings, recorded, rotation, pulses, velocities
+               laws of physics: plain functions, which Python calls as they are
     tension    a voice of latents that share one tension: the model of every string
     lanes      its inner loops, as vector instructions
     truth      a voice of the solved string

@@ -25,7 +25,7 @@ from numba import carray, njit
 from engine.kernels import constants as of
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import address_of, attack_at, behind, player_at, pointer, table_at
+from engine.kernels.memory import address_of, attack_at, behind, mixed, player_at, pointer, table_at
 from engine.kernels.records import ATTACK, Attack, Noise, Player, Table
 
 HEADER = ATTACK.itemsize // 8
@@ -39,15 +39,6 @@ HIGHEST_SHARE = 0.4  # of the rate: the middle of a band
 # 122, 2007. Its pitch is that of the windings that pass; wires of 0.4 mm are an estimate
 WINDINGS_M, LOWEST_SLIDE_HZ = 2_500.0, 200.0
 LEFT_DB = -80.0  # of the burst as it ends
-
-
-@njit(**COMPILED)
-def _mixed(number: int) -> int:
-    """A number with all bits mixed (splitmix64)."""
-    mixed = np.uint64(number) * np.uint64(0x9E3779B97F4A7C15)
-    mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return int(np.int64(mixed ^ (mixed >> np.uint64(31))))
 
 
 @njit(**COMPILED)
@@ -109,7 +100,7 @@ def touch(
     lasts = attack_frames / 3 + 1 / (1 - shrinks * shrinks)
     noise.frame = frame
     noise.done, noise.stops = 0, 0
-    noise.seed = _mixed((stroke * of.KEYS + key) * 2 + which + 1)
+    noise.seed = mixed((stroke * of.KEYS + key) * 2 + which + 1)
     noise.pulse = math.sqrt(share * energy / (0.375 * pulse_frames))
     noise.pulse_frames = pulse_frames
     noise.burst = math.sqrt((1 - share) * energy / (passed * lasts))
@@ -210,7 +201,7 @@ def _run(
     x1, x2, y1, y2 = past[0], past[1], past[2], past[3]
     seed, done, stops = noise.seed, noise.done, noise.stops
     for frame in range(begin, end):
-        x = math.sqrt(3.0) * float(_mixed(seed + done) >> 11) / 2.0**52
+        x = math.sqrt(3.0) * float(mixed(seed + done) >> 11) / 2.0**52
         y = b0 * (x - x2) - a1 * y1 - a2 * y2
         x1, x2, y1, y2 = x, x1, y, y1
         force = burst * y * ((done + 0.5) / attack_frames if done < attack_frames else envelope)

@@ -18,11 +18,12 @@ import numpy as np
 from numba import njit
 
 from engine import bounds
+from engine.kernels import pulses
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import behind, drum_at
 from engine.kernels.records import DRUM as DRUM_BLOCK
 from engine.kernels.records import DRUM_ROWS
-from engine.levels import FULL_SCALE_PA
+from engine.levels import FULL_SCALE_PA, MOST_PERIODS
 
 HEADER = DRUM_BLOCK.itemsize // 8
 
@@ -48,6 +49,7 @@ BEYOND_THE_END = 0.6133  # of a radius
 LEAST_VOLUME = 1e-6  # square of a mode's mean, below which it moves no column
 TUNINGS, NEAR = 6, 1e-4  # rounds of a secant method, and of a frequency, where it ends
 LOW_HZ, LOW_MODES = 3.0, 6  # among which a pitch is: below so many times the lowest, without air
+HERTZ = -0.2  # power of the speed in the time of contact
 J01 = 2.404825557695773  # the first zero of J₀
 
 
@@ -471,6 +473,34 @@ def struck(
         out[mode] = (
             shape(drum, found, mode, x, y, tools) * spread(found[Z, mode] / size(drum) * radius_m, tools) * scale
         )
+
+
+@njit(**COMPILED)
+def blow(
+    squares: np.ndarray,
+    struck: np.ndarray,
+    contact_s: float,
+    masses_kg: tuple[float, float],
+    speed: float,
+    out: np.ndarray,
+) -> None:
+    """Speeds (modes,) that a mallet's blow gives, see `engine.strike`.
+
+    Args:
+        squares, struck: ω², and what 1 N s at once gives, (modes,).
+        contact_s: the time of contact at 1 m/s.
+        masses_kg: of each mode, and of the mallet.
+    """
+    lowest, energy = np.inf, 0.0
+    for mode in range(len(out)):
+        lowest = min(lowest, squares[mode])
+    contact_s = min(contact_s * max(speed, 1e-3) ** HERTZ, MOST_PERIODS * 2 * math.pi / math.sqrt(lowest))
+    for mode in range(len(out)):
+        out[mode] = struck[mode] * pulses.spectrum(math.sqrt(squares[mode]) * contact_s / (2 * math.pi))
+        energy += 0.5 * masses_kg[0] * out[mode] ** 2
+    impulse = speed / (energy + 0.5 / masses_kg[1])
+    for mode in range(len(out)):
+        out[mode] *= impulse
 
 
 @njit(**COMPILED)

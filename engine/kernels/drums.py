@@ -12,16 +12,15 @@ import numpy as np
 from numba import njit
 
 from engine.kernels import constants as of
+from engine.kernels import drum_modes, loudness, velocities
 from engine.kernels import layout as at
-from engine.kernels import loudness
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import address_of, behind, drum_at, matrix, reals, wholes
 from engine.kernels.modes import TOO_HIGH
 from engine.kernels.playing import channels, slots
 from engine.kernels.records import DRUM, DRUM_ROWS, Drum, Event, Note, Player, Table
-from engine.levels import MOST_PERIODS, RUNAWAY_FACTOR
+from engine.levels import RUNAWAY_FACTOR
 
-HERTZ = -0.2  # power of the speed in the time of contact, as in `engine.strike`
 FIRM_S = 0.004  # in which a stick touches a skin at 1 m/s: what touches for as long has the hardness 1
 MOST_HARDER = 2.0  # the hardness of any other
 HEADER = DRUM.itemsize // 8
@@ -51,14 +50,13 @@ def rows_of(drum: Drum) -> np.ndarray:
 @njit(**COMPILED)
 def _speed(drum: Drum, share: float) -> float:
     """The speed of a mallet at a share of the velocities, in m/s."""
-    return drum.softest_m_s * (drum.hardest_m_s / drum.softest_m_s) ** share
+    return velocities.between(drum.softest_m_s, drum.hardest_m_s, share)
 
 
 @njit(**COMPILED)
 def _speed_of(player: Player, drum: Drum, velocity: float) -> float:
     """The speed of a mallet at a velocity, by the instrument's curve, in m/s."""
-    curve = player.values[of.CURVE]
-    return _speed(drum, min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve))
+    return _speed(drum, velocities.share(velocity, player.values[of.CURVE]))
 
 
 @njit(**COMPILED)
@@ -71,25 +69,9 @@ def contact_of(player: Player, table: Table, key: int, velocity: float) -> tuple
 
 @njit(**COMPILED)
 def _blow(drum: Drum, struck: np.ndarray, speed: float, out: np.ndarray) -> None:
-    """The speeds (modes,) that a blow gives; `struck`: those that 1 N s gives. As `engine.strike.Strike.speeds`."""
-    squares, energy = rows_of(drum)[SQUARE], 0.0
-    lowest = squares[0]
-    for mode in range(drum.modes):
-        lowest = min(lowest, squares[mode])
-    contact_s = drum.contact_s * max(speed, 1e-3) ** HERTZ
-    contact_s = min(contact_s, MOST_PERIODS * 2 * math.pi / math.sqrt(lowest))
-    for mode in range(drum.modes):
-        turns = math.sqrt(squares[mode]) * contact_s / (2 * math.pi)
-        pulse = 0.5
-        if turns < 1e-6:
-            pulse = 1.0
-        elif abs(turns - 1) > 1e-6:
-            pulse = math.sin(math.pi * turns) / (math.pi * turns * (1 - turns * turns))
-        out[mode] = struck[mode] * pulse
-        energy += 0.5 * drum.mass_kg * out[mode] ** 2
-    impulse = speed / (energy + 0.5 / drum.mallet_kg)
-    for mode in range(drum.modes):
-        out[mode] *= impulse
+    """The speeds (modes,) that a blow gives; `struck`: those that 1 N s gives."""
+    masses_kg = drum.mass_kg, drum.mallet_kg
+    drum_modes.blow(rows_of(drum)[SQUARE], struck, drum.contact_s, masses_kg, speed, out[: drum.modes])
 
 
 @njit(**COMPILED)

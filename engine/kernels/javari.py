@@ -43,6 +43,7 @@ from engine.kernels import lanes, strings, tension, truth
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.modes import damped, following, row
+from engine.kernels.rotation import rotation
 
 PHASE, MOST_STEPS = 0.15, 6
 
@@ -120,11 +121,9 @@ def _prepare(voice: np.ndarray, step_s: float) -> None:
     shapes, given, speeds = row(voice, n, at.JAVARI), row(voice, n, at.GIVEN), row(voice, n, at.GIVEN_SPEED)
     for mode in range(n):
         sigma = row(voice, n, at.SIGMA)[mode]
-        omega = damped(row(voice, n, at.OMEGA_SQUARED)[mode], sigma)
-        decay, sine = math.exp(-sigma * step_s), math.sin(omega * step_s) / omega
-        left, part = decay * (math.cos(omega * step_s) + sigma * sine), shapes[mode] / voice[at.JAVARI_MASS]
-        given[mode] = part * (1 - left) / (omega * omega + sigma * sigma)
-        speeds[mode] = part * decay * sine
+        omega, part = damped(row(voice, n, at.OMEGA_SQUARED)[mode], sigma), shapes[mode] / voice[at.JAVARI_MASS]
+        left, moved, _, _ = rotation(sigma, omega, step_s)
+        given[mode], speeds[mode] = part * (1 - left) / (omega * omega + sigma * sigma), part * moved
         give += shapes[mode] * given[mode]
     voice[at.JAVARI_GIVE] = give
 

@@ -197,3 +197,12 @@ def publish(slots: np.ndarray, slot: int, whole: int) -> None:
     fence()
     slots[slot] = whole
     fence()
+
+
+@njit(**COMPILED)
+def mixed(number: int) -> int:
+    """A number with all bits mixed (splitmix64): noise, the same for the same numbers."""
+    bits = np.uint64(number) * np.uint64(0x9E3779B97F4A7C15)
+    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return int(np.int64(bits ^ (bits >> np.uint64(31))))

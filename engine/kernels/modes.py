@@ -15,6 +15,7 @@ from numba import carray, njit
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import fence, matrix, part, pointer
+from engine.kernels.rotation import rotation
 
 TOO_HIGH = 3.0  # rad a frame: a mode that is raised beyond is laid to rest, for it would sound as another
 
@@ -71,11 +72,49 @@ def run_up(voice: np.ndarray, seconds: float) -> None:
     q, v, squares = row(voice, n, 0), row(voice, n, 1), row(voice, n, at.OMEGA_SQUARED)
     for m in range(n):
         sigma = row(voice, n, at.SIGMA)[m] + row(voice, n, at.BRIDGE)[m]
-        omega = damped(squares[m], sigma)
-        decay, cosine, sine = math.exp(-sigma * seconds), math.cos(omega * seconds), math.sin(omega * seconds) / omega
-        amplitude, speed = q[m], v[m]
-        q[m] = decay * ((cosine + sigma * sine) * amplitude + sine * speed)
-        v[m] = decay * ((cosine - sigma * sine) * speed - (sigma * sigma + omega * omega) * sine * amplitude)
+        qq, qv, vq, vv = rotation(sigma, damped(squares[m], sigma), seconds)
+        q[m], v[m] = qq * q[m] + qv * v[m], vq * q[m] + vv * v[m]
+
+
+@njit(**COMPILED)
+def rest_silent(q: np.ndarray, v: np.ndarray, squares: np.ndarray, moving: int, silence: float) -> tuple[int, float]:
+    """Lay the highest modes to rest whose amplitude is below a share of that of all.
+
+    Returns how many are left, and Σ q² + v²/ω² of all, squares being ω².
+    """
+    total = 0.0
+    for m in range(moving):
+        total += q[m] * q[m] + v[m] * v[m] / squares[m]
+    while moving > 1:
+        m = moving - 1
+        if not q[m] * q[m] + v[m] * v[m] / squares[m] < silence * silence * total:  # so that NaN is kept
+            break
+        q[m] = v[m] = 0.0
+        moving = m
+    return moving, total
+
+
+@njit(inline="always", **COMPILED)
+def turn(
+    q: np.ndarray,
+    v: np.ndarray,
+    moving: int,
+    flow: np.ndarray,
+    kick: float,
+    coupling: np.ndarray,
+    stretches: np.ndarray,
+) -> float:
+    """A kick of the tension, then the exact turn of each mode by `flow`, (4, modes), see `rotation`; the stretch."""
+    qq, qv, vq, vv = flow[0], flow[1], flow[2], flow[3]
+    stretch = 0.0
+    for m in range(moving):
+        amplitude = q[m]
+        speed = v[m] - kick * coupling[m] * amplitude
+        turned = qq[m] * amplitude + qv[m] * speed
+        q[m] = turned
+        v[m] = vq[m] * amplitude + vv[m] * speed
+        stretch += stretches[m] * turned * turned
+    return stretch
 
 
 @njit(**COMPILED)

@@ -26,7 +26,7 @@ from engine.kernels import layout as at
 from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import player_at, pointer, table_at
-from engine.kernels.playing.keys import chosen, string_of
+from engine.kernels.playing.keys import string_of
 from engine.kernels.records import Player, Table
 
 HIGHEST_HZ = 4_000.0  # of partials: an estimate, above it boards pass hardly anything to other strings
@@ -142,7 +142,7 @@ def sympathise(player_address: int, mixer_address: int) -> None:
         if not everyone:
             string = note.string
             if string < 0:
-                string = chosen(table, table.strings, note.key)
+                string = strings.chosen(table.open, table.strings, note.key)
         for n in range(count):
             if bank.owner[n] == string:
                 played[n] = 1.0

@@ -14,10 +14,9 @@ from numba import njit
 from engine.kernels import lanes
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.modes import damped, following, glide, gliding, rest_above, row
+from engine.kernels.modes import damped, following, glide, gliding, rest_above, rest_silent, row
+from engine.kernels.scheme import ENERGY_BOUND, HARDEST_KICK, MOST_NODES
 
-ENERGY_BOUND = 1.5  # of the energy at the start, as in the model
-HARDEST_KICK, MOST_NODES = 0.3, 3  # as in the model
 NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller change is the last
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
 UNFELT = 5e-6  # of S, on average: a mode that adds less rests, and adds its average
@@ -198,21 +197,6 @@ def _needs_fewer_nodes(voice: np.ndarray, program: np.ndarray) -> bool:
     for m in range(counts[at.MOVING]):
         kick += stretches[m] * couplings[m] * (x[m] * x[m] + y[m] * y[m])
     return _nodes(voice, program, kick) < counts[at.STEPS]
-
-
-@njit(**COMPILED)
-def _rest_silent(voice: np.ndarray, silence: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Lays the highest modes to rest that are silent as it sets out."""
-    counts = voice.view(np.int64)
-    squares, moving, total = row(voice, counts[at.MODES], at.OMEGA_SQUARED), counts[at.MOVING], 0.0
-    for m in range(moving):
-        total += q[m] * q[m] + v[m] * v[m] / squares[m]
-    while moving > 1:
-        m = moving - 1
-        if not q[m] * q[m] + v[m] * v[m] / squares[m] < silence * silence * total:
-            break
-        moving -= 1
-    counts[at.MOVING] = moving
 
 
 @njit(**COMPILED)
@@ -492,7 +476,8 @@ def bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
         if gliding(voice):
             glide(voice)
         if counts[at.JAVARI_STEPS] == 0:  # whose contact wakes them
-            _rest_silent(voice, program[at.S_SILENCE], q, v)
+            silence, own = program[at.S_SILENCE], row(voice, n, at.OMEGA_SQUARED)
+            counts[at.MOVING], _ = rest_silent(q, v, own, counts[at.MOVING], silence)
     prepare(voice, program, q, v)
     for m in range(counts[at.MOVING], n):
         q[m] = v[m] = 0.0

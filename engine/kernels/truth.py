@@ -12,7 +12,9 @@ from numba import njit
 
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.modes import damped, glide, gliding, rest_above, row
+from engine.kernels.memory import matrix
+from engine.kernels.modes import damped, glide, gliding, rest_above, rest_silent, row, turn
+from engine.kernels.rotation import rotation
 
 
 @njit(**COMPILED)
@@ -31,7 +33,7 @@ def _sub_steps(voice: np.ndarray, program: np.ndarray) -> int:
 
 @njit(**COMPILED)
 def _prepare(voice: np.ndarray, program: np.ndarray, sub_steps: int) -> None:
-    """The exact damped rotations between kicks, as `engine.truth.linear.damped_rotation`, of half the palindrome."""
+    """The exact damped rotations between kicks, of half the palindrome."""
     counts = voice.view(np.int64)
     n = counts[at.MODES]
     squares, sigmas = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.SIGMA)
@@ -41,14 +43,7 @@ def _prepare(voice: np.ndarray, program: np.ndarray, sub_steps: int) -> None:
         qq, qv = row(voice, n, first), row(voice, n, first + 1)
         vq, vv = row(voice, n, first + 2), row(voice, n, first + 3)
         for m in range(n):
-            sigma, omega = sigmas[m], damped(squares[m], sigmas[m])
-            decay, cosine, sine = (
-                math.exp(-sigma * time_s),
-                math.cos(omega * time_s),
-                math.sin(omega * time_s) / omega,
-            )
-            qq[m], qv[m] = decay * (cosine + sigma * sine), decay * sine
-            vq[m], vv[m] = -decay * (sigma * sigma + omega * omega) * sine, decay * (cosine - sigma * sine)
+            qq[m], qv[m], vq[m], vv[m] = rotation(sigmas[m], damped(squares[m], sigmas[m]), time_s)
     counts[at.STEPS], counts[at.PREPARED], voice[at.JAVARI_GIVE] = sub_steps, 1, 0.0
 
 
@@ -103,16 +98,7 @@ def hear(voice: np.ndarray, program: np.ndarray, frame: int, fading: bool, heard
                     found += w[m] * q[m]
                 out[2 * which + point, frame] = found
     if frame % 16 == 0:
-        total = 0.0
-        for m in range(moving):
-            total += q[m] * q[m] + v[m] * v[m] / squares[m]
-        while moving > 1:
-            m = moving - 1
-            if not q[m] * q[m] + v[m] * v[m] / squares[m] < silence * silence * total:
-                break
-            q[m] = v[m] = 0.0
-            moving = m
-        counts[at.MOVING] = moving
+        counts[at.MOVING], total = rest_silent(q, v, squares, moving, silence)
         voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.T_LOUDNESS]
 
 
@@ -128,17 +114,8 @@ def ring(voice: np.ndarray, program: np.ndarray, sub_steps: int, count: int) -> 
         stretch = 0.0
         for stage in range(at.STAGES if sub_steps else 1):
             kick = program[at.T_KICKS + stage - 1] * step_s * stretch if stage > 0 else 0.0
-            flow = at.state(n) + (at.FOLLOWING + 4 * min(stage, at.STAGES - 1 - stage)) * n
-            qq, qv = voice[flow : flow + n], voice[flow + n : flow + 2 * n]
-            vq, vv = voice[flow + 2 * n : flow + 3 * n], voice[flow + 3 * n : flow + 4 * n]
-            stretch = 0.0
-            for m in range(moving):
-                amplitude = q[m]
-                speed = v[m] - kick * couplings[m] * amplitude
-                turned = qq[m] * amplitude + qv[m] * speed
-                q[m] = turned
-                v[m] = vq[m] * amplitude + vv[m] * speed
-                stretch += stretches[m] * turned * turned
+            first = at.state(n) + (at.FOLLOWING + 4 * min(stage, at.STAGES - 1 - stage)) * n
+            stretch = turn(q, v, moving, matrix(voice, first, 4, n), kick, couplings, stretches)
 
 
 @njit(**COMPILED)

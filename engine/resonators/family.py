@@ -54,10 +54,9 @@ class StringFamily:
         The error of a model grows where high modes ring longer than in the training. With pitch, inharmonicity and
         the decay of the first mode it does not, as measured in `docs/many-strings.md`.
         """
-        sigma, omega = (float(rates[0]) for rates in (string.decay_rates(1), string.undamped_frequencies(1)))
-        pitch_hz = math.sqrt(max(0.0, omega**2 - sigma**2)) / (2 * math.pi)
+        sigma, pitch_hz = string.decay_rate(1), string.pitch_hz
         bright = max(2, round(BRIGHT_HZ / max(pitch_hz, 1.0)))
-        bright_t60_s = math.log(1000) / max(float(string.decay_rates(bright)[-1]), 1e-9)
+        bright_t60_s = math.log(1000) / max(string.decay_rate(bright), 1e-9)
         facts = (
             ("pitch", pitch_hz, self.pitch_hz, " Hz", False),
             ("inharmonicity", inharmonicity(string), self.inharmonicity, "", False),

@@ -12,13 +12,12 @@ weighted by the energies of tension and of bending. The bridge's share is in `en
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from engine import bounds
-from engine.kernels.constants import AIR_DENSITY_KG_M3, AIR_VISCOSITY_PA_S
+from engine.kernels.strings import loss
 from engine.resonators.base import Array
 from engine.resonators.string import StringParameters
 
@@ -49,10 +48,5 @@ class Losses:
         Args:
             decay, brightness_decay: factors of the losses to the air, and of those inside the string.
         """
-        omega, eta = string.undamped_frequencies(partials), string.wavenumbers(partials)
-        diameter_m = 2 * math.sqrt(string.area_m2 / math.pi)
-        drag = np.sqrt(math.pi * AIR_VISCOSITY_PA_S * AIR_DENSITY_KG_M3 * omega / (2 * math.pi))
-        air = math.pi * (AIR_VISCOSITY_PA_S + diameter_m * drag) / string.mass_per_length_kg_m
-        bent = string.youngs_modulus_pa * string.second_moment_m4 * eta**2
-        inside = (string.tension_n * self.friction + bent * self.bending) / (string.tension_n + bent)
-        return decay * self.air * air + brightness_decay * 0.5 * omega * inside
+        factors = decay * self.air, brightness_decay * self.friction, brightness_decay * self.bending
+        return loss(string.row, np.arange(1.0, partials + 1), *factors)

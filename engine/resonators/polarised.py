@@ -8,7 +8,10 @@ The bridge treats the directions differently. A conductance G at the end of a st
 a round trip of 2ℓ/c leaves 1 - 2 Z G of a wave, with Z = T/c (Fletcher and Rossing, "The Physics of Musical
 Instruments", section 2.12). Along the board it is stiffer: that motion rings longer, and two-stage decay follows
 (G. Weinreich, "Coupled piano strings", JASA 62, 1977; J. Woodhouse, "A necessary condition for double-decay
-envelopes in stringed instruments", JASA 150, 2021). Slightly different frequencies beat.
+envelopes in stringed instruments", JASA 150, 2021). Slightly different frequencies beat. The lowest `MOST_PAIRS`
+partials have two modes; above them neither beats nor stages are heard, which is an estimate.
+
+`engine.kernels.strings.rows` has the modes: pairs, then single ones.
 """
 
 from __future__ import annotations
@@ -16,15 +19,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from engine import bounds
-from engine.kernels.constants import HIGHEST_SIGMA, MOST_PAIRS
-from engine.resonators.base import Array, Resonator
-from engine.resonators.string import StringParameters
-
-PAIRS = MOST_PAIRS  # lowest partials that have two modes; an estimate: above them neither beats nor stages are heard
 
 
 @dataclass(frozen=True)
@@ -65,60 +60,3 @@ class Polarisations:
     def detuning(self) -> float:
         """ω² of the second over that of the first."""
         return float(2 ** (2 * self.second_cents / 1200))
-
-    def resonator(
-        self,
-        string: StringParameters,
-        partials: int,
-        *,
-        losses: float = 1.0,
-        tension_modulated: bool = True,
-        grid_points: int = 101,
-    ) -> Resonator:
-        """The string's first partials: pairs of modes, then single ones.
-
-        Args:
-            losses: factor of the bridge's conductances.
-
-        Raises:
-            ValueError: the grid does not hold so many partials.
-        """
-        law = string.resonator(partials, tension_modulated=tension_modulated, grid_points=grid_points)
-        partial, second = layout(partials)
-        pulled, heard = (np.array(each)[second] for each in (self.pulled, self.heard))
-        single = np.arange(len(partial)) >= 2 * min(PAIRS, partials)
-        pulled = np.where(single, 1 / self.heard[0], pulled)  # so that it is heard as the others are
-        omega, sigma = self._rates(string, partials, losses)
-        assert law.end_force is not None and law.mirror is not None and law.analysis is not None
-        return Resonator(
-            omega=omega,
-            sigma=sigma,
-            coupling=law.coupling[partial],
-            stretch=law.stretch[partial],
-            tension_rise=law.tension_rise,
-            shapes=law.shapes[partial] * heard[:, None],
-            analysis=law.analysis[:, partial] * pulled,
-            mirror=law.mirror[partial],
-            end_force=law.end_force[partial] * heard,
-        )
-
-    def _rates(self, string: StringParameters, partials: int, losses: float) -> tuple[Array, Array]:
-        """ω and σ of the modes."""
-        partial, second = layout(partials)
-        omega = string.undamped_frequencies(partials)[partial]
-        omega = np.where(second == 1, omega * math.sqrt(self.detuning), omega)
-        conductance = np.array([self.conductance_s_kg, self.second_conductance_s_kg])[second]
-        added = losses * string.tension_n / string.length_m * conductance
-        return omega, np.minimum(string.decay_rates(partials)[partial] + added, HIGHEST_SIGMA * omega)
-
-
-def layout(partials: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The partial, from 0, and the direction, 0 or 1, of each mode."""
-    mode, pairs = np.arange(partials + min(PAIRS, partials)), min(PAIRS, partials)
-    paired = mode < 2 * pairs
-    return np.where(paired, mode // 2, mode - pairs), np.where(paired, mode % 2, 0)
-
-
-def partials_of(modes: int) -> int:
-    """The number of partials of so many modes: the inverse of `layout`."""
-    return modes - min(PAIRS, modes // 2)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from engine import bounds
+from engine.kernels import strings as law
 from engine.resonators.base import Array, Resonator
 from engine.resonators.sine_transform import analysis_matrix, synthesis_matrix
 
@@ -46,47 +47,42 @@ class StringParameters:
         """ρA."""
         return self.density_kg_m3 * self.area_m2
 
+    @property
+    def row(self) -> tuple[float, ...]:
+        """The parameters in their order, as the laws of `engine.kernels.strings` take them."""
+        return tuple(getattr(self, field.name) for field in fields(self))
+
+    @property
+    def pitch_hz(self) -> float:
+        """The frequency of the first partial of a quiet pluck; 0 where it does not oscillate."""
+        return law.pitch_hz(self.row)
+
     def wavenumbers(self, modes: int) -> Array:
         """η_μ = μπ/ℓ in rad/m, float64 (modes,)."""
-        return np.arange(1.0, modes + 1) * (math.pi / self.length_m)
+        return law.wavenumber(self.row, _numbers(modes))
 
     def decay_rates(self, modes: int) -> Array:
         """σ_μ = (d₁ + d₃η²) / 2ρA in 1/s, float64 (modes,): a free mode decays as exp(-σt)."""
-        eta = self.wavenumbers(modes)
-        return (self.damping_d1_kg_m_s + self.damping_d3_kg_m_s * eta**2) / (2 * self.mass_per_length_kg_m)
+        return law.decay_rate(self.row, _numbers(modes))
 
     def undamped_frequencies(self, modes: int) -> Array:
         """ω_μ = √((EIη⁴ + T₀η²) / ρA) in rad/s, float64 (modes,)."""
-        eta = self.wavenumbers(modes)
-        bending = self.youngs_modulus_pa * self.second_moment_m4
-        return np.sqrt((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m)
+        return np.sqrt(law.omega_squared(self.row, _numbers(modes)))
 
     def decay_rate(self, mode: int) -> float:
         """σ of one mode, as in `decay_rates`."""
-        eta = mode * math.pi / self.length_m
-        return (self.damping_d1_kg_m_s + self.damping_d3_kg_m_s * eta**2) / (2 * self.mass_per_length_kg_m)
+        return law.decay_rate(self.row, mode)
 
     def undamped_frequency(self, mode: int) -> float:
         """ω of one mode, as in `undamped_frequencies`."""
-        eta = mode * math.pi / self.length_m
-        bending = self.youngs_modulus_pa * self.second_moment_m4
-        return math.sqrt((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m)
+        return math.sqrt(law.omega_squared(self.row, mode))
 
     def tension_coupling(self, modes: int) -> Array:
         """k_μ = EAη_μ² / 4ρA in 1/(m² s²)·m², float64 (modes,).
 
         The tension-modulated string adds the acceleration -k_μ q_μ Σ η_m² q_m² (Eq. 3-5 on modal amplitudes).
         """
-        return self.youngs_modulus_pa * self.area_m2 * self.wavenumbers(modes) ** 2 / (4 * self.mass_per_length_kg_m)
-
-    def bridge_forces(self, modes: int) -> Array:
-        """Force of each mode at amplitude 1 m on the support at x = 0, in N, float64 (modes,).
-
-        The transverse force that a stiff string exerts on its support is T₀ ∂y/∂x - EI ∂³y/∂x³ (N. H. Fletcher,
-        T. D. Rossing, "The Physics of Musical Instruments", 2nd ed., sections 2.12 and 2.18), here T₀η + EIη³.
-        """
-        eta = self.wavenumbers(modes)
-        return self.tension_n * eta + self.youngs_modulus_pa * self.second_moment_m4 * eta**3
+        return law.coupling(self.row, _numbers(modes))
 
     def resonator(self, modes: int, *, tension_modulated: bool = True, grid_points: int = 101) -> Resonator:
         """The string's first modes, on a grid of so many points with both ends.
@@ -106,23 +102,12 @@ class StringParameters:
             shapes=synthesis_matrix(grid_points, modes),
             analysis=analysis_matrix(grid_points, modes),
             mirror=np.where(np.arange(modes) % 2, -1.0, 1.0),
-            end_force=self.bridge_forces(modes),
+            end_force=law.bridge_force(self.row, _numbers(modes)),
         )
 
     def modes_below(self, frequency_hz: float) -> int:
         """The number of modes whose undamped frequency lies below `frequency_hz`."""
-        # EIη⁴ + T₀η² = ρAω², solved for η² without the difference of near numbers
-        omega = 2 * math.pi * max(0.0, frequency_hz)
-        load = self.mass_per_length_kg_m * omega**2
-        bending = self.youngs_modulus_pa * self.second_moment_m4
-        eta_squared = 2 * load / (self.tension_n + math.sqrt(self.tension_n**2 + 4 * bending * load))
-        count = math.floor(self.length_m / math.pi * math.sqrt(eta_squared))
-        # rounding may put it one beside the mode that lies at the frequency itself
-        while count > 0 and self.undamped_frequency(count) >= omega:
-            count -= 1
-        while self.undamped_frequency(count + 1) < omega:
-            count += 1
-        return count
+        return law.modes_below(self.row, frequency_hz)
 
     def check_motion(self, modes: int, grid_points: int, rate_hz: float, tension_modulated: bool) -> None:
         """Checks that its motion can be computed in ordinary memory and time, in closed form.
@@ -159,3 +144,7 @@ class StringParameters:
             )
         if modes * min(modes, substeps) > bounds.MOST_FLOWS:
             raise ValueError(f"{modes} modes with {substeps} sub-steps of the truth are too many; keep fewer modes")
+
+
+def _numbers(modes: int) -> Array:
+    return np.arange(1.0, modes + 1)

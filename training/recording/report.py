@@ -16,6 +16,7 @@ from engine.compare.relative import error_to_signal
 from engine.compare.spectra import log_spectral_distance, spectral_distances
 from training.recording.fit import LearnedNote
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, Note
+from training.recording.numbering import partial_hz
 from training.recording.physics import Physics
 
 Array = NDArray[np.float64]
@@ -108,7 +109,7 @@ def partials_in(learned: LearnedNote, physics: Physics) -> tuple[PartialReport, 
     found = []
     for number in sorted(spreads):
         each = spreads[number]
-        law = number * physics.f0_hz * math.sqrt(1 + physics.stiffness * number**2)
+        law = partial_hz(number, physics.f0_hz, physics.stiffness)
         hz = sum(each.hz) / 2
         low, high = each.level_db
         decay = math.sqrt(each.decay[0] * each.decay[1])

@@ -44,7 +44,7 @@ def _move(
     count, mode = table.strings, table.mode
     pitch_hz, string = keys.pitch_of(table, key), note.string
     if count > 0 and string < 0:
-        string = keys.chosen(table, count, note.key)
+        string = strings.chosen(table.open, count, note.key)
     if pitch_hz <= 0.0 or (count > 0 and key < table.open[string].note):
         return False
     modes, _ = keys.string_of(player, table, key, string, pitch_hz, False, player.own)

@@ -13,7 +13,7 @@ from numba import njit
 
 from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
-from engine.kernels import contact, drums, recorded, strings
+from engine.kernels import contact, drums, recorded, strings, velocities
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import clear, copy, fence, reals, wholes
@@ -200,7 +200,7 @@ def _identify(player: Player, table: Table, event: Event, member: int, note: Not
     note.place, note.string = channels.place_of(player, table, event), -1
     if note.place % 256 == 0 and table.strings > 0:
         string = note.place // 256 - 1
-        if keys.chosen(table, table.strings, note.key) != string:
+        if strings.chosen(table.open, table.strings, note.key) != string:
             note.string = string
     note.place += MEMBERS_APART * member
     note.octave = member > 0 and keys.has_octave(table, note.key, note.string)
@@ -230,24 +230,24 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
     """The pluck of a note by its velocity, or by hand, as amplitudes of its modes in the player."""
     shortened = note.shortened
     curve, soft = keys.value_of(player, table, of.CURVE), keys.value_of(player, table, of.SOFTEST_MM)
-    share = min(max((note.velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve)
+    share = velocities.share(note.velocity, curve)
     harder = keys.value_of(player, table, of.HARDEST_MM) / soft
     amplitude_mm = min(soft * harder**share * shortened, LARGEST_AMPLITUDE_MM)
     if note.by_hand != 0:
         amplitude_mm = min(event.amplitude_mm, LARGEST_AMPLITUDE_MM)
         if harder != 1.0:
             share = min(max(math.log(amplitude_mm / soft / shortened) / math.log(harder), 0.0), 1.0)
-    note.strength = harder ** (share - ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0**-curve))
+    note.strength = harder ** (share - velocities.share(of.REFERENCE_VELOCITY, curve))
     note.hardness = 1.0
-    width = keys.value_of(player, table, of.WIDTH)
-    width *= (keys.value_of(player, table, of.WIDTH_HARD) / width) ** share
+    widths = keys.value_of(player, table, of.WIDTH), keys.value_of(player, table, of.WIDTH_HARD)
+    width = velocities.between(widths[0], widths[1], share)
     position, slide = keys.value_of(player, table, of.POSITION), player.channels[note.channel].slide
     if note.by_hand != 0:
         position, width = event.position, event.width
     elif table.mode == of.MPE and slide >= 0:
         position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
     turned, varies, softest_ms = 0.0, table.variation, keys.value_of(player, table, of.CONTACT_MS)
-    release_s = plucks.contact_s(softest_ms, keys.value_of(player, table, of.CONTACT_HARD_MS), share)
+    release_s = velocities.contact_s(softest_ms, keys.value_of(player, table, of.CONTACT_HARD_MS), share)
     if varies > 0.0:
         note.stroke = player.age
         if note.by_hand == 0:
@@ -263,9 +263,9 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
     note.highest_m = plucks.pull(player, table, shape, note.modes, position, amplitude_mm / 1000, width)
     plucks.release_pluck(player, table, note.own, note.modes, release_s)
     if table.recorded != 0:
-        note.modes = recorded.modes_of(table, note.modes)
+        note.modes = keys.modes_of(table, note.modes)
         note.pairs = (note.modes + 1) // 2
-        recorded.split(table, note.own, note.modes, player.amplitudes[: note.modes])
+        recorded.split(keys.additions(table), note.own, note.modes, player.amplitudes[: note.modes])
     else:
         note.pairs = plucks.split(player, table, note.modes, turned)
         note.modes += note.pairs

@@ -80,7 +80,7 @@ def fill(
     if note.touched > 0:
         strings.touch(string, note.modes, note.pairs, note.touched, out)
     if table.recorded != 0:
-        recorded.correct(table, string, note.modes, out)
+        recorded.correct(keys.additions(table), string, note.modes, out)
     strings.stand(
         string,
         note.modes,

@@ -19,7 +19,8 @@ from engine.presets import find_string, load_preset, read_string
 from engine.resonators.sine_transform import project, to_grid, to_modes
 from engine.resonators.string import StringParameters
 from engine.sources import ModelSource, TruthSource
-from engine.truth import ModalState, solve_linear
+from engine.truth import ModalState
+from tests.engine.tensors import solve_linear
 
 
 def simulate(u0: Path, out: Path, string: str = "linear", steps: int = 200, modes: int = 10, *more: Any) -> list[Any]:

@@ -15,7 +15,7 @@ import json
 import threading
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import astuple, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,21 +26,16 @@ from app.instrument import events
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.string_keys import StringKeys, on_string
-from app.instrument.table import PLAYED_PARAMETERS, Tail, put_recorded
+from app.instrument.table import PLAYED_PARAMETERS
 from app.patches.library import find_patch, read_patch
 from app.patches.patch import Losses, Noise, Patch, Pickup, Polarisations
 from app.patches.tuning import TuningChoice
 from engine.kernels import constants as of
 from engine.kernels import layout as at
 from engine.kernels.layout import QUANTUM
-from engine.kernels.recorded import correct
-from engine.kernels.records import TABLE
 from engine.pluck import SHAPES, Pluck, Shape
 from engine.presets import Preset
-from engine.resonators.string import StringParameters
 from engine.voices import Mixer
-from engine.voices.player import record_of
-from tests.app.instrument.loud import LoudKeys
 from tests.app.instrument.seen import sounding
 from tests.engine.resonators.test_recorded import recorded
 
@@ -213,19 +208,6 @@ def test_a_string_learned_from_a_recording_has_its_own_modes(
     pickup = Pickup(points=shipped[name].pickup.points, kind=kind)
     patch, other = (changed(shipped[each], pickup=pickup) for each in (name, "kora"))
     assert compared(f"recorded {name} {seed}", patch, learned, drawn(patch, other, seed, 0.4), 400) < CLOSE
-
-
-@pytest.mark.parametrize("semitones", [-14, -5, -2, 0, 1, 4, 12])
-def test_the_kernels_have_the_modes_of_a_recorded_string_at_every_pitch(semitones: int) -> None:
-    own = replace(recorded(), smooth_hz=(50.0, 1e3, 5e3), smooth_ratio=(1.5, 2.5, 0.8))
-    string = replace(StringParameters(), length_m=StringParameters().length_m / 2 ** (semitones / 12))
-    modes, law = own.resonator(string, 10), string.resonator(5)
-    rows = np.concatenate([np.repeat(law.omega, 2) ** 2, np.repeat(law.sigma, 2), np.zeros(20)])
-    header, tail = np.zeros(1, TABLE), Tail()
-    put_recorded(header[0], tail, own, 101)
-    table = np.concatenate([header.view(np.float64), *tail.parts])
-    correct(record_of(table, TABLE), np.array(astuple(string)), 10, rows)
-    np.testing.assert_allclose(rows[:20], np.concatenate([modes.omega**2, modes.sigma]), rtol=1e-12)
 
 
 def test_cancel_leaves_what_has_begun(shipped: dict[str, Patch], preset: Preset) -> None:
@@ -409,7 +391,8 @@ def test_reports_say_what_was_plucked(shipped: dict[str, Patch], preset: Preset)
     patch = changed(shipped["fretless_bass"], mod_wheel="none")
     stage, played = Compiled(patch, preset), drawn(patch, shipped["koto"], 9, 0.2)
     struck = [(frame, each) for frame, each in played if isinstance(each, NoteOn)]
-    keys = LoudKeys(patch, stage.player.ear, preset.info)
+    keys = stage.player.keys
+    assert isinstance(keys, StringKeys)
     for frame, event in struck:
         stage.handle(event, frame)
     rendered(stage, (), 200)
@@ -418,11 +401,12 @@ def test_reports_say_what_was_plucked(shipped: dict[str, Patch], preset: Preset)
     for report, (frame, event) in zip(reports, struck, strict=True):
         assert (report.key, report.channel, report.velocity) == (event.key, event.channel, event.velocity)
         assert report.frame == frame
-        found = keys.of_key(event.key, report.string if report.string >= 0 else None)
+        found = keys.string_of(event.key, report.string if report.string >= 0 else None)
         assert found is not None
-        assert report.parameters == found.string.parameters and report.modes == found.resonator.modes
-        assert report.gain == pytest.approx(found.gain, rel=1e-9)
-        pluck = on_string(found.string, patch.pluck.pluck(event.velocity))
+        assert report.parameters == found.parameters
+        pairs = min(of.MOST_PAIRS, found.modes) if patch.polarisations else 0
+        assert report.modes == found.modes + pairs and report.gain > 0
+        pluck = on_string(found, patch.pluck.pluck(event.velocity))
         plucked = report.position, report.amplitude_mm
         assert plucked == pytest.approx((pluck.position, pluck.amplitude_mm), rel=1e-12)
         if pluck.shape != "triangular":

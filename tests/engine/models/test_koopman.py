@@ -11,8 +11,8 @@ from engine.models.base import Physics, count_parameters
 from engine.models.configurations import KoopmanConfiguration
 from engine.models.koopman import SHARPEST, Koopman
 from engine.resonators.string import StringParameters
-from engine.truth import ModalState, solve_linear
-from tests.engine.tensors import listening_weights, to_grid
+from engine.truth import ModalState
+from tests.engine.tensors import listening_weights, solve_linear, to_grid
 
 REFERENCE = Path(__file__).parent / "references" / "koopman.npz"
 PHYSICS = Physics(StringParameters().resonator(10), 4_000)

@@ -12,8 +12,8 @@ from engine.models.lru import LRU
 from engine.models.s5 import S5
 from engine.models.ssm import Block, SSMString, evolve, recur
 from engine.resonators.string import StringParameters
-from engine.truth import ModalState, solve_linear
-from tests.engine.tensors import listening_weights, to_grid
+from engine.truth import ModalState
+from tests.engine.tensors import listening_weights, solve_linear, to_grid
 
 PHYSICS = Physics(StringParameters().resonator(10, grid_points=21), 4_000)
 NAMES = ("lru", "s5")
