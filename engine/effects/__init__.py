@@ -2,7 +2,8 @@
 
 None of them has part in any error or comparison.
 
-impulse    an impulse response as a value: checked, at another rate, as loud as what it is given
+impulse    an impulse response as a value that is checked
+responses  what `engine.kernels` computes, with memory for it
 amp        an amplifier, whose cabinet is a body
 body       from the modes of an instrument's body, or from a response that is given
 body_table seventeen bodies: their modes, with sources

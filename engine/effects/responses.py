@@ -94,7 +94,7 @@ def powers_of(body: Response, room: Response, rate_hz: float) -> NDArray[np.floa
 
 
 def weights_of(powers: NDArray[np.float64], body_mix: float, room_mix: float) -> NDArray[np.float64]:
-    """The weights (4,) of what is heard: nothing, body, room, and both in series."""
+    """The weights (4,) of the parts of a mix: nothing, body, room, and both in series."""
     found = np.empty(4)
     responses.weigh(powers, float(body_mix), float(room_mix), found)
     return found

@@ -25,8 +25,8 @@ from engine.kernels.fourier import ONE, fill_circle, forward, row, transform
 from engine.kernels.memory import fence, pointer
 
 _SUMMING = at.WINDOW_QUANTA - 3  # quanta: one transforms the input, two transform back
-FADE_S = 0.020  # at least: the way from one response to another, in whole windows
 _SHARE = -(-(at.WINDOW + 1) // _SUMMING)  # frequencies in each
+FADE_S = 0.020  # at least: the way from one response to another, in whole windows
 
 
 @njit(**COMPILED)
@@ -327,7 +327,7 @@ def late_partitions(frames: int) -> int:
 
 @njit(**COMPILED)
 def early_partitions(frames: int) -> int:
-    """Those of a quantum's length before them."""
+    """The partitions of a quantum's length before them."""
     return min(at.EARLY, (frames + at.QUANTUM - 1) // at.QUANTUM)
 
 

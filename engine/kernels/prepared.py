@@ -86,12 +86,8 @@ def prepare(
     wide = width(body, rate_hz, size, t60_s)
     work = matrix(memory, 0, ROWS, wide)
     fill_circle(work[COSINES], work[SINES])
-    own, frames, room_frames = (
-        body_frames(body, size, rate_hz),
-        longest(body, rate_hz, size, t60_s),
-        rooms.room_frames(t60_s),
-    )
-    first = ROWS * wide
+    own, frames = body_frames(body, size, rate_hz), longest(body, rate_hz, size, t60_s)
+    first, room_frames = ROWS * wide, rooms.room_frames(t60_s)
     one = matrix(memory, first, own, 2)
     other = matrix(memory, first + 2 * own, frames - max(own - 1, 0), 2)
     both = matrix(memory, first + 2 * (frames + 1), frames, 2)
