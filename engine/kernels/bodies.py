@@ -9,7 +9,8 @@ from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels.compiled import COMPILED
-from engine.kernels.fourier import ONE, SPARE, row
+from engine.kernels.fourier import ONE, SPARE, row, silence
+from engine.kernels.memory import part
 from engine.kernels.responses import fade, high_pass, level, resample, resampled_frames
 
 RUN = 128  # frames in which a mode is computed from the frame before
@@ -39,7 +40,7 @@ def ring(work: np.ndarray, modes: np.ndarray, size: float, rate_hz: float, sound
     runs, step_s = len(sound) // RUN, 1 / rate_hz
     x, y = row(work, ONE, runs), row(work, ONE + 1, runs)
     left, right = row(work, SPARE, RUN * runs), row(work, SPARE + 1, RUN * runs)  # frames of all runs, then the next
-    left[:], right[:] = 0.0, 0.0
+    silence(work, SPARE, 0, RUN * runs)
     highest_hz = min(of.BODY_HIGHEST_HZ, HIGHEST_SHARE * rate_hz)
     for mode in range(modes.shape[1]):
         hz, sigma = modes[HZ, mode] / size, modes[DECAY, mode] / size
@@ -53,7 +54,7 @@ def ring(work: np.ndarray, modes: np.ndarray, size: float, rate_hz: float, sound
             x[run], y[run] = swing * math.cos(omega * time_s), swing * math.sin(omega * time_s)
         to_left, to_right = modes[LEFT, mode] / size, modes[RIGHT, mode] / size
         for frame in range(RUN):
-            frame_left, frame_right = left[frame * runs :][:runs], right[frame * runs :][:runs]
+            frame_left, frame_right = part(left, frame * runs, runs), part(right, frame * runs, runs)
             for run in range(runs):
                 before = x[run]
                 frame_left[run] += to_left * y[run]

@@ -21,7 +21,7 @@ from numba import carray, njit
 
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.fourier import ONE, fill_circle, forward, row, transform
+from engine.kernels.fourier import ONE, fill_circle, row, silence, transform, turn
 from engine.kernels.memory import fence, pointer
 
 _SUMMING = at.WINDOW_QUANTA - 3  # quanta: one transforms the input, two transform back
@@ -354,10 +354,10 @@ def partition(work: np.ndarray, response: np.ndarray, frames: int, memory: np.nd
         length = at.QUANTUM if number < early else at.WINDOW
         for channel in range(channels):
             re, im = row(work, ONE, 2 * length), row(work, ONE + 1, 2 * length)
-            re[:], im[:] = 0.0, 0.0
+            silence(work, ONE, 0, 2 * length)
             for frame in range(min(length, len(response) - first)):
                 re[frame] = response[first + frame, channel]
-            forward(work, ONE, 2 * length)
+            turn(work, ONE, ONE + 1, 2 * length)
             for k in range(length + 1):
                 memory[place + k] = re[k] / (2 * length)
                 memory[place + length + 1 + k] = im[k] / (2 * length)

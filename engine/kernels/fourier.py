@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from engine.kernels.compiled import COMPILED
+from engine.kernels.memory import part
 
 # Rows of a work space, (ROWS, N), N a power of two: a circle, room for transforms, two signals of complex numbers
 COSINES, SINES, SPARE, ONE, TWO, ROWS = 0, 1, 2, 4, 6, 8
@@ -113,26 +114,30 @@ def fill_circle(cosines: np.ndarray, sines: np.ndarray) -> None:
 @njit(**COMPILED)
 def row(work: np.ndarray, number: int, size: int) -> np.ndarray:
     """The first numbers of a row of a work space."""
-    return work[number][:size]
+    return part(work[number], 0, size)
 
 
 @njit(**COMPILED)
-def forward(work: np.ndarray, signal: int, size: int) -> None:
-    """Transform a signal of a work space in place; its size is a power of two."""
-    re, im = row(work, signal, size), row(work, signal + 1, size)
-    transform(re, im, row(work, SPARE, size), row(work, SPARE + 1, size), work[COSINES], work[SINES])
+def silence(work: np.ndarray, signal: int, first: int, end: int) -> None:
+    """Clears a signal of a work space from one place to another."""
+    re, im = row(work, signal, end), row(work, signal + 1, end)
+    for k in range(first, end):
+        re[k] = im[k] = 0.0
 
 
 @njit(**COMPILED)
-def backward(work: np.ndarray, signal: int, size: int) -> None:
-    """Transform it back, times its size."""
-    re, im = row(work, signal, size), row(work, signal + 1, size)
-    transform(im, re, row(work, SPARE + 1, size), row(work, SPARE, size), work[COSINES], work[SINES])
+def turn(work: np.ndarray, real: int, imaginary: int, size: int) -> None:
+    """Transform a signal of a work space, given its rows, in place; its size is a power of two.
+
+    With its rows exchanged it is the inverse, times the size.
+    """
+    re, im, spare = row(work, real, size), row(work, imaginary, size), row(work, SPARE, size)
+    transform(re, im, spare, row(work, SPARE + 1, size), work[COSINES], work[SINES])
 
 
 @njit(**COMPILED)
-def forward_any(work: np.ndarray, period: int, given: int, wanted: int, behind: int, size: int) -> None:
-    """Transform signal ONE in place at multiples of 1/period, by its convolution with a chirp; TWO is used.
+def turn_any(work: np.ndarray, period: int, given: int, wanted: int, behind: int, size: int) -> None:
+    """Transform signal ONE in place at multiples of 1/period, as its convolution with a chirp; TWO is used.
 
     Places count modulo `size`, a power of two that is not below the number of all that is given and wanted.
 
@@ -146,13 +151,13 @@ def forward_any(work: np.ndarray, period: int, given: int, wanted: int, behind: 
     _fill_chirp(work, period, size - behind, size)
     re, im = row(work, ONE, size), row(work, ONE + 1, size)
     chirp_re, chirp_im = row(work, TWO, size), row(work, TWO + 1, size)
-    forward(work, ONE, size)
-    forward(work, TWO, size)
+    turn(work, ONE, ONE + 1, size)
+    turn(work, TWO, TWO + 1, size)
     for k in range(size):
         real, imaginary = re[k] / size, im[k] / size
         re[k] = real * chirp_re[k] - imaginary * chirp_im[k]
         im[k] = real * chirp_im[k] + imaginary * chirp_re[k]
-    backward(work, ONE, size)
+    turn(work, ONE + 1, ONE, size)
     _fill_chirp(work, period, wanted, size)
     _turn_back(work, size)
 
@@ -161,13 +166,13 @@ def forward_any(work: np.ndarray, period: int, given: int, wanted: int, behind: 
 def _fill_chirp(work: np.ndarray, period: int, positive: int, size: int) -> None:
     """Writes exp(πi k²/period) as signal TWO, from k = 0 on as many as `positive`, then negative k."""
     re, im = row(work, TWO, size), row(work, TWO + 1, size)
-    turn = math.pi / period
+    angle = math.pi / period
     real = imaginary = step_re = step_im = 0.0
-    further_re, further_im = math.cos(2 * turn), math.sin(2 * turn)
+    further_re, further_im = math.cos(2 * angle), math.sin(2 * angle)
     for k in range(max(positive, size - positive + 1)):
         if k % RUN == 0:
-            real, imaginary = math.cos(turn * (k * k % (2 * period))), math.sin(turn * (k * k % (2 * period)))
-            step = turn * ((2 * k + 1) % (2 * period))
+            real, imaginary = math.cos(angle * (k * k % (2 * period))), math.sin(angle * (k * k % (2 * period)))
+            step = angle * ((2 * k + 1) % (2 * period))
             step_re, step_im = math.cos(step), math.sin(step)
         if k < positive:
             re[k], im[k] = real, imaginary

@@ -13,7 +13,8 @@ from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels.compiled import COMPILED
-from engine.kernels.fourier import ONE, SPARE, TWO, backward, forward, forward_any, power_of_two, row
+from engine.kernels.fourier import ONE, SPARE, TWO, power_of_two, row, silence, turn, turn_any
+from engine.kernels.memory import matrix
 
 FADE_SHARE = 0.1  # of a response that is cut: its end
 FINEST_RATIO = 1000  # denominators of ratios of rates: to thousandths of a cent
@@ -29,14 +30,21 @@ def load(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
     frames = len(sound)
     for frame in range(frames):
         re[frame], im[frame] = sound[frame, 0], sound[frame, 1]
-    re[frames:], im[frames:] = 0.0, 0.0
+    silence(work, signal, frames, size)
 
 
 @njit(**COMPILED)
-def store(work: np.ndarray, sound: np.ndarray, size: int) -> None:
-    """Transform the spectrum ONE back into a response."""
-    backward(work, ONE, size)
-    re, im = row(work, ONE, size), row(work, ONE + 1, size)
+def analyse(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
+    """Writes the spectrum of a response, as one signal, into the work space."""
+    load(work, signal, sound, size)
+    turn(work, signal, signal + 1, size)
+
+
+@njit(**COMPILED)
+def store(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
+    """Transform a spectrum back into a response."""
+    turn(work, signal + 1, signal, size)
+    re, im = row(work, signal, size), row(work, signal + 1, size)
     for frame in range(len(sound)):
         sound[frame, 0], sound[frame, 1] = re[frame] / size, im[frame] / size
 
@@ -54,8 +62,7 @@ def _channels(work: np.ndarray, signal: int, k: int, size: int) -> tuple[complex
 def high_pass(work: np.ndarray, sound: np.ndarray, edge_hz: float, rate_hz: float) -> None:
     """Filter a response through Butterworth's high-pass of second order."""
     size = power_of_two(2 * len(sound))
-    load(work, ONE, sound, size)
-    forward(work, ONE, size)
+    analyse(work, ONE, sound, size)
     re, im = row(work, ONE, size), row(work, ONE + 1, size)
     re[0] = im[0] = 0.0
     for k in range(1, size // 2 + 1):
@@ -72,7 +79,7 @@ def high_pass(work: np.ndarray, sound: np.ndarray, edge_hz: float, rate_hz: floa
             real * re[mirror] + imaginary * im[mirror],
             real * im[mirror] - imaginary * re[mirror],
         )
-    store(work, sound, size)
+    store(work, ONE, sound, size)
 
 
 @njit(**COMPILED)
@@ -147,18 +154,19 @@ def resample(work: np.ndarray, sound: np.ndarray, from_hz: float, to_hz: float, 
         found: its first frames, as many as there is room for.
     """
     if from_hz == to_hz:
-        found[:] = sound[: len(found)]
+        for frame in range(len(found)):
+            found[frame, 0], found[frame, 1] = sound[frame, 0], sound[frame, 1]
         return
     padded, made = _periods(len(sound), from_hz, to_hz)
     kept = min(padded, made) // 2  # and not the last, whose phase is lost
     size = _resampling_size(len(sound), len(found), from_hz, to_hz)
     load(work, ONE, sound, size)
-    forward_any(work, padded, len(sound), kept, len(sound) + kept - 2, size)
+    turn_any(work, padded, len(sound), kept, len(sound) + kept - 2, size)
     re, im = row(work, ONE, size), row(work, ONE + 1, size)
-    re[kept : size - kept + 1], im[kept : size - kept + 1] = 0.0, 0.0
+    silence(work, ONE, kept, size - kept + 1)
     for k in range(size):
         im[k] = -im[k]  # back: the conjugate of the transform of the conjugate
-    forward_any(work, made, kept, len(found), kept - 1, size)
+    turn_any(work, made, kept, len(found), kept - 1, size)
     for frame in range(len(found)):
         found[frame, 0], found[frame, 1] = re[frame] / padded, -im[frame] / padded
 
@@ -175,8 +183,7 @@ def _measured(frames: int, rate_hz: float) -> tuple[int, int, int]:
 def level(work: np.ndarray, sound: np.ndarray, rate_hz: float) -> None:
     """Scale a response: noise of equal power in each octave keeps it, in the mean of both channels."""
     size, first, last = _measured(len(sound), rate_hz)
-    load(work, ONE, sound, size)
-    forward(work, ONE, size)
+    analyse(work, ONE, sound, size)
     power = total = 0.0
     for k in range(first, last + 1):
         left, right = _channels(work, ONE, k, size)
@@ -195,12 +202,12 @@ def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float,
     The parts are: nothing, the body, the room, both in series. A body or room without frames is not there.
     """
     size, first, last = _measured(max(len(body), len(room), len(body) + len(room) - 1), rate_hz)
-    load(work, ONE, body, size)
-    forward(work, ONE, size)
-    load(work, TWO, room, size)
-    forward(work, TWO, size)
-    found[:] = 0.0
+    analyse(work, ONE, body, size)
+    analyse(work, TWO, room, size)
     total = 0.0
+    for i in range(4):
+        for j in range(4):
+            found[i, j] = 0.0
     for k in range(first, last + 1):
         one, two = _channels(work, ONE, k, size), _channels(work, TWO, k, size)
         total += 2 / k
@@ -219,17 +226,15 @@ def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float,
 def series(work: np.ndarray, body: np.ndarray, room: np.ndarray, both: np.ndarray) -> None:
     """Writes the response of a body in a room, (frames + frames − 1, 2)."""
     size = power_of_two(len(both))
-    load(work, ONE, body, size)
-    forward(work, ONE, size)
-    load(work, TWO, room, size)
-    forward(work, TWO, size)
+    analyse(work, ONE, body, size)
+    analyse(work, TWO, room, size)
     re, im = row(work, ONE, size), row(work, ONE + 1, size)
     for k in range(size // 2 + 1):
         one, two, mirror = _channels(work, ONE, k, size), _channels(work, TWO, k, size), (size - k) % size
         left, right = one[0] * two[0], one[1] * two[1]
         re[k], im[k] = left.real - right.imag, left.imag + right.real
         re[mirror], im[mirror] = left.real + right.imag, right.real - left.imag
-    store(work, both, size)
+    store(work, ONE, both, size)
 
 
 @njit(**COMPILED)
@@ -275,7 +280,7 @@ def curves(work: np.ndarray, body: np.ndarray, found: np.ndarray) -> None:
     Args:
         body: its response at CURVES_HZ.
     """
-    common = found[:16].reshape(4, 4)
+    common = matrix(found, 0, 4, 4)
     powers(work, body, body[:0], float(of.CURVES_HZ), common)
     found[of.BODY_CROSS] = common[_DRY, _BODY]
     left = right = highest = 0.0
@@ -285,8 +290,7 @@ def curves(work: np.ndarray, body: np.ndarray, found: np.ndarray) -> None:
         highest = max(highest, abs(left), abs(right))
     found[of.BODY_STEP] = highest
     size = curves_size(len(body))
-    load(work, ONE, body, size)
-    forward(work, ONE, size)
+    analyse(work, ONE, body, size)
     count, step_hz = size // 2 + 1, of.CURVES_HZ / size
     for which in range(3):
         area, values = row(work, SPARE, count), row(work, SPARE + 1, count)  # area: from 0 Hz to a frequency

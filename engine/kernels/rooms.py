@@ -9,7 +9,7 @@ from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels.compiled import COMPILED
-from engine.kernels.fourier import ONE, TWO, forward, power_of_two, row
+from engine.kernels.fourier import ONE, TWO, power_of_two, row, silence, turn
 from engine.kernels.responses import fade, high_pass, level, load, resample, store
 
 SPEED_M_S = 343.0
@@ -67,8 +67,7 @@ def _reflect(work: np.ndarray, grown: float, until_s: float, frames: int) -> flo
     for axis in range(3):
         square += (grown * SIDES_M[axis] * (SOURCE[axis] - LISTENER[axis])) ** 2
     direct_m = math.sqrt(square)
-    row(work, ONE, frames)[:] = 0.0
-    row(work, ONE + 1, frames)[:] = 0.0
+    silence(work, ONE, 0, frames)
     last = min(float(frames), until_s * of.ROOM_HZ)
     furthest = math.ceil((until_s * SPEED_M_S + direct_m) / (2 * grown * min(SIDES_M))) + 1
     images = 2 * (2 * furthest + 1)  # of an axis: as it is, and mirrored
@@ -109,7 +108,7 @@ def _decay(work: np.ndarray, sound: np.ndarray, t60_s: float) -> None:
     size = power_of_two(2 * len(sound))
     re, im = row(work, ONE, size), row(work, ONE + 1, size)
     total_re, total_im = row(work, TWO, size), row(work, TWO + 1, size)
-    total_re[:], total_im[:] = 0.0, 0.0
+    silence(work, TWO, 0, size)
     for band in range(len(BANDS_HZ)):
         load(work, ONE, sound, size)
         rate = math.log(1000) / (t60_s * BANDS_T60[band])
@@ -117,7 +116,7 @@ def _decay(work: np.ndarray, sound: np.ndarray, t60_s: float) -> None:
             fall = math.exp(-rate * (frame / of.ROOM_HZ))
             re[frame] *= fall
             im[frame] *= fall
-        forward(work, ONE, size)
+        turn(work, ONE, ONE + 1, size)
         for k in range(size // 2 + 1):
             share, mirror = _share(band, k * of.ROOM_HZ / size), (size - k) % size
             total_re[k] += share * re[k]
@@ -125,8 +124,7 @@ def _decay(work: np.ndarray, sound: np.ndarray, t60_s: float) -> None:
             if mirror != k:
                 total_re[mirror] += share * re[mirror]
                 total_im[mirror] += share * im[mirror]
-    re[:], im[:] = total_re, total_im
-    store(work, sound, size)
+    store(work, TWO, sound, size)
 
 
 @njit(**COMPILED)

@@ -31,7 +31,7 @@ def test_any_period_is_the_sum_over_its_frequencies(size: int, period: int) -> N
     work = np.zeros((fourier.ROWS, size))
     fourier.fill_circle(work[fourier.COSINES], work[fourier.SINES])
     work[fourier.ONE, times], work[fourier.ONE + 1, times] = signal.real, signal.imag
-    fourier.forward_any(work, period, given, wanted, given - 1 + lowest, size)
+    fourier.turn_any(work, period, given, wanted, given - 1 + lowest, size)
     found = work[fourier.ONE, places] + 1j * work[fourier.ONE + 1, places]
     expected = np.exp(-2j * np.pi * (np.multiply.outer(places, times) % period) / period) @ signal
     np.testing.assert_allclose(found, expected, atol=1e-13 * size)

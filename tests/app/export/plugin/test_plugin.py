@@ -23,13 +23,14 @@ from app.export.plugin.build import build_plugin
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, this_target
 from app.export.plugin.identity import held_in
 from app.export.plugin.image import Image, _Header, image_of
-from app.export.plugin.objects import objects_of, reason_of
+from app.export.plugin.objects import digest, objects_of, reason_of
 from app.instrument.events import HARMONICS, STRUM, TREMOLO, Controller, NoteOn, PatchTurned, TimedEvent
 from app.instrument.offline import render_events
 from app.instrument.strings import Strings
 from app.patches.drums import Drums
 from app.patches.patch import Patch, Technique
 from app.shared.parameters import OF_PATCHES
+from engine.kernels import cache as kernel_cache
 from engine.python_process import python_command, python_environment
 from engine.result_file import WriteError
 from tests.app.export.plugin import host, lv2_host
@@ -675,6 +676,15 @@ def test_an_instrument_that_cannot_sound_is_refused() -> None:
     assert sitar.pickup.kind == "bridge"  # whose force a recording does not give
     with pytest.raises(ValueError, match="no key sounds"):
         image_of(sitar, preset_of(LEARNED))
+
+
+def test_every_kernel_counts_for_whether_object_files_are_made_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the user chooses the folder of compiled code, it is the same for every version."""
+    read, usual = set[Path](), Path.read_bytes
+    monkeypatch.setattr(Path, "read_bytes", lambda path: read.add(path) or usual(path))
+    digest()
+    kernels = Path(kernel_cache.__file__).parent
+    assert set(kernels.rglob("*.py")) <= read
 
 
 def test_instruments_with_the_most_drums_or_modes_and_the_longest_room_are_small() -> None:
