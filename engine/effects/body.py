@@ -19,12 +19,10 @@ from engine import bounds
 from engine.effects.body_table import BODIES, Wood
 from engine.effects.impulse import Impulse
 from engine.kernels.constants import BODY_HIGHEST_HZ
-from engine.kernels.records import BODY, slots
 
 SOUND_M_S = 343.0
 SUBSONIC = 0.55  # of the lowest mode: below it a body radiates next to nothing
 MOST_PER_HZ = 0.06  # modes: where more overlap, fewer and stronger ones sound the same
-LARGEST_WHOLE = 2**31 - 1  # of a sample in a plug-in
 LEAST_ALIKE = 0.2  # of left and right, at high frequencies
 
 
@@ -74,26 +72,6 @@ def _response(name: str, impulse: Impulse | None, size: float, rate_hz: int) -> 
         found = of_given(impulse.samples, impulse.rate_hz, size, rate_hz)
     found.setflags(write=False)
     return found
-
-
-def body_memory(body: Body | None) -> NDArray[np.float64]:
-    """A body at a size of 1 as plug-ins have it: BODY with what follows."""
-    memory, rows = np.zeros(slots(BODY)), np.zeros(0)
-    record = memory.view(BODY)[0]
-    record["longest_s"] = bounds.LONGEST_IMPULSE_S
-    if body is not None and body.impulse is not None:
-        samples = body.impulse.samples
-        unit = float(np.abs(samples).max()) / LARGEST_WHOLE  # where it is loud, finer than single precision
-        record["frames"], record["channels"] = samples.shape
-        record["hz"], record["unit"] = body.impulse.rate_hz, unit
-        whole = np.zeros(2 * -(-samples.size // 2), np.int32)
-        whole[: samples.size] = np.rint(samples / unit).ravel()
-        rows = whole.view(np.float64)
-    elif body is not None:
-        wood = BODIES[body.name]
-        rows = modes_of(wood).ravel()
-        record["modes"], record["seconds"], record["subsonic_hz"] = rows.size // 4, wood.seconds, subsonic_hz(wood)
-    return np.concatenate([memory, rows])
 
 
 def subsonic_hz(wood: Wood) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from engine.effects import Body, Effects, Impulse, Room, responses
-from engine.effects.body import body_memory
+from engine.effects.body_record import body_memory
 from engine.effects.curves import curves_of
 from engine.effects.partitions import partitioned
 from engine.effects.room import room_noise
