@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from engine.effects import Effects, Room
+from engine.effects import Body, Effects, Impulse, Room
+from engine.effects.curves import curves_of
 from engine.kernels import cache, layout
 from engine.models._tension_arrays import CURVES
 from engine.pluck import Pluck
@@ -98,8 +99,16 @@ def voices() -> None:
     for voice in _each():
         _sound(voice)
     _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
-    Mixer(RATE_HZ).set_effects(Effects(room=Room()))
+    responses()
     playing()
+
+
+def responses() -> None:
+    """Compile the responses of bodies of either kind and of a room, and what a body does to loudness."""
+    given = Impulse(np.ones((1, 1)), RATE_HZ)
+    for body in (Body(), Body(impulse=given)):
+        Mixer(RATE_HZ).set_effects(Effects(body, Room()))
+        curves_of(body)
 
 
 def _each() -> Iterator[Voice]:

@@ -5,15 +5,12 @@ Its cabinet is a body: `Body` of the names "cabinet" and "bass_cabinet", or a re
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine import bounds
-
-NOMINAL = 0.15  # of full scale: a tone of this peak keeps its level, whatever the drive
 
 
 @dataclass(frozen=True)
@@ -38,24 +35,16 @@ class Amp:
         bounds.check("drive_db", self.drive_db, bounds.AMP_DRIVE_DB, "dB")
         bounds.check("tone_db", self.tone_db, bounds.AMP_TONE_DB, "dB")
 
-    @property
-    def factors(self) -> tuple[float, float, float]:
-        """The mixer's factors: before the shape, behind it, and of the tone. All 0 without an amplifier."""
-        if self.drive_db == 0:
-            return 0.0, 0.0, 0.0
-        drive, level = 10 ** (self.drive_db / 20), 10 ** (self.level_db / 20)
-        return drive / level, level * math.sqrt(1 + (drive * NOMINAL) ** 2) / drive, 10 ** (self.tone_db / 20)
-
 
 def amplified(amp: Amp, sound: NDArray[np.float64], rate_hz: int) -> NDArray[np.float64]:
     """The sound (frames, 2) through the amplifier of a mixer: its first frames, as many."""
     from engine.kernels import layout as at
-    from engine.kernels.amplifier import amplify  # Numba only when it is needed
+    from engine.kernels.amplifier import amplify, drive  # Numba only when it is needed
 
     mixer = np.zeros(at.MIXER_SLOTS)
     counts, mix = mixer.view(np.int64), mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2)
     mixer[at.M_RATE] = rate_hz
-    mixer[at.M_AMPLIFIER : at.M_AMPLIFIER + 3] = amp.factors
+    drive(mixer, float(amp.drive_db), float(amp.tone_db), float(amp.level_db))
     found = np.zeros((-(-len(sound) // at.QUANTUM) * at.QUANTUM, 2))
     found[: len(sound)] = sound
     for first in range(0, len(found), at.QUANTUM):

@@ -18,6 +18,7 @@ from numba import njit
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 
+NOMINAL = 0.15  # of full scale: a tone of this peak keeps its level, whatever the drive
 BIAS = 0.25  # in the shape's own unit: 1 is where it bends most
 COUPLING_HZ = 60.0  # high-pass before the drive
 BLOCKING_HZ = 15.0  # high-pass behind it, for what the bias gives
@@ -26,6 +27,20 @@ FADE_S = 0.020  # in which the amplifier is switched on or off
 KAISER = 10.0  # of the window of the filter to and from the higher rate: images below -100 dB
 PASSED = 0.4375  # of the rate: middle of the filter's edge, which ends at one half
 REST_QUANTA = 400  # without input, after which all has died away
+
+
+@njit(**COMPILED)
+def drive(mixer: np.ndarray, drive_db: float, tone_db: float, level_db: float) -> None:
+    """Set the amplifier of a mixer, see `engine.effects.Amp`; a tone of the peak NOMINAL keeps its level.
+
+    The input is scaled to the level that it would have without `level_db`, so that it changes no drive.
+    """
+    amp = mixer[at.M_AMPLIFIER : at.MIXER_SLOTS]
+    factor, level = 10 ** (drive_db / 20), 10 ** (level_db / 20)
+    on = drive_db > 0
+    amp[at.A_WANTED_GAIN] = level * math.sqrt(1 + (factor * NOMINAL) ** 2) / factor if on else 0.0
+    amp[at.A_WANTED_TONE] = 10 ** (tone_db / 20) if on else 0.0
+    amp[at.A_WANTED_DRIVE] = factor / level if on else 0.0
 
 
 @njit(**COMPILED)

@@ -66,6 +66,12 @@ BODY_REAL, BODY_IMAGINARY, BODY_POWER = range(3)  # the mean of the channels; of
 BODY_LOWEST_HZ, BODY_STEPS = 16.0, 96  # steps an octave: the third of a half-width of a resonance of Q 50
 BODY_POINTS = 992
 BODY_SLOTS = BODY_HEADER + 3 * BODY_POINTS
+CURVES_HZ = 48_000  # rate of the response from which they are taken; keys are as loud at other rates
+
+# Responses of bodies and rooms
+LOUDNESS_LOW_HZ, LOUDNESS_HIGH_HZ = 80.0, 3_000.0  # of the noise that keeps its level: most of a plucked string
+BODY_HIGHEST_HZ = 20_000.0  # of its modes
+ROOM_HZ = 48_000.0  # at which a room is made, so that it is the same room at any rate
 
 # Rows (modes,) of a sound, see `loudness`
 SOUND_OMEGA, SOUND_SIGMA, SOUND_LEFT, SOUND_RIGHT, SOUND_X, SOUND_Y, SOUND_COSINE, SOUND_SINE = range(8)

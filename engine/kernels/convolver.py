@@ -14,16 +14,19 @@ nothing is left and nothing is computed.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import carray, njit
 
 from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.fourier import transform
+from engine.kernels.fourier import ONE, fill_circle, row, silence, transform, turn
 from engine.kernels.memory import fence, pointer
 
 _SUMMING = at.WINDOW_QUANTA - 3  # quanta: one transforms the input, two transform back
 _SHARE = -(-(at.WINDOW + 1) // _SUMMING)  # frequencies in each
+FADE_S = 0.020  # at least: the way from one response to another, in whole windows
 
 
 @njit(**COMPILED)
@@ -298,3 +301,65 @@ def _mix(convolver: np.ndarray, whole: np.ndarray, mix: np.ndarray, wet_now: boo
 def _way(share: float) -> float:
     """The smooth way from 0 to 1, without a corner."""
     return share * share * (3 - 2 * share)
+
+
+@njit(**COMPILED)
+def begin(convolver: np.ndarray, rate_hz: float, frames: int) -> None:
+    """Set up a convolver's memory, which is all 0, for responses of so many frames."""
+    whole = convolver.view(np.int64)
+    whole[at.C_CAPACITY] = late_partitions(frames) + 1
+    whole[at.C_FADE_WINDOWS] = math.ceil(FADE_S * rate_hz / at.WINDOW)
+    whole[at.C_STEP] = -1
+    fill_circle(convolver[at.C_COSINES : at.C_SINES], convolver[at.C_SINES : at.C_EARLY_INPUT])
+
+
+@njit(**COMPILED)
+def convolver_slots(frames: int) -> int:
+    """The memory of a convolver for responses of so many frames."""
+    return at.C_LATE + (late_partitions(frames) + 1) * 4 * (at.WINDOW + 1)
+
+
+@njit(**COMPILED)
+def late_partitions(frames: int) -> int:
+    """The partitions of a window's length of a response."""
+    return max(0, (frames - at.EARLY * at.QUANTUM + at.WINDOW - 1) // at.WINDOW)
+
+
+@njit(**COMPILED)
+def early_partitions(frames: int) -> int:
+    """The partitions of a quantum's length before them."""
+    return min(at.EARLY, (frames + at.QUANTUM - 1) // at.QUANTUM)
+
+
+@njit(**COMPILED)
+def partitioned_slots(frames: int, channels: int) -> int:
+    """The memory of a response in partitions."""
+    early, late = early_partitions(frames), late_partitions(frames)
+    return at.I_HEADER + 2 * channels * (early * (at.QUANTUM + 1) + late * (at.WINDOW + 1))
+
+
+@njit(**COMPILED)
+def partition(work: np.ndarray, response: np.ndarray, frames: int, memory: np.ndarray) -> None:
+    """Writes a response (frames, 1 or 2) as the convolver reads it; the inverse transform's factor is in it.
+
+    Args:
+        work: a work space of `fourier` for two windows.
+        frames: of it with silence at the end.
+    """
+    channels, early, late = response.shape[1], early_partitions(frames), late_partitions(frames)
+    counts = memory.view(np.int64)
+    counts[at.I_CHANNELS], counts[at.I_EARLY], counts[at.I_LATE] = channels, early, late
+    place, first = at.I_HEADER, 0
+    for number in range(early + late):
+        length = at.QUANTUM if number < early else at.WINDOW
+        for channel in range(channels):
+            re, im = row(work, ONE, 2 * length), row(work, ONE + 1, 2 * length)
+            silence(work, ONE, 0, 2 * length)
+            for frame in range(min(length, len(response) - first)):
+                re[frame] = response[first + frame, channel]
+            turn(work, ONE, ONE + 1, 2 * length)
+            for k in range(length + 1):
+                memory[place + k] = re[k] / (2 * length)
+                memory[place + length + 1 + k] = im[k] / (2 * length)
+            place += 2 * (length + 1)
+        first += length

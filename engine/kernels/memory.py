@@ -93,6 +93,7 @@ def _record(dtype: np.dtype[np.void]) -> Any:
 _player, _table, _drum, _recorded, _attack = map(
     _record, (records.PLAYER, records.TABLE, records.DRUM, records.RECORDED, records.ATTACK)
 )
+_body, _responses, _needs = map(_record, (records.BODY, records.RESPONSES, records.NEEDS))
 
 
 @njit(**COMPILED)
@@ -123,6 +124,24 @@ def recorded_at(address: int) -> records.Recorded:
 def attack_at(address: int) -> records.Attack:
     """A recorded attack; its samples follow."""
     return _attack(address)
+
+
+@njit(**COMPILED)
+def body_at(address: int) -> records.Body:
+    """The body of a plug-in; its modes or samples follow."""
+    return _body(address)
+
+
+@njit(**COMPILED)
+def responses_at(address: int) -> records.Responses:
+    """The responses of body and room of a plug-in; they follow in partitions."""
+    return _responses(address)
+
+
+@njit(**COMPILED)
+def needs_at(address: int) -> records.Needs:
+    """The record at an address of the memory that responses need."""
+    return _needs(address)
 
 
 @intrinsic

@@ -26,6 +26,9 @@ Table: TypeAlias = Any
 Drum: TypeAlias = Any
 Recorded: TypeAlias = Any
 Attack: TypeAlias = Any
+Body: TypeAlias = Any
+Responses: TypeAlias = Any
+Needs: TypeAlias = Any
 
 EVENT = np.dtype(
     [
@@ -340,6 +343,41 @@ PLAYER = np.dtype(
     ]
 )
 """Its voices follow."""
+
+BODY = np.dtype(
+    [
+        ("modes", W),  # which follow, (4, modes): Hz, 1/s, amplitudes left and right; 0: it has none
+        ("seconds", R),  # for which they ring
+        ("subsonic_hz", R),  # below it the body radiates next to nothing
+        ("frames", W),  # of a body that is a response, whose samples follow, (frames, channels) of 32 bits
+        ("channels", W),  # 1 or 2
+        ("hz", R),  # their rate
+        ("unit", R),  # of the samples
+        ("longest_s", R),  # of a response that is stretched
+    ]
+)
+"""A body of a plug-in, at a size of 1; without modes and frames there is none."""
+
+RESPONSES = np.dtype(
+    [
+        (
+            "part",
+            W,
+        ),  # slots of each of the three responses that follow, as the convolver reads them: body, room, both
+        ("powers", R, (4, 4, 4)),  # see `responses.all_powers`
+        ("curves", R, of.BODY_SLOTS),  # of the body, for the loudness of keys
+    ]
+)
+
+NEEDS = np.dtype(
+    [
+        ("frames", W),  # of the longest response
+        ("part", W),  # slots of one as the convolver reads it
+        ("found", W),  # slots of RESPONSES, with what follows
+        ("memory", W),  # slots in which they are computed
+        ("convolver", W),  # slots of the convolver
+    ]
+)
 
 
 def slot(kind: np.dtype[np.void], name: str) -> int:

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.effects import Effects
+from engine.effects import Amp, Effects
 from engine.effects.partitions import convolver, partitioned
 from engine.kernels import layout as at
+from engine.kernels.amplifier import drive
 from engine.kernels.memory import publish
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.voices.derivative import differentiator_taps
@@ -151,8 +152,8 @@ class Mixer:
             if effects == self.effects:
                 return
             address = 0
-            for place, factor in enumerate(effects.factors):
-                self.memory[at.M_AMPLIFIER + place] = factor
+            amp = effects.amp or Amp()
+            drive(self.memory, float(amp.drive_db), float(amp.tone_db), float(amp.level_db))
             if effects.rings:
                 if self._convolver is None:
                     self._convolver = convolver(self.rate_hz)

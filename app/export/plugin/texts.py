@@ -18,7 +18,7 @@ from engine.result_file import explain
 PREFIX = "ls_"  # of the entries' names
 # Entries of each; those that mixers call stand in its namespace under the same names
 PARTS = {
-    "mixing": ("render", "partition"),
+    "mixing": ("render", "drive", "begin_convolver", "measure", "prepare", "weigh", "mix"),
     "playing": ("play", "sound", "sympathise", "begin", "kit_begin", "kit_follow", "kit_prepare"),
 }
 SELDOM = 50_000, 20, 50  # of objects and passes: a fifth of the time went to collections that freed next to nothing

@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.effects import Amp, Body, Effects, Room, apply
-from engine.effects.impulse import LOUDNESS_HZ, Impulse
+from engine.effects.impulse import Impulse
 from engine.kernels import layout as at
+from engine.kernels.constants import LOUDNESS_HIGH_HZ, LOUDNESS_LOW_HZ
 from engine.voices import Mixer, Voice, plain_program
 
 RATE_HZ = 48_000
@@ -18,7 +19,7 @@ def pink(frames: int) -> NDArray[np.float64]:
     """Noise of equal power in each octave, (frames, 1)."""
     frequency_hz = np.fft.rfftfreq(frames, 1 / RATE_HZ)
     draw = np.random.default_rng(0).standard_normal((2, len(frequency_hz)))
-    heard = (frequency_hz > LOUDNESS_HZ[0]) & (frequency_hz < LOUDNESS_HZ[1])
+    heard = (frequency_hz > LOUDNESS_LOW_HZ) & (frequency_hz < LOUDNESS_HIGH_HZ)
     spectrum = np.where(heard, (draw[0] + 1j * draw[1]) / np.sqrt(np.maximum(frequency_hz, 1)), 0)
     found = np.fft.irfft(spectrum, frames)[:, None]
     return 0.1 * found / found.std()

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from engine.effects import Room
-from engine.effects.impulse import resampled
+from engine.effects.responses import resampled
 
 
 def t60_s(response: NDArray[np.float64], band_hz: tuple[float, float], rate_hz: int) -> float:

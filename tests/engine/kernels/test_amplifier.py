@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.effects.amp import NOMINAL, Amp, amplified
+from engine.effects.amp import Amp, amplified
 from engine.kernels import amplifier
 from engine.kernels import layout as at
 
@@ -31,10 +31,11 @@ def spectrum(sound: NDArray[np.float64]) -> NDArray[np.float64]:
 def test_harmonics_are_those_of_its_shape(drive_db: float) -> None:
     """By a sum over one period of x/√(1 + x²), which knows neither filters nor rates."""
     periods, sound = tone(1_000, 0.1)
-    amp = Amp(drive_db)
-    found = spectrum(amplified(amp, sound, RATE_HZ))
+    found = spectrum(amplified(Amp(drive_db), sound, RATE_HZ))
     hz = periods * RATE_HZ / SIZE
-    drive, gain, _ = amp.factors
+    mixer = np.zeros(at.MIXER_SLOTS)
+    amplifier.drive(mixer, drive_db, 0.0, 0.0)
+    drive, gain = mixer[at.M_AMPLIFIER + at.A_WANTED_DRIVE], mixer[at.M_AMPLIFIER + at.A_WANTED_GAIN]
     low = amplifier.COUPLING_HZ / hz
     angle = 2 * np.pi * np.arange(4096) / 4096
     x = amplifier.BIAS + drive * 0.1 / np.sqrt(1 + low**2) * np.sin(angle)
@@ -55,7 +56,7 @@ def test_aliases_of_5_khz_at_full_drive_are_80_db_below(rate_hz: int) -> None:
 
 @pytest.mark.parametrize("drive_db", [1.0, 12.0, FULL_DB])
 def test_a_tone_of_nominal_level_keeps_it(drive_db: float) -> None:
-    _, sound = tone(1_000, NOMINAL)
+    _, sound = tone(1_000, amplifier.NOMINAL)
     found = amplified(Amp(drive_db), sound, RATE_HZ)
     assert 20 * np.log10(found[-SIZE:].std() / sound.std()) == pytest.approx(0, abs=3)
 
@@ -80,7 +81,7 @@ def test_off_it_leaves_every_sample_and_is_switched_without_a_click() -> None:
     mixer[at.M_RATE] = RATE_HZ
     mix, found = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2), []
     for number, first in enumerate(range(0, len(sound), at.QUANTUM)):
-        mixer[at.M_AMPLIFIER : at.M_AMPLIFIER + 3] = Amp(6.0 if 10 <= number < 40 else 0.0).factors
+        amplifier.drive(mixer, 6.0 if 10 <= number < 40 else 0.0, 0.0, 0.0)
         mix[:] = sound[first : first + at.QUANTUM]
         amplifier.amplify(mixer)
         mixer.view(np.int64)[at.M_FRAMES] += at.QUANTUM

@@ -47,7 +47,7 @@ void instrument_reset_values(instrument *own) {
 uint32_t instrument_latency(void) { return QUANTUM + AHEAD; }
 
 uint32_t instrument_tail(const instrument *own) {
-  return (uint32_t)((own->of->longest_s + effects_tail_s(own)) * own->rate_hz);
+  return own->kernels ? (uint32_t)((own->of->longest_s + effects_tail_s(own)) * own->rate_hz) : 0;
 }
 
 static slot *copied(const image *of, int64_t first, int64_t count, int64_t more) {
@@ -76,16 +76,11 @@ static slot *pushed(instrument *own, int64_t frame, int64_t kind, int32_t channe
 /* Events count a quantum late, so that each is known before the quantum that holds its frame. */
 static int64_t frame_of(const instrument *own, uint32_t at) { return own->mixer[M_FRAMES].whole + at + QUANTUM; }
 
-/* As `engine.effects.Amp.factors`. */
 static void follow_amp(instrument *own) {
-  slot *amp = own->mixer + M_AMPLIFIER;
   const slot *gains = own->player + PLAYER_SOURCE_GAINS;
   bool compares = gains[0].real != 0 && gains[1].real != 0;
-  double drive = pow(10, own->amp[AMP_DRIVE_DB] / 20);
-  bool on = own->amp[AMP_DRIVE_DB] > 0 && !compares;
-  amp[A_WANTED_GAIN].real = on ? own->of->level * sqrt(1 + pow(drive * AMP_NOMINAL, 2)) / drive : 0;
-  amp[A_WANTED_TONE].real = on ? pow(10, own->amp[AMP_TONE_DB] / 20) : 0;
-  amp[A_WANTED_DRIVE].real = on ? drive / own->of->level : 0;
+  void *error = NULL, *result = NULL;
+  own->kernels->drive(&result, &error, number_of(own->mixer), compares ? 0 : own->amp[AMP_DRIVE_DB], own->amp[AMP_TONE_DB], own->of->level_db);
 }
 
 static void apply(instrument *own, int32_t place, double value, int64_t frame) {
