@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from engine.effects import Effects, Room
-from engine.kernels import cache, layout
+from engine.kernels import cache
+from engine.kernels.constants import QUANTUM
 from engine.models._tension_arrays import CURVES
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, TrainedRange
@@ -52,7 +53,7 @@ LATENTS = {"grid_points": INFO.grid_points, "state_size": 4}
 MODULATED = {"modulation": True, "adiabatic": True, "physical_units": True}
 BANKS: tuple[dict[str, Any], ...] = ({}, MODULATED)
 EARS = (Ear((0.3,)), Ear((0.3, 0.7), "velocity"))
-FRAMES = 4 * layout.QUANTUM
+FRAMES = 4 * QUANTUM
 
 
 def warm() -> None:
@@ -91,7 +92,7 @@ def playing() -> None:
 def unheard() -> None:
     """A quantum of every kind of voice that is computed."""
     for voice in _each():
-        voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
+        voice.skip(QUANTUM / RATE_HZ, Mixer(RATE_HZ))
 
 
 def voices() -> None:

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Knobs, Patch, StringSet
 from app.patches.tuning import Tuning
+from engine.kernels import constants as of
 from engine.kernels.constants import HIGHEST_HZ, MOST_MODES, MOST_SLACKENED
 from engine.resonators.losses import Losses
 from engine.resonators.string import StringParameters
 
 STRING = tuple(field.name for field in fields(StringParameters))
-KNOBS = tuple(Knobs.model_fields)  # in the order of the kernels
+KNOBS = tuple(id.removeprefix("knobs.") for id in of.PLAYED[: of.KNOBS])
 
 
 @dataclass(frozen=True)

@@ -453,7 +453,7 @@ class Notes:
     def _skip(self, note: Note) -> None:
         if note.from_s > 0:
             for voice in note.voices.values():
-                voice.skip(note.from_s, Mixer(voice.program.rate_hz).memory)
+                voice.skip(note.from_s, Mixer(voice.program.rate_hz))
 
     def _make_voices(self, note: Note, rate_hz: int, struck_s: float) -> None:
         asked, voices = note.request, dict[str, Voice]()

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine import bounds
+from engine.kernels.constants import QUANTUM
+from engine.kernels.mixer_records import MIXER
 
 NOMINAL = 0.15  # of full scale: a tone of this peak keeps its level, whatever the drive
 
@@ -49,18 +51,17 @@ class Amp:
 
 def amplified(amp: Amp, sound: NDArray[np.float64], rate_hz: int) -> NDArray[np.float64]:
     """The sound (frames, 2) through the amplifier of a mixer: its first frames, as many."""
-    from engine.kernels import layout as at
     from engine.kernels.amplifier import amplify  # Numba only when it is needed
 
-    mixer = np.zeros(at.MIXER_SLOTS)
-    counts, mix = mixer.view(np.int64), mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2)
-    mixer[at.M_RATE] = rate_hz
-    mixer[at.M_AMPLIFIER : at.M_AMPLIFIER + 3] = amp.factors
-    found = np.zeros((-(-len(sound) // at.QUANTUM) * at.QUANTUM, 2))
+    mixer = np.zeros(1, MIXER)[0]
+    mix, own = mixer["mix"], mixer["amplifier"]
+    mixer["rate_hz"] = rate_hz
+    own["wanted_drive"], own["wanted_gain"], own["wanted_tone"] = amp.factors
+    found = np.zeros((-(-len(sound) // QUANTUM) * QUANTUM, 2))
     found[: len(sound)] = sound
-    for first in range(0, len(found), at.QUANTUM):
-        mix[:] = found[first : first + at.QUANTUM]
+    for first in range(0, len(found), QUANTUM):
+        mix[:] = found[first : first + QUANTUM]
         amplify(mixer)
-        found[first : first + at.QUANTUM] = mix
-        counts[at.M_FRAMES] += at.QUANTUM
+        found[first : first + QUANTUM] = mix
+        mixer["frames"] += QUANTUM
     return found[: len(sound)]

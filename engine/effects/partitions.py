@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine import bounds
-from engine.kernels import layout as at
+from engine.kernels.constants import QUANTUM
+from engine.kernels.fields import record_of, slots
+from engine.kernels.mixer_records import CONVOLVER, EARLY, IMPULSE, WINDOW
 
 FADE_S = 0.020  # at least: the way from one response to another, in whole windows
 LONGEST_S = 2 * bounds.LONGEST_IMPULSE_S  # a body's and a room's
@@ -17,11 +19,11 @@ LONGEST_S = 2 * bounds.LONGEST_IMPULSE_S  # a body's and a room's
 def partitioned(impulse: NDArray[np.float64]) -> NDArray[np.float64]:
     """A response (frames, channels) as the kernel reads it; the inverse transform's factor is in it."""
     channels = impulse.shape[1]
-    early = _spectra(impulse[: at.EARLY * at.QUANTUM], at.QUANTUM)
-    late = _spectra(impulse[at.EARLY * at.QUANTUM :], at.WINDOW)
-    memory = np.zeros(at.I_HEADER + early.size + late.size)
-    memory.view(np.int64)[[at.I_CHANNELS, at.I_EARLY, at.I_LATE]] = channels, len(early), len(late)
-    memory[at.I_HEADER :] = np.concatenate([early.ravel(), late.ravel()])
+    early = _spectra(impulse[: EARLY * QUANTUM], QUANTUM)
+    late = _spectra(impulse[EARLY * QUANTUM :], WINDOW)
+    memory = np.concatenate([np.zeros(slots(IMPULSE)), early.ravel(), late.ravel()])
+    record = record_of(memory, IMPULSE)
+    record["channels"], record["early"], record["late"] = channels, len(early), len(late)
     return memory
 
 
@@ -37,14 +39,12 @@ def _spectra(part: NDArray[np.float64], frames: int) -> NDArray[np.float64]:
 
 def convolver(rate_hz: int) -> NDArray[np.float64]:
     """The memory of a convolver for responses of up to `LONGEST_S`."""
-    capacity = math.ceil(LONGEST_S * rate_hz / at.WINDOW)
-    memory = np.empty(at.C_LATE + capacity * 4 * (at.WINDOW + 1))
+    capacity = math.ceil(LONGEST_S * rate_hz / WINDOW)
+    memory = np.empty(slots(CONVOLVER) + capacity * 4 * (WINDOW + 1))
     memory[:] = 0.0  # written to, so that the device's thread finds every page in place
-    whole = memory.view(np.int64)
-    whole[at.C_CAPACITY] = capacity
-    whole[at.C_FADE_WINDOWS] = math.ceil(FADE_S * rate_hz / at.WINDOW)
-    whole[at.C_STEP] = -1
-    turns = 2 * np.pi * np.arange(2 * at.WINDOW) / (2 * at.WINDOW)
-    memory[at.C_COSINES : at.C_SINES] = np.cos(turns)
-    memory[at.C_SINES : at.C_EARLY_INPUT] = np.sin(turns)
+    record = record_of(memory, CONVOLVER)
+    record["capacity"], record["step"] = capacity, -1
+    record["fade_windows"] = math.ceil(FADE_S * rate_hz / WINDOW)
+    turns = 2 * np.pi * np.arange(2 * WINDOW) / (2 * WINDOW)
+    record["cosines"], record["sines"] = np.cos(turns), np.sin(turns)
     return memory

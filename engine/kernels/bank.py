@@ -16,8 +16,13 @@ import math
 import numpy as np
 from numba import njit
 
-from engine.kernels import layout as at
+from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.constants import QUANTUM
+from engine.kernels.memory import behind
+from engine.kernels.mixer_records import MOST_LATENTS, SCRATCH_ROWS
+from engine.kernels.modes import row, rows, weights
+from engine.kernels.voice_records import BankProgram, Voice
 
 SHORT, LONG = 32, 64  # frames of a segment, at first and later
 INAUDIBLE = 1e-6  # of full scale: what changes less than that is left out
@@ -66,44 +71,41 @@ def _tanh(x: float) -> float:
 
 
 @njit(**COMPILED)
-def energies(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray) -> None:
+def energies(voice: Voice, program: BankProgram, time: float, out: np.ndarray) -> None:
     """E_m (modes,) at a time in trained samples."""
-    whole = program.view(np.int64)
-    n = whole[at.P_MODES]
-    rows = at.state(n)
-    sigma = program[whole[at.O_SIGMA] :]
-    start = voice[rows + at.ENERGY_0 * n :]
+    n = program.modes
+    sigma = behind(program, program.sigma, n)
+    start = row(voice, at.ENERGY_0)
     for m in range(n):
         out[m] = start[m] * _exp(-2 * sigma[m] * time)
 
 
 @njit(**COMPILED)
-def higher_orders(program: np.ndarray, energy: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
+def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
     """f(E) - K E, (2 modes,)."""
-    whole = program.view(np.int64)
-    n = whole[at.P_MODES]
-    omega = program[whole[at.O_OMEGA] :]
+    n = program.modes
+    omega = behind(program, program.omega, n)
     out[: 2 * n] = 0.0
-    units = program[whole[at.O_ENERGY_UNITS] :]
+    units = behind(program, program.energy_units, n)
     reported = 0.0
     for m in range(n):
         reported += units[m] * energy[m]
     if reported < 1e-12:
         return
-    layers = whole[at.P_LAYERS]
+    layers = program.layers
     if layers > 0:
-        single = program.view(np.float32)
+        network = behind(program, program.network, program.modulation - program.network).view(np.float32)
         values, results = (
-            scratch[: at.MOST_MODES].view(np.float32),
-            scratch[at.MOST_MODES : 2 * at.MOST_MODES].view(np.float32),
+            scratch[:MOST_LATENTS].view(np.float32),
+            scratch[MOST_LATENTS : 2 * MOST_LATENTS].view(np.float32),
         )
         for m in range(n):
             values[m] = units[m] * energy[m]
-        slot = 2 * whole[at.O_NETWORK]
+        slot = 0
         for layer in range(layers):
-            wide_in, wide_out = whole[at.P_WIDTHS + layer], whole[at.P_WIDTHS + layer + 1]
-            bias = single[slot : slot + wide_out]
-            weight = single[slot + wide_out :]
+            wide_in, wide_out = program.widths[layer], program.widths[layer + 1]
+            bias = network[slot : slot + wide_out]
+            weight = network[slot + wide_out :]
             for o in range(wide_out):
                 results[o] = bias[o]
             for i in range(wide_in):
@@ -118,17 +120,18 @@ def higher_orders(program: np.ndarray, energy: np.ndarray, out: np.ndarray, scra
                     x = results[o]
                     values[o] = x / (np.float32(1) + np.float32(_exp(-float(x))))
             else:
-                at_zero, rate_units = program[whole[at.O_AT_ZERO] :], program[whole[at.O_RATE_UNITS] :]
-                factor = reported if whole[at.P_SECOND_ORDER] else 1.0
+                at_zero = behind(program, program.at_zero, 2 * n)
+                rate_units = behind(program, program.rate_units, 2 * n)
+                factor = reported if program.second_order else 1.0
                 for o in range(2 * n):
                     out[o] = (results[o] - at_zero[o]) * rate_units[o] * factor
-    if whole[at.P_ADIABATIC]:
-        shares = program[whole[at.O_SHARES] :]
-        largest = program[whole[at.O_LARGEST] :]
+    if program.adiabatic:
+        shares = behind(program, program.shares, n * n)
+        largest = behind(program, program.largest, n)
         linear, share, found = (
             scratch[:n],
-            scratch[at.MOST_MODES : at.MOST_MODES + n],
-            scratch[2 * at.MOST_MODES : 2 * at.MOST_MODES + n],
+            scratch[MOST_LATENTS : MOST_LATENTS + n],
+            scratch[2 * MOST_LATENTS : 2 * MOST_LATENTS + n],
         )
         for step in range(3):
             found[:] = 0.0
@@ -147,30 +150,26 @@ def higher_orders(program: np.ndarray, energy: np.ndarray, out: np.ndarray, scra
 
 
 @njit(**COMPILED)
-def strike(voice: np.ndarray, program: np.ndarray, scratch: np.ndarray) -> None:
+def strike(voice: Voice, program: BankProgram, scratch: np.ndarray) -> None:
     """Fills in what follows from z(0), which `LEVEL_0` and `ANGLE_0` hold."""
-    whole = program.view(np.int64)
-    counts = voice.view(np.int64)
-    n = whole[at.P_MODES]
-    rows = at.state(n)
-    sigma, coupling = program[whole[at.O_SIGMA] :], program[whole[at.O_COUPLING] :]
-    energy = voice[rows + at.ENERGY_0 * n : rows + (at.ENERGY_0 + 1) * n]
-    constant = voice[rows + at.CONSTANT * n : rows + (at.CONSTANT + 2) * n]
+    n = program.modes
+    sigma, coupling = behind(program, program.sigma, n), behind(program, program.coupling, 2 * n * n)
+    energy, levels, constant = row(voice, at.ENERGY_0), row(voice, at.LEVEL_0), rows(voice, at.CONSTANT, 2)
     constant[:] = 0.0
     for m in range(n):
-        level = voice[rows + at.LEVEL_0 * n + m]
+        level = levels[m]
         energy[m] = math.exp(2 * level) if level > -300 else 0.0
         if sigma[m] > 0 and energy[m] > 0:
             share = energy[m] / (2 * sigma[m])
             for j in range(2 * n):
                 constant[j] += share * coupling[m * 2 * n + j]
-    voice[rows + at.INTEGRAL * n : rows + (at.INTEGRAL + 2) * n] = 0.0
-    counts[at.NODE] = 0
-    counts[at.SEGMENT_VALID] = 0
-    counts[at.MODULATED] = whole[at.P_MODULATION]
-    counts[at.REFRESH] = 0
-    counts[at.AUDIBLE_COUNT] = n
-    if whole[at.P_HIGHER]:
+    rows(voice, at.INTEGRAL, 2)[:] = 0.0
+    voice.node = 0
+    voice.segment_valid = 0
+    voice.modulated = program.modulates
+    voice.refresh = 0
+    voice.audible_count = n
+    if program.higher:
         _integrate_from(voice, program, 0, scratch)
 
 
@@ -181,37 +180,36 @@ def _width(node: int) -> int:
 
 
 @njit(**COMPILED)
-def _integrate_from(voice: np.ndarray, program: np.ndarray, node: int, scratch: np.ndarray) -> None:
+def _integrate_from(voice: Voice, program: BankProgram, node: int, scratch: np.ndarray) -> None:
     """The higher orders at a node, half-way and at the next."""
-    n = program.view(np.int64)[at.P_MODES]
-    rows, spacing = at.state(n), program[at.P_SPACING]
-    energy, more = scratch[4 * at.MOST_MODES : 4 * at.MOST_MODES + n], scratch[5 * at.MOST_MODES :]
+    n = program.modes
+    spacing = program.spacing
+    energy, more = scratch[4 * MOST_LATENTS : 4 * MOST_LATENTS + n], scratch[5 * MOST_LATENTS :]
     for half in range(3):
         energies(voice, program, (node + 0.5 * half * _width(node)) * spacing, energy)
-        higher_orders(program, energy, voice[rows + (at.AT_LEFT + 2 * half) * n :], more)
+        higher_orders(program, energy, rows(voice, at.AT_LEFT + 2 * half, 2), more)
 
 
 @njit(**COMPILED)
-def _integrate_to(voice: np.ndarray, program: np.ndarray, time: float, scratch: np.ndarray) -> None:
+def _integrate_to(voice: Voice, program: BankProgram, time: float, scratch: np.ndarray) -> None:
     """Moves on to the node before a time."""
-    counts = voice.view(np.int64)
-    n = program.view(np.int64)[at.P_MODES]
-    rows, spacing = at.state(n), program[at.P_SPACING]
-    energy, more = scratch[4 * at.MOST_MODES : 4 * at.MOST_MODES + n], scratch[5 * at.MOST_MODES :]
+    n = program.modes
+    spacing = program.spacing
+    energy, more = scratch[4 * MOST_LATENTS : 4 * MOST_LATENTS + n], scratch[5 * MOST_LATENTS :]
     wanted = int(time / spacing)
-    while counts[at.NODE] + _width(counts[at.NODE]) <= wanted:
-        width = _width(counts[at.NODE])
-        total = voice[rows + at.INTEGRAL * n : rows + (at.INTEGRAL + 2) * n]
+    while voice.node + _width(voice.node) <= wanted:
+        width = _width(voice.node)
+        total = rows(voice, at.INTEGRAL, 2)
         left, middle, right = (
-            voice[rows + at.AT_LEFT * n : rows + (at.AT_LEFT + 2) * n],
-            voice[rows + at.AT_MIDDLE * n : rows + (at.AT_MIDDLE + 2) * n],
-            voice[rows + at.AT_RIGHT * n : rows + (at.AT_RIGHT + 2) * n],
+            rows(voice, at.AT_LEFT, 2),
+            rows(voice, at.AT_MIDDLE, 2),
+            rows(voice, at.AT_RIGHT, 2),
         )
         for j in range(2 * n):
             total[j] += width * spacing * (left[j] + 4 * middle[j] + right[j]) / 6
             left[j] = right[j]
-        counts[at.NODE] += width
-        node = counts[at.NODE]
+        voice.node += width
+        node = voice.node
         width = _width(node)
         energies(voice, program, (node + 0.5 * width) * spacing, energy)
         higher_orders(program, energy, middle, more)
@@ -220,11 +218,11 @@ def _integrate_to(voice: np.ndarray, program: np.ndarray, time: float, scratch: 
 
 
 @njit(**COMPILED)
-def _change(program: np.ndarray, level: np.ndarray, n: int, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
+def _change(program: BankProgram, level: np.ndarray, alive: int, out: np.ndarray, scratch: np.ndarray) -> None:
     """The change that A adds to the log gain of each latent, of levels log |z| (modes,)."""
-    whole = program.view(np.int64)
-    weight = program[whole[at.O_A] :]  # transposed
-    squares, energy = scratch[:alive], scratch[at.MOST_MODES : at.MOST_MODES + alive]
+    n = program.modes
+    weight = behind(program, program.change, n * n)  # transposed
+    squares, energy = scratch[:alive], scratch[MOST_LATENTS : MOST_LATENTS + alive]
     found = out[:alive]
     most = 0.0
     for m in range(alive):
@@ -252,24 +250,21 @@ def _change(program: np.ndarray, level: np.ndarray, n: int, alive: int, out: np.
 
 
 @njit(**COMPILED)
-def _move(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray, scratch: np.ndarray) -> None:
+def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """Level, phase and their slopes at a time, (4, modes) from `out` on, and what A adds, behind them."""
-    whole = program.view(np.int64)
-    counts = voice.view(np.int64)
-    n = whole[at.P_MODES]
-    rows = at.state(n)
-    sigma, omega = program[whole[at.O_SIGMA] :], program[whole[at.O_OMEGA] :]
-    coupling, largest = program[whole[at.O_COUPLING] :], program[whole[at.O_LARGEST] :]
-    start = voice[rows + at.ENERGY_0 * n :]
-    constant = voice[rows + at.CONSTANT * n :]
-    alive = counts[at.AUDIBLE_COUNT]
-    f, integral = scratch[: 2 * n], scratch[2 * at.MOST_MODES : 2 * at.MOST_MODES + 2 * n]
-    if whole[at.P_HIGHER]:
-        spacing = program[at.P_SPACING]
-        spacing *= _width(counts[at.NODE])
-        u = (time - counts[at.NODE] * program[at.P_SPACING]) / spacing
-        total, left = voice[rows + at.INTEGRAL * n :], voice[rows + at.AT_LEFT * n :]
-        middle, right = voice[rows + at.AT_MIDDLE * n :], voice[rows + at.AT_RIGHT * n :]
+    n = program.modes
+    sigma, omega = behind(program, program.sigma, n), behind(program, program.omega, n)
+    coupling, largest = behind(program, program.coupling, 2 * n * n), behind(program, program.largest, n)
+    start = row(voice, at.ENERGY_0)
+    constant = rows(voice, at.CONSTANT, 2)
+    alive = voice.audible_count
+    f, integral = scratch[: 2 * n], scratch[2 * MOST_LATENTS : 2 * MOST_LATENTS + 2 * n]
+    if program.higher:
+        spacing = program.spacing
+        spacing *= _width(voice.node)
+        u = (time - voice.node * program.spacing) / spacing
+        total, left = rows(voice, at.INTEGRAL, 2), rows(voice, at.AT_LEFT, 2)
+        middle, right = rows(voice, at.AT_MIDDLE, 2), rows(voice, at.AT_RIGHT, 2)
         for j in range(2 * n):
             slope = 4 * middle[j] - 3 * left[j] - right[j]
             bend = 2 * (left[j] + right[j]) - 4 * middle[j]
@@ -285,13 +280,13 @@ def _move(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray, 
             continue
         share = energy / (2 * sigma[m])
         for part in range(2):
-            row = coupling[(2 * m + part) * n : (2 * m + part + 1) * n]
+            given = coupling[(2 * m + part) * n : (2 * m + part + 1) * n]
             slopes, sums = f[part * n : (part + 1) * n], integral[part * n : (part + 1) * n]
             for j in range(alive):
-                slopes[j] += energy * row[j]
-                sums[j] -= share * row[j]
-    limit = program[at.P_LIMIT]
-    level_0, angle_0 = voice[rows + at.LEVEL_0 * n :], voice[rows + at.ANGLE_0 * n :]
+                slopes[j] += energy * given[j]
+                sums[j] -= share * given[j]
+    limit = program.limit
+    level_0, angle_0 = row(voice, at.LEVEL_0), row(voice, at.ANGLE_0)
     level, phase, level_rate, phase_rate = out[:n], out[n : 2 * n], out[2 * n : 3 * n], out[3 * n : 4 * n]
     for j in range(alive):
         saturated = _tanh(integral[j] / limit)
@@ -299,90 +294,82 @@ def _move(voice: np.ndarray, program: np.ndarray, time: float, out: np.ndarray, 
         level_rate[j] = f[j] * (1 - saturated * saturated)  # the decay comes later: this part alone is held
         phase[j] = angle_0[j] + omega[j] * time + integral[n + j]
         phase_rate[j] = omega[j] + f[n + j]
-    if whole[at.P_ADIABATIC] and counts[at.MODULATED]:
-        _change(program, level, n, alive, out[4 * n :], scratch)
+    if program.adiabatic and voice.modulated:
+        _change(program, level, alive, out[4 * n :], scratch)
 
 
 @njit(**COMPILED)
 def generate(
-    voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
+    voice: Voice, program: BankProgram, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """The next quantum, (4, QUANTUM): two sets of weights, the second where `fading`, at two points.
 
     Args:
         heard: otherwise only time advances.
     """
-    whole = program.view(np.int64)
-    counts = voice.view(np.int64)
-    n = whole[at.P_MODES]
-    rows = at.state(n)
-    ratio = program[at.P_RATIO]
-    first = counts[at.GENERATED]
-    if whole[at.P_HIGHER]:
+    n = program.modes
+    ratio = program.ratio
+    first = voice.generated
+    if program.higher:
         _integrate_to(voice, program, first * ratio, scratch)
-    points = counts[at.POINTS]
-    if fading and counts[at.WEIGHTS_FADED] == 0:  # what could not be heard there may be heard here
-        if counts[at.MODULATED] != whole[at.P_MODULATION]:
-            counts[at.MODULATED], counts[at.SEGMENT_VALID] = whole[at.P_MODULATION], 0
-        counts[at.REFRESH] = 0
+    points = voice.points
+    if fading and voice.weights_faded == 0:  # what could not be heard there may be heard here
+        if voice.modulated != program.modulates:
+            voice.modulated, voice.segment_valid = program.modulates, 0
+        voice.refresh = 0
     if heard:
         out[:] = 0.0
-        length = SHORT if first < whole[at.P_EARLY] else LONG
-        z = scratch[at.SCRATCH_ROWS * at.MOST_MODES :].view(np.float32)[: 2 * at.QUANTUM * n]
-        if not counts[at.SEGMENT_VALID]:
+        length = SHORT if first < program.early else LONG
+        z = scratch[SCRATCH_ROWS * MOST_LATENTS :].view(np.float32)[: 2 * QUANTUM * n]
+        if not voice.segment_valid:
             _keep_end(voice, program, first * ratio, scratch)
-        for begin in range(0, at.QUANTUM, length):
-            _segment(voice, program, first + begin, length, counts[at.AUDIBLE_COUNT], z[begin * 2 * n :], scratch)
-        if counts[at.MODULATED]:
-            if counts[at.REFRESH] == 0:
+        for begin in range(0, QUANTUM, length):
+            _segment(voice, program, first + begin, length, voice.audible_count, z[begin * 2 * n :], scratch)
+        if voice.modulated:
+            if voice.refresh == 0:
                 _look(voice, program, z, scratch)
-                counts[at.REFRESH] = LOOK_EVERY
-            counts[at.REFRESH] -= 1
-        modulated = counts[at.MODULATED] and counts[at.ROWS] > 0
+                voice.refresh = LOOK_EVERY
+            voice.refresh -= 1
+        modulated = voice.modulated and voice.rows > 0
         for which in range(2 if fading else 1):
             for point in range(points):
-                _sum(voice, n, counts[at.AUDIBLE_COUNT], which, point, z, out[2 * which + point], scratch)
+                _sum(voice, which, point, z, out[2 * which + point], scratch)
         if modulated:
             _modulate(voice, program, z, fading, points, out, scratch)
     else:
-        counts[at.SEGMENT_VALID] = 0
-    counts[at.GENERATED] = first + at.QUANTUM
-    loudest, alive, was_alive = (
-        -1e9,
-        1,
-        counts[at.AUDIBLE_COUNT],
-    )  # beyond it there is no level: what is dead stays so
-    sigma = program[whole[at.O_SIGMA] :]
-    time = (first + at.QUANTUM) * ratio
+        voice.segment_valid = 0
+    voice.generated = first + QUANTUM
+    # Beyond those that were audible there is no level: what is dead stays so
+    loudest, alive, was_alive = -1e9, 1, voice.audible_count
+    sigma, levels, latest = behind(program, program.sigma, n), row(voice, at.LEVEL_0), row(voice, at.LEVEL)
+    time = (first + QUANTUM) * ratio
     for m in range(n):
-        level = voice[rows + at.LEVEL_0 * n + m] - sigma[m] * time
-        if heard and whole[at.P_HIGHER] and m < was_alive:
-            level = max(level, voice[rows + at.LEVEL * n + m])
+        level = levels[m] - sigma[m] * time
+        if heard and program.higher and m < was_alive:
+            level = max(level, latest[m])
         loudest = max(loudest, level)
-        if level + program[at.P_LOUDNESS] > DEAD:
+        if level + program.loudness > DEAD:
             alive = m + 1
-    voice[at.LOUDNESS] = loudest + program[at.P_LOUDNESS]
-    counts[at.AUDIBLE_COUNT] = alive
+    voice.loudness = loudest + program.loudness
+    voice.audible_count = alive
 
 
 @njit(**COMPILED)
-def _keep_end(voice: np.ndarray, program: np.ndarray, time: float, scratch: np.ndarray) -> None:
+def _keep_end(voice: Voice, program: BankProgram, time: float, scratch: np.ndarray) -> None:
     """Keep the state at which the next segment begins."""
-    counts = voice.view(np.int64)
-    n = program.view(np.int64)[at.P_MODES]
-    rows = at.state(n)
-    end = scratch[8 * at.MOST_MODES : 8 * at.MOST_MODES + 5 * n]
+    n = program.modes
+    end = scratch[8 * MOST_LATENTS : 8 * MOST_LATENTS + 5 * n]
     end[4 * n :] = 0.0
     _move(voice, program, time, end, scratch)
-    voice[rows + at.LEVEL * n : rows + (at.LEVEL + 4) * n] = end[: 4 * n]
-    voice[rows + at.CHANGE * n : rows + (at.CHANGE + 1) * n] = end[4 * n :]
-    counts[at.SEGMENT_VALID] = 1
+    rows(voice, at.LEVEL, 4)[:] = end[: 4 * n]
+    row(voice, at.CHANGE)[:] = end[4 * n :]
+    voice.segment_valid = 1
 
 
 @njit(**COMPILED)
 def _segment(
-    voice: np.ndarray,
-    program: np.ndarray,
+    voice: Voice,
+    program: BankProgram,
     first: int,
     length: int,
     alive: int,
@@ -390,19 +377,17 @@ def _segment(
     scratch: np.ndarray,
 ) -> None:
     """z at `length` frames, float32 (frames, 2, modes) with the real parts first."""
-    whole = program.view(np.int64)
-    n = whole[at.P_MODES]
-    rows = at.state(n)
-    ratio, limit = program[at.P_RATIO], program[at.P_LIMIT]
-    end = scratch[8 * at.MOST_MODES : 8 * at.MOST_MODES + 5 * n]
+    n = program.modes
+    ratio, limit = program.ratio, program.limit
+    end = scratch[8 * MOST_LATENTS : 8 * MOST_LATENTS + 5 * n]
     end[4 * n :] = 0.0
     _move(voice, program, (first + length) * ratio, end, scratch)
-    sigma = program[whole[at.O_SIGMA] :]
+    sigma = behind(program, program.sigma, n)
     width, count = length * ratio, float(length)
-    level, phase = voice[rows + at.LEVEL * n :], voice[rows + at.PHASE * n :]
-    level_rate, phase_rate = voice[rows + at.LEVEL_RATE * n :], voice[rows + at.PHASE_RATE * n :]
-    next_change = voice[rows + (at.CHANGE + 1) * n :]
-    turns = scratch[16 * at.MOST_MODES :].view(np.float32)
+    level, phase = row(voice, at.LEVEL), row(voice, at.PHASE)
+    level_rate, phase_rate = row(voice, at.LEVEL_RATE), row(voice, at.PHASE_RATE)
+    next_change = row(voice, at.CHANGE + 1)
+    turns = scratch[16 * MOST_LATENTS :].view(np.float32)
     zr, zi, rr, ri = turns[:n], turns[n : 2 * n], turns[2 * n : 3 * n], turns[3 * n : 4 * n]
     sr, si, cr, ci = turns[4 * n : 5 * n], turns[5 * n : 6 * n], turns[6 * n : 7 * n], turns[7 * n : 8 * n]
     bent = 0.0
@@ -455,23 +440,15 @@ def _segment(
 
 
 @njit(**COMPILED)
-def _sum(
-    voice: np.ndarray,
-    n: int,
-    alive: int,
-    which: int,
-    point: int,
-    z: np.ndarray,
-    out: np.ndarray,
-    scratch: np.ndarray,
-) -> None:
+def _sum(voice: Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
     """Adds Re Σ w z at each frame of the quantum."""
-    slot = at.weights(n, which, point, 0)
-    w, v = scratch[32 * at.MOST_MODES :].view(np.float32), scratch[33 * at.MOST_MODES :].view(np.float32)
+    n, alive = voice.modes, voice.audible_count
+    reals, imaginaries = weights(voice, which, point, 0), weights(voice, which, point, 1)
+    w, v = scratch[32 * MOST_LATENTS :].view(np.float32), scratch[33 * MOST_LATENTS :].view(np.float32)
     for m in range(alive):
-        w[m], v[m] = voice[slot + m], voice[slot + n + m]
-    constant = voice[at.bias(n, which, point)]
-    for frame in range(at.QUANTUM):
+        w[m], v[m] = reals[m], imaginaries[m]
+    constant = voice.bias[which, point]
+    for frame in range(QUANTUM):
         total = np.float32(0)
         real, imaginary = z[frame * 2 * n :], z[frame * 2 * n + n :]
         for m in range(alive):
@@ -480,19 +457,17 @@ def _sum(
 
 
 @njit(**COMPILED)
-def _look(voice: np.ndarray, program: np.ndarray, z: np.ndarray, scratch: np.ndarray) -> None:
+def _look(voice: Voice, program: BankProgram, z: np.ndarray, scratch: np.ndarray) -> None:
     """Find the latents whose modulation can be heard, and those whose squares are heard in it.
 
     Energies decay: later there are no more.
     """
-    whole = program.view(np.int64)
-    counts = voice.view(np.int64)
-    n = whole[at.P_MODES]
-    rows, alive = at.state(n), counts[at.AUDIBLE_COUNT]
-    matrix, largest = program[whole[at.O_M] :], program[whole[at.O_M_LARGEST] :]
+    n = program.modes
+    alive = voice.audible_count
+    matrix, largest = behind(program, program.modulation, 4 * n * n), behind(program, program.largest_modulation, n)
     squares, loud = (
-        scratch[20 * at.MOST_MODES : 20 * at.MOST_MODES + n],
-        scratch[21 * at.MOST_MODES : 21 * at.MOST_MODES + n],
+        scratch[20 * MOST_LATENTS : 20 * MOST_LATENTS + n],
+        scratch[21 * MOST_LATENTS : 21 * MOST_LATENTS + n],
     )
     loudest = 0.0
     for m in range(alive):  # beyond, z is another voice's
@@ -500,38 +475,38 @@ def _look(voice: np.ndarray, program: np.ndarray, z: np.ndarray, scratch: np.nda
         size = 0.0
         for which in range(2):
             for point in range(2):
-                slot = at.weights(n, which, point, 0)
-                size = max(size, abs(voice[slot + m]), abs(voice[slot + n + m]))
+                w, v = weights(voice, which, point, 0), weights(voice, which, point, 1)
+                size = max(size, abs(w[m]), abs(v[m]))
         loud[m] = size * math.sqrt(squares[m])
         loudest = max(loudest, loud[m])
-    row_list, column_list = counts[rows + at.ROW_LIST * n :], counts[rows + at.COLUMN_LIST * n :]
+    row_list, column_list = row(voice, at.ROW_LIST).view(np.int64), row(voice, at.COLUMN_LIST).view(np.int64)
     columns = 0
     for m in range(alive):
         if squares[m] * largest[m] * loudest > INAUDIBLE:
             column_list[columns] = m
             columns += 1
     kept = 0
-    change = voice[rows + at.CHANGE * n :]
+    change = row(voice, at.CHANGE)
     for j in range(alive):
         effect = 0.0
         for place in range(columns):
             m = column_list[place]
             entry = matrix[(j * n + m) * 4 : (j * n + m) * 4 + 4]
             effect += squares[m] * (abs(entry[0]) + abs(entry[1]) + abs(entry[2]) + abs(entry[3]))
-        if whole[at.P_ADIABATIC]:
+        if program.adiabatic:
             effect += abs(change[j])
         if effect * loud[j] > INAUDIBLE:
             row_list[kept] = j
             kept += 1
-    counts[at.ROWS], counts[at.COLUMNS] = kept, columns
+    voice.rows, voice.columns = kept, columns
     if kept == 0:
-        counts[at.MODULATED] = 0
+        voice.modulated = 0
 
 
 @njit(**COMPILED)
 def _modulate(
-    voice: np.ndarray,
-    program: np.ndarray,
+    voice: Voice,
+    program: BankProgram,
     z: np.ndarray,
     fading: bool,
     points: int,
@@ -539,15 +514,13 @@ def _modulate(
     scratch: np.ndarray,
 ) -> None:
     """Adds what the latents that are modulated differ by from themselves: w z (e^g - 1), for the whole quantum."""
-    whole = program.view(np.int64)
-    counts = voice.view(np.int64)
-    n = whole[at.P_MODES]
-    rows, quantum = at.state(n), at.QUANTUM
-    matrix, limit = program[whole[at.O_M] :], program[at.P_LIMIT]
-    row_list, column_list = counts[rows + at.ROW_LIST * n :], counts[rows + at.COLUMN_LIST * n :]
-    change, next_change = voice[rows + at.CHANGE * n :], voice[rows + (at.CHANGE + 1) * n :]
-    squares = scratch[(at.SCRATCH_ROWS + 2 * quantum) * at.MOST_MODES :].view(np.float32)
-    alive, columns, rows_kept = counts[at.AUDIBLE_COUNT], counts[at.COLUMNS], counts[at.ROWS]
+    n = program.modes
+    quantum = QUANTUM
+    matrix, limit = behind(program, program.modulation, 4 * n * n), program.limit
+    row_list, column_list = row(voice, at.ROW_LIST).view(np.int64), row(voice, at.COLUMN_LIST).view(np.int64)
+    change, next_change = row(voice, at.CHANGE), row(voice, at.CHANGE + 1)
+    squares = scratch[(SCRATCH_ROWS + 2 * quantum) * MOST_LATENTS :].view(np.float32)
+    alive, columns, rows_kept = voice.audible_count, voice.columns, voice.rows
     while columns > 0 and column_list[columns - 1] >= alive:  # died since the lists, which ascend, were made
         columns -= 1
     while rows_kept > 0 and row_list[rows_kept - 1] >= alive:
@@ -559,7 +532,7 @@ def _modulate(
             a, b = z[frame * 2 * n + m], z[frame * 2 * n + n + m]
             real[frame] = a * a - b * b
             imaginary[frame] = np.float32(2) * a * b
-    growth, turn = scratch[22 * at.MOST_MODES :].view(np.float32), scratch[23 * at.MOST_MODES :].view(np.float32)
+    growth, turn = scratch[22 * MOST_LATENTS :].view(np.float32), scratch[23 * MOST_LATENTS :].view(np.float32)
     for place in range(rows_kept):
         j = row_list[place]
         start = change[j]
@@ -584,11 +557,10 @@ def _modulate(
             turn[frame] = a * gain * sine + b * (gain * cosine - 1)
         for which in range(2 if fading else 1):
             for point in range(points):
-                slot = at.weights(n, which, point, 0)
-                w, v = voice[slot + j], voice[slot + n + j]
-                row = out[2 * which + point]
+                w, v = weights(voice, which, point, 0)[j], weights(voice, which, point, 1)[j]
+                given = out[2 * which + point]
                 for frame in range(quantum):
-                    row[frame] += w * growth[frame] + v * turn[frame]
-    if whole[at.P_ADIABATIC]:
+                    given[frame] += w * growth[frame] + v * turn[frame]
+    if program.adiabatic:
         for m in range(n):
             change[m] = next_change[m]

@@ -9,10 +9,13 @@ import numpy as np
 from numba import carray, njit, types
 
 from engine.kernels import contact, kit, mixer, sympathy
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.constants import QUANTUM
+from engine.kernels.convolver import BEHIND_IMPULSE
 from engine.kernels.fourier import transform
-from engine.kernels.memory import pointer
+from engine.kernels.memory import convolver_at, impulse_at, pointer, reals, shaped
+from engine.kernels.memory import mixer_at as record_of_mixer
+from engine.kernels.mixer_records import EARLY, WINDOW, Convolver
 from engine.kernels.playing import events
 
 ADDRESS = COUNT = types.int64
@@ -27,8 +30,7 @@ PARTITION = types.void(ADDRESS, COUNT, COUNT, ADDRESS, ADDRESS)
 @njit(**COMPILED)
 def render(mixer_at: int, frames: int, out_at: int) -> None:
     """The next frames of a mixer, float32 (frames, 2)."""
-    memory = carray(pointer(mixer_at), (at.MIXER_SLOTS,), np.float64)
-    mixer.render(memory, frames, carray(pointer(out_at), (2 * frames,), np.float32), 0.0)
+    mixer.render(record_of_mixer(mixer_at), frames, carray(pointer(out_at), (2 * frames,), np.float32), 0.0)
 
 
 @njit(**COMPILED)
@@ -59,54 +61,42 @@ def sympathise(player_at: int, mixer_at: int) -> None:
 
 
 @njit(**COMPILED)
-def partition(response_at: int, frames: int, channels: int, memory_at: int, convolver_at: int) -> None:
+def partition(response_at: int, frames: int, channels: int, memory_at: int, work_at: int) -> None:
     """Writes an impulse response as the convolver reads it: see `engine.effects.partitions.partitioned`.
 
     Args:
         response_at: float64 (frames, channels).
         memory_at: room for header and spectra.
-        convolver_at: whose tables and work space are used; it must not be at work.
+        work_at: a convolver, whose tables and work space are used; it must not be at work.
     """
-    response = carray(pointer(response_at), (1 << 40,), np.float64)
-    memory = carray(pointer(memory_at), (1 << 40,), np.float64)
-    convolver = carray(pointer(convolver_at), (1 << 40,), np.float64)
-    early_frames = min(frames, at.EARLY * at.QUANTUM)
-    early = (early_frames + at.QUANTUM - 1) // at.QUANTUM
-    late = (frames - early_frames + at.WINDOW - 1) // at.WINDOW
-    counts = memory.view(np.int64)
-    counts[at.I_CHANNELS], counts[at.I_EARLY], counts[at.I_LATE] = channels, early, late
-    place = at.I_HEADER
-    for number in range(early):
-        place = _spectra(response, number * at.QUANTUM, early_frames, channels, at.QUANTUM, memory, place, convolver)
-    for number in range(late):
-        first = early_frames + number * at.WINDOW
-        place = _spectra(response, first, frames, channels, at.WINDOW, memory, place, convolver)
+    response = shaped(reals(response_at), 0, (frames, channels))
+    impulse, convolver, memory = impulse_at(memory_at), convolver_at(work_at), reals(memory_at)
+    early_frames = min(frames, EARLY * QUANTUM)
+    impulse.channels, impulse.early = channels, (early_frames + QUANTUM - 1) // QUANTUM
+    impulse.late = (frames - early_frames + WINDOW - 1) // WINDOW
+    place = BEHIND_IMPULSE
+    for number in range(impulse.early):
+        part = response[number * QUANTUM : min((number + 1) * QUANTUM, early_frames)]
+        _spectra(convolver, part, shaped(memory, place, (channels, 2, QUANTUM + 1)))
+        place += channels * 2 * (QUANTUM + 1)
+    for number in range(impulse.late):
+        first = early_frames + number * WINDOW
+        part = response[first : min(first + WINDOW, frames)]
+        _spectra(convolver, part, shaped(memory, place, (channels, 2, WINDOW + 1)))
+        place += channels * 2 * (WINDOW + 1)
 
 
 @njit(**COMPILED)
-def _spectra(
-    response: np.ndarray,
-    first: int,
-    end: int,
-    channels: int,
-    length: int,
-    memory: np.ndarray,
-    place: int,
-    convolver: np.ndarray,
-) -> int:
-    """Writes the spectra (channels, 2, length + 1) of one partition; the place behind them."""
-    n, wide = 2 * length, 2 * at.WINDOW
-    re, im = convolver[at.C_WORK : at.C_WORK + n], convolver[at.C_WORK + wide : at.C_WORK + wide + n]
-    re2 = convolver[at.C_WORK + 2 * wide : at.C_WORK + 2 * wide + n]
-    im2 = convolver[at.C_WORK + 3 * wide : at.C_WORK + 3 * wide + n]
-    cosines, sines = convolver[at.C_COSINES : at.C_SINES], convolver[at.C_SINES : at.C_EARLY_INPUT]
-    for channel in range(channels):
+def _spectra(convolver: Convolver, part: np.ndarray, spectra: np.ndarray) -> None:
+    """Writes the spectra (channels, 2, length + 1) of a partition, (length, channels) or fewer frames."""
+    length = spectra.shape[2] - 1
+    n, work, cosines, sines = 2 * length, convolver.work[:], convolver.cosines[:], convolver.sines[:]
+    re, im, re2, im2 = work[0, :n], work[1, :n], work[2, :n], work[3, :n]
+    for channel in range(len(spectra)):
         re[:], im[:] = 0.0, 0.0
-        for frame in range(min(length, end - first)):
-            re[frame] = response[(first + frame) * channels + channel]
+        for frame in range(len(part)):
+            re[frame] = part[frame, channel]
         transform(re, im, re2, im2, cosines, sines)
         for frequency in range(length + 1):
-            memory[place + frequency] = re[frequency] / n
-            memory[place + length + 1 + frequency] = im[frequency] / n
-        place += 2 * (length + 1)
-    return place
+            spectra[channel, 0, frequency] = re[frequency] / n
+            spectra[channel, 1, frequency] = im[frequency] / n

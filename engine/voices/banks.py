@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import singledispatch
 from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
-from torch import Tensor, nn
+from torch import nn
 
-from engine.kernels import layout as at
+from engine.kernels.constants import QUANTUM
+from engine.kernels.mixer_records import MOST_LATENTS
+from engine.kernels.voice_records import BANK, BANK_PARTS, BANK_PROGRAM, MOST_WIDTHS
 from engine.levels import FULL_SCALE_M
 from engine.models.base import StringModel
 from engine.models.dmd import DMD
@@ -34,7 +36,7 @@ def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz:
     """The program of an integrated-phase model; None: it has more latents or layers than the kernel holds."""
     c, n = model.configuration, model.configuration.state_size
     widths = (n, *c.eigenvalue_widths)
-    if max(widths) > at.MOST_MODES or len(widths) > 7:
+    if max(widths) > MOST_LATENTS or len(widths) >= MOST_WIDTHS:
         return None
     rates = model._rates()
     units = model.energy_units if model.energy_units is not None else torch.ones(n, dtype=torch.float64)
@@ -54,21 +56,19 @@ def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz:
     if model.A_out is not None:
         change = (model.A_out * model._modulation_units[:n]).double().T.contiguous()
     ratio = info.rate_hz / rate_hz
-    header = {
-        at.P_RATIO: ratio,
-        at.P_SPACING: float(c.node_spacing),
-        at.P_LIMIT: GAIN_LIMIT,
-        at.P_LOUDNESS: math.log(info.scale_m / FULL_SCALE_M),
-    }
-    counts = {
-        at.P_MODES: n,
-        at.P_SECOND_ORDER: int(c.second_order),
-        at.P_HIGHER: int(model.g is not None or c.adiabatic),
-        at.P_ADIABATIC: int(c.adiabatic),
-        at.P_LAYERS: len(sizes) - 1 if model.g is not None else 0,
-        at.P_MODULATION: int(model.M_out is not None),
-        at.P_EARLY: math.ceil(SETTLED * c.node_spacing / ratio / at.QUANTUM) * at.QUANTUM,
-        **{at.P_WIDTHS + place: width for place, width in enumerate(sizes)},
+    values = {
+        "modes": n,
+        "ratio": ratio,
+        "spacing": c.node_spacing,
+        "limit": GAIN_LIMIT,
+        "second_order": c.second_order,
+        "higher": model.g is not None or c.adiabatic,
+        "adiabatic": c.adiabatic,
+        "layers": len(sizes) - 1 if model.g is not None else 0,
+        "modulates": model.M_out is not None,
+        "loudness": math.log(info.scale_m / FULL_SCALE_M),
+        "early": math.ceil(SETTLED * c.node_spacing / ratio / QUANTUM) * QUANTUM,
+        "widths": sizes + [0] * (MOST_WIDTHS - len(sizes)),
     }
     parts = (
         rates.sigma,
@@ -84,7 +84,7 @@ def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz:
         largest_m,
         change,
     )
-    memory = packed(at.P_HEADER, header, counts, _places(parts))
+    memory = packed(BANK_PROGRAM, values, *(part.numpy() for part in parts), names=BANK_PARTS)
     weight, offset = model.decoder.weight.double(), model.decoder.bias.double()
 
     def start(displacement_m: Array) -> tuple[Array, Array]:
@@ -109,17 +109,19 @@ def _dmd_program(model: DMD, info: PresetInfo, rate_hz: int) -> Program | None:
     present = model.magnitude_log > -600
     sigma, omega = -model.magnitude_log[present].double(), model.angle[present].double()
     n = int(present.sum())
-    if not 0 < n <= at.MOST_MODES:
+    if not 0 < n <= MOST_LATENTS:
         return None
     zeros = torch.zeros(n, dtype=torch.float64)
     parts = [sigma, omega, torch.zeros(n, 2 * n, dtype=torch.float64), zeros, *(zeros[:0] for _ in range(8))]
-    header = {
-        at.P_RATIO: (ratio := info.rate_hz / rate_hz),
-        at.P_SPACING: 1.0,
-        at.P_LIMIT: 1.0,
-        at.P_LOUDNESS: math.log(info.scale_m / FULL_SCALE_M),
+    ratio = info.rate_hz / rate_hz
+    values = {
+        "modes": n,
+        "ratio": ratio,
+        "spacing": 1.0,
+        "limit": 1.0,
+        "loudness": math.log(info.scale_m / FULL_SCALE_M),
     }
-    memory = packed(at.P_HEADER, header, {at.P_MODES: n}, _places(parts))
+    memory = packed(BANK_PROGRAM, values, *(part.numpy() for part in parts), names=BANK_PARTS)
     real, imaginary = model.modes.double().chunk(2, dim=-1)
     modes = torch.cat([real[:, present], -imaginary[:, present]], dim=-1)
     if rate_hz != info.rate_hz:
@@ -145,7 +147,7 @@ def _bank(
     info: PresetInfo,
 ) -> Program:
     force = info.resonator.force_weights
-    return Program(at.BANK, memory, modes, rate_hz, info.grid_points, start, read, None, voice_ends_s(info), force)
+    return Program(BANK, memory, modes, rate_hz, info.grid_points, start, read, None, voice_ends_s(info), force)
 
 
 def _origin(model: IntegratedPhase | DMD, displacement: Array) -> NDArray[np.complex128]:
@@ -163,8 +165,3 @@ def _flat(layer: nn.Linear) -> NDArray[np.float32]:
     """Bias, then weights by input, float32."""
     bias = torch.zeros(layer.out_features) if layer.bias is None else layer.bias
     return torch.cat([bias.detach(), layer.weight.detach().T.flatten()]).numpy().astype(np.float32)
-
-
-def _places(parts: Sequence[Tensor]) -> dict[int, NDArray[np.generic]]:
-    """The slots that say where each part begins."""
-    return dict(zip(range(at.P_OFFSETS, at.P_WIDTHS), (part.numpy() for part in parts), strict=True))

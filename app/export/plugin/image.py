@@ -20,7 +20,7 @@ from app.export.plugin.parts import AMP, EFFECTS, effects_there, kit_of, parts_o
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.string_keys import StringKeys
-from app.instrument.table import PLAYED_PARAMETERS, WHEELED, wheel_goal
+from app.instrument.table import WHEELED, wheel_goal
 from app.patches.drums import Drums
 from app.patches.patch import ASSIGNABLE, Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
@@ -29,13 +29,14 @@ from engine.effects import body, curves, impulse, room
 from engine.effects.amp import NOMINAL
 from engine.effects.partitions import FADE_S
 from engine.kernels import constants as of
-from engine.kernels import layout as at
-from engine.kernels.records import CHANNEL, EVENT, PLAYER, REPORT, TABLE, slot, slots, voice_bytes
+from engine.kernels import mixer_records as mixed
+from engine.kernels.fields import record_of, slot, slots
+from engine.kernels.records import CHANNEL, EVENT, PLAYER, REPORT, TABLE
+from engine.kernels.voice_records import TENSION_PROGRAM, TRUTH_PROGRAM, voice_bytes
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import Preset
 from engine.voices.derivative import differentiator_taps
 from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S
-from engine.voices.player import record_of
 
 PREPARED_HZ = 48_000
 MAKER = "Learned Strings"
@@ -314,13 +315,11 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     yield _record("volume_db", VOLUME, 0, 0.0, OF_CHOICES["volume_db"], "")
     drums = isinstance(patch.strings, Drums)
     fixed = not drums and patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
-    points = () if fixed else PLAYED_PARAMETERS[of.POINT :][: len(patch.pickup.points)]
+    points = () if fixed else of.PLAYED[of.POINT :][: len(patch.pickup.points)]
     for id in (*WHEELED, *points):
         if id in (DRUM_PARAMETERS if drums else ASSIGNABLE):
             parameter = OF_PATCHES[id]
-            yield _record(
-                id, VALUE, PLAYED_PARAMETERS.index(id), patch.value(id), parameter, parameter.group.capitalize()
-            )
+            yield _record(id, VALUE, of.PLAYED.index(id), patch.value(id), parameter, parameter.group.capitalize())
     for id in effects_there(patch):
         parameter = OF_PATCHES[id]
         yield _record(id, EFFECT, EFFECTS.index(id), patch.value(id), parameter, parameter.group.capitalize())
@@ -345,12 +344,8 @@ def _macros(patch: Patch, ids: tuple[str, ...]) -> tuple[list[_Macro], tuple[str
 def layout_header(version: str) -> str:
     """The C header with places and constants of the kernels' memory."""
     wanted = {
-        at: "QUANTUM AHEAD EARLY WINDOW REACH MIXER_SLOTS M_RATE M_FRAMES M_ACTIVE M_WANTED_VOLUME M_VOLUME "
-        "M_RELEASE M_REDUCTION M_PEAK M_LEFT M_CHANNELS M_SMOOTHING M_LIMITING M_CONVOLVER M_EFFECTS "
-        "M_EFFECTS_NOW M_EFFECTS_NEXT M_PLAYER M_TAPS M_GAINS M_ADDRESS M_SCRATCH M_AMPLIFIER A_WANTED_DRIVE "
-        "A_WANTED_GAIN NEXT_WEIGHTS A_WANTED_TONE I_HEADER C_CAPACITY C_FADE_WINDOWS "
-        "C_ACTIVE C_STEP C_COSINES C_SINES C_WORK C_LATE S_RATE T_RATE",
-        of: "NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENTS REPORTS MOST_NOTES "
+        mixed: "EARLY WINDOW REACH",
+        of: "QUANTUM AHEAD NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENTS REPORTS MOST_NOTES "
         "MOST_SOURCES MPE KEYS CHANNELS BEND_SEMITONES BEGAN BODY_MIX BODY_CROSS BODY_STEP BODY_HEADER "
         "BODY_POINTS BODY_LOWEST_HZ BODY_STEPS BODY_SLOTS",
     }
@@ -363,6 +358,12 @@ def layout_header(version: str) -> str:
         ("REPORT", REPORT),
         ("TABLE", TABLE),
         ("CHANNEL", CHANNEL),
+        ("MIXER", mixed.MIXER),
+        ("AMPLIFIER", mixed.AMPLIFIER),
+        ("CONVOLVER", mixed.CONVOLVER),
+        ("IMPULSE", mixed.IMPULSE),
+        ("TENSION_PROGRAM", TENSION_PROGRAM),
+        ("TRUTH_PROGRAM", TRUTH_PROGRAM),
     ):
         lines += [f"#define {name}_{field.upper()} {slot(kind, field)}" for field in kind.names or ()]
         lines += [f"#define {name}_SLOTS {slots(kind)}"]

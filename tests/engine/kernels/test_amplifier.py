@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from engine.effects.amp import NOMINAL, Amp, amplified
 from engine.kernels import amplifier
-from engine.kernels import layout as at
+from engine.kernels.constants import QUANTUM
+from engine.kernels.mixer_records import MIXER
 
 RATE_HZ = 48_000
 SIZE = 2**15
@@ -74,21 +75,22 @@ def test_tone_raises_one_side_and_lowers_the_other() -> None:
 
 
 def test_off_it_leaves_every_sample_and_is_switched_without_a_click() -> None:
-    _, sound = tone(200, 0.1, 64 * at.QUANTUM)
+    _, sound = tone(200, 0.1, 64 * QUANTUM)
     np.testing.assert_array_equal(amplified(Amp(), sound, RATE_HZ), sound)
-    mixer = np.zeros(at.MIXER_SLOTS)
-    mixer[at.M_RATE] = RATE_HZ
-    mix, found = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2), []
-    for number, first in enumerate(range(0, len(sound), at.QUANTUM)):
-        mixer[at.M_AMPLIFIER : at.M_AMPLIFIER + 3] = Amp(6.0 if 10 <= number < 40 else 0.0).factors
-        mix[:] = sound[first : first + at.QUANTUM]
+    mixer = np.zeros(1, MIXER)[0]
+    mixer["rate_hz"], amp = RATE_HZ, mixer["amplifier"]
+    mix, found = mixer["mix"], []
+    for number, first in enumerate(range(0, len(sound), QUANTUM)):
+        factors = Amp(6.0 if 10 <= number < 40 else 0.0).factors
+        amp["wanted_drive"], amp["wanted_gain"], amp["wanted_tone"] = factors
+        mix[:] = sound[first : first + QUANTUM]
         amplifier.amplify(mixer)
-        mixer.view(np.int64)[at.M_FRAMES] += at.QUANTUM
+        mixer["frames"] += QUANTUM
         found.append(mix.copy())
     whole = np.concatenate(found)[:, 0]
     assert np.abs(np.diff(whole)).max() < 1.6 * np.abs(np.diff(sound[:, 0])).max()
-    assert not np.array_equal(whole[30 * at.QUANTUM : 31 * at.QUANTUM], sound[30 * at.QUANTUM : 31 * at.QUANTUM, 0])
-    np.testing.assert_array_equal(whole[60 * at.QUANTUM :], sound[60 * at.QUANTUM :, 0])
+    assert not np.array_equal(whole[30 * QUANTUM : 31 * QUANTUM], sound[30 * QUANTUM : 31 * QUANTUM, 0])
+    np.testing.assert_array_equal(whole[60 * QUANTUM :], sound[60 * QUANTUM :, 0])
 
 
 def test_it_is_silent_before_any_input() -> None:

@@ -12,7 +12,7 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
+from engine.kernels.mixer_records import MOST_LATENTS
 from engine.levels import FULL_SCALE_M
 from engine.models.configurations import DMDConfiguration
 from engine.models.dmd import DMD
@@ -138,11 +138,11 @@ def test_what_was_silent_at_one_place_is_whole_at_another(name: str, ear: Ear, s
 def test_what_is_no_bank_has_no_program(shipped: Shipped, model: torch.nn.Module) -> None:
     preset = shipped(KNOWING)
     assert bank_program(model, preset.info, 48_000) is None  # Koopman_var: its multiplier sees every frame
-    c = replace(preset.model.configuration, eigenvalue_widths=(at.MOST_MODES + 1,))
+    c = replace(preset.model.configuration, eigenvalue_widths=(MOST_LATENTS + 1,))
     assert bank_program(IntegratedPhase(c), preset.info, 48_000) is None
 
 
-@pytest.mark.parametrize("rank", [0, at.MOST_MODES + 2])
+@pytest.mark.parametrize("rank", [0, MOST_LATENTS + 2])
 def test_a_dmd_that_the_kernel_cannot_hold_is_rendered_ahead(
     rank: int, small_info: Callable[[bool], PresetInfo]
 ) -> None:
@@ -156,10 +156,10 @@ def test_a_dmd_that_the_kernel_cannot_hold_is_rendered_ahead(
     weights = {name: tensor.numpy() for name, tensor in model.state_dict().items()}
     assert model_program(Preset("", Path(), replace(info, model_configuration=sizes), weights), 48_000).rendered
     with torch.no_grad():
-        model.magnitude_log[: at.MOST_MODES].fill_(-0.01)
-        model.magnitude_log[at.MOST_MODES :].fill_(-1e9)
+        model.magnitude_log[:MOST_LATENTS].fill_(-0.01)
+        model.magnitude_log[MOST_LATENTS:].fill_(-1e9)
     program = bank_program(model, info, 48_000)
-    assert program is not None and program.modes == min(max(rank, 2), at.MOST_MODES)
+    assert program is not None and program.modes == min(max(rank, 2), MOST_LATENTS)
 
 
 def test_at_a_low_rate_no_latent_is_heard_as_another(shipped: Shipped) -> None:

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
-from engine.kernels.layout import AHEAD
+from engine.kernels.constants import AHEAD, QUANTUM
+from engine.kernels.fields import record_of
+from engine.kernels.voice_records import BANK_PROGRAM
 from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, load_preset
@@ -88,7 +89,7 @@ def test_progress_is_reported_and_may_end_it(preset: Preset) -> None:
 
 def test_a_runaway_is_reported_with_its_time(preset: Preset) -> None:
     program = program_of("bank", preset)
-    program.memory[program.memory.view(np.int64)[at.O_SIGMA]] = -5e-3  # an e-fold in 50 ms
+    program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"]] = -5e-3  # an e-fold in 50 ms
     with pytest.raises(Runaway) as caught:
         render_voice(program, ModelSource(preset), preset.info, PLUCK, Ear((0.37,)), 2.0)
     assert 0.05 < caught.value.time_s < 1.0
@@ -99,7 +100,7 @@ def undying(kind: str, preset: Preset) -> tuple[Program, ModelSource]:
     source = ModelSource(preset)
     if kind == "bank":
         program = program_of("bank", preset)
-        program.memory[program.memory.view(np.int64)[at.O_SIGMA] :][: program.modes] = 1e-9
+        program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"] :][: program.modes] = 1e-9
     else:
         program = rendered_program(preset.info, RATE_HZ)
 
@@ -118,7 +119,7 @@ def test_a_voice_ends_though_its_model_hums_on(kind: str, ear: Ear, preset: Pres
     found = render_voice(program, source, preset.info, PLUCK, ear, 1.0)
     endless = render_voice(replace(program, ends_s=math.inf), source, preset.info, PLUCK, ear, 1.0)
     assert np.abs(endless[-RATE_HZ // 10 :]).max() > 1e-3
-    first, faded = -(-round(0.3 * RATE_HZ) // at.QUANTUM) * at.QUANTUM, round(END_FADE_S * RATE_HZ)
+    first, faded = -(-round(0.3 * RATE_HZ) // QUANTUM) * QUANTUM, round(END_FADE_S * RATE_HZ)
     done = (np.arange(len(found)) - first + 1).clip(0, faded)[:, None] / faded
     np.testing.assert_array_equal(found[:first], endless[:first])
     np.testing.assert_allclose(found, (1 - done**2 * (3 - 2 * done)) * endless, atol=1e-7)
@@ -135,10 +136,10 @@ def test_what_is_played_ends_as_in_a_file(skipped_s: float, preset: Preset, init
     voice = Voice(program, initial_m(preset.info, PLUCK), ear, 0.0 if skipped_s else 1.0)
     mixer = Mixer(RATE_HZ, limited=False)
     if skipped_s:
-        voice.skip(skipped_s, mixer.memory)
+        voice.skip(skipped_s, mixer)
         voice.set_gain(1.0)
     mixer.add(voice)
-    first = round(skipped_s * RATE_HZ / at.QUANTUM) * at.QUANTUM
+    first = round(skipped_s * RATE_HZ / QUANTUM) * QUANTUM
     played = mixer.render(RATE_HZ - first)[:, 0]
     faded_in = 2 * round(0.02 * RATE_HZ) if skipped_s else 0
     assert voice.over
@@ -165,7 +166,7 @@ def test_a_voice_of_a_string_without_losses_rings_on(preset: Preset, initial_m: 
     program, _ = undying("bank", preset)
     voice = Voice(replace(program, ends_s=math.inf), initial_m(preset.info, PLUCK), Ear((0.37,)))
     mixer = Mixer(RATE_HZ, limited=False)
-    voice.skip(3600.0, mixer.memory)
+    voice.skip(3600.0, mixer)
     voice.start_with_gain(1.0)
     mixer.add(voice)
     assert np.abs(mixer.render(RATE_HZ // 10)).max() > 1e-3

@@ -28,7 +28,7 @@ static int64_t late_of(int64_t frames) { return frames > EARLY * QUANTUM ? (fram
 /* Of a response in the convolver's form. */
 static int64_t slots_of(int64_t frames) {
   int64_t early = frames < EARLY * QUANTUM ? (frames + QUANTUM - 1) / QUANTUM : EARLY;
-  return I_HEADER + 2 * 2 * (early * (QUANTUM + 1) + late_of(frames) * (WINDOW + 1));
+  return IMPULSE_SLOTS + 2 * 2 * (early * (QUANTUM + 1) + late_of(frames) * (WINDOW + 1));
 }
 
 static void release(prepared *own) {
@@ -97,7 +97,7 @@ static void work(void *with) {
 /* The mix: one response of four, nothing, the body, the room, and both in series */
 
 static slot *idle(instrument *own) {
-  return own->effects.mixes[own->mixer[M_EFFECTS_NOW].whole == number_of(own->effects.mixes[0])];
+  return own->effects.mixes[own->mixer[MIXER_EFFECTS_NOW].whole == number_of(own->effects.mixes[0])];
 }
 
 static void begin_mix(instrument *own) {
@@ -105,7 +105,7 @@ static void begin_mix(instrument *own) {
   double body = wanted(own, EFFECT_BODY_MIX), room = wanted(own, EFFECT_ROOM_MIX), power = 0;
   e->mixing[0] = body, e->mixing[1] = room;
   if (body == 0 && room == 0) { /* nothing is changed */
-    own->mixer[M_EFFECTS].whole = 0;
+    own->mixer[MIXER_EFFECTS].whole = 0;
     return;
   }
   double weights[] = {(1 - body) * (1 - room), body * (1 - room), (1 - body) * room, body * room};
@@ -114,8 +114,8 @@ static void begin_mix(instrument *own) {
   for (int32_t each = 0; each < 1 + MIX_PARTS; each++) e->weights[each] = weights[each] / fmax(sqrt(power), 1e-30);
   e->mixing_to = idle(own);
   for (int32_t which = 0; which < MIX_PARTS; which++)
-    if (e->heard->parts[which]) memcpy(e->mixing_to, e->heard->parts[which], I_HEADER * sizeof(slot));
-  e->mixing_at = I_HEADER;
+    if (e->heard->parts[which]) memcpy(e->mixing_to, e->heard->parts[which], IMPULSE_SLOTS * sizeof(slot));
+  e->mixing_at = IMPULSE_SLOTS;
 }
 
 /* Mixes more of it; what is ready is handed to the convolver, which fades to it. */
@@ -128,16 +128,16 @@ static void mix_on(instrument *own, int64_t most) {
     for (int64_t place = first; e->heard->parts[which] && place < end; place++)
       to[place].real += e->weights[1 + which] * e->heard->parts[which][place].real;
   for (int32_t channel = 0; channel < 2; channel++) { /* a single sample at the beginning: the same at all frequencies */
-    int64_t begin = I_HEADER + channel * 2 * (QUANTUM + 1), until = begin + QUANTUM + 1;
+    int64_t begin = IMPULSE_SLOTS + channel * 2 * (QUANTUM + 1), until = begin + QUANTUM + 1;
     for (int64_t place = begin > first ? begin : first; place < until && place < end; place++)
       to[place].real += e->weights[0] / (2 * QUANTUM);
   }
   e->mixing_at = end < e->heard->slots ? end : -1;
-  if (e->mixing_at < 0) own->mixer[M_EFFECTS].whole = number_of(to);
+  if (e->mixing_at < 0) own->mixer[MIXER_EFFECTS].whole = number_of(to);
 }
 
 enum { MIXED_A_QUANTUM = 16384 }; /* slots: some ten microseconds */
-_Static_assert(I_HEADER + 4 * EARLY * (QUANTUM + 1) < MIXED_A_QUANTUM, "the first quantum hears no more");
+_Static_assert(IMPULSE_SLOTS + 4 * EARLY * (QUANTUM + 1) < MIXED_A_QUANTUM, "the first quantum hears no more");
 
 /* Takes up what the thread has made. */
 static bool adopt(instrument *own) {
@@ -170,7 +170,7 @@ bool effects_follow(instrument *own) {
     return false;
   }
   const slot *mixer = own->mixer;
-  if (mixer[M_EFFECTS_NEXT].whole || mixer[M_EFFECTS].whole != mixer[M_EFFECTS_NOW].whole) return false; /* it still fades */
+  if (mixer[MIXER_EFFECTS_NEXT].whole || mixer[MIXER_EFFECTS].whole != mixer[MIXER_EFFECTS_NOW].whole) return false; /* it still fades */
   bool other = adopt(own);
   if (other || wanted(own, EFFECT_BODY_MIX) != e->mixing[0] || wanted(own, EFFECT_ROOM_MIX) != e->mixing[1]) begin_mix(own);
   if (other) wait_offline(e);
@@ -200,16 +200,16 @@ bool effects_begin(instrument *own) {
   e->mixing_at = -1;
   e->size = size, e->t60_s = t60_s;
   e->most_frames = (int64_t)(longest_s * own->rate_hz) + WINDOW;
-  e->workshop = calloc(C_LATE, sizeof(slot));
+  e->workshop = calloc(CONVOLVER_SLOTS, sizeof(slot));
   int64_t late = late_of(e->most_frames) + 1;
-  e->convolver = calloc((size_t)(C_LATE + late * 4 * (WINDOW + 1)), sizeof(slot)); /* touched as far as it is used */
+  e->convolver = calloc((size_t)(CONVOLVER_SLOTS + late * 4 * (WINDOW + 1)), sizeof(slot)); /* touched as far as it is used */
   if (!e->workshop || !e->convolver) return false;
   for (int64_t k = 0; k < 2 * WINDOW; k++) {
     double turn = 2 * 3.14159265358979323846 * (double)k / (2 * WINDOW);
-    e->convolver[C_COSINES + k].real = e->workshop[C_COSINES + k].real = cos(turn);
-    e->convolver[C_SINES + k].real = e->workshop[C_SINES + k].real = sin(turn);
+    e->convolver[CONVOLVER_COSINES + k].real = e->workshop[CONVOLVER_COSINES + k].real = cos(turn);
+    e->convolver[CONVOLVER_SINES + k].real = e->workshop[CONVOLVER_SINES + k].real = sin(turn);
   }
-  e->convolver[C_CAPACITY].whole = late;
+  e->convolver[CONVOLVER_CAPACITY].whole = late;
   if (!e->heard || e->heard->hz != own->rate_hz || e->heard->size != size || e->heard->t60_s != t60_s) {
     effects_free(own);
     if (!(e->heard = prepare(own, size, t60_s))) return false;
@@ -225,26 +225,26 @@ bool effects_begin(instrument *own) {
 
 slot *effects_mixed(const instrument *own) {
   bool done = own->effects.mixing_at < 0;
-  return done ? (slot *)(intptr_t)own->mixer[M_EFFECTS].whole : NULL;
+  return done ? (slot *)(intptr_t)own->mixer[MIXER_EFFECTS].whole : NULL;
 }
 
 void effects_reset(instrument *own, slot *mixed) {
   effects *e = &own->effects;
-  slot *convolver = e->convolver, capacity = convolver[C_CAPACITY];
-  memset(convolver, 0, C_COSINES * sizeof(slot));
-  memset(convolver + C_SINES + 2 * WINDOW, 0, (C_LATE - C_SINES - 2 * WINDOW) * sizeof(slot));
-  convolver[C_CAPACITY] = capacity;
-  convolver[C_FADE_WINDOWS].whole = (int64_t)ceil(CONVOLVER_FADE_S * own->rate_hz / WINDOW);
-  convolver[C_STEP].whole = -1;
-  own->mixer[M_CONVOLVER].whole = number_of(convolver);
-  own->mixer[M_EFFECTS].whole = number_of(mixed);
+  slot *convolver = e->convolver, capacity = convolver[CONVOLVER_CAPACITY];
+  memset(convolver, 0, CONVOLVER_COSINES * sizeof(slot));
+  memset(convolver + CONVOLVER_SINES + 2 * WINDOW, 0, (CONVOLVER_SLOTS - CONVOLVER_SINES - 2 * WINDOW) * sizeof(slot));
+  convolver[CONVOLVER_CAPACITY] = capacity;
+  convolver[CONVOLVER_FADE_WINDOWS].whole = (int64_t)ceil(CONVOLVER_FADE_S * own->rate_hz / WINDOW);
+  convolver[CONVOLVER_STEP].whole = -1;
+  own->mixer[MIXER_CONVOLVER].whole = number_of(convolver);
+  own->mixer[MIXER_EFFECTS].whole = number_of(mixed);
   e->mixing_at = -1;
   bool same = mixed && wanted(own, EFFECT_BODY_MIX) == e->mixing[0] && wanted(own, EFFECT_ROOM_MIX) == e->mixing[1];
   if (adopt(own) || !same) {
     begin_mix(own);
     if (e->mixing_at < 0) return;
     mix_on(own, MIXED_A_QUANTUM);
-    own->mixer[M_EFFECTS].whole = number_of(e->mixing_to); /* what is heard later is mixed before */
+    own->mixer[MIXER_EFFECTS].whole = number_of(e->mixing_to); /* what is heard later is mixed before */
   }
 }
 
