@@ -64,7 +64,7 @@ class Compiled:
 def quantum(mixer: Mixer) -> NDArray[np.float64]:
     """The next one as it is mixed, in double precision."""
     mixer.render(QUANTUM)
-    return mixer.record["mix"].ravel()
+    return mixer.record["mix"].flatten()
 
 
 def rendered(stage: Compiled, played: Framed, quanta: int) -> NDArray[np.float64]:
