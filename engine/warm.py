@@ -17,7 +17,8 @@ import numpy as np
 
 from engine.effects import Body, Effects, Impulse, Room
 from engine.effects.curves import curves_of
-from engine.kernels import cache, layout
+from engine.kernels import cache
+from engine.kernels.constants import QUANTUM
 from engine.models._tension_arrays import CURVES
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, TrainedRange
@@ -49,7 +50,7 @@ INFO = PresetInfo(
 )
 PRESET = Preset("", Path(), INFO, dict.fromkeys(CURVES, np.zeros(1)))
 EARS = (Ear((0.3,)), Ear((0.3, 0.7), "velocity"))
-FRAMES = 4 * layout.QUANTUM
+FRAMES = 4 * QUANTUM
 
 
 def warm() -> None:
@@ -87,7 +88,7 @@ def playing() -> None:
 def unheard() -> None:
     """A quantum of every kind of voice that is computed."""
     for voice in _each():
-        voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
+        voice.skip(QUANTUM / RATE_HZ, Mixer(RATE_HZ))
 
 
 def voices() -> None:

@@ -9,8 +9,9 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 from app.patches.drums import Drums
-from app.patches.patch import Fretted, Knobs, Patch
+from app.patches.patch import Fretted, Patch
 from app.patches.tuning import Tuning
+from engine.kernels import constants as of
 from engine.kernels import strings as law
 from engine.kernels.constants import HIGHEST_HZ, LENGTH, MOST_MODES
 from engine.resonators.base import Array
@@ -18,7 +19,7 @@ from engine.resonators.losses import Losses
 from engine.resonators.string import StringParameters
 
 STRING = tuple(field.name for field in fields(StringParameters))
-KNOBS = tuple(Knobs.model_fields)  # in the order of the kernels
+KNOBS = tuple(id.removeprefix("knobs.") for id in of.PLAYED[: of.KNOBS])
 
 
 @dataclass(frozen=True)

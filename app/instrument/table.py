@@ -11,14 +11,15 @@ from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKeys, block_of
 from app.instrument.string_keys import StringKeys
-from app.instrument.strings import KNOBS, STRING
+from app.instrument.strings import STRING
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
 from app.shared.parameters import OF_PATCHES
 from engine.contact import CONTACTS
 from engine.kernels import constants as of
-from engine.kernels import layout as at
-from engine.kernels.records import ATTACK, RECORDED, TABLE, slots
+from engine.kernels.fields import slots
+from engine.kernels.records import ATTACK, RECORDED, TABLE
+from engine.kernels.voice_records import TENSION, TRUTH
 from engine.levels import FULL_SCALE_M
 from engine.pluck import SHAPES
 from engine.presets import Preset
@@ -33,26 +34,7 @@ from engine.voices.programs import (
     tension_memory,
 )
 
-PLAYED_PARAMETERS = (
-    *(f"knobs.{name}" for name in KNOBS),
-    *(f"pluck.{name}" for name in ("position", "width", "width_hard", "softest_mm", "hardest_mm", "curve")),
-    "damping.release_t60_s",
-    "bend_semitones",
-    "noise.onset_db",
-    "noise.release_db",
-    "damping.mute",
-    *(
-        f"technique.{name}"
-        for name in ("harmonic", "strum_ms", "strokes", "tremolo_hz", "vibrato_cents", "vibrato_hz")
-    ),
-    "pluck.release_ms",
-    "pluck.release_hard_ms",
-    "javari.gap_um",
-    "body.mix",
-    "pickup.points.0",
-    "pickup.points.1",
-)
-WHEELED = PLAYED_PARAMETERS[: of.BODY_MIX]  # what the kernel turns with the modulation wheel
+WHEELED = of.PLAYED[: of.BODY_MIX]  # what the player turns with the modulation wheel
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
 BENDS = {"tension": of.BY_TENSION, "length": of.BY_LENGTH}
 SOURCES = ("model", "truth")
@@ -141,11 +123,11 @@ def table_of(
     table["wheel"] = -1 if goal is None else WHEELED.index(patch.mod_wheel)
     table["wheel_goal"] = 0.0 if goal is None else goal
     for place, (source, program) in enumerate(zip(sources, programs, strict=True)):
-        table["kinds"][place] = at.TRUTH if source == "truth" else at.TENSION
+        table["kinds"][place] = TRUTH if source == "truth" else TENSION
         table["programs"][place] = program.ctypes.data
     table["sources"] = len(programs)
     points = [of.BRIDGE] * len(ear.points) if ear.pickup == "bridge" else ear.points
-    values = [*(patch.value(name) for name in (*WHEELED, "body.mix")), *points]
+    values = [*(patch.value(id) for id in of.PLAYED[: of.POINT]), *points]
     table["values"][: len(values)] = values
     tail = Tail()
     if loud.body is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 
@@ -74,3 +74,34 @@ class Value(BaseModel):
     """A part of a patch: immutable, without unknown fields."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
+
+class _OfRows(ModelMetaclass):
+    """Gives a class the fields of the rows of a part of the table of parameters that it does not state itself."""
+
+    def __new__(
+        meta, name: str, bases: tuple[type, ...], namespace: dict[str, Any], part: str = "", **options: Any
+    ) -> type:
+        stated = namespace.setdefault("__annotations__", {})
+        for id in OF_PATCHES:
+            section, _, field = id.rpartition(".")
+            if part and section == part and field not in stated:
+                stated[field], namespace[field] = float, parameter(id)
+        return super().__new__(meta, name, bases, namespace, **options)
+
+
+class Rows(Value, metaclass=_OfRows):
+    """A part of a patch with a field for each row `part.…` of the table of parameters, and what it adds to them.
+
+    It states those that other code names when it makes one.
+    """
+
+    if TYPE_CHECKING:  # the others
+
+        def __getattr__(self, name: str) -> float: ...

@@ -14,7 +14,20 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, get_args
 from pydantic import AfterValidator, Field, ValidationError, model_validator
 
 from app.patches.drums import Drums
-from app.patches.fields import LONGEST_NAME, Flag, Key, Name, Reference, Share, Text, Value, parameter, plain, ranged
+from app.patches.fields import (
+    LONGEST_NAME,
+    Flag,
+    Key,
+    Name,
+    Reference,
+    Rows,
+    Share,
+    Text,
+    Value,
+    parameter,
+    plain,
+    ranged,
+)
 from app.patches.tuning import TuningChoice
 from app.shared.parameters import MOST_MACROS, OF_PATCHES, modulated_by
 from app.shared.vocabulary import Pickup as PickupKind
@@ -90,7 +103,7 @@ class StringSet(Value):
         return self
 
 
-class Knobs(Value):
+class Knobs(Rows, part="knobs"):
     """Multipliers of the strings' own values; 1 leaves them as they are.
 
     The tuning says which pitch a key has. At one pitch and one mass the tension goes with the square of the length,
@@ -108,17 +121,8 @@ class Knobs(Value):
         length: of the length; the tension grows with its square. As `tension`, with what follows exchanged.
     """
 
-    stiffness: float = parameter("knobs.stiffness")
-    decay: float = parameter("knobs.decay")
-    brightness_decay: float = parameter("knobs.brightness_decay")
-    modulus: float = parameter("knobs.modulus")
-    density: float = parameter("knobs.density")
-    gauge: float = parameter("knobs.gauge")
-    tension: float = parameter("knobs.tension")
-    length: float = parameter("knobs.length")
 
-
-class PluckChoices(Value):
+class PluckChoices(Rows, part="pluck"):
     """The pluck of a string by a key. Widths are as in `engine.pluck.Pluck`; a triangle has none.
 
     Attributes:
@@ -235,7 +239,7 @@ class Course(Value):
     bridge: Annotated[float, ranged(0, 1)] = 0.0
 
 
-class Javari(Value):
+class Javari(Rows, part="javari"):
     """The edge of a wide bridge, which the string meets from above, by `engine.kernels.javari`; first polarisation.
 
     Attributes:
@@ -263,7 +267,7 @@ class Losses(Value):
     bending: Annotated[float, ranged(*bounds.LOSSES["bending"])] = 0.02
 
 
-class Noise(Value):
+class Noise(Rows, part="noise"):
     """Noise of what touches strings, by `engine.contact`; comparisons of model and truth leave it out.
 
     Attributes:
@@ -277,7 +281,7 @@ class Noise(Value):
     release_db: float = parameter("noise.release_db")
 
 
-class Damping(Value):
+class Damping(Rows, part="damping"):
     """The effect of releasing a key: none (`let_ring`), or all partials decay by 60 dB in `release_t60_s`.
 
     Attributes:
@@ -289,7 +293,7 @@ class Damping(Value):
     let_ring: Flag = False
 
 
-class Technique(Value):
+class Technique(Rows, part="technique"):
     """The technique that keys are played with. MIDI's footswitches 80, 81 and 82 switch on what is off here.
 
     Attributes:
@@ -300,13 +304,6 @@ class Technique(Value):
         vibrato_cents, vibrato_hz: how far the pitch goes up and down, and how often.
     """
 
-    harmonic: float = parameter("technique.harmonic")
-    strum_ms: float = parameter("technique.strum_ms")
-    strokes: float = parameter("technique.strokes")
-    tremolo_hz: float = parameter("technique.tremolo_hz")
-    vibrato_cents: float = parameter("technique.vibrato_cents")
-    vibrato_hz: float = parameter("technique.vibrato_hz")
-
 
 class Amp(Value):
     """The amplifier, through which the strings sound before the body: its drive (0: none) and its tone."""
@@ -315,7 +312,7 @@ class Amp(Value):
     tone_db: float = parameter("amp.tone_db")
 
 
-class Body(Value):
+class Body(Rows, part="body"):
     """The body of the instrument: the name of an impulse response ("": none), mix and size (1: as it is)."""
 
     name: Reference = ""

@@ -8,7 +8,7 @@ from app.playing.ahead import AheadVoice
 from app.rendering import RenderRequest
 from app.rendering.subject import Subject
 from app.shared.vocabulary import OTHER
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM
 from engine.voices import Ear, Mixer, Voice
 
 

@@ -456,7 +456,7 @@ class Notes:
     def _skip(self, note: Note) -> None:
         if note.from_s > 0:
             for voice in note.voices.values():
-                voice.skip(note.from_s, Mixer(voice.program.rate_hz).memory)
+                voice.skip(note.from_s, Mixer(voice.program.rate_hz))
 
     def _make_voices(self, note: Note, rate_hz: int, struck_s: float) -> None:
         asked, voices = note.request, dict[str, Voice]()
@@ -525,13 +525,13 @@ class Notes:
         mixer = note.mixer
         if mixer is None or not all(each.begun for each in again):
             return
-        memory = Mixer(mixer.rate_hz).memory
+        unheard = Mixer(mixer.rate_hz)
         with self._lock:
             if note.over or note.released or mixer is not self._sound.mixer:
                 return
             left = [note.voices[source] for source in sources]
             for each in again:
-                each.voice.skip(note.seconds, memory)
+                each.voice.skip(note.seconds, unheard)
             note.replace_voices(again, {source: each.voice for source, each in zip(sources, again, strict=True)})
             self._apply_monitor(note)
             mixer.add(*(each.voice for each in again))

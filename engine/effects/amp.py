@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine import bounds
+from engine.kernels.constants import QUANTUM
+from engine.kernels.mixer_records import MIXER
 
 
 @dataclass(frozen=True)
@@ -38,18 +40,17 @@ class Amp:
 
 def amplified(amp: Amp, sound: NDArray[np.float64], rate_hz: int) -> NDArray[np.float64]:
     """The sound (frames, 2) through the amplifier of a mixer: its first frames, as many."""
-    from engine.kernels import layout as at
     from engine.kernels.amplifier import amplify, drive  # Numba only when it is needed
 
-    mixer = np.zeros(at.MIXER_SLOTS)
-    counts, mix = mixer.view(np.int64), mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2)
-    mixer[at.M_RATE] = rate_hz
+    mixer = np.zeros(1, MIXER)[0]
+    mix = mixer["mix"]
+    mixer["rate_hz"] = rate_hz
     drive(mixer, float(amp.drive_db), float(amp.tone_db), float(amp.level_db))
-    found = np.zeros((-(-len(sound) // at.QUANTUM) * at.QUANTUM, 2))
+    found = np.zeros((-(-len(sound) // QUANTUM) * QUANTUM, 2))
     found[: len(sound)] = sound
-    for first in range(0, len(found), at.QUANTUM):
-        mix[:] = found[first : first + at.QUANTUM]
+    for first in range(0, len(found), QUANTUM):
+        mix[:] = found[first : first + QUANTUM]
         amplify(mixer)
-        found[first : first + at.QUANTUM] = mix
-        counts[at.M_FRAMES] += at.QUANTUM
+        found[first : first + QUANTUM] = mix
+        mixer["frames"] += QUANTUM
     return found[: len(sound)]

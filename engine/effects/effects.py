@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from engine.effects.amp import Amp, amplified
 from engine.effects.body import Body
 from engine.effects.room import Room
+from engine.kernels.mixer_records import LARGEST, SMALLEST
 
 
 @dataclass(frozen=True)
@@ -86,14 +87,12 @@ def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) ->
     """
     from scipy.signal import oaconvolve  # which takes the better part of a second to load, as Numba does
 
-    from engine.kernels import layout as at
-
     stereo = np.broadcast_to(sound, (len(sound), 2)).astype(np.float64)
     if effects is None or effects.neutral or not len(stereo):
         return stereo
-    wild = ~(np.abs(stereo) < at.LARGEST).all(1)
+    wild = ~(np.abs(stereo) < LARGEST).all(1)
     stereo[wild] = 0.0
-    stereo[np.abs(stereo) < at.SMALLEST] = 0.0
+    stereo[np.abs(stereo) < SMALLEST] = 0.0
     if effects.amp is not None:
         stereo = amplified(effects.amp, stereo, rate_hz)
     if not effects.rings:

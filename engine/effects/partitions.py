@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from engine import bounds
 from engine.effects.responses import work_space
 from engine.kernels import convolver as kernel
-from engine.kernels import layout as at
+from engine.kernels.fields import record_of
+from engine.kernels.mixer_records import CONVOLVER, IMPULSE, WINDOW
 
 LONGEST_S = 2 * bounds.LONGEST_IMPULSE_S  # a body's and a room's
 
@@ -17,7 +18,7 @@ def partitioned(impulse: NDArray[np.float64]) -> NDArray[np.float64]:
     """A response (frames, channels) as the kernel reads it."""
     frames, channels = impulse.shape
     memory = np.zeros(kernel.partitioned_slots(frames, channels))
-    kernel.partition(work_space(2 * at.WINDOW), np.array(impulse), frames, memory)
+    kernel.partition(work_space(2 * WINDOW), np.array(impulse), frames, record_of(memory, IMPULSE))
     return memory
 
 
@@ -26,5 +27,5 @@ def convolver(rate_hz: int) -> NDArray[np.float64]:
     frames = round(LONGEST_S * rate_hz)
     memory = np.empty(kernel.convolver_slots(frames))
     memory[:] = 0.0  # written to, so that the device's thread finds every page in place
-    kernel.begin(memory, float(rate_hz), frames)
+    kernel.begin(record_of(memory, CONVOLVER), float(rate_hz), frames)
     return memory

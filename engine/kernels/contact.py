@@ -18,14 +18,15 @@ it sounds where one source alone is heard, and never where model and truth sound
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import carray, njit
+from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import address_of, attack_at, behind, mixed, player_at, pointer, table_at
+from engine.kernels.constants import QUANTUM
+from engine.kernels.memory import address_of, attack_at, behind, mixed, mixer_at, player_at, table_at
 from engine.kernels.records import ATTACK, Attack, Noise, Player, Table
 
 HEADER = ATTACK.itemsize // 8
@@ -47,34 +48,38 @@ def attack_of(table: Table) -> Attack:
     return attack_at(address_of(table) + 8 * table.attack)
 
 
-@njit(**COMPILED)
-def touch(
-    player: Player,
-    table: Table,
-    which: int,
-    level_db: float,
-    strength: float,
-    hardness: float,
-    stroke: int,
-    key: int,
-    frame: int,
-    slid_m: float,
-    slides_s: float,
-) -> None:
-    """Begins the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends.
+class Touch(NamedTuple):
+    """The touch of a string or a drum.
 
-    Args:
-        level_db: energy re a note's; `OFF_DB` and below: none.
+    Attributes:
+        which: STROKE or RELEASE of `constants`.
+        level_db: energy of its noise re a note's; `OFF_DB` and below: none.
         strength: amplitude of the stroke, or of the motion that it stops, over that at the reference velocity.
         hardness: of what touches, over that of which the numbers of its contact hold.
         stroke: with the key, it chooses the noise.
         frame: of the mixer, at which it begins; 0: at once.
         slid_m, slides_s: way and time of a finger along the string, whose windings pass by: then that is the band.
     """
-    if not level_db > OFF_DB:
+
+    which: int
+    level_db: float
+    strength: float
+    hardness: float
+    stroke: int
+    key: int
+    frame: int
+    slid_m: float
+    slides_s: float
+
+
+@njit(**COMPILED)
+def touch(player: Player, table: Table, by: Touch) -> None:
+    """Begins the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends."""
+    if not by.level_db > OFF_DB:
         return
-    kind, rate_hz = table.contacts[which], player.rate_hz
-    energy = table.noise_level * rate_hz * 10.0 ** (level_db / 10)
+    kind, rate_hz, which = table.contacts[by.which], player.rate_hz, by.which
+    strength, hardness = by.strength, by.hardness
+    energy = table.noise_level * rate_hz * 10.0 ** (by.level_db / 10)
     energy *= strength ** (2 * kind.follows) * (HARDEST / (1 + (HARDEST - 1) / hardness**3)) ** 2
     noise, longest = player.noises[0], -1
     for number in range(of.MOST_NOISES):
@@ -89,18 +94,18 @@ def touch(
     pulse_frames = max(2.0, kind.pulse_s * shorter / hardness * rate_hz)
     band_hz, share = kind.burst_hz * brighter * hardness, kind.pulse_share
     attack_s, fall_s = kind.attack_s, kind.fall_s
-    if slides_s > 0.0:
-        band_hz, share = max(slid_m * WINDINGS_M / slides_s, LOWEST_SLIDE_HZ), 0.0
-        attack_s, fall_s = 0.5 * slides_s, 0.1 * slides_s
+    if by.slides_s > 0.0:
+        band_hz, share = max(by.slid_m * WINDINGS_M / by.slides_s, LOWEST_SLIDE_HZ), 0.0
+        attack_s, fall_s = 0.5 * by.slides_s, 0.1 * by.slides_s
     turn = 2 * math.pi * min(band_hz / rate_hz, HIGHEST_SHARE)
     alpha = math.sin(turn) / (2 * kind.burst_q)
     shrinks = math.exp(-1 / max(1.0, fall_s * rate_hz))
     attack_frames = max(1.0, attack_s * rate_hz)
     passed = alpha / (1 + alpha)  # power of white noise in the band
     lasts = attack_frames / 3 + 1 / (1 - shrinks * shrinks)
-    noise.frame = frame
+    noise.frame = by.frame
     noise.done, noise.stops = 0, 0
-    noise.seed = mixed((stroke * of.KEYS + key) * 2 + which + 1)
+    noise.seed = mixed((by.stroke * of.KEYS + by.key) * 2 + which + 1)
     noise.pulse = math.sqrt(share * energy / (0.375 * pulse_frames))
     noise.pulse_frames = pulse_frames
     noise.burst = math.sqrt((1 - share) * energy / (passed * lasts))
@@ -144,21 +149,20 @@ def sound(player_address: int, mixer_address: int) -> None:
         gain = 0.0
     before = player.noise_gain
     player.noise_gain = gain
-    mixer = carray(pointer(mixer_address), (at.MIXER_SLOTS,), np.float64)
-    mix = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2)
-    now = mixer.view(np.int64)[at.M_FRAMES]
+    mixer = mixer_at(mixer_address)
+    mix, now = mixer.mix[:], mixer.frames
     for number in range(of.MOST_NOISES):
         noise = player.noises[number]
-        if noise.left == 0 or noise.frame >= now + at.QUANTUM:
+        if noise.left == 0 or noise.frame >= now + QUANTUM:
             continue
         begin, gain_from = 0, before
         if noise.done == 0:
             begin, gain_from = max(0, noise.frame - now), gain
-        end = min(at.QUANTUM, begin + noise.left)
+        end = min(QUANTUM, begin + noise.left)
         if noise.recorded == 0:
             _run(noise, begin, end, gain_from, gain, mix)
         elif table.attack != 0:
-            _play(player, table, noise, begin, end, gain_from, gain, mix)
+            _play(player, attack_of(table), noise, begin, end, gain_from, mix)
         noise.left -= end - begin
         stops = noise.stops
         if stops > 0:
@@ -175,7 +179,7 @@ def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, 
 
     It fades out where the noise stops.
     """
-    share = (frame + 1) / at.QUANTUM
+    share = (frame + 1) / QUANTUM
     level = before + (gain - before) * share
     if stops > 0:
         level *= 1 - share / stops
@@ -219,16 +223,15 @@ def _run(
 @njit(**COMPILED)
 def _play(
     player: Player,
-    table: Table,
+    attack: Attack,
     noise: Noise,
     begin: int,
     end: int,
     before: float,
-    gain: float,
     mix: np.ndarray,
 ) -> None:
-    """Adds the table's recorded attack, by linear interpolation between its samples, as `_run` adds a noise."""
-    attack = attack_of(table)
+    """Adds a recorded attack, by linear interpolation between its samples, as `_run` adds a noise."""
+    gain = player.noise_gain
     frames, step = attack.frames, attack.rate_hz / player.rate_hz
     samples = behind(attack, HEADER, frames)
     amplitude, done, stops = noise.pulse, noise.done, noise.stops

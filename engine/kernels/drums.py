@@ -13,12 +13,13 @@ from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import drum_modes, loudness, velocities
-from engine.kernels import layout as at
+from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import address_of, behind, drum_at, matrix, reals, wholes
-from engine.kernels.modes import TOO_HIGH
+from engine.kernels.memory import address_of, behind, drum_at, matrix, reals, voice_at, wholes
+from engine.kernels.modes import TOO_HIGH, row, weights
 from engine.kernels.playing import channels, slots
 from engine.kernels.records import DRUM, DRUM_ROWS, Drum, Event, Note, Player, Table
+from engine.kernels.voice_records import Voice
 from engine.levels import RUNAWAY_FACTOR
 
 FIRM_S = 0.004  # in which a stick touches a skin at 1 m/s: what touches for as long has the hardness 1
@@ -144,44 +145,37 @@ def _make(
 
     `struck`: those that 1 N s gives.
     """
-    voice, counts, n, rate_hz, rows = reals(address), wholes(address), drum.modes, player.rate_hz, rows_of(drum)
-    kind = table.kinds[source]
-    used = at.FOLLOWING if kind == at.TENSION else at.TRUTH_ROWS  # what follows from them is prepared
-    for slot in range(at.state(n) + used * n):
-        voice[slot] = 0.0
-    counts[at.KIND], counts[at.PROGRAM] = kind, table.programs[source]
-    counts[at.MODES], counts[at.POINTS] = n, table.points
-    counts[at.BEGAN_FRAME], counts[at.MOVING] = -1, n
-    counts[at.FADE_FRAMES] = round(at.FADE_S * rate_hz)
-    counts[at.ENDS_AT], counts[at.ENDS_IN] = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
-    voice[at.SILENT] = at.SILENT_DB * math.log(10.0) / 20
-    place = at.state(n) + at.OMEGA_SQUARED * n
-    for row in range(STRUCK):
-        for mode in range(n):
-            voice[place + row * n + mode] = rows[row, mode]
+    # What follows from the modes is prepared
+    used = at.FOLLOWING if table.kinds[source] == at.TENSION else at.TRUTH_ROWS
+    voice = slots.blank_voice(player, table, address, source, drum.modes, used)
+    given, speeds = rows_of(drum), row(voice, 1)
+    for which in range(STRUCK):
+        own = row(voice, at.OMEGA_SQUARED + which)
+        for mode in range(drum.modes):
+            own[mode] = given[which, mode]
     weigh(player, table, voice, 0, drum)
-    first, widest, loudest = at.state(n), 0.0, 0.0
-    _blow(drum, struck, speed, voice[first + n : first + 2 * n])
-    for mode in range(n):
-        moved, omega = voice[first + n + mode], math.sqrt(rows[SQUARE, mode])
+    _blow(drum, struck, speed, speeds)
+    widest, loudest = 0.0, 0.0
+    for mode in range(drum.modes):
+        moved, omega = speeds[mode], math.sqrt(given[SQUARE, mode])
         widest += abs(moved) / omega
         heard = 0.0
-        for point in range(counts[at.POINTS]):
-            heard = max(heard, abs(voice[at.weights(n, 0, point, 0) + mode]))
+        for point in range(voice.points):
+            heard = max(heard, abs(weights(voice, 0, point, 0)[mode]))
         loudest += heard * abs(moved) / omega
-    voice[at.PEAK], voice[at.LIMIT] = max(widest, 1e-9), max(RUNAWAY_FACTOR * loudest, 1e-3)
+    voice.peak, voice.limit = max(widest, 1e-9), max(RUNAWAY_FACTOR * loudest, 1e-3)
 
 
 @njit(**COMPILED)
-def weigh(player: Player, table: Table, voice: np.ndarray, which: int, drum: Drum) -> None:
+def weigh(player: Player, table: Table, voice: Voice, which: int, drum: Drum) -> None:
     """Sets one of the two sets of weights of a voice; modes too high for the rate are not heard."""
-    n, highest, rows = drum.modes, TOO_HIGH * player.rate_hz, rows_of(drum)
+    highest, given = TOO_HIGH * player.rate_hz, rows_of(drum)
     for point in range(table.points):
-        for mode in range(n):
-            heard = rows[SQUARE, mode] <= highest * highest
-            first = at.weights(n, which, point, 0) + mode
-            voice[first] = rows[WEIGHTS + point, mode] if heard else 0.0
-            voice[first + n] = 0.0
+        own, imaginary = weights(voice, which, point, 0), weights(voice, which, point, 1)
+        for mode in range(drum.modes):
+            heard = given[SQUARE, mode] <= highest * highest
+            own[mode] = given[WEIGHTS + point, mode] if heard else 0.0
+            imaginary[mode] = 0.0
 
 
 @njit(**COMPILED)
@@ -198,12 +192,12 @@ def hear(player: Player, table: Table, note: Note) -> None:
         address = note.voices[source]
         if address == 0:
             continue
-        counts = wholes(address)
-        if counts[at.MODES] != drum.modes:
+        voice = voice_at(address)
+        if voice.modes != drum.modes:
             moved = False
             continue
-        reals(address)[at.WANTED_GAIN] = gain * player.source_gains[source]
-        moved = moved and counts[at.NEXT_WEIGHTS] == 0
+        voice.wanted_gain = gain * player.source_gains[source]
+        moved = moved and voice.next_weights == 0
     if not moved:
         return
     for point in range(2):
@@ -211,6 +205,7 @@ def hear(player: Player, table: Table, note: Note) -> None:
     for source in range(table.sources):
         address = note.voices[source]
         if address != 0:
-            weigh(player, table, reals(address), 1, drum)
-            wholes(address)[at.WEIGHTS_FADED] = 0
-            wholes(address)[at.NEXT_WEIGHTS] = 1
+            voice = voice_at(address)
+            weigh(player, table, voice, 1, drum)
+            voice.weights_faded = 0
+            voice.next_weights = 1

@@ -17,6 +17,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from engine.kernels.compiled import COMPILED
+from engine.kernels.mixer_records import MOST_EARS
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -24,7 +25,6 @@ LANES = 4
 # Rows of a block: z = x + iy, those of `kernels.tension.prepare`, and the output
 X, Y, COSINE, SINE, KICK, STRETCH, RATIO, SEEN, SQUARE = range(9)
 EARS = 9  # the weights of each
-MOST_EARS = 4
 ROWS = EARS + MOST_EARS
 BLOCK = ROWS * LANES
 
@@ -165,6 +165,8 @@ def turn(
 ) -> tuple[float, float]:
     """Kicks and turns blocks; returns their sums at the next node, as `_sweep` says.
 
+    It takes each number by itself, so that all stay in registers.
+
     Args:
         ears: 0, 1, 2 or 4, that hear the near blocks.
         linear, squared: S (1 - 2R) and S².
@@ -258,7 +260,8 @@ PARTS, PART_BLOCKS = 3, 12  # rows of parts in a bridge: of y and x in its motio
 def _meet(strings: int):
     """The bridge that strings share takes from each what its modes have in it, block by block.
 
-    Returns a function of the first slots of their modes and of their parts (PARTS, PART_BLOCKS, LANES).
+    Returns a function of the first slots of their modes and of their parts (PARTS, PART_BLOCKS, LANES), each by
+    itself, so that all stay in registers.
     """
 
     @intrinsic

@@ -9,8 +9,9 @@ import numpy as np
 from numba import carray, njit, types
 
 from engine.kernels import amplifier, contact, convolver, kit, mixer, prepared, sympathy
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.memory import convolver_at as record_of_convolver
+from engine.kernels.memory import mixer_at as record_of_mixer
 from engine.kernels.memory import pointer
 from engine.kernels.playing import events
 
@@ -31,8 +32,7 @@ DRIVE = types.void(ADDRESS, types.float64, types.float64, types.float64)
 @njit(**COMPILED)
 def render(mixer_at: int, frames: int, out_at: int) -> None:
     """The next frames of a mixer, float32 (frames, 2)."""
-    memory = carray(pointer(mixer_at), (at.MIXER_SLOTS,), np.float64)
-    mixer.render(memory, frames, carray(pointer(out_at), (2 * frames,), np.float32), 0.0)
+    mixer.render(record_of_mixer(mixer_at), frames, carray(pointer(out_at), (2 * frames,), np.float32), 0.0)
 
 
 @njit(**COMPILED)
@@ -54,13 +54,13 @@ measure, prepare, weigh, mix = prepared.measure, prepared.prepare, prepared.weig
 @njit(**COMPILED)
 def begin_convolver(convolver_at: int, rate_hz: float, frames: int) -> None:
     """Set up a convolver's memory, which is all 0, for responses of so many frames."""
-    convolver.begin(carray(pointer(convolver_at), (at.C_LATE,), np.float64), rate_hz, frames)
+    convolver.begin(record_of_convolver(convolver_at), rate_hz, frames)
 
 
 @njit(**COMPILED)
 def drive(mixer_at: int, drive_db: float, tone_db: float, level_db: float) -> None:
     """Set the amplifier of a mixer."""
-    amplifier.drive(carray(pointer(mixer_at), (at.MIXER_SLOTS,), np.float64), drive_db, tone_db, level_db)
+    amplifier.drive(record_of_mixer(mixer_at), drive_db, tone_db, level_db)
 
 
 @njit(**COMPILED)

@@ -10,13 +10,26 @@ from numba import carray, njit
 
 from engine.kernels import bodies, responses, rooms
 from engine.kernels import constants as of
-from engine.kernels import layout as at
 from engine.kernels.bodies import given_frames, rung_frames
 from engine.kernels.compiled import COMPILED
-from engine.kernels.convolver import convolver_slots, partition, partitioned_slots
+from engine.kernels.constants import QUANTUM
+from engine.kernels.convolver import BEHIND_IMPULSE, convolver_slots, partition, partitioned_slots
+from engine.kernels.fields import slots
 from engine.kernels.fourier import COSINES, ROWS, SINES, fill_circle, power_of_two
-from engine.kernels.memory import address_of, behind, body_at, matrix, needs_at, part, pointer, reals, responses_at
-from engine.kernels.records import BODY, RESPONSES, Body, slots
+from engine.kernels.memory import (
+    address_of,
+    behind,
+    body_at,
+    impulse_at,
+    matrix,
+    needs_at,
+    part,
+    pointer,
+    reals,
+    responses_at,
+)
+from engine.kernels.mixer_records import WINDOW
+from engine.kernels.records import BODY, RESPONSES, Body
 from engine.kernels.responses import curves_size, resampled_frames, work_size
 
 NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
@@ -42,7 +55,7 @@ def longest(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
 @njit(**COMPILED)
 def width(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
     """The width of a work space for responses of a body and a room."""
-    found = max(2 * at.WINDOW, int(rate_hz), longest(body, rate_hz, size, t60_s))
+    found = max(2 * WINDOW, int(rate_hz), longest(body, rate_hz, size, t60_s))
     found = max(found, work_size(rooms.room_frames(t60_s), of.ROOM_HZ, rate_hz))
     for hz in (rate_hz, CURVES_HZ):
         frames = body_frames(body, size, hz)
@@ -105,7 +118,8 @@ def prepare(
     for number in range(3):
         response = one if number == 0 else other if number == 1 else both
         if number == 1 or own > 0:
-            partition(work, response, frames, behind(found, RESPONSES_SLOTS + number * found.part, found.part))
+            place = address_of(found) + 8 * (RESPONSES_SLOTS + number * found.part)
+            partition(work, response, frames, impulse_at(place))
     heard = body_frames(body, size, CURVES_HZ)
     if heard > 0:
         response = matrix(scratch, 2 * body.frames, heard, 2)
@@ -151,10 +165,10 @@ def mix(found_address: int, weights_address: int, into_address: int, first: int,
             for place in range(first, end):
                 into[place] += weight * response[place]
     for channel in range(2):  # a single sample at the beginning: the same at all frequencies
-        begin = at.I_HEADER + channel * 2 * (at.QUANTUM + 1)
-        for place in range(max(begin, first), min(begin + at.QUANTUM + 1, end)):
-            into[place] += weights[0] / (2 * at.QUANTUM)
+        begin = BEHIND_IMPULSE + channel * 2 * (QUANTUM + 1)
+        for place in range(max(begin, first), min(begin + QUANTUM + 1, end)):
+            into[place] += weights[0] / (2 * QUANTUM)
     if first == 0:
         counts, room = into.view(np.int64), behind(found, RESPONSES_SLOTS + found.part, found.part).view(np.int64)
-        for place in range(at.I_HEADER):
+        for place in range(BEHIND_IMPULSE):
             counts[place] = room[place]

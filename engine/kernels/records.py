@@ -12,15 +12,17 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from engine.kernels import constants as of
-from engine.kernels import layout as at
+from engine.kernels.fields import R, W, slots
+from engine.kernels.mixer_records import MOST_LATENTS
+from engine.kernels.voice_records import voice_bytes
 
-W, R = np.int64, np.float64
 # Records, as annotations of kernels
 Event: TypeAlias = Any
 Channel: TypeAlias = Any
 Note: TypeAlias = Any
 Report: TypeAlias = Any
 Noise: TypeAlias = Any
+Sympathy: TypeAlias = Any
 Player: TypeAlias = Any
 Table: TypeAlias = Any
 Drum: TypeAlias = Any
@@ -284,7 +286,7 @@ SYMPATHY = np.dtype(
         ("gain", R, of.MOST_SYMPATHETIC),
         ("x", R, of.MOST_SYMPATHETIC),
         ("y", R, of.MOST_SYMPATHETIC),
-        ("played", R, of.MOST_SYMPATHETIC),
+        ("played", R, of.MOST_SYMPATHETIC),  # 1 for partials of strings that are played, which are stopped, else 0
         ("partials", W),  # of strings that ring with those that are played
         ("instrument", W),  # for which they were tuned, …
         ("kind", W),  # … and its kind
@@ -337,7 +339,7 @@ PLAYER = np.dtype(
         ("draft", NOTE),  # … a note that begins, …
         ("again", EVENT),  # … a tremolo's stroke, …
         ("kept_event", EVENT),  # … an event while two are exchanged, …
-        ("amplitudes", R, at.MOST_MODES),  # … a pluck's modes, …
+        ("amplitudes", R, MOST_LATENTS),  # … a pluck's modes, …
         ("pulled", R, of.MOST_GRID),  # … its shape on its grid, …
         ("sound", R, of.SOUND_ROWS * of.MOST_DRUM_MODES),  # … and the modes of a key
     ]
@@ -378,23 +380,6 @@ NEEDS = np.dtype(
         ("convolver", W),  # slots of the convolver
     ]
 )
-
-
-def slot(kind: np.dtype[np.void], name: str) -> int:
-    """The slot of a field: its place in a record, in eight-byte numbers."""
-    assert kind.fields is not None
-    return int(kind.fields[name][1]) // 8
-
-
-def slots(kind: np.dtype[np.void]) -> int:
-    """The size of a record in eight-byte numbers."""
-    return kind.itemsize // 8
-
-
-def voice_bytes(modes: int) -> int:
-    """The size of a voice with so many modes, and with the blocks of modes that it is to have."""
-    numbers = at.HEADER + 8 * modes + 4 + 8 * at.QUANTUM + at.TRUTH_ROWS * modes
-    return 8 * (numbers + of.BLOCKS * (at.B_HEADER + at.RESONATOR_ROWS * modes))
 
 
 def player_slots(modes: int) -> int:

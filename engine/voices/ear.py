@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from engine.kernels.layout import BRIGHTER
+from engine.kernels.voice_records import BRIGHTER
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, LEAST_PEAK_M
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import analysis_matrix, listening_weights, synthesis_matrix

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
 from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, Preset, PresetInfo, TrainedRange, load_preset
@@ -104,7 +103,7 @@ def rung() -> Callable[..., NDArray[np.float64]]:
     def rendered(frames: int, *voices: Voice, attack: bool = True) -> NDArray[np.float64]:
         mixer = Mixer(voices[0].program.rate_hz, limited=False)
         for voice in () if attack else voices:
-            voice.memory.view(np.int64)[at.ATTACK] = 0  # the string's own samples from the first on
+            voice.record["attack"] = 0  # the string's own samples from the first on
         mixer.add(*voices)
         return mixer.render(frames).astype(np.float64)
 

@@ -18,20 +18,21 @@ from app.export.plugin.parts import AMP, EFFECTS, body_of, effects_there, kit_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.string_keys import StringKeys
-from app.instrument.table import PLAYED_PARAMETERS, WHEELED, wheel_goal
+from app.instrument.table import WHEELED, wheel_goal
 from app.patches.drums import Drums
 from app.patches.patch import ASSIGNABLE, Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
 from engine import bounds
 from engine.effects.room import NOISE_FRAMES
 from engine.kernels import constants as of
-from engine.kernels import layout as at
-from engine.kernels.records import CHANNEL, EVENT, NEEDS, PLAYER, REPORT, RESPONSES, TABLE, slot, slots, voice_bytes
+from engine.kernels import mixer_records as mixed
+from engine.kernels.fields import record_of, slot, slots
+from engine.kernels.records import CHANNEL, EVENT, NEEDS, PLAYER, REPORT, RESPONSES, TABLE
+from engine.kernels.voice_records import TENSION_PROGRAM, TRUTH_PROGRAM, voice_bytes
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import Preset
 from engine.voices.derivative import differentiator_taps
 from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S
-from engine.voices.player import record_of
 
 PREPARED_HZ = 48_000
 MAKER = "Learned Strings"
@@ -290,13 +291,11 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     yield _record("volume_db", VOLUME, 0, 0.0, OF_CHOICES["volume_db"], "")
     drums = isinstance(patch.strings, Drums)
     fixed = not drums and patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
-    points = () if fixed else PLAYED_PARAMETERS[of.POINT :][: len(patch.pickup.points)]
+    points = () if fixed else of.PLAYED[of.POINT :][: len(patch.pickup.points)]
     for id in (*WHEELED, *points):
         if id in (DRUM_PARAMETERS if drums else ASSIGNABLE):
             parameter = OF_PATCHES[id]
-            yield _record(
-                id, VALUE, PLAYED_PARAMETERS.index(id), patch.value(id), parameter, parameter.group.capitalize()
-            )
+            yield _record(id, VALUE, of.PLAYED.index(id), patch.value(id), parameter, parameter.group.capitalize())
     for id in effects_there(patch):
         parameter = OF_PATCHES[id]
         yield _record(id, EFFECT, EFFECTS.index(id), patch.value(id), parameter, parameter.group.capitalize())
@@ -321,11 +320,8 @@ def _macros(patch: Patch, ids: tuple[str, ...]) -> tuple[list[_Macro], tuple[str
 def layout_header(version: str) -> str:
     """The C header with places and constants of the kernels' memory."""
     wanted = {
-        at: "QUANTUM AHEAD EARLY REACH MIXER_SLOTS M_RATE M_FRAMES M_ACTIVE M_WANTED_VOLUME M_VOLUME "
-        "M_RELEASE M_REDUCTION M_PEAK M_LEFT M_CHANNELS M_SMOOTHING M_LIMITING M_CONVOLVER M_EFFECTS "
-        "M_EFFECTS_NOW M_EFFECTS_NEXT M_PLAYER M_TAPS M_GAINS M_ADDRESS M_SCRATCH M_AMPLIFIER I_HEADER "
-        "C_ACTIVE C_LATE S_RATE T_RATE",
-        of: "NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENTS REPORTS MOST_NOTES "
+        mixed: "EARLY REACH",
+        of: "QUANTUM AHEAD NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENTS REPORTS MOST_NOTES "
         "MOST_SOURCES KEYS CHANNELS BEGAN BODY_MIX BODY_SLOTS",
     }
     lines = [f'#define LS_VERSION "{version}"']
@@ -339,6 +335,12 @@ def layout_header(version: str) -> str:
         ("CHANNEL", CHANNEL),
         ("RESPONSES", RESPONSES),
         ("NEEDS", NEEDS),
+        ("MIXER", mixed.MIXER),
+        ("AMPLIFIER", mixed.AMPLIFIER),
+        ("CONVOLVER", mixed.CONVOLVER),
+        ("IMPULSE", mixed.IMPULSE),
+        ("TENSION_PROGRAM", TENSION_PROGRAM),
+        ("TRUTH_PROGRAM", TRUTH_PROGRAM),
     ):
         lines += [f"#define {name}_{field.upper()} {slot(kind, field)}" for field in kind.names or ()]
         lines += [f"#define {name}_SLOTS {slots(kind)}"]

@@ -17,7 +17,8 @@ from engine.effects.body_record import body_memory
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as kernel
 from engine.kernels import kit
-from engine.kernels.records import DRUM, DRUM_ROWS, slots
+from engine.kernels.fields import slots
+from engine.kernels.records import DRUM, DRUM_ROWS
 from engine.resonators.base import Array
 
 EFFECTS = ("body.mix", "room.mix", "body.size", "room.t60_s")  # in the shell's order

@@ -14,9 +14,10 @@ from numba import njit
 from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
 from engine.kernels import contact, drums, recorded, strings, velocities
-from engine.kernels import layout as at
+from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import clear, copy, fence, reals, wholes
+from engine.kernels.memory import clear, copy, fence, voice_at
+from engine.kernels.mixer_records import MOST_VOICES, Mixer
 from engine.kernels.playing import changes, channels, gains, keys, plucks, slots, voices
 from engine.kernels.records import Event, Note, Player, Report, Table
 
@@ -71,19 +72,19 @@ def _forget(player: Player, note: Note, frame: int) -> None:
 
 
 @njit(**COMPILED)
-def free_note(player: Player, mixers: np.ndarray) -> Note:
+def free_note(player: Player, mixer: Mixer) -> Note:
     """A free note; where there is none, one which has not begun or fades is cut, else the oldest."""
     best, best_rank = player.notes[0], 3
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
         if note.state != of.FREE and slots.over(note):
-            _forget(player, note, mixers[at.M_FRAMES])
+            _forget(player, note, mixer.frames)
         if note.state == of.FREE:
             return note
         begun = False
         for source in range(of.MOST_SOURCES):
             address = note.voices[source]
-            begun = begun or (address != 0 and wholes(address)[at.STATE] != at.WAITING)
+            begun = begun or (address != 0 and voice_at(address).state != at.WAITING)
         rank = 2
         if note.released != 0 or note.has_place == 0:
             rank = 1 if begun else 0
@@ -91,9 +92,9 @@ def free_note(player: Player, mixers: np.ndarray) -> Note:
             best, best_rank = note, rank
     for source in range(of.MOST_SOURCES):
         if best.voices[source] != 0:
-            voices.take_out(mixers, best.voices[source])
+            voices.take_out(mixer, best.voices[source])
     player.cut += 1
-    _forget(player, best, mixers[at.M_FRAMES])
+    _forget(player, best, mixer.frames)
     return best
 
 
@@ -108,8 +109,8 @@ def _follow(player: Player, table: Table, note: Note, before: Note) -> None:
         if address == 0:
             voices.release(other, stops)
             continue
-        wholes(address)[at.PREVIOUS_VOICE] = other
-        wholes(address)[at.STOPS_IN] = stops if table.stops != 0 else 0
+        voice_at(address).previous_voice = other
+        voice_at(address).stops_in = stops if table.stops != 0 else 0
 
 
 @njit(**COMPILED)
@@ -130,20 +131,20 @@ def _make_room(player: Player) -> None:
 
 
 @njit(**COMPILED)
-def strike(player: Player, table: Table, mixers: np.ndarray, event: Event) -> None:
+def strike(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
     """Plays all strings of a key's course, one after the other; the first is the one that is reported."""
-    note_on(player, table, mixers, event, 0)
+    note_on(player, table, mixer, event, 0)
     frame = event.frame
     for member in range(1, table.course):
         later = round(member * table.apart_s * player.rate_hz)
         later += voices.lag_of(player, table, member)
-        event.frame = max(frame, mixers[at.M_FRAMES]) + later if later > 0 else frame
-        note_on(player, table, mixers, event, member)
+        event.frame = max(frame, mixer.frames) + later if later > 0 else frame
+        note_on(player, table, mixer, event, member)
     event.frame = frame
 
 
 @njit(**COMPILED)
-def note_on(player: Player, table: Table, mixers: np.ndarray, event: Event, member: int) -> None:
+def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: int) -> None:
     """Plays a note, of a course one string. A string that is impossible is refused, unless another sounds.
 
     The note is drafted first: one that is refused takes no other's place.
@@ -160,31 +161,21 @@ def note_on(player: Player, table: Table, mixers: np.ndarray, event: Event, memb
                 refuse(player, event)
             return
         _pluck(player, table, event, draft)
-    note = free_note(player, mixers)
+    note = free_note(player, mixer)
     player.age += 1
-    draft.number, draft.age, draft.began = note.number, player.age, max(event.frame, mixers[at.M_FRAMES])
+    draft.number, draft.age, draft.began = note.number, player.age, max(event.frame, mixer.frames)
     copy(note, draft)
     _keep_of_table(player, table, note)
     _make_voices(player, table, note)
     _take_place(player, table, note)
-    _begin_voices(player, mixers, event, note)
-    changes.retune(player, table, note, 0.0, 0, mixers[at.M_FRAMES])
+    _begin_voices(player, mixer, event, note)
+    changes.retune(player, table, note, 0.0, 0, mixer.frames)
     if member == 0:
         level_db = keys.value_of(player, table, of.ONSET_DB)
         level_db += channels.loudness_db(player, table.mode, note.channel)
-        contact.touch(
-            player,
-            table,
-            of.STROKE,
-            level_db,
-            note.strength,
-            note.hardness,
-            note.stroke,
-            note.key,
-            event.frame,
-            0.0,
-            0.0,
-        )
+        strength, hardness, frame = note.strength, note.hardness, event.frame
+        stroke = contact.Touch(of.STROKE, level_db, strength, hardness, note.stroke, note.key, frame, 0.0, 0.0)
+        contact.touch(player, table, stroke)
     _make_room(player)
     report_began(player, table, event, note, note.own)
 
@@ -311,7 +302,7 @@ def _make_voices(player: Player, table: Table, note: Note) -> None:
             slots.set_gain(address, begun)
             if note.bridge > 0.0:
                 first = player.age - note.member  # of this player, for another may ring as well
-                wholes(address)[at.COURSE] = player.here + of.MOST_SOURCES * first + source
+                voice_at(address).course = player.here + of.MOST_SOURCES * first + source
         note.voices[source] = address
 
 
@@ -327,7 +318,7 @@ def _take_place(player: Player, table: Table, note: Note) -> None:
 
 
 @njit(**COMPILED)
-def _begin_voices(player: Player, mixers: np.ndarray, event: Event, note: Note) -> None:
+def _begin_voices(player: Player, mixer: Mixer, event: Event, note: Note) -> None:
     """Hand the voices of a note to the mixer.
 
     Those that have no room there, or that nobody hears, are over.
@@ -336,15 +327,15 @@ def _begin_voices(player: Player, mixers: np.ndarray, event: Event, note: Note) 
         address = note.voices[source]
         if address == 0:
             continue
-        wholes(address)[at.BEGIN_AT] = event.frame
-        reals(address)[at.STRUCK_S] = event.struck_s
-        wholes(address)[at.OF_INSTRUMENT] = 1
+        voice_at(address).begin_at = event.frame
+        voice_at(address).struck_s = event.struck_s
+        voice_at(address).of_instrument = 1
         spared = player.spares != 0 and player.source_gains[source] == 0.0
-        if mixers[at.M_ACTIVE] < at.MOST_VOICES and not spared:
-            mixers[at.M_VOICES + mixers[at.M_ACTIVE]] = address
-            mixers[at.M_ACTIVE] += 1
+        if mixer.active < MOST_VOICES and not spared:
+            mixer.voices[mixer.active] = address
+            mixer.active += 1
         else:
-            wholes(address)[at.STATE] = at.OVER
+            voice_at(address).state = at.OVER
 
 
 @njit(**COMPILED)

@@ -26,13 +26,11 @@ from app.instrument import events
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.string_keys import StringKeys, on_string
-from app.instrument.table import PLAYED_PARAMETERS
 from app.patches.library import find_patch, read_patch
 from app.patches.patch import Losses, Noise, Patch, Pickup, Polarisations
 from app.patches.tuning import TuningChoice
 from engine.kernels import constants as of
-from engine.kernels import layout as at
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM
 from engine.pluck import SHAPES, Pluck, Shape
 from engine.presets import Preset
 from engine.voices import Mixer
@@ -60,7 +58,7 @@ class Compiled:
 def quantum(mixer: Mixer) -> NDArray[np.float64]:
     """The next one as it is mixed, in double precision."""
     mixer.render(QUANTUM)
-    return mixer.memory[at.M_MIX : at.M_MIX + 2 * QUANTUM].copy()
+    return mixer.record["mix"].flatten()
 
 
 def rendered(stage: Compiled, played: Framed, quanta: int) -> NDArray[np.float64]:
@@ -535,7 +533,7 @@ def test_a_parameter_changes_as_by_a_turned_patch(shipped: dict[str, Patch], pre
     for stage in (one, other):
         rendered(stage, [(1, NoteOn(60, 90))], 10)
     one.handle(PatchTurned(patch.with_value("knobs.decay", 3.0)), 0)
-    other.player.compiled.give(of.PARAMETER, key=PLAYED_PARAMETERS.index("knobs.decay"), value=3.0)
+    other.player.compiled.give(of.PARAMETER, key=of.DECAY, value=3.0)
     sounds = [rendered(stage, (), 200) for stage in (one, other)]
     np.testing.assert_array_equal(*sounds)
 
@@ -565,41 +563,3 @@ def test_a_pluck_at_a_place_is_none_of_a_key(shipped: dict[str, Patch], preset: 
     assert stage.player.handle(PluckAt(Pluck())) == 0
     rendered(stage, (), 1)
     assert stage.player.reports() == [] and not stage.mixer.active
-
-
-def test_values_of_the_player_have_the_indices_of_its_layout() -> None:
-    indices = {
-        "knobs.stiffness": of.STIFFNESS,
-        "knobs.decay": of.DECAY,
-        "knobs.brightness_decay": of.BRIGHTNESS_DECAY,
-        "knobs.modulus": of.MODULUS_FACTOR,
-        "knobs.density": of.DENSITY_FACTOR,
-        "knobs.gauge": of.GAUGE,
-        "knobs.tension": of.TENSION_FACTOR,
-        "knobs.length": of.LENGTH_FACTOR,
-        "pluck.position": of.POSITION,
-        "pluck.width": of.WIDTH,
-        "pluck.width_hard": of.WIDTH_HARD,
-        "pluck.softest_mm": of.SOFTEST_MM,
-        "pluck.hardest_mm": of.HARDEST_MM,
-        "pluck.curve": of.CURVE,
-        "damping.release_t60_s": of.RELEASE_S,
-        "bend_semitones": of.BEND_SEMITONES,
-        "noise.onset_db": of.ONSET_DB,
-        "noise.release_db": of.DAMPER_DB,
-        "damping.mute": of.MUTE,
-        "technique.harmonic": of.HARMONIC,
-        "technique.strum_ms": of.STRUM_MS,
-        "technique.strokes": of.STROKES,
-        "technique.tremolo_hz": of.TREMOLO_HZ,
-        "technique.vibrato_cents": of.VIBRATO_CENTS,
-        "technique.vibrato_hz": of.VIBRATO_HZ,
-        "pluck.release_ms": of.CONTACT_MS,
-        "pluck.release_hard_ms": of.CONTACT_HARD_MS,
-        "javari.gap_um": of.JAVARI_UM,
-        "body.mix": of.BODY_MIX,
-        "pickup.points.0": of.POINT,
-        "pickup.points.1": of.POINT + 1,
-    }
-    assert {id: index for index, id in enumerate(PLAYED_PARAMETERS)} == indices
-    assert len(PLAYED_PARAMETERS) == of.VALUES

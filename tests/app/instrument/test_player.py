@@ -31,8 +31,7 @@ from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, Physi
 from engine import bounds
 from engine.excitation import blow_factor
 from engine.kernels import constants as of
-from engine.kernels.constants import WANTED_DB
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM, WANTED_DB
 from engine.kernels.loudness import k_weight
 from engine.kernels.playing.notes import PLUCK_STOPS_S
 from engine.kernels.pulses import spectrum

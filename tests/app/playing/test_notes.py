@@ -27,8 +27,7 @@ from app.playing.notes import Notes
 from app.playing.sources import Sources
 from app.presets.library import PresetEntry
 from app.rendering import RenderRequest
-from engine.kernels import layout as at
-from engine.kernels.layout import AHEAD
+from engine.kernels.constants import AHEAD, QUANTUM
 from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset, read_info, save_preset
@@ -36,7 +35,7 @@ from engine.voices import Ear, Mixer, Voice
 from tests.app.monitors import hears
 
 RATE_HZ = 48_000
-QUANTUM_S = at.QUANTUM / RATE_HZ
+QUANTUM_S = QUANTUM / RATE_HZ
 Wait = Callable[[Callable[[], bool]], None]
 EAR = Ear((0.37,))
 PluckOf = Callable[..., RenderRequest]
@@ -46,7 +45,7 @@ Reports = list[tuple[str, str]]
 
 def gains(note: Note) -> dict[str, float]:
     """With which its voices sound, or fade to."""
-    return {source: float(voice.memory[at.WANTED_GAIN]) for source, voice in note.voices.items()}
+    return {source: float(voice.record["wanted_gain"]) for source, voice in note.voices.items()}
 
 
 def seconds_of(mixer: Mixer, seconds: float) -> np.ndarray:
@@ -144,7 +143,7 @@ def test_the_oldest_notes_end_where_there_are_too_many(
 
 def look(sound: Any) -> None:
     """The sound's thread looks at the load of a device that has taken a quantum since."""
-    sound.mixer.render(at.QUANTUM)
+    sound.mixer.render(QUANTUM)
     sound.take_care()
 
 
@@ -539,22 +538,22 @@ def test_a_seek_begins_in_the_middle_alone(
                 struck.began or (not struck.pending and all(a.rendered_s > 0.8 for a in struck.ahead))
             )
         )  # type: ignore[misc]
-        whole[name] = sound.mixer.render(500 * at.QUANTUM)[:, 0]
+        whole[name] = sound.mixer.render(500 * QUANTUM)[:, 0]
         notes.stop()
-        sound.mixer.render(50 * at.QUANTUM)
+        sound.mixer.render(50 * QUANTUM)
     before = strike(pluck_of(path))
     note = strike(pluck_of(path), from_s=0.4, alone=True)
     assert before.released
     assert note.seconds == 0.4, "the playhead is there at once"
     wait(lambda: not note.pending)
-    sound.mixer.render(40 * at.QUANTUM)
+    sound.mixer.render(40 * QUANTUM)
     assert note.seconds == pytest.approx(0.4 + 40 * QUANTUM_S, abs=QUANTUM_S)
     assert len({voice.seconds for voice in note.voices.values()}) == 1
     for name in ("model", "truth"):
         notes.set_monitor(hears(name))
-        sound.mixer.render(30 * at.QUANTUM)
+        sound.mixer.render(30 * QUANTUM)
         place = round(note.seconds * RATE_HZ)
-        out = sound.mixer.render(10 * at.QUANTUM)[:, 0]
+        out = sound.mixer.render(10 * QUANTUM)[:, 0]
         np.testing.assert_allclose(out, whole[name][place : place + len(out)], atol=1e-6)
     assert note.frame_at(1.0) == note.began_frame + round(0.6 * RATE_HZ)
     notes.poll()

@@ -23,7 +23,7 @@ from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.performance import Performance, growth_words
 from app.window.settings import Settings
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM
 from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import SHIPPED

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 
 from engine.effects import Amp, Body, Effects, Room, apply
 from engine.effects.impulse import Impulse
-from engine.kernels import layout as at
 from engine.kernels.constants import LOUDNESS_HIGH_HZ, LOUDNESS_LOW_HZ
 from engine.voices import Mixer, Voice, plain_program
 
@@ -38,7 +37,7 @@ CHOICES = [
 def test_the_mixer_gives_the_same_as_arrays_are_given(effects: Effects) -> None:
     sound = pink(60_000).astype(np.float32)
     voice = Voice.of_samples(plain_program(RATE_HZ), sound)
-    voice.memory.view(np.int64)[at.ATTACK] = 0
+    voice.record["attack"] = 0
     voice.sound_through_effects()
     mixer = Mixer(RATE_HZ, limited=False)
     mixer.set_effects(effects)

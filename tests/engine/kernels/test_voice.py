@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
+from engine.kernels.constants import QUANTUM
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, RUNAWAY_FACTOR
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo
@@ -45,7 +45,7 @@ def struck(strike: Strike, small_info: Callable[[bool], PresetInfo], initial_m: 
 def constant(frames: int = 48_000, level: float = 0.5) -> Voice:
     """It shows every change of gain."""
     voice = Voice.of_samples(plain_program(RATE_HZ), np.full((frames, 1), level, np.float32))
-    voice.memory.view(np.int64)[at.ATTACK] = 0
+    voice.record["attack"] = 0
     return voice
 
 
@@ -106,7 +106,7 @@ def test_a_change_of_gain_is_a_fade_without_corners() -> None:
     voice.set_gain(0.25)
     found = mixer.render(2000)[:, 0]
     first = int(np.argmax(found != 0.5))
-    assert first < at.QUANTUM
+    assert first < QUANTUM
     np.testing.assert_allclose(found[first : first + FADE], 0.5 * (1 - 0.75 * eased(FADE)), atol=1e-7)
     np.testing.assert_array_equal(found[first + FADE :], np.float32(0.125))
     assert np.abs(np.diff(found.astype(np.float64), 2)).max() < 0.375 * 6 / FADE**2 * 1.05
@@ -138,7 +138,7 @@ def test_an_unheard_voice_keeps_time(kind: str, pickup: str, struck: Strike, run
     voice.set_gain(1.0)
     found = mixer.render(12_000)
     largest = np.abs(expected).max()
-    arrived = FADE + 4 * at.QUANTUM
+    arrived = FADE + 4 * QUANTUM
     np.testing.assert_allclose(found[arrived:], expected[arrived:], atol=1e-5)
     assert (np.abs(found[:arrived]) <= largest).all()
     shares = (found[:arrived] * expected[:arrived]).sum(1) / (expected[:arrived] ** 2).sum(1).clip(1e-12)
@@ -164,10 +164,10 @@ def slowest(rate_hz: int, ear: Ear) -> Voice:
 def test_the_way_to_another_listening_point_lasts_as_long_at_any_rate(rate_hz: int) -> None:
     voice, mixer = slowest(rate_hz, Ear((0.5,))), Mixer(rate_hz, limited=False)
     mixer.add(voice)
-    mixer.render(4 * at.QUANTUM)
+    mixer.render(4 * QUANTUM)
     assert voice.listen(Ear((0.0,)))
     frames = round(0.02 * rate_hz)
-    found = mixer.render(frames + 8 * at.QUANTUM)[:, 0]
+    found = mixer.render(frames + 8 * QUANTUM)[:, 0]
     np.testing.assert_allclose(found[:frames] / found[0], 1 - np.arange(frames) / frames, atol=2e-3)
     assert np.abs(found[frames:]).max() < 1e-6
 
@@ -175,11 +175,11 @@ def test_the_way_to_another_listening_point_lasts_as_long_at_any_rate(rate_hz: i
 @RATES_HZ
 def test_a_voice_that_is_silent_ends_in_as_long_at_any_rate(rate_hz: int) -> None:
     voice, mixer = slowest(rate_hz, Ear((0.5,))), Mixer(rate_hz, limited=False)
-    voice.memory[at.SILENT] = 0.0  # louder than it is
+    voice.record["silent"] = 0.0  # louder than it is
     mixer.add(voice)
     frames = round(0.02 * rate_hz)
-    found = mixer.render(frames + 8 * at.QUANTUM)[:, 0]
-    np.testing.assert_allclose(found[at.QUANTUM : at.QUANTUM + frames] / found[0], 1 - eased(frames), atol=2e-3)
+    found = mixer.render(frames + 8 * QUANTUM)[:, 0]
+    np.testing.assert_allclose(found[QUANTUM : QUANTUM + frames] / found[0], 1 - eased(frames), atol=2e-3)
     assert voice.over
 
 
@@ -277,7 +277,7 @@ def test_one_that_begins_within_a_quantum_is_the_same_sound_to_its_end(
         voice, mixer = struck(kind, ear), Mixer(RATE_HZ, limited=False)
         voice.begin_at(begins)
         mixer.add(voice)
-        first = -(-(begins + 1) // at.QUANTUM) * at.QUANTUM + 1280 if begins else 1280 + at.QUANTUM
+        first = -(-(begins + 1) // QUANTUM) * QUANTUM + 1280 if begins else 1280 + QUANTUM
         parts = [mixer.render(first)]
         voice.set_gain(0.5)
         parts.append(mixer.render(640))
@@ -326,10 +326,10 @@ def test_what_is_released_before_it_begins_never_sounds() -> None:
 @pytest.mark.parametrize("pickup", ["displacement", "velocity"])
 def test_skipping_is_where_it_would_have_been(kind: str, pickup: str, struck: Strike, rung: Rung) -> None:
     ear = Ear((0.37,), "velocity" if pickup == "velocity" else "displacement")
-    skipped_frames = round(0.2 * RATE_HZ / at.QUANTUM) * at.QUANTUM
+    skipped_frames = round(0.2 * RATE_HZ / QUANTUM) * QUANTUM
     expected = rung(skipped_frames + 4800, struck(kind, ear))[skipped_frames:]
     voice, mixer = struck(kind, ear), Mixer(RATE_HZ, limited=False)
-    voice.skip(0.2, Mixer(RATE_HZ).memory)
+    voice.skip(0.2, Mixer(RATE_HZ))
     voice.set_struck(1.0)
     voice.begin_at(640)
     assert voice.struck_to_began_s is None
@@ -344,7 +344,7 @@ def test_skipping_is_where_it_would_have_been(kind: str, pickup: str, struck: St
 def test_skipping_in_samples(rung: Rung) -> None:
     samples = np.random.default_rng(0).uniform(-0.9, 0.9, (9600, 1)).astype(np.float32)
     voice = Voice.of_samples(plain_program(RATE_HZ), samples)
-    voice.skip(0.04, Mixer(RATE_HZ).memory)
+    voice.skip(0.04, Mixer(RATE_HZ))
     np.testing.assert_array_equal(rung(4800, voice)[FADE:, 0], samples[1920 + FADE : 1920 + 4800, 0])
 
 
@@ -400,7 +400,7 @@ def test_whatever_is_asked_of_voices_each_minds_its_own_business(
             voice = strike(name, pluck, ear=ear, gain=gain)
         voice.begin_at(int(choice.integers(0, 4000)))
         if choice.random() < 0.3:
-            voice.skip(choice.uniform(0.1, 0.5), Mixer(RATE_HZ).memory)
+            voice.skip(choice.uniform(0.1, 0.5), Mixer(RATE_HZ))
         return voice
 
     def rendered(numbers: list[int]) -> Signal:

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
-from engine.kernels.layout import AHEAD
+from engine.kernels.constants import AHEAD, QUANTUM
 from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, load_preset
@@ -121,7 +120,7 @@ def test_a_voice_ends_though_its_model_hums_on(ear: Ear, preset: Preset, initial
     found = render_voice(program, humming(preset), preset.info, PLUCK, ear, 1.0)
     endless = render_voice(replace(program, ends_s=math.inf), humming(preset), preset.info, PLUCK, ear, 1.0)
     assert np.abs(endless[-RATE_HZ // 10 :]).max() > 1e-3
-    first, faded = -(-round(0.3 * RATE_HZ) // at.QUANTUM) * at.QUANTUM, round(END_FADE_S * RATE_HZ)
+    first, faded = -(-round(0.3 * RATE_HZ) // QUANTUM) * QUANTUM, round(END_FADE_S * RATE_HZ)
     done = (np.arange(len(found)) - first + 1).clip(0, faded)[:, None] / faded
     np.testing.assert_array_equal(found[:first], endless[:first])
     np.testing.assert_allclose(found, (1 - done**2 * (3 - 2 * done)) * endless, atol=1e-7)
@@ -141,10 +140,10 @@ def test_what_is_played_ends_as_in_a_file(skipped_s: float, preset: Preset, init
     voice.append(np.concatenate([(initial @ weights)[None], wave[0]]) / FULL_SCALE_M)
     mixer = Mixer(RATE_HZ, limited=False)
     if skipped_s:
-        voice.skip(skipped_s, mixer.memory)
+        voice.skip(skipped_s, mixer)
         voice.set_gain(1.0)
     mixer.add(voice)
-    first = round(skipped_s * RATE_HZ / at.QUANTUM) * at.QUANTUM
+    first = round(skipped_s * RATE_HZ / QUANTUM) * QUANTUM
     played = mixer.render(RATE_HZ - first)[:, 0]
     faded_in = 2 * round(0.02 * RATE_HZ) if skipped_s else 0
     assert voice.over
@@ -171,7 +170,7 @@ def test_a_voice_of_a_string_without_losses_rings_on() -> None:
     program = solver_program(string.resonator(1, tension_modulated=False), RATE_HZ)
     voice = Voice(program, PLUCK.displacement(program.grid_points), Ear((0.37,)))
     mixer = Mixer(RATE_HZ, limited=False)
-    voice.skip(60.0, mixer.memory)
+    voice.skip(60.0, mixer)
     voice.start_with_gain(1.0)
     mixer.add(voice)
     assert np.abs(mixer.render(RATE_HZ // 10)).max() > 1e-3

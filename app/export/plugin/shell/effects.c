@@ -69,7 +69,7 @@ static void work(void *with) {
 /* The mix: one response of four, nothing, the body, the room, and both in series */
 
 static slot *idle(instrument *own) {
-  return own->effects.mixes[own->mixer[M_EFFECTS_NOW].whole == number_of(own->effects.mixes[0])];
+  return own->effects.mixes[own->mixer[MIXER_EFFECTS_NOW].whole == number_of(own->effects.mixes[0])];
 }
 
 static void begin_mix(instrument *own) {
@@ -77,7 +77,7 @@ static void begin_mix(instrument *own) {
   double body = wanted(own, EFFECT_BODY_MIX), room = wanted(own, EFFECT_ROOM_MIX);
   e->mixing[0] = body, e->mixing[1] = room;
   if (body == 0 && room == 0) { /* nothing is changed */
-    own->mixer[M_EFFECTS].whole = 0;
+    own->mixer[MIXER_EFFECTS].whole = 0;
     return;
   }
   void *error = NULL, *result = NULL;
@@ -94,11 +94,11 @@ static void mix_on(instrument *own, int64_t most) {
   e->mixing_at += most;
   if (e->mixing_at < e->heard->found[RESPONSES_PART].whole) return;
   e->mixing_at = -1;
-  own->mixer[M_EFFECTS].whole = number_of(e->mixing_to);
+  own->mixer[MIXER_EFFECTS].whole = number_of(e->mixing_to);
 }
 
 enum { MIXED_A_QUANTUM = 16384 }; /* slots: some ten microseconds */
-_Static_assert(I_HEADER + 4 * EARLY * (QUANTUM + 1) < MIXED_A_QUANTUM, "the first quantum hears no more");
+_Static_assert(IMPULSE_SLOTS + 4 * EARLY * (QUANTUM + 1) < MIXED_A_QUANTUM, "the first quantum hears no more");
 
 /* Takes up what the thread has made. */
 static bool adopt(instrument *own) {
@@ -131,7 +131,7 @@ bool effects_follow(instrument *own) {
     return false;
   }
   const slot *mixer = own->mixer;
-  if (mixer[M_EFFECTS_NEXT].whole || mixer[M_EFFECTS].whole != mixer[M_EFFECTS_NOW].whole) return false; /* it still fades */
+  if (mixer[MIXER_EFFECTS_NEXT].whole || mixer[MIXER_EFFECTS].whole != mixer[MIXER_EFFECTS_NOW].whole) return false; /* it still fades */
   bool other = adopt(own);
   if (other || wanted(own, EFFECT_BODY_MIX) != e->mixing[0] || wanted(own, EFFECT_ROOM_MIX) != e->mixing[1]) begin_mix(own);
   if (other) wait_offline(e);
@@ -175,23 +175,23 @@ bool effects_begin(instrument *own) {
 
 slot *effects_mixed(const instrument *own) {
   bool done = own->effects.mixing_at < 0;
-  return done ? (slot *)(intptr_t)own->mixer[M_EFFECTS].whole : NULL;
+  return done ? (slot *)(intptr_t)own->mixer[MIXER_EFFECTS].whole : NULL;
 }
 
 void effects_reset(instrument *own, slot *mixed) {
   effects *e = &own->effects;
   void *error = NULL, *result = NULL;
-  memset(e->convolver, 0, C_LATE * sizeof(slot));
+  memset(e->convolver, 0, CONVOLVER_SLOTS * sizeof(slot));
   own->kernels->begin_convolver(&result, &error, number_of(e->convolver), own->rate_hz, e->most_frames);
-  own->mixer[M_CONVOLVER].whole = number_of(e->convolver);
-  own->mixer[M_EFFECTS].whole = number_of(mixed);
+  own->mixer[MIXER_CONVOLVER].whole = number_of(e->convolver);
+  own->mixer[MIXER_EFFECTS].whole = number_of(mixed);
   e->mixing_at = -1;
   bool same = mixed && wanted(own, EFFECT_BODY_MIX) == e->mixing[0] && wanted(own, EFFECT_ROOM_MIX) == e->mixing[1];
   if (adopt(own) || !same) {
     begin_mix(own);
     if (e->mixing_at < 0) return;
     mix_on(own, MIXED_A_QUANTUM);
-    own->mixer[M_EFFECTS].whole = number_of(e->mixing_to); /* what is heard later is mixed before */
+    own->mixer[MIXER_EFFECTS].whole = number_of(e->mixing_to); /* what is heard later is mixed before */
   }
 }
 
