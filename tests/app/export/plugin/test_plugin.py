@@ -678,7 +678,7 @@ def test_an_instrument_that_cannot_sound_is_refused() -> None:
         image_of(sitar, preset_of(LEARNED))
 
 
-def test_any_other_kernel_makes_object_files_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_any_other_kernel_makes_other_object_files(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where the user chooses the folder of compiled code, it is the same for every version."""
     read, usual = set[Path](), Path.read_bytes
     monkeypatch.setattr(Path, "read_bytes", lambda path: read.add(path) or usual(path))
