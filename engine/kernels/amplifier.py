@@ -53,7 +53,7 @@ def drive(mixer: Mixer, drive_db: float, tone_db: float, level_db: float) -> Non
 
 @njit(**COMPILED)
 def amplify(mixer: Mixer) -> None:
-    """Replaces the mix, (QUANTUM, 2), by its sound through the amplifier, where it is on."""
+    """Replace the mix, (QUANTUM, 2), by its sound through the amplifier, where it is on."""
     amp = mixer.amplifier
     wanted, share = amp.wanted_drive, amp.share
     if wanted == 0.0 and share == 0.0:

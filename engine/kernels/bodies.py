@@ -32,7 +32,7 @@ def given_frames(frames: int, own_hz: float, size: float, rate_hz: float, longes
 
 @njit(**COMPILED)
 def ring(work: np.ndarray, modes: np.ndarray, size: float, rate_hz: float, sound: np.ndarray) -> None:
-    """Writes all modes after one blow, in whole runs, which are computed side by side.
+    """Write all modes after one blow, in whole runs, which are computed side by side.
 
     Args:
         modes: (4, modes).
@@ -71,7 +71,7 @@ def ring(work: np.ndarray, modes: np.ndarray, size: float, rate_hz: float, sound
 def respond(
     work: np.ndarray, modes: np.ndarray, subsonic_hz: float, size: float, rate_hz: float, sound: np.ndarray
 ) -> None:
-    """Writes the response of a body that has modes.
+    """Write the response of a body that has modes.
 
     Args:
         subsonic_hz: below it the body radiates next to nothing, at a size of 1.
@@ -87,7 +87,7 @@ def respond(
 def respond_as(
     work: np.ndarray, given: np.ndarray, own_hz: float, size: float, rate_hz: float, sound: np.ndarray
 ) -> None:
-    """Writes the response of a body that is given as one.
+    """Write the response of a body that is given as one.
 
     Args:
         sound: (`given_frames`, 2).

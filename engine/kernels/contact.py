@@ -74,7 +74,7 @@ class Touch(NamedTuple):
 
 @njit(**COMPILED)
 def touch(player: Player, table: Table, by: Touch) -> None:
-    """Begins the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends."""
+    """Begin the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends."""
     if not by.level_db > OFF_DB:
         return
     kind, rate_hz, which = table.contacts[by.which], player.rate_hz, by.which
@@ -129,14 +129,14 @@ def touch(player: Player, table: Table, by: Touch) -> None:
 
 @njit(**COMPILED)
 def hush(player: Player, quanta: int) -> None:
-    """Lets all noises fade out."""
+    """Let all noises fade out."""
     for number in range(of.MOST_NOISES):
         player.noises[number].stops = quanta
 
 
 @njit(**COMPILED)
 def sound(player_address: int, mixer_address: int) -> None:
-    """Adds all noises to the mixer's quantum, both channels alike."""
+    """Add all noises to the mixer's quantum, both channels alike."""
     player = player_at(player_address)
     if player.table == 0:
         return
@@ -196,7 +196,7 @@ def _run(
     gain: float,
     mix: np.ndarray,
 ) -> None:
-    """Adds a noise to frames of the mix, while its gain goes from `before` to `gain`."""
+    """Add a noise to frames of the mix, while its gain goes from `before` to `gain`."""
     pulse, pulse_frames = noise.pulse, noise.pulse_frames
     burst, attack_frames = noise.burst, noise.attack_frames
     shrinks, envelope = noise.shrinks, noise.envelope
@@ -230,7 +230,7 @@ def _play(
     before: float,
     mix: np.ndarray,
 ) -> None:
-    """Adds a recorded attack, by linear interpolation between its samples, as `_run` adds a noise."""
+    """Add a recorded attack, by linear interpolation between its samples, as `_run` adds a noise."""
     gain = player.noise_gain
     frames, step = attack.frames, attack.rate_hz / player.rate_hz
     samples = behind(attack, HEADER, frames)

@@ -45,7 +45,7 @@ BEHIND_CONVOLVER, BEHIND_IMPULSE = slots(CONVOLVER), slots(IMPULSE)
 
 @njit(**COMPILED)
 def convolve(mixer: Mixer) -> None:
-    """Replaces the mix, (QUANTUM, 2), by its sound with the response. Without a response it is left as it is."""
+    """Replace the mix, (QUANTUM, 2), by its sound with the response. Without a response it is left as it is."""
     if mixer.effects == 0 and mixer.effects_now == 0 and mixer.effects_next == 0:
         return
     fence()
@@ -75,7 +75,7 @@ def convolve(mixer: Mixer) -> None:
 
 @njit(**COMPILED)
 def _clean(mixer: Mixer, mix: np.ndarray) -> bool:
-    """Leaves only what may ring on. Returns whether there is anything."""
+    """Leave only what may ring on. Returns whether there is anything."""
     heard = False
     for frame in range(QUANTUM):
         left, right = mix[frame, 0], mix[frame, 1]
@@ -93,7 +93,7 @@ def _clean(mixer: Mixer, mix: np.ndarray) -> bool:
 
 @njit(**COMPILED)
 def _exchange(mixer: Mixer, convolver: Convolver) -> None:
-    """Continues with a change of the response, or begins one; it is made at once where it is inaudible."""
+    """Continue with a change of the response, or begin one; it is made at once where it is inaudible."""
     if convolver.step >= 0:
         convolver.step += 1
         if convolver.step <= convolver.fade_windows:
@@ -334,7 +334,7 @@ def partitioned_slots(frames: int, channels: int) -> int:
 
 @njit(**COMPILED)
 def partition(work: np.ndarray, response: np.ndarray, frames: int, impulse: Impulse) -> None:
-    """Writes a response (frames, 1 or 2) as the convolver reads it; the inverse transform's factor is in it.
+    """Write a response (frames, 1 or 2) as the convolver reads it; the inverse transform's factor is in it.
 
     Args:
         work: a work space of `fourier` for two windows.

@@ -60,7 +60,7 @@ def _hypot(x: float, y: float) -> float:
 
 @njit(**COMPILED)
 def bessels(x: float, out: np.ndarray) -> float:
-    """Writes J_m(x) of m from 0 on, x ≥ 0, and returns Struve's H₁(x).
+    """Write J_m(x) of m from 0 on, x ≥ 0, and return Struve's H₁(x).
 
     From a high order down (Miller), with J₀ + 2 J₂ + 2 J₄ + … = 1; orders beyond the turning point are 0.
     """
@@ -122,7 +122,7 @@ def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray
 
 @njit(**COMPILED)
 def tabulate(table: np.ndarray) -> None:
-    """Writes J_m of multiples of STEP, (steps, TERMS + orders + TERMS): m from -TERMS on."""
+    """Write J_m of multiples of STEP, (steps, TERMS + orders + TERMS): m from -TERMS on."""
     for step in range(table.shape[0]):
         row = table[step]
         bessels(step * STEP, row[TERMS:])
@@ -341,7 +341,7 @@ def reach(drum: np.ndarray, highest_hz: float, most: int) -> float:
 
 @njit(**COMPILED)
 def modes(drum: np.ndarray, around: Around, highest_hz: float, most: int, work: np.ndarray, out: np.ndarray) -> int:
-    """Writes the lowest modes below a frequency, so many at most, and returns how many they are.
+    """Write the lowest modes below a frequency, so many at most, and return how many they are.
 
     Args:
         work: of 4 modes of the surface, and ORDERS.
@@ -438,7 +438,7 @@ def _principal(drum: np.ndarray, around: Around, work: np.ndarray, out: np.ndarr
 
 @njit(**COMPILED)
 def tune(drum: np.ndarray, ratio: float, around: Around, work: np.ndarray, out: np.ndarray) -> None:
-    """Raises a drum's pitch by a ratio: a membrane's by its tension, a plate's by its size."""
+    """Raise a drum's pitch by a ratio: a membrane's by its tension, a plate's by its size."""
     if ratio == 1.0:
         return
     if drum[TENSION] == 0.0:
@@ -516,7 +516,7 @@ def radiated(drum: np.ndarray, found: np.ndarray, x: float, y: float, tools: Too
 
 @njit(**COMPILED)
 def write(drum: np.ndarray, found: np.ndarray, points: np.ndarray, tools: Tools, address: int, n: int) -> None:
-    """Writes the drum of a key, n modes and its blow, heard at points, as the player reads it: see `records.DRUM`."""
+    """Write the drum of a key, n modes and its blow, heard at points, as the player reads it: see `records.DRUM`."""
     mu, block = drum[DENSITY] * drum[THICKNESS], drum_at(address)
     block.modes, block.mallet_kg, block.contact_s = n, drum[MALLET_KG], drum[CONTACT]
     block.softest_m_s, block.hardest_m_s, block.mass_kg = drum[SOFTEST], drum[HARDEST], mass_kg(drum)

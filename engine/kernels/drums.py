@@ -118,7 +118,7 @@ def gain_of(player: Player, table: Table, key: int) -> float:
 
 @njit(**COMPILED)
 def strike(player: Player, table: Table, event: Event, number: int) -> float:
-    """Makes the voices of one of the player's notes; their gain, 0: no drum."""
+    """Make the voices of one of the player's notes; their gain, 0: no drum."""
     if not has_drum(table, event.key):
         return 0.0
     drum = drum_of(table, event.key)
@@ -168,7 +168,7 @@ def _make(
 
 @njit(**COMPILED)
 def weigh(player: Player, table: Table, voice: Voice, which: int, drum: Drum) -> None:
-    """Sets one of the two sets of weights of a voice; modes too high for the rate are not heard."""
+    """Set one of the two sets of weights of a voice; modes too high for the rate are not heard."""
     highest, given = TOO_HIGH * player.rate_hz, rows_of(drum)
     for point in range(table.points):
         own, imaginary = weights(voice, which, point, 0), weights(voice, which, point, 1)
@@ -180,7 +180,7 @@ def weigh(player: Player, table: Table, voice: Voice, which: int, drum: Drum) ->
 
 @njit(**COMPILED)
 def hear(player: Player, table: Table, note: Note) -> None:
-    """Lets a note follow the gains of sources and the places where the drum is heard."""
+    """Let a note follow the gains of sources and the places where the drum is heard."""
     if table.drums == 0 or not has_drum(table, note.key):
         return
     drum, gain = drum_of(table, note.key), note.gain * channels.loudness(player, table.mode, note.channel)

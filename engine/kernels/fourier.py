@@ -25,7 +25,7 @@ RUN = 16  # numbers of a chirp that are computed one from the other
 def transform(
     re: np.ndarray, im: np.ndarray, re2: np.ndarray, im2: np.ndarray, cosines: np.ndarray, sines: np.ndarray
 ) -> None:
-    """Replaces re + i·im, of n numbers, a power of two, by Σ (re + i·im)[t] exp(−2πi kt/n).
+    """Replace re + i·im, of n numbers, a power of two, by Σ (re + i·im)[t] exp(−2πi kt/n).
 
     With real and imaginary parts exchanged in the call it is the inverse, times n.
 
@@ -101,7 +101,7 @@ def power_of_two(least: int) -> int:
 
 @njit(**COMPILED)
 def fill_circle(cosines: np.ndarray, sines: np.ndarray) -> None:
-    """Writes cosines and sines of 2πk/N, k = 0 … N − 1; N is a multiple of 4."""
+    """Write cosines and sines of 2πk/N, k = 0 … N − 1; N is a multiple of 4."""
     quarter = len(cosines) // 4
     for k in range(quarter):
         cosine, sine = math.cos(2 * math.pi * k / len(cosines)), math.sin(2 * math.pi * k / len(cosines))
@@ -119,7 +119,7 @@ def row(work: np.ndarray, number: int, size: int) -> np.ndarray:
 
 @njit(**COMPILED)
 def silence(work: np.ndarray, signal: int, first: int, end: int) -> None:
-    """Clears a signal of a work space from one place to another."""
+    """Clear a signal of a work space from one place to another."""
     re, im = row(work, signal, end), row(work, signal + 1, end)
     for k in range(first, end):
         re[k] = im[k] = 0.0
@@ -164,7 +164,7 @@ def turn_any(work: np.ndarray, period: int, given: int, wanted: int, behind: int
 
 @njit(**COMPILED)
 def _fill_chirp(work: np.ndarray, period: int, positive: int, size: int) -> None:
-    """Writes exp(πi k²/period) as signal TWO, from k = 0 on as many as `positive`, then negative k."""
+    """Write exp(πi k²/period) as signal TWO, from k = 0 on as many as `positive`, then negative k."""
     re, im = row(work, TWO, size), row(work, TWO + 1, size)
     angle = math.pi / period
     real = imaginary = step_re = step_im = 0.0
@@ -184,7 +184,7 @@ def _fill_chirp(work: np.ndarray, period: int, positive: int, size: int) -> None
 
 @njit(**COMPILED)
 def _turn_back(work: np.ndarray, size: int) -> None:
-    """Multiplies signal ONE by the conjugate of TWO."""
+    """Multiply signal ONE by the conjugate of TWO."""
     re, im = row(work, ONE, size), row(work, ONE + 1, size)
     chirp_re, chirp_im = row(work, TWO, size), row(work, TWO + 1, size)
     for k in range(size):

@@ -53,7 +53,7 @@ PHASE, MOST_STEPS = 0.15, 6
 
 @njit(**COMPILED)
 def fit(voice: Voice, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz: float) -> None:
-    """Gives a voice that has not begun an edge of its bridge.
+    """Give a voice that has not begun an edge of its bridge.
 
     Args:
         string, pairs: as of `strings.rows`.

@@ -45,7 +45,7 @@ MOVES = (MODES_MOVED, LOSSES_MOVED, LOSSES_MOVED, PLACES_MOVED, PLACES_MOVED)
 
 @njit(**COMPILED)
 def begin(kit_address: int, table_address: int) -> None:
-    """Writes all keys' blocks into an instrument's table."""
+    """Write all keys' blocks into an instrument's table."""
     kit, counts, values = reals(kit_address), wholes(kit_address), table_at(table_address).values
     drums.tabulate(_bessels(kit, counts))
     for which in FOLLOWED:
@@ -109,7 +109,7 @@ def _possible(drum: np.ndarray) -> bool:
 
 @njit(**COMPILED)
 def _update(kit_address: int, table_address: int, key: int) -> None:
-    """Writes the block of a key that is stale."""
+    """Write the block of a key that is stale."""
     kit, counts, table = reals(kit_address), wholes(kit_address), table_at(table_address)
     own, capacity = FIRST_KEY + key * KEY, counts[CAPACITY]
     stale, drum = counts[own + KEY_STALE], counts[own + KEY_DRUM]

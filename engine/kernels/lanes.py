@@ -89,7 +89,7 @@ class _Blocks:
         return self.builder.bitcast(self.builder.gep(self._data, [slot]), _VECTOR.as_pointer())
 
     def add(self, which: int, one, other) -> None:
-        """Adds a product to a sum."""
+        """Add a product to a sum."""
         product = self.builder.fmul(one, other)
         self.builder.store(self.builder.fadd(self.builder.load(self._sums[which]), product), self._sums[which])
 
@@ -232,7 +232,7 @@ PRESSED = 3  # rows of parts in a contact: displacement there, and what x and y 
 
 @intrinsic
 def press(typing_context, memory, blocks, modes, parts, force):
-    """Changes x and y of blocks by a force at a contact, and returns their sums, as `turn` does.
+    """Change x and y of blocks by a force at a contact, and return their sums, as `turn` does.
 
     `parts`: first slot of (blocks, PRESSED, LANES).
     """

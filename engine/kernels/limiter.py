@@ -24,7 +24,7 @@ STEEPEST = 1 / _SIDE  # of the gain a frame, were it to fall to nothing
 
 @njit(**COMPILED)
 def limit(mixer: Mixer) -> None:
-    """Takes the mix, (QUANTUM, 2), and leaves there what is `AHEAD` frames older, within ±`CEILING`.
+    """Take the mix, (QUANTUM, 2), and leave there what is `AHEAD` frames older, within ±`CEILING`.
 
     Where nothing within reach exceeds the ceiling, samples stay as they are.
     """

@@ -116,7 +116,7 @@ def address_of(typing_context: Any, record: Any):
 
 @intrinsic
 def clear(typing_context: Any, record: Any):
-    """Fills a record with zeros."""
+    """Fill a record with zeros."""
 
     def generate(context, builder, signature, arguments):
         pointer = builder.bitcast(arguments[0], ir.IntType(8).as_pointer())
@@ -128,7 +128,7 @@ def clear(typing_context: Any, record: Any):
 
 @intrinsic
 def copy(typing_context: Any, into: Any, record: Any):
-    """Writes a record over another of its kind."""
+    """Write a record over another of its kind."""
 
     def generate(context, builder, signature, arguments):
         to, source = (builder.bitcast(each, ir.IntType(8).as_pointer()) for each in arguments)
@@ -182,7 +182,7 @@ def shaped(typing_context: Any, memory: Any, first: Any, shape: Any):
 
 @njit(**COMPILED)
 def publish(slots: np.ndarray, slot: int, whole: int) -> None:
-    """Writes a whole number into one of the slots, int64 (n,), after all that was written before.
+    """Write a whole number into one of the slots, int64 (n,), after all that was written before.
 
     A thread that reads the number before a fence sees what it stands for. What is read afterwards is no older.
     """

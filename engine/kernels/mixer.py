@@ -85,7 +85,7 @@ def _quantum(mixer: Mixer, now_s: float) -> None:
 
 @njit(**COMPILED)
 def _add_voices(mixer: Mixer, of_instrument: int, given_s: float) -> None:
-    """Adds the next quantum of an instrument's voices (1), or of all others (0), to the mix."""
+    """Add the next quantum of an instrument's voices (1), or of all others (0), to the mix."""
     kept = 0
     for place in range(mixer.active):
         address = mixer.voices[place]

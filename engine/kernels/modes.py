@@ -143,7 +143,7 @@ def turn(
 
 @njit(**COMPILED)
 def rest_above(voice: Voice, rate: float) -> int:
-    """Lays modes to rest that lie too high for the rate; the highest of the others."""
+    """Lay modes to rest that lie too high for the rate; the highest of the others."""
     squares, sigmas, first, second = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA), row(voice, 0), row(voice, 1)
     last = voice.modes - 1
     while last > 0 and damped(squares[last], sigmas[last]) > TOO_HIGH * rate:

@@ -37,7 +37,7 @@ def render(mixer_at: int, frames: int, out_at: int) -> None:
 
 @njit(**COMPILED)
 def begin(player_at: int) -> None:
-    """Puts the wheels and pedals of a new player at rest."""
+    """Put the wheels and pedals of a new player at rest."""
     events.begin(player_at)
 
 
@@ -65,11 +65,11 @@ def drive(mixer_at: int, drive_db: float, tone_db: float, level_db: float) -> No
 
 @njit(**COMPILED)
 def sound(player_at: int, mixer_at: int) -> None:
-    """Adds what touches strings and drums to the quantum."""
+    """Add what touches strings and drums to the quantum."""
     contact.sound(player_at, mixer_at)
 
 
 @njit(**COMPILED)
 def sympathise(player_at: int, mixer_at: int) -> None:
-    """Adds what rings along to the quantum."""
+    """Add what rings along to the quantum."""
     sympathy.sympathise(player_at, mixer_at)

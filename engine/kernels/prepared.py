@@ -67,7 +67,7 @@ def width(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
 
 @njit(**COMPILED)
 def measure(body_address: int, rate_hz: float, size: float, t60_s: float, needs_address: int) -> None:
-    """Writes the memory that `prepare` needs."""
+    """Write the memory that `prepare` needs."""
     body, needs = body_at(body_address), needs_at(needs_address)
     needs.frames = longest(body, rate_hz, size, t60_s)
     needs.part = partitioned_slots(needs.frames, 2)
@@ -87,7 +87,7 @@ def prepare(
     found_address: int,
     memory_address: int,
 ) -> None:
-    """Writes RESPONSES of a body and a room, and the responses behind them.
+    """Write RESPONSES of a body and a room, and the responses behind them.
 
     Each argument stands for itself in C.
 
@@ -131,7 +131,7 @@ def prepare(
 def _respond(
     work: np.ndarray, body: Body, size: float, rate_hz: float, scratch: np.ndarray, found: np.ndarray
 ) -> None:
-    """Writes the response of a body; `scratch` has room for the samples of one that is given."""
+    """Write the response of a body; `scratch` has room for the samples of one that is given."""
     if body.frames == 0:
         modes = matrix(reals(address_of(body)), BODY_SLOTS, 4, body.modes)
         bodies.respond(work, modes, body.subsonic_hz, size, rate_hz, found)
@@ -148,13 +148,13 @@ def _respond(
 
 @njit(**COMPILED)
 def weigh(found_address: int, body_mix: float, room_mix: float, weights_address: int) -> None:
-    """Writes the weights (4,) of a mix."""
+    """Write the weights (4,) of a mix."""
     responses.weigh(responses_at(found_address).powers, body_mix, room_mix, part(reals(weights_address), 0, 4))
 
 
 @njit(**COMPILED)
 def mix(found_address: int, weights_address: int, into_address: int, first: int, count: int) -> None:
-    """Writes some slots of a mix of responses as the convolver reads it."""
+    """Write some slots of a mix of responses as the convolver reads it."""
     found, weights, into = responses_at(found_address), reals(weights_address), reals(into_address)
     end = min(first + count, found.part)
     for place in range(first, end):

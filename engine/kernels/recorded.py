@@ -59,7 +59,7 @@ def smooth(own: Additions, hz: float) -> float:
 
 
 def split(own: Additions, string: Row, modes: int, amplitudes: Out) -> None:
-    """Splits a pluck's partials, the first of `amplitudes` (modes,), into the modes of both polarisations."""
+    """Split a pluck's partials, the first of `amplitudes` (modes,), into the modes of both polarisations."""
     higher = above(own, string)
     for mode in range(modes - 1, -1, -1):
         second = value(own, of.SECOND_SHARE, mode // 2, higher)
@@ -67,7 +67,7 @@ def split(own: Additions, string: Row, modes: int, amplitudes: Out) -> None:
 
 
 def correct(own: Additions, string: Row, modes: int, rows: Out) -> None:
-    """Changes ω² and σ of the law, the first two rows of `rows` (at least 2 modes,), to those of the recorded string.
+    """Change ω² and σ of the law, the first two rows of `rows` (at least 2 modes,), to those of the recorded string.
 
     A key that is bent keeps the order of its modes.
     """

@@ -25,7 +25,7 @@ _DRY, _BODY, _ROOM, _BOTH = range(4)  # parts of a mix; the three cases that som
 
 @njit(**COMPILED)
 def load(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
-    """Writes a response into a signal of the work space, with silence behind it."""
+    """Write a response into a signal of the work space, with silence behind it."""
     re, im = row(work, signal, size), row(work, signal + 1, size)
     frames = len(sound)
     for frame in range(frames):
@@ -35,7 +35,7 @@ def load(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
 
 @njit(**COMPILED)
 def analyse(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
-    """Writes the spectrum of a response, as one signal, into the work space."""
+    """Write the spectrum of a response, as one signal, into the work space."""
     load(work, signal, sound, size)
     turn(work, signal, signal + 1, size)
 
@@ -148,7 +148,7 @@ def _resampling_size(frames: int, found: int, from_hz: float, to_hz: float) -> i
 
 @njit(**COMPILED)
 def resample(work: np.ndarray, sound: np.ndarray, from_hz: float, to_hz: float, found: np.ndarray) -> None:
-    """Writes a response at another rate, by its Fourier series with as much silence: any ratio, in bounded time.
+    """Write a response at another rate, by its Fourier series with as much silence: any ratio, in bounded time.
 
     Args:
         found: its first frames, as many as there is room for.
@@ -224,7 +224,7 @@ def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float,
 
 @njit(**COMPILED)
 def series(work: np.ndarray, body: np.ndarray, room: np.ndarray, both: np.ndarray) -> None:
-    """Writes the response of a body in a room, (frames + frames − 1, 2)."""
+    """Write the response of a body in a room, (frames + frames − 1, 2)."""
     size = power_of_two(len(both))
     analyse(work, ONE, body, size)
     analyse(work, TWO, room, size)
@@ -239,7 +239,7 @@ def series(work: np.ndarray, body: np.ndarray, room: np.ndarray, both: np.ndarra
 
 @njit(**COMPILED)
 def all_powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float, found: np.ndarray) -> None:
-    """Writes `powers` of the cases that the body is heard, the room, and both, at their places of (4, 4, 4)."""
+    """Write `powers` of the cases that the body is heard, the room, and both, at their places of (4, 4, 4)."""
     powers(work, body, room[:0], rate_hz, found[_BODY])
     powers(work, body[:0], room, rate_hz, found[_ROOM])
     powers(work, body, room, rate_hz, found[_BOTH])
@@ -247,7 +247,7 @@ def all_powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: fl
 
 @njit(**COMPILED)
 def weigh(cases: np.ndarray, body_mix: float, room_mix: float, weights: np.ndarray) -> None:
-    """Writes the weights (4,) of the parts of a mix, with which pink noise keeps its level.
+    """Write the weights (4,) of the parts of a mix, with which pink noise keeps its level.
 
     Args:
         cases: as `all_powers` writes them.
@@ -273,7 +273,7 @@ def curves_size(frames: int) -> int:
 
 @njit(**COMPILED)
 def curves(work: np.ndarray, body: np.ndarray, found: np.ndarray) -> None:
-    """Writes the effect of a body on the loudness of keys (BODY_SLOTS,), see `constants`.
+    """Write the effect of a body on the loudness of keys (BODY_SLOTS,), see `constants`.
 
     Each value is the mean of the spectrum half-way to its neighbours.
 

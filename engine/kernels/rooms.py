@@ -30,7 +30,7 @@ def room_frames(t60_s: float) -> int:
 
 @njit(**COMPILED)
 def respond(work: np.ndarray, t60_s: float, made: np.ndarray, rate_hz: float, sound: np.ndarray) -> None:
-    """Writes the response of a room.
+    """Write the response of a room.
 
     Args:
         made: (`room_frames`, 2), independent noise of power 1; it is overwritten.
@@ -56,7 +56,7 @@ def respond(work: np.ndarray, t60_s: float, made: np.ndarray, rate_hz: float, so
 
 @njit(**COMPILED)
 def _reflect(work: np.ndarray, grown: float, until_s: float, frames: int) -> float:
-    """Writes the reflections of walls that reflect all, as signal ONE; the direct sound's way in m.
+    """Write the reflections of walls that reflect all, as signal ONE; the direct sound's way in m.
 
     They start when the direct sound arrives as 1.
 
@@ -95,7 +95,7 @@ def _apart(number: int, axis: int, furthest: int, grown: float) -> float:
 
 @njit(**COMPILED)
 def _add(sound: np.ndarray, place: float, height: float) -> None:
-    """Adds a sample between two frames."""
+    """Add a sample between two frames."""
     before = int(place)
     sound[before] += (1 - (place - before)) * height
     if before + 1 < len(sound):
@@ -104,7 +104,7 @@ def _add(sound: np.ndarray, place: float, height: float) -> None:
 
 @njit(**COMPILED)
 def _decay(work: np.ndarray, sound: np.ndarray, t60_s: float) -> None:
-    """Gives each band its own decay; bands overlap, and are the whole together."""
+    """Give each band its own decay; bands overlap, and are the whole together."""
     size = power_of_two(2 * len(sound))
     re, im = row(work, ONE, size), row(work, ONE + 1, size)
     total_re, total_im = row(work, TWO, size), row(work, TWO + 1, size)

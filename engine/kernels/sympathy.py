@@ -38,7 +38,7 @@ NOTHING = 1e-12  # of full scale: below it all rest
 
 @njit(**COMPILED)
 def tune(player: Player, table: Table) -> None:
-    """Fills the bank with the strings of an instrument: of every key, or the open ones of a set."""
+    """Fill the bank with the strings of an instrument: of every key, or the open ones of a set."""
     own, bank = player.own, player.sympathy
     count, rate_hz, everyone = 0, player.rate_hz, table.sympathy == of.EVERY_KEY
     for number in range(of.KEYS if everyone else table.strings):
@@ -70,7 +70,7 @@ def tune(player: Player, table: Table) -> None:
 
 @njit(**COMPILED)
 def ring(bank: Sympathy, force: np.ndarray, out: np.ndarray) -> float:
-    """Adds the force of partials that a force (frames,) drives to out (frames,); the largest of x² + y²."""
+    """Add the force of partials that a force (frames,) drives to out (frames,); the largest of x² + y²."""
     count = bank.partials
     x, y, cosine, sine = bank.x[:count], bank.y[:count], bank.cosine[:count], bank.sine[:count]
     gain, played = bank.gain[:count], bank.played[:count]
@@ -91,7 +91,7 @@ def ring(bank: Sympathy, force: np.ndarray, out: np.ndarray) -> float:
 
 @njit(**COMPILED)
 def sympathise(player_address: int, mixer_address: int) -> None:
-    """Adds what strings ring that are not played to the mixer's quantum, both channels alike."""
+    """Add what strings ring that are not played to the mixer's quantum, both channels alike."""
     player = player_at(player_address)
     if player.table == 0:
         return

@@ -31,7 +31,7 @@ BEHIND_PROGRAM = slots(TENSION_PROGRAM)
 
 @njit(**COMPILED)
 def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
-    """Copies modes, in this order, into blocks of `kernels.lanes`; unused lanes are zero.
+    """Copy modes, in this order, into blocks of `kernels.lanes`; unused lanes are zero.
 
     Args:
         rows: (7, modes), see `advance`.
@@ -50,7 +50,7 @@ def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memo
 
 @njit(**COMPILED)
 def load_weights(own: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
-    """Copies the weights of one ear into the blocks that `load` fills."""
+    """Copy the weights of one ear into the blocks that `load` fills."""
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number) + (lanes.EARS + ear) * lanes.LANES
         memory[slot] = own[order[number]] if number < len(order) else 0.0
@@ -58,7 +58,7 @@ def load_weights(own: np.ndarray, order: np.ndarray, memory: np.ndarray, first: 
 
 @njit(**COMPILED)
 def save(x: np.ndarray, y: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
-    """Copies modes back from their blocks."""
+    """Copy modes back from their blocks."""
     for number in range(len(order)):
         slot = first + lanes.place(number)
         x[order[number]], y[order[number]] = memory[slot], memory[slot + lanes.LANES]
@@ -90,7 +90,7 @@ def node(
 
 @njit(**COMPILED)
 def hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> tuple[float, bool]:
-    """Holds Σ ω² |z|² of blocks below the largest; returns Σ |z|², and whether anything has changed."""
+    """Hold Σ ω² |z|² of blocks below the largest; return Σ |z|², and whether anything has changed."""
     total, energy = lanes.energies(memory, first, blocks)
     held = not energy <= largest_energy  # also where it is not a number
     if held:
@@ -110,7 +110,7 @@ def hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> 
 
 @njit(**COMPILED)
 def trim(memory: np.ndarray, first: int, moving: int, silence: float, total: float) -> int:
-    """Lays the highest modes to rest that are silent; those left."""
+    """Lay the highest modes to rest that are silent; those left."""
     while moving > 1:
         x = first + lanes.place(moving - 1)
         y = x + lanes.LANES
@@ -135,7 +135,7 @@ def advance(
     rows: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Advances x and y (batch, modes) in place; writes the amplitudes out (batch, steps, modes).
+    """Advance x and y (batch, modes) in place; write the amplitudes out (batch, steps, modes).
 
     It takes what a model's step has in arrays and numbers of its own.
 
@@ -252,7 +252,7 @@ def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray)
 
 @njit(**COMPILED)
 def _turn(voice: Voice, mode: int, sign: float) -> None:
-    """Turns a mode by the angle that it has swung through since the rows were prepared, forward or back.
+    """Turn a mode by the angle that it has swung through since the rows were prepared, forward or back.
 
     Modes that rest are kept without that angle. A kick K S x turns z by K S/2 on average.
     """
@@ -288,7 +288,7 @@ def _fall(voice: Voice) -> None:
 
 @njit(**COMPILED)
 def _wake(voice: Voice) -> None:
-    """Brings the modes that rest to the present; the next quantum chooses again which rest."""
+    """Bring the modes that rest to the present; the next quantum chooses again which rest."""
     _fall(voice)
     order = row(voice, at.ORDER).view(np.int64)
     if voice.felt < voice.moving:

@@ -48,7 +48,7 @@ def _prepare(voice: Voice, program: TruthProgram, sub_steps: int) -> None:
 
 @njit(**COMPILED)
 def set_up(voice: Voice, program: TruthProgram) -> int:
-    """Brings what follows from its modes up to date for a quantum; its sub-steps, 0 where it is linear."""
+    """Bring what follows from its modes up to date for a quantum; its sub-steps, 0 where it is linear."""
     changed = gliding(voice)
     if changed:
         glide(voice)

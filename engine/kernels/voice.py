@@ -50,7 +50,7 @@ def _generate(voice: Voice, heard: bool, rate_hz: float, out: np.ndarray, scratc
 
 @njit(**COMPILED)
 def move_points(voice: Voice, heard: bool, rate_hz: float, out: np.ndarray) -> None:
-    """Fades what a quantum is at its points to what it is at others."""
+    """Fade what a quantum is at its points to what it is at others."""
     done, frames = voice.weights_faded, round(MOVE_S * rate_hz)
     for point in range(voice.points):
         for frame in range(QUANTUM):
@@ -89,7 +89,7 @@ def is_first(voice: Voice) -> bool:
 
 @njit(**COMPILED)
 def remember(voice: Voice, heard: bool, first: bool, out: np.ndarray) -> None:
-    """Keeps the quantum that was generated, and the flux that it is to a magnetic pick-up.
+    """Keep the quantum that was generated, and the flux that it is to a magnetic pick-up.
 
     That grows as (exp(x/δ) - 1) δ with the displacement x, to third order.
     What the filter needs is there when `WARM` has reached `WARMED`: at the pluck at once, else two quanta later.
@@ -212,7 +212,7 @@ def _eased(share: float) -> float:
 
 @njit(**COMPILED)
 def _look_at_wishes(voice: Voice, now: int) -> None:
-    """Continues to the latest modes that are due. Wishes count in their order, and wait for those before them."""
+    """Continue to the latest modes that are due. Wishes count in their order, and wait for those before them."""
     latest = voice.resonator
     wished = voice.pending_modes if latest == 0 else wish_at(latest).next
     while wished != 0:
@@ -226,7 +226,7 @@ def _look_at_wishes(voice: Voice, now: int) -> None:
 
 @njit(**COMPILED)
 def add(voice: Voice, mixer: Mixer, now_s: float) -> int:
-    """Adds the next quantum of a voice to the mix, (QUANTUM, 2). Returns its state, which it leaves to the caller."""
+    """Add the next quantum of a voice to the mix, (QUANTUM, 2). Returns its state, which it leaves to the caller."""
     state = begin(voice, mixer)
     if state != at.SOUNDING:
         return state
@@ -279,7 +279,7 @@ def begin(voice: Voice, mixer: Mixer) -> int:
 
 @njit(**COMPILED)
 def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) -> int:
-    """Adds a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state.
+    """Add a quantum, (2, QUANTUM) of `out`, to the mix; the voice's state.
 
     Args:
         moved: whether it was generated, else it stands still.
@@ -339,7 +339,7 @@ def note_gap(mixer: Mixer, frame: int, milliseconds: float, cause: int) -> None:
 
 @njit(**COMPILED)
 def forward(voice: Voice, mixer: Mixer, frames: int) -> None:
-    """Lets a voice that is not yet handed over ring unheard for so many frames, rounded to quanta."""
+    """Let a voice that is not yet handed over ring unheard for so many frames, rounded to quanta."""
     quanta = (frames + QUANTUM // 2) // QUANTUM
     if voice.kind == at.RENDERED:  # there need not be samples yet
         voice.generated = quanta * QUANTUM

@@ -41,7 +41,7 @@ def retune(
     frame: int,
     now: int,
 ) -> None:
-    """Lets a note glide to its string as knobs, wheels and damper have changed it, where they have."""
+    """Let a note glide to its string as knobs, wheels and damper have changed it, where they have."""
     string, changed = player.bent, False
     if note.drum != 0:
         return
@@ -81,7 +81,7 @@ def damp(
     frame: int,
     now: int,
 ) -> None:
-    """Puts the damper on a string or a drum that nothing holds."""
+    """Put the damper on a string or a drum that nothing holds."""
     held = note.held + note.kept + note.damped
     if held != 0 or table.let_ring != 0:
         return
@@ -112,7 +112,7 @@ def damp(
 
 @njit(**COMPILED)
 def damp_unkept(player: Player, table: Table, frame: int, now: int) -> None:
-    """Puts the damper on strings that a pedal kept, and keeps no longer."""
+    """Put the damper on strings that a pedal kept, and keep no longer."""
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
         if note.kept == 0 or not slots.sounds(note):
@@ -131,7 +131,7 @@ def glide(
     frame: int,
     now: int,
 ) -> None:
-    """Lets strings follow the wheels of a channel; -1: all, whatever has changed."""
+    """Let strings follow the wheels of a channel; -1: all, whatever has changed."""
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
         moved = channel < 0 or channels.acts_on(table.mode, channel, note.channel)

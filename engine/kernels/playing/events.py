@@ -21,7 +21,7 @@ from engine.kernels.records import Event, Player
 
 @njit(**COMPILED)
 def _take_table(player: Player, address: int, frame: int, now: int) -> None:
-    """Plays another instrument, or the same with a knob turned; strings that ring glide to it.
+    """Play another instrument, or the same with a knob turned; strings that ring glide to it.
 
     Another instrument begins with its wheels at rest, for what they turned may be something else now; pedals stay.
     """
@@ -42,7 +42,7 @@ def _take_table(player: Player, address: int, frame: int, now: int) -> None:
 
 @njit(**COMPILED)
 def _cancel(player: Player, id: int, now: int) -> None:
-    """Forgets the events whose frames are to come; but a table counts at once, for later events go by it.
+    """Forget the events whose frames are to come; but a table counts at once, for later events go by it.
 
     Args:
         id: of a note, of which alone events are forgotten; 0: all are.
@@ -62,7 +62,7 @@ def _cancel(player: Player, id: int, now: int) -> None:
 
 @njit(**COMPILED)
 def _handle(player: Player, mixer: Mixer, event: Event) -> None:
-    """Plays an event now. Those of a player without a table do nothing, except for a note, which is refused."""
+    """Play an event now. Those of a player without a table do nothing, except for a note, which is refused."""
     kind, frame, now = event.kind, event.frame, mixer.frames
     channel, key = event.channel, event.key
     value, address = event.value, player.table
@@ -140,7 +140,7 @@ def _superseded(event: Event, following: Event) -> bool:
 
 @njit(**COMPILED)
 def play(player_address: int, mixer_address: int) -> None:
-    """Plays all events that are due in the mixer's next quantum, before it is rendered."""
+    """Play all events that are due in the mixer's next quantum, before it is rendered."""
     player, mixer = player_at(player_address), mixer_at(mixer_address)
     now, pushed = mixer.frames, player.pushed
     fence()
@@ -180,7 +180,7 @@ def play(player_address: int, mixer_address: int) -> None:
 
 @njit(**COMPILED)
 def begin(player_address: int) -> None:
-    """Puts all wheels and pedals of a new player at rest, and numbers its notes."""
+    """Put all wheels and pedals of a new player at rest, and number its notes."""
     player = player_at(player_address)
     player.here = player_address
     for number in range(of.MOST_NOTES):

@@ -40,7 +40,7 @@ def _move(
     frame: int,
     now: int,
 ) -> bool:
-    """Shortens or lengthens the string of a note for another key; False where it cannot play that key."""
+    """Shorten or lengthen the string of a note for another key; False where it cannot play that key."""
     count, mode = table.strings, table.mode
     pitch_hz, string = keys.pitch_of(table, key), note.string
     if count > 0 and string < 0:
@@ -84,7 +84,7 @@ def _move_others(
     frame: int,
     now: int,
 ) -> None:
-    """Lets the other strings of a course follow the first, a note that has moved."""
+    """Let the other strings of a course follow the first, a note that has moved."""
     id, channel = first.id, first.channel
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
@@ -212,7 +212,7 @@ def tune(player: Player, table: Table, event: Event, frame: int, now: int) -> No
 
 @njit(**COMPILED)
 def choke(player: Player, event: Event, frame: int) -> None:
-    """Lets single notes fade out fast, though their instrument lets them ring; no release of their keys follows."""
+    """Let single notes fade out fast, though their instrument lets them ring; no release of their keys follows."""
     id, channel, key = event.id, event.channel, event.key
     seconds = event.value if event.value > 0.0 else STOP_S
     for number in range(of.MOST_NOTES):
@@ -231,7 +231,7 @@ def choke(player: Player, event: Event, frame: int) -> None:
 
 @njit(**COMPILED)
 def _vibrate(player: Player, table: Table, note: Note, now: int) -> None:
-    """Lets a note glide to where its vibrato is some quanta later; all strings of a course alike."""
+    """Let a note glide to where its vibrato is some quanta later; all strings of a course alike."""
     depth = keys.value_of(player, table, of.VIBRATO_CENTS) / 100
     if depth == 0.0 and note.vibrato == 0.0:
         return
@@ -244,7 +244,7 @@ def _vibrate(player: Player, table: Table, note: Note, now: int) -> None:
 
 @njit(inline="always", **COMPILED)
 def follow_hands(player: Player, mixer: Mixer, now: int) -> None:
-    """Lifts fingers from strings that they touch, and plucks again what a tremolo plucks, in the next quantum."""
+    """Lift fingers from strings that they touch, and pluck again what a tremolo plucks, in the next quantum."""
     address = player.table
     if address == 0:
         return

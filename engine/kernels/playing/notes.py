@@ -56,7 +56,7 @@ def reported(player: Player) -> None:
 
 @njit(**COMPILED)
 def refuse(player: Player, event: Event) -> None:
-    """Reports a note that no string can play, or that was cancelled."""
+    """Report a note that no string can play, or that was cancelled."""
     report(player, of.REFUSED, event.id, event.channel, event.key, event.frame, event.value)
     reported(player)
 
@@ -72,6 +72,16 @@ def _forget(player: Player, note: Note, frame: int) -> None:
 
 
 @njit(**COMPILED)
+def _begun(note: Note) -> bool:
+    """Return True if any voice of a note has sounded."""
+    for source in range(of.MOST_SOURCES):
+        address = note.voices[source]
+        if address != 0 and voice_at(address).state != at.WAITING:
+            return True
+    return False
+
+
+@njit(**COMPILED)
 def free_note(player: Player, mixer: Mixer) -> Note:
     """A free note; where there is none, one which has not begun or fades is cut, else the oldest."""
     best, best_rank = player.notes[0], 3
@@ -81,13 +91,9 @@ def free_note(player: Player, mixer: Mixer) -> Note:
             _forget(player, note, mixer.frames)
         if note.state == of.FREE:
             return note
-        begun = False
-        for source in range(of.MOST_SOURCES):
-            address = note.voices[source]
-            begun = begun or (address != 0 and voice_at(address).state != at.WAITING)
         rank = 2
         if note.released != 0 or note.has_place == 0:
-            rank = 1 if begun else 0
+            rank = 1 if _begun(note) else 0
         if rank < best_rank or (rank == best_rank and note.age < best.age):
             best, best_rank = note, rank
     for source in range(of.MOST_SOURCES):
@@ -114,25 +120,36 @@ def _follow(player: Player, table: Table, note: Note, before: Note) -> None:
 
 
 @njit(**COMPILED)
+def _cost(note: Note) -> int:
+    """The notes that one counts as: two with a string that may meet its bridge, whose steps cost many times more."""
+    for source in range(of.MOST_SOURCES):
+        address = note.voices[source]
+        if address != 0 and voice_at(address).javari.steps > 0:
+            return 2
+    return 1
+
+
+@njit(**COMPILED)
 def _make_room(player: Player) -> None:
-    """Releases the oldest notes where more ring than may."""
+    """Release the oldest notes where more ring than may; one that has not begun ends at once."""
     while True:
-        ringing, oldest = 0, player.notes[0]
+        notes, cost, oldest = 0, 0, player.notes[0]
         for number in range(of.MOST_NOTES):
             note = player.notes[number]
             if note.state == of.FREE or note.released != 0 or slots.over(note):
                 continue
-            if ringing == 0 or note.age < oldest.age:
+            if notes == 0 or note.age < oldest.age:
                 oldest = note
-            ringing += 1
-        if ringing <= player.most:
+            notes += 1
+            cost += _cost(note)
+        if cost <= player.most or notes == 1:
             return
-        voices.release_note(player, oldest, STOLEN_S, 0)
+        voices.release_note(player, oldest, STOLEN_S if _begun(oldest) else 0.0, 0)
 
 
 @njit(**COMPILED)
 def strike(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
-    """Plays all strings of a key's course, one after the other; the first is the one that is reported."""
+    """Play all strings of a key's course, one after the other; the first is the one that is reported."""
     note_on(player, table, mixer, event, 0)
     frame = event.frame
     for member in range(1, table.course):
@@ -145,7 +162,7 @@ def strike(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
 
 @njit(**COMPILED)
 def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: int) -> None:
-    """Plays a note, of a course one string. A string that is impossible is refused, unless another sounds.
+    """Play a note, of a course one string. A string that is impossible is refused, unless another sounds.
 
     The note is drafted first: one that is refused takes no other's place.
     """
@@ -340,7 +357,7 @@ def _begin_voices(player: Player, mixer: Mixer, event: Event, note: Note) -> Non
 
 @njit(**COMPILED)
 def report_began(player: Player, table: Table, event: Event, note: Note, own: np.ndarray) -> None:
-    """Reports the note of an event, and the string of its key."""
+    """Report the note of an event, and the string of its key."""
     if note.member != 0:
         return
     made = report(player, of.BEGAN, note.id, note.channel, note.key, event.frame, event.value)
@@ -354,7 +371,7 @@ def report_began(player: Player, table: Table, event: Event, note: Note, own: np
 
 @njit(**COMPILED)
 def tend(player: Player, now: int) -> None:
-    """Reports notes that have ended."""
+    """Report notes that have ended."""
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
         if note.state == of.RINGS and slots.over(note):

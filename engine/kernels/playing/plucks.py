@@ -103,7 +103,7 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
 
 @njit(**COMPILED)
 def release_pluck(player: Player, table: Table, own: np.ndarray, partials: int, release_s: float) -> None:
-    """Releases a pluck's partials within a time, or strikes them for so long: see `engine.excitation.blow_factor`.
+    """Release a pluck's partials within a time, or strike them for so long: see `engine.excitation.blow_factor`.
 
     What touches a string leaves it within a period of its lowest partial. So soft strokes of high keys are heard.
     """
@@ -146,7 +146,7 @@ def vary(
 
 @njit(**COMPILED)
 def split(player: Player, table: Table, partials: int, turned: float) -> int:
-    """Splits a pluck's partials into modes of both polarisations; how many partials have two.
+    """Split a pluck's partials into modes of both polarisations; how many partials have two.
 
     Args:
         turned: by so many rad from the instrument's angle.

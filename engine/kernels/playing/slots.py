@@ -59,7 +59,7 @@ def address_of_voice(player: Player, number: int, source: int) -> int:
 
 @njit(**COMPILED)
 def set_gain(address: int, gain: float) -> None:
-    """Sets the gain of a voice that begins."""
+    """Set the gain of a voice that begins."""
     voice = voice_at(address)
     voice.wanted_gain = voice.gain = voice.gain_from = voice.gain_to = gain
 

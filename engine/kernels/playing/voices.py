@@ -155,7 +155,7 @@ def swing_m(note: Note) -> float:
 
 @njit(**COMPILED)
 def release(address: int, frames: int) -> None:
-    """Lets a voice fade out; a release under way continues."""
+    """Let a voice fade out; a release under way continues."""
     voice = voice_at(address)
     if voice.release == 0:
         voice.release = frames
@@ -163,7 +163,7 @@ def release(address: int, frames: int) -> None:
 
 @njit(**COMPILED)
 def release_note(player: Player, note: Note, seconds: float, frame: int) -> None:
-    """Lets a note fade out; from a frame to come on, where that is above 0."""
+    """Let a note fade out; from a frame to come on, where that is above 0."""
     note.released = 1
     for source in range(of.MOST_SOURCES):
         address = note.voices[source]
@@ -233,7 +233,7 @@ def add_wish(
 
 @njit(**COMPILED)
 def take_out(mixer: Mixer, address: int) -> None:
-    """Takes a voice out of the mixer at once; it is over."""
+    """Take a voice out of the mixer at once; it is over."""
     kept = 0
     for place in range(mixer.active):
         each = mixer.voices[place]
@@ -256,7 +256,7 @@ def lag_of(player: Player, table: Table, member: int) -> int:
 
 @njit(**COMPILED)
 def hear(player: Player) -> None:
-    """Lets notes follow the gains of sources and the listening points."""
+    """Let notes follow the gains of sources and the listening points."""
     if player.table == 0:
         return
     table = table_at(player.table)
@@ -278,7 +278,7 @@ def hear(player: Player) -> None:
 
 @njit(**COMPILED)
 def _listen(player: Player, table: Table, note: Note) -> None:
-    """Lets a note be heard at the instrument's points, unless they are others in number, or of another pick-up."""
+    """Let a note be heard at the instrument's points, unless they are others in number, or of another pick-up."""
     moved = note.solo != table.solo
     for point in range(2):
         moved = moved or note.point[point] != player.values[of.POINT + point]
