@@ -131,7 +131,7 @@ def _cost(note: Note) -> int:
 
 @njit(**COMPILED)
 def _make_room(player: Player) -> None:
-    """Release the oldest notes where more ring than may; one that has not begun ends at once."""
+    """Release the oldest notes where more ring than may; one that costs more and has not begun ends at once."""
     while True:
         notes, cost, oldest = 0, 0, player.notes[0]
         for number in range(of.MOST_NOTES):
@@ -144,7 +144,7 @@ def _make_room(player: Player) -> None:
             cost += _cost(note)
         if cost <= player.most or notes == 1:
             return
-        voices.release_note(player, oldest, STOLEN_S if _begun(oldest) else 0.0, 0)
+        voices.release_note(player, oldest, STOLEN_S if _begun(oldest) or _cost(oldest) == 1 else 0.0, 0)
 
 
 @njit(**COMPILED)
