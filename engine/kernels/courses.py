@@ -94,7 +94,7 @@ def add(mixer: Mixer, place: int, now_s: float) -> int:
 
 @njit(inline="always", **COMPILED)
 def _string(mixer: Mixer, each: int) -> CourseString:
-    """One of the strings that are generated now."""
+    """A string that is generated now, by its number."""
     return mixer.course[mixer.generated[each]]
 
 

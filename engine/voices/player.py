@@ -374,7 +374,7 @@ class CompiledPlayer:
         return {source: self.voice(number, source) for source in range(sources) if note["voices"][source]}
 
     def _alive(self, number: int, note: np.void) -> dict[int, np.void]:
-        """Those that are not over."""
+        """The records of a note's voices that are not over, by their sources."""
         voices = self._voices(number, note).items()
         return {source: voice for source, voice in voices if voice["state"] in (WAITING, SOUNDING)}
 

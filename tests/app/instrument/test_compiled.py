@@ -27,8 +27,9 @@ from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.string_keys import StringKeys, on_string
 from app.patches.library import find_patch, read_patch
-from app.patches.patch import Losses, Noise, Patch, Pickup, Polarisations
+from app.patches.patch import ASSIGNABLE, Losses, Noise, Patch, Pickup, Polarisations
 from app.patches.tuning import TuningChoice
+from app.shared.parameters import OF_PATCHES
 from engine.kernels import constants as of
 from engine.kernels.constants import QUANTUM
 from engine.pluck import SHAPES, Pluck, Shape
@@ -527,14 +528,19 @@ def test_tables_are_freed_when_the_kernel_has_left_them(shipped: dict[str, Patch
     assert len(stage.player.compiled._tables) <= 2
 
 
-def test_a_parameter_changes_as_by_a_turned_patch(shipped: dict[str, Patch], preset: Preset) -> None:
-    patch = shipped["koto"]
+@pytest.mark.parametrize("id", [id for id in of.PLAYED[: of.POINT] if id in ASSIGNABLE])
+def test_a_parameter_changes_as_by_a_turned_patch(shipped: dict[str, Patch], preset: Preset, id: str) -> None:
+    """What rings, and what is struck later."""
+    pluck = shipped["koto"].pluck.model_copy(update={"release_ms": 4.0, "release_hard_ms": 2.0})
+    patch = changed(shipped["koto"], noise=Noise(onset_db=-20, release_db=-20), pluck=pluck)
+    value = OF_PATCHES[id].value(0.9 * OF_PATCHES[id].share(patch.value(id)) + 0.03)
     one, other = Compiled(patch, preset), Compiled(patch, preset)
     for stage in (one, other):
         rendered(stage, [(1, NoteOn(60, 90))], 10)
-    one.handle(PatchTurned(patch.with_value("knobs.decay", 3.0)), 0)
-    other.player.compiled.give(of.PARAMETER, key=of.DECAY, value=3.0)
-    sounds = [rendered(stage, (), 200) for stage in (one, other)]
+    one.handle(PatchTurned(patch.with_value(id, value)), 0)
+    other.player.compiled.give(of.PARAMETER, key=of.PLAYED.index(id), value=value)
+    later = [(10, NoteOn(62, 90)), (3000, NoteOff(62)), (3000, NoteOff(60))]
+    sounds = [rendered(stage, later, 100) for stage in (one, other)]
     np.testing.assert_array_equal(*sounds)
 
 
