@@ -11,7 +11,7 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from engine.metrics import relative_error
+    from engine.compare.relative import relative_error
     from engine.pluck import Pluck
     from engine.presets import find_preset, load_preset
     from engine.resonators import Resonator
@@ -30,7 +30,7 @@ _HOMES = {
     "find_preset": "engine.presets",
     "load_preset": "engine.presets",
     "model_program": "engine.voices",
-    "relative_error": "engine.metrics",
+    "relative_error": "engine.compare.relative",
     "render_voice": "engine.voices",
     "truth_program": "engine.voices",
 }

@@ -52,12 +52,6 @@ class Pluck:
 
     def displacement(self, grid_points: int) -> NDArray[np.float64]:
         """The raw shape in m before any projection on modes, float64 (grid_points,)."""
-        from engine import excitation  # NumPy only when it is needed: the command line starts without
+        from engine.excitation import displacement  # NumPy only when it is needed: the command line starts without
 
-        peak_m = self.amplitude_mm / 1000
-        if self.shape == "gaussian":
-            return excitation.gaussian(self.position, self.width, peak_m, grid_points)
-        if self.shape == "triangular":
-            return excitation.triangular(self.position, peak_m, grid_points)
-        bump = excitation.rounded if self.shape == "rounded" else excitation.raised_cosine
-        return bump(self.position, self.width, peak_m, grid_points)
+        return displacement(self.shape, self.position, self.width, self.amplitude_mm / 1000, grid_points)

@@ -12,14 +12,12 @@ J = v / (e + 1/2m), where e J² is the energy of the modes. It rebounds from wha
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from engine import bounds
-from engine.levels import MOST_PERIODS
 from engine.resonators.base import Array
 from engine.values.drum import Mallet
 
@@ -55,16 +53,6 @@ class Strike:
         """
         if not modes.surface.inside(np.array([self.place])):
             raise ValueError(f"strike place {self.place} is not on the drum; choose one nearer the centre")
-        period_s = 2 * math.pi / float(modes.omega.min())
-        pulse = pulse_spectrum(modes.omega, min(self.mallet.contact_at(self.speed_m_s), MOST_PERIODS * period_s))
-        unit = modes.struck(self.place, self.mallet.radius_m) * pulse
-        energy = 0.5 * modes.mass_kg * float((unit**2).sum())
-        return unit * self.speed_m_s / (energy + 0.5 / self.mallet.mass_kg)
-
-
-def pulse_spectrum(omega: Array, contact_s: float) -> Array:
-    """The spectrum of a raised cosine of area 1, at ω in rad/s, about its middle: sinc(ωτ/2) / (1 - (ωτ/2π)²)."""
-    turns = omega * contact_s / (2 * math.pi)
-    near = np.abs(turns - 1) < 1e-6
-    found: Array = np.where(near, 0.5, np.sinc(turns) / np.where(near, 1.0, 1 - turns**2))
-    return found
+        mallet = self.mallet
+        struck = modes.struck(self.place, mallet.radius_m)
+        return modes.blow(struck, mallet.contact_s, mallet.mass_kg, self.speed_m_s)

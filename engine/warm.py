@@ -10,14 +10,15 @@ import os
 import subprocess
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import astuple
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from engine.effects import Effects
-from engine.kernels import cache, layout
+from engine.effects import Body, Effects, Impulse
+from engine.effects.curves import curves_of
+from engine.kernels import cache
+from engine.kernels.constants import QUANTUM
 from engine.models._tension_arrays import CURVES
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, TrainedRange
@@ -51,11 +52,8 @@ INFO = PresetInfo(
     seed=0,
 )
 PRESET = Preset("", Path(), INFO, dict.fromkeys(CURVES, np.zeros(1)))
-LATENTS = {"grid_points": INFO.grid_points, "state_size": 4}
-MODULATED = {"modulation": True, "adiabatic": True, "physical_units": True}
-BANKS: tuple[dict[str, Any], ...] = ({}, MODULATED)
 EARS = (Ear((0.3,)), Ear((0.3, 0.7), "velocity"))
-FRAMES = 4 * layout.QUANTUM
+FRAMES = 4 * QUANTUM
 
 
 def warm() -> None:
@@ -86,7 +84,6 @@ def playing() -> None:
     for each in (events.play, contact.sound, sympathy.sympathise):
         each.compile("void(int64, int64)")
     CompiledPlayer(RATE_HZ, INFO.modes)
-    _string()
     _drum()
     _loudness()
 
@@ -94,7 +91,7 @@ def playing() -> None:
 def unheard() -> None:
     """A quantum of every kind of voice that is computed."""
     for voice in _each():
-        voice.skip(layout.QUANTUM / RATE_HZ, Mixer(RATE_HZ).memory)
+        voice.skip(QUANTUM / RATE_HZ, Mixer(RATE_HZ))
 
 
 def voices() -> None:
@@ -106,12 +103,20 @@ def voices() -> None:
     for voice in _each():
         _sound(voice)
     _sound(Voice.of_samples(plain_program(RATE_HZ), np.zeros((FRAMES, 1), np.float32)))
-    Mixer(RATE_HZ).set_effects(Effects(room=Room()))
+    responses()
     playing()
 
 
+def responses() -> None:
+    """Compile the responses of bodies of either kind and of a room, and what a body does to loudness."""
+    given = Impulse(np.ones((1, 1)), RATE_HZ)
+    for body in (Body(), Body(impulse=given)):
+        Mixer(RATE_HZ).set_effects(Effects(body, Room(0.2, 0.8)))
+        curves_of(body)
+
+
 def _each() -> Iterator[Voice]:
-    for program in (*map(_bank, BANKS), model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
+    for program in (model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
         for ear in EARS:
             yield _struck(program, ear)
 
@@ -135,17 +140,6 @@ def models() -> None:
             model.advance(state, 2, readout)
     truth = TruthSource(INFO)
     truth.advance(truth.start(_initial_m()[None]), 2)
-
-
-def _string() -> None:
-    """Compile the changes of a string by a bend, a slide, a damper and a knob."""
-    from engine.kernels import strings
-
-    string = np.array(astuple(StringParameters()))
-    strings.turned(string, np.ones(len(string)), np.empty_like(string))
-    for change in (strings.fretted, strings.bent, strings.slid, strings.damped):
-        change(string, 1.5)
-    strings.pitch_hz(string)
 
 
 def _drum() -> None:
@@ -173,14 +167,6 @@ def _loudness() -> None:
     loudness.gain(sound, 1, 1, no_body, 0.0)
     loudness.limit(loudness.peak(sound, 1, False, no_body, 0.0, 0.0))
     loudness.looked_at(0, 1, 0)
-
-
-def _bank(sizes: dict[str, Any]) -> Program:
-    from engine.voices.banks import bank_program
-
-    program = bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ)
-    assert program is not None
-    return program
 
 
 def _struck(program: Program, ear: Ear) -> Voice:

@@ -1,4 +1,4 @@
-"""Everything that run.py installs has wheels, resolved by uv for each Python and system of docs/install.md."""
+"""What run.py and extras install has wheels, resolved by uv for each Python and system of docs/install.md."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ SYSTEMS = {  # uv's names, and those of docs/install.md
 MACOS = "14.0"
 # Nothing is built, and no other Python is fetched: this one stands in for it.
 COMPILE = ("pip", "compile", "--quiet", "--no-header", "--no-annotate", "--no-build", "--no-python-downloads")
-WHAT = ("pyproject.toml", "--constraints", "constraints.txt", "--extra", "dev", "--extra", "midi", "--extra", "docs")
+EXTRAS = ("dev", "midi", "docs", "cluster")
+WHAT = ("pyproject.toml", "--constraints", "constraints.txt", *(word for e in EXTRAS for word in ("--extra", e)))
 CUDA = ("cuda-", "nvidia-", "triton")  # comes with torch's usual build for Linux, which pins it itself
 AT_ONCE = 8
 

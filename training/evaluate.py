@@ -16,19 +16,19 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from engine.metrics import ErrorSums, RelativeError
-from engine.models.base import KoopmanModel, StringModel
-from engine.partials import (
+from engine.compare.partials import (
     PartialErrors,
     PartialTrack,
     partial_errors,
     segment_frames,
     track_partials,
 )
+from engine.compare.relative import ErrorSums, RelativeError
+from engine.compare.spectra import Array, spectral_distances
+from engine.compare.true_partials import true_phasors
+from engine.models.base import KoopmanModel, StringModel
 from engine.pluck import DEFAULT_LISTEN
 from engine.resonators.sine_transform import listening_weights
-from engine.spectra import spectral_distances
-from engine.true_partials import true_phasors
 from engine.truth import ModalState, SplittingSolver
 from training.configuration import DatasetConfiguration
 from training.data.dataset import Dataset, draw_initial, split_rows
@@ -85,7 +85,7 @@ class MotionErrors:
 
 @dataclass(frozen=True)
 class SpectralDistance:
-    """See `engine.spectra`; means over the trajectories."""
+    """See `engine.compare.spectra`; means over the trajectories."""
 
     convergence: float
     log_db: float
@@ -140,7 +140,7 @@ def evaluate_past_horizon(
                 sounds[..., first + 1 : last + 1] = heard[..., 0]
                 first = last
                 report((part + first / steps) / len(parts))
-            distances.append([spectral_distances(*sounds[..., 1:][..., span]) for span in spans])
+            distances.append([spectral_distances(*sounds[..., 1:][..., span].numpy()) for span in spans])
     spectra = [_mean_distance(of_window) for of_window in zip(*distances, strict=True)]
     return MotionErrors(string, sound, spectra)
 
@@ -279,6 +279,6 @@ def _solver(c: DatasetConfiguration) -> SplittingSolver:
     return SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps)
 
 
-def _mean_distance(of_parts: Sequence[tuple[Tensor, Tensor]]) -> SpectralDistance:
-    convergence, log_db = (float(torch.cat(values).mean()) for values in zip(*of_parts, strict=True))
+def _mean_distance(of_parts: Sequence[tuple[Array, Array]]) -> SpectralDistance:
+    convergence, log_db = (float(np.concatenate(values).mean()) for values in zip(*of_parts, strict=True))
     return SpectralDistance(convergence, log_db)

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from engine.audible import FLOOR_DB, AudibleErrors, audible_errors, heard_level_db
 from engine.bounds import LARGEST_AMPLITUDE_MM
+from engine.compare.audible import FLOOR_DB, AudibleErrors, audible_errors, heard_level_db
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import Preset, PresetInfo, preset_digest
 from engine.sources import ModelSource, Runaway

@@ -37,7 +37,7 @@ _BOUNDS = {
 
 @dataclass(frozen=True)
 class Heard:
-    """A preset's sound against the truth's: medians over the plucks, see `engine.audible.AudibleErrors`.
+    """A preset's sound against the truth's: medians over the plucks, see `engine.compare.audible.AudibleErrors`.
 
     Attributes:
         name: of the preset's file, for people; `sha256` is what counts.

@@ -9,7 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from engine.metrics import ErrorSums
+from engine.compare.relative import ErrorSums
 from engine.models.base import StringModel
 from engine.presets import Preset, PresetError, PresetInfo
 from engine.schema import SchemaError

@@ -14,7 +14,7 @@ from typing import Any
 import torch
 from filelock import FileLock, Timeout
 
-from engine.metrics import ErrorSums
+from engine.compare.relative import ErrorSums
 from engine.models.base import count_parameters
 from engine.presets import PresetError, PresetInfo, TrainedRange, load_preset, read_info, save_preset
 from engine.schema import SchemaError, read, write

@@ -13,7 +13,7 @@ from app.presets.library import PresetEntry
 from app.rendering.job import BLOCK_FRAMES
 from app.rendering.subject import StringOf, load_subject
 from app.shared.worker import Cancelled, Job
-from engine.metrics import NULL_FLOOR_DB, ErrorSums
+from engine.compare.relative import NULL_FLOOR_DB, ErrorSums
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.sine_transform import listening_weights, project, synthesis_matrix, to_modes

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from app.shared.worker import Job
 from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE
-from engine.metrics import ErrorSums
+from engine.compare.relative import ErrorSums
 from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.resonators.sine_transform import project

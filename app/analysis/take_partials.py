@@ -10,7 +10,7 @@ import numpy as np
 
 from app.rendering import Take
 from app.shared.worker import Job
-from engine.partials import (
+from engine.compare.partials import (
     LEAST_SEGMENTS,
     MOST_SIMILAR,
     PartialErrors,
@@ -58,7 +58,7 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     Raises:
         Cancelled: the job was cancelled.
     """
-    from engine.true_partials import true_phasors  # and torch
+    from engine.compare.true_partials import true_phasors  # and torch
 
     info = take.info
     last = round((take.seconds if take.model_ends_s is None else take.model_ends_s) * info.rate_hz)

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from app.audio.sound_file import UnreadableSound, open_sound
 from engine import bounds
 from engine.effects import Impulse
-from engine.effects.impulse import faded
 from engine.plain_text import one_line
 
 FORMATS = ("WAV", "FLAC", "AIFF")
@@ -40,6 +39,8 @@ def read_impulse(path: Path) -> Impulse:
     samples = samples[_onset(samples, rate_hz) :]
     most = int(bounds.LONGEST_IMPULSE_S * rate_hz)
     try:
+        from engine.effects.responses import faded  # brings the compiler
+
         return Impulse(faded(samples[:most]) if len(samples) > most else samples, rate_hz)
     except ValueError as error:
         raise _unusable(path, error) from error

@@ -238,15 +238,9 @@ class _Blow:
 
     def struck(self, linear: bool = False) -> StruckDrum:
         """The struck drum at its start; `linear`: without tension modulation."""
-        import numpy as np
-
         from training.family.drums import StruckDrum
 
-        found = self.key.modes
-        speeds = self.strike.speeds(found)
-        resonator = found.resonator(np.zeros((1, 2)), tension_modulated=not linear)
-        rise = float(resonator.relative_tension_rise(speeds / resonator.omega))
-        return StruckDrum("tom", found.drum, resonator, np.zeros_like(speeds), speeds, found.scale**2, rise)
+        return StruckDrum.by(self.strike, self.key.modes, not linear)
 
     def player(self) -> DrumPlayer:
         """The player of the instrument's preset. Raises Failure: its model learned one string."""

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from app.commands.arrays import Array, Motion
-    from engine.metrics import ErrorSums
+    from engine.compare.relative import ErrorSums
     from engine.pluck import Pluck
     from engine.presets import Preset, PresetInfo
     from engine.resonators import Resonator
@@ -221,7 +221,7 @@ def window_edges(seconds: float, info: PresetInfo) -> list[float]:
 
 def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
     from app.commands import arrays
-    from engine.metrics import ErrorSums
+    from engine.compare.relative import ErrorSums
     from engine.resonators.sine_transform import project
     from engine.sources import ModelSource, TruthSource
 

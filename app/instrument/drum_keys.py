@@ -13,10 +13,11 @@ import numpy as np
 
 from app.instrument.effects import body_curves
 from app.patches.drums import Drums, PlayedDrum
-from app.patches.patch import VELOCITIES, Patch
+from app.patches.patch import Patch
 from app.patches.tuning import Tuning
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as kernel
+from engine.kernels import velocities
 from engine.kernels.records import DRUM, DRUM_ROWS
 from engine.resonators.base import Array
 from engine.resonators.drum import DrumModes, modes_of, numbers_of, tune
@@ -52,10 +53,8 @@ class DrumKey:
 
     def strike(self, velocity: float, curve: float = 0.0) -> Strike:
         """The blow of a velocity in 1 … 127."""
-        low, high = VELOCITIES
-        share = min(1.0, max(0.0, (velocity - low) / (high - low))) ** (4**-curve)
         played = self.played
-        speed = played.softest_m_s * (played.hardest_m_s / played.softest_m_s) ** share
+        speed = velocities.between(played.softest_m_s, played.hardest_m_s, velocities.share(velocity, curve))
         return Strike(played.place, speed, played.mallet)
 
     @property

@@ -20,7 +20,7 @@ from app.instrument.events import NoteOn, TimedEvent
 from app.instrument.offline import render_events
 from app.patches.patch import Noise, Patch
 from app.shared.parameters import NOISE_DB
-from engine.effects.curves import RATE_HZ as RESPONSE_HZ
+from engine.kernels.constants import CURVES_HZ as RESPONSE_HZ
 from engine.kernels.constants import PART_S, REFERENCE_VELOCITY, WANTED_DB
 from engine.kernels.loudness import k_weight
 from engine.presets import Preset

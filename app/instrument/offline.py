@@ -23,7 +23,7 @@ from app.instrument.events import (
 )
 from app.patches.patch import Patch
 from app.shared.vocabulary import DIFFERENCE
-from engine.kernels.layout import AHEAD, QUANTUM
+from engine.kernels.constants import AHEAD, QUANTUM
 from engine.presets import Preset
 from engine.voices import Mixer
 

@@ -9,6 +9,7 @@ from app.instrument.strings import KeyString, Strings
 from app.patches.drums import Drums
 from app.patches.patch import Patch
 from engine.bounds import LARGEST_AMPLITUDE_MM
+from engine.kernels.strings import overdamped
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.resonators.base import Array
@@ -45,10 +46,7 @@ class StringKeys:
             return None
         if self.recorded is not None and self.ear.pickup == "bridge":
             raise ValueError(f"{self.patch.name}: a string learned from a recording has no force at a bridge")
-        if any(
-            not found.parameters.decay_rate(mode) < found.parameters.undamped_frequency(mode)
-            for mode in (1, found.modes)  # then of all between: see `engine.bounds.check_motion`
-        ):
+        if overdamped(found.parameters.row, found.modes):
             raise ValueError(f"key {key} of {self.patch.name}: a mode is overdamped; lower the damping")
         return found
 

@@ -1,26 +1,26 @@
-"""The string of each key, and how a bend, a slide or a damper changes it, by `engine.kernels.strings`.
+"""The string of each key, by the laws of `engine.kernels.strings`, as the player has it.
 
-Pitch is that of the first partial of a quiet pluck, √(ω₁² - σ₁²)/2π. Fretting changes the length alone, a bend the
-tension alone; both are solved for the pitch in closed form, so that it is exact.
+Pitch is that of the first partial of a quiet pluck. A key changes the length alone, a slackened string the tension
+alone; both are solved for the pitch in closed form, so that it is exact.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
-
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass, fields
 
 from app.patches.drums import Drums
-from app.patches.patch import Fretted, Knobs, Patch, StringSet
+from app.patches.patch import Fretted, Patch
 from app.patches.tuning import Tuning
-from engine.kernels.constants import HIGHEST_HZ, MOST_MODES, MOST_SLACKENED
-from engine.resonators import string as law
+from engine.kernels import constants as of
+from engine.kernels import strings as law
+from engine.kernels.constants import HIGHEST_HZ, LENGTH, MOST_MODES
+from engine.resonators.base import Array
 from engine.resonators.losses import loss_rates
+from engine.resonators.string import decay_rates as law_rates
 from engine.values.string import StringParameters
 
 STRING = tuple(field.name for field in fields(StringParameters))
-KNOBS = tuple(Knobs.model_fields)  # in the order of the kernels
+KNOBS = tuple(id.removeprefix("knobs.") for id in of.PLAYED[: of.KNOBS])
 
 
 @dataclass(frozen=True)
@@ -67,14 +67,13 @@ class Strings:
                 f"key {key} of {self._patch.name} is a drum, and no string; choose an instrument of strings"
             )
         try:
-            own = self._own(key, string)
-            parameters = fretted(own, pitch_hz)
+            parameters, shortened = self._stopped(key, string, pitch_hz)
             modes = min(parameters.modes_below(HIGHEST_HZ), MOST_MODES)
             if modes < 1:
                 raise ValueError(f"it would have no partial below {HIGHEST_HZ:g} Hz; choose a lower key")
         except ValueError as error:
             raise ValueError(f"key {key} of {self._patch.name}, {pitch_hz:.4g} Hz: {error}") from error
-        return KeyString(key, parameters, pitch_hz, modes, parameters.length_m / own.length_m)
+        return KeyString(key, parameters, pitch_hz, modes, shortened)
 
     def pitch_hz(self, key: int) -> float | None:
         """The pitch of a key; None as in `of_key`."""
@@ -87,108 +86,31 @@ class Strings:
         """The pitch of an open string, which the range does not limit."""
         return self._tuning.hz(note)
 
-    def _own(self, key: int, number: int | None) -> StringParameters:
-        """The whole string on which a key is played, with the patch's knobs."""
-        strings = self._patch.strings
+    def _stopped(self, key: int, wanted: int | None, pitch_hz: float) -> tuple[StringParameters, float]:
+        """The string of a key with the patch's knobs, and its length as a share of the whole string's."""
+        strings, slackened = self._patch.strings, 1.0
         assert not isinstance(strings, Drums)
         if isinstance(strings, Fretted):
-            return turned(strings.string, self._patch.knobs)
-        ordered = strings.strings[::-1]
-        if number is None or number >= len(ordered) or key < ordered[number].note - MOST_SLACKENED:
-            number = chosen_string(strings, key)
-        chosen = ordered[number]
-        own = turned(chosen.string, self._patch.knobs)
-        if key >= chosen.note:
-            return own
-        return bent(own, self._tuning.hz(key) / self._tuning.hz(chosen.note))  # slackened
+            string = strings.string
+        else:
+            ordered = strings.strings[::-1]
+            chosen = ordered[law.played(ordered, len(ordered), key, -1 if wanted is None else wanted)]
+            string = chosen.string
+            if key < chosen.note:
+                slackened = pitch_hz / self._tuning.hz(chosen.note)
+        knobs = [getattr(self._patch.knobs, name) for name in KNOBS]
+        whole, own = [0.0] * len(STRING), [0.0] * len(STRING)
+        law.stop(string.row, knobs, slackened, pitch_hz, whole, own)
+        parameters = StringParameters(*own)  # or what is out of bounds is named
+        return parameters, parameters.length_m / whole[LENGTH]
 
 
-def chosen_string(strings: StringSet, key: int) -> int:
-    """The string that a key chooses, from the highest, 0: the highest at or below the key, else the lowest."""
-    ordered = strings.strings[::-1]
-    return next((number for number, string in enumerate(ordered) if string.note <= key), len(ordered) - 1)
-
-
-def has_octave(patch: Patch, key: int, number: int | None) -> bool:
-    """Return True if the course of a key has an octave string.
-
-    Args:
-        number: on which string of a set it is played, from the highest, 0; None: on the one that it chooses.
-    """
-    if patch.course.octaves == 0 or not isinstance(patch.strings, StringSet):
-        return False
-    chosen = chosen_string(patch.strings, key) if number is None else number
-    return chosen >= len(patch.strings.strings) - patch.course.octaves
-
-
-def turned(string: StringParameters, knobs: Knobs) -> StringParameters:
-    """The string with a patch's multipliers: pitch and decay rates stay, except for the parts of bending and d₃.
-
-    The tension follows the mass and the square of the length, the damping the mass.
-    """
-    from engine.kernels import strings as kernel  # Numba only when it is needed
-
-    kernel.turned(_row(string), np.array([getattr(knobs, name) for name in KNOBS]), out := np.empty(len(STRING)))
-    return StringParameters(*out.tolist())
-
-
-def pitch_hz_of(string: StringParameters) -> float:
-    """The frequency of the first partial of a quiet pluck; 0 where it does not oscillate."""
-    from engine.kernels import strings as kernel
-
-    return float(kernel.pitch_hz(_row(string)))
-
-
-def fretted(string: StringParameters, pitch_hz: float) -> StringParameters:
-    """The string with the length that gives the pitch.
-
-    Raises:
-        ValueError: that length is out of bounds.
-    """
-    from engine.kernels import strings as kernel
-
-    return replace(string, length_m=float(kernel.fretted(_row(string), pitch_hz)))
-
-
-def bent(string: StringParameters, ratio: float) -> StringParameters:
-    """The string with the tension that raises its pitch by a ratio.
-
-    Raises:
-        ValueError: there is none: stiffness alone is higher, or it is out of bounds.
-    """
-    from engine.kernels import strings as kernel
-
-    tension = float(kernel.bent(_row(string), ratio))
-    if not tension > 0:
-        raise ValueError(f"no tension lowers it by a factor of {ratio:.3g}; bend less")
-    return replace(string, tension_n=tension)
-
-
-def slid(string: StringParameters, ratio: float) -> StringParameters:
-    """The string with the length that raises its pitch by a ratio, as by a slide. Raises ValueError as `fretted`."""
-    from engine.kernels import strings as kernel
-
-    return replace(string, length_m=float(kernel.slid(_row(string), ratio)))
-
-
-def damped(string: StringParameters, t60_s: float) -> StringParameters:
-    """The string with a damper: each partial decays by 60 dB more in `t60_s`. Raises ValueError: out of bounds."""
-    from engine.kernels import strings as kernel
-
-    return replace(string, damping_d1_kg_m_s=float(kernel.damped(_row(string), t60_s)))
-
-
-def _row(string: StringParameters) -> NDArray[np.float64]:
-    """The row of a string as the kernels take it."""
-    return np.array([getattr(string, name) for name in STRING])
-
-
-def decay_rates(patch: Patch, string: StringParameters, modes: int) -> NDArray[np.float64]:
+def decay_rates(patch: Patch, string: StringParameters, modes: int) -> Array:
     """The decay rates σ of the modes of a patch's string in 1/s, (modes,).
 
     They follow from its own losses: d₁, d₃, and those by mode.
     """
-    rates, knobs = law.decay_rates(string, modes), patch.knobs
+    rates, knobs = law_rates(string, modes), patch.knobs
     if patch.losses is not None:
         rates = rates + loss_rates(patch.losses, string, modes, knobs.decay, knobs.brightness_decay)
     return rates

@@ -11,19 +11,19 @@ from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKeys, block_of
 from app.instrument.string_keys import StringKeys
-from app.instrument.strings import KNOBS, STRING
+from app.instrument.strings import STRING
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
 from app.shared.parameters import OF_PATCHES
 from engine.contact import CONTACTS
 from engine.kernels import constants as of
-from engine.kernels import layout as at
-from engine.kernels.records import ATTACK, RECORDED, TABLE, slots
+from engine.kernels.fields import slots
+from engine.kernels.records import ATTACK, RECORDED, TABLE
+from engine.kernels.voice_records import TENSION, TRUTH
 from engine.levels import FULL_SCALE_M
 from engine.pluck import SHAPES
 from engine.presets import Preset
-from engine.resonators.polarised import PAIRS
-from engine.resonators.recorded import OF_PARTIALS, RecordedString
+from engine.resonators.recorded import RecordedString
 from engine.voices.player import Table
 from engine.voices.programs import (
     DRUM_SILENCE,
@@ -34,26 +34,7 @@ from engine.voices.programs import (
     tension_memory,
 )
 
-PLAYED_PARAMETERS = (
-    *(f"knobs.{name}" for name in KNOBS),
-    *(f"pluck.{name}" for name in ("position", "width", "width_hard", "softest_mm", "hardest_mm", "curve")),
-    "damping.release_t60_s",
-    "bend_semitones",
-    "noise.onset_db",
-    "noise.release_db",
-    "damping.mute",
-    *(
-        f"technique.{name}"
-        for name in ("harmonic", "strum_ms", "strokes", "tremolo_hz", "vibrato_cents", "vibrato_hz")
-    ),
-    "pluck.release_ms",
-    "pluck.release_hard_ms",
-    "javari.gap_um",
-    "body.mix",
-    "pickup.points.0",
-    "pickup.points.1",
-)
-WHEELED = PLAYED_PARAMETERS[: of.BODY_MIX]  # what the kernel turns with the modulation wheel
+WHEELED = of.PLAYED[: of.BODY_MIX]  # what the player turns with the modulation wheel
 MODES = {"poly": of.POLY, "guitar": of.GUITAR, "mpe": of.MPE}
 BENDS = {"tension": of.BY_TENSION, "length": of.BY_LENGTH}
 SOURCES = ("model", "truth")
@@ -117,7 +98,7 @@ def table_of(
     table["points"], table["velocity"] = len(ear.points), ear.pickup == "velocity"
     table["solo"], table["grid"], table["detuning"] = ear.solo, grid_points, 1.0
     if (moving := loud.polarisations) is not None:
-        table["pairs"], table["detuning"] = PAIRS, moving.detuning
+        table["pairs"], table["detuning"] = of.MOST_PAIRS, moving.detuning
         table["pulled"], table["heard"] = moving.pulled, moving.heard
         table["conductance"] = moving.conductance_s_kg, moving.second_conductance_s_kg
     if patch.losses is not None:
@@ -142,11 +123,11 @@ def table_of(
     table["wheel"] = -1 if goal is None else WHEELED.index(patch.mod_wheel)
     table["wheel_goal"] = 0.0 if goal is None else goal
     for place, (source, program) in enumerate(zip(sources, programs, strict=True)):
-        table["kinds"][place] = at.TRUTH if source == "truth" else at.TENSION
+        table["kinds"][place] = TRUTH if source == "truth" else TENSION
         table["programs"][place] = program.ctypes.data
     table["sources"] = len(programs)
     points = [of.BRIDGE] * len(ear.points) if ear.pickup == "bridge" else ear.points
-    values = [*(patch.value(name) for name in (*WHEELED, "body.mix")), *points]
+    values = [*(patch.value(id) for id in of.PLAYED[: of.POINT]), *points]
     table["values"][: len(values)] = values
     tail = Tail()
     if loud.body is not None:
@@ -201,11 +182,10 @@ def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int
 def put_recorded(table: np.void, tail: Tail, own: RecordedString, grid_points: int) -> None:
     """Puts what a recording adds to strings behind a table."""
     header = np.zeros(1, RECORDED)
-    header["pitch_hz"], header["rest"] = own.pitch_hz, [own.rest(name) for name in OF_PARTIALS]
-    header["smooth"], header["partials"] = len(own.smooth_hz), len(own.cents)
-    header["modes"] = grid_points - 2
-    rows = [np.asarray(getattr(own, name), float) for name in OF_PARTIALS]
-    table["recorded"] = tail.put(header.view(np.float64), np.log(own.smooth_hz), np.log(own.smooth_ratio), *rows)
+    pitch_hz, rest, hz, ratios, rows = own.additions
+    header["pitch_hz"], header["rest"], header["modes"] = pitch_hz, rest, grid_points - 2
+    header["smooth"], header["partials"] = len(hz), rows.shape[1]
+    table["recorded"] = tail.put(header.view(np.float64), hz, ratios, rows.ravel())
 
 
 def _put_drums(tail: Tail, loud: DrumKeys) -> int:

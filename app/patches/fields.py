@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import fields
 from functools import partial
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from pydantic import AfterValidator, BeforeValidator, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 
 from app.shared.parameters import OF_CHOICES, OF_PATCHES
+from app.shared.value import Value
 from engine.values.drum import DrumParameters
 from engine.values.string import StringParameters
 
@@ -76,3 +77,34 @@ def _given_whole(kind: type, data: Any) -> Any:
 
 String = Annotated[StringParameters, BeforeValidator(partial(_given_whole, StringParameters))]
 Drum = Annotated[DrumParameters, BeforeValidator(partial(_given_whole, DrumParameters))]
+
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
+
+
+class _OfRows(ModelMetaclass):
+    """Gives a class the fields of the rows of a part of the table of parameters that it does not state itself."""
+
+    def __new__(
+        meta, name: str, bases: tuple[type, ...], namespace: dict[str, Any], part: str = "", **options: Any
+    ) -> type:
+        stated = namespace.setdefault("__annotations__", {})
+        for id in OF_PATCHES:
+            section, _, field = id.rpartition(".")
+            if part and section == part and field not in stated:
+                stated[field], namespace[field] = float, parameter(id)
+        return super().__new__(meta, name, bases, namespace, **options)
+
+
+class Rows(Value, metaclass=_OfRows):
+    """A part of a patch with a field for each row `part.…` of the table of parameters, and what it adds to them.
+
+    It states those that other code names when it makes one.
+    """
+
+    if TYPE_CHECKING:  # the others
+
+        def __getattr__(self, name: str) -> float: ...

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import math
 from dataclasses import replace
 from typing import Annotated, Any, Literal, Self, get_args
 
@@ -21,6 +20,7 @@ from app.patches.fields import (
     Key,
     Name,
     Reference,
+    Rows,
     Share,
     String,
     Text,
@@ -33,6 +33,7 @@ from app.shared.parameters import MOST_MACROS, OF_PATCHES, modulated_by
 from app.shared.value import Value
 from engine import bounds
 from engine.contact import Exciter
+from engine.kernels import velocities
 from engine.pluck import DEFAULT_LISTEN, Pluck, Shape
 from engine.schema import explained
 from engine.values.ear import Pickup as PickupKind
@@ -78,7 +79,7 @@ class StringSet(Value):
         return self
 
 
-class Knobs(Value):
+class Knobs(Rows, part="knobs"):
     """Multipliers of the strings' own values; 1 leaves them as they are.
 
     The tuning says which pitch a key has. At one pitch and one mass the tension goes with the square of the length,
@@ -96,17 +97,8 @@ class Knobs(Value):
         length: of the length; the tension grows with its square. As `tension`, with what follows exchanged.
     """
 
-    stiffness: float = parameter("knobs.stiffness")
-    decay: float = parameter("knobs.decay")
-    brightness_decay: float = parameter("knobs.brightness_decay")
-    modulus: float = parameter("knobs.modulus")
-    density: float = parameter("knobs.density")
-    gauge: float = parameter("knobs.gauge")
-    tension: float = parameter("knobs.tension")
-    length: float = parameter("knobs.length")
 
-
-class PluckChoices(Value):
+class PluckChoices(Rows, part="pluck"):
     """The pluck of a string by a key. Widths are as in `engine.pluck.Pluck`; a triangle has none.
 
     Attributes:
@@ -145,35 +137,21 @@ class PluckChoices(Value):
 
     def pluck(self, velocity: float) -> Pluck:
         """The pluck of a velocity in 1 … 127, which need not be an integer; others count as the nearest."""
-        share = self._share(velocity)
+        share = velocities.share(velocity, self.curve)
         return Pluck(shape=self.shape).nearest(  # a power of a ratio may miss its end
             position=self.position,
-            amplitude_mm=self.softest_mm * (self.hardest_mm / self.softest_mm) ** share,
-            width=self.width * (self.width_hard / self.width) ** share,
+            amplitude_mm=velocities.between(self.softest_mm, self.hardest_mm, share),
+            width=velocities.between(self.width, self.width_hard, share),
         )
 
     def velocity_of(self, amplitude_mm: float) -> int:
         """The velocity, 1 … 127, whose pluck is nearest in amplitude."""
-        if amplitude_mm <= self.softest_mm or self.hardest_mm == self.softest_mm:
-            return VELOCITIES[0]
-        share = min(math.log(amplitude_mm / self.softest_mm) / math.log(self.hardest_mm / self.softest_mm), 1.0)
-        low, high = VELOCITIES
-        return round(low + share ** (4**self.curve) * (high - low))
+        return velocities.velocity(self.softest_mm, self.hardest_mm, amplitude_mm, self.curve)
 
     @property
     def is_blow(self) -> bool:
         """Return True if strings set out with speeds."""
         return self.strikes and self.shape in ("gaussian", "raised_cosine")
-
-    def release_s(self, velocity: float) -> float:
-        """The time in which a pluck of a velocity releases the string; 0: at once."""
-        if self.release_ms == 0 or self.release_hard_ms == 0:
-            return 0.0
-        return self.release_ms / 1000 * (self.release_hard_ms / self.release_ms) ** self._share(velocity)
-
-    def _share(self, velocity: float) -> float:
-        low, high = VELOCITIES
-        return float(min(1.0, max(0.0, (velocity - low) / (high - low))) ** (4**-self.curve))
 
 
 class Pickup(Value):
@@ -215,7 +193,7 @@ class Course(Value):
     bridge: Annotated[float, ranged(0, 1)] = 0.0
 
 
-class Javari(Value):
+class Javari(Rows, part="javari"):
     """The edge of a wide bridge, which the string meets from above, by `engine.kernels.javari`; first polarisation.
 
     Attributes:
@@ -230,7 +208,7 @@ class Javari(Value):
     loss_s_m: Annotated[float, ranged(0, 10)] = 0.2
 
 
-class Noise(Value):
+class Noise(Rows, part="noise"):
     """Noise of what touches strings, by `engine.contact`; comparisons of model and truth leave it out.
 
     Attributes:
@@ -244,7 +222,7 @@ class Noise(Value):
     release_db: float = parameter("noise.release_db")
 
 
-class Damping(Value):
+class Damping(Rows, part="damping"):
     """The effect of releasing a key: none (`let_ring`), or all partials decay by 60 dB in `release_t60_s`.
 
     Attributes:
@@ -256,7 +234,7 @@ class Damping(Value):
     let_ring: Flag = False
 
 
-class Technique(Value):
+class Technique(Rows, part="technique"):
     """The technique that keys are played with. MIDI's footswitches 80, 81 and 82 switch on what is off here.
 
     Attributes:
@@ -267,15 +245,8 @@ class Technique(Value):
         vibrato_cents, vibrato_hz: how far the pitch goes up and down, and how often.
     """
 
-    harmonic: float = parameter("technique.harmonic")
-    strum_ms: float = parameter("technique.strum_ms")
-    strokes: float = parameter("technique.strokes")
-    tremolo_hz: float = parameter("technique.tremolo_hz")
-    vibrato_cents: float = parameter("technique.vibrato_cents")
-    vibrato_hz: float = parameter("technique.vibrato_hz")
 
-
-class Body(Value):
+class Body(Rows, part="body"):
     """The body of the instrument: the name of an impulse response ("": none), mix and size (1: as it is)."""
 
     name: Reference = ""

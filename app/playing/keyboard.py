@@ -5,13 +5,13 @@ Keys are known by where they are: the row begins right of Caps lock, whatever is
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE
+from engine.kernels import velocities
 from engine.pluck import Pluck
 
 if TYPE_CHECKING:
@@ -97,14 +97,12 @@ class PluckRange:
     def amplitude_of(self, velocity: int) -> float:
         """Velocity 1 … 127 to an amplitude in mm: equal steps in dB."""
         low, high = self.amplitude_mm
-        share = (min(max(velocity, 1), LARGEST_VELOCITY) - 1) / (LARGEST_VELOCITY - 1)
-        return _rounded(low * (high / low) ** share, low, high)
+        return _rounded(velocities.between(low, high, velocities.share(velocity, 0.0)), low, high)
 
     def velocity_of(self, amplitude_mm: float) -> int:
         """The velocity, 1 … 127, whose amplitude is nearest."""
         low, high = self.amplitude_mm
-        share = math.log(max(amplitude_mm, low) / low) / math.log(high / low) if high > low else 1.0
-        return round(1 + min(share, 1.0) * (LARGEST_VELOCITY - 1))
+        return velocities.velocity(low, high, amplitude_mm, 0.0) if high > low else LARGEST_VELOCITY
 
 
 @dataclass(frozen=True)

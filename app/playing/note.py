@@ -8,7 +8,8 @@ from app.playing.ahead import AheadVoice
 from app.rendering import RenderRequest
 from app.rendering.subject import Subject
 from app.shared.vocabulary import OTHER
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM
+from engine.values.ear import Ear
 from engine.voices import Mixer, Voice
 
 
@@ -43,6 +44,7 @@ class Note:
         self.voices: dict[str, Voice] = {}
         self.match: Mapping[str, float] | None = None
         self.ahead: list[AheadVoice] = []
+        self._began_frame = 0  # of voices that others have replaced
         self.pending = True
         self.handed_over = False  # or about to be
         self.released = False
@@ -55,6 +57,17 @@ class Note:
         """The preset or string whose sound a source is."""
         others = (path for path in self.request.others if source == f"{OTHER}{path.stem}")
         return next(others, self.request.preset)
+
+    def source_of(self, voice: Voice) -> str:
+        """The source whose voice it is."""
+        return next(source for source, each in self.voices.items() if each is voice)
+
+    def asks_again(self, ear: Ear) -> bool:
+        """Return True if what is rendered ahead is to be rendered at these points, which are of the same kind."""
+        own = self.request.ear
+        same = (len(own.points), own.pickup) == (len(ear.points), ear.pickup)
+        ready = bool(self.ahead) and all(each.begun and each.voice.ear == own for each in self.ahead)
+        return ready and same and own != ear
 
     @property
     def matching_key(self) -> tuple[object, ...]:
@@ -90,7 +103,21 @@ class Note:
     @property
     def began_frame(self) -> int:
         """The frame of the mixer at which it began; 0 before that."""
-        return max((voice.began_frame for voice in self.voices.values()), default=0)
+        return self._began_frame or max((voice.began_frame for voice in self.voices.values()), default=0)
+
+    def replace_voices(self, ahead: list[AheadVoice], voices: Mapping[str, Voice]) -> None:
+        """Takes voices that are as far in its motion in the place of others, by source."""
+        assert self.mixer is not None
+        self._began_frame = self.began_frame + round(self._starved_s * self.mixer.rate_hz)
+        self.ahead, self.voices = ahead, {**self.voices, **voices}
+
+    def begin_again(self, ahead: list[AheadVoice], voices: dict[str, Voice]) -> None:
+        """Takes voices that are to begin together."""
+        self._began_frame, self.ahead, self.voices = 0, ahead, voices
+
+    @property
+    def _starved_s(self) -> float:
+        return min(voice.starved_s for voice in self.voices.values())
 
     @property
     def latency_s(self) -> float | None:
@@ -105,8 +132,7 @@ class Note:
         assert self.mixer is not None
         rate_hz = self.mixer.rate_hz
         skipped = (round(self.from_s * rate_hz) + QUANTUM // 2) // QUANTUM * QUANTUM
-        starved_s = min(voice.starved_s for voice in self.voices.values())
-        return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
+        return self.began_frame + round((seconds + self._starved_s) * rate_hz) - skipped
 
     def set_begin(self, struck_s: float) -> None:
         """Gives its voices the time of their gesture, by the sound's clock (0: none), and the frame they begin at."""

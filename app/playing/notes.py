@@ -52,6 +52,7 @@ BUSY = 0.75  # load of the device: above it the oldest notes end, so that the ot
 LOOKS = 10  # at the load, 0.5 s or more, all of which it is above: another program's burst raises it for less
 LEAST_RELIEF = 2  # notes that end then
 MOST_CARRIED = 4  # notes that ring on when the device changes its rate
+RINGS_S = 12.0  # of a model that is rendered ahead, at most
 LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the mixer
 
 Report = Callable[[str, str], None]  # a message and its details
@@ -365,6 +366,8 @@ class Notes:
         if self._ear is not None:
             for voice in note.voices.values():
                 voice.listen(self._ear)
+        if not note.pending and not note.released:
+            self._listen_again(note)
 
     def _set_gains_of_keys(self) -> None:
         """Sets which sources of keys are heard; both are of one string, whose levels match as they are."""
@@ -454,7 +457,7 @@ class Notes:
     def _skip(self, note: Note) -> None:
         if note.from_s > 0:
             for voice in note.voices.values():
-                voice.skip(note.from_s, Mixer(voice.program.rate_hz).memory)
+                voice.skip(note.from_s, Mixer(voice.program.rate_hz))
 
     def _make_voices(self, note: Note, rate_hz: int, struck_s: float) -> None:
         asked, voices = note.request, dict[str, Voice]()
@@ -472,22 +475,69 @@ class Notes:
             if model is None:
                 voices[source] = Voice(program, initial_m, asked.ear, 0.0, begin=begin)
                 continue
-            voice = voices[source] = Voice(program, initial_m, asked.ear, 0.0, asked.seconds, model.rate_hz, begin)
-            voice.fade_out_by(asked.seconds)  # behind it there are no samples
-            ahead.append(
-                AheadVoice(
-                    voice,
-                    model,
-                    initial_m,
-                    program.grid_weights(asked.ear),
-                    (subject, asked.pluck, asked.ear, asked.seconds),
-                    lambda: self._rendered_enough(note, ahead, struck_s),
-                    lambda error: self._cannot_render(note, error),
-                    lambda: note.over,
-                    note.from_s,
-                )
+            each = self._ahead_voice(
+                note, source, rate_hz, note.from_s, lambda: self._rendered_enough(note, ahead, struck_s)
             )
-        note.ahead, note.voices = ahead, voices
+            voices[source] = each.voice
+            ahead.append(each)
+        note.begin_again(ahead, voices)
+
+    def _ahead_voice(
+        self, note: Note, source: str, rate_hz: int, from_s: float, begin: Callable[[], None]
+    ) -> AheadVoice:
+        """The voice of a model that is rendered ahead, with its renderer."""
+        asked, subject = note.request, note.subject(source)
+        program, model = self._sources.program(subject, source, rate_hz), self._sources.load(subject).model
+        initial_m, start = self._sources.begin(subject, source, rate_hz, asked.pluck)
+        return AheadVoice(
+            Voice(program, initial_m, asked.ear, 0.0, RINGS_S, model.rate_hz, start),
+            model,
+            initial_m,
+            program.grid_weights(asked.ear),
+            asked.seconds,
+            (subject, asked.pluck, asked.ear),
+            begin,
+            lambda error: self._cannot_render(note, error),
+            lambda: note.over,
+            from_s,
+        )
+
+    def _listen_again(self, note: Note) -> None:
+        """Renders what is rendered ahead at the present points as well, and cross-fades to it when it is ready."""
+        ear, ahead = self._ear, note.ahead
+        if ear is None or not note.asks_again(ear):
+            return
+        note.request = replace(note.request, ear=ear)
+
+        def work() -> None:
+            assert note.mixer is not None
+            rate_hz, sources = note.mixer.rate_hz, [note.source_of(each.voice) for each in ahead]
+            again: list[AheadVoice] = []
+            for source in sources:
+                begin = partial(self._heard_elsewhere, note, sources, again)
+                again.append(self._ahead_voice(note, source, rate_hz, note.seconds, begin))
+            for each in again:
+                self._ahead.render(each)
+
+        self.in_background(work)
+
+    def _heard_elsewhere(self, note: Note, sources: Sequence[str], again: list[AheadVoice]) -> None:
+        """Puts voices at other points in the place of a note's, where all are rendered as far as it has rung."""
+        mixer = note.mixer
+        if mixer is None or not all(each.begun for each in again):
+            return
+        unheard = Mixer(mixer.rate_hz)
+        with self._lock:
+            if note.over or note.released or mixer is not self._sound.mixer:
+                return
+            left = [note.voices[source] for source in sources]
+            for each in again:
+                each.voice.skip(note.seconds, unheard)
+            note.replace_voices(again, {source: each.voice for source, each in zip(sources, again, strict=True)})
+            self._apply_monitor(note)
+            mixer.add(*(each.voice for each in again))
+            for voice in left:
+                voice.release(REPLACED_S)
 
     def _rendered_enough(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
         """Hands the note over once all its models are rendered far enough. Any thread."""

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from app.rendering.strobe import FLASH_HZ
 from app.rendering.take import SOURCES, Listened
+from engine.compare.relative import ErrorWindows
 from engine.levels import FULL_SCALE_PA
 from engine.resonators.base import Array
 from engine.strike import Strike
@@ -32,7 +33,7 @@ MOST_SHOWN = 160  # modes in a picture: their waves are wider than three points 
 GRID = 57  # points of a picture along the longer side; odd: one is the centre
 MOST_HEADS = 24  # that are kept, of 2 MB at most
 RATE_HZ = 48_000
-WINDOW_PERIODS = 2.0  # of the lowest mode, in which the error is measured
+WINDOW_PERIODS = 2.0  # of the lowest mode, in which errors are measured: shorter windows would show its phase
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,66 +137,13 @@ class ModalMotion:
         self.ready = stop
 
 
-class BlowErrors:
-    """The errors of the model over the whole surface, in windows of two periods of the lowest mode.
-
-    Attributes:
-        ready: windows so far.
-        middle_s: (windows,), the time of each window's middle.
-        curves: (windows,) each. "rmse": √(Σ∫(ŵ - w)²/Σ∫w²). "level_db": 10 log₁₀(Σ∫ŵ²/Σ∫w²), not finite where one
-            of them is silent.
-    """
-
-    def __init__(self, frames: int, lowest_hz: float) -> None:
-        self.window_frames = max(round(WINDOW_PERIODS * RATE_HZ / lowest_hz), 1)
-        self.windows, self.ready = frames // self.window_frames, 0
-        self.middle_s: NDArray[np.float64] = (np.arange(self.windows, dtype=np.float64) + 0.5) * self.window_s
-        self.curves = {name: np.full(self.windows, np.nan) for name in ("rmse", "level_db")}
-        self._sums = np.zeros((3, self.windows + 1))  # of error, model and truth
-        self._total = np.zeros(2)
-        self._done = 0
-
-    @property
-    def window_s(self) -> float:
-        return self.window_frames / RATE_HZ
-
-    @property
-    def rel_mse(self) -> float:
-        """The relative error of all frames so far; not a number where the truth rests."""
-        wrong, true = self._total
-        return float(wrong / true) if true > 0 else math.nan
-
-    @property
-    def complete(self) -> bool:
-        return self.ready == self.windows
-
-    def advance(self) -> bool:
-        """The render worker adds what is new; here there is nothing to compute."""
-        return False
-
-    def add(self, model_m: Array, truth_m: Array, weight: Array) -> None:
-        """The next frames, (frames, modes) each; `weight` (modes,) is that of a square in the mean."""
-        squares = [np.einsum("fm,fm,m->f", part, part, weight) for part in (model_m - truth_m, model_m, truth_m)]
-        window = np.minimum((self._done + np.arange(len(model_m))) // self.window_frames, self.windows)
-        for row, values in enumerate(squares):
-            self._sums[row] += np.bincount(window, values, self.windows + 1)
-        self._total += squares[0].sum(), squares[2].sum()
-        self._done += len(model_m)
-        first, stop = self.ready, min(self._done // self.window_frames, self.windows)
-        wrong, model, truth = (part[first:stop] for part in self._sums)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            self.curves["rmse"][first:stop] = np.sqrt(wrong / truth)
-            self.curves["level_db"][first:stop] = 10 * np.log10(model / truth)
-        self.ready = stop
-
-
 class BlowTake:
     """The motion, sound and errors of model and truth of a blow, which grow while they are rendered.
 
     Attributes:
         head: the drum's shapes on a grid.
         motions: by source.
-        errors: of the model.
+        errors: of the model, over the whole surface.
         listened: signals by source in Pa at 1 m, one column for each direction; replaced as a whole.
         fundamental_hz: of its lowest mode at rest.
         frames: samples, the first at the blow, and one more than `seconds` has.
@@ -207,7 +155,8 @@ class BlowTake:
         self.motions = {name: ModalMotion(int(request.seconds * FLASH_HZ) + 1, len(head.shapes)) for name in SOURCES}
         omega, sigma = request.modes.omega[0], request.modes.sigma[0]
         self.fundamental_hz = math.sqrt(max(omega**2 - sigma**2, 1.0)) / math.tau
-        self.errors = BlowErrors(self.frames - 1, self.fundamental_hz)
+        window_s = WINDOW_PERIODS / self.fundamental_hz
+        self.errors = ErrorWindows(self.frames - 1, window_s, RATE_HZ, ("rmse", "level_db"))
         self.listened = Listened(request.ear)
         self.ready_frames = 0
 

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from concurrent.futures import Executor
 
 import numpy as np
-import torch
 
 from app.rendering.blow import RATE_HZ, BlowRequest, BlowTake, ModalMotion, head_of
 from app.rendering.loaded import Loaded
@@ -16,19 +15,12 @@ from app.rendering.request import RenderListener
 from app.rendering.strobe import FLASH_HZ
 from app.rendering.subject import Subject
 from app.rendering.take import SOURCES, Listened, Signal
-from engine.levels import FULL_SCALE_M
-from engine.models.base import Physics
-from engine.models.koopman_tension import KoopmanTension
 from engine.presets import PresetError
-from engine.resonators.base import Array, Resonator
-from engine.truth import ModalState, SplittingSolver, default_substeps
+from engine.resonators.base import Array
+from training.family.drums import Blocks, StruckDrum, model_player, true_motion
 
 BLOCK_FRAMES = 1_200  # of 1,600 modes 15 MB
-SUBSTEP_DIVISOR = 3  # times fewer sub-steps of the truth than a data set has: 1e-12 of the energy off after a second
-SILENCE = 1e-10  # of a mode, of all: what the truth leaves out
 TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its angle follows from them
-
-Advance = Callable[[int], Array]
 
 
 class BlowJob(Rendering[BlowRequest, BlowTake]):
@@ -65,12 +57,13 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
         return take
 
     def _set_out(self) -> dict[str, _Mover]:
-        request, resonator = self.request, self.request.modes.resonator(np.zeros((1, 2)))
-        speeds = request.strike.speeds(request.modes)
-        model = self._load(request.preset).preset.model
-        if not isinstance(model, KoopmanTension):
-            raise PresetError(f"{request.preset}: plays one string; drums need a preset of many strings")
-        return {"model": _Mover(_model(model, resonator, speeds)), "truth": _Mover(_truth(resonator, speeds))}
+        request = self.request
+        struck = StruckDrum.by(request.strike, request.modes)
+        try:
+            play = model_player(self._load(request.preset).preset.model)
+        except ValueError as error:
+            raise PresetError(f"{request.preset}: {error}") from error
+        return {"model": _Mover(play(struck, RATE_HZ)), "truth": _Mover(true_motion(struck, RATE_HZ))}
 
     def _blocks(self, movers: dict[str, _Mover], frames: int) -> dict[str, Array]:
         """The next frames, (frames, modes) each, of the modes up to the last that moves; one source in the helper."""
@@ -107,7 +100,7 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
 class _Mover:
     """The amplitudes of a source's modes from the blow on, block by block, and its lowest modes at flashes."""
 
-    def __init__(self, more: Advance) -> None:
+    def __init__(self, more: Blocks) -> None:
         self._more, self._begun = more, False
         self._done, self._step = 0, 1  # frames whose angles are known, and how many lie between two that are computed
         self._last = np.zeros((0, 0))  # the last two frames, of which the second has no angle yet
@@ -116,8 +109,8 @@ class _Mover:
     def advance(self, frames: int) -> Array:
         """The next frames, (frames, modes) in m; the first of all is that of the blow, at rest."""
         if self._begun:
-            return self._more(frames)
-        self._begun, found = True, self._more(frames - 1)
+            return self._more(frames).numpy()
+        self._begun, found = True, self._more(frames - 1).numpy()
         return np.concatenate([np.zeros((1, found.shape[1])), found])
 
     def show(self, block: Array, motion: ModalMotion, omega: Array) -> None:
@@ -146,35 +139,6 @@ class _Mover:
             flash = numbers % between == 0
             motion.append(size[flash], angles[flash])
         self._done, self._last = stop, q[-2:]
-
-
-@torch.inference_mode()
-def _model(model: KoopmanTension, resonator: Resonator, speeds: Array) -> Advance:
-    own = model.for_resonator(Physics(resonator, RATE_HZ, FULL_SCALE_M))
-    q, v = torch.zeros(1, resonator.modes, dtype=torch.float64), torch.from_numpy(speeds)[None] / FULL_SCALE_M
-    state = own.encode_modes(q, v / RATE_HZ)
-
-    @torch.inference_mode()
-    def more(frames: int) -> Array:
-        nonlocal state
-        found, state = own.advance_modes(state, frames)
-        return found[0].numpy() * FULL_SCALE_M
-
-    return more
-
-
-def _truth(resonator: Resonator, speeds: Array) -> Advance:
-    substeps = math.ceil(default_substeps(resonator, RATE_HZ) / SUBSTEP_DIVISOR)
-    solver = SplittingSolver(resonator, RATE_HZ, substeps=substeps, silence=SILENCE)
-    state = ModalState(torch.zeros(1, resonator.modes, dtype=torch.float64), torch.from_numpy(speeds)[None])
-
-    @torch.inference_mode()
-    def more(frames: int) -> Array:
-        nonlocal state
-        found, state = solver.advance(state, frames)
-        return found[0].numpy()
-
-    return more
 
 
 def _listened(request: BlowRequest) -> Listened:

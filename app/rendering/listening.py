@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.rendering.take import Motion, Signal
-from engine.kernels.layout import QUANTUM, REACH
+from engine.kernels.constants import QUANTUM
+from engine.kernels.mixer_records import REACH
 from engine.levels import FULL_SCALE_M
 from engine.resonators.base import Array
 from engine.sources import Runaway, SourceState, StringSource

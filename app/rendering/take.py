@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.rendering.strobe import Flashes, Strobe
-from engine.metrics import ErrorSums
+from engine.compare.relative import ErrorSums
 from engine.pluck import Pluck
 from engine.presets import PresetInfo
 from engine.sources import StringSource

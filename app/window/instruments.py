@@ -15,7 +15,7 @@ from app.export.struck import Struck
 from app.instrument.compiled import is_another
 from app.instrument.events import KEYS, Event, NoteOff, NoteOn, PluckAt
 from app.instrument.string_keys import on_string
-from app.instrument.strings import Strings, pitch_hz_of
+from app.instrument.strings import Strings
 from app.patches.drums import Drums
 from app.patches.instrument import SingleString
 from app.patches.patch import Patch, StringSet
@@ -319,7 +319,7 @@ class Instruments(QObject):
 
 def _key_of(patch: Patch, string: StringParameters) -> tuple[int, int | None] | None:
     """The key with the pitch of a string, and the string of a set on which it has its length. None: there is none."""
-    strings, pitch_hz = Strings(patch), pitch_hz_of(string)
+    strings, pitch_hz = Strings(patch), string.pitch_hz
     low, high = patch.range
     key = next((key for key in range(low, high + 1) if _same(strings.pitch_hz(key) or 0.0, pitch_hz)), None)
     if key is None:

@@ -2,14 +2,16 @@
 
 None of them has part in any error or comparison.
 
-impulse    an impulse response as a value: checked, at another rate, as loud as what it is given
-amp        an amplifier, whose cabinet is a body
-body       from the modes of an instrument's body, or from a response that is given
-body_table seventeen bodies: their modes, with sources
-curves     what a body does to the loudness of a key
-room       of a box of six walls
-effects    the amplifier, then body and room as one response; the same for arrays
-partitions that response as the compiled convolver reads it
+impulse     an impulse response as a value that is checked
+responses   what `engine.kernels` computes, with memory for it
+amp         an amplifier, whose cabinet is a body
+body        from the modes of an instrument's body, or from a response that is given
+body_table  seventeen bodies: their modes, with sources
+body_record a body as plug-ins have it
+curves      what a body does to the loudness of a key
+room        of a box of six walls
+effects     the amplifier, then body and room as one response; the same for arrays
+partitions  that response as the compiled convolver reads it
 """
 
 from engine.effects.body import Body

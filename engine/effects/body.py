@@ -3,7 +3,7 @@
 Above the lowest modes only the density and the loss of modes matter, as in J. Woodhouse, "On the synthesis of guitar
 plucks", Acta Acustica 90 (2004) 928. Spacings are drawn from Rayleigh's distribution (neighbours avoid one another),
 signs at random. A body that is smaller than a wave radiates alike to the left and to the right; the higher the
-frequency, the less alike.
+frequency, the less alike. `engine.kernels.bodies` computes the response.
 """
 
 from __future__ import annotations
@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 
 from engine import bounds
 from engine.effects.body_table import BODIES, Wood
-from engine.effects.impulse import Impulse, as_loud, faded, resampled, without_subsonic
+from engine.effects.impulse import Impulse
+from engine.kernels.constants import BODY_HIGHEST_HZ
 
 SOUND_M_S = 343.0
 SUBSONIC = 0.55  # of the lowest mode: below it a body radiates next to nothing
 MOST_PER_HZ = 0.06  # modes: where more overlap, fewer and stronger ones sound the same
 LEAST_ALIKE = 0.2  # of left and right, at high frequencies
-HIGHEST_HZ = 20_000.0
-_BLOCK = 128  # frames
 
 
 @dataclass(frozen=True)
@@ -52,26 +51,37 @@ class Body:
         if self.name not in BODIES:
             raise ValueError(f"no body is named {bounds.brief(self.name)}; there are {', '.join(BODIES)}")
 
+    @property
+    def channels(self) -> int:
+        """The channels of its response that differ."""
+        return 2 if self.impulse is None else self.impulse.samples.shape[1]
+
     def response(self, rate_hz: int) -> NDArray[np.float64]:
-        """The response of the body alone, (frames, 1 or 2), as loud as what it is given."""
+        """The response of the body alone, (frames, 2), as loud as what it is given."""
         return _response(self.name, self.impulse, self.size, rate_hz)
 
 
 @lru_cache(maxsize=8)
 def _response(name: str, impulse: Impulse | None, size: float, rate_hz: int) -> NDArray[np.float64]:
+    from engine.effects.responses import of_given, of_modes  # brings the compiler
+
     if impulse is None:
-        found = _rung(BODIES[name], size, rate_hz)
+        wood = BODIES[name]
+        found = of_modes(modes_of(wood), wood.seconds, subsonic_hz(wood), size, rate_hz)
     else:
-        found = resampled(impulse.samples, impulse.rate_hz / size, rate_hz)
-        longest = int(bounds.LONGEST_IMPULSE_S * rate_hz)
-        found = found if len(found) <= longest else faded(found[:longest])
-    found = as_loud(found, rate_hz)
+        found = of_given(impulse.samples, impulse.rate_hz, size, rate_hz)
     found.setflags(write=False)
     return found
 
 
-def modes_of(wood: Wood, size: float, highest_hz: float) -> tuple[NDArray[np.float64], ...]:
-    """Frequencies in Hz, decay rates in 1/s, (modes,), and amplitudes (modes, 2) of all modes, the lowest first."""
+def subsonic_hz(wood: Wood) -> float:
+    """The frequency below which a body radiates next to nothing, at a size of 1."""
+    return SUBSONIC * wood.lowest[0].frequency_hz
+
+
+@lru_cache(maxsize=8)
+def modes_of(wood: Wood) -> NDArray[np.float64]:
+    """All modes at a size of 1, the lowest first, (4, modes): Hz, decay in 1/s, amplitudes left and right."""
     draw, low = np.random.default_rng(wood.seed), len(wood.lowest)
     higher_hz = _higher_hz(wood, draw)
     frequency_hz = np.concatenate([[mode.frequency_hz for mode in wood.lowest], higher_hz])
@@ -88,9 +98,7 @@ def modes_of(wood: Wood, size: float, highest_hz: float) -> tuple[NDArray[np.flo
     wide_hz = SOUND_M_S / (2 * np.pi * wood.half_width_m)
     alike = LEAST_ALIKE + (1 - LEAST_ALIKE) / (1 + (higher_hz / wide_hz) ** 2)
     amplitude[low:, 1] *= np.where(draw.random(len(higher_hz)) < (1 + alike) / 2, 1.0, -1.0)
-    frequency_hz, decay = frequency_hz / size, decay / size
-    kept = frequency_hz < highest_hz
-    return frequency_hz[kept], decay[kept], (amplitude / size)[kept]
+    return np.vstack([frequency_hz, decay, amplitude.T])
 
 
 def _density(wood: Wood, frequency_hz: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -101,19 +109,8 @@ def _density(wood: Wood, frequency_hz: NDArray[np.float64]) -> NDArray[np.float6
 
 def _higher_hz(wood: Wood, draw: np.random.Generator) -> NDArray[np.float64]:
     """Frequencies of the modes above the lowest, the same at any rate and size."""
-    first_hz, last_hz = wood.lowest[-1].frequency_hz, HIGHEST_HZ * bounds.BODY_SIZE[1]
+    first_hz, last_hz = wood.lowest[-1].frequency_hz, BODY_HIGHEST_HZ * bounds.BODY_SIZE[1]
     grid_hz = np.arange(first_hz, last_hz, 1.0)
     counted = np.cumsum(_density(wood, grid_hz))  # modes from the first one up to a frequency
     count = int(counted[-1])
     return np.interp(np.cumsum(draw.rayleigh(math.sqrt(2 / math.pi), count)), counted, grid_hz, right=last_hz)
-
-
-def _rung(wood: Wood, size: float, rate_hz: int) -> NDArray[np.float64]:
-    """All modes after one blow, (frames, 2)."""
-    frequency_hz, decay, amplitude = modes_of(wood, size, min(HIGHEST_HZ, 0.45 * rate_hz))
-    eigenvalues = -decay + 2j * np.pi * frequency_hz
-    blocks = math.ceil(wood.seconds * size * rate_hz / _BLOCK)
-    begins = np.exp(np.multiply.outer(np.arange(blocks) * (_BLOCK / rate_hz), eigenvalues))
-    within = np.exp(np.multiply.outer(eigenvalues, np.arange(_BLOCK) / rate_hz))
-    rung = np.stack([((begins * side) @ within).imag.ravel() for side in amplitude.T], axis=1)
-    return faded(without_subsonic(rung, SUBSONIC * wood.lowest[0].frequency_hz / size, rate_hz))

@@ -8,10 +8,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.effects.amp import amplified, factors
+from engine.effects.amp import amplified
 from engine.effects.body import Body
-from engine.effects.impulse import as_loud, convolved
 from engine.effects.room import room_response
+from engine.kernels.mixer_records import LARGEST, SMALLEST
 from engine.values.effects import Amp, Room
 
 
@@ -33,17 +33,12 @@ class Effects:
     @property
     def neutral(self) -> bool:
         """Return True if nothing is changed at all."""
-        return not self.rings and self.factors[0] == 0.0
+        return not self.rings and (self.amp is None or self.amp.drive_db == 0.0)
 
     @property
     def rings(self) -> bool:
         """Return True if there is a body or a room."""
         return any(part is not None and part.mix > 0 for part in (self.body, self.room))
-
-    @property
-    def factors(self) -> tuple[float, float, float]:
-        """The mixer's factors of the amplifier."""
-        return factors(self.amp, self.level_db)
 
     def impulse(self, rate_hz: int) -> NDArray[np.float64]:
         """The impulse response of body and room, (frames, 1 or 2): the level of pink noise stays, at any mix.
@@ -59,17 +54,35 @@ class Effects:
 
 @lru_cache(maxsize=4)
 def _impulse(effects: Effects, rate_hz: int) -> NDArray[np.float64]:
-    found: NDArray[np.float64] | None = None
-    for part in (effects.body, effects.room):
-        if part is not None and part.mix > 0:
-            wet = part.mix * (
-                part.response(rate_hz) if isinstance(part, Body) else room_response(part.t60_s, rate_hz)
-            )
-            wet[0] += 1 - part.mix
-            found = wet if found is None else convolved(found, wet)
-    found = np.ones((1, 1)) if found is None else as_loud(found, rate_hz)
+    body = effects.body if effects.body and effects.body.mix > 0 else None
+    room = effects.room if effects.room and effects.room.mix > 0 else None
+    found = np.ones((1, 1))
+    if body or room:
+        from engine.effects.responses import weights_of  # brings the compiler
+
+        parts, powers = _parts(body and replace(body, mix=1.0), room and replace(room, mix=1.0), rate_hz)
+        mono = room is None and body is not None and body.channels == 1
+        found = np.zeros((max(map(len, parts)), 1 if mono else 2))
+        weights = weights_of(powers, body.mix if body else 0.0, room.mix if room else 0.0)
+        found[0] = weights[0]
+        for weight, part in zip(weights[1:], parts, strict=True):
+            found[: len(part)] += weight * part[:, : found.shape[1]]
     found.setflags(write=False)
     return found
+
+
+@lru_cache(maxsize=4)
+def _parts(
+    body: Body | None, room: Room | None, rate_hz: int
+) -> tuple[tuple[NDArray[np.float64], ...], NDArray[np.float64]]:
+    """The responses of body, room, and both in series, without frames where they are not there, and their powers."""
+    from engine.effects.responses import in_series, powers_of
+
+    nothing = np.zeros((0, 2))
+    one = body.response(rate_hz) if body else nothing
+    other = room_response(room.t60_s, rate_hz) if room else nothing
+    both = in_series(one, other) if body and room else nothing
+    return (one, other, both), powers_of(one, other, rate_hz)
 
 
 def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) -> NDArray[np.float64]:
@@ -80,14 +93,12 @@ def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) ->
     """
     from scipy.signal import oaconvolve  # which takes the better part of a second to load, as Numba does
 
-    from engine.kernels import layout as at
-
     stereo = np.broadcast_to(sound, (len(sound), 2)).astype(np.float64)
     if effects is None or effects.neutral or not len(stereo):
         return stereo
-    wild = ~(np.abs(stereo) < at.LARGEST).all(1)
+    wild = ~(np.abs(stereo) < LARGEST).all(1)
     stereo[wild] = 0.0
-    stereo[np.abs(stereo) < at.SMALLEST] = 0.0
+    stereo[np.abs(stereo) < SMALLEST] = 0.0
     if effects.amp is not None:
         stereo = amplified(effects.amp, stereo, rate_hz, effects.level_db)
     if not effects.rings:

@@ -1,8 +1,9 @@
 """The compiled code that makes sound: voices, and the mixer that a sound device calls without the interpreter.
 
     memory     pointers, fences, and what is published to another thread
-    layout     what lies where in a voice, a program and a mixer
-    bank       a voice of complex exponentials whose phases follow their energies: models with a linear decoder
+    strings, recorded, rotation, pulses, velocities
+               laws of physics: plain functions, which Python calls as they are
+    records    what is played; voice_records, mixer_records: what sounds
     tension    a voice of latents that share one tension: the model of every string
     lanes      its inner loops, as vector instructions
     truth      a voice of the solved string
@@ -16,6 +17,6 @@
     cache      where they are kept once they are compiled
     warm       compiles, or loads, all of them
 
-A voice and a mixer are flat arrays of eight-byte numbers; `engine.voices` makes them. The interpreter may be
+A voice and a mixer are NumPy records; `engine.voices` makes their memory. The interpreter may be
 busy with anything: nothing here waits for it.
 """

@@ -12,12 +12,21 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.constants import QUANTUM
+from engine.kernels.mixer_records import (
+    LAGS,
+    LARGEST,
+    OVERSAMPLING,
+    SHAPED_FRAMES,
+    SMALLEST,
+    Amplifier,
+    Mixer,
+)
 
+NOMINAL = 0.15  # of full scale: a tone of this peak keeps its level, whatever the drive
 BIAS = 0.25  # in the shape's own unit: 1 is where it bends most
 COUPLING_HZ = 60.0  # high-pass before the drive
 BLOCKING_HZ = 15.0  # high-pass behind it, for what the bias gives
@@ -26,57 +35,70 @@ FADE_S = 0.020  # in which the amplifier is switched on or off
 KAISER = 10.0  # of the window of the filter to and from the higher rate: images below -100 dB
 PASSED = 0.4375  # of the rate: middle of the filter's edge, which ends at one half
 REST_QUANTA = 400  # without input, after which all has died away
+TAPS = LAGS * OVERSAMPLING
 
 
 @njit(**COMPILED)
-def amplify(mixer: np.ndarray) -> None:
-    """Replaces the mix, (QUANTUM, 2), by its sound through the amplifier, where it is on."""
-    amp = mixer[at.M_AMPLIFIER : at.MIXER_SLOTS]
-    whole = amp.view(np.int64)
-    wanted, share = amp[at.A_WANTED_DRIVE], amp[at.A_SHARE]
+def drive(mixer: Mixer, drive_db: float, tone_db: float, level_db: float) -> None:
+    """Set the amplifier of a mixer, see `engine.effects.Amp`; a tone of the peak NOMINAL keeps its level.
+
+    The input is scaled to the level that it would have without `level_db`, so that it changes no drive.
+    """
+    amp, on = mixer.amplifier, drive_db > 0
+    factor, level = 10 ** (drive_db / 20), 10 ** (level_db / 20)
+    amp.wanted_gain = level * math.sqrt(1 + (factor * NOMINAL) ** 2) / factor if on else 0.0
+    amp.wanted_tone = 10 ** (tone_db / 20) if on else 0.0
+    amp.wanted_drive = factor / level if on else 0.0
+
+
+@njit(**COMPILED)
+def amplify(mixer: Mixer) -> None:
+    """Replace the mix, (QUANTUM, 2), by its sound through the amplifier, where it is on."""
+    amp = mixer.amplifier
+    wanted, share = amp.wanted_drive, amp.share
     if wanted == 0.0 and share == 0.0:
-        whole[at.A_ON] = 0
+        amp.on = 0
         return
-    first = mixer.view(np.int64)[at.M_FRAMES] == 0
-    if whole[at.A_ON] == 0:
-        _begin(amp, whole)
+    first = mixer.frames == 0
+    if amp.on == 0:
+        _begin(amp)
     if wanted > 0.0 and (first or share == 0.0):
-        amp[at.A_DRIVE] = wanted
-        amp[at.A_GAIN], amp[at.A_TONE] = amp[at.A_WANTED_GAIN], amp[at.A_WANTED_TONE]
+        amp.drive = wanted
+        amp.gain, amp.tone = amp.wanted_gain, amp.wanted_tone
     heard = _take(mixer, amp)
-    whole[at.A_QUIET] = 0 if heard else whole[at.A_QUIET] + 1
+    amp.quiet = 0 if heard else amp.quiet + 1
     goal = 1.0 if wanted > 0.0 else 0.0
-    step = 1.0 if first else at.QUANTUM / (FADE_S * mixer[at.M_RATE])
+    step = 1.0 if first else QUANTUM / (FADE_S * mixer.rate_hz)
     reached = min(share + step, goal) if goal > share else max(share - step, goal)
-    amp[at.A_SHARE] = reached
-    if whole[at.A_QUIET] > REST_QUANTA:
+    amp.share = reached
+    if amp.quiet > REST_QUANTA:
         return
     _shape(amp)
     _give(mixer, amp, goal if first else share, reached)
 
 
 @njit(**COMPILED)
-def _begin(amp: np.ndarray, whole: np.ndarray) -> None:
+def _begin(amp: Amplifier) -> None:
     """Reset the amplifier, as if there had never been any input.
 
     All is at rest, which is where the bias has it.
     """
-    amp[at.A_STATE :] = 0.0
     rest = BIAS / math.sqrt(1 + BIAS * BIAS)
-    amp[at.A_STATE + 1], amp[at.A_STATE + 2] = BIAS, rest
-    amp[at.A_SHAPED : at.A_OUT] = rest
-    total = 0.0
-    for tap in range(at.A_TAPS):
-        place = tap - (at.A_TAPS - 1) / 2
-        inside = 1 - (2 * place / at.A_TAPS) ** 2
-        turns = 2 * math.pi * PASSED * place / at.OVERSAMPLING
+    amp.low, amp.last, amp.mean, amp.low_out = 0.0, BIAS, rest, 0.0
+    amp.input[:] = 0.0
+    amp.shaped[:] = rest
+    filter, total = amp.filter, 0.0
+    for tap in range(TAPS):
+        place = tap - (TAPS - 1) / 2
+        inside = 1 - (2 * place / TAPS) ** 2
+        turns = 2 * math.pi * PASSED * place / OVERSAMPLING
         value = math.sin(turns) / turns * _bessel(KAISER * math.sqrt(inside))
-        amp[at.A_FILTER + tap] = value
+        filter[tap] = value
         total += value
-    for tap in range(at.A_TAPS):
-        amp[at.A_FILTER + tap] /= total
-    whole[at.A_ON] = 1
-    whole[at.A_QUIET] = 0
+    for tap in range(TAPS):
+        filter[tap] /= total
+    amp.on = 1
+    amp.quiet = 0
 
 
 @njit(**COMPILED)
@@ -90,79 +112,74 @@ def _bessel(x: float) -> float:
 
 
 @njit(**COMPILED)
-def _take(mixer: np.ndarray, amp: np.ndarray) -> bool:
+def _take(mixer: Mixer, amp: Amplifier) -> bool:
     """The next input behind the last one, through the high-pass. Returns whether there is any."""
-    heard, low = False, amp[at.A_STATE]
-    follows = 1 - math.exp(-2 * math.pi * COUPLING_HZ / mixer[at.M_RATE])
-    last = at.A_TAPS // at.OVERSAMPLING
-    for frame in range(last):
-        amp[at.A_INPUT + frame] = amp[at.A_INPUT + at.QUANTUM + frame]
-    for frame in range(at.QUANTUM):
-        value = 0.5 * (mixer[at.M_MIX + 2 * frame] + mixer[at.M_MIX + 2 * frame + 1])
-        if not abs(value) < at.LARGEST or abs(value) < at.SMALLEST:
+    heard, low, given, mix = False, amp.low, amp.input, mixer.mix
+    follows = 1 - math.exp(-2 * math.pi * COUPLING_HZ / mixer.rate_hz)
+    for frame in range(LAGS):
+        given[frame] = given[QUANTUM + frame]
+    for frame in range(QUANTUM):
+        value = 0.5 * (mix[frame, 0] + mix[frame, 1])
+        if not abs(value) < LARGEST or abs(value) < SMALLEST:
             value = 0.0
         heard = heard or value != 0.0
         low += follows * (value - low)
-        amp[at.A_INPUT + last + frame] = value - low
-    amp[at.A_STATE] = low if abs(low) >= at.SMALLEST else 0.0
+        given[LAGS + frame] = value - low
+    amp.low = low if abs(low) >= SMALLEST else 0.0
     return heard
 
 
 @njit(**COMPILED)
-def _shape(amp: np.ndarray) -> None:
+def _shape(amp: Amplifier) -> None:
     """Input to shaped output, at the higher rate: rows (OVERSAMPLING,) of frames, behind the last ones."""
-    last, rows = at.A_TAPS // at.OVERSAMPLING, at.OVERSAMPLING
-    wide = last + at.QUANTUM
-    drive, goal = amp[at.A_DRIVE], amp[at.A_WANTED_DRIVE]
+    last, rows, filter, given, all_shaped = LAGS, OVERSAMPLING, amp.filter, amp.input, amp.shaped
+    drive, goal = amp.drive, amp.wanted_drive
     if goal == 0.0:  # it is switched off: as it was
         goal = drive
     for row in range(rows):
-        out = amp[at.A_SHAPED + row * wide : at.A_SHAPED + (row + 1) * wide]
+        out = all_shaped[row]
         for frame in range(last):
-            out[frame] = out[at.QUANTUM + frame]
+            out[frame] = out[QUANTUM + frame]
         new = out[last:]
         new[:] = 0.0
         for lag in range(last):
-            tap = rows * amp[at.A_FILTER + rows * lag + row]
-            delayed = amp[at.A_INPUT + last - lag : at.A_INPUT + last - lag + at.QUANTUM]
-            for frame in range(at.QUANTUM):
+            tap = rows * filter[rows * lag + row]
+            delayed = given[last - lag : last - lag + QUANTUM]
+            for frame in range(QUANTUM):
                 new[frame] += tap * delayed[frame]
-        for frame in range(at.QUANTUM):
-            new[frame] = BIAS + new[frame] * (drive + (goal - drive) * (frame + (row + 1) / rows) / at.QUANTUM)
-    before = amp[at.A_STATE + 1]
+        for frame in range(QUANTUM):
+            new[frame] = BIAS + new[frame] * (drive + (goal - drive) * (frame + (row + 1) / rows) / QUANTUM)
+    before = amp.last
     root = math.sqrt(1 + before * before)
-    for frame in range(last, wide):
+    for frame in range(last, SHAPED_FRAMES):
         for row in range(rows):
-            value = amp[at.A_SHAPED + row * wide + frame]
+            value = all_shaped[row, frame]
             following = math.sqrt(1 + value * value)
-            amp[at.A_SHAPED + row * wide + frame] = (before + value) / (root + following)
+            all_shaped[row, frame] = (before + value) / (root + following)
             before, root = value, following
-    amp[at.A_STATE + 1] = before
+    amp.last = before
 
 
 @njit(**COMPILED)
-def _give(mixer: np.ndarray, amp: np.ndarray, share: float, share_to: float) -> None:
+def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
     """Bring the sound back to the rate of the mixer, without the mean, through gain and tone."""
-    last, rows = at.A_TAPS // at.OVERSAMPLING, at.OVERSAMPLING
-    wide = last + at.QUANTUM
-    out = amp[at.A_OUT : at.A_OUT + at.QUANTUM]
+    last, rows, filter, out, mix = LAGS, OVERSAMPLING, amp.filter, amp.out, mixer.mix
     out[:] = 0.0
     for row in range(rows):
         for lag in range(last):
-            tap = amp[at.A_FILTER + rows * lag + rows - 1 - row]
-            first = at.A_SHAPED + row * wide + last - lag
-            shaped = amp[first : first + at.QUANTUM]
-            for frame in range(at.QUANTUM):
+            tap = filter[rows * lag + rows - 1 - row]
+            shaped = amp.shaped[row, last - lag : last - lag + QUANTUM]
+            for frame in range(QUANTUM):
                 out[frame] += tap * shaped[frame]
-    drive, gain, tone = amp[at.A_DRIVE], amp[at.A_GAIN], amp[at.A_TONE]
-    drive_to, gain_to, tone_to = amp[at.A_WANTED_DRIVE], amp[at.A_WANTED_GAIN], amp[at.A_WANTED_TONE]
+    drive, gain, tone = amp.drive, amp.gain, amp.tone
+    drive_to, gain_to, tone_to = amp.wanted_drive, amp.wanted_gain, amp.wanted_tone
     if drive_to == 0.0:
         drive_to, gain_to, tone_to = drive, gain, tone
-    blocks = 1 - math.exp(-2 * math.pi * BLOCKING_HZ / mixer[at.M_RATE])
-    follows = 1 - math.exp(-2 * math.pi * PIVOT_HZ / mixer[at.M_RATE])
-    mean, low = amp[at.A_STATE + 2], amp[at.A_STATE + 3]
-    for frame in range(at.QUANTUM):
-        way = (frame + 1) / at.QUANTUM
+    blocks = 1 - math.exp(-2 * math.pi * BLOCKING_HZ / mixer.rate_hz)
+    follows = 1 - math.exp(-2 * math.pi * PIVOT_HZ / mixer.rate_hz)
+    mean, low = amp.mean, amp.low_out
+    for frame in range(QUANTUM):
+        way = (frame + 1) / QUANTUM
         mean += blocks * (out[frame] - mean)
         value = (out[frame] - mean) * (gain + way * (gain_to - gain))
         low += follows * (value - low)
@@ -170,7 +187,7 @@ def _give(mixer: np.ndarray, amp: np.ndarray, share: float, share_to: float) -> 
         value = low / high + (value - low) * high
         wet = share + way * (share_to - share)
         for side in range(2):
-            dry = mixer[at.M_MIX + 2 * frame + side]
-            mixer[at.M_MIX + 2 * frame + side] = value if wet == 1.0 else dry + wet * (value - dry)
-    amp[at.A_STATE + 2], amp[at.A_STATE + 3] = mean, low if abs(low) >= at.SMALLEST else 0.0
-    amp[at.A_DRIVE], amp[at.A_GAIN], amp[at.A_TONE] = drive_to, gain_to, tone_to
+            dry = mix[frame, side]
+            mix[frame, side] = value if wet == 1.0 else dry + wet * (value - dry)
+    amp.mean, amp.low_out = mean, low if abs(low) >= SMALLEST else 0.0
+    amp.drive, amp.gain, amp.tone = drive_to, gain_to, tone_to

@@ -1,13 +1,15 @@
-"""The means that compiled kernels share: compiler options, the cache's place, and a tanh for vector instructions."""
+"""The means that compiled kernels share: compiler options, the cache's place, plain laws, a tanh for vectors."""
 
 from __future__ import annotations
 
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 from numba import config, njit
+from numba.extending import register_jitable
 
-from engine.kernels import cache
+from engine.kernels import cache, pulses, recorded, rotation, strings, velocities
 from engine.kernels.numba_internals import compile_once_for_all_numbers
 
 PLACE = cache.folder()
@@ -22,8 +24,14 @@ COMPILED: dict[str, Any] = {
     "error_model": "numpy",
 }
 
+LAWS = pulses, recorded, rotation, strings, velocities  # modules of plain functions that compiled ones call
+
 
 compile_once_for_all_numbers()
+for _laws in LAWS:
+    for _law in vars(_laws).values():
+        if isinstance(_law, FunctionType) and _law.__module__ == _laws.__name__:
+            register_jitable(error_model="numpy")(_law)
 
 # A number in the source would be a double and take the whole expression with it.
 ZERO, HALF, ONE, _TWO, _LARGE = (np.float32(x) for x in (0, 0.5, 1, 2, 9))

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+QUANTUM = 64  # frames that are rendered at a time, whatever the device asks for
+AHEAD = 32  # frames that the limiter looks ahead, its delay; even, and a quantum at most
+
 HIGHEST_HZ = 20_000.0  # of modes: those above are inaudible
 MOST_MODES = 99  # partials of a key's string: the shipped model's grid holds no more
 MOST_PAIRS = 24  # of them that have a second mode, of the other polarisation
@@ -13,24 +16,50 @@ HIGHEST_SIGMA = 0.5  # of ω: the most damping that bridge and losses by mode gi
 # A string: the fields of `StringParameters`, in their order
 LENGTH, AREA, MOMENT, DENSITY, MODULUS, D1, D3, TENSION = range(8)
 STRING = 8
-# Multipliers of a string, the first of an instrument's values
-STIFFNESS, DECAY, BRIGHTNESS_DECAY, MODULUS_FACTOR, DENSITY_FACTOR, GAUGE, TENSION_FACTOR, LENGTH_FACTOR = range(8)
-KNOBS = 8
-# An instrument's values, which events and the modulation wheel may change
-POSITION, WIDTH, WIDTH_HARD, SOFTEST_MM, HARDEST_MM, CURVE, RELEASE_S, BEND_SEMITONES = range(KNOBS, KNOBS + 8)
-ONSET_DB, DAMPER_DB = range(KNOBS + 8, KNOBS + 10)  # noise of the stroke and of the release
-MUTE = KNOBS + 10  # 0 … 1: palm mute
-HARMONIC = KNOBS + 11  # which partial is the lowest that a touch leaves; 1: there is no touch
-STRUM_MS = KNOBS + 12  # from one string of a chord to the next; 0: all at once
-STROKES = KNOBS + 13  # of strums: one of the three below
-TREMOLO_HZ = KNOBS + 14  # strokes of a key that is held; 0: one
-VIBRATO_CENTS = KNOBS + 15  # how far a finger rolls the pitch up and down
-VIBRATO_HZ = KNOBS + 16
-CONTACT_MS, CONTACT_HARD_MS = range(KNOBS + 17, KNOBS + 19)  # of the softest and the hardest pluck; a 0: at once
-JAVARI_UM = KNOBS + 19  # from the string at rest to the edge of its bridge
-BODY_MIX = KNOBS + 20  # as far as keys are as loud through it
-POINT = KNOBS + 21  # two: listening points
-VALUES = KNOBS + 23
+_played: list[str] = []
+
+
+def _value(id: str) -> int:
+    """The place among an instrument's values of the parameter of this id, which the app's table of parameters has."""
+    _played.append(id)
+    return len(_played) - 1
+
+
+# An instrument's values, which events and the modulation wheel may change. First the multipliers of a string
+STIFFNESS = _value("knobs.stiffness")
+DECAY = _value("knobs.decay")
+BRIGHTNESS_DECAY = _value("knobs.brightness_decay")
+MODULUS_FACTOR = _value("knobs.modulus")
+DENSITY_FACTOR = _value("knobs.density")
+GAUGE = _value("knobs.gauge")
+TENSION_FACTOR = _value("knobs.tension")
+LENGTH_FACTOR = _value("knobs.length")
+KNOBS = len(_played)
+POSITION = _value("pluck.position")
+WIDTH = _value("pluck.width")
+WIDTH_HARD = _value("pluck.width_hard")
+SOFTEST_MM = _value("pluck.softest_mm")
+HARDEST_MM = _value("pluck.hardest_mm")
+CONTACT_MS = _value("pluck.release_ms")
+CONTACT_HARD_MS = _value("pluck.release_hard_ms")
+CURVE = _value("pluck.curve")  # keys are made as loud again when one of the values so far is turned
+RELEASE_S = _value("damping.release_t60_s")
+BEND_SEMITONES = _value("bend_semitones")
+ONSET_DB = _value("noise.onset_db")
+DAMPER_DB = _value("noise.release_db")
+MUTE = _value("damping.mute")
+HARMONIC = _value("technique.harmonic")  # which partial is the lowest that a touch leaves; 1: there is no touch
+STRUM_MS = _value("technique.strum_ms")
+STROKES = _value("technique.strokes")  # one of the three below
+TREMOLO_HZ = _value("technique.tremolo_hz")
+VIBRATO_CENTS = _value("technique.vibrato_cents")
+VIBRATO_HZ = _value("technique.vibrato_hz")
+JAVARI_UM = _value("javari.gap_um")
+BODY_MIX = _value("body.mix")  # as far as keys are as loud through it; the player's wheel turns those before
+POINT = _value("pickup.points.0")
+_value("pickup.points.1")
+PLAYED = tuple(_played)
+VALUES = len(PLAYED)
 DOWN, UP, ALTERNATE = range(3)
 REFERENCE_VELOCITY = 100  # at which keys are equally loud, and levels of noise hold
 # The level of such a note over its first part. Six of the classical guitar, strummed, peak at -9 dBFS
@@ -66,6 +95,12 @@ BODY_REAL, BODY_IMAGINARY, BODY_POWER = range(3)  # the mean of the channels; of
 BODY_LOWEST_HZ, BODY_STEPS = 16.0, 96  # steps an octave: the third of a half-width of a resonance of Q 50
 BODY_POINTS = 992
 BODY_SLOTS = BODY_HEADER + 3 * BODY_POINTS
+CURVES_HZ = 48_000  # rate of the response from which they are taken; keys are as loud at other rates
+
+# Responses of bodies and rooms
+LOUDNESS_LOW_HZ, LOUDNESS_HIGH_HZ = 80.0, 3_000.0  # of the noise that keeps its level: most of a plucked string
+BODY_HIGHEST_HZ = 20_000.0  # of its modes
+ROOM_HZ = 48_000.0  # at which a room is made, so that it is the same room at any rate
 
 # Rows (modes,) of a sound, see `loudness`
 SOUND_OMEGA, SOUND_SIGMA, SOUND_LEFT, SOUND_RIGHT, SOUND_X, SOUND_Y, SOUND_COSINE, SOUND_SINE = range(8)

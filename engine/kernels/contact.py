@@ -18,14 +18,15 @@ it sounds where one source alone is heard, and never where model and truth sound
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
-from numba import carray, njit
+from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import address_of, attack_at, behind, player_at, pointer, table_at
+from engine.kernels.constants import QUANTUM
+from engine.kernels.memory import address_of, attack_at, behind, mixed, mixer_at, player_at, table_at
 from engine.kernels.records import ATTACK, Attack, Noise, Player, Table
 
 HEADER = ATTACK.itemsize // 8
@@ -42,48 +43,43 @@ LEFT_DB = -80.0  # of the burst as it ends
 
 
 @njit(**COMPILED)
-def _mixed(number: int) -> int:
-    """A number with all bits mixed (splitmix64)."""
-    mixed = np.uint64(number) * np.uint64(0x9E3779B97F4A7C15)
-    mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return int(np.int64(mixed ^ (mixed >> np.uint64(31))))
-
-
-@njit(**COMPILED)
 def attack_of(table: Table) -> Attack:
     """The recorded attack of a table that has one."""
     return attack_at(address_of(table) + 8 * table.attack)
 
 
-@njit(**COMPILED)
-def touch(
-    player: Player,
-    table: Table,
-    which: int,
-    level_db: float,
-    strength: float,
-    hardness: float,
-    stroke: int,
-    key: int,
-    frame: int,
-    slid_m: float,
-    slides_s: float,
-) -> None:
-    """Begins the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends.
+class Touch(NamedTuple):
+    """The touch of a string or a drum.
 
-    Args:
-        level_db: energy re a note's; `OFF_DB` and below: none.
+    Attributes:
+        which: STROKE or RELEASE of `constants`.
+        level_db: energy of its noise re a note's; `OFF_DB` and below: none.
         strength: amplitude of the stroke, or of the motion that it stops, over that at the reference velocity.
         hardness: of what touches, over that of which the numbers of its contact hold.
         stroke: with the key, it chooses the noise.
         frame: of the mixer, at which it begins; 0: at once.
         slid_m, slides_s: way and time of a finger along the string, whose windings pass by: then that is the band.
     """
-    if not level_db > OFF_DB:
+
+    which: int
+    level_db: float
+    strength: float
+    hardness: float
+    stroke: int
+    key: int
+    frame: int
+    slid_m: float
+    slides_s: float
+
+
+@njit(**COMPILED)
+def touch(player: Player, table: Table, by: Touch) -> None:
+    """Begin the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends."""
+    if not by.level_db > OFF_DB:
         return
-    kind, rate_hz = table.contacts[which], player.rate_hz
-    energy = table.noise_level * rate_hz * 10.0 ** (level_db / 10)
+    kind, rate_hz, which = table.contacts[by.which], player.rate_hz, by.which
+    strength, hardness = by.strength, by.hardness
+    energy = table.noise_level * rate_hz * 10.0 ** (by.level_db / 10)
     energy *= strength ** (2 * kind.follows) * (HARDEST / (1 + (HARDEST - 1) / hardness**3)) ** 2
     noise, longest = player.noises[0], -1
     for number in range(of.MOST_NOISES):
@@ -98,18 +94,18 @@ def touch(
     pulse_frames = max(2.0, kind.pulse_s * shorter / hardness * rate_hz)
     band_hz, share = kind.burst_hz * brighter * hardness, kind.pulse_share
     attack_s, fall_s = kind.attack_s, kind.fall_s
-    if slides_s > 0.0:
-        band_hz, share = max(slid_m * WINDINGS_M / slides_s, LOWEST_SLIDE_HZ), 0.0
-        attack_s, fall_s = 0.5 * slides_s, 0.1 * slides_s
+    if by.slides_s > 0.0:
+        band_hz, share = max(by.slid_m * WINDINGS_M / by.slides_s, LOWEST_SLIDE_HZ), 0.0
+        attack_s, fall_s = 0.5 * by.slides_s, 0.1 * by.slides_s
     turn = 2 * math.pi * min(band_hz / rate_hz, HIGHEST_SHARE)
     alpha = math.sin(turn) / (2 * kind.burst_q)
     shrinks = math.exp(-1 / max(1.0, fall_s * rate_hz))
     attack_frames = max(1.0, attack_s * rate_hz)
     passed = alpha / (1 + alpha)  # power of white noise in the band
     lasts = attack_frames / 3 + 1 / (1 - shrinks * shrinks)
-    noise.frame = frame
+    noise.frame = by.frame
     noise.done, noise.stops = 0, 0
-    noise.seed = _mixed((stroke * of.KEYS + key) * 2 + which + 1)
+    noise.seed = mixed((by.stroke * of.KEYS + by.key) * 2 + which + 1)
     noise.pulse = math.sqrt(share * energy / (0.375 * pulse_frames))
     noise.pulse_frames = pulse_frames
     noise.burst = math.sqrt((1 - share) * energy / (passed * lasts))
@@ -133,14 +129,14 @@ def touch(
 
 @njit(**COMPILED)
 def hush(player: Player, quanta: int) -> None:
-    """Lets all noises fade out."""
+    """Let all noises fade out."""
     for number in range(of.MOST_NOISES):
         player.noises[number].stops = quanta
 
 
 @njit(**COMPILED)
 def sound(player_address: int, mixer_address: int) -> None:
-    """Adds all noises to the mixer's quantum, both channels alike."""
+    """Add all noises to the mixer's quantum, both channels alike."""
     player = player_at(player_address)
     if player.table == 0:
         return
@@ -153,21 +149,20 @@ def sound(player_address: int, mixer_address: int) -> None:
         gain = 0.0
     before = player.noise_gain
     player.noise_gain = gain
-    mixer = carray(pointer(mixer_address), (at.MIXER_SLOTS,), np.float64)
-    mix = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2)
-    now = mixer.view(np.int64)[at.M_FRAMES]
+    mixer = mixer_at(mixer_address)
+    mix, now = mixer.mix[:], mixer.frames
     for number in range(of.MOST_NOISES):
         noise = player.noises[number]
-        if noise.left == 0 or noise.frame >= now + at.QUANTUM:
+        if noise.left == 0 or noise.frame >= now + QUANTUM:
             continue
         begin, gain_from = 0, before
         if noise.done == 0:
             begin, gain_from = max(0, noise.frame - now), gain
-        end = min(at.QUANTUM, begin + noise.left)
+        end = min(QUANTUM, begin + noise.left)
         if noise.recorded == 0:
             _run(noise, begin, end, gain_from, gain, mix)
         elif table.attack != 0:
-            _play(player, table, noise, begin, end, gain_from, gain, mix)
+            _play(player, attack_of(table), noise, begin, end, gain_from, mix)
         noise.left -= end - begin
         stops = noise.stops
         if stops > 0:
@@ -184,7 +179,7 @@ def _add(mix: np.ndarray, frame: int, force: float, before: float, gain: float, 
 
     It fades out where the noise stops.
     """
-    share = (frame + 1) / at.QUANTUM
+    share = (frame + 1) / QUANTUM
     level = before + (gain - before) * share
     if stops > 0:
         level *= 1 - share / stops
@@ -201,7 +196,7 @@ def _run(
     gain: float,
     mix: np.ndarray,
 ) -> None:
-    """Adds a noise to frames of the mix, while its gain goes from `before` to `gain`."""
+    """Add a noise to frames of the mix, while its gain goes from `before` to `gain`."""
     pulse, pulse_frames = noise.pulse, noise.pulse_frames
     burst, attack_frames = noise.burst, noise.attack_frames
     shrinks, envelope = noise.shrinks, noise.envelope
@@ -210,7 +205,7 @@ def _run(
     x1, x2, y1, y2 = past[0], past[1], past[2], past[3]
     seed, done, stops = noise.seed, noise.done, noise.stops
     for frame in range(begin, end):
-        x = math.sqrt(3.0) * float(_mixed(seed + done) >> 11) / 2.0**52
+        x = math.sqrt(3.0) * float(mixed(seed + done) >> 11) / 2.0**52
         y = b0 * (x - x2) - a1 * y1 - a2 * y2
         x1, x2, y1, y2 = x, x1, y, y1
         force = burst * y * ((done + 0.5) / attack_frames if done < attack_frames else envelope)
@@ -228,16 +223,15 @@ def _run(
 @njit(**COMPILED)
 def _play(
     player: Player,
-    table: Table,
+    attack: Attack,
     noise: Noise,
     begin: int,
     end: int,
     before: float,
-    gain: float,
     mix: np.ndarray,
 ) -> None:
-    """Adds the table's recorded attack, by linear interpolation between its samples, as `_run` adds a noise."""
-    attack = attack_of(table)
+    """Add a recorded attack, by linear interpolation between its samples, as `_run` adds a noise."""
+    gain = player.noise_gain
     frames, step = attack.frames, attack.rate_hz / player.rate_hz
     samples = behind(attack, HEADER, frames)
     amplitude, done, stops = noise.pulse, noise.done, noise.stops

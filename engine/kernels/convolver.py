@@ -14,63 +14,77 @@ nothing is left and nothing is computed.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
-from numba import carray, njit
+from numba import njit
 
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.fourier import transform
-from engine.kernels.memory import fence, pointer
+from engine.kernels.constants import QUANTUM
+from engine.kernels.fields import slots
+from engine.kernels.fourier import ONE, fill_circle, row, silence, transform, turn
+from engine.kernels.memory import address_of, convolver_at, fence, impulse_at, reals, shaped
+from engine.kernels.mixer_records import (
+    CONVOLVER,
+    EARLY,
+    IMPULSE,
+    LARGEST,
+    SMALLEST,
+    WINDOW,
+    WINDOW_QUANTA,
+    Convolver,
+    Impulse,
+    Mixer,
+)
 
-_SUMMING = at.WINDOW_QUANTA - 3  # quanta: one transforms the input, two transform back
-_SHARE = -(-(at.WINDOW + 1) // _SUMMING)  # frequencies in each
+_SUMMING = WINDOW_QUANTA - 3  # quanta: one transforms the input, two transform back
+_SHARE = -(-(WINDOW + 1) // _SUMMING)  # frequencies in each
+FADE_S = 0.020  # at least: the way from one response to another, in whole windows
+BEHIND_CONVOLVER, BEHIND_IMPULSE = slots(CONVOLVER), slots(IMPULSE)
 
 
 @njit(**COMPILED)
-def convolve(mixer: np.ndarray) -> None:
-    """Replaces the mix, (QUANTUM, 2), by its sound with the response. Without a response it is left as it is."""
-    counts = mixer.view(np.int64)
-    if counts[at.M_EFFECTS] == 0 and counts[at.M_EFFECTS_NOW] == 0 and counts[at.M_EFFECTS_NEXT] == 0:
+def convolve(mixer: Mixer) -> None:
+    """Replace the mix, (QUANTUM, 2), by its sound with the response. Without a response it is left as it is."""
+    if mixer.effects == 0 and mixer.effects_now == 0 and mixer.effects_next == 0:
         return
     fence()
-    convolver = carray(pointer(counts[at.M_CONVOLVER]), (1 << 40,), np.float64)
-    whole = convolver.view(np.int64)
-    mix = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2)
-    heard = _clean(counts, mix)
-    if not whole[at.C_ACTIVE] or whole[at.C_PHASE] == 0:
-        _exchange(counts, whole)
-    step, now = whole[at.C_STEP], counts[at.M_EFFECTS_NOW]
+    convolver, mix = convolver_at(mixer.convolver), mixer.mix[:]
+    heard = _clean(mixer, mix)
+    if not convolver.active or convolver.phase == 0:
+        _exchange(mixer, convolver)
+    step, now = convolver.step, mixer.effects_now
     if step < 0 and now == 0:
         return
-    if not whole[at.C_ACTIVE]:
+    if not convolver.active:
         if step < 0 and not heard:
             return
-        _wake(convolver, whole)
-    whole[at.C_QUIET] = 0 if heard else whole[at.C_QUIET] + 1
-    _listen(convolver, whole, mix, step == 0 and now == 0)
-    lane, tail = whole[at.C_LANE], 0
+        _wake(convolver)
+    convolver.quiet = 0 if heard else convolver.quiet + 1
+    _listen(convolver, mix, step == 0 and now == 0)
+    lane, tail = convolver.lane, 0
     if now != 0:
-        tail = _play(convolver, whole, now, lane, step < whole[at.C_FADE_WINDOWS])
-    if step >= 0 and counts[at.M_EFFECTS_NEXT] != 0:
-        _play(convolver, whole, counts[at.M_EFFECTS_NEXT], 1 - lane, True)
-    _mix(convolver, whole, mix, now != 0, counts[at.M_EFFECTS_NEXT] != 0)
-    whole[at.C_PHASE] = (whole[at.C_PHASE] + 1) % at.WINDOW_QUANTA
-    if step < 0 and whole[at.C_QUIET] > tail:
-        whole[at.C_ACTIVE] = 0
+        tail = _play(convolver, impulse_at(now), lane, step < convolver.fade_windows)
+    if step >= 0 and mixer.effects_next != 0:
+        _play(convolver, impulse_at(mixer.effects_next), 1 - lane, True)
+    _mix(convolver, mix, now != 0, mixer.effects_next != 0)
+    convolver.phase = (convolver.phase + 1) % WINDOW_QUANTA
+    if step < 0 and convolver.quiet > tail:
+        convolver.active = 0
 
 
 @njit(**COMPILED)
-def _clean(counts: np.ndarray, mix: np.ndarray) -> bool:
-    """Leaves only what may ring on. Returns whether there is anything."""
+def _clean(mixer: Mixer, mix: np.ndarray) -> bool:
+    """Leave only what may ring on. Returns whether there is anything."""
     heard = False
-    for frame in range(at.QUANTUM):
+    for frame in range(QUANTUM):
         left, right = mix[frame, 0], mix[frame, 1]
-        if not (abs(left) < at.LARGEST and abs(right) < at.LARGEST):
+        if not (abs(left) < LARGEST and abs(right) < LARGEST):
             left = right = 0.0
-            counts[at.M_NON_FINITE] += 1
-        if abs(left) < at.SMALLEST:
+            mixer.non_finite += 1
+        if abs(left) < SMALLEST:
             left = 0.0
-        if abs(right) < at.SMALLEST:
+        if abs(right) < SMALLEST:
             right = 0.0
         heard = heard or left != 0.0 or right != 0.0
         mix[frame, 0], mix[frame, 1] = left, right
@@ -78,218 +92,202 @@ def _clean(counts: np.ndarray, mix: np.ndarray) -> bool:
 
 
 @njit(**COMPILED)
-def _exchange(counts: np.ndarray, whole: np.ndarray) -> None:
-    """Continues with a change of the response, or begins one; it is made at once where it is inaudible."""
-    if whole[at.C_STEP] >= 0:
-        whole[at.C_STEP] += 1
-        if whole[at.C_STEP] <= whole[at.C_FADE_WINDOWS]:
+def _exchange(mixer: Mixer, convolver: Convolver) -> None:
+    """Continue with a change of the response, or begin one; it is made at once where it is inaudible."""
+    if convolver.step >= 0:
+        convolver.step += 1
+        if convolver.step <= convolver.fade_windows:
             return
-        _take(counts, whole)
-    wanted, now = counts[at.M_EFFECTS], counts[at.M_EFFECTS_NOW]
+        _take(mixer, convolver)
+    wanted, now = mixer.effects, mixer.effects_now
     if wanted == now:
         return
-    counts[at.M_EFFECTS_NEXT] = wanted
+    mixer.effects_next = wanted
     fence()
-    if counts[at.M_EFFECTS] != wanted:  # it may be gone already: ask again
-        counts[at.M_EFFECTS_NEXT] = 0
+    if mixer.effects != wanted:  # it may be gone already: ask again
+        mixer.effects_next = 0
         return
-    whole[at.C_STEP] = 0
+    convolver.step = 0
     if now == 0:
-        whole[at.C_ACTIVE] = 0  # the input up to now is not known
-    if counts[at.M_FRAMES] == 0 or (now != 0 and not whole[at.C_ACTIVE]):
-        _take(counts, whole)
+        convolver.active = 0  # the input up to now is not known
+    if mixer.frames == 0 or (now != 0 and not convolver.active):
+        _take(mixer, convolver)
 
 
 @njit(**COMPILED)
-def _take(counts: np.ndarray, whole: np.ndarray) -> None:
+def _take(mixer: Mixer, convolver: Convolver) -> None:
     """The next response is the one that is heard."""
-    whole[at.C_STEP] = -1
-    whole[at.C_LANE] = 1 - whole[at.C_LANE]
-    counts[at.M_EFFECTS_NOW] = counts[at.M_EFFECTS_NEXT]
+    convolver.step = -1
+    convolver.lane = 1 - convolver.lane
+    mixer.effects_now = mixer.effects_next
     fence()
-    counts[at.M_EFFECTS_NEXT] = 0
+    mixer.effects_next = 0
 
 
 @njit(**COMPILED)
-def _wake(convolver: np.ndarray, whole: np.ndarray) -> None:
+def _wake(convolver: Convolver) -> None:
     """Reset the convolver, as if there had never been any input."""
-    convolver[at.C_EARLY_INPUT : at.C_WORK] = 0.0
-    convolver[at.C_GIVEN : at.C_WET] = 0.0
-    whole[at.C_PHASE] = whole[at.C_WINDOWS] = whole[at.C_QUIET] = 0
-    whole[at.C_EARLY_FILLED] = whole[at.C_LATE_FILLED] = 0
-    whole[at.C_ACTIVE] = 1
+    convolver.early_input[:] = 0.0
+    convolver.late_input[:] = 0.0
+    convolver.given[:] = 0.0
+    convolver.phase = convolver.windows = convolver.quiet = 0
+    convolver.early_filled = convolver.late_filled = 0
+    convolver.active = 1
 
 
 @njit(**COMPILED)
-def _listen(convolver: np.ndarray, whole: np.ndarray, mix: np.ndarray, softly: bool) -> None:
+def _late(convolver: Convolver) -> np.ndarray:
+    """The late spectra, (capacity, 2, 2, WINDOW + 1)."""
+    return shaped(reals(address_of(convolver)), BEHIND_CONVOLVER, (convolver.capacity, 2, 2, WINDOW + 1))
+
+
+@njit(**COMPILED)
+def _listen(convolver: Convolver, mix: np.ndarray, softly: bool) -> None:
     """The spectra of the input's last two quanta and, where a window is over, of its last two windows.
 
     softly: the first window of a sound that began before; with an edge it would click, and ring on.
     """
-    phase = whole[at.C_PHASE]
+    phase = convolver.phase
+    early_input, late_input = convolver.early_input[:], convolver.late_input[:]
     if phase == 0:
-        if whole[at.C_WINDOWS] > 0:
-            place = (whole[at.C_LATE_PLACE] + 1) % whole[at.C_CAPACITY]
-            spectrum = at.C_LATE + place * 4 * (at.WINDOW + 1)
-            _analyse(convolver, at.C_LATE_INPUT, at.WINDOW, spectrum)
-            whole[at.C_LATE_PLACE] = place
-            whole[at.C_LATE_FILLED] = min(whole[at.C_LATE_FILLED] + 1, whole[at.C_CAPACITY])
-        whole[at.C_WINDOWS] += 1
-        whole[at.C_HALF] = 1 - whole[at.C_HALF]
+        if convolver.windows > 0:
+            place = (convolver.late_place + 1) % convolver.capacity
+            _analyse(convolver, late_input, _late(convolver)[place])
+            convolver.late_place = place
+            convolver.late_filled = min(convolver.late_filled + 1, convolver.capacity)
+        convolver.windows += 1
+        convolver.half = 1 - convolver.half
     for side in range(2):
-        early = convolver[at.C_EARLY_INPUT + side * 2 * at.QUANTUM :]
-        late = convolver[at.C_LATE_INPUT + side * 2 * at.WINDOW + at.WINDOW + phase * at.QUANTUM :]
-        for frame in range(at.QUANTUM):
-            share = _way((phase * at.QUANTUM + frame + 1) / at.WINDOW) if softly else 1.0
-            early[at.QUANTUM + frame] = late[frame] = share * mix[frame, side]
-    place = (whole[at.C_EARLY_PLACE] + 1) % at.EARLY
-    _analyse(convolver, at.C_EARLY_INPUT, at.QUANTUM, at.C_EARLY + place * 4 * (at.QUANTUM + 1))
-    whole[at.C_EARLY_PLACE] = place
-    whole[at.C_EARLY_FILLED] = min(whole[at.C_EARLY_FILLED] + 1, at.EARLY)
+        early, late = early_input[side], late_input[side, WINDOW + phase * QUANTUM :]
+        for frame in range(QUANTUM):
+            share = _way((phase * QUANTUM + frame + 1) / WINDOW) if softly else 1.0
+            early[QUANTUM + frame] = late[frame] = share * mix[frame, side]
+    place = (convolver.early_place + 1) % EARLY
+    _analyse(convolver, early_input, convolver.early[place])
+    convolver.early_place = place
+    convolver.early_filled = min(convolver.early_filled + 1, EARLY)
 
 
 @njit(**COMPILED)
-def _analyse(convolver: np.ndarray, source: int, half: int, spectrum: int) -> None:
-    """The spectra of two real signals (2, 2 half) by one complex transform; their later halves become the earlier."""
-    n = 2 * half
+def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> None:
+    """The spectra (2, 2, half + 1) of two real signals (2, 2 half) by one complex transform.
+
+    The signals' later halves become the earlier.
+    """
+    n, half = signals.shape[1], signals.shape[1] // 2
     re, im, re2, im2 = _work(convolver, n)
     for frame in range(n):
-        re[frame], im[frame] = convolver[source + frame], convolver[source + n + frame]
+        re[frame], im[frame] = signals[0, frame], signals[1, frame]
     for side in range(2):
-        signal = convolver[source + side * n : source + (side + 1) * n]
+        signal = signals[side]
         for frame in range(half):
             signal[frame] = signal[half + frame]
-    _transform(convolver, re, im, re2, im2)
-    bins = half + 1
-    left_re, left_im = convolver[spectrum : spectrum + bins], convolver[spectrum + bins : spectrum + 2 * bins]
-    spectrum += 2 * bins
-    right_re, right_im = convolver[spectrum : spectrum + bins], convolver[spectrum + bins : spectrum + 2 * bins]
-    for k in range(bins):
+    transform(re, im, re2, im2, convolver.cosines[:], convolver.sines[:])
+    left_re, left_im, right_re, right_im = spectra[0, 0], spectra[0, 1], spectra[1, 0], spectra[1, 1]
+    for k in range(half + 1):
         mirror = n - k if k > 0 else 0
         left_re[k], left_im[k] = 0.5 * (re[k] + re[mirror]), 0.5 * (im[k] - im[mirror])
         right_re[k], right_im[k] = 0.5 * (im[k] + im[mirror]), 0.5 * (re[mirror] - re[k])
 
 
 @njit(**COMPILED)
-def _play(convolver: np.ndarray, whole: np.ndarray, address: int, lane: int, later: bool) -> int:
+def _play(convolver: Convolver, impulse: Impulse, lane: int, later: bool) -> int:
     """A quantum of a lane; `later`: the next window needs it too. Returns after how many quanta it has rung out."""
-    impulse = carray(pointer(address), (1 << 40,), np.float64)
-    sizes = impulse.view(np.int64)
-    channels, early, late = sizes[at.I_CHANNELS], sizes[at.I_EARLY], sizes[at.I_LATE]
-    bins, sums = at.QUANTUM + 1, at.C_SUMS + 8 * (at.WINDOW + 1)
-    count = min(early, whole[at.C_EARLY_FILLED])
-    place = whole[at.C_EARLY_PLACE]
-    _multiply(convolver, at.C_EARLY, at.EARLY, place, impulse[at.I_HEADER :], channels, count, bins, 0, bins, sums)
-    wet = at.C_WET + lane * 2 * at.QUANTUM
-    _synthesise(convolver, sums, at.QUANTUM, wet)
+    channels, early, late, spectra = impulse.channels, impulse.early, impulse.late, reals(address_of(impulse))
+    response, sums = shaped(spectra, BEHIND_IMPULSE, (early, channels, 2, QUANTUM + 1)), convolver.early_sums[:]
+    count = min(early, convolver.early_filled)
+    _multiply(convolver.early[:], convolver.early_place, response[:count], 0, QUANTUM + 1, sums)
+    wet = convolver.wet[lane]
+    _synthesise(convolver, sums, wet)
     if late > 0:
-        given = at.C_GIVEN + (2 * lane + whole[at.C_HALF]) * 2 * at.WINDOW + whole[at.C_PHASE] * at.QUANTUM
         for side in range(2):
-            for frame in range(at.QUANTUM):
-                convolver[wet + side * at.QUANTUM + frame] += convolver[given + side * at.WINDOW + frame]
+            given = convolver.given[lane, convolver.half, side, convolver.phase * QUANTUM :]
+            for frame in range(QUANTUM):
+                wet[side, frame] += given[frame]
         if later:
-            first = at.I_HEADER + early * channels * 2 * (at.QUANTUM + 1)
-            _compute(convolver, whole, impulse[first:], channels, late, lane)
-    return early + (late + 4) * at.WINDOW_QUANTA
+            first = BEHIND_IMPULSE + early * channels * 2 * (QUANTUM + 1)
+            _compute(convolver, shaped(spectra, first, (late, channels, 2, WINDOW + 1)), lane)
+    return early + (late + 4) * WINDOW_QUANTA
 
 
 @njit(**COMPILED)
-def _compute(
-    convolver: np.ndarray, whole: np.ndarray, impulse: np.ndarray, channels: int, late: int, lane: int
-) -> None:
+def _compute(convolver: Convolver, response: np.ndarray, lane: int) -> None:
     """Compute this quantum's part of what the late partitions give in the next window."""
-    phase, bins, sums = whole[at.C_PHASE], at.WINDOW + 1, at.C_SUMS + lane * 4 * (at.WINDOW + 1)
-    count = min(late, whole[at.C_LATE_FILLED])
+    phase, sums = convolver.phase, convolver.late_sums[lane]
+    count = min(len(response), convolver.late_filled)
     if 1 <= phase <= _SUMMING:
-        begin, end = (phase - 1) * _SHARE, min(phase * _SHARE, bins)
-        place = whole[at.C_LATE_PLACE]
-        capacity = whole[at.C_CAPACITY]
-        _multiply(convolver, at.C_LATE, capacity, place, impulse, channels, count, bins, begin, end, sums)
-    elif phase == at.WINDOW_QUANTA - 2 + lane:
-        goal = at.C_GIVEN + (2 * lane + 1 - whole[at.C_HALF]) * 2 * at.WINDOW
+        begin, end = (phase - 1) * _SHARE, min(phase * _SHARE, WINDOW + 1)
+        _multiply(_late(convolver), convolver.late_place, response[:count], begin, end, sums)
+    elif phase == WINDOW_QUANTA - 2 + lane:
+        goal = convolver.given[lane, 1 - convolver.half]
         if count > 0:
-            _synthesise(convolver, sums, at.WINDOW, goal)
+            _synthesise(convolver, sums, goal)
         else:
-            convolver[goal : goal + 2 * at.WINDOW] = 0.0
+            goal[:] = 0.0
 
 
 @njit(**COMPILED)
-def _multiply(
-    convolver: np.ndarray,
-    spectra: int,
-    ring: int,
-    place: int,
-    impulse: np.ndarray,
-    channels: int,
-    count: int,
-    bins: int,
-    begin: int,
-    end: int,
-    sums: int,
-) -> None:
-    """The sum over partitions of input times response, at some of the frequencies."""
+def _multiply(spectra: np.ndarray, place: int, response: np.ndarray, begin: int, end: int, sums: np.ndarray) -> None:
+    """The sum over partitions of input times response, at some of the frequencies.
+
+    Args:
+        spectra: of the input, a ring (partitions, 2, 2, bins), whose latest is at `place`.
+        response: (partitions, channels, 2, bins).
+    """
+    ring, channels = len(spectra), response.shape[1]
     for side in range(2):
         of = side if channels == 2 else 0
-        sum_re = convolver[sums + side * 2 * bins + begin : sums + side * 2 * bins + end]
-        sum_im = convolver[sums + (side * 2 + 1) * bins + begin : sums + (side * 2 + 1) * bins + end]
+        sum_re, sum_im = sums[side, 0, begin:end], sums[side, 1, begin:end]
         sum_re[:] = 0.0
         sum_im[:] = 0.0
-        for partition in range(count):
+        for partition in range(len(response)):
             slot = (place - partition + ring) % ring
-            x = spectra + (slot * 2 + side) * 2 * bins
-            h = (partition * channels + of) * 2 * bins
-            x_re, x_im = convolver[x + begin : x + end], convolver[x + bins + begin : x + bins + end]
-            h_re, h_im = impulse[h + begin : h + end], impulse[h + bins + begin : h + bins + end]
+            x_re, x_im = spectra[slot, side, 0, begin:end], spectra[slot, side, 1, begin:end]
+            h_re, h_im = response[partition, of, 0, begin:end], response[partition, of, 1, begin:end]
             for k in range(end - begin):
                 sum_re[k] += x_re[k] * h_re[k] - x_im[k] * h_im[k]
                 sum_im[k] += x_re[k] * h_im[k] + x_im[k] * h_re[k]
 
 
 @njit(**COMPILED)
-def _synthesise(convolver: np.ndarray, spectrum: int, half: int, goal: int) -> None:
+def _synthesise(convolver: Convolver, spectra: np.ndarray, goal: np.ndarray) -> None:
     """The later halves (2, half) of two real signals from their spectra, by one complex transform."""
+    half = goal.shape[1]
     n, bins = 2 * half, half + 1
     re, im, re2, im2 = _work(convolver, n)
-    left_re, left_im = convolver[spectrum : spectrum + bins], convolver[spectrum + bins : spectrum + 2 * bins]
-    spectrum += 2 * bins
-    right_re, right_im = convolver[spectrum : spectrum + bins], convolver[spectrum + bins : spectrum + 2 * bins]
+    left_re, left_im, right_re, right_im = spectra[0, 0], spectra[0, 1], spectra[1, 0], spectra[1, 1]
     for k in range(bins):
         re[k], im[k] = left_re[k] - right_im[k], left_im[k] + right_re[k]
     for k in range(1, half):
         re[n - k], im[n - k] = left_re[k] + right_im[k], right_re[k] - left_im[k]
-    _transform(convolver, im, re, im2, re2)  # exchanged: the inverse
+    transform(im, re, im2, re2, convolver.cosines[:], convolver.sines[:])  # exchanged: the inverse
+    left, right = goal[0], goal[1]
     for frame in range(half):
-        convolver[goal + frame], convolver[goal + half + frame] = re[half + frame], im[half + frame]
+        left[frame], right[frame] = re[half + frame], im[half + frame]
 
 
 @njit(**COMPILED)
-def _work(convolver: np.ndarray, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    work = convolver[at.C_WORK : at.C_WORK + 4 * n]
-    return work[:n], work[n : 2 * n], work[2 * n : 3 * n], work[3 * n : 4 * n]
+def _work(convolver: Convolver, n: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    work = convolver.work[:]
+    return work[0, :n], work[1, :n], work[2, :n], work[3, :n]
 
 
 @njit(**COMPILED)
-def _transform(convolver: np.ndarray, re: np.ndarray, im: np.ndarray, re2: np.ndarray, im2: np.ndarray) -> None:
-    cosines, sines = convolver[at.C_COSINES : at.C_SINES], convolver[at.C_SINES : at.C_EARLY_INPUT]
-    transform(re, im, re2, im2, cosines, sines)
-
-
-@njit(**COMPILED)
-def _mix(convolver: np.ndarray, whole: np.ndarray, mix: np.ndarray, wet_now: bool, wet_next: bool) -> None:
+def _mix(convolver: Convolver, mix: np.ndarray, wet_now: bool, wet_next: bool) -> None:
     """The output: a lane, or the fade from one to the other.
 
     A lane without a response is the mix itself.
     """
-    step, lane = whole[at.C_STEP], whole[at.C_LANE]
-    now, following = at.C_WET + lane * 2 * at.QUANTUM, at.C_WET + (1 - lane) * 2 * at.QUANTUM
-    done = (step - 1) * at.WINDOW + whole[at.C_PHASE] * at.QUANTUM
-    frames = whole[at.C_FADE_WINDOWS] * at.WINDOW
+    step, lane = convolver.step, convolver.lane
+    now, following = convolver.wet[lane], convolver.wet[1 - lane]
+    done = (step - 1) * WINDOW + convolver.phase * QUANTUM
+    frames = convolver.fade_windows * WINDOW
     for side in range(2):
-        for frame in range(at.QUANTUM):
+        for frame in range(QUANTUM):
             dry = mix[frame, side]
-            value = convolver[now + side * at.QUANTUM + frame] if wet_now else dry
+            value = now[side, frame] if wet_now else dry
             if step > 0:
-                other = convolver[following + side * at.QUANTUM + frame] if wet_next else dry
+                other = following[side, frame] if wet_next else dry
                 value += _way((done + frame + 1) / frames) * (other - value)
             mix[frame, side] = value
 
@@ -298,3 +296,64 @@ def _mix(convolver: np.ndarray, whole: np.ndarray, mix: np.ndarray, wet_now: boo
 def _way(share: float) -> float:
     """The smooth way from 0 to 1, without a corner."""
     return share * share * (3 - 2 * share)
+
+
+@njit(**COMPILED)
+def begin(convolver: Convolver, rate_hz: float, frames: int) -> None:
+    """Set up a convolver, which is all 0, for responses of so many frames."""
+    convolver.capacity = late_partitions(frames) + 1
+    convolver.fade_windows = math.ceil(FADE_S * rate_hz / WINDOW)
+    convolver.step = -1
+    fill_circle(convolver.cosines[:], convolver.sines[:])
+
+
+@njit(**COMPILED)
+def convolver_slots(frames: int) -> int:
+    """The memory of a convolver for responses of so many frames."""
+    return BEHIND_CONVOLVER + (late_partitions(frames) + 1) * 4 * (WINDOW + 1)
+
+
+@njit(**COMPILED)
+def late_partitions(frames: int) -> int:
+    """The partitions of a window's length of a response."""
+    return max(0, (frames - EARLY * QUANTUM + WINDOW - 1) // WINDOW)
+
+
+@njit(**COMPILED)
+def early_partitions(frames: int) -> int:
+    """The partitions of a quantum's length before them."""
+    return min(EARLY, (frames + QUANTUM - 1) // QUANTUM)
+
+
+@njit(**COMPILED)
+def partitioned_slots(frames: int, channels: int) -> int:
+    """The memory of a response in partitions."""
+    early, late = early_partitions(frames), late_partitions(frames)
+    return BEHIND_IMPULSE + 2 * channels * (early * (QUANTUM + 1) + late * (WINDOW + 1))
+
+
+@njit(**COMPILED)
+def partition(work: np.ndarray, response: np.ndarray, frames: int, impulse: Impulse) -> None:
+    """Write a response (frames, 1 or 2) as the convolver reads it; the inverse transform's factor is in it.
+
+    Args:
+        work: a work space of `fourier` for two windows.
+        frames: of it with silence at the end.
+        impulse: of `partitioned_slots`.
+    """
+    channels, early, late = response.shape[1], early_partitions(frames), late_partitions(frames)
+    impulse.channels, impulse.early, impulse.late = channels, early, late
+    memory, place, first = reals(address_of(impulse)), BEHIND_IMPULSE, 0
+    for number in range(early + late):
+        length = QUANTUM if number < early else WINDOW
+        for channel in range(channels):
+            re, im = row(work, ONE, 2 * length), row(work, ONE + 1, 2 * length)
+            silence(work, ONE, 0, 2 * length)
+            for frame in range(min(length, len(response) - first)):
+                re[frame] = response[first + frame, channel]
+            turn(work, ONE, ONE + 1, 2 * length)
+            for k in range(length + 1):
+                memory[place + k] = re[k] / (2 * length)
+                memory[place + length + 1 + k] = im[k] / (2 * length)
+            place += 2 * (length + 1)
+        first += length

@@ -18,11 +18,12 @@ import numpy as np
 from numba import njit
 
 from engine import bounds
+from engine.kernels import pulses
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import behind, drum_at
 from engine.kernels.records import DRUM as DRUM_BLOCK
 from engine.kernels.records import DRUM_ROWS
-from engine.levels import FULL_SCALE_PA
+from engine.levels import FULL_SCALE_PA, MOST_PERIODS
 
 HEADER = DRUM_BLOCK.itemsize // 8
 
@@ -48,6 +49,7 @@ BEYOND_THE_END = 0.6133  # of a radius
 LEAST_VOLUME = 1e-6  # square of a mode's mean, below which it moves no column
 TUNINGS, NEAR = 6, 1e-4  # rounds of a secant method, and of a frequency, where it ends
 LOW_HZ, LOW_MODES = 3.0, 6  # among which a pitch is: below so many times the lowest, without air
+HERTZ = -0.2  # power of the speed in the time of contact
 J01 = 2.404825557695773  # the first zero of J₀
 
 
@@ -58,7 +60,7 @@ def _hypot(x: float, y: float) -> float:
 
 @njit(**COMPILED)
 def bessels(x: float, out: np.ndarray) -> float:
-    """Writes J_m(x) of m from 0 on, x ≥ 0, and returns Struve's H₁(x).
+    """Write J_m(x) of m from 0 on, x ≥ 0, and return Struve's H₁(x).
 
     From a high order down (Miller), with J₀ + 2 J₂ + 2 J₄ + … = 1; orders beyond the turning point are 0.
     """
@@ -120,7 +122,7 @@ def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray
 
 @njit(**COMPILED)
 def tabulate(table: np.ndarray) -> None:
-    """Writes J_m of multiples of STEP, (steps, TERMS + orders + TERMS): m from -TERMS on."""
+    """Write J_m of multiples of STEP, (steps, TERMS + orders + TERMS): m from -TERMS on."""
     for step in range(table.shape[0]):
         row = table[step]
         bessels(step * STEP, row[TERMS:])
@@ -339,7 +341,7 @@ def reach(drum: np.ndarray, highest_hz: float, most: int) -> float:
 
 @njit(**COMPILED)
 def modes(drum: np.ndarray, around: Around, highest_hz: float, most: int, work: np.ndarray, out: np.ndarray) -> int:
-    """Writes the lowest modes below a frequency, so many at most, and returns how many they are.
+    """Write the lowest modes below a frequency, so many at most, and return how many they are.
 
     Args:
         work: of 4 modes of the surface, and ORDERS.
@@ -436,7 +438,7 @@ def _principal(drum: np.ndarray, around: Around, work: np.ndarray, out: np.ndarr
 
 @njit(**COMPILED)
 def tune(drum: np.ndarray, ratio: float, around: Around, work: np.ndarray, out: np.ndarray) -> None:
-    """Raises a drum's pitch by a ratio: a membrane's by its tension, a plate's by its size."""
+    """Raise a drum's pitch by a ratio: a membrane's by its tension, a plate's by its size."""
     if ratio == 1.0:
         return
     if drum[TENSION] == 0.0:
@@ -474,6 +476,34 @@ def struck(
 
 
 @njit(**COMPILED)
+def blow(
+    squares: np.ndarray,
+    struck: np.ndarray,
+    contact_s: float,
+    masses_kg: tuple[float, float],
+    speed: float,
+    out: np.ndarray,
+) -> None:
+    """Speeds (modes,) that a mallet's blow gives, see `engine.strike`.
+
+    Args:
+        squares, struck: ω², and what 1 N s at once gives, (modes,).
+        contact_s: the time of contact at 1 m/s.
+        masses_kg: of each mode, and of the mallet.
+    """
+    lowest, energy = np.inf, 0.0
+    for mode in range(len(out)):
+        lowest = min(lowest, squares[mode])
+    contact_s = min(contact_s * max(speed, 1e-3) ** HERTZ, MOST_PERIODS * 2 * math.pi / math.sqrt(lowest))
+    for mode in range(len(out)):
+        out[mode] = struck[mode] * pulses.spectrum(math.sqrt(squares[mode]) * contact_s / (2 * math.pi))
+        energy += 0.5 * masses_kg[0] * out[mode] ** 2
+    impulse = speed / (energy + 0.5 / masses_kg[1])
+    for mode in range(len(out)):
+        out[mode] *= impulse
+
+
+@njit(**COMPILED)
 def radiated(drum: np.ndarray, found: np.ndarray, x: float, y: float, tools: Tools, out: np.ndarray) -> None:
     """Sound pressure in Pa of modes at amplitude 1 m, 1 m off, as from a baffle: see `DrumModes.radiated`."""
     for mode in range(len(out)):
@@ -486,7 +516,7 @@ def radiated(drum: np.ndarray, found: np.ndarray, x: float, y: float, tools: Too
 
 @njit(**COMPILED)
 def write(drum: np.ndarray, found: np.ndarray, points: np.ndarray, tools: Tools, address: int, n: int) -> None:
-    """Writes the drum of a key, n modes and its blow, heard at points, as the player reads it: see `records.DRUM`."""
+    """Write the drum of a key, n modes and its blow, heard at points, as the player reads it: see `records.DRUM`."""
     mu, block = drum[DENSITY] * drum[THICKNESS], drum_at(address)
     block.modes, block.mallet_kg, block.contact_s = n, drum[MALLET_KG], drum[CONTACT]
     block.softest_m_s, block.hardest_m_s, block.mass_kg = drum[SOFTEST], drum[HARDEST], mass_kg(drum)

@@ -12,16 +12,16 @@ import numpy as np
 from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels import layout as at
-from engine.kernels import loudness
+from engine.kernels import drum_modes, loudness, velocities
+from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import address_of, behind, drum_at, matrix, reals, wholes
-from engine.kernels.modes import TOO_HIGH
+from engine.kernels.memory import address_of, behind, drum_at, matrix, reals, voice_at, wholes
+from engine.kernels.modes import TOO_HIGH, row, weights
 from engine.kernels.playing import channels, slots
 from engine.kernels.records import DRUM, DRUM_ROWS, Drum, Event, Note, Player, Table
-from engine.levels import MOST_PERIODS, RUNAWAY_FACTOR
+from engine.kernels.voice_records import Voice
+from engine.levels import RUNAWAY_FACTOR
 
-HERTZ = -0.2  # power of the speed in the time of contact, as in `engine.strike`
 FIRM_S = 0.004  # in which a stick touches a skin at 1 m/s: what touches for as long has the hardness 1
 MOST_HARDER = 2.0  # the hardness of any other
 HEADER = DRUM.itemsize // 8
@@ -51,14 +51,13 @@ def rows_of(drum: Drum) -> np.ndarray:
 @njit(**COMPILED)
 def _speed(drum: Drum, share: float) -> float:
     """The speed of a mallet at a share of the velocities, in m/s."""
-    return drum.softest_m_s * (drum.hardest_m_s / drum.softest_m_s) ** share
+    return velocities.between(drum.softest_m_s, drum.hardest_m_s, share)
 
 
 @njit(**COMPILED)
 def _speed_of(player: Player, drum: Drum, velocity: float) -> float:
     """The speed of a mallet at a velocity, by the instrument's curve, in m/s."""
-    curve = player.values[of.CURVE]
-    return _speed(drum, min(max((velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve))
+    return _speed(drum, velocities.share(velocity, player.values[of.CURVE]))
 
 
 @njit(**COMPILED)
@@ -71,25 +70,9 @@ def contact_of(player: Player, table: Table, key: int, velocity: float) -> tuple
 
 @njit(**COMPILED)
 def _blow(drum: Drum, struck: np.ndarray, speed: float, out: np.ndarray) -> None:
-    """The speeds (modes,) that a blow gives; `struck`: those that 1 N s gives. As `engine.strike.Strike.speeds`."""
-    squares, energy = rows_of(drum)[SQUARE], 0.0
-    lowest = squares[0]
-    for mode in range(drum.modes):
-        lowest = min(lowest, squares[mode])
-    contact_s = drum.contact_s * max(speed, 1e-3) ** HERTZ
-    contact_s = min(contact_s, MOST_PERIODS * 2 * math.pi / math.sqrt(lowest))
-    for mode in range(drum.modes):
-        turns = math.sqrt(squares[mode]) * contact_s / (2 * math.pi)
-        pulse = 0.5
-        if turns < 1e-6:
-            pulse = 1.0
-        elif abs(turns - 1) > 1e-6:
-            pulse = math.sin(math.pi * turns) / (math.pi * turns * (1 - turns * turns))
-        out[mode] = struck[mode] * pulse
-        energy += 0.5 * drum.mass_kg * out[mode] ** 2
-    impulse = speed / (energy + 0.5 / drum.mallet_kg)
-    for mode in range(drum.modes):
-        out[mode] *= impulse
+    """The speeds (modes,) that a blow gives; `struck`: those that 1 N s gives."""
+    masses_kg = drum.mass_kg, drum.mallet_kg
+    drum_modes.blow(rows_of(drum)[SQUARE], struck, drum.contact_s, masses_kg, speed, out[: drum.modes])
 
 
 @njit(**COMPILED)
@@ -135,7 +118,7 @@ def gain_of(player: Player, table: Table, key: int) -> float:
 
 @njit(**COMPILED)
 def strike(player: Player, table: Table, event: Event, number: int) -> float:
-    """Makes the voices of one of the player's notes; their gain, 0: no drum."""
+    """Make the voices of one of the player's notes; their gain, 0: no drum."""
     if not has_drum(table, event.key):
         return 0.0
     drum = drum_of(table, event.key)
@@ -162,49 +145,42 @@ def _make(
 
     `struck`: those that 1 N s gives.
     """
-    voice, counts, n, rate_hz, rows = reals(address), wholes(address), drum.modes, player.rate_hz, rows_of(drum)
-    kind = table.kinds[source]
-    used = at.FOLLOWING if kind == at.TENSION else at.TRUTH_ROWS  # what follows from them is prepared
-    for slot in range(at.state(n) + used * n):
-        voice[slot] = 0.0
-    counts[at.KIND], counts[at.PROGRAM] = kind, table.programs[source]
-    counts[at.MODES], counts[at.POINTS] = n, table.points
-    counts[at.BEGAN_FRAME], counts[at.MOVING] = -1, n
-    counts[at.FADE_FRAMES] = round(at.FADE_S * rate_hz)
-    counts[at.ENDS_AT], counts[at.ENDS_IN] = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
-    voice[at.SILENT] = at.SILENT_DB * math.log(10.0) / 20
-    place = at.state(n) + at.OMEGA_SQUARED * n
-    for row in range(STRUCK):
-        for mode in range(n):
-            voice[place + row * n + mode] = rows[row, mode]
+    # What follows from the modes is prepared
+    used = at.FOLLOWING if table.kinds[source] == at.TENSION else at.TRUTH_ROWS
+    voice = slots.blank_voice(player, table, address, source, drum.modes, used)
+    given, speeds = rows_of(drum), row(voice, 1)
+    for which in range(STRUCK):
+        own = row(voice, at.OMEGA_SQUARED + which)
+        for mode in range(drum.modes):
+            own[mode] = given[which, mode]
     weigh(player, table, voice, 0, drum)
-    first, widest, loudest = at.state(n), 0.0, 0.0
-    _blow(drum, struck, speed, voice[first + n : first + 2 * n])
-    for mode in range(n):
-        moved, omega = voice[first + n + mode], math.sqrt(rows[SQUARE, mode])
+    _blow(drum, struck, speed, speeds)
+    widest, loudest = 0.0, 0.0
+    for mode in range(drum.modes):
+        moved, omega = speeds[mode], math.sqrt(given[SQUARE, mode])
         widest += abs(moved) / omega
         heard = 0.0
-        for point in range(counts[at.POINTS]):
-            heard = max(heard, abs(voice[at.weights(n, 0, point, 0) + mode]))
+        for point in range(voice.points):
+            heard = max(heard, abs(weights(voice, 0, point, 0)[mode]))
         loudest += heard * abs(moved) / omega
-    voice[at.PEAK], voice[at.LIMIT] = max(widest, 1e-9), max(RUNAWAY_FACTOR * loudest, 1e-3)
+    voice.peak, voice.limit = max(widest, 1e-9), max(RUNAWAY_FACTOR * loudest, 1e-3)
 
 
 @njit(**COMPILED)
-def weigh(player: Player, table: Table, voice: np.ndarray, which: int, drum: Drum) -> None:
-    """Sets one of the two sets of weights of a voice; modes too high for the rate are not heard."""
-    n, highest, rows = drum.modes, TOO_HIGH * player.rate_hz, rows_of(drum)
+def weigh(player: Player, table: Table, voice: Voice, which: int, drum: Drum) -> None:
+    """Set one of the two sets of weights of a voice; modes too high for the rate are not heard."""
+    highest, given = TOO_HIGH * player.rate_hz, rows_of(drum)
     for point in range(table.points):
-        for mode in range(n):
-            heard = rows[SQUARE, mode] <= highest * highest
-            first = at.weights(n, which, point, 0) + mode
-            voice[first] = rows[WEIGHTS + point, mode] if heard else 0.0
-            voice[first + n] = 0.0
+        own, imaginary = weights(voice, which, point, 0), weights(voice, which, point, 1)
+        for mode in range(drum.modes):
+            heard = given[SQUARE, mode] <= highest * highest
+            own[mode] = given[WEIGHTS + point, mode] if heard else 0.0
+            imaginary[mode] = 0.0
 
 
 @njit(**COMPILED)
 def hear(player: Player, table: Table, note: Note) -> None:
-    """Lets a note follow the gains of sources and the places where the drum is heard."""
+    """Let a note follow the gains of sources and the places where the drum is heard."""
     if table.drums == 0 or not has_drum(table, note.key):
         return
     drum, gain = drum_of(table, note.key), note.gain * channels.loudness(player, table.mode, note.channel)
@@ -216,12 +192,12 @@ def hear(player: Player, table: Table, note: Note) -> None:
         address = note.voices[source]
         if address == 0:
             continue
-        counts = wholes(address)
-        if counts[at.MODES] != drum.modes:
+        voice = voice_at(address)
+        if voice.modes != drum.modes:
             moved = False
             continue
-        reals(address)[at.WANTED_GAIN] = gain * player.source_gains[source]
-        moved = moved and counts[at.NEXT_WEIGHTS] == 0
+        voice.wanted_gain = gain * player.source_gains[source]
+        moved = moved and voice.next_weights == 0
     if not moved:
         return
     for point in range(2):
@@ -229,6 +205,7 @@ def hear(player: Player, table: Table, note: Note) -> None:
     for source in range(table.sources):
         address = note.voices[source]
         if address != 0:
-            weigh(player, table, reals(address), 1, drum)
-            wholes(address)[at.WEIGHTS_FADED] = 0
-            wholes(address)[at.NEXT_WEIGHTS] = 1
+            voice = voice_at(address)
+            weigh(player, table, voice, 1, drum)
+            voice.weights_faded = 0
+            voice.next_weights = 1

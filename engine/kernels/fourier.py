@@ -1,23 +1,31 @@
-"""A complex Fourier transform that needs no memory of its own.
+"""Complex Fourier transforms that need no memory of their own.
 
 Stockham's self-sorting form with factors of four and one of two: C. Van Loan, "Computational Frameworks for the Fast
 Fourier Transform", SIAM 1992, section 1.7. Libraries that Numba can call (rocket-fft) make a new array with each
-call and look their plan up behind a lock, which the device's thread must not do.
+call and look their plan up behind a lock, which the device's thread must not do. Other lengths are convolutions of
+a power of two with a chirp (L. Bluestein, IEEE Trans. Audio Electroacoust. 18 (1970) 451).
 """
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 from numba import njit
 
 from engine.kernels.compiled import COMPILED
+from engine.kernels.memory import part
+
+# Rows of a work space, (ROWS, N), N a power of two: a circle, room for transforms, two signals of complex numbers
+COSINES, SINES, SPARE, ONE, TWO, ROWS = 0, 1, 2, 4, 6, 8
+RUN = 16  # numbers of a chirp that are computed one from the other
 
 
 @njit(**COMPILED)
 def transform(
     re: np.ndarray, im: np.ndarray, re2: np.ndarray, im2: np.ndarray, cosines: np.ndarray, sines: np.ndarray
 ) -> None:
-    """Replaces re + i·im, of n = 128, 512, 2048 … numbers (2·4ᵏ, k odd), by Σ (re + i·im)[t] exp(−2πi kt/n).
+    """Replace re + i·im, of n numbers, a power of two, by Σ (re + i·im)[t] exp(−2πi kt/n).
 
     With real and imaginary parts exchanged in the call it is the inverse, times n.
 
@@ -27,7 +35,7 @@ def transform(
     """
     n = len(re)
     unit = len(cosines) // n
-    left, stride = n, 1
+    left, stride, exchanged = n, 1, False
     while left > 1:
         if left % 4 == 0:
             _fours(re, im, re2, im2, cosines, sines, left // 4, stride, unit * stride)
@@ -38,6 +46,10 @@ def transform(
                 re2[q + stride], im2[q + stride] = re[q] - re[q + stride], im[q] - im[q + stride]
             left, stride = left // 2, stride * 2
         re, im, re2, im2 = re2, im2, re, im
+        exchanged = not exchanged
+    if exchanged:
+        for k in range(n):
+            re2[k], im2[k] = re[k], im[k]
 
 
 @njit(**COMPILED)
@@ -76,3 +88,104 @@ def _fours(
             out_r[q + 2 * stride], out_i[q + 2 * stride] = r * c2 - i * s2, r * s2 + i * c2
             r, i = gap_r - turn_r, gap_i - turn_i
             out_r[q + 3 * stride], out_i[q + 3 * stride] = r * c3 - i * s3, r * s3 + i * c3
+
+
+@njit(**COMPILED)
+def power_of_two(least: int) -> int:
+    """The smallest power of two that is not below a number."""
+    found = 1
+    while found < least:
+        found *= 2
+    return found
+
+
+@njit(**COMPILED)
+def fill_circle(cosines: np.ndarray, sines: np.ndarray) -> None:
+    """Write cosines and sines of 2πk/N, k = 0 … N − 1; N is a multiple of 4."""
+    quarter = len(cosines) // 4
+    for k in range(quarter):
+        cosine, sine = math.cos(2 * math.pi * k / len(cosines)), math.sin(2 * math.pi * k / len(cosines))
+        cosines[k], sines[k] = cosine, sine
+        cosines[quarter + k], sines[quarter + k] = -sine, cosine
+        cosines[2 * quarter + k], sines[2 * quarter + k] = -cosine, -sine
+        cosines[3 * quarter + k], sines[3 * quarter + k] = sine, -cosine
+
+
+@njit(**COMPILED)
+def row(work: np.ndarray, number: int, size: int) -> np.ndarray:
+    """The first numbers of a row of a work space."""
+    return part(work[number], 0, size)
+
+
+@njit(**COMPILED)
+def silence(work: np.ndarray, signal: int, first: int, end: int) -> None:
+    """Clear a signal of a work space from one place to another."""
+    re, im = row(work, signal, end), row(work, signal + 1, end)
+    for k in range(first, end):
+        re[k] = im[k] = 0.0
+
+
+@njit(**COMPILED)
+def turn(work: np.ndarray, real: int, imaginary: int, size: int) -> None:
+    """Transform a signal of a work space, given its rows, in place; its size is a power of two.
+
+    With its rows exchanged it is the inverse, times the size.
+    """
+    re, im, spare = row(work, real, size), row(work, imaginary, size), row(work, SPARE, size)
+    transform(re, im, spare, row(work, SPARE + 1, size), work[COSINES], work[SINES])
+
+
+@njit(**COMPILED)
+def turn_any(work: np.ndarray, period: int, given: int, wanted: int, behind: int, size: int) -> None:
+    """Transform signal ONE in place at multiples of 1/period, as its convolution with a chirp; TWO is used.
+
+    Places count modulo `size`, a power of two that is not below the number of all that is given and wanted.
+
+    Args:
+        given: places from 0 on that may hold something; the others are negative.
+        wanted: places from 0 on that are wanted; the others are negative.
+        behind: the longest way from a place that is given down to one that is wanted.
+    """
+    _fill_chirp(work, period, given, size)
+    _turn_back(work, size)
+    _fill_chirp(work, period, size - behind, size)
+    re, im = row(work, ONE, size), row(work, ONE + 1, size)
+    chirp_re, chirp_im = row(work, TWO, size), row(work, TWO + 1, size)
+    turn(work, ONE, ONE + 1, size)
+    turn(work, TWO, TWO + 1, size)
+    for k in range(size):
+        real, imaginary = re[k] / size, im[k] / size
+        re[k] = real * chirp_re[k] - imaginary * chirp_im[k]
+        im[k] = real * chirp_im[k] + imaginary * chirp_re[k]
+    turn(work, ONE + 1, ONE, size)
+    _fill_chirp(work, period, wanted, size)
+    _turn_back(work, size)
+
+
+@njit(**COMPILED)
+def _fill_chirp(work: np.ndarray, period: int, positive: int, size: int) -> None:
+    """Write exp(πi k²/period) as signal TWO, from k = 0 on as many as `positive`, then negative k."""
+    re, im = row(work, TWO, size), row(work, TWO + 1, size)
+    angle = math.pi / period
+    real = imaginary = step_re = step_im = 0.0
+    further_re, further_im = math.cos(2 * angle), math.sin(2 * angle)
+    for k in range(max(positive, size - positive + 1)):
+        if k % RUN == 0:
+            real, imaginary = math.cos(angle * (k * k % (2 * period))), math.sin(angle * (k * k % (2 * period)))
+            step = angle * ((2 * k + 1) % (2 * period))
+            step_re, step_im = math.cos(step), math.sin(step)
+        if k < positive:
+            re[k], im[k] = real, imaginary
+        if 0 < k <= size - positive:
+            re[size - k], im[size - k] = real, imaginary
+        real, imaginary = real * step_re - imaginary * step_im, real * step_im + imaginary * step_re
+        step_re, step_im = step_re * further_re - step_im * further_im, step_re * further_im + step_im * further_re
+
+
+@njit(**COMPILED)
+def _turn_back(work: np.ndarray, size: int) -> None:
+    """Multiply signal ONE by the conjugate of TWO."""
+    re, im = row(work, ONE, size), row(work, ONE + 1, size)
+    chirp_re, chirp_im = row(work, TWO, size), row(work, TWO + 1, size)
+    for k in range(size):
+        re[k], im[k] = re[k] * chirp_re[k] + im[k] * chirp_im[k], im[k] * chirp_re[k] - re[k] * chirp_im[k]

@@ -40,24 +40,27 @@ from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import lanes, strings, tension, truth
-from engine.kernels import layout as at
+from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.modes import damped, following, row
+from engine.kernels.constants import QUANTUM
+from engine.kernels.memory import tension_program_at, truth_program_at
+from engine.kernels.modes import damped, following, row, weights
+from engine.kernels.rotation import rotation
+from engine.kernels.voice_records import TensionProgram, TruthProgram, Voice
 
 PHASE, MOST_STEPS = 0.15, 6
 
 
 @njit(**COMPILED)
-def fit(voice: np.ndarray, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz: float) -> None:
-    """Gives a voice that has not begun an edge of its bridge.
+def fit(voice: Voice, string: np.ndarray, pairs: int, edge: np.ndarray, rate_hz: float) -> None:
+    """Give a voice that has not begun an edge of its bridge.
 
     Args:
         string, pairs: as of `strings.rows`.
         edge: its distance from the end in m, stiffness in N/m and loss in s/m.
     """
-    counts = voice.view(np.int64)
-    n, total = counts[at.MODES], 0.0
-    shapes = row(voice, n, at.JAVARI)
+    n, total = voice.modes, 0.0
+    shapes = row(voice, at.JAVARI)
     for mode in range(n):
         along = strings.direction_of(mode, pairs) == 1
         turn = math.pi * strings.partial_of(mode, pairs) * edge[0] / string[of.LENGTH]
@@ -65,9 +68,9 @@ def fit(voice: np.ndarray, string: np.ndarray, pairs: int, edge: np.ndarray, rat
         total += shapes[mode] * shapes[mode]
     mass, resolved = 0.5 * strings.mass(string) * string[of.LENGTH], PHASE * rate_hz
     steps = math.ceil(math.sqrt(edge[1] * total / mass) / resolved)
-    counts[at.JAVARI_STEPS] = min(max(steps, 1), MOST_STEPS)
-    voice[at.JAVARI_STIFFNESS] = min(edge[1], (resolved * counts[at.JAVARI_STEPS]) ** 2 * mass / total)
-    voice[at.JAVARI_LOSS], voice[at.JAVARI_MASS] = edge[2], mass
+    voice.javari.steps = min(max(steps, 1), MOST_STEPS)
+    voice.javari.stiffness = min(edge[1], (resolved * voice.javari.steps) ** 2 * mass / total)
+    voice.javari.loss, voice.javari.mass_kg = edge[2], mass
 
 
 @njit(**COMPILED)
@@ -94,55 +97,48 @@ def force(before: float, free: float, give: float, stiffness: float, loss: float
 
 
 @njit(**COMPILED)
-def generate(
-    voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
-) -> None:
+def generate(voice: Voice, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release. As `tension` and `truth` have it."""
-    counts = voice.view(np.int64)
-    if counts[at.KIND] == at.TRUTH:
-        _ring_solved(voice, program, fading, heard, out)
+    if voice.kind == at.TRUTH:
+        _ring_solved(voice, truth_program_at(voice.program), fading, heard, out)
     else:
-        _ring(voice, program, fading, heard, out, scratch)
-    n = counts[at.MODES]
-    first, second = row(voice, n, 0), row(voice, n, 1)
-    for mode in range(n):  # or they would become denormal
+        _ring(voice, tension_program_at(voice.program), fading, heard, out, scratch)
+    first, second = row(voice, 0), row(voice, 1)
+    for mode in range(voice.modes):  # or they would become denormal
         if first[mode] * first[mode] < tension.NOTHING:
             first[mode] = 0.0
         if second[mode] * second[mode] < tension.NOTHING:
             second[mode] = 0.0
-    counts[at.GENERATED] += at.QUANTUM
+    voice.generated += QUANTUM
 
 
 @njit(**COMPILED)
-def _prepare(voice: np.ndarray, step_s: float) -> None:
+def _prepare(voice: Voice, step_s: float) -> None:
     """Prepare the change by a force of 1 N within a step, of a string whose modes are new."""
-    n, give = voice.view(np.int64)[at.MODES], 0.0
-    shapes, given, speeds = row(voice, n, at.JAVARI), row(voice, n, at.GIVEN), row(voice, n, at.GIVEN_SPEED)
-    for mode in range(n):
-        sigma = row(voice, n, at.SIGMA)[mode]
-        omega = damped(row(voice, n, at.OMEGA_SQUARED)[mode], sigma)
-        decay, sine = math.exp(-sigma * step_s), math.sin(omega * step_s) / omega
-        left, part = decay * (math.cos(omega * step_s) + sigma * sine), shapes[mode] / voice[at.JAVARI_MASS]
-        given[mode] = part * (1 - left) / (omega * omega + sigma * sigma)
-        speeds[mode] = part * decay * sine
+    shapes, given, speeds = row(voice, at.JAVARI), row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
+    squares, sigmas, give = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA), 0.0
+    for mode in range(voice.modes):
+        sigma = sigmas[mode]
+        omega, part = damped(squares[mode], sigma), shapes[mode] / voice.javari.mass_kg
+        left, moved, _, _ = rotation(sigma, omega, step_s)
+        given[mode], speeds[mode] = part * (1 - left) / (omega * omega + sigma * sigma), part * moved
         give += shapes[mode] * given[mode]
-    voice[at.JAVARI_GIVE] = give
+    voice.javari.give = give
 
 
 @njit(**COMPILED)
 def _ring(
-    voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
+    voice: Voice, program: TensionProgram, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """A quantum of latents that share a tension."""
     tension.bring_up_to_date(voice, program)
-    counts = voice.view(np.int64)
-    n, points, moving, steps = counts[at.MODES], counts[at.POINTS], counts[at.MOVING], counts[at.JAVARI_STEPS]
-    step_s, nodes = 1 / (program[at.S_RATE] * steps), counts[at.STEPS] // steps
-    if voice[at.JAVARI_GIVE] == 0.0:
+    n, points, moving, steps = voice.modes, voice.points, voice.moving, voice.javari.steps
+    step_s, nodes = 1 / (program.rate_hz * steps), voice.steps // steps
+    if voice.javari.give == 0.0:
         _prepare(voice, step_s)
-    counts[at.HEARD] = counts[at.FELT] = moving
-    x, y, rows = row(voice, n, 0), row(voice, n, 1), following(voice, n)
-    order = row(voice, n, at.ORDER).view(np.int64)[:moving]
+    voice.heard = voice.felt = moving
+    x, y, rows = row(voice, 0), row(voice, 1), following(voice)
+    order = row(voice, at.ORDER).view(np.int64)[:moving]
     first, near = lanes.aligned(scratch), lanes.blocks_of(moving)
     tension.load(x, y, rows, order, scratch, first)
     parts = first + lanes.slots(n)
@@ -152,23 +148,22 @@ def _ring(
         for each in range(lanes.PRESSED):
             scratch[slot + each * lanes.LANES] = 0.0
         if number < moving:
-            given, speed = row(voice, n, at.GIVEN)[number], row(voice, n, at.GIVEN_SPEED)[number]
-            scratch[slot], scratch[slot + lanes.LANES] = row(voice, n, at.JAVARI)[number], given
-            speed += row(voice, n, at.SIGMA)[number] * given
+            given, speed = row(voice, at.GIVEN)[number], row(voice, at.GIVEN_SPEED)[number]
+            scratch[slot], scratch[slot + lanes.LANES] = row(voice, at.JAVARI)[number], given
+            speed += row(voice, at.SIGMA)[number] * given
             scratch[slot + 2 * lanes.LANES] = -speed / math.sqrt(rows[6, number])  # v = -(ω y + σ x)
     ears = (2 if fading else 1) * points if heard else 0
     for ear in range(ears):
-        place = at.weights(n, ear // points, ear % points, 0)
-        tension.load_weights(voice[place : place + n], order, scratch, first, ear)
-    largest, apart, nothing, total = voice[at.LARGEST_STRETCH], 2 if points == 1 else 1, (0.0, 0.0), 0.0
-    gap, give, pushed = voice[at.JAVARI_GAP], voice[at.JAVARI_GIVE], voice[at.JAVARI_FORCE]
+        tension.load_weights(weights(voice, ear // points, ear % points, 0), order, scratch, first, ear)
+    largest, apart, nothing, total = voice.largest_stretch, 2 if points == 1 else 1, (0.0, 0.0), 0.0
+    gap, give, pushed = voice.javari.gap_m, voice.javari.give, voice.javari.force
     sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
     moved = lanes.felt(scratch, near, first, parts)
     before = sums[0] * moved[1] - moved[0] - gap
-    for frame in range(at.QUANTUM):
+    for frame in range(QUANTUM):
         for ear in range(ears):
             out[apart * ear, frame] = ear_sums[2 * ear] - sums[0] * ear_sums[2 * ear + 1]
-            out[apart * ear, frame] -= voice[at.JAVARI_HEARD] * pushed
+            out[apart * ear, frame] -= voice.javari.heard * pushed
         pushed = 0.0
         for step in range(steps):
             hearing = ears if step == steps - 1 else 0
@@ -178,42 +173,41 @@ def _ring(
             moved = lanes.felt(scratch, near, first, parts)
             free = sums[0] * moved[1] - moved[0] - gap
             if before > 0.0 or free > 0.0:
-                push = force(before, free, give, voice[at.JAVARI_STIFFNESS], voice[at.JAVARI_LOSS] / step_s)
+                push = force(before, free, give, voice.javari.stiffness, voice.javari.loss / step_s)
                 sums = lanes.press(scratch, near, first, parts, push)
                 if hearing > 0:
                     sums = lanes.add_up(scratch, first, near, 0, hearing, ear_sums)
                 free -= give * push
                 pushed += push / steps
             before = free
-        voice[at.LARGEST_ENERGY] *= voice[at.DECAY]
+        voice.largest_energy *= voice.decay
         if frame % 16 == 15:
-            total, held = tension.hold(scratch, first, near, voice[at.LARGEST_ENERGY])
+            total, held = tension.hold(scratch, first, near, voice.largest_energy)
             if held:
                 sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
     tension.save(x, y, order, scratch, first)
-    voice[at.JAVARI_FORCE] = pushed
-    voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.S_LOUDNESS]
+    voice.javari.force = pushed
+    voice.loudness = (0.5 * math.log(total) if total > 0 else -1e9) + program.loudness
 
 
 @njit(**COMPILED)
-def _ring_solved(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray) -> None:
+def _ring_solved(voice: Voice, program: TruthProgram, fading: bool, heard: bool, out: np.ndarray) -> None:
     """A quantum of a string that is solved."""
-    sub_steps, counts = truth.set_up(voice, program), voice.view(np.int64)
-    n, points, steps = counts[at.MODES], counts[at.POINTS], counts[at.JAVARI_STEPS]
-    step_s = 1 / (program[at.T_RATE] * steps)
-    if voice[at.JAVARI_GIVE] == 0.0:
+    sub_steps, points, steps = truth.set_up(voice, program), voice.points, voice.javari.steps
+    step_s = 1 / (program.rate_hz * steps)
+    if voice.javari.give == 0.0:
         _prepare(voice, step_s)
-    gap, give, moving = voice[at.JAVARI_GAP], voice[at.JAVARI_GIVE], counts[at.MOVING]
-    q, v, shapes = row(voice, n, 0), row(voice, n, 1), row(voice, n, at.JAVARI)
-    given, speeds = row(voice, n, at.GIVEN), row(voice, n, at.GIVEN_SPEED)
-    before, pushed = -gap, voice[at.JAVARI_FORCE]
+    gap, give, moving = voice.javari.gap_m, voice.javari.give, voice.moving
+    q, v, shapes = row(voice, 0), row(voice, 1), row(voice, at.JAVARI)
+    given, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
+    before, pushed = -gap, voice.javari.force
     for mode in range(moving):
         before -= shapes[mode] * q[mode]
-    for frame in range(at.QUANTUM):
+    for frame in range(QUANTUM):
         truth.hear(voice, program, frame, fading, heard, out)
         for which in range((2 if fading else 1) if heard else 0):
             for point in range(points):
-                out[2 * which + point, frame] -= voice[at.JAVARI_HEARD] * pushed
+                out[2 * which + point, frame] -= voice.javari.heard * pushed
         pushed = 0.0
         for _ in range(steps):
             truth.ring(voice, program, sub_steps, sub_steps // steps)
@@ -221,11 +215,11 @@ def _ring_solved(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bo
             for mode in range(moving):
                 free -= shapes[mode] * q[mode]
             if before > 0.0 or free > 0.0:
-                push = force(before, free, give, voice[at.JAVARI_STIFFNESS], voice[at.JAVARI_LOSS] / step_s)
+                push = force(before, free, give, voice.javari.stiffness, voice.javari.loss / step_s)
                 for mode in range(moving):
                     q[mode] += given[mode] * push
                     v[mode] += speeds[mode] * push
                 free -= give * push
                 pushed += push / steps
             before = free
-    voice[at.JAVARI_FORCE] = pushed
+    voice.javari.force = pushed

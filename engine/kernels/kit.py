@@ -12,11 +12,10 @@ from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as drums
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.constants import KEYS
 from engine.kernels.drum_modes import D1, D3, DRUM, HARDEST, MODULUS, ORDERS, ROWS, SOFTEST, SURFACE
-from engine.kernels.memory import matrix, part, player_at, reals, table_at, wholes
+from engine.kernels.memory import matrix, part, player_at, reals, table_at, voice_at, wholes
 from engine.kernels.records import DRUM_ROWS, Event
 
 # Slots of a kit, of a key and of a drum behind its own values. R real number, W whole number
@@ -46,7 +45,7 @@ MOVES = (MODES_MOVED, LOSSES_MOVED, LOSSES_MOVED, PLACES_MOVED, PLACES_MOVED)
 
 @njit(**COMPILED)
 def begin(kit_address: int, table_address: int) -> None:
-    """Writes all keys' blocks into an instrument's table."""
+    """Write all keys' blocks into an instrument's table."""
     kit, counts, values = reals(kit_address), wholes(kit_address), table_at(table_address).values
     drums.tabulate(_bessels(kit, counts))
     for which in FOLLOWED:
@@ -83,7 +82,7 @@ def prepare(kit_address: int, table_address: int, player_address: int) -> None:
         key, voice = note.key, note.voices[0]
         if note.state == of.RINGS and voice != 0:
             moved = counts[FIRST_KEY + key * KEY + KEY_STALE] & PLACES_MOVED
-            if moved and wholes(voice)[at.NEXT_WEIGHTS] == 0:  # else it fades to other places yet
+            if moved and voice_at(voice).next_weights == 0:  # else it fades to other places yet
                 _update(kit_address, table_address, key)
 
 
@@ -110,7 +109,7 @@ def _possible(drum: np.ndarray) -> bool:
 
 @njit(**COMPILED)
 def _update(kit_address: int, table_address: int, key: int) -> None:
-    """Writes the block of a key that is stale."""
+    """Write the block of a key that is stale."""
     kit, counts, table = reals(kit_address), wholes(kit_address), table_at(table_address)
     own, capacity = FIRST_KEY + key * KEY, counts[CAPACITY]
     stale, drum = counts[own + KEY_STALE], counts[own + KEY_DRUM]

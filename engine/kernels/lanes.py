@@ -17,6 +17,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from engine.kernels.compiled import COMPILED
+from engine.kernels.mixer_records import MOST_EARS
 
 # mypy: disable-error-code="no-untyped-def"
 
@@ -24,7 +25,6 @@ LANES = 4
 # Rows of a block: z = x + iy, those of `kernels.tension.prepare`, and the output
 X, Y, COSINE, SINE, KICK, STRETCH, RATIO, SEEN, SQUARE = range(9)
 EARS = 9  # the weights of each
-MOST_EARS = 4
 ROWS = EARS + MOST_EARS
 BLOCK = ROWS * LANES
 
@@ -89,7 +89,7 @@ class _Blocks:
         return self.builder.bitcast(self.builder.gep(self._data, [slot]), _VECTOR.as_pointer())
 
     def add(self, which: int, one, other) -> None:
-        """Adds a product to a sum."""
+        """Add a product to a sum."""
         product = self.builder.fmul(one, other)
         self.builder.store(self.builder.fadd(self.builder.load(self._sums[which]), product), self._sums[which])
 
@@ -165,6 +165,8 @@ def turn(
 ) -> tuple[float, float]:
     """Kicks and turns blocks; returns their sums at the next node, as `_sweep` says.
 
+    It takes each number by itself, so that all stay in registers.
+
     Args:
         ears: 0, 1, 2 or 4, that hear the near blocks.
         linear, squared: S (1 - 2R) and S².
@@ -230,7 +232,7 @@ PRESSED = 3  # rows of parts in a contact: displacement there, and what x and y 
 
 @intrinsic
 def press(typing_context, memory, blocks, modes, parts, force):
-    """Changes x and y of blocks by a force at a contact, and returns their sums, as `turn` does.
+    """Change x and y of blocks by a force at a contact, and return their sums, as `turn` does.
 
     `parts`: first slot of (blocks, PRESSED, LANES).
     """
@@ -258,7 +260,8 @@ PARTS, PART_BLOCKS = 3, 12  # rows of parts in a bridge: of y and x in its motio
 def _meet(strings: int):
     """The bridge that strings share takes from each what its modes have in it, block by block.
 
-    Returns a function of the first slots of their modes and of their parts (PARTS, PART_BLOCKS, LANES).
+    Returns a function of the first slots of their modes and of their parts (PARTS, PART_BLOCKS, LANES), each by
+    itself, so that all stay in registers.
     """
 
     @intrinsic

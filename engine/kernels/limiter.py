@@ -10,35 +10,31 @@ as in G. Luff, "Designing a straightforward limiter", Signalsmith Audio, 2022.
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.constants import AHEAD, QUANTUM
+from engine.kernels.mixer_records import Mixer
 
 CEILING = 10 ** (-0.3 / 20)
 LARGEST_LEVEL = 100.0  # +40 dBFS: the level that is believed at most, so that one wild sample is soon forgotten
-AHEAD, QUANTUM = at.AHEAD, at.QUANTUM
 _SIDE = AHEAD // 2 + 1  # frames of either average
 STEEPEST = 1 / _SIDE  # of the gain a frame, were it to fall to nothing
 
 
 @njit(**COMPILED)
-def limit(mixer: np.ndarray) -> None:
-    """Takes the mix, (QUANTUM, 2), and leaves there what is `AHEAD` frames older, within ±`CEILING`.
+def limit(mixer: Mixer) -> None:
+    """Take the mix, (QUANTUM, 2), and leave there what is `AHEAD` frames older, within ±`CEILING`.
 
     Where nothing within reach exceeds the ceiling, samples stay as they are.
     """
-    mix = mixer[at.M_MIX : at.M_MIX + 2 * QUANTUM].reshape(QUANTUM, 2)
-    waiting = mixer[at.M_WAITING : at.M_WAITING + 2 * (AHEAD + QUANTUM)].reshape(AHEAD + QUANTUM, 2)
-    peaks = mixer[at.M_PEAKS : at.M_PEAKS + AHEAD + QUANTUM]
-    gains = mixer[at.M_GAINS : at.M_GAINS + AHEAD + QUANTUM]
+    mix, waiting, peaks, gains = mixer.mix[:], mixer.waiting[:], mixer.peaks[:], mixer.gains[:]
     for frame in range(QUANTUM):
         left, right = mix[frame, 0], mix[frame, 1]
         waiting[AHEAD + frame, 0], waiting[AHEAD + frame, 1] = left, right
         peaks[AHEAD + frame] = min(max(abs(left), abs(right)), LARGEST_LEVEL)
-    if mixer[at.M_LIMITER] > CEILING or peaks.max() > CEILING or gains[:AHEAD].min() < 1.0:
-        _reduce(mixer, mix, waiting, peaks, gains)
+    if mixer.limiter > CEILING or peaks.max() > CEILING or gains[:AHEAD].min() < 1.0:
+        _reduce(mixer)
     else:
         gains[AHEAD:] = 1.0
         mix[:] = waiting[:QUANTUM]
@@ -48,8 +44,9 @@ def limit(mixer: np.ndarray) -> None:
 
 
 @njit(**COMPILED)
-def _reduce(mixer: np.ndarray, mix: np.ndarray, waiting: np.ndarray, peaks: np.ndarray, gains: np.ndarray) -> None:
-    level, release, reduction = mixer[at.M_LIMITER], mixer[at.M_RELEASE], mixer[at.M_REDUCTION]
+def _reduce(mixer: Mixer) -> None:
+    mix, waiting, peaks, gains = mixer.mix[:], mixer.waiting[:], mixer.peaks[:], mixer.gains[:]
+    level, release, reduction = mixer.limiter, mixer.release, mixer.reduction
     for frame in range(AHEAD, AHEAD + QUANTUM):
         level *= release
         for before in range(AHEAD + 1):
@@ -63,4 +60,4 @@ def _reduce(mixer: np.ndarray, mix: np.ndarray, waiting: np.ndarray, peaks: np.n
         reduction = min(reduction, gain)
         for side in range(2):
             mix[frame, side] = min(max(waiting[frame, side] * gain, -CEILING), CEILING)
-    mixer[at.M_LIMITER], mixer[at.M_REDUCTION] = level, reduction
+    mixer.limiter, mixer.reduction = level, reduction

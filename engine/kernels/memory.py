@@ -11,7 +11,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
-from engine.kernels import records
+from engine.kernels import mixer_records, records, voice_records
 from engine.kernels.compiled import COMPILED
 
 # mypy: disable-error-code="no-untyped-def"
@@ -41,7 +41,9 @@ def fence(typing_context: Any):
 def _array(context, builder, kind, data, shape):
     """Numbers of eight bytes at a pointer, which belong to somebody else: nobody counts references to them."""
     found, size = context.make_array(kind)(context, builder), context.get_constant(types.intp, 8)
-    strides = [size] if len(shape) == 1 else [builder.mul(shape[1], size), size]
+    strides = [size]
+    for length in reversed(shape[1:]):
+        strides.insert(0, builder.mul(length, strides[0]))
     populate_array(found, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)
     return found._getvalue()
 
@@ -76,53 +78,30 @@ def wholes(address: int) -> np.ndarray:
     return _wholes(address)
 
 
-def _record(dtype: np.dtype[np.void]) -> Any:
-    """An intrinsic: the record at an address (int64)."""
+def record_at(dtype: np.dtype[np.void]) -> Any:
+    """An intrinsic: the record at an address (int64, or a `void *`)."""
     kind = from_dtype(dtype)
 
     @intrinsic
     def memory(typing_context, address):
-        def generate(context, builder, _signature, arguments):
-            return builder.inttoptr(arguments[0], context.get_value_type(kind))
+        def generate(context, builder, signature, arguments):
+            lead = builder.bitcast if signature.args[0] == types.voidptr else builder.inttoptr
+            return lead(arguments[0], context.get_value_type(kind))
 
-        return kind(types.int64), generate
+        return kind(types.voidptr if address == types.voidptr else types.int64), generate
 
     return memory
 
 
-_player, _table, _drum, _recorded, _attack = map(
-    _record, (records.PLAYER, records.TABLE, records.DRUM, records.RECORDED, records.ATTACK)
-)
-
-
-@njit(**COMPILED)
-def player_at(address: int) -> records.Player:
-    """The player at an address."""
-    return _player(address)
-
-
-@njit(**COMPILED)
-def table_at(address: int) -> records.Table:
-    """The instrument's table at an address."""
-    return _table(address)
-
-
-@njit(**COMPILED)
-def drum_at(address: int) -> records.Drum:
-    """The drum of a key at an address; its rows follow."""
-    return _drum(address)
-
-
-@njit(**COMPILED)
-def recorded_at(address: int) -> records.Recorded:
-    """The record at an address of what a recording adds to strings; its curves and rows follow."""
-    return _recorded(address)
-
-
-@njit(**COMPILED)
-def attack_at(address: int) -> records.Attack:
-    """A recorded attack; its samples follow."""
-    return _attack(address)
+player_at, table_at = record_at(records.PLAYER), record_at(records.TABLE)
+# Their rows, curves, samples or partitions follow
+drum_at, recorded_at, attack_at = map(record_at, (records.DRUM, records.RECORDED, records.ATTACK))
+body_at, responses_at, needs_at = map(record_at, (records.BODY, records.RESPONSES, records.NEEDS))
+voice_at, wish_at = record_at(voice_records.VOICE), record_at(voice_records.WISH)
+truth_program_at, tension_program_at = map(record_at, (voice_records.TRUTH_PROGRAM, voice_records.TENSION_PROGRAM))
+rendered_program_at = record_at(voice_records.RENDERED_PROGRAM)
+mixer_at, convolver_at = record_at(mixer_records.MIXER), record_at(mixer_records.CONVOLVER)
+impulse_at = record_at(mixer_records.IMPULSE)
 
 
 @intrinsic
@@ -137,7 +116,7 @@ def address_of(typing_context: Any, record: Any):
 
 @intrinsic
 def clear(typing_context: Any, record: Any):
-    """Fills a record with zeros."""
+    """Fill a record with zeros."""
 
     def generate(context, builder, signature, arguments):
         pointer = builder.bitcast(arguments[0], ir.IntType(8).as_pointer())
@@ -149,7 +128,7 @@ def clear(typing_context: Any, record: Any):
 
 @intrinsic
 def copy(typing_context: Any, into: Any, record: Any):
-    """Writes a record over another of its kind."""
+    """Write a record over another of its kind."""
 
     def generate(context, builder, signature, arguments):
         to, source = (builder.bitcast(each, ir.IntType(8).as_pointer()) for each in arguments)
@@ -188,12 +167,34 @@ def matrix(typing_context: Any, memory: Any, first: Any, rows: Any, columns: Any
     return kind(memory, types.int64, types.int64, types.int64), generate
 
 
+@intrinsic
+def shaped(typing_context: Any, memory: Any, first: Any, shape: Any):
+    """The same as an array of any shape, a tuple of whole numbers."""
+    kind = types.Array(memory.dtype, len(shape), "C", readonly=not memory.mutable)
+
+    def generate(context, builder, signature, arguments):
+        data = context.make_array(memory)(context, builder, arguments[0]).data
+        lengths = cgutils.unpack_tuple(builder, arguments[2])
+        return _array(context, builder, kind, builder.gep(data, [arguments[1]]), lengths)
+
+    return kind(memory, types.int64, types.UniTuple(types.intp, len(shape))), generate
+
+
 @njit(**COMPILED)
 def publish(slots: np.ndarray, slot: int, whole: int) -> None:
-    """Writes a whole number into one of the slots, int64 (n,), after all that was written before.
+    """Write a whole number into one of the slots, int64 (n,), after all that was written before.
 
     A thread that reads the number before a fence sees what it stands for. What is read afterwards is no older.
     """
     fence()
     slots[slot] = whole
     fence()
+
+
+@njit(**COMPILED)
+def mixed(number: int) -> int:
+    """A number with all bits mixed (splitmix64): noise, the same for the same numbers."""
+    bits = np.uint64(number) * np.uint64(0x9E3779B97F4A7C15)
+    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return int(np.int64(bits ^ (bits >> np.uint64(31))))

@@ -12,20 +12,25 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from engine.kernels import constants as of
-from engine.kernels import layout as at
+from engine.kernels.fields import R, W, slots
+from engine.kernels.mixer_records import MOST_LATENTS
+from engine.kernels.voice_records import voice_bytes
 
-W, R = np.int64, np.float64
 # Records, as annotations of kernels
 Event: TypeAlias = Any
 Channel: TypeAlias = Any
 Note: TypeAlias = Any
 Report: TypeAlias = Any
 Noise: TypeAlias = Any
+Sympathy: TypeAlias = Any
 Player: TypeAlias = Any
 Table: TypeAlias = Any
 Drum: TypeAlias = Any
 Recorded: TypeAlias = Any
 Attack: TypeAlias = Any
+Body: TypeAlias = Any
+Responses: TypeAlias = Any
+Needs: TypeAlias = Any
 
 EVENT = np.dtype(
     [
@@ -281,7 +286,7 @@ SYMPATHY = np.dtype(
         ("gain", R, of.MOST_SYMPATHETIC),
         ("x", R, of.MOST_SYMPATHETIC),
         ("y", R, of.MOST_SYMPATHETIC),
-        ("played", R, of.MOST_SYMPATHETIC),
+        ("played", R, of.MOST_SYMPATHETIC),  # 1 for partials of strings that are played, which are stopped, else 0
         ("partials", W),  # of strings that ring with those that are played
         ("instrument", W),  # for which they were tuned, …
         ("kind", W),  # … and its kind
@@ -334,29 +339,47 @@ PLAYER = np.dtype(
         ("draft", NOTE),  # … a note that begins, …
         ("again", EVENT),  # … a tremolo's stroke, …
         ("kept_event", EVENT),  # … an event while two are exchanged, …
-        ("amplitudes", R, at.MOST_MODES),  # … a pluck's modes, …
+        ("amplitudes", R, MOST_LATENTS),  # … a pluck's modes, …
         ("pulled", R, of.MOST_GRID),  # … its shape on its grid, …
         ("sound", R, of.SOUND_ROWS * of.MOST_DRUM_MODES),  # … and the modes of a key
     ]
 )
 """Its voices follow."""
 
+BODY = np.dtype(
+    [
+        ("modes", W),  # which follow, (4, modes): Hz, 1/s, amplitudes left and right; 0: it has none
+        ("seconds", R),  # for which they ring
+        ("subsonic_hz", R),  # below it the body radiates next to nothing
+        ("frames", W),  # of a body that is a response, whose samples follow, (frames, channels) of 32 bits
+        ("channels", W),  # 1 or 2
+        ("hz", R),  # their rate
+        ("unit", R),  # of the samples
+        ("longest_s", R),  # of a response that is stretched
+    ]
+)
+"""A body of a plug-in, at a size of 1; without modes and frames there is none."""
 
-def slot(kind: np.dtype[np.void], name: str) -> int:
-    """The slot of a field: its place in a record, in eight-byte numbers."""
-    assert kind.fields is not None
-    return int(kind.fields[name][1]) // 8
+RESPONSES = np.dtype(
+    [
+        (
+            "part",
+            W,
+        ),  # slots of each of the three responses that follow, as the convolver reads them: body, room, both
+        ("powers", R, (4, 4, 4)),  # see `responses.all_powers`
+        ("curves", R, of.BODY_SLOTS),  # of the body, for the loudness of keys
+    ]
+)
 
-
-def slots(kind: np.dtype[np.void]) -> int:
-    """The size of a record in eight-byte numbers."""
-    return kind.itemsize // 8
-
-
-def voice_bytes(modes: int) -> int:
-    """The size of a voice with so many modes, and with the blocks of modes that it is to have."""
-    numbers = at.HEADER + 8 * modes + 4 + 8 * at.QUANTUM + at.TRUTH_ROWS * modes
-    return 8 * (numbers + of.BLOCKS * (at.B_HEADER + at.RESONATOR_ROWS * modes))
+NEEDS = np.dtype(
+    [
+        ("frames", W),  # of the longest response
+        ("part", W),  # slots of one as the convolver reads it
+        ("found", W),  # slots of RESPONSES, with what follows
+        ("memory", W),  # slots in which they are computed
+        ("convolver", W),  # slots of the convolver
+    ]
+)
 
 
 def player_slots(modes: int) -> int:

@@ -5,34 +5,33 @@ from __future__ import annotations
 import numpy as np
 from numba import carray, njit
 
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import fence, pointer
+from engine.kernels.constants import QUANTUM
+from engine.kernels.memory import behind, fence, pointer
+from engine.kernels.voice_records import RenderedProgram, Voice
 
 
 @njit(**COMPILED)
-def generate(voice: np.ndarray, program: np.ndarray, out: np.ndarray) -> None:
+def generate(voice: Voice, program: RenderedProgram, out: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM). Where the samples are not there yet it fades out, stands still, and counts."""
-    whole = program.view(np.int64)
-    counts = voice.view(np.int64)
-    taps, phases, ratio = whole[at.R_TAPS], whole[at.R_PHASES], program[at.R_RATIO]
-    table = program[whole[at.R_FILTER] :]
-    points = counts[at.POINTS]
-    ready, length = counts[at.READY], counts[at.LENGTH]
+    taps, phases, ratio = program.taps, program.phases, program.ratio
+    table = behind(program, program.filter, 2 * taps * (phases + 2))
+    points = voice.points
+    ready, length = voice.ready, voice.length
     fence()
-    samples = carray(pointer(counts[at.SAMPLES]), (length * points,), np.float32)
-    first = counts[at.GENERATED]
+    samples = carray(pointer(voice.samples), (length * points,), np.float32)
+    first = voice.generated
     # of this quantum and the next, so that there is a quantum in which to fade out
-    needed = int((first + 2 * at.QUANTUM) * ratio) + taps + 1
+    needed = int((first + 2 * QUANTUM) * ratio) + taps + 1
     dry = ready < length and ready < needed
-    was_dry = counts[at.DRY]
+    was_dry = voice.dry
     if dry and (was_dry or first == 0):
-        counts[at.DRY] = 1
+        voice.dry = 1
         out[:] = 0.0
-        counts[at.STARVED] += at.QUANTUM
+        voice.starved += QUANTUM
         return
-    looped = counts[at.LOOPED]
-    for frame in range(at.QUANTUM):
+    looped = voice.looped
+    for frame in range(QUANTUM):
         place = float((first + frame) % length) if looped else (first + frame) * ratio
         before = int(place)
         phase = (place - before) * phases
@@ -40,9 +39,9 @@ def generate(voice: np.ndarray, program: np.ndarray, out: np.ndarray) -> None:
         share = phase - row
         gain = 1.0
         if dry:
-            gain = 1.0 - (frame + 1) / at.QUANTUM
+            gain = 1.0 - (frame + 1) / QUANTUM
         elif was_dry:
-            gain = (frame + 1) / at.QUANTUM
+            gain = (frame + 1) / QUANTUM
         low, high = table[row * 2 * taps :], table[(row + 1) * 2 * taps :]
         for point in range(points):
             total = 0.0
@@ -53,7 +52,7 @@ def generate(voice: np.ndarray, program: np.ndarray, out: np.ndarray) -> None:
                 if index < ready:
                     total += (low[tap] * (1 - share) + high[tap] * share) * samples[index * points + point]
             out[point, frame] = gain * total
-    counts[at.DRY] = 1 if dry else 0
-    counts[at.GENERATED] = first + at.QUANTUM
-    over = not looped and ready == length and (first + at.QUANTUM) * ratio >= length
-    voice[at.LOUDNESS] = -1e9 if over else 0.0
+    voice.dry = 1 if dry else 0
+    voice.generated = first + QUANTUM
+    over = not looped and ready == length and (first + QUANTUM) * ratio >= length
+    voice.loudness = -1e9 if over else 0.0

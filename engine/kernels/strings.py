@@ -1,21 +1,30 @@
-"""The string of a key and how a bend, a slide, a damper or a knob changes it, in closed form.
+"""The laws of a string, of its modes, and of how a key, a bend, a slide, a damper or a knob changes it.
 
-A string is a row of eight numbers, the fields of `StringParameters`. Pitch is that of the first partial of a quiet
-pluck, √(ω₁² - σ₁²)/2π. Without fast mathematics: computing a string again gives the same numbers.
+They are plain functions: Python calls them as they are, and compiled functions call them compiled, without fast
+mathematics (`engine.kernels.compiled.LAWS`). A string is a row of eight numbers, the fields of `StringParameters`.
+Pitch is that of the first partial of a quiet pluck, √(ω₁² - σ₁²)/2π. The source of ω, σ and k is in
+`engine.resonators.string`, that of losses by mode in `engine.resonators.losses`.
+
+What takes a `Mode` takes the number of one, from 1, or an array of numbers; only Python gives arrays.
 """
 
 from __future__ import annotations
 
 import math
-
-import numpy as np
-from numba import njit
+from typing import TYPE_CHECKING, Any, TypeAlias, TypeVar
 
 from engine import bounds
 from engine.kernels import constants as of
-from engine.kernels.compiled import COMPILED
 
-EXACT = {**COMPILED, "fastmath": False}
+if TYPE_CHECKING:  # what has strings does without NumPy
+    from collections.abc import MutableSequence, Sequence
+
+    import numpy as np
+
+    Row: TypeAlias = Sequence[float] | np.ndarray
+    Out: TypeAlias = MutableSequence[float] | np.ndarray
+Mode = TypeVar("Mode", float, "np.ndarray")
+
 _BOUNDS = tuple(bounds.STRING.values())
 _MAY_BE_ZERO = (of.MOMENT, of.MODULUS, of.D1, of.D3)
 ROUNDS = 4  # σ₁ depends on the length, a little
@@ -23,9 +32,8 @@ MUTED_M, MUTED_SHARE, MUTED_SIGMA = 0.05, 0.25, 300.0  # of a palm mute: m, of t
 TOUCH_RESISTANCE = 1.0  # of a finger that touches a string, over the string's own √(TρA): an estimate
 
 
-@njit(**EXACT)
-def possible(string: np.ndarray) -> bool:
-    """Return True if all numbers are finite and within bounds: as `StringParameters` checks them."""
+def possible(string: Row) -> bool:
+    """Return True if all numbers are finite and within bounds, as `StringParameters` checks them."""
     for place in range(of.STRING):
         value = string[place]
         low, high = _BOUNDS[place]
@@ -34,39 +42,50 @@ def possible(string: np.ndarray) -> bool:
     return True
 
 
-@njit(**EXACT)
-def mass(string: np.ndarray) -> float:
+def mass(string: Row) -> float:
     """ρA in kg/m."""
     return string[of.DENSITY] * string[of.AREA]
 
 
-@njit(**EXACT)
-def decay_rate(string: np.ndarray, mode: int) -> float:
-    """σ in 1/s."""
-    eta = mode * math.pi / string[of.LENGTH]
+def wavenumber(string: Row, mode: Mode) -> Mode:
+    """η = μπ/ℓ in rad/m."""
+    return mode * math.pi / string[of.LENGTH]
+
+
+def decay_rate(string: Row, mode: Mode) -> Mode:
+    """σ = (d₁ + d₃η²) / 2ρA in 1/s: a free mode decays as exp(-σt)."""
+    eta = wavenumber(string, mode)
     return (string[of.D1] + string[of.D3] * eta * eta) / (2 * mass(string))
 
 
-@njit(**EXACT)
-def omega_squared(string: np.ndarray, mode: int) -> float:
-    """ω² in 1/s²."""
-    eta = mode * math.pi / string[of.LENGTH]
+def omega_squared(string: Row, mode: Mode) -> Mode:
+    """ω² = (EIη⁴ + T₀η²) / ρA in 1/s²."""
+    eta = wavenumber(string, mode)
     squared = eta * eta
     return (string[of.MODULUS] * string[of.MOMENT] * squared * squared + string[of.TENSION] * squared) / mass(string)
 
 
-@njit(**EXACT)
-def bridge_force(string: np.ndarray, mode: int) -> float:
-    """Force of a mode at amplitude 1 m on the end at 0, in N: as `StringParameters.bridge_forces`."""
-    eta = mode * math.pi / string[of.LENGTH]
+def coupling(string: Row, mode: Mode) -> Mode:
+    """k = EAη² / 4ρA in 1/s²: a mode has the additional acceleration -k q Σ η_m² q_m²."""
+    eta = wavenumber(string, mode)
+    return string[of.MODULUS] * string[of.AREA] / (4 * mass(string)) * eta * eta
+
+
+def bridge_force(string: Row, mode: Mode) -> Mode:
+    """Force of a mode at amplitude 1 m on the support at x = 0, in N: T₀η + EIη³.
+
+    The transverse force that a stiff string exerts on its support is T₀ ∂y/∂x - EI ∂³y/∂x³ (N. H. Fletcher,
+    T. D. Rossing, "The Physics of Musical Instruments", 2nd ed., sections 2.12 and 2.18).
+    """
+    eta = wavenumber(string, mode)
     return string[of.TENSION] * eta + string[of.MODULUS] * string[of.MOMENT] * eta**3
 
 
-@njit(**EXACT)
-def modes_below(string: np.ndarray, frequency_hz: float) -> int:
-    """The number of modes whose undamped frequency lies below: as `StringParameters.modes_below`."""
-    omega = 2 * math.pi * frequency_hz
+def modes_below(string: Row, frequency_hz: float) -> int:
+    """The number of modes whose undamped frequency lies below."""
+    omega = 2 * math.pi * max(frequency_hz, 0.0)
     count = int(string[of.LENGTH] / math.pi * math.sqrt(_eta_squared(string, mass(string) * omega * omega)))
+    # rounding may put it one beside the mode that lies at the frequency itself
     while count > 0 and math.sqrt(omega_squared(string, count)) >= omega:
         count -= 1
     while math.sqrt(omega_squared(string, count + 1)) < omega:
@@ -74,22 +93,19 @@ def modes_below(string: np.ndarray, frequency_hz: float) -> int:
     return count
 
 
-@njit(**EXACT)
-def _eta_squared(string: np.ndarray, load: float) -> float:
+def _eta_squared(string: Row, load: float) -> float:
     """η² of EIη⁴ + T₀η² = load, without the difference of near numbers."""
     tension, bending = string[of.TENSION], string[of.MODULUS] * string[of.MOMENT]
     return 2 * load / (tension + math.sqrt(tension * tension + 4 * bending * load))
 
 
-@njit(**EXACT)
-def pitch_hz(string: np.ndarray) -> float:
+def pitch_hz(string: Row) -> float:
     """The frequency of the first partial of a quiet pluck; 0 where it does not oscillate."""
     sigma = decay_rate(string, 1)
     return math.sqrt(max(0.0, omega_squared(string, 1) - sigma * sigma)) / (2 * math.pi)
 
 
-@njit(**EXACT)
-def turned(string: np.ndarray, knobs: np.ndarray, out: np.ndarray) -> None:
+def turned(string: Row, knobs: Row, out: Out) -> None:
     """The string with multipliers, as `app.patches.patch.Knobs` says; pitch and decay rates stay, nearly.
 
     Each number stays within its bounds: a knob turns no string into an impossible one.
@@ -109,8 +125,7 @@ def turned(string: np.ndarray, knobs: np.ndarray, out: np.ndarray) -> None:
         out[place] = min(max(out[place], low), high)
 
 
-@njit(**EXACT)
-def fretted(string: np.ndarray, wanted_hz: float) -> float:
+def fretted(string: Row, wanted_hz: float) -> float:
     """The length in m that gives the string a pitch."""
     sigma, squared = decay_rate(string, 1), 0.0
     for _ in range(ROUNDS):
@@ -120,14 +135,53 @@ def fretted(string: np.ndarray, wanted_hz: float) -> float:
     return math.pi / math.sqrt(squared)
 
 
-@njit(**EXACT)
-def is_wound(string: np.ndarray) -> bool:
+def chosen(strings: Any, count: int, key: int) -> int:
+    """The string of a set that a key chooses: the highest at or below the key, else the lowest.
+
+    Args:
+        strings: records or objects with the key of each open string as its `note`, the highest first.
+    """
+    for number in range(count):
+        if strings[number].note <= key:
+            return number
+    return count - 1
+
+
+def played(strings: Any, count: int, key: int, number: int) -> int:
+    """The string of a set on which a key is played.
+
+    Args:
+        number: the string that is wanted; -1, or one that the set does not have or that would have to be slackened
+            too far: the one that the key chooses.
+    """
+    if 0 <= number < count and key >= strings[number].note - of.MOST_SLACKENED:
+        return number
+    return chosen(strings, count, key)
+
+
+def stop(string: Row, knobs: Row, slackened: float, pitch_hz: float, whole: Out, out: Out) -> bool:
+    """Write the whole string with its knobs, and what a key leaves of it; False: that is no possible string.
+
+    Args:
+        slackened: ratio of its pitch to that of the whole string as it is; 1: not slackened.
+        pitch_hz: of the key.
+    """
+    turned(string, knobs, whole)
+    if slackened != 1.0 and possible(whole):
+        whole[of.TENSION] = bent(whole, slackened)
+    for place in range(of.STRING):
+        out[place] = whole[place]
+    if possible(whole):
+        out[of.LENGTH] = fretted(whole, pitch_hz)
+    return possible(out)
+
+
+def is_wound(string: Row) -> bool:
     """Return True if it is wound: denser, by volume of core, than metal, or than gut and nylon."""
     return string[of.DENSITY] > (8_900.0 if string[of.MODULUS] > 5e10 else 2_000.0)
 
 
-@njit(**EXACT)
-def thin(string: np.ndarray, pitch_hz: float) -> None:
+def thin(string: Out, pitch_hz: float) -> None:
     """Make it the octave string of its course: half as thick, equally tight, with twice the pitch by its length."""
     for place in (of.AREA, of.D1, of.D3):
         string[place] *= 0.25
@@ -135,8 +189,7 @@ def thin(string: np.ndarray, pitch_hz: float) -> None:
     string[of.LENGTH] = fretted(string, 2 * pitch_hz)
 
 
-@njit(**EXACT)
-def bent(string: np.ndarray, ratio: float) -> float:
+def bent(string: Row, ratio: float) -> float:
     """The tension in N that raises the string's pitch by a ratio; not above 0 where there is none."""
     if ratio == 1.0:
         return string[of.TENSION]
@@ -146,38 +199,33 @@ def bent(string: np.ndarray, ratio: float) -> float:
     return (mass(string) * (wanted * wanted + sigma * sigma) - bending * squared * squared) / squared
 
 
-@njit(**EXACT)
-def slid(string: np.ndarray, ratio: float) -> float:
+def slid(string: Row, ratio: float) -> float:
     """The length in m that raises the string's pitch by a ratio."""
     return string[of.LENGTH] if ratio == 1.0 else fretted(string, ratio * pitch_hz(string))
 
 
-@njit(**EXACT)
-def damped(string: np.ndarray, t60_s: float) -> float:
+def damped(string: Row, t60_s: float) -> float:
     """d₁ with which each partial decays by 60 dB more in so many seconds."""
     return string[of.D1] + 2 * mass(string) * math.log(1000.0) / t60_s
 
 
-@njit(**EXACT)
-def overdamped(string: np.ndarray, modes: int) -> bool:
+def overdamped(string: Row, modes: int) -> bool:
     """Return True if the first or the last mode does not swing; otherwise all do."""
     first = decay_rate(string, 1) < math.sqrt(omega_squared(string, 1))
     return not (first and decay_rate(string, modes) < math.sqrt(omega_squared(string, modes)))
 
 
-@njit(**EXACT)
-def loss(string: np.ndarray, partial: int, air: float, friction: float, bending: float) -> float:
-    """σ in 1/s that losses by mode add: as `Losses.rates`."""
-    omega, eta = math.sqrt(omega_squared(string, partial)), partial * math.pi / string[of.LENGTH]
+def loss(string: Row, partial: Mode, air: float, friction: float, bending: float) -> Mode:
+    """σ in 1/s that losses by mode add, see `engine.resonators.losses`."""
+    omega, eta = omega_squared(string, partial) ** 0.5, wavenumber(string, partial)
     diameter = 2 * math.sqrt(string[of.AREA] / math.pi)
-    drag = math.sqrt(math.pi * of.AIR_VISCOSITY_PA_S * of.AIR_DENSITY_KG_M3 * omega / (2 * math.pi))
+    drag = (math.pi * of.AIR_VISCOSITY_PA_S * of.AIR_DENSITY_KG_M3 * omega / (2 * math.pi)) ** 0.5
     bent = string[of.MODULUS] * string[of.MOMENT] * eta * eta
     inside = (string[of.TENSION] * friction + bent * bending) / (string[of.TENSION] + bent)
     return air * math.pi * (of.AIR_VISCOSITY_PA_S + diameter * drag) / mass(string) + 0.5 * omega * inside
 
 
-@njit(**EXACT)
-def mute(string: np.ndarray, modes: int, pairs: int, share: float, out: np.ndarray) -> None:
+def mute(string: Row, modes: int, pairs: int, share: float, out: Out) -> None:
     """Add to σ the losses to a hand that lies on the string from the bridge on.
 
     `out` is as of `rows`.
@@ -192,8 +240,7 @@ def mute(string: np.ndarray, modes: int, pairs: int, share: float, out: np.ndarr
         out[modes + mode] = max(before, min(before + share * MUTED_SIGMA * (1 - math.sin(turn) / turn), most))
 
 
-@njit(**EXACT)
-def touch(string: np.ndarray, modes: int, pairs: int, node: int, out: np.ndarray) -> None:
+def touch(string: Row, modes: int, pairs: int, node: int, out: Out) -> None:
     """Add to σ the losses to a finger that touches the string at 1/node of its length.
 
     `out` is as of `rows`.
@@ -208,10 +255,7 @@ def touch(string: np.ndarray, modes: int, pairs: int, node: int, out: np.ndarray
         out[modes + mode] = max(before, min(before + largest * moves, most))
 
 
-@njit(**EXACT)
-def stand(
-    string: np.ndarray, modes: int, pairs: int, conductance: float, second_conductance: float, out: np.ndarray
-) -> None:
+def stand(string: Row, modes: int, pairs: int, conductance: float, second_conductance: float, out: Out) -> None:
     """Move what pairs lose to a bridge that others share from σ to the place behind η².
 
     `out` is as of `rows`.
@@ -227,21 +271,18 @@ def stand(
         out[4 * modes + mode] = shared
 
 
-@njit(**EXACT)
 def partial_of(mode: int, pairs: int) -> int:
     """The partial, from 1, of a mode, from 0: pairs come first, the two polarisations side by side."""
     return (mode // 2 if mode < 2 * pairs else mode - pairs) + 1
 
 
-@njit(**EXACT)
 def direction_of(mode: int, pairs: int) -> int:
     """0: the first polarisation; 1: the second."""
     return mode % 2 if mode < 2 * pairs else 0
 
 
-@njit(**EXACT)
 def rows(
-    string: np.ndarray,
+    string: Row,
     modes: int,
     pairs: int,
     detuning: float,
@@ -250,20 +291,20 @@ def rows(
     air: float,
     friction: float,
     bending: float,
-    out: np.ndarray,
+    out: Out,
 ) -> None:
-    """ω², σ, k and η² of the lowest modes, one after the other, (4 modes,): as `Polarisations.resonator`.
+    """ω², σ, k and η² of the lowest modes, one after the other, (4 modes,).
+
+    Of two polarisations, see `engine.values.string.Polarisations`.
 
     Args:
         pairs: partials of two modes, whose ω² are in the ratio `detuning`; 0: there is one direction.
         conductance, second_conductance: of the bridge in both directions, in s/kg.
         air, friction, bending: losses by mode, 0 for none.
     """
-    stiffness = string[of.MODULUS] * string[of.AREA] / (4 * mass(string))
     pull = string[of.TENSION] / string[of.LENGTH]
     for mode in range(modes):
         partial, second = partial_of(mode, pairs), direction_of(mode, pairs) == 1
-        eta = partial * (math.pi / string[of.LENGTH])
         squared = omega_squared(string, partial)
         if second:
             squared *= detuning
@@ -273,5 +314,5 @@ def rows(
             added += loss(string, partial, air, friction, bending)
         out[mode] = squared
         out[modes + mode] = min(sigma + added, of.HIGHEST_SIGMA * math.sqrt(squared)) if added > 0.0 else sigma
-        out[2 * modes + mode] = stiffness * eta * eta
-        out[3 * modes + mode] = eta * eta
+        out[2 * modes + mode] = coupling(string, partial)
+        out[3 * modes + mode] = wavenumber(string, partial) ** 2

@@ -5,7 +5,7 @@ a string at rest, whose own force on the bridge is, near its resonance,
 
     H(s) = -2 σ_b s / (s² + 2σ s + ω²),      σ_b = T G/ℓ ≤ σ,
 
-σ_b being what the partial itself loses to the bridge (`engine.resonators.polarised`), and σ all that it loses.
+σ_b being what the partial itself loses to the bridge (`engine.values.string`), and σ all that it loses.
 Nothing rings up: |H| is at most σ_b/σ ≤ 1, the poles have the decay of the string, and nothing leads back from these
 strings to those that are played, or to one another. So all that is given is bounded by the sum of σ_b/σ times the
 largest input.
@@ -19,15 +19,16 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import carray, njit
+from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels import layout as at
 from engine.kernels import strings
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import player_at, pointer, table_at
-from engine.kernels.playing.keys import chosen, string_of
-from engine.kernels.records import Player, Table
+from engine.kernels.constants import QUANTUM
+from engine.kernels.memory import mixer_at, player_at, table_at
+from engine.kernels.mixer_records import LARGEST
+from engine.kernels.playing.keys import string_of
+from engine.kernels.records import Player, Sympathy, Table
 
 HIGHEST_HZ = 4_000.0  # of partials: an estimate, above it boards pass hardly anything to other strings
 PARTIALS = 8  # of a string
@@ -37,7 +38,7 @@ NOTHING = 1e-12  # of full scale: below it all rest
 
 @njit(**COMPILED)
 def tune(player: Player, table: Table) -> None:
-    """Fills the bank with the strings of an instrument: of every key, or the open ones of a set."""
+    """Fill the bank with the strings of an instrument: of every key, or the open ones of a set."""
     own, bank = player.own, player.sympathy
     count, rate_hz, everyone = 0, player.rate_hz, table.sympathy == of.EVERY_KEY
     for number in range(of.KEYS if everyone else table.strings):
@@ -68,21 +69,11 @@ def tune(player: Player, table: Table) -> None:
 
 
 @njit(**COMPILED)
-def ring(
-    x: np.ndarray,
-    y: np.ndarray,
-    cosine: np.ndarray,
-    sine: np.ndarray,
-    gain: np.ndarray,
-    played: np.ndarray,
-    force: np.ndarray,
-    out: np.ndarray,
-) -> float:
-    """Adds the force of partials (count,) that a force (frames,) drives to out (frames,); the largest of x² + y².
-
-    Args:
-        played: 1 for partials of strings that are played, which are stopped, else 0.
-    """
+def ring(bank: Sympathy, force: np.ndarray, out: np.ndarray) -> float:
+    """Add the force of partials that a force (frames,) drives to out (frames,); the largest of x² + y²."""
+    count = bank.partials
+    x, y, cosine, sine = bank.x[:count], bank.y[:count], bank.cosine[:count], bank.sine[:count]
+    gain, played = bank.gain[:count], bank.played[:count]
     for frame in range(len(force)):
         driven, total = force[frame], 0.0
         for n in range(len(x)):
@@ -100,7 +91,7 @@ def ring(
 
 @njit(**COMPILED)
 def sympathise(player_address: int, mixer_address: int) -> None:
-    """Adds what strings ring that are not played to the mixer's quantum, both channels alike."""
+    """Add what strings ring that are not played to the mixer's quantum, both channels alike."""
     player = player_at(player_address)
     if player.table == 0:
         return
@@ -113,16 +104,12 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     count = bank.partials
     if count == 0:
         return
-    mixer = carray(pointer(mixer_address), (at.MIXER_SLOTS,), np.float64)
-    mix = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2)
-    force, out = (
-        mixer[at.M_SCRATCH : at.M_SCRATCH + at.QUANTUM],
-        mixer[at.M_SCRATCH + at.QUANTUM : at.M_SCRATCH + 2 * at.QUANTUM],
-    )
+    mixer = mixer_at(mixer_address)
+    mix, force, out = mixer.mix[:], mixer.scratch[:QUANTUM], mixer.scratch[QUANTUM : 2 * QUANTUM]
     heard = False
-    for frame in range(at.QUANTUM):
+    for frame in range(QUANTUM):
         given = 0.5 * (mix[frame, 0] + mix[frame, 1])
-        force[frame] = given if abs(given) < at.LARGEST else 0.0  # also where it is not a number
+        force[frame] = given if abs(given) < LARGEST else 0.0  # also where it is not a number
         heard = heard or abs(given) > NOTHING
         out[frame] = 0.0
     if not heard and bank.rings == 0:
@@ -142,25 +129,16 @@ def sympathise(player_address: int, mixer_address: int) -> None:
         if not everyone:
             string = note.string
             if string < 0:
-                string = chosen(table, table.strings, note.key)
+                string = strings.chosen(table.open, table.strings, note.key)
         for n in range(count):
             if bank.owner[n] == string:
                 played[n] = 1.0
-    largest = ring(
-        bank.x[:count],
-        bank.y[:count],
-        bank.cosine[:count],
-        bank.sine[:count],
-        bank.gain[:count],
-        played,
-        force,
-        out,
-    )
+    largest = ring(bank, force, out)
     rings = largest > NOTHING * NOTHING
     bank.rings = rings
     if not rings and not heard:
         bank.x[:count] = 0.0
         bank.y[:count] = 0.0
-    for frame in range(at.QUANTUM):
+    for frame in range(QUANTUM):
         mix[frame, 0] += out[frame]
         mix[frame, 1] += out[frame]

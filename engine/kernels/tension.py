@@ -12,22 +12,26 @@ import numpy as np
 from numba import njit
 
 from engine.kernels import lanes
-from engine.kernels import layout as at
+from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.modes import damped, following, glide, gliding, rest_above, row
+from engine.kernels.constants import QUANTUM
+from engine.kernels.fields import slots
+from engine.kernels.memory import behind
+from engine.kernels.modes import damped, following, glide, gliding, rest_above, rest_silent, row, weights
+from engine.kernels.scheme import ENERGY_BOUND, HARDEST_KICK, MOST_NODES
+from engine.kernels.voice_records import TENSION_PROGRAM, TensionProgram, Voice
 
-ENERGY_BOUND = 1.5  # of the energy at the start, as in the model
-HARDEST_KICK, MOST_NODES = 0.3, 3  # as in the model
 NEWTON_STEPS, NEWTON_DONE = 20, 1e-9  # at most; of the tension: a smaller change is the last
 NOTHING = 1e-60  # squares of displacement: what is left is put to zero, before it becomes denormal
 UNFELT = 5e-6  # of S, on average: a mode that adds less rests, and adds its average
 LOOKS_QUANTA = 8  # from one look at which modes of a drum move to the next
 FEWER_QUANTA = 64  # from one look at whether a string's modes that still move need so many nodes to the next
+BEHIND_PROGRAM = slots(TENSION_PROGRAM)
 
 
 @njit(**COMPILED)
 def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
-    """Copies modes, in this order, into blocks of `kernels.lanes`; unused lanes are zero.
+    """Copy modes, in this order, into blocks of `kernels.lanes`; unused lanes are zero.
 
     Args:
         rows: (7, modes), see `advance`.
@@ -45,16 +49,16 @@ def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memo
 
 
 @njit(**COMPILED)
-def load_weights(weights: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
-    """Copies the weights of one ear into the blocks that `load` fills."""
+def load_weights(own: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
+    """Copy the weights of one ear into the blocks that `load` fills."""
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number) + (lanes.EARS + ear) * lanes.LANES
-        memory[slot] = weights[order[number]] if number < len(order) else 0.0
+        memory[slot] = own[order[number]] if number < len(order) else 0.0
 
 
 @njit(**COMPILED)
 def save(x: np.ndarray, y: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int) -> None:
-    """Copies modes back from their blocks."""
+    """Copy modes back from their blocks."""
     for number in range(len(order)):
         slot = first + lanes.place(number)
         x[order[number]], y[order[number]] = memory[slot], memory[slot + lanes.LANES]
@@ -74,7 +78,7 @@ def node(
 ) -> tuple[float, float]:
     """The kick of the common tension and the turn to the next node, in place.
 
-    It leads from S and R here to those there.
+    It leads from S and R here to those there. It takes each number by itself, so that all stay in registers.
 
     Args:
         sums, rest: S and R of the blocks here, and what resting modes add; the result is of the blocks.
@@ -86,7 +90,7 @@ def node(
 
 @njit(**COMPILED)
 def hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> tuple[float, bool]:
-    """Holds Σ ω² |z|² of blocks below the largest; returns Σ |z|², and whether anything has changed."""
+    """Hold Σ ω² |z|² of blocks below the largest; return Σ |z|², and whether anything has changed."""
     total, energy = lanes.energies(memory, first, blocks)
     held = not energy <= largest_energy  # also where it is not a number
     if held:
@@ -106,7 +110,7 @@ def hold(memory: np.ndarray, first: int, blocks: int, largest_energy: float) -> 
 
 @njit(**COMPILED)
 def trim(memory: np.ndarray, first: int, moving: int, silence: float, total: float) -> int:
-    """Lays the highest modes to rest that are silent; those left."""
+    """Lay the highest modes to rest that are silent; those left."""
     while moving > 1:
         x = first + lanes.place(moving - 1)
         y = x + lanes.LANES
@@ -131,7 +135,9 @@ def advance(
     rows: np.ndarray,
     out: np.ndarray,
 ) -> None:
-    """Advances x and y (batch, modes) in place; writes the amplitudes out (batch, steps, modes).
+    """Advance x and y (batch, modes) in place; write the amplitudes out (batch, steps, modes).
+
+    It takes what a model's step has in arrays and numbers of its own.
 
     Args:
         largest_energies: of Σ ω² |z|², (batch,), which fall by `decay` a frame, in place.
@@ -166,73 +172,54 @@ def advance(
 
 
 @njit(**COMPILED)
-def _nodes(voice: np.ndarray, program: np.ndarray, kick: float) -> int:
+def _nodes(voice: Voice, program: TensionProgram, kick: float) -> int:
     """The number of nodes in a frame, as many as the modes that move need: as `KoopmanTension.step`.
 
     Args:
         kick: Σ η² k (q² + v²/ω²).
     """
-    counts = voice.view(np.int64)
-    n, last = counts[at.MODES], counts[at.MOVING] - 1
-    squares, sigmas = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.SIGMA)
-    first_rate = damped(squares[0], sigmas[0]) / program[at.S_NODE_PHASE]
-    fastest = max(first_rate, damped(squares[last], sigmas[last]) / program[at.S_HIGHEST_PHASE])
+    last = voice.moving - 1
+    squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
+    first_rate = damped(squares[0], sigmas[0]) / program.node_phase
+    fastest = max(first_rate, damped(squares[last], sigmas[last]) / program.highest_phase)
     fastest = min(max(fastest, math.sqrt(kick) / HARDEST_KICK), MOST_NODES * fastest)
-    nodes, steps = max(1, math.ceil(fastest / program[at.S_RATE])), max(1, counts[at.JAVARI_STEPS])
+    nodes, steps = max(1, math.ceil(fastest / program.rate_hz)), max(1, voice.javari.steps)
     return (nodes + steps - 1) // steps * steps
 
 
 @njit(**COMPILED)
-def _needs_fewer_nodes(voice: np.ndarray, program: np.ndarray) -> bool:
+def _needs_fewer_nodes(voice: Voice, program: TensionProgram) -> bool:
     """Return True if fewer nodes are enough: high modes have fallen silent since its rows were prepared."""
-    counts = voice.view(np.int64)
-    if counts[at.STEPS] == 1 or program[at.S_UNHEARD] > 0:
+    if voice.steps == 1 or program.unheard > 0:
         return False
-    counts[at.REFRESH] -= 1
-    if counts[at.REFRESH] > 0:
+    voice.refresh -= 1
+    if voice.refresh > 0:
         return False
-    counts[at.REFRESH] = FEWER_QUANTA
-    n, kick = counts[at.MODES], 0.0
-    x, y = row(voice, n, 0), row(voice, n, 1)
-    couplings, stretches = row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
-    for m in range(counts[at.MOVING]):
+    voice.refresh = FEWER_QUANTA
+    x, y, kick = row(voice, 0), row(voice, 1), 0.0
+    couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
+    for m in range(voice.moving):
         kick += stretches[m] * couplings[m] * (x[m] * x[m] + y[m] * y[m])
-    return _nodes(voice, program, kick) < counts[at.STEPS]
+    return _nodes(voice, program, kick) < voice.steps
 
 
 @njit(**COMPILED)
-def _rest_silent(voice: np.ndarray, silence: float, q: np.ndarray, v: np.ndarray) -> None:
-    """Lays the highest modes to rest that are silent as it sets out."""
-    counts = voice.view(np.int64)
-    squares, moving, total = row(voice, counts[at.MODES], at.OMEGA_SQUARED), counts[at.MOVING], 0.0
-    for m in range(moving):
-        total += q[m] * q[m] + v[m] * v[m] / squares[m]
-    while moving > 1:
-        m = moving - 1
-        if not q[m] * q[m] + v[m] * v[m] / squares[m] < silence * silence * total:
-            break
-        moving -= 1
-    counts[at.MOVING] = moving
-
-
-@njit(**COMPILED)
-def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
+def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray) -> None:
     """The rows that follow from the voice's modes, its amplitudes and speeds (modes,): as `KoopmanTension.step`."""
-    counts, whole = voice.view(np.int64), program.view(np.int64)
-    n, rate = counts[at.MODES], program[at.S_RATE]
-    squares, sigmas = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.SIGMA)
-    couplings, stretches = row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
-    rows = following(voice, n)
+    n, rate = voice.modes, program.rate_hz
+    squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
+    couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
+    rows = following(voice)
     rest_above(voice, rate)
-    highest, kick = program[at.S_HIGHEST_PHASE], 0.0
-    for m in range(counts[at.MOVING]):
+    highest, kick = program.highest_phase, 0.0
+    for m in range(voice.moving):
         omega = damped(squares[m], sigmas[m])
         kick += stretches[m] * couplings[m] * (q[m] * q[m] + (v[m] / omega) ** 2)
-    nodes, drum = _nodes(voice, program, kick), program[at.S_UNHEARD] > 0
-    if counts[at.PREPARED] and not drum:  # a glide leaves as many, so that one to the same modes changes nothing
-        nodes = max(nodes, counts[at.STEPS])
-    h, coefficients = 1 / (nodes * rate), whole[at.S_COEFFICIENTS]
-    slowest = np.inf
+    nodes, drum = _nodes(voice, program, kick), program.unheard > 0
+    if voice.prepared and not drum:  # a glide leaves as many, so that one to the same modes changes nothing
+        nodes = max(nodes, voice.steps)
+    h, coefficients = 1 / (nodes * rate), program.coefficients
+    curves, slowest = behind(program, BEHIND_PROGRAM, 3 * coefficients), np.inf
     for m in range(n):
         sigma, omega = sigmas[m], damped(squares[m], sigmas[m])
         slowest = min(slowest, sigma)
@@ -241,9 +228,9 @@ def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray
         growth = r = p = 0.0
         now, before = 1.0, argument  # Chebyshev polynomials
         for degree in range(coefficients):
-            growth += program[at.S_HEADER + degree] * now
-            r += program[at.S_HEADER + coefficients + degree] * now
-            p += program[at.S_HEADER + 2 * coefficients + degree] * now
+            growth += curves[degree] * now
+            r += curves[coefficients + degree] * now
+            p += curves[2 * coefficients + degree] * now
             now, before = (2 * argument * now - before, now)
         growth = min(max(1 + phase * phase * growth, 0.0), 2.0)
         r, p = min(max(r, -1.0), 1.0), min(max(p, -1.0), 1.0)
@@ -252,44 +239,41 @@ def prepare(voice: np.ndarray, program: np.ndarray, q: np.ndarray, v: np.ndarray
         rows[2, m], rows[3, m] = angle * growth, stretches[m] * growth
         rows[4, m] = kappa * r / growth if growth > 0.0 else 0.0
         rows[5, m], rows[6, m] = kappa * p, omega * omega
-    counts[at.STEPS] = nodes
-    if drum or not counts[at.PREPARED]:
-        counts[at.REFRESH] = 0 if drum else FEWER_QUANTA
-    voice[at.DECAY] = math.exp(-2 * slowest / rate)
-    order = row(voice, n, at.ORDER).view(np.int64)
+    voice.steps = nodes
+    if drum or not voice.prepared:
+        voice.refresh = 0 if drum else FEWER_QUANTA
+    voice.decay = math.exp(-2 * slowest / rate)
+    order = row(voice, at.ORDER).view(np.int64)
     for m in range(n):
         order[m] = m
-    counts[at.HEARD] = counts[at.FELT] = counts[at.MOVING]
-    counts[at.NODES], voice[at.STRETCHED], voice[at.JAVARI_GIVE] = 0, 0.0, 0.0
+    voice.heard = voice.felt = voice.moving
+    voice.nodes, voice.stretched, voice.javari.give = 0, 0.0, 0.0
 
 
 @njit(**COMPILED)
-def _turn(voice: np.ndarray, mode: int, sign: float) -> None:
-    """Turns a mode by the angle that it has swung through since the rows were prepared, forward or back.
+def _turn(voice: Voice, mode: int, sign: float) -> None:
+    """Turn a mode by the angle that it has swung through since the rows were prepared, forward or back.
 
     Modes that rest are kept without that angle. A kick K S x turns z by K S/2 on average.
     """
-    counts = voice.view(np.int64)
-    n = counts[at.MODES]
-    if counts[at.NODES] == 0:
+    if voice.nodes == 0:
         return
-    x, y, rows = row(voice, n, 0), row(voice, n, 1), following(voice, n)
-    angle = counts[at.NODES] * math.atan2(rows[1, mode], rows[0, mode]) + 0.5 * rows[2, mode] * voice[at.STRETCHED]
+    x, y, rows = row(voice, 0), row(voice, 1), following(voice)
+    angle = voice.nodes * math.atan2(rows[1, mode], rows[0, mode]) + 0.5 * rows[2, mode] * voice.stretched
     cosine, sine = math.cos(angle), sign * math.sin(angle)
     x[mode], y[mode] = cosine * x[mode] - sine * y[mode], sine * x[mode] + cosine * y[mode]
 
 
 @njit(**COMPILED)
-def _fall(voice: np.ndarray) -> None:
+def _fall(voice: Voice) -> None:
     """Modes that rest because nobody hears or feels them decay to the present."""
-    counts = voice.view(np.int64)
-    n, frames = counts[at.MODES], counts[at.RESTED] * at.QUANTUM
+    frames = voice.rested * QUANTUM
     if frames == 0:
         return
-    x, y, rows = row(voice, n, 0), row(voice, n, 1), following(voice, n)
-    order = row(voice, n, at.ORDER).view(np.int64)
-    steps = counts[at.STEPS] * frames // 2  # a quantum is even
-    for place in range(counts[at.FELT], counts[at.MOVING]):
+    x, y, rows = row(voice, 0), row(voice, 1), following(voice)
+    order = row(voice, at.ORDER).view(np.int64)
+    steps = voice.steps * frames // 2  # a quantum is even
+    for place in range(voice.felt, voice.moving):
         m = order[place]
         square, left, power = rows[0, m] * rows[0, m] + rows[1, m] * rows[1, m], 1.0, steps
         while power > 0:  # square ** steps: of whole numbers in fewer steps than of any
@@ -299,24 +283,23 @@ def _fall(voice: np.ndarray) -> None:
             power >>= 1
         x[m] *= left
         y[m] *= left
-    counts[at.RESTED] = 0
+    voice.rested = 0
 
 
 @njit(**COMPILED)
-def _wake(voice: np.ndarray) -> None:
-    """Brings the modes that rest to the present; the next quantum chooses again which rest."""
+def _wake(voice: Voice) -> None:
+    """Bring the modes that rest to the present; the next quantum chooses again which rest."""
     _fall(voice)
-    counts = voice.view(np.int64)
-    order = row(voice, counts[at.MODES], at.ORDER).view(np.int64)
-    if counts[at.FELT] < counts[at.MOVING]:
-        counts[at.REFRESH] = 0
-    for place in range(counts[at.FELT], counts[at.MOVING]):
+    order = row(voice, at.ORDER).view(np.int64)
+    if voice.felt < voice.moving:
+        voice.refresh = 0
+    for place in range(voice.felt, voice.moving):
         _turn(voice, order[place], 1.0)
-    counts[at.FELT] = counts[at.MOVING]
+    voice.felt = voice.moving
 
 
 @njit(**COMPILED)
-def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray) -> None:
+def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray) -> None:
     """Orders the modes of a drum: those that are heard, others that stretch it, and those that rest.
 
     The highest that are silent are laid to rest for good.
@@ -325,44 +308,42 @@ def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray
         sets: of weights that hear it.
         scratch: room for three rows (modes,).
     """
-    counts = voice.view(np.int64)
     _fall(voice)
-    n, moving = counts[at.MODES], counts[at.MOVING]
-    x, y, rows, sigmas = row(voice, n, 0), row(voice, n, 1), following(voice, n), row(voice, n, at.SIGMA)
-    stretches, order = rows[3], row(voice, n, at.ORDER).view(np.int64)
+    moving = voice.moving
+    x, y, rows, sigmas = row(voice, 0), row(voice, 1), following(voice), row(voice, at.SIGMA)
+    stretches, order = rows[3], row(voice, at.ORDER).view(np.int64)
     sizes, heard, rested = scratch[:moving], scratch[moving : 2 * moving], scratch[2 * moving : 3 * moving]
     for place in range(moving):
-        rested[order[place]] = 1.0 if place >= counts[at.FELT] else 0.0
+        rested[order[place]] = 1.0 if place >= voice.felt else 0.0
     total = stretch = 0.0
     for m in range(moving):
         sizes[m], heard[m] = x[m] * x[m] + y[m] * y[m], 0.0
         total += sizes[m]
         stretch += stretches[m] * sizes[m]
     for which in range(sets):
-        for point in range(counts[at.POINTS]):
-            place = at.weights(n, which, point, 0)
-            weights, loudness = voice[place : place + n], 0.0
+        for point in range(voice.points):
+            w, loudness = weights(voice, which, point, 0), 0.0
             for m in range(moving):
-                loudness += weights[m] * weights[m] * sizes[m]
+                loudness += w[m] * w[m] * sizes[m]
             share = 1 / loudness if loudness > 0 else 0.0
             for m in range(moving):
-                heard[m] = max(heard[m], share * weights[m] * weights[m] * sizes[m])
-    while moving > 1 and sizes[moving - 1] < program[at.S_SILENCE] ** 2 * total + NOTHING:
+                heard[m] = max(heard[m], share * w[m] * w[m] * sizes[m])
+    while moving > 1 and sizes[moving - 1] < program.silence**2 * total + NOTHING:
         moving -= 1
         x[moving] = y[moving] = heard[moving] = 0.0
         order[moving] = moving
-    audible = program[at.S_UNHEARD] ** 2
+    audible = program.unheard**2
     place = 0
     for m in range(moving):
         if heard[m] > audible:
             order[place] = m
             place += 1
-    counts[at.HEARD] = place
+    voice.heard = place
     for m in range(moving):
         if heard[m] <= audible and stretches[m] * sizes[m] > UNFELT * stretch:
             order[place] = m
             place += 1
-    counts[at.FELT], counts[at.MOVING] = place, moving
+    voice.felt, voice.moving = place, moving
     for felt in range(place):
         if rested[order[felt]] > 0.0:
             _turn(voice, order[felt], 1.0)
@@ -376,9 +357,9 @@ def _look(voice: np.ndarray, program: np.ndarray, sets: int, scratch: np.ndarray
             rest += 0.5 * stretches[m] * sizes[m]
             second += 0.5 * stretches[m] * rows[4, m] * sizes[m]
             rate += stretches[m] * sizes[m] * sigmas[m]
-    voice[at.REST_STRETCH], voice[at.REST_SECOND] = rest, second
-    voice[at.REST_DECAY] = math.exp(-rate / rest * at.QUANTUM / program[at.S_RATE]) if rest > 0 else 0.0
-    counts[at.REFRESH] = LOOKS_QUANTA
+    voice.rest_stretch, voice.rest_second = rest, second
+    voice.rest_decay = math.exp(-rate / rest * QUANTUM / program.rate_hz) if rest > 0 else 0.0
+    voice.refresh = LOOKS_QUANTA
 
 
 @njit(**COMPILED)
@@ -396,17 +377,16 @@ def _half_kick(rows: np.ndarray, x: np.ndarray, largest_stretch: float, y: np.nd
 
 
 @njit(**COMPILED)
-def physical(voice: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
+def physical(voice: Voice, q: np.ndarray, v: np.ndarray) -> None:
     """Amplitudes in m and speeds in m/s, (modes,), of a voice as it is now: the inverse of `set_out`, to rounding."""
-    counts = voice.view(np.int64)
-    n = counts[at.MODES]
+    n = voice.modes
     _wake(voice)
-    x, y = row(voice, n, 0), row(voice, n, 1)
-    rows = following(voice, n)
-    sigmas, stretches = row(voice, n, at.SIGMA), row(voice, n, at.STRETCH)
+    x, y = row(voice, 0), row(voice, 1)
+    rows = following(voice)
+    sigmas, stretches = row(voice, at.SIGMA), row(voice, at.STRETCH)
     for m in range(n):
         v[m] = y[m]
-    _half_kick(rows, x, voice[at.LARGEST_STRETCH], v, 1.0)
+    _half_kick(rows, x, voice.largest_stretch, v, 1.0)
     tension = 0.0  # S₀ of x = q (1 + κ p S₀), by Newton's method
     for _ in range(NEWTON_STEPS):
         value, slope = -tension, 1.0
@@ -429,7 +409,7 @@ def physical(voice: np.ndarray, q: np.ndarray, v: np.ndarray) -> None:
 
 
 @njit(**COMPILED)
-def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
+def set_out(voice: Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
     """The coordinates in which kicks act, half a kick before the first node, of amplitudes and speeds (modes,).
 
     As `KoopmanTension._set_out`.
@@ -437,11 +417,10 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
     Args:
         bounded: the largest energy is there, and may only fall; otherwise it follows from the input.
     """
-    counts = voice.view(np.int64)
-    n = counts[at.MODES]
-    x, y = row(voice, n, 0), row(voice, n, 1)
-    rows = following(voice, n)
-    sigmas, couplings, stretches = row(voice, n, at.SIGMA), row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
+    n = voice.modes
+    x, y = row(voice, 0), row(voice, 1)
+    rows = following(voice)
+    sigmas, couplings, stretches = row(voice, at.SIGMA), row(voice, at.COUPLING), row(voice, at.STRETCH)
     tension = held = energy = widest = 0.0
     for m in range(n):
         omega, square = math.sqrt(rows[6, m]), q[m] * q[m]
@@ -451,8 +430,8 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
         energy += rows[6, m] * (square + y[m] * y[m])
         widest = max(widest, stretches[m] / rows[6, m])
     largest = ENERGY_BOUND * (energy + 0.5 * tension * held)
-    voice[at.LARGEST_ENERGY] = min(voice[at.LARGEST_ENERGY], largest) if bounded else largest
-    voice[at.LARGEST_STRETCH] = voice[at.LARGEST_ENERGY] * widest
+    voice.largest_energy = min(voice.largest_energy, largest) if bounded else largest
+    voice.largest_stretch = voice.largest_energy * widest
     moved, share = 0.0, 1.0
     for m in range(n):
         part = stretches[m] * q[m] / (1 + rows[5, m] * tension)
@@ -464,73 +443,72 @@ def set_out(voice: np.ndarray, q: np.ndarray, v: np.ndarray, bounded: bool) -> N
         lifted = (v[m] - 2 * rows[5, m] * q[m] * moved) / lift
         x[m] = q[m] * lift
         y[m] -= (lifted - v[m]) / math.sqrt(rows[6, m])
-    _half_kick(rows, x, voice[at.LARGEST_STRETCH], y, -1.0)
+    _half_kick(rows, x, voice.largest_stretch, y, -1.0)
 
 
 @njit(**COMPILED)
-def bring_up_to_date(voice: np.ndarray, program: np.ndarray) -> None:
+def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
     """Bring up to date what follows from the modes, and the latents, where a voice begins or its modes change."""
-    counts = voice.view(np.int64)
-    n = counts[at.MODES]
-    fewer = counts[at.PREPARED] and _needs_fewer_nodes(voice, program)
-    if counts[at.PREPARED] and not gliding(voice) and not fewer:
+    n = voice.modes
+    fewer = voice.prepared and _needs_fewer_nodes(voice, program)
+    if voice.prepared and not gliding(voice) and not fewer:
         return
-    q, v, squares = row(voice, n, at.PHYSICAL), row(voice, n, at.PHYSICAL + 1), following(voice, n)[6]
-    if counts[at.PREPARED]:
+    q, v, squares = row(voice, at.PHYSICAL), row(voice, at.PHYSICAL + 1), following(voice)[6]
+    if voice.prepared:
         physical(voice, q, v)
         if fewer:
-            counts[at.STEPS] = 1  # or as many as are needed
+            voice.steps = 1  # or as many as are needed
         if gliding(voice):
             glide(voice)
         raised = 1.0  # by the work that raises the tension
+        present, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
         for m in range(n):
-            omega = damped(row(voice, n, at.OMEGA_SQUARED)[m], row(voice, n, at.SIGMA)[m])
+            omega = damped(present[m], sigmas[m])
             raised = max(raised, omega * omega / squares[m])
-        voice[at.LARGEST_ENERGY] *= raised
+        voice.largest_energy *= raised
     else:
-        q[:], v[:] = row(voice, n, 0), row(voice, n, 1)
+        q[:], v[:] = row(voice, 0), row(voice, 1)
         if gliding(voice):
             glide(voice)
-        if counts[at.JAVARI_STEPS] == 0:  # whose contact wakes them
-            _rest_silent(voice, program[at.S_SILENCE], q, v)
+        if voice.javari.steps == 0:  # whose contact wakes them
+            own = row(voice, at.OMEGA_SQUARED)
+            voice.moving, _ = rest_silent(q, v, own, voice.moving, program.silence)
     prepare(voice, program, q, v)
-    for m in range(counts[at.MOVING], n):
+    for m in range(voice.moving, n):
         q[m] = v[m] = 0.0
-    set_out(voice, q, v, bool(counts[at.PREPARED]))
-    counts[at.PREPARED] = 1
+    set_out(voice, q, v, bool(voice.prepared))
+    voice.prepared = 1
 
 
 @njit(**COMPILED)
 def generate(
-    voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
+    voice: Voice, program: TensionProgram, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     bring_up_to_date(voice, program)
-    counts = voice.view(np.int64)
-    n, nodes, points = counts[at.MODES], counts[at.STEPS], counts[at.POINTS]
-    sets, rests = 2 if fading else 1, program[at.S_UNHEARD] > 0
+    n, nodes, points = voice.modes, voice.steps, voice.points
+    sets, rests = 2 if fading else 1, program.unheard > 0
     ears = sets * points if heard else 0
     rest = (0.0, 0.0)
     if not rests:
-        counts[at.HEARD] = counts[at.FELT] = counts[at.MOVING]
-    elif fading or counts[at.REFRESH] == 0:
+        voice.heard = voice.felt = voice.moving
+    elif fading or voice.refresh == 0:
         _look(voice, program, sets, scratch)
     if rests:
-        rest = (voice[at.REST_STRETCH], voice[at.REST_SECOND])
-    x, y, rows = row(voice, n, 0), row(voice, n, 1), following(voice, n)
-    order = row(voice, n, at.ORDER).view(np.int64)
-    loud, quiet = order[: counts[at.HEARD]], order[counts[at.HEARD] : counts[at.FELT]]
+        rest = (voice.rest_stretch, voice.rest_second)
+    x, y, rows = row(voice, 0), row(voice, 1), following(voice)
+    order = row(voice, at.ORDER).view(np.int64)
+    loud, quiet = order[: voice.heard], order[voice.heard : voice.felt]
     first, near, far = lanes.aligned(scratch), lanes.blocks_of(len(loud)), lanes.blocks_of(len(quiet))
     ear_sums, behind = scratch[first + lanes.slots(n) :][: 2 * lanes.MOST_EARS], first + near * lanes.BLOCK
     load(x, y, rows, loud, scratch, first)
     load(x, y, rows, quiet, scratch, behind)
     for ear in range(ears):
-        place = at.weights(n, ear // points, ear % points, 0)
-        load_weights(voice[place : place + n], loud, scratch, first, ear)
-    moving, total, apart, largest = len(loud), 0.0, 2 if points == 1 else 1, voice[at.LARGEST_STRETCH]
-    stretched = at.QUANTUM * nodes * rest[0]
+        load_weights(weights(voice, ear // points, ear % points, 0), loud, scratch, first, ear)
+    moving, total, apart, largest = len(loud), 0.0, 2 if points == 1 else 1, voice.largest_stretch
+    stretched = QUANTUM * nodes * rest[0]
     sums = lanes.add_up(scratch, first, near, far, ears, ear_sums)
-    for frame in range(at.QUANTUM):
+    for frame in range(QUANTUM):
         for ear in range(ears):
             out[apart * ear, frame] = ear_sums[2 * ear] - (sums[0] + rest[0]) * ear_sums[2 * ear + 1]
         stretched += sums[0]
@@ -538,25 +516,25 @@ def generate(
             sums = node(scratch, first, near, far, 0, sums, rest, largest, ear_sums)
             stretched += sums[0]
         sums = node(scratch, first, near, far, ears, sums, rest, largest, ear_sums)
-        voice[at.LARGEST_ENERGY] *= voice[at.DECAY]
+        voice.largest_energy *= voice.decay
         if frame % 16 == 15:
-            total, held = hold(scratch, first, near + far, voice[at.LARGEST_ENERGY])
+            total, held = hold(scratch, first, near + far, voice.largest_energy)
             before = moving
             if not rests:
-                moving = trim(scratch, first, moving, program[at.S_SILENCE], total)
+                moving = trim(scratch, first, moving, program.silence, total)
                 near = lanes.blocks_of(moving)
             if held or moving < before or total < NOTHING:
                 sums = lanes.add_up(scratch, first, near, far, ears, ear_sums)
     save(x, y, loud, scratch, first)
     save(x, y, quiet, scratch, behind)
     if rests:
-        counts[at.REFRESH] -= 1
-        counts[at.RESTED] += 1
-        counts[at.NODES] += at.QUANTUM * nodes
-        voice[at.STRETCHED] += stretched
-        voice[at.REST_STRETCH] *= voice[at.REST_DECAY]
-        voice[at.REST_SECOND] *= voice[at.REST_DECAY]
+        voice.refresh -= 1
+        voice.rested += 1
+        voice.nodes += QUANTUM * nodes
+        voice.stretched += stretched
+        voice.rest_stretch *= voice.rest_decay
+        voice.rest_second *= voice.rest_decay
     else:
-        counts[at.MOVING] = moving
-    counts[at.GENERATED] += at.QUANTUM
-    voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.S_LOUDNESS]
+        voice.moving = moving
+    voice.generated += QUANTUM
+    voice.loudness = (0.5 * math.log(total) if total > 0 else -1e9) + program.loudness

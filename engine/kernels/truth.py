@@ -10,66 +10,59 @@ import math
 import numpy as np
 from numba import njit
 
-from engine.kernels import layout as at
+from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.modes import damped, glide, gliding, rest_above, row
+from engine.kernels.constants import QUANTUM
+from engine.kernels.modes import damped, glide, gliding, rest_above, rest_silent, row, table, turn, weights
+from engine.kernels.rotation import rotation
+from engine.kernels.voice_records import TruthProgram, Voice
 
 
 @njit(**COMPILED)
-def _sub_steps(voice: np.ndarray, program: np.ndarray) -> int:
+def _sub_steps(voice: Voice, program: TruthProgram) -> int:
     """The number of sub-steps of a frame, by the highest mode that moves; 0: what is linear needs none."""
-    counts = voice.view(np.int64)
-    n = counts[at.MODES]
-    squares, couplings = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.COUPLING)
-    steps = counts[at.JAVARI_STEPS]
+    n = voice.modes
+    squares, couplings = row(voice, at.OMEGA_SQUARED), row(voice, at.COUPLING)
+    steps = voice.javari.steps
     if couplings[n - 1] == 0.0:
         return steps
-    highest = math.sqrt(squares[counts[at.MOVING] - 1])
-    found = max(1, math.ceil(program[at.T_SUBSTEPS] * highest / (2 * math.pi * program[at.T_RATE])))
+    highest = math.sqrt(squares[voice.moving - 1])
+    found = max(1, math.ceil(program.substeps * highest / (2 * math.pi * program.rate_hz)))
     return found if steps == 0 else (found + steps - 1) // steps * steps
 
 
 @njit(**COMPILED)
-def _prepare(voice: np.ndarray, program: np.ndarray, sub_steps: int) -> None:
-    """The exact damped rotations between kicks, as `engine.truth.linear.damped_rotation`, of half the palindrome."""
-    counts = voice.view(np.int64)
-    n = counts[at.MODES]
-    squares, sigmas = row(voice, n, at.OMEGA_SQUARED), row(voice, n, at.SIGMA)
+def _prepare(voice: Voice, program: TruthProgram, sub_steps: int) -> None:
+    """The exact damped rotations between kicks, of half the palindrome."""
+    n = voice.modes
+    squares, sigmas = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA)
     for stage in range(at.STAGES // 2 if sub_steps else 1):
-        time_s = (program[at.T_ROTATIONS + stage] / sub_steps if sub_steps else 1.0) / program[at.T_RATE]
+        time_s = (program.rotations[stage] / sub_steps if sub_steps else 1.0) / program.rate_hz
         first = at.FOLLOWING + 4 * stage
-        qq, qv = row(voice, n, first), row(voice, n, first + 1)
-        vq, vv = row(voice, n, first + 2), row(voice, n, first + 3)
+        qq, qv = row(voice, first), row(voice, first + 1)
+        vq, vv = row(voice, first + 2), row(voice, first + 3)
         for m in range(n):
-            sigma, omega = sigmas[m], damped(squares[m], sigmas[m])
-            decay, cosine, sine = (
-                math.exp(-sigma * time_s),
-                math.cos(omega * time_s),
-                math.sin(omega * time_s) / omega,
-            )
-            qq[m], qv[m] = decay * (cosine + sigma * sine), decay * sine
-            vq[m], vv[m] = -decay * (sigma * sigma + omega * omega) * sine, decay * (cosine - sigma * sine)
-    counts[at.STEPS], counts[at.PREPARED], voice[at.JAVARI_GIVE] = sub_steps, 1, 0.0
+            qq[m], qv[m], vq[m], vv[m] = rotation(sigmas[m], damped(squares[m], sigmas[m]), time_s)
+    voice.steps, voice.prepared, voice.javari.give = sub_steps, 1, 0.0
 
 
 @njit(**COMPILED)
-def set_up(voice: np.ndarray, program: np.ndarray) -> int:
-    """Brings what follows from its modes up to date for a quantum; its sub-steps, 0 where it is linear."""
-    counts = voice.view(np.int64)
+def set_up(voice: Voice, program: TruthProgram) -> int:
+    """Bring what follows from its modes up to date for a quantum; its sub-steps, 0 where it is linear."""
     changed = gliding(voice)
     if changed:
         glide(voice)
-        rest_above(voice, program[at.T_RATE])
+        rest_above(voice, program.rate_hz)
     sub_steps = _sub_steps(voice, program)
-    if changed or not counts[at.PREPARED] or sub_steps != counts[at.STEPS]:
+    if changed or not voice.prepared or sub_steps != voice.steps:
         _prepare(voice, program, sub_steps)
     return sub_steps
 
 
 @njit(**COMPILED)
 def advance(
-    voice: np.ndarray,
-    program: np.ndarray,
+    voice: Voice,
+    program: TruthProgram,
     sub_steps: int,
     frame: int,
     fading: bool,
@@ -82,69 +75,45 @@ def advance(
 
 
 @njit(**COMPILED)
-def hear(voice: np.ndarray, program: np.ndarray, frame: int, fading: bool, heard: bool, out: np.ndarray) -> None:
+def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, heard: bool, out: np.ndarray) -> None:
     """The output of a frame.
 
     The highest modes are left out from when they are below the program's silence: sub-steps follow those left. Where
     a contact may wake them they are not.
     """
-    counts = voice.view(np.int64)
-    n, points = counts[at.MODES], counts[at.POINTS]
-    q, v, squares = row(voice, n, 0), row(voice, n, 1), row(voice, n, at.OMEGA_SQUARED)
-    silence = program[at.T_SILENCE] if counts[at.JAVARI_STEPS] == 0 else 0.0
-    moving = counts[at.MOVING]
+    q, v, squares = row(voice, 0), row(voice, 1), row(voice, at.OMEGA_SQUARED)
+    silence = program.silence if voice.javari.steps == 0 else 0.0
+    moving = voice.moving
     if heard:
         for which in range(2 if fading else 1):
-            for point in range(points):
-                slot = at.weights(n, which, point, 0)
-                w = voice[slot : slot + n]
-                found = 0.0
+            for point in range(voice.points):
+                w, found = weights(voice, which, point, 0), 0.0
                 for m in range(moving):
                     found += w[m] * q[m]
                 out[2 * which + point, frame] = found
     if frame % 16 == 0:
-        total = 0.0
-        for m in range(moving):
-            total += q[m] * q[m] + v[m] * v[m] / squares[m]
-        while moving > 1:
-            m = moving - 1
-            if not q[m] * q[m] + v[m] * v[m] / squares[m] < silence * silence * total:
-                break
-            q[m] = v[m] = 0.0
-            moving = m
-        counts[at.MOVING] = moving
-        voice[at.LOUDNESS] = (0.5 * math.log(total) if total > 0 else -1e9) + program[at.T_LOUDNESS]
+        voice.moving, total = rest_silent(q, v, squares, moving, silence)
+        voice.loudness = (0.5 * math.log(total) if total > 0 else -1e9) + program.loudness
 
 
 @njit(**COMPILED)
-def ring(voice: np.ndarray, program: np.ndarray, sub_steps: int, count: int) -> None:
+def ring(voice: Voice, program: TruthProgram, sub_steps: int, count: int) -> None:
     """Advance by so many of a frame's sub-steps; of what is linear, 0, it is the frame."""
-    counts = voice.view(np.int64)
-    n, moving = counts[at.MODES], counts[at.MOVING]
-    q, v = row(voice, n, 0), row(voice, n, 1)
-    couplings, stretches = row(voice, n, at.COUPLING), row(voice, n, at.STRETCH)
-    step_s = 1 / (max(sub_steps, 1) * program[at.T_RATE])
+    moving, q, v = voice.moving, row(voice, 0), row(voice, 1)
+    couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
+    step_s = 1 / (max(sub_steps, 1) * program.rate_hz)
     for _ in range(count):
         stretch = 0.0
         for stage in range(at.STAGES if sub_steps else 1):
-            kick = program[at.T_KICKS + stage - 1] * step_s * stretch if stage > 0 else 0.0
-            flow = at.state(n) + (at.FOLLOWING + 4 * min(stage, at.STAGES - 1 - stage)) * n
-            qq, qv = voice[flow : flow + n], voice[flow + n : flow + 2 * n]
-            vq, vv = voice[flow + 2 * n : flow + 3 * n], voice[flow + 3 * n : flow + 4 * n]
-            stretch = 0.0
-            for m in range(moving):
-                amplitude = q[m]
-                speed = v[m] - kick * couplings[m] * amplitude
-                turned = qq[m] * amplitude + qv[m] * speed
-                q[m] = turned
-                v[m] = vq[m] * amplitude + vv[m] * speed
-                stretch += stretches[m] * turned * turned
+            kick = program.kicks[stage - 1] * step_s * stretch if stage > 0 else 0.0
+            first = at.FOLLOWING + 4 * min(stage, at.STAGES - 1 - stage)
+            stretch = turn(q, v, moving, table(voice, first, 4), kick, couplings, stretches)
 
 
 @njit(**COMPILED)
-def generate(voice: np.ndarray, program: np.ndarray, fading: bool, heard: bool, out: np.ndarray) -> None:
+def generate(voice: Voice, program: TruthProgram, fading: bool, heard: bool, out: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     sub_steps = set_up(voice, program)
-    for frame in range(at.QUANTUM):
+    for frame in range(QUANTUM):
         advance(voice, program, sub_steps, frame, fading, heard, out)
-    voice.view(np.int64)[at.GENERATED] += at.QUANTUM
+    voice.generated += QUANTUM

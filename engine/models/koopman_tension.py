@@ -50,16 +50,14 @@ from typing import ClassVar, NamedTuple
 import torch
 from torch import Tensor, nn
 
+from engine.kernels.scheme import ENERGY_BOUND, HARDEST_KICK, MOST_NODES
 from engine.models._tension_arrays import resonator_arrays
 from engine.models.base import LINEAR_STRING, AnyFrameModel, Physics, check_initialisation
 from engine.models.configurations import KoopmanTensionConfiguration
 
 SERIES = 1 / 12  # r and p of small hω
-ENERGY_BOUND = 1.5  # of the energy at the start: more is not believed
 SILENCE = 1e-9  # of a mode, of all: what is left out is 180 dB down
 FRAMES_AT_ONCE = 4096
-HARDEST_KICK = 0.3  # of the root of Σ η²κ (q² + v²/ω²) as a string sets out: beyond it nodes come closer
-MOST_NODES = 3  # times as many as a soft pluck has
 LEAST_GROWTH = 1e-9  # of A in a quotient: gradients stay finite
 
 

@@ -112,19 +112,11 @@ class PresetInfo:
 
     @cached_property
     def resonator(self) -> Resonator:
-        """The resonator that its model learned, at rest and with the tension that it knows."""
-        return self.resonator_of(self.string, self.modes)
-
-    def resonator_of(self, string: StringParameters, modes: int) -> Resonator:
-        """The modes of another string that it plays; of a recorded one with what the recording adds to the law."""
+        """The modes of its string, with the tension that its model knows and with what a recording adds."""
         modulated, points = self.tension_modulated, self.grid_points
         if self.recorded is not None:
-            return self.recorded.resonator(string, modes, tension_modulated=modulated, grid_points=points)
-        return resonator_of(string, modes, tension_modulated=modulated, grid_points=points)
-
-    def modes_of(self, partials: int) -> int:
-        """The number of modes for so many partials: of a recorded string two for each, if its grid allows."""
-        return min(partials * (2 if self.recorded is not None else 1), self.grid_points - 2)
+            return self.recorded.resonator(self.string, self.modes, tension_modulated=modulated, grid_points=points)
+        return resonator_of(self.string, self.modes, tension_modulated=modulated, grid_points=points)
 
     def tension_rise(self, pluck: Pluck) -> float:
         """ΔT/T₀ of its string as it is pulled."""

@@ -178,6 +178,17 @@ class DrumModes:
         kernel.struck(self.numbers, self.rows, *map(float, place), radius_m, tools(), found)
         return found
 
+    def blow(self, struck: Array, contact_s: float, mallet_kg: float, speed_m_s: float) -> Array:
+        """The speeds (modes,) in m/s from a mallet's blow, see `engine.strike`.
+
+        Args:
+            struck: those that 1 N s at once gives.
+            contact_s: time of contact at 1 m/s.
+        """
+        found = np.empty(len(self))
+        kernel.blow(self.omega**2, struck, contact_s, (self.mass_kg, mallet_kg), speed_m_s, found)
+        return found
+
     def radiated(self, direction: tuple[float, float], distance_m: float = 1.0) -> Array:
         """Sound pressure in Pa (modes,) far off, of each mode at amplitude 1 m, as from a baffle.
 

@@ -6,7 +6,6 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from engine.resonators.string import decay_rates, undamped_frequencies
 from engine.values.string import StringParameters
 
 BRIGHT_HZ = 3_000.0  # where the second decay time is given
@@ -55,10 +54,9 @@ class StringFamily:
         The error of a model grows where high modes ring longer than in the training. With pitch, inharmonicity and
         the decay of the first mode it does not, as measured in `docs/many-strings.md`.
         """
-        sigma, omega = (float(rates[0]) for rates in (decay_rates(string, 1), undamped_frequencies(string, 1)))
-        pitch_hz = math.sqrt(max(0.0, omega**2 - sigma**2)) / (2 * math.pi)
+        sigma, pitch_hz = string.decay_rate(1), string.pitch_hz
         bright = max(2, round(BRIGHT_HZ / max(pitch_hz, 1.0)))
-        bright_t60_s = math.log(1000) / max(float(decay_rates(string, bright)[-1]), 1e-9)
+        bright_t60_s = math.log(1000) / max(string.decay_rate(bright), 1e-9)
         facts = (
             ("pitch", pitch_hz, self.pitch_hz, " Hz", False),
             ("inharmonicity", inharmonicity(string), self.inharmonicity, "", False),

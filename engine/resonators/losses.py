@@ -7,18 +7,15 @@ A string's two numbers d₁ and d₃ stand beside it, and may be 0 then.
 Air, by the diameter d, with its viscosity ν and density ρ: C. Valette, "The mechanics of vibrating strings", in
 "Mechanics of Musical Instruments", Springer 1995. Friction inside the string δ, the same at all frequencies, and the
 loss factor of bending β: J. Woodhouse, "Plucked guitar transients", Acta Acustica 90, 2004, whose loss factors are
-weighted by the energies of tension and of bending. The bridge's share is in `engine.resonators.polarised`.
+weighted by the energies of tension and of bending. The bridge's share is in `engine.values.string`.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from engine.kernels.constants import AIR_DENSITY_KG_M3, AIR_VISCOSITY_PA_S
+from engine.kernels.strings import loss
 from engine.resonators.base import Array
-from engine.resonators.string import undamped_frequencies, wavenumbers
 from engine.values.string import Losses, StringParameters
 
 
@@ -30,10 +27,5 @@ def loss_rates(
     Args:
         decay, brightness_decay: factors of the losses to the air, and of those inside the string.
     """
-    omega, eta = undamped_frequencies(string, partials), wavenumbers(string, partials)
-    diameter_m = 2 * math.sqrt(string.area_m2 / math.pi)
-    drag = np.sqrt(math.pi * AIR_VISCOSITY_PA_S * AIR_DENSITY_KG_M3 * omega / (2 * math.pi))
-    air = math.pi * (AIR_VISCOSITY_PA_S + diameter_m * drag) / string.mass_per_length_kg_m
-    bent = string.youngs_modulus_pa * string.second_moment_m4 * eta**2
-    inside = (string.tension_n * losses.friction + bent * losses.bending) / (string.tension_n + bent)
-    return decay * losses.air * air + brightness_decay * 0.5 * omega * inside
+    factors = decay * losses.air, brightness_decay * losses.friction, brightness_decay * losses.bending
+    return loss(string.row, np.arange(1.0, partials + 1), *factors)

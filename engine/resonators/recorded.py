@@ -16,15 +16,18 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from engine import bounds
-from engine.kernels.constants import FADES_SEMITONES
+from engine.kernels.recorded import correct, split
 from engine.resonators.base import Array, Resonator
 from engine.resonators.string import resonator_of
 from engine.values.string import StringParameters
+
+if TYPE_CHECKING:
+    from engine.kernels.recorded import Additions
 
 MOST_CENTS = 60.0
 RATIOS = (0.05, 20.0)
@@ -200,21 +203,16 @@ class RecordedString:
         """
         partials = (modes + 1) // 2
         law = resonator_of(string, partials, tension_modulated=tension_modulated, grid_points=grid_points)
-        omega, sigma = law.omega, law.sigma
-        hz = omega / (2 * math.pi)
-        own = {name: self._faded(name, partials, hz[0] / self.pitch_hz) for name in OF_PARTIALS}
-        smooth = np.exp(np.interp(np.log(hz), np.log(self.smooth_hz), np.log(self.smooth_ratio)))
-        first = omega * 2 ** (own["cents"] / 1200)
-        sigma = np.minimum(sigma * smooth * own["ratio"], 0.5 * first)
-        second = first * 2 ** (own["second_cents"] / 1200)
-        # pairs in the order of partials: a key that is bent keeps the order of its modes
-        omegas = np.maximum.accumulate(np.stack([first, second], 1).ravel())[:modes]
-        sigmas = np.stack([sigma, np.minimum(sigma * own["second_ratio"], 0.5 * second)], 1).ravel()[:modes]
-        shares = np.stack([1 - own["second_share"], own["second_share"]], 1).ravel()[:modes]
-        partial = np.arange(modes) // 2
+        partial, shares = np.arange(modes) // 2, [1.0] * modes
+        squares_and_sigma = np.concatenate([law.omega[partial] ** 2, law.sigma[partial]]).tolist()
+        pitch_hz, *parts = self.additions
+        own: Any = pitch_hz, *(part.tolist() for part in parts)  # lists are faster, number by number
+        correct(own, string.row, modes, squares_and_sigma)
+        split(own, string.row, modes, shares)
+        rows = np.array(squares_and_sigma)
         return Resonator(
-            omega=omegas,
-            sigma=sigmas,
+            omega=np.sqrt(rows[:modes]),
+            sigma=rows[modes:],
             coupling=law.coupling[partial],
             stretch=law.stretch[partial],
             tension_rise=law.tension_rise,
@@ -223,26 +221,10 @@ class RecordedString:
             mirror=None if law.mirror is None else law.mirror[partial],
         )
 
-    def rest(self, name: str) -> float:
-        """The value to which one of `OF_PARTIALS` fades with distance in pitch, if the note has no such frequency."""
-        shared = _SHARED.get(name)
-        return float(np.median(np.asarray(getattr(self, name)))) if shared is None else shared
-
-    def _faded(self, name: str, partials: int, above: float) -> Array:
-        """The note's own values for so many partials of a string whose pitch is `above` times its own.
-
-        They fade to those of its partials of nearly the same frequency: the bridge and the body, which make them, do
-        not move with the pitch. So keys keep slow and fast partials, not their median.
-        """
-        known, k = np.asarray(getattr(self, name), float), np.arange(partials)
-        there = np.rint((k + 1) * above).astype(int) - 1
-        shared = (there >= 0) & (there < len(known)) & (name != "cents")
-        rest = np.where(shared, known[np.clip(there, 0, len(known) - 1)], self.rest(name))
-        own = np.where(k < len(known), known[np.minimum(k, len(known) - 1)], self.rest(name))
-        fade = math.exp(-((12 * math.log2(above) / FADES_SEMITONES) ** 2))
-        if name.endswith("ratio"):
-            return np.asarray(np.exp(fade * np.log(own) + (1 - fade) * np.log(rest)))
-        return np.asarray(fade * own + (1 - fade) * rest)
-
-
-_SHARED = {"cents": 0.0, "ratio": 1.0}  # the others fade to the median of the note's partials
+    @property
+    def additions(self) -> Additions:
+        """The same as the laws of `engine.kernels.recorded` take it."""
+        rows = np.array([getattr(self, name) for name in OF_PARTIALS], float)
+        rest = np.median(rows, axis=1)
+        rest[:2] = 0.0, 1.0  # cents and ratio, if the note has no such frequency; the others fade to its median
+        return self.pitch_hz, rest, np.log(self.smooth_hz), np.log(self.smooth_ratio), rows

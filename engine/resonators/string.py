@@ -1,15 +1,14 @@
 """The stiff string: what follows from its physical parameters in closed form, for all modes at once.
 
 Source: Diaz, De La Vega Martin, Sandler, "Towards Efficient Modelling of String Dynamics", DAFx24
-(below: the paper), Eq. 1-5 and Table 1.
+(below: the paper), Eq. 1-5 and Table 1. The laws are those of `engine.kernels.strings`.
 """
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
+from engine.kernels import strings as law
 from engine.resonators.base import Array, Resonator
 from engine.resonators.sine_transform import analysis_matrix, synthesis_matrix
 from engine.values.string import StringParameters
@@ -17,20 +16,17 @@ from engine.values.string import StringParameters
 
 def wavenumbers(string: StringParameters, modes: int) -> Array:
     """η_μ = μπ/ℓ in rad/m, float64 (modes,)."""
-    return np.arange(1.0, modes + 1) * (math.pi / string.length_m)
+    return law.wavenumber(string.row, _numbers(modes))
 
 
 def decay_rates(string: StringParameters, modes: int) -> Array:
     """σ_μ = (d₁ + d₃η²) / 2ρA in 1/s, float64 (modes,): a free mode decays as exp(-σt)."""
-    eta = wavenumbers(string, modes)
-    return (string.damping_d1_kg_m_s + string.damping_d3_kg_m_s * eta**2) / (2 * string.mass_per_length_kg_m)
+    return law.decay_rate(string.row, _numbers(modes))
 
 
 def undamped_frequencies(string: StringParameters, modes: int) -> Array:
     """ω_μ = √((EIη⁴ + T₀η²) / ρA) in rad/s, float64 (modes,)."""
-    eta = wavenumbers(string, modes)
-    bending = string.youngs_modulus_pa * string.second_moment_m4
-    return np.sqrt((bending * eta**4 + string.tension_n * eta**2) / string.mass_per_length_kg_m)
+    return np.sqrt(law.omega_squared(string.row, _numbers(modes)))
 
 
 def tension_coupling(string: StringParameters, modes: int) -> Array:
@@ -38,22 +34,7 @@ def tension_coupling(string: StringParameters, modes: int) -> Array:
 
     The tension-modulated string adds the acceleration -k_μ q_μ Σ η_m² q_m² (Eq. 3-5 on modal amplitudes).
     """
-    return (
-        string.youngs_modulus_pa
-        * string.area_m2
-        * wavenumbers(string, modes) ** 2
-        / (4 * string.mass_per_length_kg_m)
-    )
-
-
-def bridge_forces(string: StringParameters, modes: int) -> Array:
-    """Force of each mode at amplitude 1 m on the support at x = 0, in N, float64 (modes,).
-
-    The transverse force that a stiff string exerts on its support is T₀ ∂y/∂x - EI ∂³y/∂x³ (N. H. Fletcher,
-    T. D. Rossing, "The Physics of Musical Instruments", 2nd ed., sections 2.12 and 2.18), here T₀η + EIη³.
-    """
-    eta = wavenumbers(string, modes)
-    return string.tension_n * eta + string.youngs_modulus_pa * string.second_moment_m4 * eta**3
+    return law.coupling(string.row, _numbers(modes))
 
 
 def resonator_of(
@@ -76,5 +57,9 @@ def resonator_of(
         shapes=synthesis_matrix(grid_points, modes),
         analysis=analysis_matrix(grid_points, modes),
         mirror=np.where(np.arange(modes) % 2, -1.0, 1.0),
-        end_force=bridge_forces(string, modes),
+        end_force=law.bridge_force(string.row, _numbers(modes)),
     )
+
+
+def _numbers(modes: int) -> Array:
+    return np.arange(1.0, modes + 1)

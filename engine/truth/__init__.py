@@ -1,13 +1,11 @@
 """The truth: exact and numerical solutions of the string that the models learn.
 
-`linear`     exact solution of the linear string, at any time
 `splitting`  the fast solver, linear or tension-modulated, streaming
 `oracle`     SciPy's DOP853 at the paper's tolerances, slow: what the fast solver is checked against
 """
 
-from engine.truth.linear import solve_linear
 from engine.truth.oracle import solve_dop853
 from engine.truth.splitting import SplittingSolver, default_substeps
 from engine.truth.state import ModalState
 
-__all__ = ["ModalState", "SplittingSolver", "default_substeps", "solve_dop853", "solve_linear"]
+__all__ = ["ModalState", "SplittingSolver", "default_substeps", "solve_dop853"]

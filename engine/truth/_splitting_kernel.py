@@ -11,6 +11,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from engine.kernels.compiled import COMPILED
+from engine.kernels.modes import rest_silent, turn
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ def advance(
     eta_squared: Array,
     substeps: NDArray[np.int64],
     levels: NDArray[np.int64],
-    inverse_omega_squared: Array,
+    omega_squared: Array,
     silence: float,
 ) -> None:
     """Advances amplitudes q and velocities v (batch, modes) in place by `steps` samples.
@@ -47,31 +48,13 @@ def advance(
         written = 0
         for step in range(steps):
             if silence > 0:
-                total = 0.0
-                for n in range(moving):
-                    total += qb[n] * qb[n] + inverse_omega_squared[n] * vb[n] * vb[n]
-                while moving > 1:
-                    n = moving - 1
-                    own = qb[n] * qb[n] + inverse_omega_squared[n] * vb[n] * vb[n]
-                    if not own < silence * silence * total:  # so that NaN is kept
-                        break
-                    qb[n] = vb[n] = 0.0
-                    moving = n
+                moving, _ = rest_silent(qb, vb, omega_squared, moving, silence)
             level = levels[moving - 1]
             for _ in range(substeps[level]):
                 stretch = 0.0
                 for stage in range(stages):
                     kick = kicks[level, stage - 1] * stretch if stage > 0 else 0.0
-                    flow = flows[level, stage]
-                    qq, qv, vq, vv = flow[0], flow[1], flow[2], flow[3]
-                    stretch = 0.0
-                    for n in range(moving):
-                        amplitude = qb[n]
-                        velocity = vb[n] - kick * coupling[n] * amplitude
-                        rotated = qq[n] * amplitude + qv[n] * velocity
-                        qb[n] = rotated
-                        vb[n] = vq[n] * amplitude + vv[n] * velocity
-                        stretch += eta_squared[n] * rotated * rotated
+                    stretch = turn(qb, vb, moving, flows[level, stage], kick, coupling, eta_squared)
             if written < kept and frames[written] == step + 1:
                 out[b, written] = qb
                 written += 1

@@ -13,13 +13,14 @@ import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from engine.bounds import MOST_SUBSTEPS, SUBSTEPS_IN_A_PERIOD
+from engine.kernels.rotation import rotation
 from engine.kernels.scheme import KICKS, ROTATIONS
 from engine.resonators.base import Resonator
-from engine.truth.linear import damped_rotation
 from engine.truth.state import ModalState
 
 
@@ -64,29 +65,16 @@ class SplittingSolver:
         self.tension_modulated = tension_modulated = resonator.tension_modulated
         self.substeps = (substeps or default_substeps(resonator, rate_hz)) if tension_modulated else 1
         self._silence = silence
-        omega = torch.from_numpy(resonator.omega)
-        self._inverse_omega_squared = omega.pow(-2)
+        omega, eigenvalues = resonator.omega, resonator.eigenvalues()
         # sub-steps by how many modes move, and what depends on them, once for each number that there is
-        wanted = torch.ceil(self.substeps * omega / omega[-1]) if silence else torch.full_like(omega, self.substeps)
-        self._substeps, self._levels = wanted.long().unique(return_inverse=True)
-        steps_s = 1 / (rate_hz * self._substeps.double())[:, None]
-        rotations = ROTATIONS if tension_modulated else (1.0,)
-        times_s = torch.tensor(rotations, dtype=torch.float64) * steps_s
-        flows = damped_rotation(torch.from_numpy(resonator.eigenvalues()), times_s.flatten())
-        self._flows = flows.reshape(*times_s.shape, 4, modes)
-        kicks = KICKS if tension_modulated else ()
-        self._kicks = torch.tensor(kicks, dtype=torch.float64) * steps_s
-        self._coupling = torch.from_numpy(resonator.coupling)
-        self._eta_squared = torch.from_numpy(resonator.stretch)
-
-    @property
-    def constants(self) -> tuple[Tensor, ...]:
-        """The constants for compiled kernels: flows, kicks, coupling, η², sub-steps, levels, ω⁻².
-
-        See `_splitting_kernel`.
-        """
-        of_flow = (self._flows, self._kicks, self._coupling, self._eta_squared)
-        return (*of_flow, self._substeps, self._levels, self._inverse_omega_squared)
+        wanted = np.ceil(self.substeps * omega / omega[-1]) if silence else np.full(modes, self.substeps)
+        substeps_of, levels = np.unique(wanted.astype(np.int64), return_inverse=True)
+        steps_s = 1 / (rate_hz * substeps_of)[:, None]
+        times_s = (np.array(ROTATIONS if tension_modulated else (1.0,)) * steps_s)[..., None]
+        flows = np.stack(rotation(-eigenvalues.real, eigenvalues.imag, times_s), axis=-2)
+        kicks = np.array(KICKS if tension_modulated else ()) * steps_s
+        # flows, kicks, coupling, η², sub-steps, levels and ω², see `_splitting_kernel`
+        self.constants = flows, kicks, resonator.coupling, resonator.stretch, substeps_of, levels, omega**2
 
     def advance(self, state: ModalState, steps: int) -> tuple[Tensor, ModalState]:
         """Modal amplitudes after 1 … steps samples, float64 (batch, steps, modes), and the last state."""
@@ -114,11 +102,11 @@ class SplittingSolver:
         # compiles, or loads what it compiled earlier: only when it is needed
         from engine.truth._splitting_kernel import advance
 
-        constants, numbers = [t.numpy() for t in self.constants], frames.numpy()
+        numbers = frames.numpy()
 
         def run(rows: slice) -> None:
             of_rows = q[rows].numpy(), v[rows].numpy()
-            advance(*of_rows, steps, numbers, out[rows].numpy(), *constants, self._silence)
+            advance(*of_rows, steps, numbers, out[rows].numpy(), *self.constants, self._silence)
 
         workers = min(torch.get_num_threads(), os.cpu_count() or 1, q.shape[0])
         if workers <= 1:

@@ -11,7 +11,6 @@ from engine.values.number import Number
 DrumShape = Literal["circle", "rectangle", "bar"]
 SHAPES: tuple[str, ...] = get_args(DrumShape)  # numbers of the kernels
 LARGEST_ELLIPTICITY = 0.1
-HERTZ = -0.2  # power of the speed in the time of contact
 
 
 @dataclass(frozen=True)
@@ -101,7 +100,3 @@ class Mallet:
 
     def __post_init__(self) -> None:
         bounds.check_all(self, bounds.MALLET, "mallet ")
-
-    def contact_at(self, speed_m_s: float) -> float:
-        """Time of contact in s at a speed."""
-        return float(self.contact_s * max(speed_m_s, 1e-3) ** HERTZ)

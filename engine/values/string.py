@@ -7,9 +7,10 @@ Source: Diaz, De La Vega Martin, Sandler, "Towards Efficient Modelling of String
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from engine import bounds
+from engine.kernels import strings as law
 from engine.values.number import Number
 
 
@@ -38,31 +39,27 @@ class StringParameters:
         """ρA."""
         return self.density_kg_m3 * self.area_m2
 
+    @property
+    def row(self) -> tuple[float, ...]:
+        """The parameters in their order, as the laws of `engine.kernels.strings` take them."""
+        return tuple(getattr(self, field.name) for field in fields(self))
+
+    @property
+    def pitch_hz(self) -> float:
+        """The frequency of the first partial of a quiet pluck; 0 where it does not oscillate."""
+        return law.pitch_hz(self.row)
+
     def decay_rate(self, mode: int) -> float:
-        """σ of one mode, as in `decay_rates`."""
-        eta = mode * math.pi / self.length_m
-        return (self.damping_d1_kg_m_s + self.damping_d3_kg_m_s * eta**2) / (2 * self.mass_per_length_kg_m)
+        """σ of one mode in 1/s: a free mode decays as exp(-σt)."""
+        return law.decay_rate(self.row, mode)
 
     def undamped_frequency(self, mode: int) -> float:
-        """ω of one mode, as in `undamped_frequencies`."""
-        eta = mode * math.pi / self.length_m
-        bending = self.youngs_modulus_pa * self.second_moment_m4
-        return math.sqrt((bending * eta**4 + self.tension_n * eta**2) / self.mass_per_length_kg_m)
+        """ω of one mode in rad/s."""
+        return math.sqrt(law.omega_squared(self.row, mode))
 
     def modes_below(self, frequency_hz: float) -> int:
         """The number of modes whose undamped frequency lies below `frequency_hz`."""
-        # EIη⁴ + T₀η² = ρAω², solved for η² without the difference of near numbers
-        omega = 2 * math.pi * max(0.0, frequency_hz)
-        load = self.mass_per_length_kg_m * omega**2
-        bending = self.youngs_modulus_pa * self.second_moment_m4
-        eta_squared = 2 * load / (self.tension_n + math.sqrt(self.tension_n**2 + 4 * bending * load))
-        count = math.floor(self.length_m / math.pi * math.sqrt(eta_squared))
-        # rounding may put it one beside the mode that lies at the frequency itself
-        while count > 0 and self.undamped_frequency(count) >= omega:
-            count -= 1
-        while self.undamped_frequency(count + 1) < omega:
-            count += 1
-        return count
+        return law.modes_below(self.row, frequency_hz)
 
     def check_motion(self, modes: int, grid_points: int, rate_hz: float, tension_modulated: bool) -> None:
         """Checks that its motion can be computed in ordinary memory and time, in closed form.
@@ -103,7 +100,19 @@ class StringParameters:
 
 @dataclass(frozen=True)
 class Polarisations:
-    """Motion across the string in two directions, the first normal to the board: see `engine.resonators.polarised`.
+    """Motion across the string in two directions: normal to the soundboard, and along it.
+
+    Kirchhoff's and Carrier's tension acts on both alike, S = Σ η² (y² + z²) (C. E. Gough, "The nonlinear free
+    vibration of a damped elastic string", JASA 75, 1984). To a resonator they are modes of one shape, side by side,
+    that share one stretch: solvers and models need no other equation. `engine.kernels.strings.rows` has the modes:
+    pairs, then single ones. The lowest `MOST_PAIRS` partials have two modes; above them neither beats nor stages are
+    heard, which is an estimate.
+
+    The bridge treats the directions differently. A conductance G at the end of a string adds T G/ℓ to its decay
+    rates: a round trip of 2ℓ/c leaves 1 - 2 Z G of a wave, with Z = T/c (Fletcher and Rossing, "The Physics of
+    Musical Instruments", section 2.12). Along the board it is stiffer: that motion rings longer, and two-stage decay
+    follows (G. Weinreich, "Coupled piano strings", JASA 62, 1977; J. Woodhouse, "A necessary condition for
+    double-decay envelopes in stringed instruments", JASA 150, 2021). Slightly different frequencies beat.
 
     Attributes:
         angle_deg: of the pluck, from the first direction.

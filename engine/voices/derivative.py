@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
+from engine.kernels.mixer_records import REACH
 
-REACH_FRAMES = at.REACH  # of the filter to either side
+REACH_FRAMES = REACH  # of the filter to either side
 _KAISER_BETA = 8.0
 
 

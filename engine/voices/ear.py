@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from engine.kernels.layout import BRIGHTER
+from engine.kernels.voice_records import BRIGHTER
 from engine.levels import FULL_SCALE_M, FULL_SCALE_N, LEAST_PEAK_M
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import analysis_matrix, listening_weights, synthesis_matrix

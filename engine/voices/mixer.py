@@ -12,9 +12,13 @@ from numpy.typing import NDArray
 
 from engine.effects import Effects
 from engine.effects.partitions import convolver, partitioned
-from engine.kernels import layout as at
+from engine.kernels.amplifier import drive
+from engine.kernels.constants import AHEAD
+from engine.kernels.fields import record_of, slot, slots
 from engine.kernels.memory import publish
+from engine.kernels.mixer_records import CAUSE_DEVICE, CAUSE_RUNAWAY, CAUSE_STARVED, GAPS, MIXER, RING
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
+from engine.values.effects import Amp
 from engine.voices.derivative import differentiator_taps
 from engine.voices.voice import Voice, possible_s
 
@@ -25,7 +29,7 @@ LIMITER_RELEASE_S = 0.08
 VOLUME_SMOOTHING_S = 0.015
 LEFT_S = 0.03  # of the fade of a player's notes when two others have taken its place
 LEFT_FRAMES = 16_384  # after which no quantum can hold it: more than a device takes at once
-CAUSES = {at.CAUSE_DEVICE: "device", at.CAUSE_STARVED: "rendering", at.CAUSE_RUNAWAY: "runaway"}
+CAUSES = {CAUSE_DEVICE: "device", CAUSE_STARVED: "rendering", CAUSE_RUNAWAY: "runaway"}
 
 
 @dataclass(frozen=True)
@@ -46,13 +50,13 @@ class Mixer:
     Commands come from any thread, frames are taken by one.
 
     Args:
-        limited: whether the safety limiter is at work: for ears, not for files. It delays by `layout.AHEAD` frames.
+        limited: whether the safety limiter is at work: for ears, not for files. It delays by `AHEAD` frames.
     """
 
     def __init__(self, rate_hz: int, channels: int = 2, limited: bool = True) -> None:
         self.rate_hz = rate_hz
-        self.memory = memory = np.zeros(at.MIXER_SLOTS)
-        self._counts = counts = memory.view(np.int64)
+        self.memory = np.zeros(slots(MIXER))
+        self.record = record = record_of(self.memory, MIXER)
         self._lock = threading.Lock()
         self._voices: list[Voice] = []  # handed over and not over yet: their memory is in use
         self._gaps_read = 0
@@ -61,20 +65,17 @@ class Mixer:
         self._convolver: NDArray[np.float64] | None = None
         self._impulses: dict[int, NDArray[np.float64]] = {}  # by address: those that may be in use
         self._players: list[tuple[CompiledPlayer, int]] = []  # whose memory may be in use, from which frame on
-        memory[at.M_RATE] = rate_hz
-        counts[at.M_CHANNELS], counts[at.M_LIMITING] = channels, limited
-        counts[at.M_ADDRESS] = memory.ctypes.data
-        memory[at.M_WANTED_VOLUME] = memory[at.M_VOLUME] = memory[at.M_REDUCTION] = 1.0
-        memory[at.M_GAINS : at.M_GAINS + at.AHEAD] = 1.0
-        memory[at.M_RELEASE] = math.exp(-1 / (LIMITER_RELEASE_S * rate_hz))
-        memory[at.M_SMOOTHING] = math.exp(-1 / (VOLUME_SMOOTHING_S * rate_hz))
-        counts[at.M_TONE_FRAME] = counts[at.M_TONE_LENGTH] = 0
-        taps = differentiator_taps(rate_hz) * (FULL_SCALE_M / FULL_SCALE_M_S)
-        memory[at.M_TAPS : at.M_TAPS + len(taps)] = taps
+        record["rate_hz"] = rate_hz
+        record["channels"], record["limiting"] = channels, limited
+        record["wanted_volume"] = record["volume"] = record["reduction"] = 1.0
+        record["gains"][:AHEAD] = 1.0
+        record["release"] = math.exp(-1 / (LIMITER_RELEASE_S * rate_hz))
+        record["smoothing"] = math.exp(-1 / (VOLUME_SMOOTHING_S * rate_hz))
+        record["taps"] = differentiator_taps(rate_hz) * (FULL_SCALE_M / FULL_SCALE_M_S)
 
     @property
     def channels(self) -> int:
-        return int(self._counts[at.M_CHANNELS])
+        return int(self.record["channels"])
 
     @property
     def address(self) -> int:
@@ -93,14 +94,18 @@ class Mixer:
             if voice.program.rate_hz != self.rate_hz:
                 raise ValueError(f"the voice has {voice.program.rate_hz} Hz, the mixer {self.rate_hz} Hz")
         with self._lock:
-            counts = self._counts
-            pushed, room = int(counts[at.M_PUSHED]), at.RING - int(counts[at.M_PUSHED] - counts[at.M_TAKEN])
+            pushed, taken = int(self.record["pushed"]), int(self.record["taken"])
+            room = RING - (pushed - taken)
             for number, voice in enumerate(voices[:room]):
-                counts[at.M_RING + (pushed + number) % at.RING] = voice.address
+                self.record["ring"][(pushed + number) % RING] = voice.address
                 self._voices.append(voice)
             for voice in voices[room:]:
                 voice.refuse()
-            publish(counts, at.M_PUSHED, pushed + min(len(voices), room))
+            self._publish("pushed", pushed + min(len(voices), room))
+
+    def _publish(self, field: str, whole: int) -> None:
+        """Writes a whole number after all that was written before."""
+        publish(self.memory.view(np.int64), slot(MIXER, field), whole)
 
     def set_player(self, player: CompiledPlayer) -> None:
         """The events of this player are played from the next quantum on; what the one before has struck rings on.
@@ -113,12 +118,12 @@ class Mixer:
         if player.rate_hz != self.rate_hz:
             raise ValueError(f"the player has {player.rate_hz} Hz, the mixer {self.rate_hz} Hz")
         with self._lock:
-            present, before = (int(self._counts[slot]) for slot in (at.M_PLAYER, at.M_PLAYER_BEFORE))
+            present, before = (int(self.record[name]) for name in ("player", "player_before"))
             if present == player.address:
                 return
             self._players = [(each, self.frames) for each, _ in self._players if each is not player]
-            publish(self._counts, at.M_PLAYER_BEFORE, present)
-            publish(self._counts, at.M_PLAYER, player.address)
+            self._publish("player_before", present)
+            self._publish("player", player.address)
             for each, _ in self._players:
                 if each.address == before:
                     each.release(LEFT_S)
@@ -126,12 +131,11 @@ class Mixer:
 
     def _forget_players(self) -> None:
         """Frees those that play nothing any more. Under the lock."""
-        counts = self._counts
         for each, _ in self._players:
-            if each.address == int(counts[at.M_PLAYER_BEFORE]) and each.rests:
-                publish(counts, at.M_PLAYER_BEFORE, 0)
+            if each.address == int(self.record["player_before"]) and each.rests:
+                self._publish("player_before", 0)
                 self._players = [(one, self.frames if one is each else frame) for one, frame in self._players]
-        held = [int(counts[slot]) for slot in (at.M_PLAYER, at.M_PLAYER_BEFORE)]
+        held = [int(self.record[name]) for name in ("player", "player_before")]
         # a quantum that has begun may still play one that was taken out
         self._players = [
             (each, frame)
@@ -151,8 +155,8 @@ class Mixer:
             if effects == self.effects:
                 return
             address = 0
-            for place, factor in enumerate(effects.factors):
-                self.memory[at.M_AMPLIFIER + place] = factor
+            amp = effects.amp or Amp()
+            drive(self.record, float(amp.drive_db), float(amp.tone_db), float(effects.level_db))
             if effects.rings:
                 if self._convolver is None:
                     self._convolver = convolver(self.rate_hz)
@@ -160,14 +164,14 @@ class Mixer:
                 address = int(memory.ctypes.data)
                 self._impulses[address] = memory
             if self._convolver is not None:
-                publish(self._counts, at.M_CONVOLVER, self._convolver.ctypes.data)
-                publish(self._counts, at.M_EFFECTS, address)
+                self._publish("convolver", self._convolver.ctypes.data)
+                self._publish("effects", address)
             self.effects = effects
             self._forget_impulses()
 
     def _forget_impulses(self) -> None:
         """Frees those that the kernels use no more; in the order in which none that moves up is missed."""
-        in_use = [int(self._counts[slot]) for slot in (at.M_EFFECTS, at.M_EFFECTS_NEXT, at.M_EFFECTS_NOW)]
+        in_use = [int(self.record[name]) for name in ("effects", "effects_next", "effects_now")]
         # one that the kernel has just turned away from may be reported once more, after it was freed
         self._impulses = {address: self._impulses[address] for address in in_use if address in self._impulses}
 
@@ -188,46 +192,46 @@ class Mixer:
     @property
     def active(self) -> int:
         """Voices that sound or wait, those of a player among them."""
-        return int(self._counts[at.M_ACTIVE])
+        return int(self.record["active"])
 
     def render(self, frames: int) -> NDArray[np.float32]:
         """The next frames, (frames, channels), where no device takes them."""
         from engine.kernels.mixer import render
 
-        channels = int(self._counts[at.M_CHANNELS])
+        channels = int(self.record["channels"])
         out = np.zeros(frames * channels, np.float32)
-        render(self.memory, frames, out, float(self._counts[at.M_FRAMES]) / self.rate_hz)
+        render(self.record, frames, out, float(self.record["frames"]) / self.rate_hz)
         return out.reshape(frames, channels)
 
     def set_volume(self, factor: float) -> None:
         """Set the volume of everything; 1 leaves the samples as they are."""
-        self.memory[at.M_WANTED_VOLUME] = factor
+        self.record["wanted_volume"] = factor
 
     def sound_tone(self, side: str) -> None:
         """A soft tone for a second, on "left", "right" or "both"."""
-        self._counts[at.M_TONE_LENGTH] = 0
-        self._counts[at.M_TONE_FRAME] = 0
-        self._counts[at.M_TONE_SIDE] = {"left": 1, "right": 2}.get(side, 3)
-        self._counts[at.M_TONE_LENGTH] = self.rate_hz
+        self.record["tone_length"] = 0
+        self.record["tone_frame"] = 0
+        self.record["tone_side"] = {"left": 1, "right": 2}.get(side, 3)
+        self.record["tone_length"] = self.rate_hz
 
     @property
     def frames(self) -> int:
         """The frames of sound given so far."""
-        return int(self._counts[at.M_FRAMES])
+        return int(self.record["frames"])
 
     @property
     def seconds(self) -> float:
         """The seconds of sound given so far."""
-        return float(self._counts[at.M_FRAMES]) / self.rate_hz
+        return float(self.record["frames"]) / self.rate_hz
 
     @property
     def calls(self) -> int:
         """The number of calls of the device's callback."""
-        return int(self._counts[at.M_CALLS])
+        return int(self.record["calls"])
 
     @property
     def underflows(self) -> int:
-        return int(self._counts[at.M_UNDERFLOWS])
+        return int(self.record["underflows"])
 
     @property
     def output_latency_s(self) -> float:
@@ -235,27 +239,26 @@ class Mixer:
 
         The latter is what the device said last; 0 where it says nothing, or what cannot be.
         """
-        delay_s = at.AHEAD / self.rate_hz if self._counts[at.M_LIMITING] else 0.0
-        return delay_s + (possible_s(self.memory[at.M_DAC_S] - self.memory[at.M_NOW_S]) or 0.0)
+        delay_s = AHEAD / self.rate_hz if self.record["limiting"] else 0.0
+        return delay_s + (possible_s(self.record["dac_s"] - self.record["now_s"]) or 0.0)
 
     def take_peak(self) -> float:
         """The highest sample since it was asked for the last time."""
-        peak = float(self.memory[at.M_PEAK])
-        self.memory[at.M_PEAK] = 0.0
+        peak = float(self.record["peak"])
+        self.record["peak"] = 0.0
         return peak
 
     def take_reduction_db(self) -> float:
         """The limiter's strongest reduction since it was asked for the last time; 0: untouched."""
-        gain = float(self.memory[at.M_REDUCTION])
-        self.memory[at.M_REDUCTION] = 1.0
+        gain = float(self.record["reduction"])
+        self.record["reduction"] = 1.0
         return -20 * math.log10(gain)
 
     def new_gaps(self) -> list[Gap]:
         """The gaps since this was asked for the last time; of very many only the latest."""
-        found, total = [], int(self._counts[at.M_GAPS])
-        for number in range(max(self._gaps_read, total - at.GAPS), total):
-            slot = at.M_GAP_LIST + number % at.GAPS * at.GAP_FIELDS
-            frame, milliseconds, cause = self.memory[slot : slot + at.GAP_FIELDS]
+        found, total = [], int(self.record["gap_count"])
+        for number in range(max(self._gaps_read, total - GAPS), total):
+            frame, milliseconds, cause = self.record["gaps"][number % GAPS].tolist()
             lasted_ms = 1000 * (possible_s(milliseconds / 1000) or 0.0)
             found.append(Gap(float(frame) / self.rate_hz, CAUSES.get(int(cause), "unknown"), lasted_ms))
         self._gaps_read = total
@@ -264,4 +267,4 @@ class Mixer:
     @property
     def non_finite(self) -> int:
         """Samples that were replaced by silence."""
-        return int(self._counts[at.M_NON_FINITE])
+        return int(self.record["non_finite"])

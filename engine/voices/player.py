@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.kernels import constants as of
-from engine.kernels import layout as at
+from engine.kernels.fields import record_of, slot, slots
 from engine.kernels.memory import publish
-from engine.kernels.records import EVENT, PLAYER, REPORT, TABLE, player_slots, slot, slots, voice_bytes
+from engine.kernels.records import EVENT, PLAYER, REPORT, TABLE, player_slots
+from engine.kernels.voice_records import OMEGA_SQUARED, SOUNDING, VOICE, WAITING, WEIGHT_ROWS, voice_bytes
 from engine.pluck import SHAPES, Pluck
 from engine.values.string import StringParameters
 from engine.voices.voice import possible_s
@@ -300,28 +301,26 @@ class CompiledPlayer:
         for number, note in enumerate(self._notes()):
             if note["state"] != of.RINGS or not note["has_place"] or note["member"]:
                 continue
-            alive = _alive(self._voices(number, note))
+            alive = self._alive(number, note)
             if alive:
-                level = max(float(voice[at.LOUDNESS]) for voice in alive) * LOG_DB
-                frames = max(int(voice.view(np.int64)[at.FRAME]) for voice in alive)
+                level = max(float(voice["loudness"]) for voice in alive.values()) * LOG_DB
+                frames = max(int(voice["frame"]) for voice in alive.values())
                 id, channel, key, string = (int(note[name]) for name in ("id", "channel", "key", "string"))
-                length_m = self._length_m(note, alive[0])
+                length_m = self._length_m(note, self.rows_of(number, min(alive)))
                 found.append(Ringing(id, channel, key, level, frames / self.rate_hz, string, length_m))
         return found
 
-    def _length_m(self, note: np.void, voice: NDArray[np.float64]) -> float | None:
+    def _length_m(self, note: np.void, rows: NDArray[np.float64]) -> float | None:
         """The length of a note's string in m.
 
-        It is its goal, times how far a voice's first mode has still to go.
+        It is its goal, times how far the first mode of a voice, of these rows, has still to go.
         """
         if note["drum"]:
             return None
         own = _string(note["string_now"])
         if own is None:
             return None
-        modes = int(voice.view(np.int64)[at.MODES])
-        first = (int(voice.ctypes.data) - self.address) // 8 + at.state(modes) + at.OMEGA_SQUARED * modes
-        present = float(self.memory[first])
+        present = float(rows[OMEGA_SQUARED, 0])
         return own.length_m * (own.undamped_frequency(1) / math.sqrt(present) if present > 0.0 else 1.0)
 
     def missing(self, ids: Iterable[int]) -> list[int]:
@@ -340,12 +339,11 @@ class CompiledPlayer:
         note = self.record["notes"][report.note].copy()
         if note["state"] != of.RINGS or note["id"] != report.id:
             return None
-        voices = self._voices(report.note, note)
-        counts = [voice.view(np.int64) for voice in voices]
-        frames = max((int(whole[at.FRAME]) for whole in counts), default=0)
-        began = max((int(whole[at.BEGAN_FRAME]) for whole in counts), default=0)
-        known = began > 0 and bool(voices[0][at.STRUCK_S])
-        took_s = possible_s(voices[0][at.BEGAN_S] - voices[0][at.STRUCK_S]) if known else None
+        voices = [*self._voices(report.note, note).values()]
+        frames = max((int(voice["frame"]) for voice in voices), default=0)
+        began = max((int(voice["began_frame"]) for voice in voices), default=0)
+        known = began > 0 and bool(voices[0]["struck_s"])
+        took_s = possible_s(voices[0]["began_s"] - voices[0]["struck_s"]) if known else None
         return Playing(frames / self.rate_hz, max(0, began), took_s)
 
     @property
@@ -357,27 +355,43 @@ class CompiledPlayer:
     @property
     def over(self) -> bool:
         """Return True if all its voices are over, also where no mixer plays its events any more."""
-        return not any(_alive(self._voices(number, note)) for number, note in enumerate(self._notes()))
+        return not any(self._alive(number, note) for number, note in enumerate(self._notes()))
 
     def release(self, seconds: float) -> None:
         """Lets all voices fade out, where no mixer plays its events any more; one of them may still have them."""
         for number, note in enumerate(self._notes()):
-            for voice in _alive(self._voices(number, note)):
-                if voice.view(np.int64)[at.RELEASE] == 0:
-                    voice.view(np.int64)[at.RELEASE] = max(1, round(seconds * self.rate_hz))
+            for voice in self._alive(number, note).values():
+                if voice["release"] == 0:
+                    voice["release"] = max(1, round(seconds * self.rate_hz))
 
     def _notes(self) -> NDArray[np.void]:
         """The notes (MOST_NOTES,) as they are now."""
         return self.record["notes"].copy()
 
-    def _voices(self, number: int, note: np.void) -> list[NDArray[np.float64]]:
-        """The headers of a note's voices; none where it is free."""
-        found = []
-        for source in range(of.MOST_SOURCES if note["state"] == of.RINGS else 0):
-            own = slots(PLAYER) + (number * of.MOST_SOURCES + source) * self._voice_slots
-            if note["voices"][source]:
-                found.append(self.memory[own : own + at.HEADER])
-        return found
+    def _voices(self, number: int, note: np.void) -> dict[int, np.void]:
+        """The records of a note's voices by their sources; none where it is free."""
+        sources = of.MOST_SOURCES if note["state"] == of.RINGS else 0
+        return {source: self.voice(number, source) for source in range(sources) if note["voices"][source]}
+
+    def _alive(self, number: int, note: np.void) -> dict[int, np.void]:
+        """The records of a note's voices that are not over, by their sources."""
+        voices = self._voices(number, note).items()
+        return {source: voice for source, voice in voices if voice["state"] in (WAITING, SOUNDING)}
+
+    def _memory_of(self, number: int, source: int) -> NDArray[np.float64]:
+        first = slots(PLAYER) + (number * of.MOST_SOURCES + source) * self._voice_slots
+        return self.memory[first : first + self._voice_slots]
+
+    def voice(self, number: int, source: int) -> np.void:
+        """The record of a note's voice of a source."""
+        return record_of(self._memory_of(number, source), VOICE)
+
+    def rows_of(self, number: int, source: int) -> NDArray[np.float64]:
+        """The rows (rows, modes) of that voice, with the memory behind them as far as it makes whole rows."""
+        memory = self._memory_of(number, source)
+        modes = int(record_of(memory, VOICE)["modes"])
+        rows = memory[slots(VOICE) + WEIGHT_ROWS * modes :]
+        return rows[: len(rows) // modes * modes].reshape(-1, modes)
 
     @property
     def wheel(self) -> tuple[int, int]:
@@ -408,11 +422,6 @@ class CompiledPlayer:
         )
 
 
-def record_of(memory: NDArray[np.float64], kind: np.dtype[np.void]) -> np.void:
-    """The record at the beginning of memory, which shares it."""
-    return memory[: slots(kind)].view(kind)[0]
-
-
 def _string(row: NDArray[np.float64]) -> StringParameters | None:
     """A string of the player's memory; None: it is bent beyond the bounds."""
     try:
@@ -423,8 +432,3 @@ def _string(row: NDArray[np.float64]) -> StringParameters | None:
 
 def _drawn(pluck: Pluck) -> tuple[float, float, float, int]:
     return pluck.position, pluck.amplitude_mm, pluck.width, SHAPES.index(pluck.shape)
-
-
-def _alive(voices: Iterable[NDArray[np.float64]]) -> list[NDArray[np.float64]]:
-    """The voices that are not over."""
-    return [voice for voice in voices if voice.view(np.int64)[at.STATE] in (at.WAITING, at.SOUNDING)]

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
+from engine.kernels.fields import record_of, slots
 from engine.kernels.modes import TOO_HIGH
+from engine.kernels.voice_records import RENDERED
 from engine.presets import PresetInfo
 from engine.resonators.base import Array, Resonator
 from engine.values.ear import Ear
@@ -27,7 +29,7 @@ class Program:
     """See the module; the kernels read `memory`.
 
     Attributes:
-        modes: latents of a bank, modes of a solver, 0 where samples are rendered.
+        modes: of the string; 0 where samples are rendered.
         start: initial displacement (grid_points,) in m to the two rows (modes,) that a voice sets out from.
         read: weights (grid_points, points) of displacement to weights (points, 2 modes) and bias (points,), of full
             scale.
@@ -65,7 +67,7 @@ class Program:
     @property
     def rendered(self) -> bool:
         """Return True if somebody renders the samples of its voices."""
-        return self.kind == at.RENDERED
+        return self.kind == RENDERED
 
     @property
     def address(self) -> int:
@@ -90,26 +92,19 @@ def fits(omega: Array) -> Array:
 
 
 def packed(
-    header_slots: int, reals: dict[int, float], wholes: dict[int, int], parts: dict[int, NDArray[np.generic]]
+    kind: np.dtype[np.void], values: Mapping[str, Any], *parts: NDArray[np.generic], names: Sequence[str] = ()
 ) -> Array:
-    """Pack a header and its parts, whose places the header gives, in one array."""
-    arrays: Sequence[NDArray[np.generic]] = [np.asarray(part).ravel() for part in parts.values()]
-    first = header(header_slots, reals, wholes)
-    memory = np.concatenate([first, np.zeros(sum(len(array) for array in arrays))])
-    counts = memory.view(np.int64)
-    place = header_slots
-    for slot, array in zip(parts, arrays, strict=True):
-        counts[slot] = place
-        target = counts if array.dtype == np.int64 else memory
-        target[place : place + len(array)] = array
-        place += len(array)
-    return memory
+    """A program's record with these values, and the parts that follow it, in one array.
 
-
-def header(slots: int, reals: dict[int, float], wholes: dict[int, int]) -> Array:
-    memory = np.zeros(slots)
-    for slot, real in reals.items():
-        memory[slot] = real
-    for slot, whole in wholes.items():
-        memory.view(np.int64)[slot] = whole
+    Args:
+        names: the fields that are to have the slots of the parts.
+    """
+    arrays = [np.asarray(part, np.float64).ravel() for part in parts]
+    memory = np.concatenate([np.zeros(slots(kind)), *arrays])
+    record = record_of(memory, kind)
+    for name, value in values.items():
+        record[name] = value
+    places = np.cumsum([slots(kind), *(len(array) for array in arrays)])
+    for name, place in zip(names, places.tolist(), strict=False):
+        record[name] = place
     return memory

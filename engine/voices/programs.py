@@ -1,7 +1,7 @@
 """Programs: what all voices of one source share, at one sample rate.
 
-A model whose decoder is linear becomes a bank of latents, and the string itself a solver; both are compiled and
-sound at once, at the device's own rate. Any other model is rendered ahead at its own rate, and converted.
+The model of many strings and the string itself, a solver, are compiled and sound at once, at the device's own rate.
+Any other model is rendered ahead at its own rate, and converted.
 """
 
 from __future__ import annotations
@@ -13,14 +13,22 @@ from functools import lru_cache
 import numpy as np
 
 from engine.bounds import SUBSTEPS_IN_A_PERIOD
-from engine.kernels import layout as at
 from engine.kernels.scheme import KICKS, ROTATIONS
+from engine.kernels.voice_records import (
+    RENDERED,
+    RENDERED_PROGRAM,
+    STAGES,
+    TENSION,
+    TENSION_PROGRAM,
+    TRUTH,
+    TRUTH_PROGRAM,
+)
 from engine.levels import FULL_SCALE_M
 from engine.models._tension_arrays import CURVES
 from engine.models.configurations import KoopmanTensionConfiguration
 from engine.presets import Preset, PresetInfo
 from engine.resonators.base import Array, Resonator
-from engine.voices.program import Program, fits, header, packed, voice_ends_s
+from engine.voices.program import Program, fits, packed, voice_ends_s
 
 HEARD_SILENCE = 4e-6  # of a mode, of all: what the truth leaves out where it is heard is 108 dB down
 # Drums radiate high modes better than low ones: at 4e-6 they would leave with audible steps.
@@ -36,7 +44,7 @@ def tension_program(
     weights: Mapping[str, Array], c: KoopmanTensionConfiguration, resonator: Resonator, rate_hz: int
 ) -> Program:
     """The program of what the model of many strings learned (its curves), for any kind of resonator at any rate."""
-    return _with_modes(at.TENSION, tension_memory(weights, c, rate_hz), resonator, rate_hz)
+    return _with_modes(TENSION, tension_memory(weights, c, rate_hz), resonator, rate_hz)
 
 
 def tension_memory(
@@ -52,16 +60,16 @@ def tension_memory(
         silence: of a mode, of all together, from which on the highest are laid to rest.
         unheard: see `DRUM_UNHEARD`; 0: all modes move.
     """
-    reals = {
-        at.S_NODE_PHASE: c.node_phase,
-        at.S_HIGHEST_PHASE: c.highest_phase,
-        at.S_SILENCE: silence,
-        at.S_LOUDNESS: -math.log(FULL_SCALE_M),
-        at.S_RATE: float(rate_hz),
-        at.S_UNHEARD: unheard,
+    values = {
+        "coefficients": c.degree + 1,
+        "node_phase": c.node_phase,
+        "highest_phase": c.highest_phase,
+        "silence": silence,
+        "loudness": -math.log(FULL_SCALE_M),
+        "rate_hz": rate_hz,
+        "unheard": unheard,
     }
-    curves = [weights[name] for name in CURVES]
-    return np.concatenate([header(at.S_HEADER, reals, {at.S_COEFFICIENTS: c.degree + 1}), *curves])
+    return packed(TENSION_PROGRAM, values, *(weights[name] for name in CURVES))
 
 
 def truth_program(info: PresetInfo, rate_hz: int, coarser: int = HEARD_COARSER) -> Program:
@@ -81,20 +89,20 @@ def solver_program(
     Args:
         aliased: modes that are too high for the rate are heard as others, as they are in data of that rate.
     """
-    return _with_modes(at.TRUTH, solver_memory(rate_hz, coarser), resonator, rate_hz, aliased)
+    return _with_modes(TRUTH, solver_memory(rate_hz, coarser), resonator, rate_hz, aliased)
 
 
 def solver_memory(rate_hz: int, coarser: int = HEARD_COARSER, silence: float = HEARD_SILENCE) -> Array:
     """The memory that the kernels read of the solver, as `tension_memory`."""
-    reals = {
-        at.T_SUBSTEPS: SUBSTEPS_IN_A_PERIOD / coarser,
-        at.T_SILENCE: silence,
-        at.T_LOUDNESS: -math.log(FULL_SCALE_M),
-        at.T_RATE: float(rate_hz),
-        **{at.T_ROTATIONS + stage: share for stage, share in enumerate(ROTATIONS[: at.STAGES // 2])},
-        **{at.T_KICKS + stage: share for stage, share in enumerate(KICKS)},
+    values = {
+        "substeps": SUBSTEPS_IN_A_PERIOD / coarser,
+        "silence": silence,
+        "loudness": -math.log(FULL_SCALE_M),
+        "rate_hz": rate_hz,
+        "rotations": ROTATIONS[: STAGES // 2],
+        "kicks": KICKS,
     }
-    return header(at.T_HEADER, reals, {})
+    return packed(TRUTH_PROGRAM, values)
 
 
 def _with_modes(kind: int, memory: Array, resonator: Resonator, rate_hz: int, aliased: bool = False) -> Program:
@@ -118,11 +126,6 @@ def model_program(preset: Preset, rate_hz: int) -> Program:
     """The compiled voice of a model where it has one, otherwise for samples that are rendered ahead."""
     if preset.info.of_many_strings:
         return tension_program(preset.weights, preset.configuration, preset.info.resonator, rate_hz)
-    if preset.info.model in ("dmd", "koopman_integrated"):
-        from engine.voices.banks import bank_program  # and torch, which a preset of many strings plays without
-
-        if (bank := bank_program(preset.model, preset.info, rate_hz)) is not None:
-            return bank
     return rendered_program(preset.info, rate_hz)
 
 
@@ -149,12 +152,8 @@ def _samples_program(
     window = np.i0(FILTER_BETA * np.sqrt(np.clip(1 - (place / FILTER_TAPS) ** 2, 0, 1))) / np.i0(FILTER_BETA)
     sinc = np.sinc(cutoff * place)
     table = cutoff * np.where(np.abs(sinc) < 1e-15, 0.0, sinc) * window
-    memory = packed(
-        at.R_HEADER,
-        {at.R_RATIO: ratio},
-        {at.R_TAPS: FILTER_TAPS, at.R_PHASES: FILTER_PHASES},
-        {at.R_FILTER: np.concatenate([table, table[-1:]])},
-    )
+    values = {"ratio": ratio, "taps": FILTER_TAPS, "phases": FILTER_PHASES}
+    memory = packed(RENDERED_PROGRAM, values, np.concatenate([table, table[-1:]]), names=("filter",))
 
     def start(_displacement_m: Array) -> tuple[Array, Array]:
         return np.zeros(0), np.zeros(0)
@@ -162,4 +161,4 @@ def _samples_program(
     def read(weights: Array) -> tuple[Array, Array]:
         return np.zeros((weights.shape[1], 0)), np.zeros(weights.shape[1])
 
-    return Program(at.RENDERED, memory, 0, rate_hz, grid_points, start, read, None, ends_s, force)
+    return Program(RENDERED, memory, 0, rate_hz, grid_points, start, read, None, ends_s, force)

@@ -50,16 +50,13 @@ def hear(derivative: Callable[[np.ndarray, int], np.ndarray]) -> Hear:
     return heard
 
 
-OF_LIBRARIES = {"IO loop"}  # threads of a whole process: Dask's
-
-
 @pytest.fixture(autouse=True)
 def threads_begun() -> Iterator[Callable[[], list[str]]]:
     """Names the threads that the test has begun and that are alive. None is once it is over: a test ends its own."""
     before = set(threading.enumerate())
 
     def begun() -> list[threading.Thread]:
-        return [each for each in threading.enumerate() if each not in before and each.name not in OF_LIBRARIES]
+        return [each for each in threading.enumerate() if each not in before]
 
     yield lambda: [each.name for each in begun()]
     for each in begun():

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from engine.effects import Body, Effects
-from engine.kernels import layout as at
+from engine.kernels.constants import QUANTUM
+from engine.kernels.mixer_records import WINDOW, WINDOW_QUANTA
 from engine.values.effects import Room
 from engine.voices import Mixer, Voice, plain_program
 from tests.bench.machine import Machine, one_thread
@@ -80,8 +81,8 @@ def _cost(name: str, effects: Effects, exchanged: bool) -> EffectsCost:
     empty_us = float(np.median(_quanta_us(None, False)))
     quanta_us = _quanta_us(effects, exchanged) - empty_us
     rest_us, nothing_us = (np.median(_quanta_us(choice, False, sounding=False)) for choice in (effects, None))
-    quantum_us = 1e6 * at.QUANTUM / RATE_HZ
-    period = 2 * at.WINDOW_QUANTA  # of an exchange: it is prepared in one window and fades in the next
+    quantum_us = 1e6 * QUANTUM / RATE_HZ
+    period = 2 * WINDOW_QUANTA  # of an exchange: it is prepared in one window and fades in the next
     places = np.median(quanta_us[: len(quanta_us) // period * period].reshape(-1, period), axis=0)
     first_ms, set_ms = _setting_ms(effects)
     return EffectsCost(
@@ -105,14 +106,14 @@ def _quanta_us(effects: Effects | None, exchanged: bool, sounding: bool = True) 
     voice = Voice.of_samples(plain_program(RATE_HZ), draw.uniform(-0.1, 0.1, (frames, 2)).astype(np.float32))
     voice.sound_through_effects()
     mixer.add(voice)
-    mixer.render(round(FILLING_S * RATE_HZ) // at.WINDOW * at.WINDOW)
+    mixer.render(round(FILLING_S * RATE_HZ) // WINDOW * WINDOW)
     found = []
-    for number in range(round(SECONDS * RATE_HZ) // at.QUANTUM):
-        if exchanged and effects is not None and number % at.WINDOW_QUANTA == 0:
+    for number in range(round(SECONDS * RATE_HZ) // QUANTUM):
+        if exchanged and effects is not None and number % WINDOW_QUANTA == 0:
             room = effects.room or Room()
-            mixer.set_effects(Effects(effects.body, Room(0.2 + 0.1 * (number // at.WINDOW_QUANTA % 2), room.t60_s)))
+            mixer.set_effects(Effects(effects.body, Room(0.2 + 0.1 * (number // WINDOW_QUANTA % 2), room.t60_s)))
         began_ns = time.thread_time_ns()
-        mixer.render(at.QUANTUM)
+        mixer.render(QUANTUM)
         found.append((time.thread_time_ns() - began_ns) / 1000)
     return np.array(found)
 

@@ -7,8 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from torch import Tensor
-
+from engine.compare.relative import error_to_signal
 from engine.pluck import Pluck
 from engine.resonators.string import resonator_of
 from engine.sources import SILENCE
@@ -103,7 +102,7 @@ def _measure_protocol(data: DatasetConfiguration, batch: int) -> SolverTiming:
     dop853_s = time.perf_counter() - started
 
     def error(substeps: int) -> float:
-        return relative_l2(_solver(data, substeps).solve(worst, data.steps), truth)
+        return math.sqrt(error_to_signal(_solver(data, substeps).solve(worst, data.steps), truth))
 
     def cost_s(substeps: int) -> float:
         solver, state = _solver(data, substeps), ModalState.at_rest(initial[:batch])
@@ -131,11 +130,6 @@ def _measure_protocol(data: DatasetConfiguration, batch: int) -> SolverTiming:
     )
 
 
-def relative_l2(found: Tensor, truth: Tensor) -> float:
-    """‖found - truth‖ / ‖truth‖ over all frames and modes (the sine transform keeps the norm)."""
-    return float((found - truth).norm() / truth.norm())
-
-
 def _solver(data: DatasetConfiguration, substeps: int | None) -> SplittingSolver:
     return SplittingSolver(data.resonator, data.rate_hz, substeps=substeps)
 
@@ -149,7 +143,7 @@ def _measure_audio(substeps: int | None, silence: float = 0.0) -> AudioTiming:
     whole, solver = (
         SplittingSolver(resonator, AUDIO_RATE_HZ, substeps=substeps, silence=share) for share in (0.0, silence)
     )
-    error = relative_l2(solver.solve(state, samples), whole.solve(state, samples))
+    error = math.sqrt(error_to_signal(solver.solve(state, samples), whole.solve(state, samples)))
     with one_thread():
         taken_s = median_s(lambda: solver.advance(state, samples), 3)
     factor = taken_s * AUDIO_RATE_HZ / samples

@@ -17,8 +17,8 @@ from tests.bench.baselines.models import BASELINES, ModalSynthesis, baseline_pla
 from training.cli.console import number
 from training.family.preset import FamilyConfiguration
 from training.family.strings import PluckedString, draw_string
+from training.family.untrained import linear_string
 from training.fitting.checkpoint import Checkpoint
-from training.research.players import linear_string
 
 RATE_HZ = 48_000
 SMALL = FamilyConfiguration("Two", "", 25, strings=2, validation_strings=1, rate_hz=8_000)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
 from engine.resonators.sine_transform import project

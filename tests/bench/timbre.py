@@ -18,7 +18,7 @@ from app.instrument.offline import render_events
 from app.instrument.strings import Strings
 from app.patches.patch import Damping, Noise, Patch
 from app.shared.vocabulary import DIFFERENCE
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM
 from engine.presets import Preset
 from engine.resonators.string import undamped_frequencies
 

@@ -6,6 +6,7 @@ Errors are relative L2 over the first second of the sound.
 
 from __future__ import annotations
 
+import math
 import statistics
 import time
 from collections.abc import Callable
@@ -21,6 +22,7 @@ from app.instrument.strings import Strings
 from app.patches.library import find_patch
 from app.patches.patch import Noise
 from app.presets.library import STUDIO
+from engine.compare.relative import error_to_signal
 from engine.kernels.constants import MOST_NOTES, MOST_PAIRS
 from engine.levels import FULL_SCALE_M
 from engine.pluck import DEFAULT_LISTEN, Pluck
@@ -231,7 +233,7 @@ def _error(program: Program, preset: Preset, source: StringSource) -> float:
     initial_m = project(PLUCK.displacement(info.grid_points), info.modes)
     blocks, _ = source.advance(source.start(initial_m[None]), frames - 1, weights_of(EAR, info.grid_points))
     expected = blocks[0, first - 1 :, 0].astype(np.float64) / FULL_SCALE_M
-    return float(np.linalg.norm(found - expected) / np.linalg.norm(expected))
+    return math.sqrt(error_to_signal(found, expected))
 
 
 def _strikes(preset: Preset, programs: tuple[Program, Program]) -> StrikeCost:

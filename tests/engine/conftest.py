@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
 from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, Preset, PresetInfo, TrainedRange, load_preset
@@ -42,7 +41,7 @@ def _shipped(name: str) -> Preset:
 
 
 @cache
-def _bank(name: str, rate_hz: int) -> Program:
+def _program(name: str, rate_hz: int) -> Program:
     preset = _shipped(name)
     return model_program(preset, rate_hz)
 
@@ -93,7 +92,7 @@ def strike() -> Callable[..., Voice]:
     """A voice of a shipped preset's model: strike(name, pluck=…, rate_hz=…, ear=…, gain=…)."""
 
     def made(name: str, pluck: Pluck = PLUCK, rate_hz: int = 48_000, ear: Ear = EAR, gain: float = 1.0) -> Voice:
-        return Voice(_bank(name, rate_hz), _initial_m(_shipped(name).info, pluck), ear, gain)
+        return Voice(_program(name, rate_hz), _initial_m(_shipped(name).info, pluck), ear, gain)
 
     return made
 
@@ -105,7 +104,7 @@ def rung() -> Callable[..., NDArray[np.float64]]:
     def rendered(frames: int, *voices: Voice, attack: bool = True) -> NDArray[np.float64]:
         mixer = Mixer(voices[0].program.rate_hz, limited=False)
         for voice in () if attack else voices:
-            voice.memory.view(np.int64)[at.ATTACK] = 0  # the string's own samples from the first on
+            voice.record["attack"] = 0  # the string's own samples from the first on
         mixer.add(*voices)
         return mixer.render(frames).astype(np.float64)
 

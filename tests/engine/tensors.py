@@ -10,6 +10,7 @@ from engine.models.fno import FourierConvolution
 from engine.pluck import Pluck
 from engine.resonators import sine_transform
 from engine.resonators.base import Resonator
+from engine.truth import ModalState
 from training.data import draws
 
 
@@ -38,6 +39,13 @@ def draw(kind: str, count: int, modes: int, seed: int = 0) -> Tensor:
 def of_tension_rise(resonator: Resonator, amplitudes: Tensor, rise: float) -> Tensor:
     """The amplitudes, scaled to a rise of tension."""
     return amplitudes * float(np.sqrt(rise / resonator.relative_tension_rise(amplitudes.numpy())))
+
+
+def solve_linear(resonator: Resonator, state: ModalState, times_s: Tensor) -> Tensor:
+    """The closed form of motion without coupling: modal amplitudes at `times_s` (times,), (batch, times, modes)."""
+    sigma, omega = torch.from_numpy(resonator.sigma), torch.from_numpy(resonator.eigenvalues().imag)
+    q, speed, t = state.amplitude[:, None], state.velocity[:, None], times_s.double()[:, None]
+    return torch.exp(-sigma * t) * (q * torch.cos(omega * t) + (speed + sigma * q) / omega * torch.sin(omega * t))
 
 
 def convolved(layer: FourierConvolution, field: Tensor) -> Tensor:

@@ -32,6 +32,9 @@ def test_every_name_is_there() -> None:
         engine.nothing  # noqa: B018
 
 
-def test_the_engine_itself_loads_nothing() -> None:
-    code = "import sys, engine; assert not {'torch', 'numpy', 'numba'} & set(sys.modules)"
+@pytest.mark.parametrize(
+    ("module", "unloaded"), [("engine", {"torch", "numpy", "numba"}), ("engine.effects", {"torch", "numba"})]
+)
+def test_the_engine_itself_loads_nothing_and_effects_no_compiler(module: str, unloaded: set[str]) -> None:
+    code = f"import sys, {module}; assert not {unloaded} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT)

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from engine.audible import heard_level_db
+from engine.compare.audible import heard_level_db
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset, read_info
 from engine.resonators.sine_transform import project

@@ -24,7 +24,7 @@ KINDS = {
     "koopman_integrated_400": {},
     "koopman_integrated_400_blind": {},
     "lru_400": {},
-    "frnn_100": {"epochs": 1},
+    "frnn_100": {"epochs": 1, "start": "paper"},
     "fgru_20_paper": {"epochs": 1},
 }
 

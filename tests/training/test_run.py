@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from engine.metrics import RelativeError
+from engine.compare.relative import RelativeError
 from engine.models.base import count_parameters
 from engine.presets import load_preset
 from training.cell import Cell, configuration_of

@@ -17,7 +17,7 @@ from training.cli.console import Shares, number, print_json, print_table, progre
 from training.cli.training import Known, known_errors, load_data, print_known
 
 if TYPE_CHECKING:
-    from engine.metrics import ErrorSums
+    from engine.compare.relative import ErrorSums
     from engine.presets import Preset
     from training.configuration import DatasetConfiguration
     from training.data.dataset import Dataset

@@ -49,14 +49,7 @@ def train(
     file = output or default_runs() / f"{path.stem}.safetensors"
     file.parent.mkdir(parents=True, exist_ok=True)
     with progress("family train") as report:
-        info = train_preset(
-            configuration,
-            file,
-            made=lambda share: report(0.5 * share, "true motions"),
-            report=lambda p: report(
-                0.5 + 0.5 * p.step / p.steps, f"step {p.step}, validation {p.validation:.3g}", p.left_s
-            ),
-        )
+        info = train_preset(configuration, file, report=report)
     print(
         f"{file}: rel. MSE {number(info.rel_mse)}, rel. MAE {number(info.rel_mae)} on validation; "
         f"{number(info.test_rel_mse)}, {number(info.test_rel_mae)} on test"
@@ -106,7 +99,7 @@ def evaluate(
     loaded = _open_preset_of_many(preset)
     players: dict[str, Player] = {loaded.name: player(loaded.model)}
     if baselines:
-        from training.research.players import knowing_physics
+        from training.family.untrained import knowing_physics
 
         players |= knowing_physics()
     with progress("family evaluate") as report:

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from training.fitting.fit import Progress
     from training.results import Row
     from training.sweeping.plan import Plan, Run
-    from training.sweeping.workers.base import Noted, Progressed
 
 LINE_EVERY_S = 60.0  # between two lines of a run's progress
 MOST_MINUTES = 10_000.0
@@ -36,7 +35,9 @@ def sweep(
     scheduler: Annotated[
         str | None,
         typer.Option(
-            metavar="ADDRESS", help="A Dask scheduler, such as tls://HOST:PORT; default workers on this machine."
+            metavar="ADDRESS",
+            help="A Dask scheduler, such as tls://HOST:PORT; needs the extra learned-strings[cluster]. "
+            "Default workers on this machine.",
         ),
     ] = None,
     workers: Annotated[
@@ -65,7 +66,9 @@ def sweep(
     ] = None,
     runs: Runs = None,
     cache: Cache = None,
-    retries: Annotated[int, typer.Option(min=0, max=MOST_RETRIES, help="Further tries of a run that failed.")] = 1,
+    retries: Annotated[
+        int, typer.Option(min=0, max=MOST_RETRIES, help="Further tries of a run that failed or died.")
+    ] = 1,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="List the runs in their order, and train none.")] = False,
     json: Json = False,
 ) -> None:
@@ -75,10 +78,11 @@ def sweep(
     the same command continues after an interruption.
     """
     from training.results import read_results
+    from training.sweeping.cluster import cluster_workers, open_to_anybody
     from training.sweeping.plan import load_plan
+    from training.sweeping.processes import fitted, process_workers
     from training.sweeping.sweep import Options, results_of, unfinished
     from training.sweeping.sweep import sweep as run  # this command has the name
-    from training.sweeping.workers import cluster_workers, fitted, local_workers, open_to_anybody
 
     ends_s = None
     if minutes is not None:
@@ -96,7 +100,7 @@ def sweep(
         layout = fitted(max(left, 1), device=device, workers=workers, threads=threads, per_device=per_device)
         seeds_at_once = layout.device == "cuda"
         options = Options(file, runs, cache, layout.device, layout.threads, retries, every_s, seeds_at_once, ends_s)
-        opened = local_workers(layout)
+        opened = process_workers(layout)
     else:
         options = Options(file, runs, cache, device, threads, retries, every_s, device == "cuda", ends_s)
         if open_to_anybody(scheduler):
@@ -192,13 +196,12 @@ class Shown:
         self._reports[run.name] = self._begin(run.name)
         self._shown[run.name] = training_report(self._reports[run.name])
 
-    def progressed(self, event: Progressed) -> None:
-        if event.name in self._reports:
-            self._last[event.name] = event.progress
-            self._shown[event.name](event.progress)
+    def progressed(self, run: Run, progress: Progress) -> None:
+        self._last[run.name] = progress
+        self._shown[run.name](progress)
 
-    def noted(self, event: Noted) -> None:
-        say(f"{event.name}: {event.text}")
+    def failed(self, run: Run, error: str) -> None:
+        say(f"{run.name}: failed and is tried again ({error})")
 
     def finished(self, row: Row) -> None:
         self._reports.pop(row.name)(1.0)

@@ -205,7 +205,7 @@ def load_data(configuration: DatasetConfiguration, cache: Path | None) -> Datase
     from training.data.dataset import load_dataset
 
     with progress("data set") as report:
-        return load_dataset(configuration, cache, lambda done, total: report(done / total))
+        return load_dataset(configuration, cache, report)
 
 
 def _device(wanted: Device) -> str:

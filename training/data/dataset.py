@@ -93,12 +93,12 @@ def draw_initial(configuration: DatasetConfiguration) -> Array:
 def load_dataset(
     configuration: DatasetConfiguration,
     cache: Path | None = None,
-    progress: Callable[[int, int], None] = lambda done, total: None,
+    report: Callable[[float], None] = lambda share: None,
 ) -> Dataset:
     """The data set from the cache, generated first where it is not there. Safe to kill at any time.
 
     Args:
-        progress: called with (trajectories done, all).
+        report: receives the share that is done.
 
     Raises:
         OSError: the cache folder cannot be written.
@@ -108,7 +108,7 @@ def load_dataset(
     folder.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(folder.with_suffix(".lock")):  # one process makes it, the others wait
         if not folder.exists():
-            _generate(configuration, folder, progress)
+            _generate(configuration, folder, report)
     try:
         facts = json.loads((folder / "dataset.json").read_text(encoding="utf-8"))
         amplitudes = _map(folder / "amplitudes.npy", _amplitudes_shape(configuration), facts["amplitudes_crc32"])
@@ -137,7 +137,7 @@ def _map(file: Path, shape: tuple[int, int, int], checksum: int) -> np.ndarray[A
     return values
 
 
-def _generate(configuration: DatasetConfiguration, folder: Path, progress: Callable[[int, int], None]) -> None:
+def _generate(configuration: DatasetConfiguration, folder: Path, report: Callable[[float], None]) -> None:
     """Writes into another folder that is renamed when it is whole; the caller holds the lock."""
     unfinished = folder.with_suffix(".unfinished")
     shutil.rmtree(unfinished, ignore_errors=True)
@@ -145,18 +145,18 @@ def _generate(configuration: DatasetConfiguration, folder: Path, progress: Calla
         with naming(folder):
             unfinished.mkdir()
             facts = {"configuration": write(configuration), "data_version": DATA_VERSION}
-            facts["amplitudes_crc32"] = _simulate(configuration, unfinished / "amplitudes.npy", progress)
+            facts["amplitudes_crc32"] = _simulate(configuration, unfinished / "amplitudes.npy", report)
             values = np.load(unfinished / "amplitudes.npy", mmap_mode="r")[split_rows(configuration.count, "train")]
             facts["scale_m"] = displacement_deviation(values, configuration.resonator.shapes)
             del values  # an open mapping would hold the folder on Windows
             (unfinished / "dataset.json").write_text(json.dumps(facts, indent=2), encoding="utf-8")
             unfinished.rename(folder)
-        progress(configuration.count, configuration.count)
+        report(1.0)
     finally:
         shutil.rmtree(unfinished, ignore_errors=True)
 
 
-def _simulate(c: DatasetConfiguration, file: Path, progress: Callable[[int, int], None]) -> int:
+def _simulate(c: DatasetConfiguration, file: Path, report: Callable[[float], None]) -> int:
     """Writes the amplitudes row by row, so that a full disk is an OSError and no broken mapping; their checksum."""
     solver = SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps)
     initial = draw_initial(c)
@@ -165,7 +165,7 @@ def _simulate(c: DatasetConfiguration, file: Path, progress: Callable[[int, int]
         header = {"descr": "<f4", "fortran_order": False, "shape": _amplitudes_shape(c)}
         np.lib.format.write_array_header_1_0(amplitudes, header)
         for first in range(0, c.count, CHUNK):
-            progress(first, c.count)
+            report(first / c.count)
             state = ModalState.at_rest(initial[first : first + CHUNK])
             frames = [state.amplitude[:, None]]
             for done in range(0, c.steps, FRAMES_AT_ONCE * c.stride):

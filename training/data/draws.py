@@ -6,12 +6,14 @@ PyTorch draws the numbers: a seed means the same data for ever.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import torch
 
-from engine.excitation import gaussian, held, raised_cosine, triangular
+from engine.excitation import displacement, held
+from engine.kernels.pulses import gaussian
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import grid_positions
 
@@ -28,7 +30,7 @@ def draw_gaussians(count: int, grid_points: int, generator: torch.Generator) -> 
     centre, width, peak = (
         _uniform(count, low, high, generator) for low, high in (CENTRE_RANGE, WIDTH_RANGE, PEAK_RANGE_M)
     )
-    return held(peak * np.exp(-(((grid_positions(grid_points) - centre) / width) ** 2)))
+    return held(peak * gaussian((grid_positions(grid_points) - centre) / width))
 
 
 def draw_noise(count: int, grid_points: int, generator: torch.Generator) -> Array:
@@ -49,16 +51,8 @@ def draw_plucks(count: int, grid_points: int, generator: torch.Generator) -> Arr
         np.exp(_uniform(count, math.log(low), math.log(high), generator)[:, 0]).tolist()
         for low, high in (PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M)
     )
-    drawn = []
-    for number, (at, wide, peak) in enumerate(zip(position, width, peak_m, strict=True)):
-        shape = number % 3
-        if shape == 0:
-            drawn.append(gaussian(at, wide, peak, grid_points))
-        elif shape == 1:
-            drawn.append(triangular(at, peak, grid_points))
-        else:
-            drawn.append(raised_cosine(at, wide, peak, grid_points))
-    return np.stack(drawn)
+    shapes = itertools.cycle(("gaussian", "triangular", "raised_cosine"))
+    return np.stack([displacement(*each, grid_points) for each in zip(shapes, position, width, peak_m, strict=False)])
 
 
 DRAWS = {"gaussian": draw_gaussians, "noise": draw_noise, "pluck": draw_plucks}

@@ -22,12 +22,13 @@ from filelock import FileLock
 from torch import Tensor
 
 from engine.kernels.drum_modes import AIR_KG_M3
+from engine.kernels.pulses import spectrum
 from engine.models import build_model
 from engine.models.base import Physics, StringModel
 from engine.models.koopman_tension import KoopmanTension
 from engine.resonators.base import Array, Resonator
 from engine.resonators.drum import DrumModes, bending_nm, modes_of
-from engine.strike import pulse_spectrum
+from engine.strike import Strike
 from engine.table import checked, read_table, write_table
 from engine.truth import ModalState, SplittingSolver
 from engine.values.drum import DrumParameters
@@ -58,6 +59,7 @@ RANGES: Mapping[Kind, Ranges] = {
 }
 T60_S, BRIGHT_T60_S, RISE, RADIUS_M, CONTACT_S = (0.4, 2.5), (0.08, 0.35), (0.02, 0.5), (0.005, 0.04), (1e-3, 5e-3)
 SCATTER = 0.2
+NOWHERE = np.zeros((1, 2))  # a place, where none counts
 AIRLESS: tuple[Kind, ...] = ("steel plate", "narrow plate")
 
 
@@ -78,6 +80,13 @@ class StruckDrum:
     speeds_m_s: Array
     weight: Array
     tension_rise: float
+
+    @classmethod
+    def by(cls, strike: Strike, modes: DrumModes, tension_modulated: bool = True) -> StruckDrum:
+        """A drum of an instrument, by a blow on it."""
+        speeds, resonator = strike.speeds(modes), modes.resonator(NOWHERE, tension_modulated=tension_modulated)
+        rise = float(resonator.relative_tension_rise(speeds / resonator.omega))
+        return cls("tom", modes.drum, resonator, np.zeros_like(speeds), speeds, modes.scale**2, rise)
 
     @property
     def pitch_hz(self) -> float:
@@ -141,7 +150,7 @@ def _start(
     radius_m, contact_s = _between(random, RADIUS_M), _between(random, CONTACT_S)
     still, pressed = np.zeros(len(modes)), modes.struck(place, radius_m)
     if blow:
-        return still, pressed * pulse_spectrum(modes.omega, contact_s)
+        return still, pressed * spectrum(modes.omega * contact_s / (2 * math.pi))
     return pressed / modes.omega**2, still
 
 

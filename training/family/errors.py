@@ -13,6 +13,7 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from engine.compare.relative import error_to_signal
 from engine.models.base import Physics, StringModel
 from engine.models.koopman_tension import KoopmanTension
 from training.family.motions import solve
@@ -92,13 +93,10 @@ def measure(
             started = time.process_time()
             played = play(plucked, rate_hz, last)
             processor_s = (time.process_time() - started) * rate_hz / last
-            wrong = played[first:] - truth
-            energy = float(truth.square().sum())
-            error = float(wrong.square().sum()) / max(energy, unheard)
+            error = error_to_signal(played[first:], truth, unheard)
+            sounds = float(truth.square().sum()) > unheard
             reported = (plucked.pitch_hz, plucked.inharmonicity, plucked.tension_rise, plucked.resonator.modes)
-            found[name].append(
-                StringError(*reported, error if math.isfinite(error) else math.inf, processor_s, energy > unheard)
-            )
+            found[name].append(StringError(*reported, error, processor_s, sounds))
         report((number + 1) / count)
     return {name: FamilyErrors(tuple(errors)) for name, errors in found.items()}
 

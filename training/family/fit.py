@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import torch
 from torch import Tensor
 
+from engine.compare.relative import error_to_signal
 from engine.models.base import Physics
 from engine.models.koopman_tension import KoopmanTension
 from training.family.strings import PluckedString, displacement_m
@@ -34,18 +35,6 @@ class Case:
     truth: Tensor
 
 
-@dataclass(frozen=True)
-class FitProgress:
-    """The progress after a step: geometric means of training and validation errors, frames in reach, time left."""
-
-    step: int
-    steps: int
-    frames: int
-    train: float
-    validation: float
-    left_s: float
-
-
 @torch.no_grad()
 def fit_curves(
     model: KoopmanTension,
@@ -56,7 +45,7 @@ def fit_curves(
     steps: int,
     first_frames: int,
     seed: int,
-    report: Callable[[FitProgress], None] = lambda progress: None,
+    report: Callable[[float, str, float], None] = lambda share, text, left_s: None,
 ) -> float:
     """Sets the model's curves in place to those that are best on validation; its geometric mean there.
 
@@ -108,20 +97,15 @@ def fit_curves(
         if measured < best:
             best, best_numbers = measured, present.clone()
         left_s = (time.monotonic() - started) / (step + 1) * (steps - step - 1)
-        report(FitProgress(step + 1, steps, frames, math.exp(min(value, start)), measured, left_s))
+        report((step + 1) / steps, f"step {step + 1}, validation {measured:.3g}", left_s)
     _set(model, best_numbers)
     return best
 
 
 def errors(model: KoopmanTension, cases: Sequence[Case], rate_hz: int, frames: int) -> Tensor:
     """Relative squared error of each string's first frames, over the whole grid, (strings,)."""
-    return torch.stack(
-        [
-            (_motion(model, case, rate_hz, frames) - case.truth[:frames]).square().sum()
-            / case.truth[:frames].square().sum()
-            for case in cases
-        ]
-    )
+    found = [error_to_signal(_motion(model, case, rate_hz, frames), case.truth[:frames]) for case in cases]
+    return torch.tensor(found, dtype=torch.float64)
 
 
 def geometric_mean(errors: Tensor) -> float:

@@ -6,10 +6,12 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from statistics import mean
 
 import torch
 
 from engine import bounds
+from engine.compare.relative import relative_error
 from engine.models import build_model
 from engine.models.base import Physics
 from engine.models.koopman_tension import KoopmanTension
@@ -18,7 +20,7 @@ from engine.resonators.string import resonator_of
 from engine.schema import SchemaError, read, read_toml, write
 from engine.values.string import StringParameters
 from training.family.errors import SCALE_M, player
-from training.family.fit import Case, FitProgress, fit_curves
+from training.family.fit import Case, fit_curves
 from training.family.motions import solve
 from training.family.strings import FAMILY, GRID_POINTS, draw_string
 
@@ -69,13 +71,12 @@ def train_preset(
     configuration: FamilyConfiguration,
     output: Path,
     *,
-    made: Callable[[float], None] = lambda share: None,
-    report: Callable[[FitProgress], None] = lambda progress: None,
+    report: Callable[[float, str, float | None], None] = lambda share, text, left_s: None,
 ) -> PresetInfo:
     """Makes the preset's file, in some minutes.
 
     Args:
-        made: receives the share of the true motions that are there.
+        report: receives the share that is done, what is being done, and the time left, where it is known.
     """
     c, started = configuration, time.monotonic()
     steps = round(c.seconds * c.rate_hz)
@@ -86,7 +87,7 @@ def train_preset(
             plucked = draw_string("inside", split, number, c.seed)
             # as a data set keeps them, in single precision: 4e-15 of the energy
             cases[split].append(Case(plucked, solve(plucked, c.rate_hz, steps).float().double()))
-            made(sum(map(len, cases.values())) / sum(counts.values()))
+            report(0.5 * sum(map(len, cases.values())) / sum(counts.values()), "true motions", None)
     sizes = {"grid_points": GRID_POINTS, "modes": c.modes, "degree": c.degree}
     model = build_model("koopman_tension", sizes)
     assert isinstance(model, KoopmanTension)
@@ -102,7 +103,7 @@ def train_preset(
         steps=c.steps,
         first_frames=first,
         seed=c.seed,
-        report=report,
+        report=lambda share, text, left_s: report(0.5 + 0.5 * share, text, left_s),
     )
     rel_mse, rel_mae = mean_errors(model, cases["validation"], c.rate_hz)
     test_rel_mse, test_rel_mae = mean_errors(model, cases["test"], c.rate_hz)
@@ -140,11 +141,9 @@ def train_preset(
 def mean_errors(model: KoopmanTension, cases: list[Case], rate_hz: int) -> tuple[float, float]:
     """Relative MSE and MAE of displacement on the grid, each string's own, and their mean over the strings."""
     play = player(model)
-    squared = absolute = 0.0
+    errors = []
     for case in cases:
         shapes = torch.from_numpy(case.plucked.resonator.shapes)
-        truth = case.truth @ shapes
-        wrong = play(case.plucked, rate_hz, len(truth)) @ shapes - truth
-        squared += float(wrong.square().sum() / truth.square().sum()) / len(cases)
-        absolute += float(wrong.abs().sum() / truth.abs().sum()) / len(cases)
-    return squared, absolute
+        found = play(case.plucked, rate_hz, len(case.truth)) @ shapes
+        errors.append(relative_error(found[None], (case.truth @ shapes)[None]))
+    return mean(each.rel_mse for each in errors), mean(each.rel_mae for each in errors)

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from engine import excitation
+from engine.excitation import displacement
 from engine.pluck import Shape
 from engine.resonators.base import Resonator
 from engine.resonators.family import BRIGHT_HZ, StringFamily
@@ -74,13 +74,8 @@ def draw_from(ranges: StringFamily, random: np.random.Generator, shape: Shape | 
     drawn, place = DRAWN_SHAPES[int(random.integers(3))], float(random.uniform(*ranges.position))
     half_width, rise = _log_uniform(random, ranges.half_width), _log_uniform(random, ranges.tension_rise)
     shape = shape or drawn
-    if shape == "triangular":
-        displacement = excitation.triangular(place, 1e-3, GRID_POINTS)
-    elif shape == "raised_cosine":
-        displacement = excitation.raised_cosine(place, 2 * half_width, 1e-3, GRID_POINTS)
-    else:
-        displacement = excitation.gaussian(place, half_width, 1e-3, GRID_POINTS)
-    amplitudes = resonator.to_modes(displacement)
+    width = 2 * half_width if shape == "raised_cosine" else half_width
+    amplitudes = resonator.to_modes(displacement(shape, place, width, 1e-3, GRID_POINTS))
     amplitudes = amplitudes * np.sqrt(rise / resonator.relative_tension_rise(amplitudes))
     return PluckedString(string, resonator, torch.from_numpy(amplitudes), pitch_hz, inharmonicity, rise)
 

@@ -20,7 +20,7 @@ from torch import Tensor
 from torch.nn import BatchNorm1d
 from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
-from engine.metrics import ErrorSums, RelativeError
+from engine.compare.relative import ErrorSums, RelativeError
 from engine.models.base import StringModel
 from engine.plain_text import one_line
 from engine.schema import SchemaError, read, write

@@ -1,6 +1,6 @@
 """A start from the displacement alone: shapes, eigenvalues, and how energies shift frequencies.
 
-For an integrated phase, which has that form, and for the Fourier cells, which can be wired to have it.
+For an integrated phase, which has that form; `training.research.fourier_wiring` adds the Fourier cells.
 
 The shapes that the motions show (`modes`) keep theirs while their frequencies move, so that the motion of a mode n
 in a string that starts at rest is, with its start q_n and all starts' energies E_m(t) = q_m² e^{-2σ_m t},
@@ -14,19 +14,17 @@ while it is known to less than half a turn, so the first fit sees a dozen frames
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import torch
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from engine.models.base import StringModel
-from engine.models.fno import FGRU, FRNN
-from engine.models.integrated_phase import IntegratedPhase
 from engine.models.string_modes import StringModes
 from training.fitting.modes import SLOWEST, Modes
-from training.research.fourier_wiring import store_in_fgru, store_in_frnn
 
 FIRST_FRAMES = 12
 MORE_FRAMES = 1.4  # times as many in each further fit
@@ -36,21 +34,13 @@ EVALUATIONS = 12  # of a fit, at most: the next one continues from there
 Floats = NDArray[np.float64]
 
 
-def start_from_phases(model: StringModel, modes: Modes, seed: int) -> None:
-    """Gives a model what the motions of the modes that were found show.
+def _store_in_integrated_phase(model: Any, modes: Modes, seed: int) -> None:
+    model.store_modes(fit_phases(modes, seed))
 
-    FRNN, whose frequencies follow nothing, is given each mode's mean motion (`mean_motions`).
 
-    Raises:
-        ValueError: the model cannot hold as many modes.
-    """
-    if isinstance(model, IntegratedPhase):
-        model.store_modes(fit_phases(modes, seed))
-    elif isinstance(model, FGRU):
-        store_in_fgru(model, fit_phases(modes, seed))
-    else:
-        assert isinstance(model, FRNN)
-        store_in_frnn(model, mean_motions(modes))
+# by model: gives it what the motions of the modes that were found show
+STORES: dict[str, Callable[[Any, Modes, int], None]] = {"koopman_integrated": _store_in_integrated_phase}
+WIRED = "its start is computed: train it with .venv/bin/python -m training.research.fourier_wiring RUN"
 
 
 def fit_phases(modes: Modes, seed: int) -> StringModes:
@@ -59,7 +49,7 @@ def fit_phases(modes: Modes, seed: int) -> StringModes:
     trajectories, frames, count = motions.shape
     generator = np.random.default_rng(seed)
     energies = motions[:, 0] ** 2
-    found = [_first_guess(motions[..., mode], count) for mode in range(count)]
+    found = [first_guess(motions[..., mode], count) for mode in range(count)]
     last = min(FIRST_FRAMES, frames - 1)
     while True:
         rows, times = generator.integers(trajectories, size=SAMPLES), generator.integers(1, last + 1, size=SAMPLES)
@@ -67,33 +57,15 @@ def fit_phases(modes: Modes, seed: int) -> StringModes:
         sigma = np.array([max(guess[1], slowest) for guess in found])
         integrals = energies[rows] * -np.expm1(-2 * sigma * times[:, None]) / (2 * sigma)
         for mode, guess in enumerate(found):
-            motion = _Motion(motions[rows, 0, mode], motions[rows, times, mode], times.astype(float), integrals)
+            motion = Motion(motions[rows, 0, mode], motions[rows, times, mode], times.astype(float), integrals)
             found[mode] = motion.fitted(guess)
         if last == frames - 1:
             break
         last = min(frames - 1, int(MORE_FRAMES * last) + 1)
-    return _string_modes([_upright(guess) for guess in found], slowest, modes)
+    return string_modes([upright(guess) for guess in found], slowest, modes)
 
 
-def mean_motions(modes: Modes) -> StringModes:
-    """Fit to each mode the one exponential nearest to all its motions, each by its own start; no coupling."""
-    motions = modes.motions.numpy()
-    frames, count = motions.shape[1:]
-    mean = np.einsum("rtn,rn->tn", motions, motions[:, 0]) / np.sum(motions[:, 0] ** 2, axis=0)
-    found = [_first_guess(motions[..., mode], 0) for mode in range(count)]
-    last = min(FIRST_FRAMES, frames - 1)
-    while True:
-        times = np.arange(1.0, last + 1)
-        for mode, guess in enumerate(found):
-            seen = mean[1 : last + 1, mode]
-            found[mode] = _Motion(np.ones(last), seen, times, np.empty((last, 0))).fitted(guess)
-        if last == frames - 1:
-            break
-        last = min(frames - 1, int(MORE_FRAMES * last) + 1)
-    return _string_modes([_upright(guess) for guess in found], SLOWEST / (frames - 1), modes)
-
-
-def _string_modes(found: list[Floats], slowest: float, modes: Modes) -> StringModes:
+def string_modes(found: list[Floats], slowest: float, modes: Modes) -> StringModes:
     """The modes as fitted; uncoupled where there is no κ."""
     omega, sigma, real, imag = np.array(found)[:, :4].T
     count = len(found)
@@ -107,7 +79,7 @@ def _string_modes(found: list[Floats], slowest: float, modes: Modes) -> StringMo
     )
 
 
-def _first_guess(motions: Floats, count: int) -> Floats:
+def first_guess(motions: Floats, count: int) -> Floats:
     """The guess of ω, σ, Re s, Im s and κ (count,) from the first frames.
 
     ω is the frequency at which u(t+1) + u(t-1) = 2 cos ω u(t).
@@ -118,7 +90,7 @@ def _first_guess(motions: Floats, count: int) -> Floats:
     return np.array([np.arccos(np.clip(cosine, -1, 1)), 0.0, 1.0, 0.0, *np.zeros(count)])
 
 
-def _upright(guess: Floats) -> Floats:
+def upright(guess: Floats) -> Floats:
     """The same motion with ω ≥ 0: its cosine does not tell a phase from the negative one."""
     omega, sigma, real, imag = guess[:4]
     sign = math.copysign(1.0, omega)
@@ -126,7 +98,7 @@ def _upright(guess: Floats) -> Floats:
 
 
 @dataclass(frozen=True)
-class _Motion:
+class Motion:
     """A mode's samples: start and displacement there, time, and the energies' integrals, (samples, modes)."""
 
     start: Floats

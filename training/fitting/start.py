@@ -70,13 +70,16 @@ def _pursued(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
 
 def _from_phases(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
     from training.fitting.modes import found_modes
-    from training.fitting.phases import start_from_phases
+    from training.fitting.phases import STORES, WIRED
 
+    store = STORES.get(configuration.model)
+    if store is None:
+        raise ValueError(f"{configuration.title}: {WIRED}")
     modes = found_modes(dataset, configuration.steps)
     counted = configuration.model != "koopman_integrated" or "state_size" in configuration.model_configuration
     found = None if counted else {"state_size": len(modes.shapes)}
     model = new_model(configuration, dataset.scale_m, found)
-    start_from_phases(model, modes, configuration.recipe.seed)
+    store(model, modes, configuration.recipe.seed)
     return model, None
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,9 +65,13 @@ def apart_cents(first: Series, other: Series) -> float:
     return abs(1200 * math.log2(other.f0_hz / first.f0_hz))
 
 
-def partials_hz(f0_hz: float, stiffness: float, count: int) -> Array:
-    k = np.arange(1, count + 1)
+def partial_hz(k: Any, f0_hz: float, stiffness: float) -> Any:
+    """The frequency of a stiff string's partial of number k, or of each of an array."""
     return k * f0_hz * np.sqrt(1 + stiffness * k**2)
+
+
+def partials_hz(f0_hz: float, stiffness: float, count: int) -> Array:
+    return partial_hz(np.arange(1.0, count + 1), f0_hz, stiffness)
 
 
 @dataclass(frozen=True)
@@ -110,7 +115,7 @@ class Peaks:
 def distances(hz: Array, f0_hz: float, stiffness: float) -> Array:
     """The distances from each frequency to the nearest partial, in Hz."""
     k = np.maximum(1, np.round(_number(hz, f0_hz, stiffness)))
-    return hz - k * f0_hz * np.sqrt(1 + stiffness * k**2)
+    return hz - partial_hz(k, f0_hz, stiffness)
 
 
 def _number(hz: Array, f0_hz: float, stiffness: float) -> Array:
@@ -211,7 +216,7 @@ def _candidates(peaks: Peaks, f0_range_hz: tuple[float, float]) -> Array:
 
 def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, float, tuple[int, ...]]:
     k_of = np.maximum(1, np.round(_number(peaks.hz, f0_hz, stiffness))).astype(int)
-    target = k_of * f0_hz * np.sqrt(1 + stiffness * k_of**2)
+    target = partial_hz(k_of, f0_hz, stiffness)
     allowed = tolerance(peaks.hz, f0_hz, peaks.width_hz)
     near = np.clip(1.5 * (1 - np.abs(peaks.hz - target) / allowed), 0.0, 1.0)
     inside = (near > 0) & (k_of <= MOST_PARTIALS)

@@ -18,6 +18,7 @@ from engine.resonators.recorded import MOST_CENTS, RATIOS
 from engine.resonators.string import decay_rates, undamped_frequencies
 from engine.values.string import StringParameters
 from training.recording.fit import LearnedNote
+from training.recording.numbering import partial_hz
 from training.recording.refine import Pole, polarisations
 
 Array = NDArray[np.float64]
@@ -138,7 +139,7 @@ def _of_string(learned: LearnedNote, number: int) -> list[Pole]:
 
     What is further off is a resonance of the body. A partial that has nothing near is pulled by it: its own stay.
     """
-    place = learned.f0_hz * number * math.sqrt(1 + learned.stiffness * number**2)
+    place = partial_hz(number, learned.f0_hz, learned.stiffness)
     far = 300 * math.log2((number + 1) / number)  # a quarter of the way to the next partial
     own = [pole for pole in learned.poles if pole.partial == number and pole.a]
     free = [pole for pole in learned.poles if pole.partial == 0 and pole.a and pole.hz > 0]
@@ -178,9 +179,9 @@ def physics_of(learned: LearnedNote) -> Physics:
         f0, stiffness = math.sqrt(square), slope / square
         f0_error, stiffness_error = math.sqrt(covariance[0, 0]) / (2 * f0), math.sqrt(covariance[1, 1]) / square
     else:
-        f0, stiffness = hz[0] / k[0] / math.sqrt(1 + learned.stiffness * k[0] ** 2), learned.stiffness
+        f0, stiffness = hz[0] / partial_hz(k[0], 1.0, learned.stiffness), learned.stiffness
         f0_error, stiffness_error = math.inf, math.inf
-    cents = 1200 * np.log2(hz / (f0 * k * np.sqrt(1 + stiffness * k**2)))
+    cents = 1200 * np.log2(hz / partial_hz(k, f0, stiffness))
     of_string = weight * np.where(np.abs(cents) > MOST_OFF_CENTS, PULLED_WEIGHT, 1.0)
     smooth_hz, smooth = _smooth(hz, np.array([each.decay for each in partials]), of_string)
     rise = float(learned.glide.shares.sum())

@@ -12,16 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft, signal
 
+from engine.compare.relative import error_to_signal
+from engine.compare.spectra import log_spectral_distance, spectral_distances
 from training.recording.fit import LearnedNote
 from training.recording.note import FIT_BEGINS_S, FIT_LASTS_S, Note
+from training.recording.numbering import partial_hz
 from training.recording.physics import Physics
 
 Array = NDArray[np.float64]
 
 LATE_S = 0.05  # after the onset: the second ESR begins here
 MOST_DELAY_S = 0.002
-SPECTRA = 2048  # of the log spectral distance; hop a quarter
-FLOOR_DB = -80.0  # below a recording's loudest bin, or its noise, whichever is higher
 STFT_SIZES = (512, 1024, 2048, 4096)
 BANDS_HZ = (31.5, 63.0, 125.0, 250.0, 500.0, 1_000.0, 2_000.0, 4_000.0, 8_000.0)
 
@@ -108,7 +109,7 @@ def partials_in(learned: LearnedNote, physics: Physics) -> tuple[PartialReport, 
     found = []
     for number in sorted(spreads):
         each = spreads[number]
-        law = number * physics.f0_hz * math.sqrt(1 + physics.stiffness * number**2)
+        law = partial_hz(number, physics.f0_hz, physics.stiffness)
         hz = sum(each.hz) / 2
         low, high = each.level_db
         decay = math.sqrt(each.decay[0] * each.decay[1])
@@ -124,13 +125,13 @@ def partials_in(learned: LearnedNote, physics: Physics) -> tuple[PartialReport, 
 def errors_of(truth: Array, found: Array, rate_hz: int, noise_power: float = 0.0) -> Errors:
     """The errors between sounds of one length that begin 8 ms after the onset."""
     moved, gain, delay = aligned(truth, found, rate_hz)
-    wrong = truth - moved
     late = round((LATE_S - FIT_BEGINS_S) * rate_hz)
+    convergence, log_db = spectral_distances(moved[None], truth[None], STFT_SIZES)
     return Errors(
-        float(wrong @ wrong / max(float(truth @ truth), 1e-30)),
-        float(wrong[late:] @ wrong[late:] / max(float(truth[late:] @ truth[late:]), 1e-30)),
+        error_to_signal(moved, truth),
+        error_to_signal(moved[late:], truth[late:]),
         log_spectral_distance(truth, moved, noise_power),
-        multi_resolution(truth, moved),
+        float(convergence[0] + math.log(10) / 20 * log_db[0]),
         20 * math.log10(max(abs(gain), 1e-9)),
         delay,
     )
@@ -156,34 +157,6 @@ def aligned(truth: Array, found: Array, rate_hz: float) -> tuple[Array, float, f
     moved = fft.irfft(ours * turn, size)[: len(truth)] if abs(delay) > 1e-3 else found
     gain = float(truth @ moved / max(float(moved @ moved), 1e-30))
     return gain * moved, gain, delay / rate_hz
-
-
-def _spectra(sound: Array, size: int) -> Array:
-    """Magnitudes through Hann windows, (bins, frames)."""
-    padded = np.pad(sound, (0, max(0, size - len(sound))))
-    frames = np.lib.stride_tricks.sliding_window_view(padded, size)[:: size // 4]
-    return np.abs(fft.rfft(frames * signal.get_window("hann", size), axis=1)).T
-
-
-def log_spectral_distance(truth: Array, found: Array, noise_power: float = 0.0) -> float:
-    """Root mean square over bins of the difference in dB, mean over frames; levels below the floor count as it."""
-    theirs, ours = _spectra(truth, SPECTRA), _spectra(found, SPECTRA)
-    window = signal.get_window("hann", SPECTRA)
-    floor = max(float(theirs.max()) * 10 ** (FLOOR_DB / 20), math.sqrt(noise_power * float(window @ window)), 1e-12)
-    difference = 20 * np.log10(np.maximum(theirs, floor) / np.maximum(ours, floor))
-    heard = (np.maximum(theirs, ours) > floor).any(axis=1)
-    return float(np.sqrt(np.mean(difference[heard] ** 2, axis=0)).mean()) if heard.any() else 0.0
-
-
-def multi_resolution(truth: Array, found: Array) -> float:
-    """Yamamoto, Song, Kim 2020, over four sizes of windows."""
-    total = 0.0
-    for size in STFT_SIZES:
-        theirs, ours = _spectra(truth, size), _spectra(found, size)
-        floor = 1e-4 * float(theirs.max()) + 1e-12
-        total += float(np.linalg.norm(theirs - ours) / max(float(np.linalg.norm(theirs)), 1e-30))
-        total += float(np.abs(np.log(np.maximum(theirs, floor) / np.maximum(ours, floor))).mean())
-    return total / len(STFT_SIZES)
 
 
 def bands_of(truth: Array, found: Array, rate_hz: int, noise_power: float) -> tuple[Band, ...]:

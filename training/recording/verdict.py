@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from engine.compare.relative import error_to_signal
 from training.recording.fit import LearnedNote, fit_note
 from training.recording.note import Note
 from training.recording.numbering import Series
@@ -62,8 +63,7 @@ def verdict_of(note: Note, series: Series, learned: LearnedNote, report: Report)
     truth = note.fitted()
     t = np.arange(len(truth)) / note.rate_hz
     whole = max(float(truth @ truth), 1e-30)
-    wrong = truth - fit_note(note, series, free=0, glides=False).render(t)
-    linear_esr = float(wrong @ wrong) / whole
+    linear_esr = error_to_signal(fit_note(note, series, free=0, glides=False).render(t), truth)
     loud = [abs(each.cents) < NEAR_CENTS for each in report.partials if each.level_db > LOUD_DB]
     of_law = {each.number for each in report.partials if abs(each.cents) < PULLED_CENTS}
     tau = learned.glide.tau(t)

@@ -1,1 +1,1 @@
-"""Research: `fourier_wiring`, Fourier cells wired as a string of given modes."""
+"""Scripts that nothing imports: `fourier_wiring` trains Fourier cells that are wired as a string of given modes."""

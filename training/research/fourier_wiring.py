@@ -1,6 +1,6 @@
-"""The weights that make the Fourier cells of `fno` a string of known modes.
+"""Train Fourier cells of `fno` from the weights that make them a string of known modes: python -m … RUN [OPTIONS].
 
-A training may start from them.
+RUN and options are those of `train`. So the presets of FGRU and FRNN by our recipe were made.
 
 A Fourier convolution of a zero-padded field is any map that looks the same from every point: a kernel of lags for
 each pair of channels. A string is not the same at every point, so that its state is kept as numbers at single points
@@ -23,11 +23,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from engine.models.fno import FGRU, FRNN, FourierConvolution
 from engine.models.string_modes import StringModes
+from training.fitting import phases
+from training.fitting.modes import SLOWEST, Modes
 
 ENDS = 2  # modes a channel that is read from the ends
 
@@ -438,3 +441,42 @@ class _LeastKernels:
         kernels = torch.zeros(2 * points, channels, dtype=torch.float64)
         kernels[lags] = found.view(len(lags), channels)
         return kernels
+
+
+def mean_motions(modes: Modes) -> StringModes:
+    """Fit to each mode the one exponential nearest to all its motions, each by its own start; no coupling."""
+    motions = modes.motions.numpy()
+    frames, count = motions.shape[1:]
+    mean = np.einsum("rtn,rn->tn", motions, motions[:, 0]) / np.sum(motions[:, 0] ** 2, axis=0)
+    found = [phases.first_guess(motions[..., mode], 0) for mode in range(count)]
+    last = min(phases.FIRST_FRAMES, frames - 1)
+    while True:
+        times = np.arange(1.0, last + 1)
+        for mode, guess in enumerate(found):
+            seen = mean[1 : last + 1, mode]
+            found[mode] = phases.Motion(np.ones(last), seen, times, np.empty((last, 0))).fitted(guess)
+        if last == frames - 1:
+            break
+        last = min(frames - 1, int(phases.MORE_FRAMES * last) + 1)
+    return phases.string_modes([phases.upright(guess) for guess in found], SLOWEST / (frames - 1), modes)
+
+
+def _start_fgru(model: FGRU, modes: Modes, seed: int) -> None:
+    store_in_fgru(model, phases.fit_phases(modes, seed))
+
+
+def _start_frnn(model: FRNN, modes: Modes, seed: int) -> None:
+    store_in_frnn(model, mean_motions(modes))
+
+
+def use() -> None:
+    """Let runs of this process start so."""
+    phases.STORES.update(fgru=_start_fgru, frnn=_start_frnn)
+
+
+if __name__ == "__main__":
+    from training.cli.__main__ import main
+    from training.cli.training import train
+
+    use()
+    main(train)

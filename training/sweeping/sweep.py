@@ -10,19 +10,25 @@ import math
 import time
 from collections import Counter, deque
 from collections.abc import Iterable
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from engine.schema import write
+from engine.plain_text import one_line
+from engine.schema import SchemaError, read, write
 from training.cell import Cell
 from training.provenance import now
 from training.results import RESULTS, Row, add_rows
 from training.run import default_runs
 from training.sweeping.plan import Plan, Run
-from training.sweeping.workers.base import Ended, Noted, OtherSeed, Progressed, Task, Workers
+from training.sweeping.task import PROGRESS, Task, TaskRun, Workers, WorkersError, read_progress
 
-POLL_S = 1.0  # for workers that came or went
+if TYPE_CHECKING:
+    from training.fitting.fit import Progress
+
+POLL_S = 1.0  # for progress, and for workers that came or went
 
 
 @dataclass(frozen=True)
@@ -58,19 +64,16 @@ class Options:
             pieces.setdefault(replace(run.cell, seed=0) if self.seeds_at_once else run.cell, []).append(run)
         return [tuple(piece) for piece in pieces.values()]
 
-    def task(self, plan: Plan, run: Run, *others: Run) -> Task:
+    def task(self, plan: Plan, *runs: Run) -> Task:
         return Task(
-            name=run.name,
-            recipe=run.cell.recipe,
-            configuration=write(run.configuration),
-            digest=run.digest,
-            runs=str(self.runs.absolute()) if self.runs else None,
+            runs=tuple(TaskRun(run.name, write(run.configuration), run.digest) for run in runs),
+            recipe=runs[0].cell.recipe,
+            folder=str(self.runs.absolute()) if self.runs else None,
             group=group_of(plan),
             cache=str(self.cache.absolute()) if self.cache else None,
             device=self.device,
             threads=self.threads,
             checkpoint_every_s=self.checkpoint_every_s,
-            others=tuple(OtherSeed(each.name, write(each.configuration), each.digest) for each in others),
         )
 
 
@@ -80,11 +83,11 @@ class Watch(Protocol):
     def started(self, run: Run) -> None:
         """A run was handed to the workers."""
 
-    def progressed(self, event: Progressed) -> None:
-        """An epoch is over."""
+    def progressed(self, run: Run, progress: Progress) -> None:
+        """A run is under way."""
 
-    def noted(self, event: Noted) -> None:
-        """A note is worth a line."""
+    def failed(self, run: Run, error: str) -> None:
+        """A run has failed and is tried again."""
 
     def finished(self, row: Row) -> None:
         """A run has ended, and its row is in the results file."""
@@ -125,36 +128,56 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[
         WorkersError: the workers are gone.
     """
     file = options.results or results_of(plan, options.runs)
+    folder = (options.runs or default_runs()) / group_of(plan)
     rows = {row.digest: row for row in add_rows(file, ())}  # fails before the work where it cannot be written
     waiting = deque(options.pieces(unfinished(plan, rows.values())))
-    running: dict[str, tuple[Run, ...]] = {}  # pieces by their first run's name
-    failures: Counter[str] = Counter()
+    running: dict[Future[dict[str, Any]], tuple[Run, ...]] = {}
+    failures: Counter[str] = Counter()  # of pieces by their first run
     while (waiting or running) and options.left_s > 0:
         while waiting and len(running) < workers.capacity():
             # another machine's rows may have come in meanwhile
             piece = tuple(run for run in waiting.popleft() if not is_finished(rows.get(run.digest)))
             if piece:
-                running[piece[0].name] = piece
-                workers.start(options.task(plan, *piece))
                 for run in piece:
+                    (folder / run.name / PROGRESS).unlink(missing_ok=True)  # of an earlier try
                     watch.started(run)
-        event = workers.next(min(POLL_S, max(options.left_s, 0.0))) if running else None
-        if isinstance(event, Progressed):
-            watch.progressed(event)
-        elif isinstance(event, Noted):
-            watch.noted(event)
-        elif isinstance(event, Ended):
-            piece = running.pop(event.name)
-            failures[event.name] += event.row is None
-            if event.row is None and not event.final and failures[event.name] <= options.retries:
-                watch.noted(Noted(event.name, f"failed and is tried again ({event.error})"))
+                running[workers.submit(write(options.task(plan, *piece)))] = piece
+        ended, _ = wait(running, min(POLL_S, max(options.left_s, 0.0)), FIRST_COMPLETED)
+        for run in chain(*running.values()):
+            if progress := read_progress(folder / run.name):
+                watch.progressed(run, progress)
+        for future in ended:
+            piece = running.pop(future)
+            found, error = _outcome(future)
+            failures[piece[0].name] += bool(error)
+            if error and failures[piece[0].name] <= options.retries:
+                watch.failed(piece[0], error)
                 waiting.appendleft(piece)
                 continue
-            ended = [event.row, *event.others] if event.row else [_failed(run, event.error) for run in piece]
-            rows.update((other.digest, other) for other in add_rows(file, ended))
-            for row in ended:
+            found = found or [_failed(run, error) for run in piece]
+            rows.update((other.digest, other) for other in add_rows(file, found))
+            for row in found:
                 watch.finished(row)
     return [rows[run.digest] for run in plan.runs if run.digest in rows]
+
+
+def _outcome(future: Future[dict[str, Any]]) -> tuple[list[Row], str]:
+    """The rows of a task that has ended; or none, and why it failed.
+
+    Raises:
+        WorkersError: see `sweep`.
+    """
+    if future.cancelled():
+        raise WorkersError("the scheduler has given up its tasks; is it still there? The same command continues")
+    if died := future.exception():
+        return [], one_line(
+            f"its worker died: {type(died).__name__}: {died}; too little memory, or a fault in a library"
+        )
+    try:
+        outcome = future.result()
+        return [read(Row, row, "row") for row in outcome["rows"]], one_line(outcome["error"])
+    except SchemaError as error:
+        return [], f"its result makes no sense: {error}"
 
 
 def _failed(run: Run, error: str) -> Row:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from app.analysis.abx.trials import Identity
+from engine.compare.spectra import spectral_distances
 from engine.kernels.limiter import CEILING
 
 SOURCES = ("model", "truth")  # of A and B
@@ -69,19 +70,12 @@ def make_stimuli(sounds: Mapping[str, NDArray[np.float32]], rate_hz: int, volume
         levelled = gain * samples
         levelled[len(levelled) - fade :] *= falling
         made[identity] = levelled.astype(np.float32)
+    # differences in phase alone are hardly heard
+    convergence, _ = spectral_distances(gains[0] * a.mean(axis=1)[None], gains[1] * b.mean(axis=1)[None])
     return Stimuli(
         rate_hz,
         made,
         (min(0.0, 20 * math.log10(gains[0])), min(0.0, 20 * math.log10(gains[1]))),  # not a rounding above 0
         same=bool(np.array_equal(made["A"], made["B"])),
-        trivial=_convergence(gains[0] * a.mean(axis=1), gains[1] * b.mean(axis=1)) > TRIVIAL_CONVERGENCE,
+        trivial=bool(convergence[0] > TRIVIAL_CONVERGENCE),
     )
-
-
-def _convergence(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
-    """The distance of the magnitude spectra (see `engine.spectra`); differences in phase alone are hardly heard."""
-    import torch
-
-    from engine.spectra import spectral_distances
-
-    return float(spectral_distances(torch.from_numpy(a)[None], torch.from_numpy(b)[None])[0])

@@ -18,10 +18,11 @@ import numpy as np
 
 from app.export.plugin.formats import FORMATS, TARGETS, PluginError, check_compiler
 from app.export.plugin.identity import PREFIX, check_kept, lost_with
-from app.export.plugin.image import MAKER, NOISE_FRAMES, NOISE_UNIT, Image, layout_header
+from app.export.plugin.image import MAKER, Image, layout_header
 from app.export.plugin.objects import STUBS, objects_of, reason_of, run_waiting
 from app.shared.version import program_version
 from engine.effects.room import room_noise
+from engine.kernels.prepared import NOISE_UNIT
 from engine.python_process import python_command, python_environment
 from engine.result_file import WriteError, explain
 from engine.whole_file import naming, whole_file, whole_folder, working_folder
@@ -29,7 +30,7 @@ from engine.whole_file import naming, whole_file, whole_folder, working_folder
 MOST_IMAGES = 128  # of the shell
 FULL_BYTES = 2**24  # where less is left, a build that failed has filled the disk
 COMPILING = 0.97  # of the time of a first build, measured
-COMMON = ("instrument.c", "effects.c", "responses.c", "thread.c", "kernels.c")
+COMMON = ("instrument.c", "effects.c", "thread.c", "kernels.c")
 LIBRARY_ENDINGS = {"linux": ".so", "windows": ".dll", "macos": ".dylib"}
 VST3_ENDINGS = {"linux": ".so", "windows": ".vst3"}
 VST3_FOLDERS = {"linux-x64": "x86_64-linux", "linux-arm64": "aarch64-linux", "windows-x64": "x86_64-win"}
@@ -161,7 +162,7 @@ def _images(images: Sequence[Image], folder: Path) -> str:
         (folder / f"image{number}.bin").write_bytes(image.content)
         lines.append(f"_Alignas(64) static const unsigned char image{number}[] = {{")
         lines += [f'#embed "image{number}.bin"', "};"]
-    noise = np.rint(room_noise(NOISE_FRAMES) / NOISE_UNIT).astype(np.int32)  # finer than single precision
+    noise = np.rint(room_noise() / NOISE_UNIT).astype(np.int32)  # finer than single precision
     (folder / "noise.bin").write_bytes(noise.tobytes())
     lines += [
         f"static const union {{ unsigned char bytes[{noise.nbytes}]; int32_t samples[{noise.size}]; }} noise_bytes ="

@@ -2,7 +2,7 @@
 
 It holds the sound of an instrument: the table of its keys with their gains, the model's and the solver's
 programs, the modes of its body, its macros and parameters. Nothing depends on the rate, which the shell sets when
-the host does. The shell computes the responses of body and room then.
+the host does. The responses of body and room are computed then.
 """
 
 from __future__ import annotations
@@ -13,39 +13,33 @@ import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-import numpy as np
-
 from app.export.plugin.identity import identifier
-from app.export.plugin.parts import AMP, EFFECTS, effects_there, kit_of, parts_of
+from app.export.plugin.parts import AMP, EFFECTS, body_of, effects_there, kit_of
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.string_keys import StringKeys
-from app.instrument.table import PLAYED_PARAMETERS, WHEELED, wheel_goal
+from app.instrument.table import WHEELED, wheel_goal
 from app.patches.drums import Drums
 from app.patches.patch import ASSIGNABLE, Patch
 from app.shared.parameters import MACROS, OF_CHOICES, OF_PATCHES, Parameter
 from engine import bounds
-from engine.effects import body, curves, impulse, room
-from engine.effects.amp import NOMINAL
-from engine.effects.partitions import FADE_S
+from engine.effects.room import NOISE_FRAMES
 from engine.kernels import constants as of
-from engine.kernels import layout as at
-from engine.kernels.records import CHANNEL, EVENT, PLAYER, REPORT, TABLE, slot, slots, voice_bytes
+from engine.kernels import mixer_records as mixed
+from engine.kernels.fields import record_of, slot, slots
+from engine.kernels.records import CHANNEL, EVENT, NEEDS, PLAYER, REPORT, RESPONSES, TABLE
+from engine.kernels.voice_records import TENSION_PROGRAM, TRUTH_PROGRAM, voice_bytes
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import Preset
 from engine.voices.derivative import differentiator_taps
 from engine.voices.mixer import LIMITER_RELEASE_S, VOLUME_SMOOTHING_S
-from engine.voices.player import record_of
 
 PREPARED_HZ = 48_000
 MAKER = "Learned Strings"
 MOST_NOTES = 40
 MOST_PARAMETERS, MOST_TARGETS = 64, 8  # of the shell
 MOST_LOUD_S = 30.0  # after its last key an instrument may ring on so long
-LARGEST_WHOLE = 2**31 - 1
 NOISE_BYTES = 8  # of a frame
-NOISE_FRAMES = round(bounds.ROOM_T60_S[1] * room.RATE_HZ)  # of the noise of the longest room
-NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
 SOURCE, VOLUME, VALUE, MACRO, EFFECT, AMPLIFIER = range(6)  # kinds of the shell's parameters
 SOURCE_ID = "source"
 SOURCES = ("model", "truth", "difference")
@@ -111,15 +105,7 @@ class _Header(ctypes.Structure):
                 "macro_count",
                 "taps",
                 "body",
-                "body_modes",
-                "impulse",
-                "impulse_frames",
-                "impulse_channels",
             )
-        ),
-        *(
-            (name, ctypes.c_double)
-            for name in ("body_s", "body_subsonic_hz", "impulse_hz", "impulse_unit", "body_size")
         ),
         *(
             (name, ctypes.c_int64)
@@ -135,7 +121,7 @@ class _Header(ctypes.Structure):
         ),
         ("longest_s", ctypes.c_double),
         ("wheel_goal", ctypes.c_double),
-        ("level", ctypes.c_double),
+        ("level_db", ctypes.c_double),
         ("id", ctypes.c_char * 128),
         ("name", ctypes.c_char * 64),
         ("description", ctypes.c_char * 512),
@@ -220,21 +206,12 @@ def image_of(patch: Patch, preset: Preset) -> Image:
     header.macros, header.macro_count = put(b"".join(bytes(each) for each in macros)), len(macros)
     header.wheel_effect = EFFECTS.index(patch.mod_wheel) if patch.mod_wheel in EFFECTS else -1
     header.wheel_goal = wheel_goal(patch) or 0.0
-    header.level = 10 ** (patch.level_db / 20)
+    header.level_db = patch.level_db
 
     if kit is not None:
         header.kit, header.kit_slots, header.kit_room = put(kit.memory.tobytes()) // 8, len(kit.memory), kit.room
         header.table_room, header.modes = kit.table_room, kit.modes
-    parts = parts_of(patch)
-    if parts.modes is not None:
-        header.body, header.body_modes = put(parts.modes.tobytes()) // 8, parts.modes.shape[1]
-        header.body_s, header.body_subsonic_hz = parts.seconds, parts.subsonic_hz
-    if parts.impulse is not None:  # where it is loud, finer than single precision
-        unit = float(np.abs(parts.impulse).max()) / LARGEST_WHOLE
-        header.impulse = put(np.rint(parts.impulse / unit).astype(np.int32).tobytes()) // 4
-        header.impulse_frames, header.impulse_channels = parts.impulse.shape
-        header.impulse_hz, header.impulse_unit = parts.impulse_hz, unit
-    header.body_size = patch.body.size
+    header.body = put(body_of(patch).tobytes()) // 8
     header.longest_s = MOST_LOUD_S
     id = identifier(patch.name)
     header.id, header.name, header.maker = id.encode(), _bytes(patch.name, 63), MAKER.encode()
@@ -314,13 +291,11 @@ def _parameters(patch: Patch) -> Iterable[tuple[str, _Parameter]]:
     yield _record("volume_db", VOLUME, 0, 0.0, OF_CHOICES["volume_db"], "")
     drums = isinstance(patch.strings, Drums)
     fixed = not drums and patch.pickup.kind == "bridge"  # at the bridge there is no place to choose
-    points = () if fixed else PLAYED_PARAMETERS[of.POINT :][: len(patch.pickup.points)]
+    points = () if fixed else of.PLAYED[of.POINT :][: len(patch.pickup.points)]
     for id in (*WHEELED, *points):
         if id in (DRUM_PARAMETERS if drums else ASSIGNABLE):
             parameter = OF_PATCHES[id]
-            yield _record(
-                id, VALUE, PLAYED_PARAMETERS.index(id), patch.value(id), parameter, parameter.group.capitalize()
-            )
+            yield _record(id, VALUE, of.PLAYED.index(id), patch.value(id), parameter, parameter.group.capitalize())
     for id in effects_there(patch):
         parameter = OF_PATCHES[id]
         yield _record(id, EFFECT, EFFECTS.index(id), patch.value(id), parameter, parameter.group.capitalize())
@@ -345,14 +320,9 @@ def _macros(patch: Patch, ids: tuple[str, ...]) -> tuple[list[_Macro], tuple[str
 def layout_header(version: str) -> str:
     """The C header with places and constants of the kernels' memory."""
     wanted = {
-        at: "QUANTUM AHEAD EARLY WINDOW REACH MIXER_SLOTS M_RATE M_FRAMES M_ACTIVE M_WANTED_VOLUME M_VOLUME "
-        "M_RELEASE M_REDUCTION M_PEAK M_LEFT M_CHANNELS M_SMOOTHING M_LIMITING M_CONVOLVER M_EFFECTS "
-        "M_EFFECTS_NOW M_EFFECTS_NEXT M_PLAYER M_TAPS M_GAINS M_ADDRESS M_SCRATCH M_AMPLIFIER A_WANTED_DRIVE "
-        "A_WANTED_GAIN NEXT_WEIGHTS A_WANTED_TONE I_HEADER C_CAPACITY C_FADE_WINDOWS "
-        "C_ACTIVE C_STEP C_COSINES C_SINES C_WORK C_LATE S_RATE T_RATE",
-        of: "NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENTS REPORTS MOST_NOTES "
-        "MOST_SOURCES MPE KEYS CHANNELS BEND_SEMITONES BEGAN BODY_MIX BODY_CROSS BODY_STEP BODY_HEADER "
-        "BODY_POINTS BODY_LOWEST_HZ BODY_STEPS BODY_SLOTS",
+        mixed: "EARLY REACH",
+        of: "QUANTUM AHEAD NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENTS REPORTS MOST_NOTES "
+        "MOST_SOURCES KEYS CHANNELS BEGAN BODY_MIX BODY_SLOTS",
     }
     lines = [f'#define LS_VERSION "{version}"']
     for module, names in wanted.items():
@@ -363,49 +333,26 @@ def layout_header(version: str) -> str:
         ("REPORT", REPORT),
         ("TABLE", TABLE),
         ("CHANNEL", CHANNEL),
+        ("RESPONSES", RESPONSES),
+        ("NEEDS", NEEDS),
+        ("MIXER", mixed.MIXER),
+        ("AMPLIFIER", mixed.AMPLIFIER),
+        ("CONVOLVER", mixed.CONVOLVER),
+        ("IMPULSE", mixed.IMPULSE),
+        ("TENSION_PROGRAM", TENSION_PROGRAM),
+        ("TRUTH_PROGRAM", TRUTH_PROGRAM),
     ):
         lines += [f"#define {name}_{field.upper()} {slot(kind, field)}" for field in kind.names or ()]
         lines += [f"#define {name}_SLOTS {slots(kind)}"]
     none = voice_bytes(0) // 8
     records = {"IMAGE": _Header, "PARAMETER": _Parameter, "MACRO": _Macro}
     lines += [f"#define {name}_BYTES {ctypes.sizeof(record)}" for name, record in records.items()]
-    lines += [f"#define {name} {_in_c(value)}" for name, value in _RESPONSES.items()]
     lines += [
         f"#define VOICE_SLOTS_FIXED {none}",
         f"#define VOICE_SLOTS_A_MODE {voice_bytes(1) // 8 - none}",
-        f"#define CONVOLVER_FADE_S {FADE_S}",
-        f"#define AMP_NOMINAL {NOMINAL}",
+        f"#define BODY_SIZE_HIGHEST {bounds.BODY_SIZE[1]}",
+        f"#define ROOM_T60_HIGHEST_S {bounds.ROOM_T60_S[1]}",
         f"#define LIMITER_RELEASE_S {LIMITER_RELEASE_S}",
         f"#define VOLUME_SMOOTHING_S {VOLUME_SMOOTHING_S}",
     ]
     return "\n".join(lines) + "\n"
-
-
-_RESPONSES = {
-    "LOUDNESS_LOW_HZ": impulse.LOUDNESS_HZ[0],
-    "LOUDNESS_HIGH_HZ": impulse.LOUDNESS_HZ[1],
-    "CURVES_HZ": curves.RATE_HZ,
-    "CURVES_FINEST_HZ": curves.FINEST_HZ,
-    "BODY_SIZE_HIGHEST": bounds.BODY_SIZE[1],
-    "ROOM_T60_HIGHEST_S": bounds.ROOM_T60_S[1],
-    "FADE_SHARE": impulse.FADE_SHARE,
-    "LONGEST_IMPULSE_S": bounds.LONGEST_IMPULSE_S,
-    "BODY_HIGHEST_HZ": body.HIGHEST_HZ,
-    "NOISE_UNIT": NOISE_UNIT,
-    "ROOM_HZ": room.RATE_HZ,
-    "SOUND_M_S": room.SPEED_M_S,
-    "ROOM_SIDES_M": room.SIDES_M,
-    "ROOM_SOURCE": room.SOURCE,
-    "ROOM_LISTENER": room.LISTENER,
-    "ROOM_APART_M": room.APART_M,
-    "ROOM_MIXING_S": room.MIXING_S,
-    "ROOM_BANDS_HZ": room.BANDS_HZ,
-    "ROOM_BANDS_T60": room.BANDS_T60,
-    "ROOM_SUBSONIC_HZ": room.SUBSONIC_HZ,
-}
-
-
-def _in_c(value: object) -> str:
-    if isinstance(value, tuple | np.ndarray):
-        return "{" + ", ".join(_in_c(float(each)) for each in value) + "}"
-    return repr(float(value))  # type: ignore[arg-type]

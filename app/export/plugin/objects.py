@@ -51,7 +51,7 @@ def digest() -> str:
     """The digest of the kernels and of what compiles them: it changes with either."""
     kernels = Path(sys.modules["engine"].__file__ or "").parent / "kernels"
     found = hashlib.sha256()
-    for source in (*sorted(kernels.glob("*.py")), Path(__file__), Path(texts.__file__)):
+    for source in (*sorted(kernels.rglob("*.py")), Path(__file__), Path(texts.__file__)):
         found.update(source.read_bytes())
     for package in ("numba", "llvmlite"):
         found.update(version(package).encode())

@@ -1,4 +1,4 @@
-"""Parts beyond the table of strings that the shell computes sounds from: body and room, and drums."""
+"""Parts beyond the table of strings that a plug-in computes sounds from: its body, and drums."""
 
 from __future__ import annotations
 
@@ -8,19 +8,17 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKeys, struck_drum
 from app.instrument.effects import effects_of
 from app.patches.patch import Patch
 from app.shared.parameters import OF_PATCHES
-from engine.bounds import BODY_SIZE
-from engine.effects import BODIES
-from engine.effects.body import HIGHEST_HZ, SUBSONIC, modes_of
+from engine.effects.body_record import body_memory
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as kernel
 from engine.kernels import kit
-from engine.kernels.records import DRUM, DRUM_ROWS, slots
+from engine.kernels.fields import slots
+from engine.kernels.records import DRUM, DRUM_ROWS
 from engine.resonators.base import Array
 from engine.resonators.drum import around as around_of
 
@@ -29,35 +27,10 @@ MORE = 1.05  # of modes than the keys need
 AMP = ("amp.drive_db", "amp.tone_db")
 
 
-@dataclass(frozen=True, eq=False)
-class Parts:
-    """The parts that the shell computes responses of the body from, at a size of 1.
-
-    Attributes:
-        modes: (4, modes): Hz, decay in 1/s, amplitudes left and right; None: it has no modes.
-        seconds: how long they ring.
-        subsonic_hz: below it the body radiates next to nothing.
-        impulse: a body that is a response, at `impulse_hz` (frames, 1 or 2); None: it is not.
-    """
-
-    modes: NDArray[np.float64] | None = None
-    seconds: float = 0.0
-    subsonic_hz: float = 0.0
-    impulse: NDArray[np.float64] | None = None
-    impulse_hz: float = 0.0
-
-
-def parts_of(patch: Patch) -> Parts:
-    """The parts of a patch's body, as far as it has one."""
+def body_of(patch: Patch) -> Array:
+    """The body of a patch as a plug-in reads it."""
     effects = effects_of(patch.with_value("body.mix", 1.0))
-    body = None if effects is None else effects.body
-    if body is None:
-        return Parts()
-    if body.impulse is not None:
-        return Parts(impulse=body.impulse.samples, impulse_hz=body.impulse.rate_hz)
-    wood = BODIES[body.name]
-    modes = np.vstack([part.T for part in modes_of(wood, 1.0, HIGHEST_HZ * BODY_SIZE[1])])
-    return Parts(modes, wood.seconds, SUBSONIC * wood.lowest[0].frequency_hz)
+    return body_memory(None if effects is None else effects.body)
 
 
 def effects_there(patch: Patch) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from engine.result_file import explain
 PREFIX = "ls_"  # of the entries' names
 # Entries of each; those that mixers call stand in its namespace under the same names
 PARTS = {
-    "mixing": ("render", "partition"),
+    "mixing": ("render", "drive", "begin_convolver", "measure", "prepare", "weigh", "mix"),
     "playing": ("play", "sound", "sympathise", "begin", "kit_begin", "kit_follow", "kit_prepare"),
 }
 SELDOM = 50_000, 20, 50  # of objects and passes: a fifth of the time went to collections that freed next to nothing
@@ -66,10 +66,9 @@ def text(part: str) -> str:
 
     compiled.COMPILED["cache"] = False
     compiled.COMPILED["no_cpython_wrapper"] = compiled.COMPILED["no_cfunc_wrapper"] = True
-    from engine.kernels import bank, mixer, plugin, rendered
+    from engine.kernels import mixer, plugin, rendered
 
-    for kind in (bank, rendered):  # of voices, which the compiled player does not make
-        kind.generate = njit(lambda *_: None)  # type: ignore[attr-defined]
+    rendered.generate = njit(lambda *_: None)  # of voices that the compiled player does not make
     for name in (each for entries in PARTS.values() for each in entries if hasattr(mixer, each)):
         if name not in PARTS[part]:
             setattr(mixer, name, _elsewhere(name))

@@ -14,7 +14,6 @@ from app.analysis.error_course import ErrorCourse
 from app.presets import words
 from app.presets.library import Library
 from app.rendering import BlowTake, Sounding, Take
-from app.rendering.blow import BlowErrors
 from app.session.choices import Session
 from app.views import theme
 from app.views.controls.parts import tool_button
@@ -22,6 +21,7 @@ from app.views.controls.segments import SMALL, Segments
 from app.views.plots.axis_label import UprightLabel, UprightTicks
 from app.views.plots.time_plot import TimePlot
 from app.window.panels.time_panel import TimePanel
+from engine.compare.relative import ErrorWindows
 
 LONG_S = 10.0
 QUANTITIES = (
@@ -32,7 +32,7 @@ LOWEST_DECADE, HIGHEST_DECADE = -9, 4  # motions are kept in single precision, a
 LEVEL_SPANS_DB = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0)
 
 
-class ErrorTimePanel(TimePanel[ErrorCourse | BlowErrors]):
+class ErrorTimePanel(TimePanel[ErrorWindows]):
     """The axis grows with the curves by decades."""
 
     of_strings = False
@@ -95,13 +95,13 @@ class ErrorTimePanel(TimePanel[ErrorCourse | BlowErrors]):
         self._fit([])
         self._show_legend()
 
-    def _begin(self, take: Sounding) -> ErrorCourse | BlowErrors:
+    def _begin(self, take: Sounding) -> ErrorWindows:
         if isinstance(take, BlowTake):
             return take.errors
         assert isinstance(take, Take)
         return ErrorCourse(take)
 
-    def _draw(self, made: ErrorCourse | BlowErrors) -> None:
+    def _draw(self, made: ErrorWindows) -> None:
         ready = made.ready
         shown = (made, ready, self.quantities.key)
         if ready and shown != self._shown:
@@ -119,7 +119,7 @@ class ErrorTimePanel(TimePanel[ErrorCourse | BlowErrors]):
             self._curves[name].setData(time_s, np.where(np.isfinite(values), values, np.nan), connect="finite")
         self._fit(list(drawn.values()))
 
-    def _words(self, made: ErrorCourse | BlowErrors, time_s: float, place: float) -> Iterable[str]:
+    def _words(self, made: ErrorWindows, time_s: float, place: float) -> Iterable[str]:
         window = int(time_s / made.window_s)
         if not 0 <= window < made.ready:
             return []

@@ -12,7 +12,7 @@ from app.views.controls.parts import combo_box, words_label
 from app.views.controls.progress_strip import ProgressStrip
 from app.views.plots.figures_table import Column, FiguresTable, TableRow, lay_out_table, values_of
 from app.window.panels.base import LEAST_HEIGHT, Moment, Panel
-from engine.partials import LEAST_DECAY_DB
+from engine.compare.partials import LEAST_DECAY_DB
 
 
 def hertz(value: float) -> str:

@@ -8,9 +8,10 @@ from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import contact
-from engine.kernels import layout as at
+from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import reals, wholes
+from engine.kernels.memory import voice_at
+from engine.kernels.modes import rows, wished_rows
 from engine.kernels.playing import channels, keys, slots, voices
 from engine.kernels.records import Note, Player, Table
 
@@ -40,7 +41,7 @@ def retune(
     frame: int,
     now: int,
 ) -> None:
-    """Lets a note glide to its string as knobs, wheels and damper have changed it, where they have."""
+    """Let a note glide to its string as knobs, wheels and damper have changed it, where they have."""
     string, changed = player.bent, False
     if note.drum != 0:
         return
@@ -56,18 +57,20 @@ def retune(
         changed = True
     if not changed:
         return
-    size, filled = at.RESONATOR_ROWS * note.modes, 0
+    filled = 0
     for source in range(of.MOST_SOURCES):
         address = note.voices[source]
         if address == 0 or slots.voice_over(address):
             continue
-        rows = voices.wish(player, note, source, seconds, frame, now)
+        wished = voices.add_wish(player, note, source, seconds, frame, now)
+        own = wished_rows(wished, note.modes)
         if filled == 0:
-            voices.fill(player, table, note, string, reals(rows))
-            filled = rows
+            voices.fill(player, table, note, string, own)
+            filled = wished
         else:
-            for place in range(size):
-                reals(rows)[place] = reals(filled)[place]
+            others = wished_rows(filled, note.modes)
+            for place in range(len(own)):
+                own[place] = others[place]
 
 
 @njit(**COMPILED)
@@ -78,7 +81,7 @@ def damp(
     frame: int,
     now: int,
 ) -> None:
-    """Puts the damper on a string or a drum that nothing holds."""
+    """Put the damper on a string or a drum that nothing holds."""
     held = note.held + note.kept + note.damped
     if held != 0 or table.let_ring != 0:
         return
@@ -90,25 +93,26 @@ def damp(
         level_db = keys.value_of(player, table, of.DAMPER_DB)
         level_db += channels.loudness_db(player, table.mode, note.channel)
         stroke, strength = note.age if table.variation > 0.0 else 0, landing(table, note)
-        contact.touch(player, table, of.RELEASE, level_db, strength, 1.0, stroke, note.key, frame, 0.0, 0.0)
+        by = contact.Touch(of.RELEASE, level_db, strength, 1.0, stroke, note.key, frame, 0.0, 0.0)
+        contact.touch(player, table, by)
         return
     t60_s = keys.value_of(player, table, of.RELEASE_S)
     for source in range(of.MOST_SOURCES):
         address = note.voices[source]
         if address == 0 or slots.voice_over(address):
             continue
-        voice, n = reals(address), wholes(address)[at.MODES]
-        rows = reals(voices.wish(player, note, source, DAMPER_S, frame, now))
-        first = at.state(n) + at.OMEGA_SQUARED * n
-        for place in range(at.RESONATOR_ROWS * n):
-            rows[place] = voice[first + place]
+        voice = voice_at(address)
+        n, present = voice.modes, rows(voice, at.OMEGA_SQUARED, at.RESONATOR_ROWS)
+        wished = wished_rows(voices.add_wish(player, note, source, DAMPER_S, frame, now), n)
+        for place in range(len(wished)):
+            wished[place] = present[place]
             if n <= place < 2 * n:  # σ
-                rows[place] += math.log(1000.0) / t60_s
+                wished[place] += math.log(1000.0) / t60_s
 
 
 @njit(**COMPILED)
 def damp_unkept(player: Player, table: Table, frame: int, now: int) -> None:
-    """Puts the damper on strings that a pedal kept, and keeps no longer."""
+    """Put the damper on strings that a pedal kept, and keep no longer."""
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
         if note.kept == 0 or not slots.sounds(note):
@@ -127,7 +131,7 @@ def glide(
     frame: int,
     now: int,
 ) -> None:
-    """Lets strings follow the wheels of a channel; -1: all, whatever has changed."""
+    """Let strings follow the wheels of a channel; -1: all, whatever has changed."""
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
         moved = channel < 0 or channels.acts_on(table.mode, channel, note.channel)

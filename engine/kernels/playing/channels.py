@@ -55,7 +55,7 @@ def rest(player: Player, number: int, pedal: int, plays: int) -> None:
 
 @njit(**COMPILED)
 def reset(player: Player, number: int) -> None:
-    """Resets wheel, pedals, expression and the choice of a parameter, as MIDI's RP-015 has it; all else stays."""
+    """Reset wheel, pedals, expression and the choice of a parameter, as MIDI's RP-015 has it; all else stays."""
     channel = player.channels[number]
     channel.bend = channel.mute = 0.0
     channel.pedal = 0
@@ -68,7 +68,7 @@ def reset(player: Player, number: int) -> None:
 
 @njit(**COMPILED)
 def begin(player: Player, number: int) -> None:
-    """Puts a channel in the state in which nobody has played on it."""
+    """Put a channel in the state in which nobody has played on it."""
     reset(player, number)
     rest(player, number, 0, 0)
     player.channels[number].volume = of.USUAL_VOLUME
@@ -144,7 +144,7 @@ def _bend_range(player: Player, mode: int, number: int) -> float:
 
 @njit(**COMPILED)
 def set_parameter(player: Player, mode: int, number: int, controller: int, value: int) -> bool:
-    """Follows the controllers that choose a registered parameter and set it; whether they set one that counts here.
+    """Follow the controllers that choose a registered parameter and set it; whether they set one that counts here.
 
     Increments are of the least step, as MIDI's RP-018 has it. A member's range of bends is that of all members.
     """
@@ -229,7 +229,7 @@ def strike(player: Player, channel: int, key: int) -> None:
 
 @njit(**COMPILED)
 def release_latest(player: Player, channel: int, key: int) -> bool:
-    """Takes a release of a key for its earliest stroke that has none; whether that is the latest."""
+    """Take a release of a key for its earliest stroke that has none; whether that is the latest."""
     strokes = player.channels[channel].strokes
     strokes[key] = max(strokes[key] - 1, 0)
     return strokes[key] == 0

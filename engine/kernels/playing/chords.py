@@ -55,7 +55,7 @@ def _goes_up(player: Player, table: Table) -> bool:
 
 @njit(**COMPILED)
 def _swap(player: Player, first: Event, second: Event) -> None:
-    """Exchanges two events; each place keeps its frame."""
+    """Exchange two events; each place keeps its frame."""
     kept, frame, other_frame = player.kept_event, first.frame, second.frame
     copy(kept, first)
     copy(first, second)
@@ -65,7 +65,7 @@ def _swap(player: Player, first: Event, second: Event) -> None:
 
 @njit(**COMPILED)
 def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) -> None:
-    """Lets the first string of a chord come first, of notes that come at the same frame.
+    """Let the first string of a chord come first, of notes that come at the same frame.
 
     Args:
         ring: events (count,), of which `place` is played next, and `end` is the last one's successor.
@@ -90,7 +90,7 @@ def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) ->
 
 @njit(**COMPILED)
 def strum(player: Player, table: Table, event: Event, now: int) -> bool:
-    """Lets a note wait for its turn in a chord; False: it begins now."""
+    """Let a note wait for its turn in a chord; False: it begins now."""
     chord = player.chord
     if event.chord != 0:  # its turn has come
         player.chord_begun += event.chord == chord
@@ -155,7 +155,7 @@ def waits(player: Player, event: Event, now: int) -> bool:
 
 @njit(**COMPILED)
 def forget_turns(player: Player, mode: int, channel: int) -> None:
-    """Forgets notes that wait for their turns in a chord: those of a channel, or all, -1."""
+    """Forget notes that wait for their turns in a chord: those of a channel, or all, -1."""
     for place in range(player.queued):
         event = player.queue[place]
         meant = channel < 0 or channels.is_master(mode, channel, event.channel)
@@ -167,7 +167,7 @@ def forget_turns(player: Player, mode: int, channel: int) -> None:
 
 @njit(**COMPILED)
 def queue(player: Player, event: Event) -> None:
-    """Puts an event behind those of its frame and of earlier ones."""
+    """Put an event behind those of its frame and of earlier ones."""
     place = player.queued
     while place > 0 and player.queue[place - 1].frame > event.frame:
         copy(player.queue[place], player.queue[place - 1])

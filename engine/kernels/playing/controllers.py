@@ -19,7 +19,7 @@ LAST_MODE = 127  # messages from NOTES_OFF on choose a mode, and release all key
 
 @njit(**COMPILED)
 def stop(player: Player, seconds: float, frame: int) -> None:
-    """Lets all strings fade out, those too that nobody plays, and forgets their places."""
+    """Let all strings fade out, those too that nobody plays, and forget their places."""
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
         if note.state == of.RINGS:

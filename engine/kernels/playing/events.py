@@ -7,21 +7,21 @@ before it: slots, channels, keys, plucks, voices, gains, changes, notes, hands, 
 
 from __future__ import annotations
 
-import numpy as np
 from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import drums
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import copy, fence, player_at, table_at, wholes
+from engine.kernels.constants import QUANTUM
+from engine.kernels.memory import copy, fence, mixer_at, player_at, table_at
+from engine.kernels.mixer_records import Mixer
 from engine.kernels.playing import changes, channels, chords, controllers, gains, hands, notes, voices
 from engine.kernels.records import Event, Player
 
 
 @njit(**COMPILED)
 def _take_table(player: Player, address: int, frame: int, now: int) -> None:
-    """Plays another instrument, or the same with a knob turned; strings that ring glide to it.
+    """Play another instrument, or the same with a knob turned; strings that ring glide to it.
 
     Another instrument begins with its wheels at rest, for what they turned may be something else now; pedals stay.
     """
@@ -42,7 +42,7 @@ def _take_table(player: Player, address: int, frame: int, now: int) -> None:
 
 @njit(**COMPILED)
 def _cancel(player: Player, id: int, now: int) -> None:
-    """Forgets the events whose frames are to come; but a table counts at once, for later events go by it.
+    """Forget the events whose frames are to come; but a table counts at once, for later events go by it.
 
     Args:
         id: of a note, of which alone events are forgotten; 0: all are.
@@ -61,9 +61,9 @@ def _cancel(player: Player, id: int, now: int) -> None:
 
 
 @njit(**COMPILED)
-def _handle(player: Player, mixers: np.ndarray, event: Event) -> None:
-    """Plays an event now. Those of a player without a table do nothing, except for a note, which is refused."""
-    kind, frame, now = event.kind, event.frame, mixers[at.M_FRAMES]
+def _handle(player: Player, mixer: Mixer, event: Event) -> None:
+    """Play an event now. Those of a player without a table do nothing, except for a note, which is refused."""
+    kind, frame, now = event.kind, event.frame, mixer.frames
     channel, key = event.channel, event.key
     value, address = event.value, player.table
     if kind == of.TABLE:
@@ -92,7 +92,7 @@ def _handle(player: Player, mixers: np.ndarray, event: Event) -> None:
         if chords.strum(player, table, event, now):
             return
         if event.position > 0.0:  # by hand: no key is down
-            notes.strike(player, table, mixers, event)
+            notes.strike(player, table, mixer, event)
             return
         channels.hold(player, channel, key, True)
         if event.string == 0:
@@ -100,15 +100,15 @@ def _handle(player: Player, mixers: np.ndarray, event: Event) -> None:
         if table.drums == 0 and hands.hammer_on(player, table, event, frame, now):
             return
         if table.drums != 0:
-            note = notes.free_note(player, mixers)
+            note = notes.free_note(player, mixer)
             gain = drums.strike(player, table, event, note.number)
             if gain == 0.0:
                 notes.refuse(player, event)
                 return
-            notes.note_on(player, table, mixers, event, 0)
+            notes.note_on(player, table, mixer, event, 0)
             note.gain = gain
             return
-        notes.strike(player, table, mixers, event)
+        notes.strike(player, table, mixer, event)
     elif kind in (of.NOTE_ON, of.NOTE_OFF):
         if chords.waits(player, event, now):
             return
@@ -140,9 +140,9 @@ def _superseded(event: Event, following: Event) -> bool:
 
 @njit(**COMPILED)
 def play(player_address: int, mixer_address: int) -> None:
-    """Plays all events that are due in the mixer's next quantum, before it is rendered."""
-    player, mixers = player_at(player_address), wholes(mixer_address)
-    now, pushed = mixers[at.M_FRAMES], player.pushed
+    """Play all events that are due in the mixer's next quantum, before it is rendered."""
+    player, mixer = player_at(player_address), mixer_at(mixer_address)
+    now, pushed = mixer.frames, player.pushed
     fence()
     notes.tend(player, now)
     while player.taken < pushed:
@@ -153,7 +153,7 @@ def play(player_address: int, mixer_address: int) -> None:
             pass
         elif event.frame <= now or event.kind == of.CANCEL:
             chords.arrange(player, now, player.events, taken, pushed)
-            _handle(player, mixers, event)
+            _handle(player, mixer, event)
         elif player.queued < of.QUEUED:
             chords.queue(player, event)
         else:
@@ -163,24 +163,24 @@ def play(player_address: int, mixer_address: int) -> None:
     done = 0
     while done < player.queued:
         event = player.queue[done]
-        if event.frame >= now + at.QUANTUM:
+        if event.frame >= now + QUANTUM:
             break
         done += 1
         together = done < player.queued and player.queue[done].frame == event.frame
         if not (together and _superseded(event, player.queue[done])):
             chords.arrange(player, now, player.queue, done - 1, player.queued)
-            _handle(player, mixers, event)
+            _handle(player, mixer, event)
     if done > 0:
         player.queued -= done
         for place in range(player.queued):
             copy(player.queue[place], player.queue[done + place])
-    hands.follow_hands(player, mixers, now)
+    hands.follow_hands(player, mixer, now)
     voices.hear(player)
 
 
 @njit(**COMPILED)
 def begin(player_address: int) -> None:
-    """Puts all wheels and pedals of a new player at rest, and numbers its notes."""
+    """Put all wheels and pedals of a new player at rest, and number its notes."""
     player = player_at(player_address)
     player.here = player_address
     for number in range(of.MOST_NOTES):

@@ -9,7 +9,7 @@ from numba import njit
 
 from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
-from engine.kernels import loudness, recorded, strings
+from engine.kernels import loudness, recorded, strings, velocities
 from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import behind
 from engine.kernels.playing import keys, plucks, voices
@@ -43,18 +43,18 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
     partials, shortened = keys.string_of(player, table, key, string, pitch_hz, False, own)
     if partials < 1 or strings.overdamped(own, partials):
         return 0
-    share, soft = plucks.reference_share(player), player.values[of.SOFTEST_MM]
-    amplitude_mm = soft * (player.values[of.HARDEST_MM] / soft) ** share * shortened
+    share = plucks.reference_share(player)
+    amplitude_mm = velocities.between(player.values[of.SOFTEST_MM], player.values[of.HARDEST_MM], share) * shortened
     for mode in range(partials):
         pulled_m = min(amplitude_mm, LARGEST_AMPLITUDE_MM) / 1000
         player.amplitudes[mode] = pulled_m * player.reference[mode]
-    release_s = plucks.contact_s(player.values[of.CONTACT_MS], player.values[of.CONTACT_HARD_MS], share)
+    release_s = velocities.contact_s(player.values[of.CONTACT_MS], player.values[of.CONTACT_HARD_MS], share)
     plucks.release_pluck(player, table, own, partials, release_s)
     modes, pairs, learned = partials, 0, table.recorded != 0
     if learned:
-        modes = recorded.modes_of(table, partials)
+        modes = keys.modes_of(table, partials)
         pairs = (modes + 1) // 2
-        recorded.split(table, own, modes, player.amplitudes[:modes])
+        recorded.split(keys.additions(table), own, modes, player.amplitudes[:modes])
     else:
         pairs = plucks.split(player, table, partials, 0.0)
         modes += pairs
@@ -76,7 +76,7 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
         rows,
     )
     if learned:
-        recorded.correct(table, own, modes, rows)
+        recorded.correct(keys.additions(table), own, modes, rows)
     for mode in range(modes):
         partial, direction = strings.partial_of(mode, pairs), strings.direction_of(mode, pairs)
         omega = math.sqrt(rows[mode])
@@ -105,8 +105,7 @@ def _body(player: Player, table: Table) -> tuple[np.ndarray, float]:
 def _look_at_peaks(player: Player, table: Table) -> None:
     """The pluck of which keys are equally loud, and the factor that keeps all keys below the highest peak."""
     share = plucks.reference_share(player)
-    width = player.values[of.WIDTH]
-    width *= (player.values[of.WIDTH_HARD] / width) ** share
+    width = velocities.between(player.values[of.WIDTH], player.values[of.WIDTH_HARD], share)
     partials = min(player.modes - of.MOST_PAIRS, of.MOST_MODES)
     plucks.pull(player, table, table.shape, partials, player.values[of.POSITION], 1.0, width)
     for mode in range(partials):

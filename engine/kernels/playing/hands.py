@@ -13,14 +13,14 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
 from numba import njit
 
 from engine.kernels import constants as of
 from engine.kernels import contact, strings
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import clear, table_at
+from engine.kernels.mixer_records import Mixer
 from engine.kernels.playing import changes, channels, keys, notes, slots, voices
 from engine.kernels.records import Event, Note, Player, Table
 
@@ -40,11 +40,11 @@ def _move(
     frame: int,
     now: int,
 ) -> bool:
-    """Shortens or lengthens the string of a note for another key; False where it cannot play that key."""
+    """Shorten or lengthen the string of a note for another key; False where it cannot play that key."""
     count, mode = table.strings, table.mode
     pitch_hz, string = keys.pitch_of(table, key), note.string
     if count > 0 and string < 0:
-        string = keys.chosen(table, count, note.key)
+        string = strings.chosen(table.open, count, note.key)
     if pitch_hz <= 0.0 or (count > 0 and key < table.open[string].note):
         return False
     modes, _ = keys.string_of(player, table, key, string, pitch_hz, False, player.own)
@@ -68,7 +68,8 @@ def _move(
         slides_s = seconds if seconds > channels.HAMMER_S else 0.0
         stroke = note.age if table.variation > 0.0 else 0
         strength = 1.0 if slides_s > 0.0 else changes.landing(table, note)
-        contact.touch(player, table, of.RELEASE, level_db, strength, 1.0, stroke, key, frame, slid_m, slides_s)
+        by = contact.Touch(of.RELEASE, level_db, strength, 1.0, stroke, key, frame, slid_m, slides_s)
+        contact.touch(player, table, by)
     changes.retune(player, table, note, seconds, frame, now)
     return True
 
@@ -83,7 +84,7 @@ def _move_others(
     frame: int,
     now: int,
 ) -> None:
-    """Lets the other strings of a course follow the first, a note that has moved."""
+    """Let the other strings of a course follow the first, a note that has moved."""
     id, channel = first.id, first.channel
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
@@ -211,7 +212,7 @@ def tune(player: Player, table: Table, event: Event, frame: int, now: int) -> No
 
 @njit(**COMPILED)
 def choke(player: Player, event: Event, frame: int) -> None:
-    """Lets single notes fade out fast, though their instrument lets them ring; no release of their keys follows."""
+    """Let single notes fade out fast, though their instrument lets them ring; no release of their keys follows."""
     id, channel, key = event.id, event.channel, event.key
     seconds = event.value if event.value > 0.0 else STOP_S
     for number in range(of.MOST_NOTES):
@@ -230,24 +231,24 @@ def choke(player: Player, event: Event, frame: int) -> None:
 
 @njit(**COMPILED)
 def _vibrate(player: Player, table: Table, note: Note, now: int) -> None:
-    """Lets a note glide to where its vibrato is some quanta later; all strings of a course alike."""
+    """Let a note glide to where its vibrato is some quanta later; all strings of a course alike."""
     depth = keys.value_of(player, table, of.VIBRATO_CENTS) / 100
     if depth == 0.0 and note.vibrato == 0.0:
         return
-    ahead = now + VIBRATO_QUANTA * at.QUANTUM - note.began
+    ahead = now + VIBRATO_QUANTA * QUANTUM - note.began
     hz = keys.value_of(player, table, of.VIBRATO_HZ)
     note.vibrato = depth * math.sin(2 * math.pi * hz * max(ahead, 0) / player.rate_hz)
-    seconds = VIBRATO_QUANTA * at.QUANTUM / player.rate_hz
+    seconds = VIBRATO_QUANTA * QUANTUM / player.rate_hz
     changes.retune(player, table, note, seconds, 0, now)
 
 
 @njit(inline="always", **COMPILED)
-def follow_hands(player: Player, mixers: np.ndarray, now: int) -> None:
-    """Lifts fingers from strings that they touch, and plucks again what a tremolo plucks, in the next quantum."""
+def follow_hands(player: Player, mixer: Mixer, now: int) -> None:
+    """Lift fingers from strings that they touch, and pluck again what a tremolo plucks, in the next quantum."""
     address = player.table
     if address == 0:
         return
-    table, end = table_at(address), now + at.QUANTUM
+    table, end = table_at(address), now + QUANTUM
     if table.drums != 0:
         return
     for number in range(of.MOST_NOTES):
@@ -256,7 +257,7 @@ def follow_hands(player: Player, mixers: np.ndarray, now: int) -> None:
             continue
         if note.touched != 0 and note.lifted < end:
             changes.retune(player, table, note, LIFT_S, note.lifted, now)
-        if (now - note.began) // at.QUANTUM % VIBRATO_QUANTA == 0:
+        if (now - note.began) // QUANTUM % VIBRATO_QUANTA == 0:
             _vibrate(player, table, note, now)
         if note.held == 0 or note.released != 0 or not slots.sounds(note):
             continue
@@ -266,14 +267,14 @@ def follow_hands(player: Player, mixers: np.ndarray, now: int) -> None:
         hz = keys.technique_of(player, table, channel, of.TREMOLO_HZ, switch, USUAL_TREMOLO_HZ)
         due = note.began + slots.frames(player, 1 / hz) if hz > 0.0 else end
         if due < end:
-            _pluck_again(player, table, mixers, note, max(due, now))
+            _pluck_again(player, table, mixer, note, max(due, now))
 
 
 @njit(inline="always", **COMPILED)
 def _pluck_again(
     player: Player,
     table: Table,
-    mixers: np.ndarray,
+    mixer: Mixer,
     note: Note,
     frame: int,
 ) -> None:
@@ -289,9 +290,9 @@ def _pluck_again(
     event.value = note.velocity
     note.id, note.began = 0, frame
     tuned, before = note.tuned, player.age
-    notes.strike(player, table, mixers, event)
+    notes.strike(player, table, mixer, event)
     for number in range(of.MOST_NOTES):
         made = player.notes[number]
         if tuned != 0.0 and made.state == of.RINGS and made.age > before:
             made.tuned = tuned
-            changes.retune(player, table, made, 0.0, 0, mixers[at.M_FRAMES])
+            changes.retune(player, table, made, 0.0, 0, mixer.frames)

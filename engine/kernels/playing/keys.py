@@ -6,11 +6,13 @@ import numpy as np
 from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels import strings
+from engine.kernels import recorded, strings
 from engine.kernels.compiled import COMPILED
+from engine.kernels.memory import address_of, behind, recorded_at
 from engine.kernels.playing import channels
-from engine.kernels.records import Note, Player, Table
+from engine.kernels.records import RECORDED, Note, Player, Recorded, Table
 
+RECORDED_SLOTS = RECORDED.itemsize // 8
 USUAL_HARMONIC = 2.0  # of its footswitch where the parameter is off: an estimate, as those of other techniques
 
 
@@ -61,18 +63,6 @@ def node_of(player: Player, table: Table, channel: int, partials: int) -> int:
 
 
 @njit(**COMPILED)
-def chosen(table: Table, count: int, key: int) -> int:
-    """The string of a set, from the highest, 0, that a key chooses.
-
-    It is the highest at or below the key, else the lowest.
-    """
-    for number in range(count):
-        if table.open[number].note <= key:
-            return number
-    return count - 1
-
-
-@njit(**COMPILED)
 def string_of(
     player: Player,
     table: Table,
@@ -87,8 +77,7 @@ def string_of(
     Returns its partials, 0 where there is none, and its share of the whole string.
 
     Args:
-        number: on which of a set it is played, from the highest, 0; -1, or one that would have to be slackened too
-            far: the one that the key itself chooses.
+        number: on which of a set it is wanted, as of `strings.played`.
         wheeled: whether with the knob that the modulation wheel turns, as far as it does.
     """
     whole, knobs, count = player.whole, player.knobs, table.strings
@@ -96,22 +85,9 @@ def string_of(
         knobs[which] = player.values[which]
         if wheeled:
             knobs[which] = value_of(player, table, which)
-    first = table.open[0]
-    if count > 0:
-        if not 0 <= number < count or key < table.open[number].note - of.MOST_SLACKENED:
-            number = chosen(table, count, key)
-        first = table.open[number]
-    strings.turned(first.string, knobs, whole)
-    if not strings.possible(whole):
-        return 0, 1.0
-    if count > 0 and key < first.note:  # slackened
-        whole[of.TENSION] = strings.bent(whole, pitch_hz / first.pitch_hz)
-        if not strings.possible(whole):
-            return 0, 1.0
-    for place in range(of.STRING):
-        out[place] = whole[place]
-    out[of.LENGTH] = strings.fretted(whole, pitch_hz)
-    if not strings.possible(out):
+    first = table.open[strings.played(table.open, count, key, number) if count > 0 else 0]
+    slackened = pitch_hz / first.pitch_hz if count > 0 and key < first.note else 1.0
+    if not strings.stop(first.string, knobs, slackened, pitch_hz, whole, out):
         return 0, 1.0
     modes = min(strings.modes_below(out, of.HIGHEST_HZ), player.modes - of.MOST_PAIRS)
     return modes, out[of.LENGTH] / whole[of.LENGTH]
@@ -124,7 +100,28 @@ def has_octave(table: Table, key: int, number: int) -> bool:
     -1: on the string that the key chooses.
     """
     count, octaves = table.strings, table.octaves
-    return octaves > 0 and (number if number >= 0 else chosen(table, count, key)) >= count - octaves
+    return octaves > 0 and (number if number >= 0 else strings.chosen(table.open, count, key)) >= count - octaves
+
+
+@njit(**COMPILED)
+def _recorded(table: Table) -> Recorded:
+    return recorded_at(address_of(table) + 8 * table.recorded)
+
+
+@njit(**COMPILED)
+def modes_of(table: Table, partials: int) -> int:
+    """The number of modes of so many partials of a recorded string."""
+    return min(2 * partials, _recorded(table).modes)
+
+
+@njit(**COMPILED)
+def additions(table: Table) -> recorded.Additions:
+    """The additions of a recording to a string's law, of a table that has them."""
+    own = _recorded(table)
+    points, partials = own.smooth, own.partials
+    rows = behind(own, RECORDED_SLOTS + 2 * points, 5 * partials).reshape((5, partials))
+    smooth = behind(own, RECORDED_SLOTS, points), behind(own, RECORDED_SLOTS + points, points)
+    return own.pitch_hz, own.rest, smooth[0], smooth[1], rows
 
 
 @njit(**COMPILED)

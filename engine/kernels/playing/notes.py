@@ -13,10 +13,11 @@ from numba import njit
 
 from engine.bounds import LARGEST_AMPLITUDE_MM
 from engine.kernels import constants as of
-from engine.kernels import contact, drums, recorded, strings
-from engine.kernels import layout as at
+from engine.kernels import contact, drums, recorded, strings, velocities
+from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import clear, copy, fence, reals, wholes
+from engine.kernels.memory import clear, copy, fence, voice_at
+from engine.kernels.mixer_records import MOST_VOICES, Mixer
 from engine.kernels.playing import changes, channels, gains, keys, plucks, slots, voices
 from engine.kernels.records import Event, Note, Player, Report, Table
 
@@ -55,7 +56,7 @@ def reported(player: Player) -> None:
 
 @njit(**COMPILED)
 def refuse(player: Player, event: Event) -> None:
-    """Reports a note that no string can play, or that was cancelled."""
+    """Report a note that no string can play, or that was cancelled."""
     report(player, of.REFUSED, event.id, event.channel, event.key, event.frame, event.value)
     reported(player)
 
@@ -71,29 +72,35 @@ def _forget(player: Player, note: Note, frame: int) -> None:
 
 
 @njit(**COMPILED)
-def free_note(player: Player, mixers: np.ndarray) -> Note:
+def _begun(note: Note) -> bool:
+    """Return True if any voice of a note has sounded."""
+    for source in range(of.MOST_SOURCES):
+        address = note.voices[source]
+        if address != 0 and voice_at(address).state != at.WAITING:
+            return True
+    return False
+
+
+@njit(**COMPILED)
+def free_note(player: Player, mixer: Mixer) -> Note:
     """A free note; where there is none, one which has not begun or fades is cut, else the oldest."""
     best, best_rank = player.notes[0], 3
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
         if note.state != of.FREE and slots.over(note):
-            _forget(player, note, mixers[at.M_FRAMES])
+            _forget(player, note, mixer.frames)
         if note.state == of.FREE:
             return note
-        begun = False
-        for source in range(of.MOST_SOURCES):
-            address = note.voices[source]
-            begun = begun or (address != 0 and wholes(address)[at.STATE] != at.WAITING)
         rank = 2
         if note.released != 0 or note.has_place == 0:
-            rank = 1 if begun else 0
+            rank = 1 if _begun(note) else 0
         if rank < best_rank or (rank == best_rank and note.age < best.age):
             best, best_rank = note, rank
     for source in range(of.MOST_SOURCES):
         if best.voices[source] != 0:
-            voices.take_out(mixers, best.voices[source])
+            voices.take_out(mixer, best.voices[source])
     player.cut += 1
-    _forget(player, best, mixers[at.M_FRAMES])
+    _forget(player, best, mixer.frames)
     return best
 
 
@@ -108,43 +115,54 @@ def _follow(player: Player, table: Table, note: Note, before: Note) -> None:
         if address == 0:
             voices.release(other, stops)
             continue
-        wholes(address)[at.PREVIOUS_VOICE] = other
-        wholes(address)[at.STOPS_IN] = stops if table.stops != 0 else 0
+        voice_at(address).previous_voice = other
+        voice_at(address).stops_in = stops if table.stops != 0 else 0
+
+
+@njit(**COMPILED)
+def _cost(note: Note) -> int:
+    """The notes that one counts as: two with a string that may meet its bridge, whose steps cost many times more."""
+    for source in range(of.MOST_SOURCES):
+        address = note.voices[source]
+        if address != 0 and voice_at(address).javari.steps > 0:
+            return 2
+    return 1
 
 
 @njit(**COMPILED)
 def _make_room(player: Player) -> None:
-    """Releases the oldest notes where more ring than may."""
+    """Release the oldest notes where more ring than may; one that costs more and has not begun ends at once."""
     while True:
-        ringing, oldest = 0, player.notes[0]
+        notes, cost, oldest = 0, 0, player.notes[0]
         for number in range(of.MOST_NOTES):
             note = player.notes[number]
             if note.state == of.FREE or note.released != 0 or slots.over(note):
                 continue
-            if ringing == 0 or note.age < oldest.age:
+            if notes == 0 or note.age < oldest.age:
                 oldest = note
-            ringing += 1
-        if ringing <= player.most:
+            notes += 1
+            cost += _cost(note)
+        if cost <= player.most or notes == 1:
             return
-        voices.release_note(player, oldest, STOLEN_S, 0)
+        voices.release_note(player, oldest, STOLEN_S if _begun(oldest) or _cost(oldest) == 1 else 0.0, 0)
 
 
 @njit(**COMPILED)
-def strike(player: Player, table: Table, mixers: np.ndarray, event: Event) -> None:
-    """Plays all strings of a key's course, one after the other; the first is the one that is reported."""
-    note_on(player, table, mixers, event, 0)
+def strike(player: Player, table: Table, mixer: Mixer, event: Event) -> None:
+    """Play all strings of a key's course, one after the other; the first is the one that is reported."""
+    note_on(player, table, mixer, event, 0)
     frame = event.frame
     for member in range(1, table.course):
         later = round(member * table.apart_s * player.rate_hz)
         later += voices.lag_of(player, table, member)
-        event.frame = max(frame, mixers[at.M_FRAMES]) + later if later > 0 else frame
-        note_on(player, table, mixers, event, member)
+        event.frame = max(frame, mixer.frames) + later if later > 0 else frame
+        note_on(player, table, mixer, event, member)
     event.frame = frame
 
 
 @njit(**COMPILED)
-def note_on(player: Player, table: Table, mixers: np.ndarray, event: Event, member: int) -> None:
-    """Plays a note, of a course one string. A string that is impossible is refused, unless another sounds.
+def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: int) -> None:
+    """Play a note, of a course one string. A string that is impossible is refused, unless another sounds.
 
     The note is drafted first: one that is refused takes no other's place.
     """
@@ -160,31 +178,21 @@ def note_on(player: Player, table: Table, mixers: np.ndarray, event: Event, memb
                 refuse(player, event)
             return
         _pluck(player, table, event, draft)
-    note = free_note(player, mixers)
+    note = free_note(player, mixer)
     player.age += 1
-    draft.number, draft.age, draft.began = note.number, player.age, max(event.frame, mixers[at.M_FRAMES])
+    draft.number, draft.age, draft.began = note.number, player.age, max(event.frame, mixer.frames)
     copy(note, draft)
     _keep_of_table(player, table, note)
     _make_voices(player, table, note)
     _take_place(player, table, note)
-    _begin_voices(player, mixers, event, note)
-    changes.retune(player, table, note, 0.0, 0, mixers[at.M_FRAMES])
+    _begin_voices(player, mixer, event, note)
+    changes.retune(player, table, note, 0.0, 0, mixer.frames)
     if member == 0:
         level_db = keys.value_of(player, table, of.ONSET_DB)
         level_db += channels.loudness_db(player, table.mode, note.channel)
-        contact.touch(
-            player,
-            table,
-            of.STROKE,
-            level_db,
-            note.strength,
-            note.hardness,
-            note.stroke,
-            note.key,
-            event.frame,
-            0.0,
-            0.0,
-        )
+        strength, hardness, frame = note.strength, note.hardness, event.frame
+        stroke = contact.Touch(of.STROKE, level_db, strength, hardness, note.stroke, note.key, frame, 0.0, 0.0)
+        contact.touch(player, table, stroke)
     _make_room(player)
     report_began(player, table, event, note, note.own)
 
@@ -200,7 +208,7 @@ def _identify(player: Player, table: Table, event: Event, member: int, note: Not
     note.place, note.string = channels.place_of(player, table, event), -1
     if note.place % 256 == 0 and table.strings > 0:
         string = note.place // 256 - 1
-        if keys.chosen(table, table.strings, note.key) != string:
+        if strings.chosen(table.open, table.strings, note.key) != string:
             note.string = string
     note.place += MEMBERS_APART * member
     note.octave = member > 0 and keys.has_octave(table, note.key, note.string)
@@ -230,24 +238,24 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
     """The pluck of a note by its velocity, or by hand, as amplitudes of its modes in the player."""
     shortened = note.shortened
     curve, soft = keys.value_of(player, table, of.CURVE), keys.value_of(player, table, of.SOFTEST_MM)
-    share = min(max((note.velocity - 1) / 126, 0.0), 1.0) ** (4.0**-curve)
+    share = velocities.share(note.velocity, curve)
     harder = keys.value_of(player, table, of.HARDEST_MM) / soft
     amplitude_mm = min(soft * harder**share * shortened, LARGEST_AMPLITUDE_MM)
     if note.by_hand != 0:
         amplitude_mm = min(event.amplitude_mm, LARGEST_AMPLITUDE_MM)
         if harder != 1.0:
             share = min(max(math.log(amplitude_mm / soft / shortened) / math.log(harder), 0.0), 1.0)
-    note.strength = harder ** (share - ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0**-curve))
+    note.strength = harder ** (share - velocities.share(of.REFERENCE_VELOCITY, curve))
     note.hardness = 1.0
-    width = keys.value_of(player, table, of.WIDTH)
-    width *= (keys.value_of(player, table, of.WIDTH_HARD) / width) ** share
+    widths = keys.value_of(player, table, of.WIDTH), keys.value_of(player, table, of.WIDTH_HARD)
+    width = velocities.between(widths[0], widths[1], share)
     position, slide = keys.value_of(player, table, of.POSITION), player.channels[note.channel].slide
     if note.by_hand != 0:
         position, width = event.position, event.width
     elif table.mode == of.MPE and slide >= 0:
         position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
     turned, varies, softest_ms = 0.0, table.variation, keys.value_of(player, table, of.CONTACT_MS)
-    release_s = plucks.contact_s(softest_ms, keys.value_of(player, table, of.CONTACT_HARD_MS), share)
+    release_s = velocities.contact_s(softest_ms, keys.value_of(player, table, of.CONTACT_HARD_MS), share)
     if varies > 0.0:
         note.stroke = player.age
         if note.by_hand == 0:
@@ -263,9 +271,9 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
     note.highest_m = plucks.pull(player, table, shape, note.modes, position, amplitude_mm / 1000, width)
     plucks.release_pluck(player, table, note.own, note.modes, release_s)
     if table.recorded != 0:
-        note.modes = recorded.modes_of(table, note.modes)
+        note.modes = keys.modes_of(table, note.modes)
         note.pairs = (note.modes + 1) // 2
-        recorded.split(table, note.own, note.modes, player.amplitudes[: note.modes])
+        recorded.split(keys.additions(table), note.own, note.modes, player.amplitudes[: note.modes])
     else:
         note.pairs = plucks.split(player, table, note.modes, turned)
         note.modes += note.pairs
@@ -311,7 +319,7 @@ def _make_voices(player: Player, table: Table, note: Note) -> None:
             slots.set_gain(address, begun)
             if note.bridge > 0.0:
                 first = player.age - note.member  # of this player, for another may ring as well
-                wholes(address)[at.COURSE] = player.here + of.MOST_SOURCES * first + source
+                voice_at(address).course = player.here + of.MOST_SOURCES * first + source
         note.voices[source] = address
 
 
@@ -327,7 +335,7 @@ def _take_place(player: Player, table: Table, note: Note) -> None:
 
 
 @njit(**COMPILED)
-def _begin_voices(player: Player, mixers: np.ndarray, event: Event, note: Note) -> None:
+def _begin_voices(player: Player, mixer: Mixer, event: Event, note: Note) -> None:
     """Hand the voices of a note to the mixer.
 
     Those that have no room there, or that nobody hears, are over.
@@ -336,20 +344,20 @@ def _begin_voices(player: Player, mixers: np.ndarray, event: Event, note: Note) 
         address = note.voices[source]
         if address == 0:
             continue
-        wholes(address)[at.BEGIN_AT] = event.frame
-        reals(address)[at.STRUCK_S] = event.struck_s
-        wholes(address)[at.OF_INSTRUMENT] = 1
+        voice_at(address).begin_at = event.frame
+        voice_at(address).struck_s = event.struck_s
+        voice_at(address).of_instrument = 1
         spared = player.spares != 0 and player.source_gains[source] == 0.0
-        if mixers[at.M_ACTIVE] < at.MOST_VOICES and not spared:
-            mixers[at.M_VOICES + mixers[at.M_ACTIVE]] = address
-            mixers[at.M_ACTIVE] += 1
+        if mixer.active < MOST_VOICES and not spared:
+            mixer.voices[mixer.active] = address
+            mixer.active += 1
         else:
-            wholes(address)[at.STATE] = at.OVER
+            voice_at(address).state = at.OVER
 
 
 @njit(**COMPILED)
 def report_began(player: Player, table: Table, event: Event, note: Note, own: np.ndarray) -> None:
-    """Reports the note of an event, and the string of its key."""
+    """Report the note of an event, and the string of its key."""
     if note.member != 0:
         return
     made = report(player, of.BEGAN, note.id, note.channel, note.key, event.frame, event.value)
@@ -363,7 +371,7 @@ def report_began(player: Player, table: Table, event: Event, note: Note, own: np
 
 @njit(**COMPILED)
 def tend(player: Player, now: int) -> None:
-    """Reports notes that have ended."""
+    """Report notes that have ended."""
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
         if note.state == of.RINGS and slots.over(note):

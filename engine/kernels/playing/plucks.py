@@ -9,9 +9,9 @@ from numba import njit
 
 from engine.bounds import LARGEST_AMPLITUDE_MM, POSITION_RANGE, WIDTH_RANGE
 from engine.kernels import constants as of
-from engine.kernels import strings
+from engine.kernels import pulses, strings, velocities
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import behind
+from engine.kernels.memory import behind, mixed
 from engine.kernels.records import Player, Table
 from engine.levels import MOST_PERIODS
 
@@ -47,13 +47,13 @@ def pull(
         x = point / (grid - 1)
         distance = (x - position) / width
         if shape == of.TRIANGULAR:
-            found = peak_m * min(x / position, (1 - x) / (1 - position))
+            found = peak_m * pulses.triangle(x, position)
         elif point == 0 or point == grid - 1:
             found = 0.0
         elif shape == of.GAUSSIAN:
-            found = peak_m * math.exp(-distance * distance)
+            found = peak_m * pulses.gaussian(distance)
         else:
-            found = peak_m / 2 * (1 + math.cos(2 * math.pi * distance)) if abs(distance) < 0.5 else 0.0
+            found = peak_m * pulses.raised_cosine(distance)
         player.pulled[point] = found
         highest = max(highest, found)
     turn = 2 * (grid - 1)
@@ -76,7 +76,7 @@ def pull(
 
 @njit(**COMPILED)
 def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_m: float, width: float) -> None:
-    """The amplitudes of the modes of a rounded triangle: as `excitation.rounded`.
+    """The amplitudes of the modes of a rounded triangle, up to its height `pulses.corner`.
 
     It peaks where the force pulls: elsewhere it is straight.
     """
@@ -87,9 +87,7 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
     for point in range(low, high):
         player.pulled[point] = 0.0
     for mode in range(1, grid - 1):
-        half = mode * width / 2
-        spread = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
-        each, place = math.sin(math.pi * mode * position) / (mode * mode) * spread, mode * low % turn
+        each, place = pulses.corner(mode, position, width), mode * low % turn
         for point in range(low, high):
             player.pulled[point] += each * sines[place]
             place += mode
@@ -105,7 +103,7 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
 
 @njit(**COMPILED)
 def release_pluck(player: Player, table: Table, own: np.ndarray, partials: int, release_s: float) -> None:
-    """Releases a pluck's partials within a time, or strikes them for so long: as `excitation`.
+    """Release a pluck's partials within a time, or strike them for so long: see `engine.excitation.blow_factor`.
 
     What touches a string leaves it within a period of its lowest partial. So soft strokes of high keys are heard.
     """
@@ -114,19 +112,14 @@ def release_pluck(player: Player, table: Table, own: np.ndarray, partials: int, 
         share = math.sqrt(strings.omega_squared(own, 1) / strings.omega_squared(own, mode + 1))
         player.amplitudes[mode] *= 2 / math.pi * share
     for mode in range(partials if release_s > 0.0 else 0):
-        half = math.sqrt(strings.omega_squared(own, mode + 1)) * release_s / (2 * math.pi)
-        left = 0.5 if abs(half - 1) < 1e-6 else math.sin(math.pi * half) / (math.pi * half * (1 - half * half))
-        player.amplitudes[mode] *= left
+        turns = math.sqrt(strings.omega_squared(own, mode + 1)) * release_s / (2 * math.pi)
+        player.amplitudes[mode] *= pulses.spectrum(turns)
 
 
 @njit(**COMPILED)
 def varied(stroke: int, key: int, which: int) -> float:
-    """A number in -1 … 1 for each stroke: the same for the same strokes (splitmix64)."""
-    mixed = np.uint64(stroke * 4096 + key * 16 + which + 1) * np.uint64(0x9E3779B97F4A7C15)
-    mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    mixed = mixed ^ (mixed >> np.uint64(31))
-    return float(np.int64(mixed >> np.uint64(12))) / 2.0**51 - 1
+    """A number in -1 … 1 for each stroke: the same for the same strokes."""
+    return float(np.uint64(mixed(stroke * 4096 + key * 16 + which + 1)) >> np.uint64(12)) / 2.0**51 - 1
 
 
 @njit(**COMPILED)
@@ -153,7 +146,7 @@ def vary(
 
 @njit(**COMPILED)
 def split(player: Player, table: Table, partials: int, turned: float) -> int:
-    """Splits a pluck's partials into modes of both polarisations; how many partials have two.
+    """Split a pluck's partials into modes of both polarisations; how many partials have two.
 
     Args:
         turned: by so many rad from the instrument's angle.
@@ -176,12 +169,4 @@ def split(player: Player, table: Table, partials: int, turned: float) -> int:
 @njit(**COMPILED)
 def reference_share(player: Player) -> float:
     """The share of the velocities at which keys are equally loud."""
-    return ((of.REFERENCE_VELOCITY - 1) / 126) ** (4.0 ** -player.values[of.CURVE])
-
-
-@njit(**COMPILED)
-def contact_s(softest_ms: float, hardest_ms: float, share: float) -> float:
-    """The time in which a pluck releases the string, or a hammer touches it, of a share of the velocities."""
-    if softest_ms <= 0.0 or hardest_ms <= 0.0:
-        return 0.0
-    return softest_ms / 1000 * (hardest_ms / softest_ms) ** share
+    return velocities.share(of.REFERENCE_VELOCITY, player.values[of.CURVE])

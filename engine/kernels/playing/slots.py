@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
+
 from numba import njit
 
 from engine.kernels import constants as of
-from engine.kernels import layout as at
-from engine.kernels import records
+from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
-from engine.kernels.memory import reals, wholes
-from engine.kernels.records import PLAYER, Note, Player
+from engine.kernels.constants import QUANTUM
+from engine.kernels.memory import clear, voice_at
+from engine.kernels.modes import rows
+from engine.kernels.records import PLAYER, Note, Player, Table
+from engine.kernels.voice_records import WEIGHT_ROWS, Voice
 
 VOICES_AT = PLAYER.itemsize
-voice_bytes = njit(**COMPILED)(records.voice_bytes)
+voice_bytes = njit(**COMPILED)(at.voice_bytes)
 
 
 @njit(**COMPILED)
@@ -22,12 +26,12 @@ def frames(player: Player, seconds: float) -> int:
 
 @njit(**COMPILED)
 def quanta(player: Player, seconds: float) -> int:
-    return max(1, round(seconds * player.rate_hz / at.QUANTUM))
+    return max(1, round(seconds * player.rate_hz / QUANTUM))
 
 
 @njit(**COMPILED)
 def voice_over(address: int) -> bool:
-    state = wholes(address)[at.STATE]
+    state = voice_at(address).state
     return state == at.OVER or state == at.RUNAWAY
 
 
@@ -55,6 +59,22 @@ def address_of_voice(player: Player, number: int, source: int) -> int:
 
 @njit(**COMPILED)
 def set_gain(address: int, gain: float) -> None:
-    """Sets the gain of a voice that begins."""
-    voice = reals(address)
-    voice[at.WANTED_GAIN] = voice[at.GAIN] = voice[at.GAIN_FROM] = voice[at.GAIN_TO] = gain
+    """Set the gain of a voice that begins."""
+    voice = voice_at(address)
+    voice.wanted_gain = voice.gain = voice.gain_from = voice.gain_to = gain
+
+
+@njit(**COMPILED)
+def blank_voice(player: Player, table: Table, address: int, source: int, modes: int, used: int) -> Voice:
+    """A voice of a source at rest, with as many rows as are used set to zero."""
+    voice, rate_hz = voice_at(address), player.rate_hz
+    clear(voice)
+    voice.kind, voice.program, voice.modes = table.kinds[source], table.programs[source], modes
+    voice.points, voice.began_frame, voice.moving = table.points, -1, modes
+    voice.fade_frames = round(at.FADE_S * rate_hz)
+    voice.ends_at, voice.ends_in = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
+    voice.silent = at.SILENT_DB * math.log(10.0) / 20
+    behind = rows(voice, -WEIGHT_ROWS, WEIGHT_ROWS + used)
+    for place in range(len(behind)):
+        behind[place] = 0.0
+    return voice

@@ -9,7 +9,7 @@ import pytest
 
 from app.analysis.error_course import ErrorCourse
 from app.rendering import Take
-from engine.metrics import ErrorSums
+from engine.compare.relative import ErrorSums
 from tests.app.takes import append_to
 
 random = np.random.default_rng(3)

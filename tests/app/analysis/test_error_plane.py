@@ -21,7 +21,7 @@ from app.analysis.error_plane import (
     refine,
 )
 from app.shared.worker import Cancelled
-from engine.metrics import relative_error
+from engine.compare.relative import relative_error
 from engine.pluck import Pluck
 from engine.presets import load_preset
 from engine.resonators.sine_transform import project

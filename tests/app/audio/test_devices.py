@@ -14,8 +14,8 @@ import app
 from app.audio.devices import AudioDevice, close_device, default_device, find, open_device, output_devices
 from app.audio.output import DeviceOutput
 from app.audio.problems import AudioUnavailable, ProblemKind
-from engine.kernels.layout import CAUSE_DEVICE, M_CALLS, M_DAC_S
 from engine.kernels.mixer import call
+from engine.kernels.mixer_records import CAUSE_DEVICE
 from engine.kernels.voice import note_gap
 from engine.voices import Mixer
 
@@ -154,9 +154,9 @@ def test_times_of_a_device_that_cannot_be_are_not_shown(
     output = DeviceOutput(find("Speakers", "ALSA"), 0.05, mixer)
     assert output.latency_s == 0.05, "as it was asked for"
     assert math.isfinite(output.now_s()) and 0 <= output.load() < math.inf
-    mixer.memory[M_DAC_S] = value
+    mixer.record["dac_s"] = value
     assert 0 <= mixer.output_latency_s < 1
-    note_gap(mixer.memory, 100, 1000 * value, CAUSE_DEVICE)
+    note_gap(mixer.record, 100, 1000 * value, CAUSE_DEVICE)
     (gap,) = mixer.new_gaps()
     assert gap.milliseconds == 0.0
     output.close()
@@ -173,11 +173,11 @@ def test_an_output_plays_stalls_and_is_lost(
     assert not output.stalled() and not output.lost()
     now_s += 3.0
     assert output.stalled() and not output.lost()
-    mixer.memory.view("int64")[M_CALLS] += 1
+    mixer.record["calls"] += 1
     assert not output.stalled()
     now_s += 7.0
     assert output.lost()
-    mixer.memory.view("int64")[M_CALLS] += 1
+    mixer.record["calls"] += 1
     assert not output.lost()
     stream.active = False
     assert output.lost()

@@ -22,7 +22,7 @@ import pytest
 import app
 from app.audio.devices import output_devices
 from app.audio.problems import AudioUnavailable
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM
 
 RATE_HZ = 44_100  # what PortAudio calls the default rate of an ALSA plugin
 SCRIPT = Path(__file__).with_name("play_through_device.py")

@@ -15,7 +15,6 @@ from app.audio.devices import AudioDevice
 from app.audio.problems import AudioProblem, AudioUnavailable, ProblemKind, no_device, refused, vanished
 from app.audio.sound import BUFFER_S, Sound
 from engine.effects import Effects
-from engine.kernels.layout import M_CALLS
 from engine.values.effects import Room
 from engine.voices import Mixer, Voice, plain_program
 
@@ -373,7 +372,7 @@ def test_a_device_that_stops_under_load_is_opened_again_at_once(
     monkeypatch.setattr(sound_module, "TRY_AGAIN_S", 1e6)
     opened(sound)
     voice = lasting(sound)
-    sound.mixer.memory.view(np.int64)[M_CALLS] += 1
+    sound.mixer.record["calls"] += 1
     desk.outputs[0].is_lost = True
     wait_for(lambda: len(desk.outputs) == 2 and sound.status().gaps != ())
     assert desk.outputs[0].closed and desk.problems == []

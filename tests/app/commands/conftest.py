@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from app.commands.cli import main
-from engine.excitation import gaussian
+from engine.excitation import displacement
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def full_disk() -> FullDisk:
 @pytest.fixture
 def u0(tmp_path: Path) -> Path:
     """Three plucks (3, 101) in m."""
-    plucks = [gaussian(0.3 + 0.1 * i, 0.05, (2 + i) * 1e-3, 101) for i in range(3)]
+    plucks = [displacement("gaussian", 0.3 + 0.1 * i, 0.05, (2 + i) * 1e-3, 101) for i in range(3)]
     path = tmp_path / "u0.npy"
     np.save(path, np.stack(plucks))
     return path

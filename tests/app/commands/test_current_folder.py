@@ -42,19 +42,16 @@ with warm._beside("os.getpid") as process:  # a function that compiles nothing
 print(process.returncode)
 """
 SWEEPING = """
-from training.sweeping.workers.base import Task
-from training.sweeping.workers.layout import Layout
-from training.sweeping.workers.processes import process_workers
+from training.sweeping.processes import Layout, process_workers
 if __name__ == "__main__":
     with process_workers(Layout("cpu", 1, ({},))) as workers:
-        workers.start(Task("a", "ours", {}, "a"))
-        print(workers.next(300.0))
+        print(workers.submit({}).result(300.0))
 """
 CHILDREN = {
     "plugin: the kernels' code": (TEXTS, "failed the kernels cannot be compiled: KeyError: 'no part'"),
     "plugin: the compiler": (LINKING, "linking for linux-x64 failed: zig: error:"),
     "warm": (WARMING, "0"),
-    "sweep": (SWEEPING, "Ended("),
+    "sweep": (SWEEPING, "{'rows': [], 'error': "),
 }
 COMMANDS = (
     ("presets",),

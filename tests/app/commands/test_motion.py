@@ -13,14 +13,15 @@ import pytest
 import torch
 
 from app.commands import arrays, motion
-from engine.metrics import relative_error
+from engine.compare.relative import relative_error
 from engine.pluck import Pluck
 from engine.presets import find_string, load_preset, read_string
 from engine.resonators.sine_transform import project, to_grid, to_modes
 from engine.resonators.string import resonator_of
 from engine.sources import ModelSource, TruthSource
-from engine.truth import ModalState, solve_linear
+from engine.truth import ModalState
 from engine.values.string import StringParameters
+from tests.engine.tensors import solve_linear
 
 
 def simulate(u0: Path, out: Path, string: str = "linear", steps: int = 200, modes: int = 10, *more: Any) -> list[Any]:

@@ -2,25 +2,27 @@ from __future__ import annotations
 
 import errno
 import json
+import sys
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from engine.metrics import RelativeError
+from engine.compare.relative import RelativeError
 from engine.result_file import REMEDIES
+from engine.schema import read, write
 from tests.app.commands.conftest import FullDisk
 from training.cli import console
 from training.cli.sweep import Shown
 from training.fitting.fit import Progress
 from training.results import Row, add_rows, read_results
 from training.sweeping.plan import load_plan
-from training.sweeping.workers import Layout
-from training.sweeping.workers.base import Ended, Event, Noted, Progressed, Task
+from training.sweeping.processes import Layout
+from training.sweeping.task import Task, Workers
 
 PLAN = """
 description = "Two runs."
@@ -43,10 +45,12 @@ def row_of(name: str, digest: str = "", **changes: Any) -> Row:
     return Row(digest or name, name, **({**fields, "finished": "2026-01-01T00:00:00Z"} | changes))
 
 
-def progress_of(
-    name: str, seconds: float, seconds_left: float, validation: RelativeError | None = None
-) -> Progressed:
-    return Progressed(name, Progress(2, 8, 1, 4, 60, 1e-3, 0.5, validation, seconds, seconds_left), "here", 1)
+def named(name: str) -> Any:
+    return SimpleNamespace(name=name)
+
+
+def progress_of(seconds: float, seconds_left: float, validation: RelativeError | None = None) -> Progress:
+    return Progress(2, 8, 1, 4, 60, 1e-3, 0.5, validation, seconds, seconds_left)
 
 
 @pytest.fixture
@@ -68,32 +72,22 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[Layout]]:
     def make(outcome: Callable[[str], Row | str]) -> list[Layout]:
         layouts: list[Layout] = []
 
-        class Script:
-            description = "a script"
-
-            def __init__(self) -> None:
-                self.events: list[Event] = []
-
-            def capacity(self) -> int:
-                return 1
-
-            def start(self, task: Task) -> None:
-                found = outcome(task.name)
-                self.events += [Noted(task.name, "waits"), progress_of(task.name, 1, 3)]
-                if isinstance(found, str):
-                    self.events.append(Ended(task.name, None, found))
-                else:
-                    self.events.append(Ended(task.name, replace(found, digest=task.digest)))
-
-            def next(self, timeout_s: float) -> Event | None:
-                return self.events.pop(0)
+        def submit(plain: Any) -> Future[dict[str, Any]]:
+            task = read(Task, plain, "task")
+            (run,) = task.runs
+            future: Future[dict[str, Any]] = Future()
+            found = outcome(run.name)
+            failed = isinstance(found, str)
+            rows = [] if failed else [write(found) | {"digest": run.digest}]
+            future.set_result({"rows": rows, "error": found if failed else ""})
+            return future
 
         @contextmanager
-        def local_workers(layout: Layout) -> Iterator[Script]:
+        def process_workers(layout: Layout) -> Iterator[Workers]:
             layouts.append(layout)
-            yield Script()
+            yield Workers("a script", submit, lambda: 1)
 
-        monkeypatch.setattr("training.sweeping.workers.local_workers", local_workers)
+        monkeypatch.setattr("training.sweeping.processes.process_workers", process_workers)
         return layouts
 
     return make
@@ -109,8 +103,7 @@ def test_a_sweep_ends_with_its_rows(run, words: list[Any], tmp_path: Path, scrip
     lines = found.err.splitlines()
     assert lines[0] == f"learned-strings: trial: 2 of 2 runs to do; rows go to {file}"
     assert lines[1] == "learned-strings: on a script"
-    assert lines[2] == f"learned-strings: {NAMES[0]}: waits"
-    assert f"{NAMES[0]}: done, rel. MAE 0.5, 8 s (1 done, 0 running, 1 waiting; about 8 s left)" in lines[3]
+    assert f"{NAMES[0]}: done, rel. MAE 0.5, 8 s (1 done, 0 running, 1 waiting; about 8 s left)" in lines[2]
     assert [name in found.out for name in NAMES] == [True, True]
 
     again = run(*words, "--json")
@@ -176,18 +169,22 @@ def test_a_results_file_that_is_none_is_reported(run, words: list[Any], plan: Pa
     assert "not a results file" in run(*words, "--results", plan).failure
 
 
-def test_a_scheduler_that_is_not_there_is_reported(run, words: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("training.sweeping.workers.on_dask.CONNECT_S", 0.2)
-    found = run(*words, "--scheduler", "tcp://127.0.0.1:9")
+def test_a_cluster_without_its_extra_is_one_line_with_the_remedy(
+    run, words: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    found = run(*words, "--scheduler", "tls://127.0.0.1:9")
     assert found.status == 1
-    assert "tcp://127.0.0.1:9: no Dask scheduler answers there" in found.err.splitlines()[-1]
+    _, reported = found.err.splitlines()
+    assert reported.startswith("learned-strings: tls://127.0.0.1:9: a cluster needs Dask")
+    assert "install the extra learned-strings[cluster] as docs/install.md says" in reported
 
 
 @pytest.mark.parametrize(("scheme", "warned"), [("tcp", True), ("tls", False)])
 def test_a_scheduler_that_anybody_can_reach_is_warned_of(
     run, words: list[Any], monkeypatch: pytest.MonkeyPatch, scheme: str, warned: bool
 ) -> None:
-    monkeypatch.setattr("training.sweeping.workers.on_dask.CONNECT_S", 0.2)
+    monkeypatch.setitem(sys.modules, "distributed", None)
     found = run(*words, "--scheduler", f"{scheme}://127.0.0.1:9")
     assert ("can run code on its workers" in found.err) == warned
 
@@ -235,15 +232,13 @@ def test_the_time_left_follows_what_is_known() -> None:
     shown = Shown(begin, 5, 2)
     assert shown.summary() == "0 done, 0 running, 5 waiting"
     for name in ("a", "b"):
-        shown.started(SimpleNamespace(name=name))
+        shown.started(named(name))
     assert shown.seconds_left() is None
-    shown.progressed(progress_of("a", 10, 30))
+    shown.progressed(named("a"), progress_of(10, 30))
     assert shown.seconds_left() == (30 + 4 * 40) / 2
     shown.finished(row_of("a", seconds=20.0))
     assert shown.seconds_left() == 4 * 20 / 2
     shown.finished(row_of("b", status="diverged", seconds=None))
-    assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30 s left"
-    shown.progressed(progress_of("a", 1, 1))  # that came late
     assert shown.summary() == "1 done, 1 diverged, 0 running, 3 waiting; about 30 s left"
     assert ended == ["a", "b"]
 
@@ -254,9 +249,9 @@ def test_a_terminal_shows_each_run_that_is_under_way(capsys, monkeypatch: pytest
     with console.bars() as begin:
         shown = Shown(begin, 3, 2)
         for name in ("first", "second"):
-            shown.started(SimpleNamespace(name=name))
-        shown.progressed(progress_of("second", 10, 30, RelativeError(0.25, 0.125)))
-        shown.progressed(progress_of("second", 20, 20))
+            shown.started(named(name))
+        shown.progressed(named("second"), progress_of(10, 30, RelativeError(0.25, 0.125)))
+        shown.progressed(named("second"), progress_of(20, 20))
     reported = capsys.readouterr().err
     assert "first" in reported
     assert "20 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125" in reported
@@ -267,6 +262,6 @@ def test_a_log_reports_of_a_long_run_now_and_then(capsys) -> None:
         with console.bars(every_s) as begin:
             shown = Shown(begin, 1, 1)
             shown.started(SimpleNamespace(name="a"))
-            shown.progressed(progress_of("a", 1, 3, RelativeError(0.25, 0.125)))
+            shown.progressed(named("a"), progress_of(1, 3, RelativeError(0.25, 0.125)))
     reported = "learned-strings: a: 25%, 3 s left step 2, epoch 1/4, horizon 60, loss 0.5, val. MAE 0.125\n"
     assert capsys.readouterr().err == reported

@@ -15,7 +15,7 @@ import json
 import threading
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import astuple, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,22 +26,16 @@ from app.instrument import events
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import KEYS, Bend, Controller, Event, NoteOff, NoteOn, PatchTurned, PluckAt
 from app.instrument.string_keys import StringKeys, on_string
-from app.instrument.table import PLAYED_PARAMETERS, Tail, put_recorded
 from app.patches.library import find_patch, read_patch
-from app.patches.patch import Noise, Patch, Pickup
+from app.patches.patch import ASSIGNABLE, Noise, Patch, Pickup
 from app.patches.tuning import TuningChoice
+from app.shared.parameters import OF_PATCHES
 from engine.kernels import constants as of
-from engine.kernels import layout as at
-from engine.kernels.layout import QUANTUM
-from engine.kernels.recorded import correct
-from engine.kernels.records import TABLE
+from engine.kernels.constants import QUANTUM
 from engine.pluck import SHAPES, Pluck, Shape
 from engine.presets import Preset
-from engine.resonators.string import resonator_of
-from engine.values.string import Losses, Polarisations, StringParameters
+from engine.values.string import Losses, Polarisations
 from engine.voices import Mixer
-from engine.voices.player import record_of
-from tests.app.instrument.loud import LoudKeys
 from tests.app.instrument.seen import sounding
 from tests.engine.resonators.test_recorded import recorded
 
@@ -66,7 +60,7 @@ class Compiled:
 def quantum(mixer: Mixer) -> NDArray[np.float64]:
     """The next one as it is mixed, in double precision."""
     mixer.render(QUANTUM)
-    return mixer.memory[at.M_MIX : at.M_MIX + 2 * QUANTUM].copy()
+    return mixer.record["mix"].flatten()
 
 
 def rendered(stage: Compiled, played: Framed, quanta: int) -> NDArray[np.float64]:
@@ -214,19 +208,6 @@ def test_a_string_learned_from_a_recording_has_its_own_modes(
     pickup = Pickup(points=shipped[name].pickup.points, kind=kind)
     patch, other = (changed(shipped[each], pickup=pickup) for each in (name, "kora"))
     assert compared(f"recorded {name} {seed}", patch, learned, drawn(patch, other, seed, 0.4), 400) < CLOSE
-
-
-@pytest.mark.parametrize("semitones", [-14, -5, -2, 0, 1, 4, 12])
-def test_the_kernels_have_the_modes_of_a_recorded_string_at_every_pitch(semitones: int) -> None:
-    own = replace(recorded(), smooth_hz=(50.0, 1e3, 5e3), smooth_ratio=(1.5, 2.5, 0.8))
-    string = replace(StringParameters(), length_m=StringParameters().length_m / 2 ** (semitones / 12))
-    modes, law = own.resonator(string, 10), resonator_of(string, 5)
-    rows = np.concatenate([np.repeat(law.omega, 2) ** 2, np.repeat(law.sigma, 2), np.zeros(20)])
-    header, tail = np.zeros(1, TABLE), Tail()
-    put_recorded(header[0], tail, own, 101)
-    table = np.concatenate([header.view(np.float64), *tail.parts])
-    correct(record_of(table, TABLE), np.array(astuple(string)), 10, rows)
-    np.testing.assert_allclose(rows[:20], np.concatenate([modes.omega**2, modes.sigma]), rtol=1e-12)
 
 
 def test_cancel_leaves_what_has_begun(shipped: dict[str, Patch], preset: Preset) -> None:
@@ -410,7 +391,8 @@ def test_reports_say_what_was_plucked(shipped: dict[str, Patch], preset: Preset)
     patch = changed(shipped["fretless_bass"], mod_wheel="none")
     stage, played = Compiled(patch, preset), drawn(patch, shipped["koto"], 9, 0.2)
     struck = [(frame, each) for frame, each in played if isinstance(each, NoteOn)]
-    keys = LoudKeys(patch, stage.player.ear, preset.info)
+    keys = stage.player.keys
+    assert isinstance(keys, StringKeys)
     for frame, event in struck:
         stage.handle(event, frame)
     rendered(stage, (), 200)
@@ -419,11 +401,12 @@ def test_reports_say_what_was_plucked(shipped: dict[str, Patch], preset: Preset)
     for report, (frame, event) in zip(reports, struck, strict=True):
         assert (report.key, report.channel, report.velocity) == (event.key, event.channel, event.velocity)
         assert report.frame == frame
-        found = keys.of_key(event.key, report.string if report.string >= 0 else None)
+        found = keys.string_of(event.key, report.string if report.string >= 0 else None)
         assert found is not None
-        assert report.parameters == found.string.parameters and report.modes == found.resonator.modes
-        assert report.gain == pytest.approx(found.gain, rel=1e-9)
-        pluck = on_string(found.string, patch.pluck.pluck(event.velocity))
+        assert report.parameters == found.parameters
+        pairs = min(of.MOST_PAIRS, found.modes) if patch.polarisations else 0
+        assert report.modes == found.modes + pairs and report.gain > 0
+        pluck = on_string(found, patch.pluck.pluck(event.velocity))
         plucked = report.position, report.amplitude_mm
         assert plucked == pytest.approx((pluck.position, pluck.amplitude_mm), rel=1e-12)
         if pluck.shape != "triangular":
@@ -546,14 +529,19 @@ def test_tables_are_freed_when_the_kernel_has_left_them(shipped: dict[str, Patch
     assert len(stage.player.compiled._tables) <= 2
 
 
-def test_a_parameter_changes_as_by_a_turned_patch(shipped: dict[str, Patch], preset: Preset) -> None:
-    patch = shipped["koto"]
+@pytest.mark.parametrize("id", [id for id in of.PLAYED[: of.POINT] if id in ASSIGNABLE])
+def test_a_parameter_changes_as_by_a_turned_patch(shipped: dict[str, Patch], preset: Preset, id: str) -> None:
+    """What rings, and what is struck later."""
+    pluck = shipped["koto"].pluck.model_copy(update={"release_ms": 4.0, "release_hard_ms": 2.0})
+    patch = changed(shipped["koto"], noise=Noise(onset_db=-20, release_db=-20), pluck=pluck)
+    value = OF_PATCHES[id].value(0.9 * OF_PATCHES[id].share(patch.value(id)) + 0.03)
     one, other = Compiled(patch, preset), Compiled(patch, preset)
     for stage in (one, other):
         rendered(stage, [(1, NoteOn(60, 90))], 10)
-    one.handle(PatchTurned(patch.with_value("knobs.decay", 3.0)), 0)
-    other.player.compiled.give(of.PARAMETER, key=PLAYED_PARAMETERS.index("knobs.decay"), value=3.0)
-    sounds = [rendered(stage, (), 200) for stage in (one, other)]
+    one.handle(PatchTurned(patch.with_value(id, value)), 0)
+    other.player.compiled.give(of.PARAMETER, key=of.PLAYED.index(id), value=value)
+    later = [(10, NoteOn(62, 90)), (3000, NoteOff(62)), (3000, NoteOff(60))]
+    sounds = [rendered(stage, later, 100) for stage in (one, other)]
     np.testing.assert_array_equal(*sounds)
 
 
@@ -582,41 +570,3 @@ def test_a_pluck_at_a_place_is_none_of_a_key(shipped: dict[str, Patch], preset: 
     assert stage.player.handle(PluckAt(Pluck())) == 0
     rendered(stage, (), 1)
     assert stage.player.reports() == [] and not stage.mixer.active
-
-
-def test_values_of_the_player_have_the_indices_of_its_layout() -> None:
-    indices = {
-        "knobs.stiffness": of.STIFFNESS,
-        "knobs.decay": of.DECAY,
-        "knobs.brightness_decay": of.BRIGHTNESS_DECAY,
-        "knobs.modulus": of.MODULUS_FACTOR,
-        "knobs.density": of.DENSITY_FACTOR,
-        "knobs.gauge": of.GAUGE,
-        "knobs.tension": of.TENSION_FACTOR,
-        "knobs.length": of.LENGTH_FACTOR,
-        "pluck.position": of.POSITION,
-        "pluck.width": of.WIDTH,
-        "pluck.width_hard": of.WIDTH_HARD,
-        "pluck.softest_mm": of.SOFTEST_MM,
-        "pluck.hardest_mm": of.HARDEST_MM,
-        "pluck.curve": of.CURVE,
-        "damping.release_t60_s": of.RELEASE_S,
-        "bend_semitones": of.BEND_SEMITONES,
-        "noise.onset_db": of.ONSET_DB,
-        "noise.release_db": of.DAMPER_DB,
-        "damping.mute": of.MUTE,
-        "technique.harmonic": of.HARMONIC,
-        "technique.strum_ms": of.STRUM_MS,
-        "technique.strokes": of.STROKES,
-        "technique.tremolo_hz": of.TREMOLO_HZ,
-        "technique.vibrato_cents": of.VIBRATO_CENTS,
-        "technique.vibrato_hz": of.VIBRATO_HZ,
-        "pluck.release_ms": of.CONTACT_MS,
-        "pluck.release_hard_ms": of.CONTACT_HARD_MS,
-        "javari.gap_um": of.JAVARI_UM,
-        "body.mix": of.BODY_MIX,
-        "pickup.points.0": of.POINT,
-        "pickup.points.1": of.POINT + 1,
-    }
-    assert {id: index for index, id in enumerate(PLAYED_PARAMETERS)} == indices
-    assert len(PLAYED_PARAMETERS) == of.VALUES

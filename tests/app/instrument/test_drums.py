@@ -21,7 +21,6 @@ from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import PatchError, read_patch
 from app.patches.patch import Noise, Patch
 from engine.kernels import constants as of
-from engine.kernels.records import PLAYER, slots
 from engine.pluck import Pluck
 from engine.presets import SHIPPED, load_preset
 from engine.values.drum import Mallet
@@ -144,22 +143,13 @@ def test_the_kernel_strikes_as_the_engine_does() -> None:
     mixer.set_player(player.compiled)
     player.handle(NoteOn(47, 90))
     player.compiled.catch_up(mixer.address)
-    first = slots(PLAYER)
-    from engine.kernels import layout as at
-
-    n = len(found.modes)
-    place = first + at.state(n) + n
-    assert np.allclose(player.compiled.memory[place : place + n], found.strike(90).speeds(found.modes), rtol=1e-9)
+    assert np.allclose(player.compiled.rows_of(0, 0)[1], found.strike(90).speeds(found.modes), rtol=1e-9)
 
 
 def test_a_blow_at_a_place_of_its_own_moves_the_modes_of_that_place() -> None:
     """As the engine says; at its own place it is the same blow as without a place."""
-    from engine.kernels import layout as at
-
     found = DrumKeys(KIT, Ear((0.5,))).of_key(47)
     assert found is not None
-    n = len(found.modes)
-    place = slots(PLAYER) + at.state(n) + n
 
     def speeds(where: tuple[float, float] | None) -> np.ndarray:
         player, mixer = InstrumentPlayer(KIT, PRESET, RATE_HZ, {"truth": 1.0}), Mixer(RATE_HZ)
@@ -168,7 +158,7 @@ def test_a_blow_at_a_place_of_its_own_moves_the_modes_of_that_place() -> None:
         assert len(player.compiled._struck) == (where is not None)
         player.reports()
         assert not player.compiled._struck, "its memory is free"
-        return player.compiled.memory[place : place + n].copy()
+        return player.compiled.rows_of(0, 0)[1].copy()
 
     own = speeds(None)
     np.testing.assert_array_equal(speeds(found.played.place), own)

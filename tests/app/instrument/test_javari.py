@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from app.instrument.events import Bend, Event, NoteOff, NoteOn, PatchTurned
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Course, Javari, Patch, Pickup
-from engine.kernels import layout as at
+from engine.kernels.constants import QUANTUM
+from engine.kernels.voice_records import COUPLING, JAVARI, OMEGA_SQUARED, SIGMA, STRETCH
 from engine.presets import Preset
 from engine.values.string import Polarisations
 from tests.app.instrument.test_techniques import KEY, RATE_HZ, play
@@ -29,15 +30,11 @@ def buzzing(patch: Patch, **edge: float) -> Patch:
 class Equation:
     """That of a voice, from its memory."""
 
-    def __init__(self, voice: NDArray[np.float64]) -> None:
-        n = int(voice.view(np.int64)[at.MODES])
-        rows = voice[at.state(n) : at.state(n) + at.TRUTH_ROWS * n].reshape(-1, n)
-        self.q, self.squares, self.sigma = rows[0].copy(), rows[at.OMEGA_SQUARED].copy(), rows[at.SIGMA].copy()
-        self.coupling, self.stretch = rows[at.COUPLING].copy(), rows[at.STRETCH].copy()
-        self.shapes, self.mass = rows[at.JAVARI].copy(), voice[at.JAVARI_MASS]
-        self.gap, self.stiffness, self.loss = (
-            voice[slot] for slot in (at.JAVARI_GAP, at.JAVARI_STIFFNESS, at.JAVARI_LOSS)
-        )
+    def __init__(self, voice: np.void, rows: NDArray[np.float64]) -> None:
+        self.q, self.squares, self.sigma = rows[0].copy(), rows[OMEGA_SQUARED].copy(), rows[SIGMA].copy()
+        self.coupling, self.stretch = rows[COUPLING].copy(), rows[STRETCH].copy()
+        self.shapes, self.mass = rows[JAVARI].copy(), voice["javari"]["mass_kg"]
+        self.gap, self.stiffness, self.loss = (voice["javari"][name] for name in ("gap_m", "stiffness", "loss"))
 
     def energy(self, states: NDArray[np.float64]) -> NDArray[np.float64]:
         """In J, of states (quanta, 2, 1, modes): of motion, strings, the rise of their tension, and the edge."""
@@ -60,7 +57,7 @@ def watched(
     """A note before its first quantum is rendered, whose equation has the modes of its first."""
     note = Watched(patch, preset, source, velocity, key)
     note.player.compiled.catch_up(note.mixer.address)
-    return note, Equation(note.voices()[0])
+    return note, Equation(*note.voices()[0])
 
 
 @pytest.mark.parametrize("loss", [0.0, 0.5])
@@ -87,7 +84,7 @@ def test_truth_is_the_solution_of_its_equation(patch: Patch, preset: Preset) -> 
     note, equation = watched(buzzing(patch, stiffness_n_m=1e4), preset, "truth", key=88)
     assert equation.stiffness == 1e4
     quanta = 30
-    times_s = np.arange(1, quanta + 1) * at.QUANTUM / RATE_HZ
+    times_s = np.arange(1, quanta + 1) * QUANTUM / RATE_HZ
     first = np.concatenate([equation.q, np.zeros_like(equation.q)])
     solved = scipy.integrate.solve_ivp(
         equation.rates, (0, times_s[-1] + 1e-9), first, "DOP853", times_s, rtol=1e-9, atol=1e-14, max_step=2e-6
@@ -142,13 +139,13 @@ def test_the_push_of_the_edge_is_heard_in_the_force_on_the_bridge(patch: Patch, 
     note, _ = watched(changed(buzzing(patch, gap_um=0), pickup=Pickup(kind="bridge")), preset, source)
     heard, pushes = [], []
     for _ in range(600):
-        heard.append(note.mixer.render(at.QUANTUM)[:, 0].mean())
-        pushes.append(note.voices()[0][at.JAVARI_FORCE])
-    pushed = note.notes[0].gain * note.voices()[0][at.JAVARI_HEARD] * np.mean(pushes)
+        heard.append(note.mixer.render(QUANTUM)[:, 0].mean())
+        pushes.append(note.voices()[0][0]["javari"]["force"])
+    pushed = note.notes[0].gain * note.voices()[0][0]["javari"]["heard"] * np.mean(pushes)
     assert pushed > 0
     assert abs(np.mean(heard)) < 0.2 * pushed
     point, _ = watched(buzzing(patch), preset, source)
-    assert point.voices()[0][at.JAVARI_HEARD] == 0
+    assert point.voices()[0][0]["javari"]["heard"] == 0
 
 
 @pytest.mark.parametrize("stops", [True, False])

@@ -24,26 +24,27 @@ from app.instrument.events import (
     TimedEvent,
 )
 from app.instrument.offline import BLOCK_FRAMES, SILENT_DB, OfflinePlayer, channels_played, render_events, render_note
+from app.instrument.strings import Strings
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
 from app.patches.patch import WHEEL, Body, Damping, Fretted, Knobs, Patch, Pickup, PluckChoices
 from engine import bounds
-from engine.excitation import blow_factor, release_factor
+from engine.excitation import blow_factor
 from engine.kernels import constants as of
-from engine.kernels.constants import WANTED_DB
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM, WANTED_DB
 from engine.kernels.loudness import k_weight
 from engine.kernels.playing.notes import PLUCK_STOPS_S
+from engine.kernels.pulses import spectrum
 from engine.levels import FULL_SCALE_M
 from engine.presets import Preset, load_preset
 from engine.presets.finding import SHIPPED
+from engine.resonators.string import resonator_of
 from engine.values.ear import Ear
 from engine.values.effects import Room
 from engine.values.string import StringParameters
 from engine.voices import Mixer, Voice, plain_program
 from engine.voices.ear import weights_of
 from engine.voices.player import Report
-from tests.app.instrument.loud import LoudKeys
 from tests.app.instrument.seen import Seen, seen, sounding, taken_up
 
 RATE_HZ = 48_000
@@ -201,15 +202,17 @@ def struck(patch: Patch, **pluck: object) -> Patch:
 def test_a_hammer_starts_the_string_from_rest_with_speeds(patch: Patch, preset: Preset) -> None:
     """Against modes in closed form, of a blow so soft that the string is linear."""
     soft = struck(patch, softest_mm=1e-3, hardest_mm=1e-3, release_ms=2.0, release_hard_ms=2.0)
-    found = LoudKeys(soft, Ear((0.37,)), preset.info).of_key(57)
+    heard = changed(soft, pickup=Pickup(points=(0.37,)))
+    found, stage = Strings(soft).of_key(57), Stage(heard, preset)
     assert found is not None
-    modes, shape = found.resonator, soft.pluck.pluck(64).displacement(preset.info.grid_points)
-    amplitudes = modes.to_modes(shape) * found.string.shortened * blow_factor(modes.omega, shape / 1e-6)
-    amplitudes *= release_factor(modes.omega, 2e-3) * (modes.shapes @ weights_of(Ear((0.37,)), modes.points))[:, 0]
+    stage.play(NoteOn(57, 64))
+    modes = resonator_of(found.parameters, found.modes, grid_points=preset.info.grid_points)
+    shape = soft.pluck.pluck(64).displacement(modes.points)
+    amplitudes = modes.to_modes(shape) * found.shortened * blow_factor(modes.omega, shape / 1e-6)
+    amplitudes *= spectrum(modes.omega * 1e-3 / np.pi) * (modes.shapes @ weights_of(Ear((0.37,)), modes.points))[:, 0]
     t = np.arange(9_600) / RATE_HZ
     turns = np.exp(np.outer(t, 1j * np.sqrt(modes.omega**2 - modes.sigma**2) - modes.sigma)).imag
-    expected = found.gain / FULL_SCALE_M * turns @ amplitudes
-    heard = changed(soft, pickup=Pickup(points=(0.37,)))
+    expected = stage.begun()[0].gain / FULL_SCALE_M * turns @ amplitudes
     for source in ("model", "truth"):
         sound = play(heard, preset, 0.2, (0.0, NoteOn(57, 64)), source=source)
         np.testing.assert_allclose(sound[200:], expected[200:], atol=1e-3 * np.abs(expected).max())

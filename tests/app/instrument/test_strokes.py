@@ -27,7 +27,7 @@ from app.instrument.events import (
 )
 from app.patches.patch import Fretted, Patch, Pickup, Technique
 from engine.kernels import constants as of
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM
 from engine.kernels.playing.chords import CHORD_S, USUAL_STRUM_MS
 from engine.kernels.playing.hands import USUAL_TREMOLO_HZ
 from engine.kernels.playing.keys import USUAL_HARMONIC

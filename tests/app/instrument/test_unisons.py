@@ -15,9 +15,9 @@ from app.instrument.events import Bend, NoteOff, NoteOn
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Course, Fretted, Patch, Pickup, PluckChoices, Technique
 from engine.kernels import constants as of
-from engine.kernels import layout as at
-from engine.kernels.records import PLAYER, slots, voice_bytes
+from engine.kernels.constants import QUANTUM
 from engine.kernels.tension import physical as physical_of
+from engine.kernels.voice_records import TRUTH
 from engine.presets import Preset
 from engine.resonators.string import decay_rates, undamped_frequencies, wavenumbers
 from engine.values.string import Polarisations
@@ -29,7 +29,7 @@ from tests.app.instrument.test_techniques import KEY, RATE_HZ, play
 SOURCES = pytest.mark.parametrize("source", ["model", "truth"])
 STRINGS = pytest.mark.parametrize("strings", [2, 3])
 MOVING = Polarisations(angle_deg=30, second_cents=2, conductance_s_kg=0.02, second_conductance_s_kg=0.004)
-QUANTUM_S = at.QUANTUM / RATE_HZ
+QUANTUM_S = QUANTUM / RATE_HZ
 
 
 def changed(patch: Patch, **parts: object) -> Patch:
@@ -57,32 +57,28 @@ class Watched:
     def notes(self) -> list[Seen]:
         return seen(self.player)
 
-    def voices(self) -> list[NDArray[np.float64]]:
-        """Memory of the strings of the course, the first first."""
+    def voices(self) -> list[tuple[np.void, NDArray[np.float64]]]:
+        """The voices of the strings of the course, the first first, with their rows."""
         player, found = self.player.compiled, []
-        stride = voice_bytes(int(player.record["modes"])) // 8
         for number, note in enumerate(player.record["notes"]):
             if note["state"] == of.RINGS:
-                first = slots(PLAYER) + number * of.MOST_SOURCES * stride
-                found.append((int(note["age"]), player.memory[first : first + stride]))
-        return [voice for _, voice in sorted(found, key=lambda each: each[0])]
+                found.append((int(note["age"]), player.voice(number, 0), player.rows_of(number, 0)))
+        return [voice for _, *voice in sorted(found, key=lambda each: each[0])]
 
     def states(self, quanta: int) -> NDArray[np.float64]:
         """Amplitudes and speeds, (quanta, 2, strings, modes)."""
         found = []
         for _ in range(quanta):
-            self.mixer.render(at.QUANTUM)
-            found.append(np.array([state(voice) for voice in self.voices()]).transpose(1, 0, 2))
+            self.mixer.render(QUANTUM)
+            found.append(np.array([state(*voice) for voice in self.voices()]).transpose(1, 0, 2))
         return np.array(found)
 
 
-def state(voice: NDArray[np.float64]) -> NDArray[np.float64]:
+def state(voice: np.void, rows: NDArray[np.float64]) -> NDArray[np.float64]:
     """Amplitudes and speeds of a voice, (2, modes)."""
-    counts = voice.view(np.int64)
-    n = int(counts[at.MODES])
-    if counts[at.KIND] == at.TRUTH:
-        return voice[at.state(n) : at.state(n) + 2 * n].reshape(2, n).copy()
-    found = np.zeros((2, n))
+    if voice["kind"] == TRUTH:
+        return rows[:2].copy()
+    found = np.zeros((2, rows.shape[1]))
     physical_of(voice, found[0], found[1])
     return found
 

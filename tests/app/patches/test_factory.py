@@ -11,7 +11,7 @@ import pytest
 from app.instrument.drum_keys import DrumKeys, block_of
 from app.instrument.glide import glides_cents
 from app.instrument.offline import render_note
-from app.instrument.strings import KeyString, Strings, pitch_hz_of
+from app.instrument.strings import KeyString, Strings
 from app.patches.drums import Drums
 from app.patches.library import SHIPPED, file_stem, list_patches
 from app.patches.patch import CATEGORIES, Noise, Patch
@@ -82,7 +82,7 @@ def test_every_key_is_a_string_that_the_model_knows(patch: Patch) -> None:
     for string in strings:
         reported = f"key {string.key}: {string}"
         assert PITCH_RANGE_HZ[0] <= string.pitch_hz <= PITCH_RANGE_HZ[1], reported
-        assert pitch_hz_of(string.parameters) == pytest.approx(tuning.hz(string.key), rel=1e-6), reported
+        assert string.parameters.pitch_hz == pytest.approx(tuning.hz(string.key), rel=1e-6), reported
         assert inharmonicity(string.parameters) <= MOST_INHARMONIC, reported
         assert T60_RANGE_S[0] <= math.log(1000) / string.parameters.decay_rate(1) <= T60_RANGE_S[1], reported
         string.parameters.check_motion(string.modes, GRID_POINTS, 48_000, tension_modulated=True)

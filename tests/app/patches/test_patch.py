@@ -63,12 +63,6 @@ def test_impossible_values_are_refused_by_name(make_patch: Make, field: str, cha
         make_patch(**changes)
 
 
-def test_a_release_is_a_ratio_for_each_step_of_velocity() -> None:
-    slow = PluckChoices(release_ms=4.0, release_hard_ms=1.0)
-    assert [1000 * slow.release_s(velocity) for velocity in (1, 64, 127)] == pytest.approx([4.0, 2.0, 1.0])
-    assert PluckChoices().release_s(100) == 0.0
-
-
 def test_a_patch_survives_json(make_patch: Make) -> None:
     strings = StringSet(strings=tuple(OpenString(note=n, string=make_patch().strings.string) for n in (40, 45)))  # type: ignore[union-attr]
     whole = make_patch(strings=strings, macros=[Macro(name="m", targets=(Target(field="level_db", low=-3, high=3),))])

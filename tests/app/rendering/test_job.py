@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from app.playing.sources import Sources
 from app.rendering import SOURCES, BlowTake, RenderRequest, Take
 from app.rendering.job import Job
-from engine.metrics import ErrorSums
+from engine.compare.relative import ErrorSums
 from engine.pluck import Pluck
 from engine.presets import SHIPPED
 from engine.resonators.sine_transform import project

@@ -17,7 +17,7 @@ from app.playing.sources import Sources
 from app.rendering import BlowTake, RenderRequest, RenderWorker, Take
 from app.rendering import worker as worker_module
 from app.rendering.line import Line
-from engine.metrics import ErrorSums
+from engine.compare.relative import ErrorSums
 from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
 from engine.resonators.sine_transform import project

@@ -19,7 +19,6 @@ from app.views.stage import MARGIN_X
 from app.window.controller import FRAME_MS, IDLE_MS, Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings, load_settings
-from engine.kernels import layout as at
 from engine.values.ear import Ear
 
 LEFT = Qt.MouseButton.LeftButton
@@ -45,7 +44,7 @@ def gains(controller: Controller) -> dict[str, float]:
     (*_, note) = notes(controller)
     match = note.match or {}
     return {
-        name: float(voice.memory[at.WANTED_GAIN]) / (match.get(name, 1.0) or 1.0)
+        name: float(voice.record["wanted_gain"]) / (match.get(name, 1.0) or 1.0)
         for name, voice in note.voices.items()
     }
 

@@ -29,7 +29,7 @@ from app.shared.vocabulary import Source
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.settings import Settings
-from engine.kernels import layout as at
+from engine.kernels.constants import AHEAD, QUANTUM
 from engine.presets import SHIPPED, load_preset, of_string
 from engine.values.ear import PICKUPS
 from engine.voices import Mixer
@@ -105,7 +105,7 @@ def lab(qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterat
 
 def take(lab: Controller, seconds: float) -> Samples:
     """The next frames of the output, (frames, 2), in whole quanta: so what is played begins with the first."""
-    return lab.sound.mixer.render(round(seconds * RATE_HZ) // at.QUANTUM * at.QUANTUM).astype(np.float64)
+    return lab.sound.mixer.render(round(seconds * RATE_HZ) // QUANTUM * QUANTUM).astype(np.float64)
 
 
 def play_instrument(qtbot: QtBot, lab: Controller, patch: Patch) -> None:
@@ -134,11 +134,11 @@ def heard(qtbot: QtBot, lab: Controller, slot: str) -> Samples:
     lab.pluck()
     note = lab.instruments.latest
     assert isinstance(note, Note)
-    qtbot.waitUntil(lambda: not note.pending and all(each.finished for each in note.ahead))
+    qtbot.waitUntil(lambda: not note.pending and not any(each.wants_more for each in note.ahead))
     sound = take(lab, SECONDS)
     lab.performance.stop()
     take(lab, 0.05)
-    return sound[at.AHEAD :]
+    return sound[AHEAD:]
 
 
 def rendered(lab: Controller, source: Source) -> Samples:
@@ -172,7 +172,7 @@ def blind(qtbot: QtBot, lab: Controller) -> dict[str, Samples]:
     found = {}
     for sound, slot in (("A", "a"), ("B", "b")):
         dialog._audition(sound, again=True)  # type: ignore[arg-type]
-        found[slot] = take(lab, 0.3)[at.AHEAD :]
+        found[slot] = take(lab, 0.3)[AHEAD:]
         dialog._hush()
         take(lab, 0.05)
     dialog.abandon()

@@ -157,15 +157,14 @@ def test_a_pedal_that_is_lifted_meanwhile_is_up_afterwards(
 
 def test_the_volume_of_a_test_stays_what_it_was_begun_with(qtbot: QtBot, heard: Controller) -> None:
     """A fader that was taught to it moves the sound afterwards."""
-    from engine.kernels import layout as at
 
     heard.session.update(volume_db=-6.0)
     dialog = open_test(qtbot, heard)
     heard.instruments.midi.performed.emit({"volume_db": 12.0})
     qtbot.waitUntil(lambda: heard.session.choices.volume_db == 12.0)
-    assert heard.sound.mixer.memory[at.M_WANTED_VOLUME] == pytest.approx(10 ** (-6 / 20))
+    assert heard.sound.mixer.record["wanted_volume"] == pytest.approx(10 ** (-6 / 20))
     dialog.abandon()
-    qtbot.waitUntil(lambda: heard.sound.mixer.memory[at.M_WANTED_VOLUME] == pytest.approx(10 ** (12 / 20)))
+    qtbot.waitUntil(lambda: heard.sound.mixer.record["wanted_volume"] == pytest.approx(10 ** (12 / 20)))
 
 
 def test_closing_the_window_keeps_an_incomplete_record(qtbot: QtBot, heard: Controller, tmp_path: Path) -> None:

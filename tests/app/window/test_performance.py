@@ -23,7 +23,7 @@ from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.performance import Performance, growth_words
 from app.window.settings import Settings
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM
 from engine.models.koopman_var import KoopmanState, KoopmanVar
 from engine.pluck import Pluck
 from engine.presets import SHIPPED
@@ -45,7 +45,7 @@ def window(
     """With a device that makes no sound, a preset that sounds at once and one that is rendered first."""
     folder = tmp_path / "presets"
     folder.mkdir()
-    shutil.copy(SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors", folder / "bank.safetensors")
+    shutil.copy(SHIPPED / "studio_any_nylon_b3.safetensors", folder / "compiled.safetensors")
     shutil.copy(small_preset, folder / "rendered.safetensors")
     monkeypatch.setattr("app.presets.library.SHIPPED", folder)
     monkeypatch.setattr("app.playing.notes.LOOP_AHEAD_S", TURN_S)
@@ -53,7 +53,7 @@ def window(
     qtbot.addWidget(made)
     controller = Controller(
         made,
-        Settings(choices=Choices(instrument=SingleString(preset="bank"), seconds=1.0)),
+        Settings(choices=Choices(instrument=SingleString(preset="compiled"), seconds=1.0)),
         tmp_path / "settings.json",
         lambda on_problem: Sound(on_problem, look_up=lambda *_: SPEAKERS, open_output=numb_output),
     )
@@ -163,7 +163,7 @@ def next_turn(qtbot: QtBot, performance: Performance, before: Note) -> Note:
     return performance._shown.note
 
 
-@pytest.mark.parametrize("preset", ["bank", "rendered"])
+@pytest.mark.parametrize("preset", ["compiled", "rendered"])
 def test_a_loop_begins_each_turn_at_its_frame(
     qtbot: QtBot, window: Controller, performance: Performance, preset: str
 ) -> None:

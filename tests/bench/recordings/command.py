@@ -12,7 +12,6 @@ from training.cli.console import Failure, print_json, print_table, progress, say
 
 COLUMNS = ("figure", "median", "90 %", "N")
 GATE_COLUMNS = ("kind", "N", "refused", "fitted", "no string found", "kept")
-FITTED_EVERY = 20  # notes
 
 
 def recordings(
@@ -36,6 +35,9 @@ def recordings(
             min=0, metavar="N", help="Only which of N synthetic notes, and the folder's, are kept; --quick: no fit."
         ),
     ] = None,
+    fit_every: Annotated[
+        int, typer.Option("--fit-every", min=1, metavar="N", help="With --gate: one of N notes is fitted.")
+    ] = 20,
     synthetic: Annotated[
         int | None,
         typer.Option(min=1, metavar="N", help="Instead: N synthetic notes, how intervals hold them, or neighbours."),
@@ -83,7 +85,7 @@ def recordings(
             found[path.stem] = (read.samples, read.rate_hz)
     if gate is not None:
         with progress("bench recordings") as report:
-            ends = outcomes(found, gate, 0 if quick else FITTED_EVERY, progress=report)
+            ends = outcomes(found, gate, 0 if quick else fit_every, progress=report)
         print_json(as_data(ends)) if json else print_table(GATE_COLUMNS, rows(ends))
         return
     with progress("bench recordings") as report:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import interpolate, optimize, signal
 
+from engine.compare.relative import error_to_signal
 from training.recording.fit import LearnedNote, fit_note, fit_takes
 from training.recording.gate import examine
 from training.recording.glide import Glide
@@ -104,8 +105,7 @@ def _row(
 
     def error(learned: LearnedNote, begin_s: float = 0.0) -> float:
         first = round(begin_s * note.rate_hz)
-        wrong = truth[first:] - learned.render(t[first:])
-        return float(wrong @ wrong / max(float(truth[first:] @ truth[first:]), 1e-30))
+        return error_to_signal(learned.render(t[first:]), truth[first:])
 
     learned = fit_note(note, series)
     errors = errors_of(truth, learned.render(t), note.rate_hz, note.noise_power)
@@ -259,12 +259,11 @@ def _misses(truth: Array, sound: Callable[[Array], Array], t: Array, rate_hz: fl
     best, delay = np.inf, 0.0
     for _ in range(3):
         moved, _, more = aligned(truth, sound(np.maximum(t - delay, -FIT_BEGINS_S) * (1 + pitch)), rate_hz)
-        wrong = truth - moved
-        best = min(best, float(wrong @ wrong))
+        best = min(best, error_to_signal(moved, truth))
         if abs(more) < 1e-5 or abs(delay + more) > MOST_DELAY_S:
             break
         delay += more
-    return best / max(float(truth @ truth), 1e-30)
+    return best
 
 
 def below(learned: LearnedNote, rate_hz: float) -> LearnedNote:

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.effects import Body, Effects, apply
-from engine.effects.impulse import LOUDNESS_HZ, Impulse
-from engine.kernels import layout as at
+from engine.effects.impulse import Impulse
+from engine.kernels.constants import LOUDNESS_HIGH_HZ, LOUDNESS_LOW_HZ
 from engine.values.effects import Amp, Room
 from engine.voices import Mixer, Voice, plain_program
 
@@ -19,7 +19,7 @@ def pink(frames: int) -> NDArray[np.float64]:
     """Noise of equal power in each octave, (frames, 1)."""
     frequency_hz = np.fft.rfftfreq(frames, 1 / RATE_HZ)
     draw = np.random.default_rng(0).standard_normal((2, len(frequency_hz)))
-    heard = (frequency_hz > LOUDNESS_HZ[0]) & (frequency_hz < LOUDNESS_HZ[1])
+    heard = (frequency_hz > LOUDNESS_LOW_HZ) & (frequency_hz < LOUDNESS_HIGH_HZ)
     spectrum = np.where(heard, (draw[0] + 1j * draw[1]) / np.sqrt(np.maximum(frequency_hz, 1)), 0)
     found = np.fft.irfft(spectrum, frames)[:, None]
     return 0.1 * found / found.std()
@@ -38,7 +38,7 @@ CHOICES = [
 def test_the_mixer_gives_the_same_as_arrays_are_given(effects: Effects) -> None:
     sound = pink(60_000).astype(np.float32)
     voice = Voice.of_samples(plain_program(RATE_HZ), sound)
-    voice.memory.view(np.int64)[at.ATTACK] = 0
+    voice.record["attack"] = 0
     voice.sound_through_effects()
     mixer = Mixer(RATE_HZ, limited=False)
     mixer.set_effects(effects)

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
-from engine.effects.impulse import resampled
+from engine.effects.responses import resampled
 from engine.effects.room import room_response
 from engine.values.effects import Room
 

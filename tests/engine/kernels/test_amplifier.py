@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.effects.amp import NOMINAL, amplified, factors
+from engine.effects.amp import amplified
 from engine.kernels import amplifier
-from engine.kernels import layout as at
+from engine.kernels.constants import QUANTUM
+from engine.kernels.mixer_records import MIXER
 from engine.values.effects import Amp
 
 RATE_HZ = 48_000
@@ -32,10 +33,11 @@ def spectrum(sound: NDArray[np.float64]) -> NDArray[np.float64]:
 def test_harmonics_are_those_of_its_shape(drive_db: float) -> None:
     """By a sum over one period of x/√(1 + x²), which knows neither filters nor rates."""
     periods, sound = tone(1_000, 0.1)
-    amp = Amp(drive_db)
-    found = spectrum(amplified(amp, sound, RATE_HZ))
+    found = spectrum(amplified(Amp(drive_db), sound, RATE_HZ))
     hz = periods * RATE_HZ / SIZE
-    drive, gain, _ = factors(amp)
+    mixer = np.zeros(1, MIXER)[0]
+    amplifier.drive(mixer, drive_db, 0.0, 0.0)
+    drive, gain = mixer["amplifier"]["wanted_drive"], mixer["amplifier"]["wanted_gain"]
     low = amplifier.COUPLING_HZ / hz
     angle = 2 * np.pi * np.arange(4096) / 4096
     x = amplifier.BIAS + drive * 0.1 / np.sqrt(1 + low**2) * np.sin(angle)
@@ -56,7 +58,7 @@ def test_aliases_of_5_khz_at_full_drive_are_80_db_below(rate_hz: int) -> None:
 
 @pytest.mark.parametrize("drive_db", [1.0, 12.0, FULL_DB])
 def test_a_tone_of_nominal_level_keeps_it(drive_db: float) -> None:
-    _, sound = tone(1_000, NOMINAL)
+    _, sound = tone(1_000, amplifier.NOMINAL)
     found = amplified(Amp(drive_db), sound, RATE_HZ)
     assert 20 * np.log10(found[-SIZE:].std() / sound.std()) == pytest.approx(0, abs=3)
 
@@ -75,21 +77,21 @@ def test_tone_raises_one_side_and_lowers_the_other() -> None:
 
 
 def test_off_it_leaves_every_sample_and_is_switched_without_a_click() -> None:
-    _, sound = tone(200, 0.1, 64 * at.QUANTUM)
+    _, sound = tone(200, 0.1, 64 * QUANTUM)
     np.testing.assert_array_equal(amplified(Amp(), sound, RATE_HZ), sound)
-    mixer = np.zeros(at.MIXER_SLOTS)
-    mixer[at.M_RATE] = RATE_HZ
-    mix, found = mixer[at.M_MIX : at.M_MIX + 2 * at.QUANTUM].reshape(at.QUANTUM, 2), []
-    for number, first in enumerate(range(0, len(sound), at.QUANTUM)):
-        mixer[at.M_AMPLIFIER : at.M_AMPLIFIER + 3] = factors(Amp(6.0 if 10 <= number < 40 else 0.0))
-        mix[:] = sound[first : first + at.QUANTUM]
+    mixer = np.zeros(1, MIXER)[0]
+    mixer["rate_hz"] = RATE_HZ
+    mix, found = mixer["mix"], []
+    for number, first in enumerate(range(0, len(sound), QUANTUM)):
+        amplifier.drive(mixer, 6.0 if 10 <= number < 40 else 0.0, 0.0, 0.0)
+        mix[:] = sound[first : first + QUANTUM]
         amplifier.amplify(mixer)
-        mixer.view(np.int64)[at.M_FRAMES] += at.QUANTUM
+        mixer["frames"] += QUANTUM
         found.append(mix.copy())
     whole = np.concatenate(found)[:, 0]
     assert np.abs(np.diff(whole)).max() < 1.6 * np.abs(np.diff(sound[:, 0])).max()
-    assert not np.array_equal(whole[30 * at.QUANTUM : 31 * at.QUANTUM], sound[30 * at.QUANTUM : 31 * at.QUANTUM, 0])
-    np.testing.assert_array_equal(whole[60 * at.QUANTUM :], sound[60 * at.QUANTUM :, 0])
+    assert not np.array_equal(whole[30 * QUANTUM : 31 * QUANTUM], sound[30 * QUANTUM : 31 * QUANTUM, 0])
+    np.testing.assert_array_equal(whole[60 * QUANTUM :], sound[60 * QUANTUM :, 0])
 
 
 def test_it_is_silent_before_any_input() -> None:

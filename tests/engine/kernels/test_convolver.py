@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from engine.effects import Body, Effects, Impulse, apply
-from engine.kernels import layout as at
+from engine.kernels.constants import AHEAD, QUANTUM
+from engine.kernels.fields import record_of
+from engine.kernels.mixer_records import CONVOLVER, WINDOW
 from engine.values.effects import Room
 from engine.voices import Mixer, Voice, plain_program
 
 RATE_HZ = 48_000
-WINDOW = at.WINDOW
 
 
 def noise(frames: int, points: int = 2, seed: int = 1) -> NDArray[np.float32]:
@@ -26,7 +27,7 @@ def of(samples: NDArray[np.float32], gain: float = 1.0) -> Voice:
     voice = Voice.of_samples(plain_program(RATE_HZ), samples)
     voice.start_with_gain(gain)
     voice.sound_through_effects()
-    voice.memory.view(np.int64)[at.ATTACK] = 0
+    voice.record["attack"] = 0
     return voice
 
 
@@ -46,7 +47,7 @@ def mixer_with(effects: Effects | None, samples: NDArray[np.float32] | None = No
 
 def is_awake(mixer: Mixer) -> bool:
     assert mixer._convolver is not None
-    return bool(mixer._convolver.view(np.int64)[at.C_ACTIVE])
+    return bool(record_of(mixer._convolver, CONVOLVER)["active"])
 
 
 EDGES = [1, 63, 64, 65, 2 * WINDOW - 1, 2 * WINDOW, 2 * WINDOW + 1, 3 * WINDOW, 3 * WINDOW + 1, 20_000]
@@ -99,7 +100,7 @@ def test_another_response_is_faded_to_and_what_was_played_rings_on(at_frame: int
     first = mixer.render(at_frame)
     mixer.set_effects(other)
     found = np.concatenate([first, mixer.render(frames - at_frame)])
-    next_quantum = -(-at_frame // at.QUANTUM) * at.QUANTUM
+    next_quantum = -(-at_frame // QUANTUM) * QUANTUM
     begin = -(-next_quantum // WINDOW) * WINDOW + WINDOW
     padded = np.pad(samples, ((0, frames - len(samples)), (0, 0)))
     before, after = apply(one, padded, RATE_HZ), apply(other, padded, RATE_HZ)
@@ -247,9 +248,9 @@ def test_volume_and_limiter_come_after_it() -> None:
     mixer = Mixer(RATE_HZ)
     mixer.set_effects(effects)
     mixer.set_volume(0.25)
-    mixer.memory[at.M_VOLUME] = 0.25
+    mixer.record["volume"] = 0.25
     mixer.add(of(samples))
     found = mixer.render(20_000)
     assert mixer.take_reduction_db() == 0.0
     expected = 0.25 * apply(effects, samples, RATE_HZ)
-    np.testing.assert_allclose(found[at.AHEAD :], expected[: -at.AHEAD], atol=1e-6)
+    np.testing.assert_allclose(found[AHEAD:], expected[:-AHEAD], atol=1e-6)

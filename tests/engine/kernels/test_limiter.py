@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
 from engine.kernels.limiter import AHEAD, CEILING, STEEPEST
 from engine.voices import Mixer, Voice, plain_program
 from engine.voices.mixer import LIMITER_RELEASE_S
@@ -21,7 +20,7 @@ def limited(sound: Sound, block: int = 1000, channels: int = 2) -> Sound:
     """As a device is given it, without the delay."""
     voice = Voice.of_samples(plain_program(RATE_HZ), sound)
     voice.start_with_gain(1.0)
-    voice.memory.view(np.int64)[at.ATTACK] = 0
+    voice.record["attack"] = 0
     mixer = Mixer(RATE_HZ, channels)
     mixer.add(voice)
     total = len(sound) + AHEAD

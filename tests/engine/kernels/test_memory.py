@@ -9,9 +9,11 @@ import pytest
 from numba import njit
 
 from engine.effects import Effects
-from engine.kernels import layout as at
 from engine.kernels.compiled import COMPILED
+from engine.kernels.fields import slot
 from engine.kernels.memory import publish
+from engine.kernels.mixer_records import MIXER
+from engine.kernels.voice_records import VOICE
 from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
 from engine.resonators.string import resonator_of
@@ -61,26 +63,25 @@ def test_samples_and_voices_are_published_when_they_are_there(published: Publish
     samples = np.full((100, 1), 0.25, np.float32)
     rendered = Voice(plain_program(RATE_HZ), np.full(3, FULL_SCALE_M), Ear((0.5,)), 1.0, 1.0, RATE_HZ)
     rendered.append(samples)
-    assert published == [(at.READY, 100)]
-    assert rendered.memory.view(np.int64)[at.READY] == 0
+    assert published == [(slot(VOICE, "ready"), 100)]
+    assert rendered.record["ready"] == 0
     assert rendered._samples is not None
     np.testing.assert_array_equal(rendered._samples[:100], samples)
     mixer, voices = Mixer(RATE_HZ), [string_voice(), string_voice()]
     mixer.add(*voices)
-    counts = mixer.memory.view(np.int64)
-    assert published[1:] == [(at.M_PUSHED, 2)]
-    assert [int(each) for each in counts[at.M_RING : at.M_RING + 2]] == [each.address for each in voices]
-    assert counts[at.M_PUSHED] == 0
+    assert published[1:] == [(slot(MIXER, "pushed"), 2)]
+    assert mixer.record["ring"][:2].tolist() == [each.address for each in voices]
+    assert mixer.record["pushed"] == 0
 
 
 def test_listening_points_are_published(published: Published) -> None:
     voice = string_voice()
     voice.listen(Ear((0.2,)))
-    assert [each for each, _ in published] == [at.NEXT_WEIGHTS]
-    assert voice.memory.view(np.int64)[at.NEXT_WEIGHTS] == 0
+    assert [each for each, _ in published] == [slot(VOICE, "next_weights")]
+    assert voice.record["next_weights"] == 0
 
 
 def test_a_response_is_published_after_the_convolver(published: Published) -> None:
     mixer = Mixer(RATE_HZ)
     mixer.set_effects(Effects(room=Room(mix=0.5)))
-    assert [slot for slot, _ in published] == [at.M_CONVOLVER, at.M_EFFECTS]
+    assert [place for place, _ in published] == [slot(MIXER, "convolver"), slot(MIXER, "effects")]

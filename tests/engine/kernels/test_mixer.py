@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
+from engine.kernels.constants import AHEAD
 from engine.kernels.limiter import LARGEST_LEVEL
 from engine.kernels.mixer import TONE_HZ, TONE_LEVEL, UNDERFLOW, call
+from engine.kernels.mixer_records import GAPS, MOST_VOICES, RING
 from engine.voices import Mixer, Voice, plain_program
 from engine.voices.mixer import VOLUME_SMOOTHING_S
 
 RATE_HZ = 48_000
-AHEAD = at.AHEAD  # by so much is late what goes through the limiter
+AHEAD = AHEAD  # by so much is late what goes through the limiter
 
 
 def noise(frames: int, points: int = 2, level: float = 0.4) -> NDArray[np.float32]:
@@ -25,7 +26,7 @@ def noise(frames: int, points: int = 2, level: float = 0.4) -> NDArray[np.float3
 def of(samples: NDArray[np.float32], gain: float = 1.0) -> Voice:
     voice = Voice.of_samples(plain_program(RATE_HZ), samples)
     voice.start_with_gain(gain)
-    voice.memory.view(np.int64)[at.ATTACK] = 0
+    voice.record["attack"] = 0
     return voice
 
 
@@ -75,7 +76,7 @@ def test_one_wild_sample_is_soon_forgotten() -> None:
     wild[100] = 19.0
     mixer.add(of(wild, 20_000.0))  # a gain that nothing in the app asks for
     mixer.render(128)
-    level = float(mixer.memory[at.M_LIMITER])
+    level = float(mixer.record["limiter"])
     assert level <= LARGEST_LEVEL
 
 
@@ -183,20 +184,20 @@ def test_an_underflow_counts_as_a_gap_where_something_sounds() -> None:
 def test_of_very_many_gaps_the_latest_are_reported() -> None:
     mixer = Mixer(RATE_HZ)
     mixer.add(of(noise(48_000)))
-    for number in range(at.GAPS + 20):
+    for number in range(GAPS + 20):
         ask(mixer, 64, UNDERFLOW, now_s=number / 100)
     gaps = mixer.new_gaps()
-    assert len(gaps) == at.GAPS
-    assert gaps[-1].time_s == (at.GAPS + 19) * 64 / RATE_HZ
+    assert len(gaps) == GAPS
+    assert gaps[-1].time_s == (GAPS + 19) * 64 / RATE_HZ
 
 
 def test_beyond_the_last_place_voices_are_refused_and_over() -> None:
     mixer = Mixer(RATE_HZ)
-    voices = [of(noise(2000, level=0.001)) for _ in range(at.MOST_VOICES + 3)]
+    voices = [of(noise(2000, level=0.001)) for _ in range(MOST_VOICES + 3)]
     mixer.add(*voices)
     mixer.render(64)
-    assert [voice.over for voice in voices] == [False] * at.MOST_VOICES + [True] * 3
-    assert len(mixer.voices) == at.MOST_VOICES
+    assert [voice.over for voice in voices] == [False] * MOST_VOICES + [True] * 3
+    assert len(mixer.voices) == MOST_VOICES
     mixer.render(4000)
     assert mixer.voices == []
     late = of(noise(2000))
@@ -207,9 +208,9 @@ def test_beyond_the_last_place_voices_are_refused_and_over() -> None:
 def test_a_full_ring_refuses_and_reports() -> None:
     mixer = Mixer(RATE_HZ)
     samples = noise(64)
-    voices = [of(samples) for _ in range(at.RING + 2)]
+    voices = [of(samples) for _ in range(RING + 2)]
     mixer.add(*voices)  # and nobody takes any
-    assert [voice.over for voice in voices] == [False] * at.RING + [True] * 2
+    assert [voice.over for voice in voices] == [False] * RING + [True] * 2
     another = of(samples)
     mixer.add(another)
     assert another.over

@@ -10,7 +10,7 @@ import pytest
 import soxr
 from numpy.typing import NDArray
 
-from engine.kernels.layout import QUANTUM
+from engine.kernels.constants import QUANTUM
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import PresetInfo
 from engine.values.ear import Ear

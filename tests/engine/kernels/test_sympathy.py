@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from engine.kernels.records import SYMPATHY
 from engine.kernels.sympathy import NOTHING, ring
 
 RATE_HZ = 48_000
@@ -17,9 +18,13 @@ def partials(omega: np.ndarray, sigma: np.ndarray, lost: np.ndarray) -> tuple[np
 
 
 def rung(force: np.ndarray, rows: tuple[np.ndarray, ...], played: np.ndarray | None = None) -> np.ndarray:
-    count = len(rows[0])
-    x, y, out = np.zeros(count), np.zeros(count), np.zeros(len(force))
-    ring(x, y, *rows, np.zeros(count) if played is None else played, force, out)
+    bank, count, out = np.zeros(1, SYMPATHY)[0], len(rows[0]), np.zeros(len(force))
+    bank["partials"] = count
+    for name, row in zip(("cosine", "sine", "gain"), rows, strict=True):
+        bank[name][:count] = row
+    if played is not None:
+        bank["played"][:count] = played
+    ring(bank, force, out)
     return out
 
 

@@ -9,8 +9,10 @@ import pytest
 import torch
 from numpy.typing import NDArray
 
-from engine.kernels import layout, tension
-from engine.kernels.modes import row
+from engine.kernels import tension
+from engine.kernels.constants import QUANTUM
+from engine.kernels.fields import record_of
+from engine.kernels.voice_records import TENSION_PROGRAM
 from engine.levels import FULL_SCALE_M, FULL_SCALE_N
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
@@ -108,12 +110,12 @@ def test_what_is_set_out_comes_back(shipped: Callable[[str], Preset]) -> None:
     alike = np.sqrt(0.5 / info.resonator.relative_tension_rise(np.ones(info.modes))) * np.ones(info.modes)
     states = [ringing(info, 1), ringing(info, 301), ringing(info, 2_000), (alike, alike * info.resonator.omega)]
     for q, v in states:
-        memory = Voice(program, info.resonator.to_grid(q), STEREO, begin=(q, v)).memory
-        tension.prepare(memory, program.memory, q, v)
-        tension.set_out(memory, q, v, False)
-        assert relative(row(memory, len(q), 0), q) > 1e-6
+        voice = Voice(program, info.resonator.to_grid(q), STEREO, begin=(q, v))
+        tension.prepare(voice.record, record_of(program.memory, TENSION_PROGRAM), q, v)
+        tension.set_out(voice.record, q, v, False)
+        assert relative(voice.rows[0], q) > 1e-6
         back_q, back_v = np.empty_like(q), np.empty_like(v)
-        tension.physical(memory, back_q, back_v)
+        tension.physical(voice.record, back_q, back_v)
         assert relative(back_q, q) < 1e-14
         assert relative(back_v, v) < 1e-14
 
@@ -129,8 +131,8 @@ def test_a_string_retuned_to_its_own_modes_does_not_change(shipped: Callable[[st
         for _ in range(100):
             if retuned:
                 voice.retune(info.resonator, 0.0)
-            heard.append(mixer.render(layout.QUANTUM))
-        latents.append(np.concatenate([row(voice.memory, len(q), 0), row(voice.memory, len(q), 1)]))
+            heard.append(mixer.render(QUANTUM))
+        latents.append(voice.rows[:2].ravel())
     np.testing.assert_allclose(np.concatenate(heard[100:]), np.concatenate(heard[:100]), rtol=0, atol=1e-7)
     assert relative(latents[1], latents[0]) < 1e-12
 

@@ -16,10 +16,11 @@ from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo
 from engine.resonators.sine_transform import to_grid, to_modes
 from engine.sources import TruthSource
-from engine.truth import ModalState, solve_dop853, solve_linear
+from engine.truth import ModalState, solve_dop853
 from engine.values.ear import Ear
 from engine.voices import Voice, truth_program
 from engine.voices.ear import weights_of
+from tests.engine.tensors import solve_linear
 
 STEREO = Ear((0.37, 0.8))
 Rung = Callable[..., NDArray[np.float64]]

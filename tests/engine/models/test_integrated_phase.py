@@ -15,9 +15,9 @@ from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.integrated_phase import GAIN_LIMIT, IntegratedPhase
 from engine.resonators.sine_transform import synthesis_matrix
 from engine.resonators.string import resonator_of
-from engine.truth import ModalState, SplittingSolver, solve_linear
+from engine.truth import ModalState, SplittingSolver
 from engine.values.string import StringParameters
-from tests.engine.tensors import draw, listening_weights, to_grid, to_modes
+from tests.engine.tensors import draw, listening_weights, solve_linear, to_grid, to_modes
 
 SMALL = {"encoder_widths": (12,), "eigenvalue_widths": (12, 12)}
 KINDS: tuple[dict, ...] = (

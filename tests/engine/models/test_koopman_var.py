@@ -10,9 +10,9 @@ from engine.models.base import Physics, count_parameters
 from engine.models.configurations import KoopmanVarConfiguration
 from engine.models.koopman_var import KoopmanVar
 from engine.resonators.string import resonator_of
-from engine.truth import ModalState, solve_linear
+from engine.truth import ModalState
 from engine.values.string import StringParameters
-from tests.engine.tensors import listening_weights, to_grid
+from tests.engine.tensors import listening_weights, solve_linear, to_grid
 
 REFERENCE = Path(__file__).parent / "references" / "koopman_var.npz"
 

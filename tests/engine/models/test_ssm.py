@@ -12,9 +12,9 @@ from engine.models.lru import LRU
 from engine.models.s5 import S5
 from engine.models.ssm import Block, SSMString, evolve, recur
 from engine.resonators.string import resonator_of
-from engine.truth import ModalState, solve_linear
+from engine.truth import ModalState
 from engine.values.string import StringParameters
-from tests.engine.tensors import listening_weights, to_grid
+from tests.engine.tensors import listening_weights, solve_linear, to_grid
 
 PHYSICS = Physics(resonator_of(StringParameters(), 10, grid_points=21), 4_000)
 NAMES = ("lru", "s5")

@@ -15,8 +15,9 @@ from engine.models import build_model
 from engine.models.base import Physics
 from engine.resonators import Resonator
 from engine.resonators.string import resonator_of
-from engine.truth import ModalState, SplittingSolver, solve_dop853, solve_linear
+from engine.truth import ModalState, SplittingSolver, solve_dop853
 from engine.values.string import StringParameters
+from tests.engine.tensors import solve_linear
 
 SIDES_M = (0.30, 0.22)
 POINTS = (9, 7)  # of the grid, edges included

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import astuple, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from engine.kernels import strings
 from engine.resonators.losses import loss_rates
 from engine.resonators.string import undamped_frequencies
 from engine.values.string import Losses, StringParameters
@@ -34,12 +33,6 @@ def test_air_takes_a_tenth_of_a_millimetre_of_steel_a_thousandth() -> None:
     thin = replace(thin, tension_n=(2 * 440 * thin.length_m) ** 2 * thin.mass_per_length_kg_m, youngs_modulus_pa=0.0)
     by_hand = math.pi * (1.8e-5 + 2e-4 * math.sqrt(math.pi * 1.8e-5 * 1.2 * 440)) / 2.4662e-4
     assert float(loss_rates(Losses(1.0, 0.0, 0.0), thin, 1)[0]) == pytest.approx(by_hand, rel=1e-3)
-
-
-def test_compiled_rows_have_the_same_decay() -> None:
-    losses, found = Losses(1.3, 3e-4, 0.05), np.empty(4 * 50)
-    strings.rows(np.array(astuple(STEEL)), 50, 0, 1.0, 0.0, 0.0, 2 * 1.3, 0.5 * 3e-4, 0.5 * 0.05, found)
-    np.testing.assert_allclose(found[50:100], loss_rates(losses, STEEL, 50, 2.0, 0.5), rtol=1e-12)
 
 
 def test_impossible_losses_are_refused() -> None:

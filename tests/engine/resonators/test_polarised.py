@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple
-
 import numpy as np
 import pytest
 import torch
 
 from engine.kernels import strings
+from engine.kernels.constants import MOST_PAIRS
 from engine.models.base import Physics
 from engine.models.koopman_tension import KoopmanTension
 from engine.pluck import Pluck
 from engine.presets import load_preset
 from engine.presets.finding import SHIPPED
-from engine.resonators.polarised import PAIRS, layout, polarised_resonator
+from engine.resonators.base import Resonator
 from engine.resonators.string import resonator_of
 from engine.truth.oracle import solve_dop853
 from engine.truth.splitting import SplittingSolver
@@ -26,8 +25,33 @@ MOVING = Polarisations(angle_deg=40, second_heard=0.25, second_cents=2.0, conduc
 PLUCK = Pluck(0.17, 3.0, "rounded", 0.08)
 
 
+def polarised(moving: Polarisations, string: StringParameters, partials: int, decay: float = 1.0) -> Resonator:
+    """Pairs of modes, then single ones; `decay`: of the bridge's conductances."""
+    law, pairs = resonator_of(string, partials), min(MOST_PAIRS, partials)
+    modes = range(partials + pairs)
+    partial = [strings.partial_of(mode, pairs) - 1 for mode in modes]
+    direction = [strings.direction_of(mode, pairs) for mode in modes]
+    conductances = decay * moving.conductance_s_kg, decay * moving.second_conductance_s_kg
+    rows = np.empty(4 * len(modes))
+    strings.rows(string.row, len(modes), pairs, moving.detuning, *conductances, 0.0, 0.0, 0.0, rows)
+    squares, sigma, coupling, stretch = rows.reshape(4, -1)
+    pulled, heard = (np.array(each)[direction] for each in (moving.pulled, moving.heard))
+    pulled[2 * pairs :] = 1 / moving.heard[0]  # so that it is heard as the others are
+    assert law.end_force is not None and law.analysis is not None
+    return Resonator(
+        omega=np.sqrt(squares),
+        sigma=sigma,
+        coupling=coupling,
+        stretch=stretch,
+        tension_rise=law.tension_rise,
+        shapes=law.shapes[partial] * heard[:, None],
+        analysis=law.analysis[:, partial] * pulled,
+        end_force=law.end_force[partial] * heard,
+    )
+
+
 def test_a_pluck_is_heard_as_high_as_it_is_pulled() -> None:
-    resonator, law = polarised_resonator(MOVING, STRING, 60), resonator_of(STRING, 60)
+    resonator, law = polarised(MOVING, STRING, 60), resonator_of(STRING, 60)
     displacement = PLUCK.displacement(101)
     heard = resonator.to_grid(resonator.to_modes(displacement))
     np.testing.assert_allclose(heard, law.to_grid(law.to_modes(displacement)), atol=1e-12)
@@ -37,8 +61,8 @@ def test_a_pluck_is_heard_as_high_as_it_is_pulled() -> None:
 
 def test_without_an_angle_it_moves_as_one_string() -> None:
     plain = Polarisations(0.0, 0.0, 0.0, 0.0, 0.0)
-    state = ModalState.at_rest(polarised_resonator(plain, STRING, 30).to_modes(PLUCK.displacement(101))[None])
-    paired = polarised_resonator(plain, STRING, 30)
+    state = ModalState.at_rest(polarised(plain, STRING, 30).to_modes(PLUCK.displacement(101))[None])
+    paired = polarised(plain, STRING, 30)
     found = SplittingSolver(paired, 48_000).solve(state, 400).numpy() @ paired.shapes
     law = resonator_of(STRING, 30)
     alone = SplittingSolver(law, 48_000).solve(ModalState.at_rest(law.to_modes(PLUCK.displacement(101))[None]), 400)
@@ -47,7 +71,7 @@ def test_without_an_angle_it_moves_as_one_string() -> None:
 
 def test_the_truth_is_that_of_dop853() -> None:
     """Both polarisations share one tension: at velocities that glide by a quarter-tone, and not only at rest."""
-    resonator = polarised_resonator(MOVING, STRING, 12)
+    resonator = polarised(MOVING, STRING, 12)
     q = resonator.to_modes(Pluck(0.17, 8.0, "rounded", 0.2).displacement(101))[None]
     state = ModalState(torch.from_numpy(q), torch.from_numpy(q[:, ::-1].copy()))
     rise = float(resonator.relative_tension_rise(q[0]))
@@ -68,7 +92,7 @@ def test_the_learned_curves_hold_for_both(amplitude_mm: float) -> None:
     """As accurate as in one direction: relative MSE below 1e-6 over a second."""
     model = load_preset(SHIPPED / "studio_any_string.safetensors").model
     assert isinstance(model, KoopmanTension)
-    rate_hz, resonator = 48_000, polarised_resonator(MOVING, STRING, 60)
+    rate_hz, resonator = 48_000, polarised(MOVING, STRING, 60)
     displacement = PLUCK.moved(amplitude_mm=amplitude_mm).displacement(101)[None]
     tuned = model.for_resonator(Physics(resonator, rate_hz, 1.0))
     with torch.inference_mode():
@@ -79,21 +103,20 @@ def test_the_learned_curves_hold_for_both(amplitude_mm: float) -> None:
     assert relative_l2(found @ heard, wanted @ heard) ** 2 < 1e-6
 
 
-def test_compiled_rows_are_those_of_the_resonator() -> None:
-    for partials in (10, 60):
-        resonator = polarised_resonator(MOVING, STRING, partials, losses=1.7)
-        pairs, modes = min(PAIRS, partials), resonator.modes
-        found = np.empty(4 * modes)
-        losses = 1.7 * MOVING.conductance_s_kg, 1.7 * MOVING.second_conductance_s_kg
-        strings.rows(np.array(astuple(STRING)), modes, pairs, MOVING.detuning, *losses, 0.0, 0.0, 0.0, found)
-        own = resonator.omega**2, resonator.sigma, resonator.coupling, resonator.stretch
-        np.testing.assert_allclose(found, np.concatenate(own), rtol=1e-12)
-
-
-def test_pairs_come_first() -> None:
-    partial, second = layout(PAIRS + 2)
-    assert partial[:4].tolist() == [0, 0, 1, 1] and partial[-2:].tolist() == [PAIRS, PAIRS + 1]
-    assert second[:4].tolist() == [0, 1, 0, 1] and second[-2:].tolist() == [0, 0]
+@pytest.mark.parametrize("partials", [10, 60])
+def test_the_bridge_takes_from_both_and_detunes_the_second(partials: int) -> None:
+    resonator, law, pairs = (
+        polarised(MOVING, STRING, partials, decay=1.7),
+        resonator_of(STRING, partials),
+        min(24, partials),
+    )
+    pull = 1.7 * STRING.tension_n / STRING.length_m
+    for direction, cents, conductance in ((0, 0.0, 0.02), (1, 2.0, MOVING.second_conductance_s_kg)):
+        own = slice(direction, 2 * pairs, 2)
+        np.testing.assert_allclose(resonator.omega[own], law.omega[:pairs] * 2 ** (cents / 1200), rtol=1e-12)
+        np.testing.assert_allclose(resonator.sigma[own], law.sigma[:pairs] + pull * conductance, rtol=1e-12)
+    np.testing.assert_allclose(resonator.omega[2 * pairs :], law.omega[pairs:], rtol=1e-12)
+    np.testing.assert_allclose(resonator.coupling[: 2 * pairs], np.repeat(law.coupling[:pairs], 2), rtol=1e-12)
 
 
 def test_an_impossible_bridge_is_refused() -> None:

@@ -8,8 +8,9 @@ import torch
 from engine.kernels.scheme import KICKS, ROTATIONS
 from engine.resonators.sine_transform import to_modes
 from engine.resonators.string import resonator_of, undamped_frequencies, wavenumbers
-from engine.truth import ModalState, SplittingSolver, default_substeps, solve_dop853, solve_linear
+from engine.truth import ModalState, SplittingSolver, default_substeps, solve_dop853
 from engine.values.string import StringParameters
+from tests.engine.tensors import solve_linear
 from training.data.draws import DRAWS, draw_noise
 
 STRING = StringParameters()
@@ -123,7 +124,7 @@ def test_the_kernel_is_the_scheme(tension_modulated: bool) -> None:
     state = random_state(4, 25)
     compiled, last = solver.advance(state, 20)
     q, v = state.amplitude.clone(), state.velocity.clone()
-    flows, kicks, coupling, eta_squared = solver.constants[:4]
+    flows, kicks, coupling, eta_squared = map(torch.from_numpy, solver.constants[:4])
     for step in range(20):
         for _ in range(solver.substeps):
             for stage, (qq, qv, vq, vv) in enumerate(flows[-1]):

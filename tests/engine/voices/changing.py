@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from engine.kernels import layout as at
+from engine.kernels.constants import QUANTUM
+from engine.kernels.fields import record_of, slot, slots
 from engine.kernels.memory import publish
+from engine.kernels.voice_records import VOICE, WISH
 from engine.resonators.base import Resonator
 from engine.values.ear import Ear
 from engine.voices import Program, Voice
-from engine.voices.voice import _rows
+from engine.voices.voice import resonator_rows
 
 Array = NDArray[np.float64]
 
@@ -34,18 +36,18 @@ class ChangingVoice(Voice):
         Args:
             frame: of the mixer, from which they count, within a quantum; they wait for those wished for before.
         """
-        block = np.concatenate([np.zeros(at.B_HEADER), _rows(resonator)])
-        own = block.view(np.int64)
-        own[at.B_QUANTA], own[at.B_AT] = max(1, round(seconds * self.program.rate_hz / at.QUANTUM)), frame
-        taken = int(self._counts[at.CURRENT_MODES])
+        block = np.concatenate([np.zeros(slots(WISH)), resonator_rows(resonator).ravel()])
+        own = record_of(block, WISH)
+        own["quanta"], own["at"] = max(1, round(seconds * self.program.rate_hz / QUANTUM)), frame
+        taken = int(self.record["current_modes"])
         for place, each in enumerate(self._blocks):
             if int(each.ctypes.data) == taken:
                 del self._blocks[:place]
                 break
         if self._blocks:
-            publish(self._blocks[-1].view(np.int64), at.B_NEXT, block.ctypes.data)
+            publish(self._blocks[-1].view(np.int64), slot(WISH, "next"), block.ctypes.data)
         else:
-            publish(self._counts, at.PENDING_MODES, block.ctypes.data)
+            publish(self.memory.view(np.int64), slot(VOICE, "pending_modes"), block.ctypes.data)
         self._blocks.append(block)
 
     def continues(self, before: ChangingVoice) -> None:
@@ -62,14 +64,14 @@ class ChangingVoice(Voice):
         has not begun by then never sounds.
         """
         self._follow(before)
-        self._counts[at.STOPS_IN] = max(1, round(seconds * self.program.rate_hz))
+        self.record["stops_in"] = max(1, round(seconds * self.program.rate_hz))
 
     def _follow(self, before: ChangingVoice) -> None:
         """Keeps the voice before in memory until this one, which is the same string, has begun."""
         before._forget_before()
         self._before = before
-        self._counts[at.PREVIOUS_VOICE] = before.address
+        self.record["previous_voice"] = before.address
 
     def _forget_before(self) -> None:
-        if self._counts[at.PREVIOUS_VOICE] == 0:
+        if self.record["previous_voice"] == 0:
             self._before = None

@@ -11,7 +11,7 @@ import torch
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from engine.kernels import layout
+from engine.kernels.constants import QUANTUM
 from engine.levels import FULL_SCALE_M
 from engine.models._tension_arrays import CURVES
 from engine.models.base import Physics
@@ -70,7 +70,7 @@ def sound(of: Program, changes: Changes, quanta: int = 300, ear: Ear = EAR) -> N
     mixer, voice, blocks, done = Mixer(RATE_HZ, limited=False), struck(of, ear=ear), [], 0
     mixer.add(voice)
     for quantum, change, seconds in [*changes, (quanta, PLUCK, 0.0)]:
-        blocks.append(mixer.render((quantum - done) * layout.QUANTUM)[:, 0])
+        blocks.append(mixer.render((quantum - done) * QUANTUM)[:, 0])
         done = quantum
         if quantum == quanta:
             break
@@ -124,9 +124,9 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
     mixer, voice = Mixer(RATE_HZ, limited=False), struck(of)
     voice.begin_at_once()
     mixer.add(voice)
-    heard = [mixer.render(4 * layout.QUANTUM)[:, 0]]
-    voice.retune(last, 5 * layout.QUANTUM / RATE_HZ)
-    heard.append(mixer.render((quanta - 4) * layout.QUANTUM)[:, 0])
+    heard = [mixer.render(4 * QUANTUM)[:, 0]]
+    voice.retune(last, 5 * QUANTUM / RATE_HZ)
+    heard.append(mixer.render((quanta - 4) * QUANTUM)[:, 0])
 
     q = first.to_modes(PLUCK.displacement(101))
     state, expected, weights = np.concatenate([q, 0 * q]), [], of.weights(EAR)[0][0, :4]
@@ -146,7 +146,7 @@ def test_the_truth_is_the_equation_whose_modes_change() -> None:
             a, v = y[:4], y[4:]
             return np.concatenate([v, -2 * own[1] * v - own[0] * a - own[2] * a * (own[3] * a * a).sum()])
 
-        times = np.arange(layout.QUANTUM + 1) / RATE_HZ
+        times = np.arange(QUANTUM + 1) / RATE_HZ
         solved = solve_ivp(
             slope,
             (0, times[-1]),
@@ -168,9 +168,9 @@ def test_a_soft_second_pluck_leaves_the_loud_tail_and_makes_no_click(kind: str, 
     of, ear = program(kind), Ear((0.37,), pickup)  # type: ignore[arg-type]
     alone = sound(of, [], ear=ear)
     touched = sound(of, [(100, Pluck(0.3, 0.02, "raised_cosine", 0.2), 0.0)], ear=ear)
-    after = slice(101 * layout.QUANTUM, 200 * layout.QUANTUM)
+    after = slice(101 * QUANTUM, 200 * QUANTUM)
     assert np.std(touched[after]) == pytest.approx(np.std(alone[after]), rel=0.05)
-    joint = slice(99 * layout.QUANTUM, 104 * layout.QUANTUM)
+    joint = slice(99 * QUANTUM, 104 * QUANTUM)
     bend, usual = np.abs(np.diff(touched, 2))[joint].max(), np.abs(np.diff(alone, 2))[joint].max()
     assert bend < 1.2 * usual
 
@@ -319,14 +319,14 @@ def test_modes_that_are_no_longer_read_are_freed() -> None:
     mixer.add(voice)
     for turn in range(50):
         voice.retune(bent(turn / 50))
-        mixer.render(layout.QUANTUM)
+        mixer.render(QUANTUM)
     assert len(voice._blocks) <= 2
 
 
 @pytest.mark.parametrize("kind", ["model", "truth"])
 def test_modes_count_from_their_frame_on(kind: str) -> None:
     """As if they had been wished for then, to a quantum; each waits for those before it."""
-    quantum = layout.QUANTUM
+    quantum = QUANTUM
     asked: Changes = [(50, bent(1), 0.002), (51, bent(2), 0.005), (80, bent(-1), 0.01), (120, damped(0.2), 0.01)]
     expected = sound(program(kind), asked)
     mixer, voice = Mixer(RATE_HZ, limited=False), struck(program(kind))
@@ -348,7 +348,7 @@ def test_modes_count_from_their_frame_on(kind: str) -> None:
 
 def test_modes_of_a_voice_that_begins_within_a_quantum_are_no_earlier_than_their_frame() -> None:
     """The first quantum of its own that begins at the frame or later has them."""
-    quantum, late = layout.QUANTUM, 20
+    quantum, late = QUANTUM, 20
     mixer, voice = Mixer(RATE_HZ, limited=False), struck(program("model"))
     voice.begin_at(late)
     voice.retune(bent(2), 0.0, 50 * quantum + late)

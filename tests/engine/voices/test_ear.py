@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 import torch
 
-from engine.excitation import triangular
+from engine.excitation import displacement
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S, FULL_SCALE_N, RUNAWAY_FACTOR
 from engine.pluck import Pluck
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import listening_weights, to_grid
 from engine.resonators.string import resonator_of
-from engine.truth import ModalState, solve_linear
+from engine.truth import ModalState
 from engine.values.ear import Ear
 from engine.values.string import StringParameters
 from engine.voices.ear import largest, weights_of
+from tests.engine.tensors import solve_linear
 
 POINTS = 101
 
@@ -83,7 +84,7 @@ def test_the_bridge_bears_the_tension_times_the_slope_of_a_pull() -> None:
     flexible = StringParameters(0.65, 5e-7, 0.0, 7850.0, 2e11, 4e-4, 4e-7, 75.0)
     force = resonator_of(flexible, POINTS - 2, grid_points=POINTS).force_weights
     pulled = Pluck(0.4, 3.0, "raised_cosine", 0.4).displacement(POINTS)  # it lies flat at the bridge
-    wide = triangular(0.5, 3e-3, POINTS)
+    wide = displacement("triangular", 0.5, 1.0, 3e-3, POINTS)
     weights = weights_of(BRIDGE, POINTS, force)[:, 0] * (FULL_SCALE_N / FULL_SCALE_M)
     assert float(wide @ weights) == pytest.approx(75.0 * 3e-3 / (0.5 * 0.65), rel=0.02)
     assert abs(float(pulled @ weights)) < 0.02

@@ -51,7 +51,7 @@ def test_splits_are_in_order_and_whole() -> None:
 def test_the_cache_is_used_again_and_never_shared_by_other_data(tmp_path: Path) -> None:
     load_dataset(TINY, tmp_path)
     stamp = (dataset_folder(TINY, tmp_path) / "amplitudes.npy").stat().st_mtime_ns
-    load_dataset(TINY, tmp_path, lambda done, total: pytest.fail("made again"))
+    load_dataset(TINY, tmp_path, lambda share: pytest.fail("made again"))
     assert (dataset_folder(TINY, tmp_path) / "amplitudes.npy").stat().st_mtime_ns == stamp
     assert dataset_folder(replace(TINY, seed=1), tmp_path) != dataset_folder(TINY, tmp_path)
     assert not list((tmp_path / "datasets").glob("*.unfinished"))

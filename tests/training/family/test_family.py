@@ -15,12 +15,12 @@ from engine.presets import load_preset
 from engine.resonators.family import inharmonicity
 from engine.resonators.string import resonator_of
 from training.family import errors as family_errors
+from training.family import untrained as players_of_physics
 from training.family.errors import FamilyErrors, StringError
 from training.family.fit import Case, errors, fit_curves, geometric_mean
 from training.family.motions import solve
 from training.family.preset import FamilyConfiguration, read_configuration, train_preset
 from training.family.strings import COLUMNS, FAMILY, Column, draw_string, string_of
-from training.research import players as players_of_physics
 
 RATE_HZ, STEPS = 48_000, 1_200
 
@@ -74,11 +74,11 @@ def test_curves_are_found_from_nothing_and_hold_on_other_strings() -> None:
     physics = Physics(resonator_of(plucked.string, 25), RATE_HZ, 1e-3)
     model.initialise("kicks", physics, torch.Generator())
     start = geometric_mean(errors(model, validation, RATE_HZ, STEPS))
-    reported = []
+    shares = []
     best = fit_curves(
-        model, train, validation, RATE_HZ, steps=3, first_frames=600, seed=0, report=lambda p: reported.append(p.step)
+        model, train, validation, RATE_HZ, steps=3, first_frames=600, seed=0, report=lambda *of: shares.append(of[0])
     )
-    assert reported == [1, 2, 3]
+    assert shares == [1 / 3, 2 / 3, 1]
     assert best < start / 100
     assert math.isclose(best, geometric_mean(errors(model, validation, RATE_HZ, STEPS)), rel_tol=1e-9)
     with torch.no_grad():

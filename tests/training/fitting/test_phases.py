@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 import torch
 
-from engine.models import build_model
 from engine.models.base import StringModel
 from engine.models.configurations import IntegratedPhaseConfiguration
 from engine.models.integrated_phase import IntegratedPhase
@@ -20,7 +19,7 @@ from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting.fit import fit
 from training.fitting.modes import Modes, found_modes
-from training.fitting.phases import _Motion, _upright, fit_phases, mean_motions, start_from_phases
+from training.fitting.phases import Motion, fit_phases, upright
 from training.fitting.start import begin
 from training.start import BLIND_PURSUIT, COUNT, PHASES, PURSUIT, SYMMETRIES
 
@@ -56,45 +55,18 @@ def test_what_follows_its_equation_is_found_exactly() -> None:
 
 def test_a_negative_frequency_is_the_same_motion_as_a_positive_one() -> None:
     times, starts = np.arange(1.0, 50.0), np.linspace(0.1, 1, 49)
-    motion = _Motion(starts, starts, times, np.outer(times, [1.0, 0.5]))
+    motion = Motion(starts, starts, times, np.outer(times, [1.0, 0.5]))
     found = np.array([-0.01, 0.002, 0.9, 0.2, 0.03, -0.05])
-    upright = _upright(found)
-    assert upright[0] == 0.01
-    np.testing.assert_allclose(motion._latent(upright).real, motion._latent(found).real, rtol=1e-12)
-    np.testing.assert_array_equal(_upright(upright), upright)
-
-
-def test_a_mean_motion_is_the_linear_strings_own() -> None:
-    omega, sigma = torch.tensor([0.4, 1.3, 2.9]).double(), torch.tensor([1e-4, 2e-3, 5e-3]).double()
-    found = mean_motions(motions_of(omega, sigma, torch.zeros(3, 3).double(), 400))
-    torch.testing.assert_close(found.log_eigenvalues, torch.complex(-sigma, omega), rtol=1e-6, atol=1e-9)
-    assert not found.coupling.any()
-
-
-def test_a_mean_motion_is_between_those_of_soft_and_loud_strings() -> None:
-    omega, sigma = torch.tensor([0.4, 1.3]).double(), torch.tensor([1e-4, 2e-3]).double()
-    coupling = torch.tensor([[0.002, 0.002], [0.002, 0.004]]).double()
-    found = mean_motions(motions_of(omega, sigma, coupling, 400)).log_eigenvalues
-    assert (found.imag > omega).all()
-    assert (found.imag < omega + coupling.sum(1)).all()
-    assert (-found.real > sigma).all()  # motions that part cancel one another
-
-
-@pytest.mark.parametrize(("model", "largest"), [("fgru", 0.02), ("frnn", 0.5)])
-def test_a_fourier_cell_starts_as_the_string_that_it_has_seen(
-    small_dataset: Dataset, model: str, largest: float
-) -> None:
-    """FGRU's frequencies follow the squares; FRNN is the linear string that is nearest."""
-    cell = build_model(model)
-    start_from_phases(cell, found_modes(small_dataset, 200), seed=0)
-    error = evaluate_model(cell, small_dataset, "validation", 200).total()
-    assert error.rel_mse < largest
+    other = upright(found)
+    assert other[0] == 0.01
+    np.testing.assert_allclose(motion._latent(other).real, motion._latent(found).real, rtol=1e-12)
+    np.testing.assert_array_equal(upright(other), other)
 
 
 @pytest.mark.parametrize("state_size", [5, 7])
 def test_it_predicts_strings_that_the_fit_has_not_seen(small_dataset: Dataset, state_size: int) -> None:
     model = integrated_phase(state_size)
-    start_from_phases(model, found_modes(small_dataset, STEPS), seed=0)
+    model.store_modes(fit_phases(found_modes(small_dataset, STEPS), seed=0))
     assert evaluate_model(model, small_dataset, "validation", STEPS).total().rel_mse < 1e-3
     linear = resonator_of(small_dataset.configuration.string, 5).eigenvalues() / small_dataset.configuration.rate_hz
     torch.testing.assert_close(model.theta_log[:5].exp(), torch.from_numpy(linear.imag), rtol=2e-3, atol=0)
@@ -107,7 +79,7 @@ def test_a_run_starts_there(small_dataset: Dataset, runs: Path) -> None:
     )
     assert configuration.start == PHASES
     untrained = integrated_phase()
-    start_from_phases(untrained, found_modes(small_dataset, STEPS), recipe.seed)
+    untrained.store_modes(fit_phases(found_modes(small_dataset, STEPS), recipe.seed))
     expected = evaluate_model(untrained, small_dataset, "validation", STEPS).total()
     assert fit(configuration, small_dataset, runs).validation.total().rel_mae == pytest.approx(
         expected.rel_mae, rel=1e-2
@@ -116,10 +88,17 @@ def test_a_run_starts_there(small_dataset: Dataset, runs: Path) -> None:
 
 def test_what_cannot_start_so_is_refused(small_dataset: Dataset) -> None:
     with pytest.raises(ValueError, match="state_size must be at least 5, the modes that the data show, not 4"):
-        start_from_phases(integrated_phase(4), found_modes(small_dataset, STEPS), seed=0)
+        integrated_phase(4).store_modes(fit_phases(found_modes(small_dataset, STEPS), seed=0))
     strided = replace(small_dataset, configuration=replace(small_dataset.configuration, stride=2))
     with pytest.raises(ValueError, match="stride must be 1, not 2"):
         found_modes(strided, STEPS)
+
+
+@pytest.mark.parametrize("model", ["fgru", "frnn"])
+def test_a_fourier_cell_names_the_script_that_starts_it(small_dataset: Dataset, model: str) -> None:
+    configuration = configuration_of(Cell(model, True, "gaussian", 4000, 400))
+    with pytest.raises(ValueError, match=r"-m training\.research\.fourier_wiring RUN$"):
+        begin(configuration, small_dataset)
 
 
 def test_a_start_is_one_of_the_models() -> None:

@@ -1,5 +1,7 @@
 """Fourier cells that are wired as strings of known modes, against closed forms."""
 
+from dataclasses import replace
+
 import pytest
 import torch
 
@@ -8,7 +10,14 @@ from engine.models.fno import FGRU, FRNN, FourierConvolution
 from engine.models.string_modes import StringModes
 from engine.resonators.sine_transform import synthesis_matrix
 from tests.engine.tensors import convolved
-from training.research.fourier_wiring import Kernels, shared_coupling, store_in_fgru, store_in_frnn
+from tests.training.fitting.test_phases import motions_of
+from training.cell import Cell, configuration_of
+from training.data.dataset import Dataset
+from training.evaluate import evaluate_model
+from training.fitting import phases
+from training.fitting.start import begin
+from training.research import fourier_wiring as wiring
+from training.research.fourier_wiring import Kernels, mean_motions, shared_coupling, store_in_fgru, store_in_frnn
 
 POINTS = 31
 
@@ -108,3 +117,32 @@ def test_a_string_that_does_not_fit_is_refused() -> None:
         fgru(modes(), width=15)
     with pytest.raises(ValueError, match="5 modes need a width of 16 and 16 points"):
         fgru(modes(points=15), points=15)
+
+
+def test_a_mean_motion_is_the_linear_strings_own() -> None:
+    omega, sigma = torch.tensor([0.4, 1.3, 2.9]).double(), torch.tensor([1e-4, 2e-3, 5e-3]).double()
+    found = mean_motions(motions_of(omega, sigma, torch.zeros(3, 3).double(), 400))
+    torch.testing.assert_close(found.log_eigenvalues, torch.complex(-sigma, omega), rtol=1e-6, atol=1e-9)
+    assert not found.coupling.any()
+
+
+def test_a_mean_motion_is_between_those_of_soft_and_loud_strings() -> None:
+    omega, sigma = torch.tensor([0.4, 1.3]).double(), torch.tensor([1e-4, 2e-3]).double()
+    coupling = torch.tensor([[0.002, 0.002], [0.002, 0.004]]).double()
+    found = mean_motions(motions_of(omega, sigma, coupling, 400)).log_eigenvalues
+    assert (found.imag > omega).all()
+    assert (found.imag < omega + coupling.sum(1)).all()
+    assert (-found.real > sigma).all()  # motions that part cancel one another
+
+
+@pytest.mark.parametrize(("model", "largest"), [("fgru", 0.02), ("frnn", 0.5)])
+def test_a_fourier_cell_starts_as_the_string_that_it_has_seen(
+    small_dataset: Dataset, model: str, largest: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """FGRU's frequencies follow the squares; FRNN is the linear string that is nearest."""
+    monkeypatch.setattr(phases, "STORES", dict(phases.STORES))
+    wiring.use()
+    configuration = configuration_of(Cell(model, True, "gaussian", 4000, 200))
+    cell, _ = begin(replace(configuration, data=small_dataset.configuration), small_dataset)
+    error = evaluate_model(cell, small_dataset, "validation", 200).total()
+    assert error.rel_mse < largest

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from training.sweeping.plan import Plan, load_plan
+from training.results import Row
+from training.sweeping.plan import Plan, Run, load_plan
 from training.sweeping.sweep import Options
-from training.sweeping.workers.base import Task
+from training.sweeping.task import Task, TaskRun
 
 PLAN = """
 description = "Tiny."
@@ -53,6 +56,18 @@ def options(tmp_path: Path) -> Options:
 
 
 @pytest.fixture
+def alone(options: Options, tmp_path: Path) -> Options:
+    """Another place for the same runs."""
+    return replace(options, results=tmp_path / "alone.csv", runs=tmp_path / "alone")
+
+
+@pytest.fixture
 def task(plan, options: Options) -> Task:
     made = plan()
     return options.task(made, made.runs[0])
+
+
+def row_of(run: Run | TaskRun, **changes: Any) -> Row:
+    fields = {"status": "done", "model": "koopman", "string": "linear", "initial": "noise", "rate_hz": 4000}
+    fields |= {"horizon": 60, "recipe": "ours", "seed": 0, "rel_mae": 0.5, "finished": "2026-01-01T00:00:00Z"}
+    return Row(run.digest, run.name, **(fields | changes))

@@ -15,19 +15,18 @@ RUN = f"""
 import sys
 sys.modules.update(dict.fromkeys({MISSING!r}))  # to import one is an error
 from pathlib import Path
-from engine.schema import write
+from engine.schema import read, write
 from training.results import Row, add_rows
 from training.sweeping.plan import load_plan
 from training.sweeping.sweep import Options
-from training.sweeping.workers.performing import end_of, perform
+from training.sweeping.task import perform
 import training.cli.__main__
 
 plan = load_plan("tiny")
 for first in (0, 2):  # of the linear string and of the other
-    task = Options().task(plan, plan.runs[first])
-    ended = end_of(task.name, perform(write(task), lambda reported: None))
-    assert ended.row, ended.error
-    add_rows(Path("rows.csv"), [ended.row])
+    ended = perform(write(Options().task(plan, plan.runs[first])))
+    assert not ended["error"], ended["error"]
+    add_rows(Path("rows.csv"), [read(Row, row, "row") for row in ended["rows"]])
 """
 
 

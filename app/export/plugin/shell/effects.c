@@ -2,13 +2,13 @@
 
 #include "effects.h"
 
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
 #include "layout.h"
-#include "responses.h"
 #include "thread.h"
+
+extern const int32_t *const noise; /* of rooms (frames, 2) */
 
 static int64_t number_of(const void *pointer) { return (int64_t)(intptr_t)pointer; }
 
@@ -23,66 +23,38 @@ static double wanted(const instrument *own, int32_t which) {
 
 /* Responses */
 
-static int64_t late_of(int64_t frames) { return frames > EARLY * QUANTUM ? (frames - EARLY * QUANTUM + WINDOW - 1) / WINDOW : 0; }
+static int64_t body_of(const instrument *own) { return number_of((const slot *)own->of + own->of->body); }
 
-/* Of a response in the convolver's form. */
-static int64_t slots_of(int64_t frames) {
-  int64_t early = frames < EARLY * QUANTUM ? (frames + QUANTUM - 1) / QUANTUM : EARLY;
-  return I_HEADER + 2 * 2 * (early * (QUANTUM + 1) + late_of(frames) * (WINDOW + 1));
-}
-
-static void release(prepared *own) {
-  if (!own) return;
-  for (int32_t which = 0; which < MIX_PARTS; which++) free(own->parts[which]);
-  free(own);
+/* The memory that they need. */
+static void measure(const instrument *own, double size, double t60_s, slot *needs) {
+  void *error = NULL, *result = NULL;
+  own->kernels->measure(&result, &error, body_of(own), own->rate_hz, size, t60_s, number_of(needs));
 }
 
 /* NULL where there is no memory. */
 static prepared *prepare(const instrument *own, double size, double t60_s) {
-  const image *of = own->of;
-  const effects *e = &own->effects;
-  responses found;
-  prepared *made = calloc(1, sizeof *made);
-  bool done = responses_begin(&found, of, own->rate_hz, size, t60_s) && made;
-  int64_t frames = 1;
-  for (int32_t which = 0; which < MIX_PARTS; which++)
-    if (found.of[which].frames > frames) frames = found.of[which].frames;
-  done = done && frames <= e->most_frames;
-  if (done) {
-    made->hz = own->rate_hz, made->size = size, made->t60_s = t60_s, made->slots = slots_of(frames);
-    memcpy(made->powers, found.powers, sizeof made->powers);
-  }
-  double *padded = done ? calloc((size_t)(2 * frames), sizeof(double)) : NULL; /* all of one length: all are laid out alike */
-  done = done && padded;
-  for (int32_t which = 0; done && which < MIX_PARTS; which++) {
-    const sound *each = &found.of[which];
-    if (!each->frames) continue;
-    made->parts[which] = calloc((size_t)made->slots, sizeof(slot));
-    done = made->parts[which];
-    if (!done) break;
-    memcpy(padded, each->samples, (size_t)each->frames * sizeof(pair));
-    memset(padded + 2 * each->frames, 0, (size_t)(2 * (frames - each->frames)) * sizeof(double));
+  slot needs[NEEDS_SLOTS];
+  measure(own, size, t60_s, needs);
+  if (needs[NEEDS_PART].whole > own->effects.most_slots) return NULL;
+  prepared *made = calloc(1, sizeof *made + (size_t)needs[NEEDS_FOUND].whole * sizeof(slot));
+  slot *memory = malloc((size_t)needs[NEEDS_MEMORY].whole * sizeof(slot));
+  if (made && memory) {
     void *error = NULL, *result = NULL;
-    own->kernels->partition(&result, &error, number_of(padded), frames, 2, number_of(made->parts[which]), number_of(e->workshop));
+    made->hz = own->rate_hz, made->size = size, made->t60_s = t60_s;
+    own->kernels->prepare(&result, &error, body_of(own), number_of(noise), own->rate_hz, size, t60_s, number_of(made->found), number_of(memory));
+  } else {
+    free(made);
+    made = NULL;
   }
-  free(padded);
-  responses_end(&found);
-  const slot *table = (const slot *)of + of->table;
-  int64_t body = table[TABLE_BODY].whole;
-  if (done && body) {
-    if (size == of->body_size) memcpy(made->curves, table + body, sizeof made->curves);
-    else done = responses_curves(of, size, made->curves);
-  }
-  if (done) return made;
-  release(made);
-  return NULL;
+  free(memory);
+  return made;
 }
 
 static void work(void *with) {
   instrument *own = with;
   effects *e = &own->effects;
   while (!e->ends) {
-    release(atomic_exchange(&e->spent, NULL));
+    free(atomic_exchange(&e->spent, NULL));
     unsigned number = e->asked;
     if (e->made || number == e->answered) {
       thread_pause();
@@ -97,47 +69,36 @@ static void work(void *with) {
 /* The mix: one response of four, nothing, the body, the room, and both in series */
 
 static slot *idle(instrument *own) {
-  return own->effects.mixes[own->mixer[M_EFFECTS_NOW].whole == number_of(own->effects.mixes[0])];
+  return own->effects.mixes[own->mixer[MIXER_EFFECTS_NOW].whole == number_of(own->effects.mixes[0])];
 }
 
 static void begin_mix(instrument *own) {
   effects *e = &own->effects;
-  double body = wanted(own, EFFECT_BODY_MIX), room = wanted(own, EFFECT_ROOM_MIX), power = 0;
+  double body = wanted(own, EFFECT_BODY_MIX), room = wanted(own, EFFECT_ROOM_MIX);
   e->mixing[0] = body, e->mixing[1] = room;
   if (body == 0 && room == 0) { /* nothing is changed */
-    own->mixer[M_EFFECTS].whole = 0;
+    own->mixer[MIXER_EFFECTS].whole = 0;
     return;
   }
-  double weights[] = {(1 - body) * (1 - room), body * (1 - room), (1 - body) * room, body * room};
-  const double *powers = e->heard->powers[(body > 0 ? POWER_BODY : 0) + (room > 0 ? POWER_ROOM : 0)];
-  for (int32_t each = 0; each < 16; each++) power += weights[each / 4] * weights[each % 4] * powers[each];
-  for (int32_t each = 0; each < 1 + MIX_PARTS; each++) e->weights[each] = weights[each] / fmax(sqrt(power), 1e-30);
+  void *error = NULL, *result = NULL;
+  own->kernels->weigh(&result, &error, number_of(e->heard->found), body, room, number_of(e->weights));
   e->mixing_to = idle(own);
-  for (int32_t which = 0; which < MIX_PARTS; which++)
-    if (e->heard->parts[which]) memcpy(e->mixing_to, e->heard->parts[which], I_HEADER * sizeof(slot));
-  e->mixing_at = I_HEADER;
+  e->mixing_at = 0;
 }
 
 /* Mixes more of it; what is ready is handed to the convolver, which fades to it. */
 static void mix_on(instrument *own, int64_t most) {
   effects *e = &own->effects;
-  slot *to = e->mixing_to;
-  int64_t first = e->mixing_at, end = first + most < e->heard->slots ? first + most : e->heard->slots;
-  for (int64_t place = first; place < end; place++) to[place].real = 0;
-  for (int32_t which = 0; which < MIX_PARTS; which++)
-    for (int64_t place = first; e->heard->parts[which] && place < end; place++)
-      to[place].real += e->weights[1 + which] * e->heard->parts[which][place].real;
-  for (int32_t channel = 0; channel < 2; channel++) { /* a single sample at the beginning: the same at all frequencies */
-    int64_t begin = I_HEADER + channel * 2 * (QUANTUM + 1), until = begin + QUANTUM + 1;
-    for (int64_t place = begin > first ? begin : first; place < until && place < end; place++)
-      to[place].real += e->weights[0] / (2 * QUANTUM);
-  }
-  e->mixing_at = end < e->heard->slots ? end : -1;
-  if (e->mixing_at < 0) own->mixer[M_EFFECTS].whole = number_of(to);
+  void *error = NULL, *result = NULL;
+  own->kernels->mix(&result, &error, number_of(e->heard->found), number_of(e->weights), number_of(e->mixing_to), e->mixing_at, most);
+  e->mixing_at += most;
+  if (e->mixing_at < e->heard->found[RESPONSES_PART].whole) return;
+  e->mixing_at = -1;
+  own->mixer[MIXER_EFFECTS].whole = number_of(e->mixing_to);
 }
 
 enum { MIXED_A_QUANTUM = 16384 }; /* slots: some ten microseconds */
-_Static_assert(I_HEADER + 4 * EARLY * (QUANTUM + 1) < MIXED_A_QUANTUM, "the first quantum hears no more");
+_Static_assert(IMPULSE_SLOTS + 4 * EARLY * (QUANTUM + 1) < MIXED_A_QUANTUM, "the first quantum hears no more");
 
 /* Takes up what the thread has made. */
 static bool adopt(instrument *own) {
@@ -148,7 +109,7 @@ static bool adopt(instrument *own) {
   e->made = NULL;
   e->spent = before;
   int64_t body = own->table[TABLE_BODY].whole;
-  if (body) memcpy(own->table + body, e->heard->curves, sizeof e->heard->curves);
+  if (body) memcpy(own->table + body, e->heard->found + RESPONSES_CURVES, BODY_SLOTS * sizeof(slot));
   return true;
 }
 
@@ -170,7 +131,7 @@ bool effects_follow(instrument *own) {
     return false;
   }
   const slot *mixer = own->mixer;
-  if (mixer[M_EFFECTS_NEXT].whole || mixer[M_EFFECTS].whole != mixer[M_EFFECTS_NOW].whole) return false; /* it still fades */
+  if (mixer[MIXER_EFFECTS_NEXT].whole || mixer[MIXER_EFFECTS].whole != mixer[MIXER_EFFECTS_NOW].whole) return false; /* it still fades */
   bool other = adopt(own);
   if (other || wanted(own, EFFECT_BODY_MIX) != e->mixing[0] || wanted(own, EFFECT_ROOM_MIX) != e->mixing[1]) begin_mix(own);
   if (other) wait_offline(e);
@@ -184,40 +145,29 @@ bool effects_wait(const instrument *own) {
 
 /* Begin and end */
 
-static double body_s(const image *of, double size) {
-  double heard_s = of->impulse_frames ? fmin((double)of->impulse_frames / of->impulse_hz * size, LONGEST_IMPULSE_S) : 0;
-  return of->body_s * size + heard_s;
-}
-
 double effects_tail_s(const instrument *own) {
-  return body_s(own->of, own->effects.values[EFFECT_BODY_SIZE]) + own->effects.values[EFFECT_ROOM_T60_S];
+  slot needs[NEEDS_SLOTS];
+  measure(own, own->effects.values[EFFECT_BODY_SIZE], own->effects.values[EFFECT_ROOM_T60_S], needs);
+  return (double)needs[NEEDS_FRAMES].whole / own->rate_hz;
 }
 
 bool effects_begin(instrument *own) {
   effects *e = &own->effects;
   double size = wanted(own, EFFECT_BODY_SIZE), t60_s = wanted(own, EFFECT_ROOM_T60_S);
-  double longest_s = body_s(own->of, BODY_SIZE_HIGHEST) + ROOM_T60_HIGHEST_S;
+  slot most[NEEDS_SLOTS];
+  measure(own, BODY_SIZE_HIGHEST, ROOM_T60_HIGHEST_S, most);
   e->mixing_at = -1;
   e->size = size, e->t60_s = t60_s;
-  e->most_frames = (int64_t)(longest_s * own->rate_hz) + WINDOW;
-  e->workshop = calloc(C_LATE, sizeof(slot));
-  int64_t late = late_of(e->most_frames) + 1;
-  e->convolver = calloc((size_t)(C_LATE + late * 4 * (WINDOW + 1)), sizeof(slot)); /* touched as far as it is used */
-  if (!e->workshop || !e->convolver) return false;
-  for (int64_t k = 0; k < 2 * WINDOW; k++) {
-    double turn = 2 * 3.14159265358979323846 * (double)k / (2 * WINDOW);
-    e->convolver[C_COSINES + k].real = e->workshop[C_COSINES + k].real = cos(turn);
-    e->convolver[C_SINES + k].real = e->workshop[C_SINES + k].real = sin(turn);
-  }
-  e->convolver[C_CAPACITY].whole = late;
+  e->most_frames = most[NEEDS_FRAMES].whole, e->most_slots = most[NEEDS_PART].whole;
+  e->convolver = calloc((size_t)most[NEEDS_CONVOLVER].whole, sizeof(slot)); /* touched as far as it is used */
+  for (int32_t each = 0; each < 2; each++) e->mixes[each] = calloc((size_t)e->most_slots, sizeof(slot));
+  if (!e->convolver || !e->mixes[0] || !e->mixes[1]) return false;
   if (!e->heard || e->heard->hz != own->rate_hz || e->heard->size != size || e->heard->t60_s != t60_s) {
     effects_free(own);
     if (!(e->heard = prepare(own, size, t60_s))) return false;
   }
-  for (int32_t each = 0; each < 2; each++)
-    if (!(e->mixes[each] = calloc((size_t)slots_of(e->most_frames), sizeof(slot)))) return false;
   int64_t body = own->table[TABLE_BODY].whole;
-  if (body) memcpy(own->table + body, e->heard->curves, sizeof e->heard->curves);
+  if (body) memcpy(own->table + body, e->heard->found + RESPONSES_CURVES, BODY_SLOTS * sizeof(slot));
   e->ends = false;
   e->thread = thread_begin(work, own); /* without it, size and time stay as they are */
   return true;
@@ -225,26 +175,23 @@ bool effects_begin(instrument *own) {
 
 slot *effects_mixed(const instrument *own) {
   bool done = own->effects.mixing_at < 0;
-  return done ? (slot *)(intptr_t)own->mixer[M_EFFECTS].whole : NULL;
+  return done ? (slot *)(intptr_t)own->mixer[MIXER_EFFECTS].whole : NULL;
 }
 
 void effects_reset(instrument *own, slot *mixed) {
   effects *e = &own->effects;
-  slot *convolver = e->convolver, capacity = convolver[C_CAPACITY];
-  memset(convolver, 0, C_COSINES * sizeof(slot));
-  memset(convolver + C_SINES + 2 * WINDOW, 0, (C_LATE - C_SINES - 2 * WINDOW) * sizeof(slot));
-  convolver[C_CAPACITY] = capacity;
-  convolver[C_FADE_WINDOWS].whole = (int64_t)ceil(CONVOLVER_FADE_S * own->rate_hz / WINDOW);
-  convolver[C_STEP].whole = -1;
-  own->mixer[M_CONVOLVER].whole = number_of(convolver);
-  own->mixer[M_EFFECTS].whole = number_of(mixed);
+  void *error = NULL, *result = NULL;
+  memset(e->convolver, 0, CONVOLVER_SLOTS * sizeof(slot));
+  own->kernels->begin_convolver(&result, &error, number_of(e->convolver), own->rate_hz, e->most_frames);
+  own->mixer[MIXER_CONVOLVER].whole = number_of(e->convolver);
+  own->mixer[MIXER_EFFECTS].whole = number_of(mixed);
   e->mixing_at = -1;
   bool same = mixed && wanted(own, EFFECT_BODY_MIX) == e->mixing[0] && wanted(own, EFFECT_ROOM_MIX) == e->mixing[1];
   if (adopt(own) || !same) {
     begin_mix(own);
     if (e->mixing_at < 0) return;
     mix_on(own, MIXED_A_QUANTUM);
-    own->mixer[M_EFFECTS].whole = number_of(e->mixing_to); /* what is heard later is mixed before */
+    own->mixer[MIXER_EFFECTS].whole = number_of(e->mixing_to); /* what is heard later is mixed before */
   }
 }
 
@@ -254,9 +201,9 @@ void effects_end(instrument *own) {
   thread_end(e->thread);
   e->thread = NULL;
   e->asked = e->answered = 0;
-  release(atomic_exchange(&e->made, NULL));
-  release(atomic_exchange(&e->spent, NULL));
-  slot **all[] = {&e->workshop, &e->convolver, &e->mixes[0], &e->mixes[1]};
+  free(atomic_exchange(&e->made, NULL));
+  free(atomic_exchange(&e->spent, NULL));
+  slot **all[] = {&e->convolver, &e->mixes[0], &e->mixes[1]};
   for (size_t place = 0; place < sizeof all / sizeof *all; place++) {
     free(*all[place]);
     *all[place] = NULL;
@@ -264,6 +211,6 @@ void effects_end(instrument *own) {
 }
 
 void effects_free(instrument *own) {
-  release(own->effects.heard);
+  free(own->effects.heard);
   own->effects.heard = NULL;
 }

@@ -47,7 +47,7 @@ void instrument_reset_values(instrument *own) {
 uint32_t instrument_latency(void) { return QUANTUM + AHEAD; }
 
 uint32_t instrument_tail(const instrument *own) {
-  return (uint32_t)((own->of->longest_s + effects_tail_s(own)) * own->rate_hz);
+  return own->kernels ? (uint32_t)((own->of->longest_s + effects_tail_s(own)) * own->rate_hz) : 0;
 }
 
 static slot *copied(const image *of, int64_t first, int64_t count, int64_t more) {
@@ -74,18 +74,13 @@ static slot *pushed(instrument *own, int64_t frame, int64_t kind, int32_t channe
 }
 
 /* Events count a quantum late, so that each is known before the quantum that holds its frame. */
-static int64_t frame_of(const instrument *own, uint32_t at) { return own->mixer[M_FRAMES].whole + at + QUANTUM; }
+static int64_t frame_of(const instrument *own, uint32_t at) { return own->mixer[MIXER_FRAMES].whole + at + QUANTUM; }
 
-/* As `engine.effects.Amp.factors`. */
 static void follow_amp(instrument *own) {
-  slot *amp = own->mixer + M_AMPLIFIER;
   const slot *gains = own->player + PLAYER_SOURCE_GAINS;
   bool compares = gains[0].real != 0 && gains[1].real != 0;
-  double drive = pow(10, own->amp[AMP_DRIVE_DB] / 20);
-  bool on = own->amp[AMP_DRIVE_DB] > 0 && !compares;
-  amp[A_WANTED_GAIN].real = on ? own->of->level * sqrt(1 + pow(drive * AMP_NOMINAL, 2)) / drive : 0;
-  amp[A_WANTED_TONE].real = on ? pow(10, own->amp[AMP_TONE_DB] / 20) : 0;
-  amp[A_WANTED_DRIVE].real = on ? drive / own->of->level : 0;
+  void *error = NULL, *result = NULL;
+  own->kernels->drive(&result, &error, number_of(own->mixer), compares ? 0 : own->amp[AMP_DRIVE_DB], own->amp[AMP_TONE_DB], own->of->level_db);
 }
 
 static void apply(instrument *own, int32_t place, double value, int64_t frame) {
@@ -97,7 +92,7 @@ static void apply(instrument *own, int32_t place, double value, int64_t frame) {
       own->kernels->kit_follow(&result, &error, number_of(own->kit), of->index, value);
     own->followed[place] = value;
   } else if (of->kind == KIND_VOLUME) {
-    own->mixer[M_WANTED_VOLUME].real = pow(10, value / 20);
+    own->mixer[MIXER_WANTED_VOLUME].real = pow(10, value / 20);
   } else if (of->kind == KIND_SOURCE) {
     int source = (int)(value + 0.5);
     own->table[TABLE_SOURCES].whole = source == SOURCE_MODEL ? 1 : 2;
@@ -118,20 +113,19 @@ static void rest(instrument *own) {
   const image *of = own->of;
   double rate_hz = own->rate_hz;
   slot *mixer = own->mixer, *player = own->player;
-  memset(mixer, 0, M_SCRATCH * sizeof(slot));
-  memset(mixer + M_AMPLIFIER, 0, (MIXER_SLOTS - M_AMPLIFIER) * sizeof(slot));
+  memset(mixer, 0, MIXER_SCRATCH * sizeof(slot));
+  memset(mixer + MIXER_AMPLIFIER, 0, (MIXER_SLOTS - MIXER_AMPLIFIER) * sizeof(slot));
   memset(player, 0, PLAYER_SLOTS * sizeof(slot));
-  mixer[M_RATE].real = rate_hz;
-  mixer[M_CHANNELS].whole = 2;
-  mixer[M_LIMITING].whole = 1;
-  mixer[M_WANTED_VOLUME].real = mixer[M_REDUCTION].real = 1;
-  for (int frame = 0; frame < AHEAD; frame++) mixer[M_GAINS + frame].real = 1;
-  mixer[M_RELEASE].real = exp(-1 / (LIMITER_RELEASE_S * rate_hz));
-  mixer[M_SMOOTHING].real = exp(-1 / (VOLUME_SMOOTHING_S * rate_hz));
+  mixer[MIXER_RATE_HZ].real = rate_hz;
+  mixer[MIXER_CHANNELS].whole = 2;
+  mixer[MIXER_LIMITING].whole = 1;
+  mixer[MIXER_WANTED_VOLUME].real = mixer[MIXER_REDUCTION].real = 1;
+  for (int frame = 0; frame < AHEAD; frame++) mixer[MIXER_GAINS + frame].real = 1;
+  mixer[MIXER_RELEASE].real = exp(-1 / (LIMITER_RELEASE_S * rate_hz));
+  mixer[MIXER_SMOOTHING].real = exp(-1 / (VOLUME_SMOOTHING_S * rate_hz));
   const double *taps = (const double *)of + of->taps;
-  for (int tap = 0; tap < 2 * REACH + 1; tap++) mixer[M_TAPS + tap].real = taps[tap] * rate_hz;
-  mixer[M_ADDRESS].whole = number_of(mixer);
-  mixer[M_PLAYER].whole = number_of(player);
+  for (int tap = 0; tap < 2 * REACH + 1; tap++) mixer[MIXER_TAPS + tap].real = taps[tap] * rate_hz;
+  mixer[MIXER_PLAYER].whole = number_of(player);
   player[PLAYER_RATE_HZ].real = rate_hz;
   player[PLAYER_MODES].whole = of->modes;
   player[PLAYER_MOST].whole = of->most_notes;
@@ -157,7 +151,7 @@ void instrument_reset(instrument *own) {
     bool always = each->kind == KIND_SOURCE || each->kind == KIND_VOLUME;
     if (always || value != each->standard || value != own->followed[place]) apply(own, place, value, 0);
   }
-  own->mixer[M_VOLUME].real = own->mixer[M_WANTED_VOLUME].real;
+  own->mixer[MIXER_VOLUME].real = own->mixer[MIXER_WANTED_VOLUME].real;
   effects_reset(own, heard);
 }
 
@@ -181,7 +175,7 @@ bool instrument_begin(instrument *own, double rate_hz) {
     instrument_end(own);
     return false;
   }
-  own->model[S_RATE].real = own->truth[T_RATE].real = rate_hz;
+  own->model[TENSION_PROGRAM_RATE_HZ].real = own->truth[TRUTH_PROGRAM_RATE_HZ].real = rate_hz;
   own->table[TABLE_PROGRAMS].whole = number_of(own->model);
   own->table[TABLE_PROGRAMS + 1].whole = number_of(own->truth);
   void *error = NULL, *result = NULL;
@@ -308,7 +302,7 @@ void instrument_change(instrument *own, uint32_t at, int32_t place, double value
 /* Sound */
 
 static void apply_due(instrument *own) {
-  int64_t end = own->mixer[M_FRAMES].whole + QUANTUM;
+  int64_t end = own->mixer[MIXER_FRAMES].whole + QUANTUM;
   int32_t done = 0;
   while (done < own->waiting && own->changes[done].frame < end) {
     apply(own, own->changes[done].parameter, own->changes[done].value, own->changes[done].frame);
@@ -347,10 +341,10 @@ static void end_flushing(uint64_t before) {
 
 void instrument_render(instrument *own, uint32_t frames, float *left, float *right) {
   uint64_t before = begin_flushing();
-  own->mixer[M_PEAK].real = 0; /* of what is rendered now */
+  own->mixer[MIXER_PEAK].real = 0; /* of what is rendered now */
   float *block = (float *)own->scratch;
   for (uint32_t done = 0; done < frames;) {
-    int64_t rendered = own->mixer[M_LEFT].whole, left_over = frames - done;
+    int64_t rendered = own->mixer[MIXER_LEFT].whole, left_over = frames - done;
     void *error = NULL, *result = NULL;
     if (!rendered) {
       apply_due(own);
@@ -384,8 +378,8 @@ bool instrument_silent(const instrument *own) {
   const slot *player = own->player;
   bool events = player[PLAYER_PUSHED].whole != player[PLAYER_TAKEN].whole || player[PLAYER_QUEUED].whole;
   const slot *convolver = own->effects.convolver;
-  bool echo = (convolver && convolver[C_ACTIVE].whole) || effects_wait(own);
-  return !events && !echo && !own->waiting && !own->mixer[M_ACTIVE].whole && own->mixer[M_PEAK].real < 1e-9;
+  bool echo = (convolver && convolver[CONVOLVER_ACTIVE].whole) || effects_wait(own);
+  return !events && !echo && !own->waiting && !own->mixer[MIXER_ACTIVE].whole && own->mixer[MIXER_PEAK].real < 1e-9;
 }
 
 /* State */

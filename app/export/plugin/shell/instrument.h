@@ -17,8 +17,6 @@ typedef union { double real; int64_t whole; } slot;
 enum { KIND_SOURCE, KIND_VOLUME, KIND_VALUE, KIND_MACRO, KIND_EFFECT, KIND_AMP };
 enum { EFFECT_BODY_MIX, EFFECT_ROOM_MIX, EFFECT_BODY_SIZE, EFFECT_ROOM_T60_S, EFFECTS };
 enum { AMP_DRIVE_DB, AMP_TONE_DB };
-enum { PART_BODY, PART_ROOM, PART_BOTH, MIX_PARTS };
-enum { POWER_BODY = 1, POWER_ROOM = 2, POWER_CASES = 4 }; /* which of both are heard: a sum of these */
 enum { SOURCE_MODEL, SOURCE_TRUTH, SOURCE_DIFFERENCE };
 enum { MOST_PARAMETERS = 64, MOST_MACRO_TARGETS = 8, MOST_CHANGES = 512, MOST_STATE_BYTES = 8 + 12 * 4096 };
 
@@ -37,35 +35,26 @@ typedef struct {
   int64_t table, table_slots, model, model_slots, truth, truth_slots; /* in slots from the beginning */
   int64_t parameters, parameter_count, macros, macro_count;           /* in bytes */
   int64_t taps;
-  int64_t body, body_modes;                          /* Hz, 1/s, left, right: each of all modes, at a size of 1 */
-  int64_t impulse, impulse_frames, impulse_channels; /* a body that is a response: 32-bit whole numbers */
-  double body_s, body_subsonic_hz, impulse_hz, impulse_unit; /* at a size of 1 */
-  double body_size;                                  /* of the instrument itself */
+  int64_t body;
   int64_t kit, kit_slots, kit_room, table_room; /* drums, and slots behind kit and table in which they are computed; 0: strings */
   int64_t wheel_effect;        /* which of EFFECTS the modulation wheel moves, -1: none */
   int64_t modes, most_notes;
-  double longest_s, wheel_goal, level;
+  double longest_s, wheel_goal, level_db;
   char id[128], name[64], description[512], maker[64], features[128], category[16];
   uint8_t uid[16]; /* of VST3 */
 } image;
 
 typedef struct { int64_t frame; int32_t parameter; double value; } change;
 
-typedef struct { /* responses of body, room and both at a rate, a size and a time, as the convolver reads them */
-  double hz, size, t60_s;
-  slot *parts[MIX_PARTS];
-  int64_t slots;                  /* of each */
-  double powers[POWER_CASES][16]; /* of `responses` */
-  double curves[BODY_SLOTS];      /* what the body does to the loudness of keys */
-} prepared;
+typedef struct { double hz, size, t60_s; slot found[]; } prepared; /* RESPONSES of a body and a room */
 
 typedef struct {
   double values[EFFECTS];         /* the latest */
-  slot *convolver, *workshop;     /* of the audio thread, and of the other one */
+  slot *convolver;
   prepared *heard;                /* what is mixed from; it is kept from rate to rate */
   slot *mixes[2], *mixing_to;     /* what is heard, and the next; the one that is mixed */
-  int64_t most_frames, mixing_at; /* of a response; the next slot that is mixed, -1: none is */
-  double mixing[2], weights[1 + MIX_PARTS]; /* of the latest mix */
+  int64_t most_frames, most_slots, mixing_at; /* of a response; the next slot that is mixed, -1: none is */
+  double mixing[2], weights[4]; /* of the latest mix */
   void *thread;                   /* it computes a response of `size` and `t60_s` whenever another one is asked for */
   _Atomic double size, t60_s;
   atomic_uint asked, answered;

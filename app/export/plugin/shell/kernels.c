@@ -8,9 +8,15 @@
   int32_t ls##number##_kit_begin(void *, void **, int64_t, int64_t);                                                    \
   int32_t ls##number##_kit_follow(void *, void **, int64_t, int64_t, double);                                           \
   int32_t ls##number##_kit_prepare(void *, void **, int64_t, int64_t, int64_t);                                         \
-  int32_t ls##number##_partition(void *, void **, int64_t, int64_t, int64_t, int64_t, int64_t);                         \
+  int32_t ls##number##_drive(void *, void **, int64_t, double, double, double);                                         \
+  int32_t ls##number##_begin_convolver(void *, void **, int64_t, double, int64_t);                                      \
+  int32_t ls##number##_measure(void *, void **, int64_t, double, double, double, int64_t);                              \
+  int32_t ls##number##_prepare(void *, void **, int64_t, int64_t, double, double, double, int64_t, int64_t);            \
+  int32_t ls##number##_weigh(void *, void **, int64_t, double, double, int64_t);                                        \
+  int32_t ls##number##_mix(void *, void **, int64_t, int64_t, int64_t, int64_t, int64_t);                               \
   static const kernels kernels##number = {ls##number##_render, ls##number##_begin, ls##number##_kit_begin,              \
-    ls##number##_kit_follow, ls##number##_kit_prepare, ls##number##_partition};
+    ls##number##_kit_follow, ls##number##_kit_prepare, ls##number##_drive, ls##number##_begin_convolver,                \
+    ls##number##_measure, ls##number##_prepare, ls##number##_weigh, ls##number##_mix};
 
 KERNELS(0)
 

@@ -19,7 +19,6 @@ from app.audio.devices import AudioDevice
 from app.audio.output import Output
 from app.audio.sound import Sound
 from app.views.dialogs.abx_dialog import DEVICE_CHANGED, NO_DEVICE, SAME, TRIVIAL, AbxDialog
-from engine.kernels import layout as at
 from engine.voices import Mixer
 from tests.app.questions import answered
 
@@ -131,7 +130,7 @@ def test_a_key_sounds_what_it_says(qtbot: QtBot, open_dialog: Open, sound: Sound
     assert dialog._pair is not None
     voices = dialog._pair._voices
     qtbot.waitUntil(lambda: all(voice.sounding for voice in voices.values()))
-    assert {name: voice.memory[at.WANTED_GAIN] for name, voice in voices.items()} == (
+    assert {name: voice.record["wanted_gain"] for name, voice in voices.items()} == (
         {"A": 1.0, "B": 0.0} if key == "a" else {"A": 0.0, "B": 1.0}
     )
     assert len({voice.began_frame for voice in voices.values()}) == 1

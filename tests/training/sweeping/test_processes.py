@@ -2,8 +2,8 @@ from __future__ import annotations
 
 import pytest
 
-from training.sweeping.workers import layout as module
-from training.sweeping.workers.layout import Layout, fitted
+from training.sweeping import processes as module
+from training.sweeping.processes import Layout, fitted
 
 
 def test_workers_fit_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:

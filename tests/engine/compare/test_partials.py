@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from engine.partials import (
+from engine.compare.partials import (
     Array,
     PartialErrors,
     PartialTrack,

@@ -17,6 +17,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from engine.compare.spectra import magnitudes
+
 FRAME_S = 0.17  # of a spectrum, half of it between two
 LOWEST_HZ = 20.0
 FLOOR_DB = 60.0  # below the loudest that the truth ever is: what both have there is equal
@@ -101,9 +103,8 @@ def frame_length(rate_hz: int) -> int:
 def _spectra(sound: Array, rate_hz: int) -> Array:
     """Power (frames, frequencies from LOWEST_HZ on)."""
     length = frame_length(rate_hz)
-    frames = np.lib.stride_tricks.sliding_window_view(sound, length)[:: length // 2]
     first = math.ceil(LOWEST_HZ * length / rate_hz)
-    return np.square(np.abs(np.fft.rfft(frames * np.hanning(length), axis=1)[:, first:]))
+    return np.square(magnitudes(sound, np.hanning(length), length // 2)[:, first:])
 
 
 def _distance(found: Array, true: Array) -> float:

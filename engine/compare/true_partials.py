@@ -1,4 +1,4 @@
-"""The true motion mode by mode, as the phasors that `engine.partials` compares a prediction with."""
+"""The true motion mode by mode, as the phasors that `engine.compare.partials` compares a prediction with."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from engine.partials import Array, Phasors, phasors
+from engine.compare.partials import Array, Phasors, phasors
 from engine.resonators.base import Resonator
 from engine.truth import ModalState, SplittingSolver
 

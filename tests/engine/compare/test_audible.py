@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from engine.audible import FLOOR_DB, audible_errors, heard_level_db
+from engine.compare.audible import FLOOR_DB, audible_errors, heard_level_db
 
 RATE_HZ = 24_000
 PARTIALS_HZ = tuple(247.0 * n for n in range(1, 9))

@@ -1,4 +1,4 @@
-"""Errors of a predicted motion, relative to the true one (the paper's §4.3)."""
+"""Errors of a predicted motion or sound, relative to the true one (the paper's §4.3)."""
 
 from __future__ import annotations
 
@@ -165,11 +165,84 @@ class ErrorSums:
         return float(mse[0]), float(mae[0])
 
 
+class ErrorWindows:
+    """Relative errors of a motion in windows of a few frames, which grow; any thread may read.
+
+    Attributes:
+        ready: windows so far; what lies after the last whole one counts in `rel_mse` alone.
+        window_s: of each; `middle_s`: (windows,), of its middle.
+        curves: (windows,) each. "rmse": √(Σ(û - u)²/Σu²). "mae": Σ|û - u|/Σ|u|. "level_db": 10 log₁₀(Σû²/Σu²), not
+            a number where one of them is silent.
+
+    Args:
+        frames: of the whole motion, after the first, at time 0.
+        window_s: is rounded to frames.
+    """
+
+    def __init__(
+        self, frames: int, window_s: float, rate_hz: float, curves: Sequence[str] = ("rmse", "mae", "level_db")
+    ) -> None:
+        self._window_frames = max(round(window_s * rate_hz), 1)
+        self.windows, self.ready, self._done = frames // self._window_frames, 0, 0
+        self.window_s = self._window_frames / rate_hz
+        self.middle_s = (np.arange(self.windows, dtype=np.float64) + 0.5) * self.window_s + 1 / rate_hz
+        self.curves = {name: np.full(self.windows, np.nan) for name in curves}
+        self._sums = np.zeros((5, self.windows + 1))  # of (û - u)², u², û², |û - u| and |u|
+
+    @property
+    def complete(self) -> bool:
+        return self.ready == self.windows
+
+    @property
+    def rel_mse(self) -> float:
+        """The relative error of all frames so far; not a number where the truth rests."""
+        wrong, true = self._sums[:2].sum(1)
+        return float(wrong / true) if true > 0 else math.nan
+
+    def advance(self) -> bool:
+        """Return False: what renders the frames adds them."""
+        return False
+
+    def add(
+        self, model: NDArray[np.floating], truth: NDArray[np.floating], weight: NDArray[np.float64] | None = None
+    ) -> None:
+        """Add the next frames, (frames, points) each; `weight` (points,) is that of a square, 1 by default."""
+        error, window = model - truth, (self._done + np.arange(len(model))) // self._window_frames
+        weights = np.ones(model.shape[1]) if weight is None else weight
+        terms = [np.einsum("fp,fp,p->f", part, part, weights, dtype=np.float64) for part in (error, truth, model)]
+        if "mae" in self.curves:
+            terms += [np.abs(part).sum(1, dtype=np.float64) for part in (error, truth)]
+        for row, values in enumerate(terms):
+            self._sums[row] += np.bincount(np.minimum(window, self.windows), values, self.windows + 1)
+        self._done += len(model)
+        ready = min(self._done // self._window_frames, self.windows)
+        sums = self._sums[:, self.ready : ready]
+        mse, mae = _ratios(sums[[0, 1, 3, 4]])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            level_db = np.where((sums[2] > 0) & (sums[1] > 0), 10 * np.log10(sums[2] / sums[1]), math.nan)
+        for name, values in (("rmse", np.sqrt(mse)), ("mae", mae), ("level_db", level_db)):
+            if name in self.curves:
+                self.curves[name][self.ready : ready] = values
+        self.ready = ready
+
+
 def relative_error(predicted: Motion, truth: Motion) -> RelativeError:
     """The relative error of trajectories (batch, steps, points), frame 0 not among them."""
     sums = ErrorSums(truth.shape[1])
     sums.add(predicted, truth)
     return sums.total()
+
+
+def error_to_signal(found: Motion, truth: Motion, least: float = 1e-30) -> float:
+    """Σ(û - u)²/Σu² of two sounds or motions of one shape; infinite where it is not a number.
+
+    Args:
+        least: what the truth's Σu² counts as at least, so that silence has an error too.
+    """
+    error: Any = found - truth
+    squared: Any = truth**2
+    ratio = float((error**2).sum()) / max(float(squared.sum()), least)
+    return ratio if math.isfinite(ratio) else math.inf
 
 
 def _over_points(terms: Any) -> NDArray[np.float64]:

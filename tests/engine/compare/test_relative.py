@@ -1,12 +1,14 @@
 """Relative errors by hand."""
 
 import math
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 import torch
 
-from engine.metrics import NULL_FLOOR_DB, ErrorSums, RelativeError, relative_error
+from engine.compare.relative import NULL_FLOOR_DB, ErrorSums, RelativeError, error_to_signal, relative_error
 
 
 def test_by_hand() -> None:
@@ -183,3 +185,12 @@ def test_the_standard_error_of_some_frames_is_that_of_sums_over_them_alone() -> 
     assert (found.rel_mse, found.rel_mae) == pytest.approx((wanted.rel_mse, wanted.rel_mae))
     with pytest.raises(ValueError, match="edges"):
         whole.standard_error(first=11, last=20)
+
+
+@pytest.mark.parametrize("of", [np.asarray, torch.tensor])
+def test_an_error_to_signal_ratio(of: Callable[..., Any]) -> None:
+    truth = of([3.0, -4.0])
+    assert error_to_signal(truth, truth) == 0
+    assert error_to_signal(of([3.0, -3.0]), truth) == pytest.approx(1 / 25)
+    assert error_to_signal(truth, 0 * truth, least=50) == 0.5
+    assert error_to_signal(of([math.nan, 0.0]), truth) == math.inf

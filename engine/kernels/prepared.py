@@ -1,0 +1,174 @@
+"""Body and room of a plug-in's instrument: their responses at its rate, in partitions, and the mix of them.
+
+A plug-in computes the responses beside the sound, and mixes their partitions a part a quantum.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import carray, njit
+
+from engine.kernels import bodies, responses, rooms
+from engine.kernels import constants as of
+from engine.kernels.bodies import given_frames, rung_frames
+from engine.kernels.compiled import COMPILED
+from engine.kernels.constants import QUANTUM
+from engine.kernels.convolver import BEHIND_IMPULSE, convolver_slots, partition, partitioned_slots
+from engine.kernels.fields import slots
+from engine.kernels.fourier import COSINES, ROWS, SINES, fill_circle, power_of_two
+from engine.kernels.memory import (
+    address_of,
+    behind,
+    body_at,
+    impulse_at,
+    matrix,
+    needs_at,
+    part,
+    pointer,
+    reals,
+    responses_at,
+)
+from engine.kernels.mixer_records import WINDOW
+from engine.kernels.records import BODY, RESPONSES, Body
+from engine.kernels.responses import curves_size, resampled_frames, work_size
+
+NOISE_UNIT = 2.0**-28  # of the noise that rooms share, which stays below 8
+CURVES_HZ = float(of.CURVES_HZ)
+BODY_SLOTS, RESPONSES_SLOTS = slots(BODY), slots(RESPONSES)
+
+
+@njit(**COMPILED)
+def body_frames(body: Body, size: float, rate_hz: float) -> int:
+    """The length of a body's response; 0: there is none."""
+    if body.frames > 0:
+        return given_frames(body.frames, body.hz, size, rate_hz, body.longest_s)
+    return rung_frames(body.seconds, size, rate_hz) if body.modes > 0 else 0
+
+
+@njit(**COMPILED)
+def longest(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
+    """The length of body and room in series."""
+    room = resampled_frames(rooms.room_frames(t60_s), of.ROOM_HZ, rate_hz)
+    return room + max(body_frames(body, size, rate_hz) - 1, 0)
+
+
+@njit(**COMPILED)
+def width(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
+    """The width of a work space for responses of a body and a room."""
+    found = max(2 * WINDOW, int(rate_hz), longest(body, rate_hz, size, t60_s))
+    found = max(found, work_size(rooms.room_frames(t60_s), of.ROOM_HZ, rate_hz))
+    for hz in (rate_hz, CURVES_HZ):
+        frames = body_frames(body, size, hz)
+        found = max(found, curves_size(frames), 2 * frames)
+        if body.frames > 0:
+            found = max(found, work_size(body.frames, body.hz / size, hz))
+    return power_of_two(found)
+
+
+@njit(**COMPILED)
+def measure(body_address: int, rate_hz: float, size: float, t60_s: float, needs_address: int) -> None:
+    """Write the memory that `prepare` needs."""
+    body, needs = body_at(body_address), needs_at(needs_address)
+    needs.frames = longest(body, rate_hz, size, t60_s)
+    needs.part = partitioned_slots(needs.frames, 2)
+    needs.found = RESPONSES_SLOTS + 3 * needs.part
+    sounds = max(rooms.room_frames(t60_s), body.frames) + body_frames(body, size, CURVES_HZ) + 2 * needs.frames + 1
+    needs.memory = ROWS * width(body, rate_hz, size, t60_s) + 2 * sounds
+    needs.convolver = convolver_slots(needs.frames)
+
+
+@njit(**COMPILED)
+def prepare(
+    body_address: int,
+    noise_address: int,
+    rate_hz: float,
+    size: float,
+    t60_s: float,
+    found_address: int,
+    memory_address: int,
+) -> None:
+    """Write RESPONSES of a body and a room, and the responses behind them.
+
+    Each argument stands for itself in C.
+
+    Args:
+        noise_address: 32-bit whole numbers (frames, 2), of NOISE_UNIT.
+        found_address: all 0.
+    """
+    body, found, memory = body_at(body_address), responses_at(found_address), reals(memory_address)
+    wide = width(body, rate_hz, size, t60_s)
+    work = matrix(memory, 0, ROWS, wide)
+    fill_circle(work[COSINES], work[SINES])
+    own, frames = body_frames(body, size, rate_hz), longest(body, rate_hz, size, t60_s)
+    first, room_frames = ROWS * wide, rooms.room_frames(t60_s)
+    one = matrix(memory, first, own, 2)
+    other = matrix(memory, first + 2 * own, frames - max(own - 1, 0), 2)
+    both = matrix(memory, first + 2 * (frames + 1), frames, 2)
+    scratch = part(memory, first + 2 * (2 * frames + 1), 1 << 40)
+    if own > 0:
+        _respond(work, body, size, rate_hz, scratch, one)
+    noise, made = carray(pointer(noise_address), (room_frames, 2), np.int32), matrix(scratch, 0, room_frames, 2)
+    for frame in range(room_frames):
+        made[frame, 0], made[frame, 1] = NOISE_UNIT * noise[frame, 0], NOISE_UNIT * noise[frame, 1]
+    rooms.respond(work, t60_s, made, rate_hz, other)
+    if own > 0:
+        responses.series(work, one, other, both)
+    responses.all_powers(work, one, other, rate_hz, found.powers)
+    found.part = partitioned_slots(frames, 2)
+    for number in range(3):
+        response = one if number == 0 else other if number == 1 else both
+        if number == 1 or own > 0:
+            place = address_of(found) + 8 * (RESPONSES_SLOTS + number * found.part)
+            partition(work, response, frames, impulse_at(place))
+    heard = body_frames(body, size, CURVES_HZ)
+    if heard > 0:
+        response = matrix(scratch, 2 * body.frames, heard, 2)
+        _respond(work, body, size, CURVES_HZ, scratch, response)
+        responses.curves(work, response, found.curves)
+
+
+@njit(**COMPILED)
+def _respond(
+    work: np.ndarray, body: Body, size: float, rate_hz: float, scratch: np.ndarray, found: np.ndarray
+) -> None:
+    """Write the response of a body; `scratch` has room for the samples of one that is given."""
+    if body.frames == 0:
+        modes = matrix(reals(address_of(body)), BODY_SLOTS, 4, body.modes)
+        bodies.respond(work, modes, body.subsonic_hz, size, rate_hz, found)
+        return
+    samples = carray(pointer(address_of(body) + 8 * BODY_SLOTS), (body.frames, body.channels), np.int32)
+    given = matrix(scratch, 0, body.frames, 2)
+    for frame in range(body.frames):
+        given[frame, 0], given[frame, 1] = (
+            body.unit * samples[frame, 0],
+            body.unit * samples[frame, body.channels - 1],
+        )
+    bodies.respond_as(work, given, body.hz, size, rate_hz, found)
+
+
+@njit(**COMPILED)
+def weigh(found_address: int, body_mix: float, room_mix: float, weights_address: int) -> None:
+    """Write the weights (4,) of a mix."""
+    responses.weigh(responses_at(found_address).powers, body_mix, room_mix, part(reals(weights_address), 0, 4))
+
+
+@njit(**COMPILED)
+def mix(found_address: int, weights_address: int, into_address: int, first: int, count: int) -> None:
+    """Write some slots of a mix of responses as the convolver reads it."""
+    found, weights, into = responses_at(found_address), reals(weights_address), reals(into_address)
+    end = min(first + count, found.part)
+    for place in range(first, end):
+        into[place] = 0.0
+    for number in range(3):
+        weight, response = weights[1 + number], behind(found, RESPONSES_SLOTS + number * found.part, found.part)
+        if weight != 0.0:
+            for place in range(first, end):
+                into[place] += weight * response[place]
+    for channel in range(2):  # a single sample at the beginning: the same at all frequencies
+        begin = BEHIND_IMPULSE + channel * 2 * (QUANTUM + 1)
+        for place in range(max(begin, first), min(begin + QUANTUM + 1, end)):
+            into[place] += weights[0] / (2 * QUANTUM)
+    if first == 0:
+        counts, room = into.view(np.int64), behind(found, RESPONSES_SLOTS + found.part, found.part).view(np.int64)
+        for place in range(BEHIND_IMPULSE):
+            counts[place] = room[place]

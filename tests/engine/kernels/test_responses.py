@@ -1,0 +1,153 @@
+"""Impulse responses of kernels against NumPy, and those of a plug-in against those of the app."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.signal import fftconvolve
+
+from engine.effects import Body, Effects, Impulse, responses
+from engine.effects.body_record import body_memory
+from engine.effects.curves import curves_of
+from engine.effects.partitions import partitioned
+from engine.effects.room import room_noise, room_response
+from engine.kernels import prepared
+from engine.kernels import responses as kernel
+from engine.kernels.records import NEEDS, RESPONSES
+from engine.values.effects import Room
+
+Array = NDArray[np.float64]
+GUARD = 1234.5
+
+
+def noise(frames: int, channels: int = 2) -> Array:
+    return np.random.default_rng(frames).standard_normal((frames, channels))
+
+
+def test_ratios_of_rates_are_those_of_pythons_fractions() -> None:
+    draw = np.random.default_rng(0)
+    for _ in range(2_000):
+        (from_hz, to_hz), size = draw.uniform(8_000, 384_000, 2).round(), draw.uniform(0.5, 2)
+        for ratio in (to_hz / from_hz, to_hz / (from_hz / size), to_hz / 48_000, 44_100 / from_hz):
+            expected = Fraction(ratio).limit_denominator(kernel.FINEST_RATIO)
+            assert kernel.fraction(ratio) == (expected.numerator, expected.denominator)
+
+
+@pytest.mark.parametrize(
+    ("frames", "from_hz", "to_hz"),
+    [(300, 48_000, 44_100), (1, 44_100, 48_000), (777, 31_337, 96_000), (50, 96_000, 8_000)],
+)
+def test_another_rate_has_the_fourier_series_with_as_much_silence(frames: int, from_hz: int, to_hz: int) -> None:
+    given = noise(frames)
+    ratio = Fraction(to_hz / from_hz).limit_denominator(1000)
+    units = -(-frames // ratio.denominator)
+    padded, made = 2 * units * ratio.denominator, 2 * units * ratio.numerator
+    spectrum = np.zeros((made // 2 + 1, 2), complex)
+    kept = min(padded, made) // 2
+    spectrum[:kept] = np.fft.rfft(given, padded, axis=0)[:kept]
+    expected = np.fft.irfft(spectrum, made, axis=0) * (made / padded)
+    found = responses.resampled(given, from_hz, to_hz)
+    assert len(found) == max(1, round(frames * to_hz / from_hz))
+    np.testing.assert_allclose(found, expected[: len(found)], atol=1e-12)
+
+
+def test_two_in_series_are_their_convolution() -> None:
+    one, other = noise(700), noise(301)
+    np.testing.assert_allclose(responses.in_series(one, other), fftconvolve(one, other, axes=0), atol=1e-12)
+
+
+@pytest.mark.parametrize(("body_mix", "room_mix"), [(1.0, 0.0), (0.3, 0.0), (0.0, 0.6), (0.7, 0.4), (1.0, 1.0)])
+def test_a_mix_has_the_level_of_the_noise_that_goes_in(body_mix: float, room_mix: float) -> None:
+    """Its power at octaves that count alike is 1, in the mean of both channels."""
+    rate_hz, body, room = 8_000, noise(900), noise(1_300)
+    weights = responses.weights_of(responses.powers_of(body, room, rate_hz), body_mix, room_mix)
+    dry, wet = np.zeros((2_199, 2)), responses.in_series(body, room)
+    dry[0] = 1.0
+    found = weights[0] * dry + weights[3] * wet
+    found[:900] += weights[1] * body
+    found[:1_300] += weights[2] * room
+    frames = 2_199 if body_mix and room_mix else 900 if body_mix else 1_300
+    size = 1 << (max(frames, rate_hz // 4) - 1).bit_length()
+    hz = np.fft.rfftfreq(size, 1 / rate_hz)
+    heard = (hz >= 80) & (hz <= 3_000)
+    power = (np.abs(np.fft.rfft(found[:frames], size, axis=0)[heard]) ** 2).mean(1)
+    assert (power / hz[heard]).sum() / (1 / hz[heard]).sum() == pytest.approx(1.0)
+    assert weights[1] * room_mix == pytest.approx(weights[3] * (1 - room_mix))
+
+
+# The sum of each response times a slow cosine, left plus right, and its largest sample, of NumPy's code before
+FROZEN = {
+    "room 0.2 48000": (-2.6516992656680634, 0.19009873708926778),
+    "room 0.8 44100": (2.1785637987086006, 0.16618795325984778),
+    "room 1.5 96000": (-1.1656136432116548, 0.06515379462116891),
+    "body guitar 1.0 48000": (0.18136322224393583, 0.1641018368803138),
+    "body harp 1.63 44100": (0.07686475989079102, 0.08459428570552732),
+    "body cabinet 0.5 96000": (2.3050694810786787, 0.1215099207005202),
+    "body piano 1.0 8000": (-0.01181056311124019, 0.3314517663042752),
+    "given 1.0 44100": (-1.3491419439693206, 0.12728636247344602),
+    "given 1.37 48000": (-1.2759756150392958, 0.09638609191736673),
+    "given 0.5 96000": (-1.4390607703145701, 0.14019766746105977),
+}
+
+
+@pytest.mark.parametrize("name", FROZEN)
+def test_sounds_are_as_they_were(name: str) -> None:
+    kind, *values = name.split()
+    if kind == "room":
+        found = room_response(float(values[0]), int(values[1]))
+    elif kind == "body":
+        found = Body(1.0, float(values[1]), values[0]).response(int(values[2]))
+    else:
+        samples = noise(5_000) * np.exp(-np.arange(5_000) / 900)[:, None]
+        found = Body(1.0, float(values[0]), impulse=Impulse(samples, 44_100)).response(int(values[1]))
+    waves = np.cos(0.01 * np.arange(len(found)))[:, None]
+    np.testing.assert_allclose([(found * waves).sum(), np.abs(found).max()], FROZEN[name], rtol=1e-10)
+
+
+def body_record(kind: str) -> tuple[Array, Body | None]:
+    body = {
+        "none": None,
+        "guitar": Body(),
+        "mono": Body(impulse=Impulse(noise(4_001, 1) * np.exp(-np.arange(4_001) / 700)[:, None], 44_100)),
+        "stereo": Body(impulse=Impulse(noise(9_000) * np.exp(-np.arange(9_000) / 700)[:, None], 96_000)),
+    }[kind]
+    return body_memory(body), body
+
+
+@pytest.mark.parametrize("kind", ["none", "guitar", "mono", "stereo"])
+@pytest.mark.parametrize(("rate_hz", "size", "t60_s"), [(48_000, 1.0, 0.3), (44_100, 1.37, 0.2), (8_000, 0.5, 0.5)])
+def test_a_plug_in_has_the_responses_of_the_app_within_its_memory(
+    kind: str, rate_hz: int, size: float, t60_s: float
+) -> None:
+    """Noise and samples are whole numbers in it."""
+    memory, body = body_record(kind)
+    needs = np.zeros(len(NEEDS), np.int64)
+    prepared.measure(memory.ctypes.data, float(rate_hz), size, t60_s, needs.ctypes.data)
+    need = needs.view(NEEDS)[0]
+    whole = np.rint(room_noise() / prepared.NOISE_UNIT).astype(np.int32)
+    found, work = np.zeros(need["found"] + 1), np.full(need["memory"] + 1, np.nan)
+    found[-1] = work[-1] = GUARD
+    address = found.ctypes.data
+    prepared.prepare(memory.ctypes.data, whole.ctypes.data, float(rate_hz), size, t60_s, address, work.ctypes.data)
+    assert found[-1] == work[-1] == GUARD
+    for body_mix, room_mix in ((0.0, 0.4), (0.6, 0.0), (0.8, 0.3)):
+        if body is None and body_mix:
+            continue
+        weights, mixed = np.zeros(4), np.full(need["part"] + 1, GUARD)
+        prepared.weigh(address, body_mix, room_mix, weights.ctypes.data)
+        for first in range(0, need["part"], 5_000):
+            prepared.mix(address, weights.ctypes.data, mixed.ctypes.data, first, 5_000)
+        assert mixed[-1] == GUARD
+        own = body and Body(body_mix, size, body.name, body.impulse)
+        expected = Effects(own, Room(room_mix, t60_s)).impulse(rate_hz)
+        padded = np.zeros((need["frames"], 2))
+        padded[: len(expected)] = expected
+        wanted = partitioned(padded)
+        np.testing.assert_array_equal(mixed[:4].view(np.int64), wanted[:4].view(np.int64))
+        np.testing.assert_allclose(mixed[4:-1], wanted[4:], atol=1e-8 * np.abs(wanted[4:]).max())
+    if body is not None:
+        curves = found[: RESPONSES.itemsize // 8].view(RESPONSES)[0]["curves"]
+        np.testing.assert_allclose(curves, curves_of(Body(1.0, size, body.name, body.impulse)), atol=1e-7)

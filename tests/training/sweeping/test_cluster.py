@@ -1,0 +1,57 @@
+from __future__ import annotations
+
+import sys
+from concurrent.futures import wait
+from typing import Any
+from unittest.mock import Mock
+
+import pytest
+
+from engine.schema import write
+from tests.training.sweeping.test_sweep import alone_rows, measured
+from training.sweeping import cluster as module
+from training.sweeping.cluster import cluster_workers
+from training.sweeping.sweep import Options, sweep
+from training.sweeping.task import Task, WorkersError
+
+
+@pytest.fixture
+def distributed() -> Any:
+    return pytest.importorskip("distributed", reason="Dask is not installed (the extra learned-strings[cluster])")
+
+
+def test_a_cluster_without_the_extra_names_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    remedy = r"a cluster needs Dask .* install the extra learned-strings\[cluster\] .*, or leave --scheduler out$"
+    with pytest.raises(WorkersError, match=remedy), cluster_workers("tcp://127.0.0.1:9"):
+        pass
+
+
+def test_a_scheduler_that_is_not_there_is_reported(distributed: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "CONNECT_S", 0.2)
+    with pytest.raises(WorkersError, match="no Dask scheduler answers there"), cluster_workers("tcp://127.0.0.1:9"):
+        pass
+
+
+def test_the_workers_of_a_cluster_do_the_same(distributed: Any, plan, options: Options, alone: Options) -> None:
+    made = plan(seeds="0")
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+        ) as cluster,
+        cluster_workers(cluster.scheduler_address) as workers,
+    ):
+        assert "the Dask cluster inproc://" in workers.description
+        assert workers.capacity() == 1
+        sweep(made, workers, options, Mock())
+    assert measured(options.results) == alone_rows(made, alone)
+
+
+def test_a_cluster_that_ends_cancels_its_tasks(distributed: Any, plan, options: Options, task: Task) -> None:
+    with distributed.LocalCluster(
+        n_workers=0, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        with cluster_workers(cluster.scheduler_address) as workers:
+            left = workers.submit(write(task))
+        wait([left], timeout=10)
+        assert left.cancelled()

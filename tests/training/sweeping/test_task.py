@@ -1,0 +1,110 @@
+from __future__ import annotations
+
+import errno
+import json
+import math
+import shutil
+import threading
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from filelock import FileLock
+
+from engine.compare.relative import RelativeError
+from engine.schema import read, write
+from training.data.dataset import dataset_folder, load_dataset
+from training.fitting.fit import Progress
+from training.fitting.log import TrainingLog
+from training.results import Row
+from training.sweeping.sweep import Options
+from training.sweeping.task import PROGRESS, Task, perform, read_progress
+
+
+def folder_of(task: Task) -> Path:
+    return task.folder_of(task.runs[0].name)
+
+
+def test_a_task_ends_with_its_row_and_reports_its_progress(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    add = TrainingLog.add
+
+    def followed(log: TrainingLog, progress: Progress) -> None:
+        add(log, progress)
+        seen.append(read_progress(folder_of(task)))  # of the epoch before
+
+    monkeypatch.setattr(TrainingLog, "add", followed)
+    outcome = perform(write(task))
+    (row,) = (read(Row, row, "row") for row in outcome["rows"])
+    assert (row.status, row.digest, row.threads) == ("done", task.runs[0].digest, 1)
+    assert seen[0] is None and seen[1] is not None and (seen[1].epoch, seen[1].epochs) == (1, 4)
+    assert not (folder_of(task) / PROGRESS).exists()
+    assert perform(write(task)) == outcome  # from the run's folder
+
+
+def test_a_run_that_diverges_is_recorded_so(plan, options: Options) -> None:
+    made = plan(more="peak_learning_rate = 1e30")
+    (row,) = perform(write(options.task(made, made.runs[0])))["rows"]
+    assert (row["status"], row["rel_mae"]) == ("diverged", None)
+    assert "lower peak_learning_rate" in row["message"]
+
+
+def test_a_damaged_data_cache_is_reported(plan, task: Task, options: Options) -> None:
+    configuration = plan().runs[0].configuration.data
+    load_dataset(configuration, options.cache)
+    folder = dataset_folder(configuration, options.cache)
+    file = folder / "amplitudes.npy"
+    file.write_bytes(file.read_bytes()[:1000])
+    error = perform(write(task))["error"]
+    assert f"{folder}: damaged data cache" in error and "delete" in error
+    reported = folder_of(task) / "failure.txt"
+    assert "Traceback" in reported.read_text(encoding="utf-8")
+    shutil.rmtree(folder)
+    assert perform(write(task))["rows"]
+    assert not reported.exists()  # it did not fail in the end
+
+
+def test_a_checkpoint_of_another_configuration_is_reported(plan, task: Task, options: Options) -> None:
+    perform(write(task))
+    other = plan(epochs=5)
+    error = perform(write(options.task(other, other.runs[0])))["error"]
+    assert "was trained with other settings; delete it" in error
+
+
+def test_a_full_disk_is_reported(task: Task, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*arguments: Any, **options: Any) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device", "checkpoint")
+
+    monkeypatch.setattr("training.run.run_rows", full)
+    assert "No space left on device: 'checkpoint'" in perform(write(task))["error"]
+
+
+def test_a_worker_of_another_version_trains_nothing(task: Task) -> None:
+    (run,) = task.runs
+    assert "another version" in perform(write(replace(task, runs=(replace(run, digest="0"),))))["error"]
+    assert "unknown field 'colour'" in perform(write(task) | {"colour": 1})["error"]
+    plain = write(task)
+    plain["runs"][0]["configuration"]["recipe"]["colour"] = 1
+    assert "unknown field 'colour'" in perform(plain)["error"]
+
+
+@pytest.mark.parametrize(("loss", "is_read"), [(0.5, True), (math.inf, False), (math.nan, False)])
+def test_a_progress_that_is_not_finite_is_not_reported(tmp_path: Path, loss: float, is_read: bool) -> None:
+    progress = Progress(2, 8, 1, 4, 60, 1e-3, loss, RelativeError(0.5, 0.25), 1.0, 3.0)
+    assert read_progress(tmp_path) is None
+    (tmp_path / PROGRESS).write_text(json.dumps(write(progress)), encoding="utf-8")
+    assert read_progress(tmp_path) == (progress if is_read else None)
+
+
+def test_two_tasks_never_train_in_one_folder(task: Task, capfd: pytest.CaptureFixture[str]) -> None:
+    folder_of(task).mkdir(parents=True)
+    lock = FileLock(folder_of(task) / "run.lock")
+    with lock:
+        second = threading.Thread(target=perform, args=(write(task),))
+        second.start()
+        while "waits: another process trains it" not in capfd.readouterr().err:
+            assert second.is_alive()
+        assert not (folder_of(task) / "log.csv").exists()
+    second.join()
+    assert (folder_of(task) / "log.csv").exists()
