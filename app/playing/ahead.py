@@ -134,7 +134,7 @@ class AheadVoice:
 
     @property
     def known(self) -> Known:
-        """What is known of its pluck by now."""
+        """The knowledge of its pluck by now."""
         return self._state, tuple(self._frames), self._spent_s, self.finished
 
     def take_known(self, known: Known) -> None:

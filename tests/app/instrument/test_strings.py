@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from app.instrument.string_keys import on_string
-from app.instrument.strings import Strings, decay_rates
+from app.instrument.strings import KNOBS, Strings, decay_rates
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Knobs, OpenString, Patch, StringSet
 from app.patches.tuning import TuningChoice
@@ -97,7 +97,7 @@ def test_a_damper_adds_its_decay_to_every_partial() -> None:
 
 
 def turned(**knobs: float) -> StringParameters:
-    law.turned(STEEL.row, list(Knobs(**knobs).model_dump().values()), out := [0.0] * 8)
+    law.turned(STEEL.row, [getattr(Knobs(**knobs), name) for name in KNOBS], out := [0.0] * 8)
     return StringParameters(*out)
 
 
