@@ -134,7 +134,7 @@ class AheadVoice:
 
     @property
     def known(self) -> Known:
-        """The knowledge of its pluck by now."""
+        """The part of its pluck that is rendered, and where that can be continued."""
         return self._state, tuple(self._frames), self._spent_s, self.finished
 
     def take_known(self, known: Known) -> None:

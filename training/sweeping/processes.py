@@ -73,12 +73,12 @@ def fitted(
 def process_workers(layout: Layout) -> Iterator[Workers]:
     """The workers of a layout. At the end of the block their processes end: only time since a checkpoint is lost."""
     leashes, ours = multiprocessing.get_context("spawn").Pipe(duplex=False)
-    places = [_Place(environment, leashes) for environment in layout.environments]
 
     def submit(task: Mapping[str, Any]) -> Future[dict[str, Any]]:
         return next(place for place in places if place.is_free).submit(task)
 
-    with safe_children():
+    with safe_children():  # also the process that a pool's semaphores start
+        places = [_Place(environment, leashes) for environment in layout.environments]
         try:
             yield Workers(f"processes here: {layout.description}", submit, lambda: len(places))
         finally:
