@@ -118,7 +118,7 @@ LARGEST_DATASET_BYTES = 64 * 2**30
 
 
 def check(name: str, value: float, limits: tuple[float, float], unit: str = "") -> None:
-    """Raises ValueError, naming the field and its range, where a value is out of it."""
+    """Raise ValueError, naming the field and its range, where a value is out of it."""
     low, high = limits
     if not low <= value <= high:
         reported = f" {unit}" if unit else ""
@@ -127,14 +127,14 @@ def check(name: str, value: float, limits: tuple[float, float], unit: str = "") 
 
 
 def check_all(value: object, limits: Mapping[str, tuple[float, float]], of: str = "") -> None:
-    """Raises ValueError as `check`, for fields of a value that have limits and are not None; `of` precedes names."""
+    """Raise ValueError as `check`, for fields of a value that have limits and are not None; `of` precedes names."""
     for name, low_high in limits.items():
         if (found := getattr(value, name)) is not None:
             check(f"{of}{name}", found, low_high)
 
 
 def check_choice(name: str, value: object, known: Collection[str]) -> None:
-    """Raises ValueError, naming the field and what there is, where a value is none of those that are known."""
+    """Raise ValueError, naming the field and what there is, where a value is none of those that are known."""
     if value not in known:
         raise ValueError(f"{name} {brief(value)} is not one of {', '.join(known)}")
 

@@ -75,7 +75,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def check_nesting(data: object, where: str) -> None:
-    """Raises SchemaError where lists and tables lie deeper in each other, or hold more, than anything of ours."""
+    """Raise SchemaError where lists and tables lie deeper in each other, or hold more, than anything of ours."""
     level, entries = [data], 0
     for _ in range(bounds.DEEPEST_NESTING):
         level = [
@@ -161,7 +161,7 @@ def _names(kind: Any, path: Iterable[str | int]) -> list[str]:
 
 
 def _check_bounds(data: object, where: str) -> None:
-    """Raises SchemaError for what no field holds: a long list or text, a number that is not finite, a date."""
+    """Raise SchemaError for what no field holds: a long list or text, a number that is not finite, a date."""
     if isinstance(data, Mapping | list | tuple):
         if not isinstance(data, Mapping) and len(data) > bounds.MOST_ENTRIES:
             raise SchemaError(f"{where}: has {len(data)} entries, at most {bounds.MOST_ENTRIES} may be given")

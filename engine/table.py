@@ -114,7 +114,7 @@ def texts_of(record: Any) -> list[str]:
 
 
 def write_table(path: Path, kind: type, records: Iterable[Any]) -> None:
-    """Writes a table whole or not at all. Raises OSError."""
+    """Write a table whole or not at all. Raises OSError."""
     with whole_file(path) as unfinished, unfinished.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(columns_of(kind))
@@ -122,6 +122,6 @@ def write_table(path: Path, kind: type, records: Iterable[Any]) -> None:
 
 
 def append_record(path: Path, record: Any) -> None:
-    """Adds a line to a table. Raises OSError."""
+    """Add a line to a table. Raises OSError."""
     with naming(path), path.open("a", newline="", encoding="utf-8") as file:
         csv.writer(file, lineterminator="\n").writerow(texts_of(record))

@@ -57,7 +57,7 @@ FRAMES = 4 * QUANTUM
 
 
 def warm() -> None:
-    """Loads what a pluck needs at once; where not all has been compiled yet, compiles all."""
+    """Load what a pluck needs at once; where not all has been compiled yet, compiles all."""
     if cache.is_whole():
         _sound(_struck(model_program(PRESET, RATE_HZ), EARS[0]))
     else:

@@ -95,7 +95,7 @@ def naming(path: Path) -> Iterator[None]:
 
 
 def remove_left_over(folder: Path) -> None:
-    """Removes unfinished files and folders of this user's processes that are no more.
+    """Remove unfinished files and folders of this user's processes that are no more.
 
     Those of other users or computers stay: in a shared folder, nobody here knows whether they are under way.
     """

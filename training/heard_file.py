@@ -98,7 +98,7 @@ def read_heard(folder: Path) -> tuple[dict[str, Heard], list[str]]:
 
 
 def add_heard(folder: Path, measured: Iterable[Heard]) -> None:
-    """Adds to a folder's table, or makes it; a preset's new line replaces the one of its name.
+    """Add to a folder's table, or make it; a preset's new line replaces the one of its name.
 
     Locked against other processes; whole or not at all. Lines that cannot be used are left out.
 

@@ -74,7 +74,7 @@ class Basis:
 
 
 def compare(entries: list[PresetEntry], basis: Basis, job: Job) -> None:
-    """Reports a `ComparedRow` for each preset, one after the other. A preset that fails has a row that says why."""
+    """Report a `ComparedRow` for each preset, one after the other. A preset that fails has a row that says why."""
     truths = _Truths(basis)
     for done, entry in enumerate(entries):
         try:

@@ -90,7 +90,7 @@ class ErrorPlane:
         return float((~np.isnan(self.error)).mean())
 
     def compute(self, preset: Preset, pluck: Pluck, job: Job) -> PlanePicture:
-        """Computes what is not known yet, of plucks with the shape and width of `pluck`.
+        """Compute what is not known yet, of plucks with the shape and width of `pluck`.
 
         Raises:
             Cancelled: the job was cancelled; what is known stays.

@@ -18,11 +18,11 @@ class Growing(Protocol):
         """Return True if all results are ready."""
 
     def advance(self) -> bool:
-        """Computes the next few results; returns False where the take has nothing new for them yet."""
+        """Compute the next few results; returns False where the take has nothing new for them yet."""
 
 
 def keep_up(growing: Growing, job: Job) -> None:
-    """Computes all results as the take grows.
+    """Compute all results as the take grows.
 
     Raises:
         Cancelled: they are no longer wanted.

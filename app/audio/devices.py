@@ -120,7 +120,7 @@ def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream
 
 
 def close_device(stream: RawStream) -> None:
-    """Stops at once and frees the device; errors of a device that cannot be stopped are ignored."""
+    """Stop at once and free the device; errors of a device that cannot be stopped are ignored."""
     with _lock:
         for end in (stream.abort, stream.close):
             with contextlib.suppress(Exception):
@@ -181,7 +181,7 @@ def _sounddevice() -> ModuleType:
 
 @cache
 def _silence_alsa() -> None:
-    """Lets ALSA print nothing: the window counts gaps, and errors are raised.
+    """Let ALSA print nothing: the window counts gaps, and errors are raised.
 
     ALSA calls the handler in the audio thread too, where Python must not run. So it is one of C's functions that
     has no effect.

@@ -106,7 +106,7 @@ def internal(detail: str) -> AudioProblem:
 
 
 def unexpected(error: Exception, device_name: str) -> AudioUnavailable:
-    """Returns the problem of a device that was looked for or opened, where that is no known fault."""
+    """Return the problem of a device that was looked for or opened, where that is no known fault."""
     return AudioUnavailable(
         AudioProblem(
             ProblemKind.OTHER,
@@ -129,7 +129,7 @@ def vanished(device_name: str, detail: str = "") -> AudioUnavailable:
 
 
 def refused(error: Exception, device_name: str, rate_hz: int) -> AudioUnavailable:
-    """Returns why a device did not open or start, from PortAudio's error code and text."""
+    """Return why a device did not open or start, from PortAudio's error code and text."""
     detail = str(error)
     text = detail.lower()
     code = next((value for value in error.args[1:2] if isinstance(value, int)), 0)

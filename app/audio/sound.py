@@ -128,7 +128,7 @@ class Sound:
         buffer_frames: int = 0,
         rescan: bool = False,
     ) -> None:
-        """Asks the caretaker thread to open another device, or the present one in another way.
+        """Ask the caretaker thread to open another device, or the present one in another way.
 
         If it is refused, the present device is opened again as it was, and `on_problem` is called. Voices continue
         ringing where rate and channels stay; otherwise there is a new mixer, and notes that ring need new voices.
@@ -166,23 +166,23 @@ class Sound:
         self.mixer.set_volume(10 ** (volume_db / 20))
 
     def set_effects(self, effects: Effects | None) -> None:
-        """Sets body and room of all that sounds from now on, within tens of ms; see `Mixer.set_effects`."""
+        """Set body and room of all that sounds from now on, within tens of ms; see `Mixer.set_effects`."""
         self._effects = effects
         self.mixer.set_effects(effects)
 
     def sound_tone(self, side: str) -> None:
-        """Plays a soft tone for a second on "left", "right" or "both" sides, beside whatever else is playing."""
+        """Play a soft tone for a second on "left", "right" or "both" sides, beside whatever else is playing."""
         self.mixer.sound_tone(side)
 
     def status(self) -> SoundStatus:
         return self._status
 
     def watch(self, look: Callable[[SoundStatus], None]) -> None:
-        """Calls `look` with each status, every LOOK_EVERY_S, in the caretaker's thread. The latest call counts."""
+        """Call `look` with each status, every LOOK_EVERY_S, in the caretaker's thread. The latest call counts."""
         self._watch = look
 
     def close(self) -> None:
-        """Cuts the sound, ends the thread, for which it waits, and frees the device; may be called again."""
+        """Cut the sound, end the thread, for which it waits, and free the device; may be called again."""
         self._closing.set()
         self._woken.set()
         if threading.current_thread() is not self._caretaker:
@@ -228,7 +228,7 @@ class Sound:
             return False
 
     def _restart(self) -> None:
-        """Opens the output again, which cannot be supervised as it is."""
+        """Open the output again, which cannot be supervised as it is."""
         device = self._output.device
         if device is not None:
             self._be_silent()
@@ -278,7 +278,7 @@ class Sound:
             raise unexpected(error, wish.device.name if wish.device else "default") from error
 
     def _adopt(self, device: AudioDevice, wish: _Wish) -> None:
-        """Opens a device, with the present mixer where rate and channels stay, else with a new one.
+        """Open a device, with the present mixer where rate and channels stay, else with a new one.
 
         Raises:
             AudioUnavailable: it could not be opened; the clock takes the frames then.
@@ -301,7 +301,7 @@ class Sound:
         self._status = replace(self._status, problem=None)
 
     def _set_up(self, mixer: Mixer) -> None:
-        """Gives it volume and effects, the latest where another thread sets them meanwhile."""
+        """Give it volume and effects, the latest where another thread sets them meanwhile."""
         given: object = None
         while given != (wished := (self._volume_db, self._effects)):
             mixer.set_volume(10 ** (wished[0] / 20))
@@ -309,7 +309,7 @@ class Sound:
             given = wished
 
     def _reopen(self, device: AudioDevice, wish: _Wish) -> None:
-        """Opens the device again as before a change that was refused; if that fails too, it counts as lost."""
+        """Open the device again as before a change that was refused; if that fails too, it counts as lost."""
         try:
             self._adopt(device, wish)
         except AudioUnavailable:
@@ -345,7 +345,7 @@ class Sound:
                 pass
 
     def _resume(self, device: AudioDevice) -> bool:
-        """Opens a device at once that has played and stands: a driver gives up under load, too. Whether it could."""
+        """Open a device at once that has played and stands: a driver gives up under load, too. Whether it could."""
         began_s, mixer = time.monotonic(), self.mixer
         if mixer.calls == self._calls_before:
             return False
@@ -357,7 +357,7 @@ class Sound:
         return True
 
     def _lose(self, wish: _Wish) -> None:
-        """Marks an output as lost: it is opened again when it is back, and until then no fault is reported."""
+        """Mark an output as lost: it is opened again when it is back, and until then no fault is reported."""
         self._lost, self._try_again_s = wish, time.monotonic() + TRY_AGAIN_S
 
     def _report(self, problem: AudioProblem) -> None:

@@ -47,7 +47,7 @@ def read_displacements(path: Path) -> Array:
 
 
 def check_result_size(batch: int, frames: int, points: int) -> None:
-    """Refuses a result, float64 (batch, frames, points), above `LARGEST_RESULT_BYTES`, before any work.
+    """Refuse a result, float64 (batch, frames, points), above `LARGEST_RESULT_BYTES`, before any work.
 
     Raises:
         Failure: it is larger.
@@ -61,7 +61,7 @@ def check_result_size(batch: int, frames: int, points: int) -> None:
 
 
 def write_motion(path: Path, initial: Array, steps: int, motion: Motion, report: Report) -> None:
-    """Writes float64 (batch, steps + 1, points) in m, whole or not at all, a few trajectories at a time.
+    """Write float64 (batch, steps + 1, points) in m, whole or not at all, a few trajectories at a time.
 
     Raises:
         As `write_array`.
@@ -79,7 +79,7 @@ def write_motion(path: Path, initial: Array, steps: int, motion: Motion, report:
 
 
 def write_array(path: Path, shape: tuple[int, ...], blocks: Iterator[Array], report: Report) -> None:
-    """Writes float64 of a shape, whole or not at all, from blocks that follow one another.
+    """Write float64 of a shape, whole or not at all, from blocks that follow one another.
 
     Raises:
         Failure: the motion is not finite.

@@ -255,7 +255,7 @@ class _Blow:
 def _blow_of(
     drum: str, key: int | None, velocity: int, place: tuple[float, float] | None, preset: str | None = None
 ) -> _Blow:
-    """Raises typer.BadParameter: the place is not on the drum."""
+    """Raise typer.BadParameter: the place is not on the drum."""
     import numpy as np
 
     from engine.strike import Strike

@@ -95,7 +95,7 @@ def _parameters(patch: Patch) -> Iterator[dict[str, Any]]:
 
 
 def _show(found: list[dict[str, Any]], json: bool, but: Container[str] = ()) -> None:
-    """Prints facts as JSON, or as a table without the columns `but`."""
+    """Print facts as JSON, or as a table without the columns `but`."""
     if json:
         print_json(found)
     elif found:

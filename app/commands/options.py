@@ -38,7 +38,7 @@ GainDb = Annotated[float, typer.Option(metavar="DB", help="Gain of the differenc
 
 
 def check(**values: float | None) -> None:
-    """Checks options, by the names of their parameters, against the table's ranges; None: not given.
+    """Check options, by the names of their parameters, against the table's ranges; None: not given.
 
     Raises:
         typer.BadParameter: one is out of its range; the message names option, value and range.

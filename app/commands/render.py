@@ -134,7 +134,7 @@ def check_sound(
     difference_gain_db: float,
     decay_db: float | None,
 ) -> None:
-    """Checks the ranges of the options that `render` and `batch` share. Raises as `arguments.check_range`."""
+    """Check the ranges of the options that `render` and `batch` share. Raises as `arguments.check_range`."""
     from app.export.sound import DECAY_RANGE_DB, LONGEST_S
     from app.export.wav import RATE_RANGE_HZ
 
@@ -147,7 +147,7 @@ def check_sound(
 
 
 def check_shortest(preset: Preset, seconds: float) -> None:
-    """Checks that `seconds` are one sample of the preset's own rate at least. Raises typer.BadParameter."""
+    """Check that `seconds` are one sample of the preset's own rate at least. Raises typer.BadParameter."""
     if round(seconds * preset.info.rate_hz) < 1:
         raise typer.BadParameter(
             f"must hold a sample of {preset.info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"

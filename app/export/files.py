@@ -66,7 +66,7 @@ def export_sound(
     *,
     progress: Progress = lambda *_: None,
 ) -> WavReport:
-    """Renders and writes a WAV file, whole or not at all.
+    """Render and write a WAV file, whole or not at all.
 
     Raises:
         WriteError: the file cannot be written.
@@ -85,7 +85,7 @@ def export_sounds(
     *,
     progress: Progress = lambda *_: None,
 ) -> list[WavReport]:
-    """Renders a pluck once and writes a file for each source, model and truth with one gain.
+    """Render a pluck once and write a file for each source, model and truth with one gain.
 
     Args:
         request: its own `source` is ignored.

@@ -22,7 +22,7 @@ class ExportJob(Protocol):
         """The folder where the files are written."""
 
     def run(self, progress: Progress) -> str:
-        """Writes the files and returns the result in words, a line each. Any thread.
+        """Write the files and return the result in words, a line each. Any thread.
 
         Raises:
             Cancelled: `progress` raised it.

@@ -91,23 +91,23 @@ class Journal:
         return made
 
     def write(self, events: Iterable[TimedEvent]) -> None:
-        """Appends events, in the order of their times from the beginning of the recording. Raises OSError."""
+        """Append events, in the order of their times from the beginning of the recording. Raises OSError."""
         self._append([self._line(each) for each in events])
 
     def hear(self, source: PlayedSource, difference_gain_db: float) -> None:
-        """Appends the source that is heard from now on. Raises OSError."""
+        """Append the source that is heard from now on. Raises OSError."""
         self._append([{"source": source, "difference_gain_db": difference_gain_db}])
 
     def end(self, end_s: float) -> None:
-        """Appends the time at which the recording ended. Raises OSError."""
+        """Append the time at which the recording ended. Raises OSError."""
         self._append([{"end": end_s}])
 
     def close(self) -> None:
-        """Leaves it to the next start, or to another process."""
+        """Leave it to the next start, or to another process."""
         self._lock.unlock()
 
     def delete(self) -> None:
-        """Removes it: the recording is saved, or not wanted. Where that fails, it is offered again."""
+        """Remove it: the recording is saved, or not wanted. Where that fails, it is offered again."""
         with suppress(OSError):
             self.path.unlink(missing_ok=True)
         self._lock.unlock()

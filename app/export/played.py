@@ -66,7 +66,7 @@ def write_played(
     difference_gain_db: float = 0.0,
     recorded: datetime | None = None,
 ) -> PlayedFile:
-    """Writes a WAV file, whole or not at all, that carries what it is. Memory does not grow with its length.
+    """Write a WAV file, whole or not at all, that carries what it is. Memory does not grow with its length.
 
     Args:
         midi: the name of the MIDI file with the events.

@@ -34,7 +34,7 @@ class Recording:
         self._frames = 0
 
     def append(self, block: NDArray[np.float32]) -> None:
-        """Appends frames (n, points)."""
+        """Append frames (n, points)."""
         data = memoryview(np.ascontiguousarray(block, np.float32).tobytes())
         self._file.seek(self._frames * self._frame_bytes)
         while data:
@@ -42,7 +42,7 @@ class Recording:
         self._frames += len(block)
 
     def cut(self, frames: int) -> None:
-        """Drops all but the first `frames`."""
+        """Drop all but the first `frames`."""
         self._frames = min(self._frames, frames)
 
     def __len__(self) -> int:

@@ -63,7 +63,7 @@ class Through(Value):
 
     @property
     def effects(self) -> Effects | None:
-        """Raises ValueError: the body is not here, or another of its name."""
+        """Raise ValueError: the body is not here, or another of its name."""
         if body_digest(self.body.name) != self.body_sha256:
             raise ValueError(
                 f"the body {self.body.name} is not the one of {self.instrument}; get its file and add it"
@@ -199,7 +199,7 @@ def render_voices(
     all_voices: bool = False,
     progress: Progress = lambda *_: None,
 ) -> Voices:
-    """Renders model and truth once for any number of sources of one pluck.
+    """Render model and truth once for any number of sources of one pluck.
 
     `request.source` counts for body and room alone, which a difference does not have.
 

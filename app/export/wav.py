@@ -73,7 +73,7 @@ def write_wav(
     tags: Mapping[str, str],
     beside: Sequence[Sound] = (),
 ) -> Level:
-    """Writes a WAV file of a sound, (frames,) or (frames, channels), where ±1 is full scale.
+    """Write a WAV file of a sound, (frames,) or (frames, channels), where ±1 is full scale.
 
     It is written block by block, so that memory does not grow with its length.
 
@@ -151,7 +151,7 @@ class _Noting:
 
 
 def _undate(file: BinaryIO, channels: int) -> None:
-    """Zeroes the time of writing in the chunk PEAK, so that the same sound makes the same bytes."""
+    """Zero the time of writing in the chunk PEAK, so that the same sound makes the same bytes."""
     file.seek(0)
     place = file.read(HEAD_BYTES).find(b"PEAK" + struct.pack("<II", 8 * (1 + channels), 1))
     if place >= 0:

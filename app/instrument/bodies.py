@@ -71,7 +71,7 @@ def body_digest(name: str) -> str:
 
 
 def install_body(file: Path) -> str:
-    """Copies an impulse response into the user's folder, and returns the name of the body.
+    """Copy an impulse response into the user's folder, and return the name of the body.
 
     The same file is not copied twice; a name that is taken gets a number.
 

@@ -212,7 +212,7 @@ class InstrumentPlayer:
         return Tabled(keys, table_of(keys, self.grid_points, self._sources, self._programs, self._varied))
 
     def take(self, made: Tabled, frame: int = 0) -> None:
-        """Plays these keys from a frame on, at once; strings that ring glide to them.
+        """Play these keys from a frame on, at once; strings that ring glide to them.
 
         Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
         """
@@ -235,7 +235,7 @@ class InstrumentPlayer:
         return self._keys.strings.pitch_hz(key) is None
 
     def handle(self, event: Event, frame: int = 0, struck_s: float = 0.0) -> int:
-        """Hands an event over; its number, which the reports of a note carry. 0 for a pluck at a place: no key's.
+        """Hand an event over; its number, which the reports of a note carry. 0 for a pluck at a place: no key's.
 
         Args:
             frame: of the mixer, at which it counts: a note begins with it, all else within a quantum after it. 0: at
@@ -274,7 +274,7 @@ class InstrumentPlayer:
             return give(of.CONTROLLER, key=event.number, value=event.value)
 
     def _check(self, event: NoteOn) -> None:
-        """Raises ValueError: no string on which an event may play its key is possible."""
+        """Raise ValueError: no string on which an event may play its key is possible."""
         keys = self._keys
         if isinstance(keys, DrumKeys):
             keys.of_key(event.key)
@@ -303,21 +303,21 @@ class InstrumentPlayer:
                 self._wheel = 0, moved_by
 
     def cancel(self, note: int = 0) -> None:
-        """Forgets the events whose frames are to come, or those of one note, by its number."""
+        """Forget the events whose frames are to come, or those of one note, by its number."""
         self.compiled.give(of.CANCEL, note=note)
 
     def stop(self, seconds: float = STOP_S) -> None:
-        """Lets all strings fade out."""
+        """Let all strings fade out."""
         self.compiled.give(of.STOP, value=seconds)
 
     def release(self, note: int, seconds: float = STOP_S, frame: int = 0) -> None:
-        """Lets one note fade out, by its number, from a frame on."""
+        """Let one note fade out, by its number, from a frame on."""
         self.compiled.give(of.CHOKE, of.ANY, of.ANY, seconds, frame, note=note)
 
     # What became of them
 
     def reports(self) -> list[Report]:
-        """Reports of what became of notes since the last call. One thread asks."""
+        """Report of what became of notes since the last call. One thread asks."""
         return self.compiled.reports()
 
     def ringing(self) -> list[Ringing]:

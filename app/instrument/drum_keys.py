@@ -86,7 +86,7 @@ class DrumKeys:
     polarisations = None
 
     def __init__(self, patch: Patch, ear: Ear, near: DrumKeys | None = None) -> None:
-        """Raises ValueError: the tuning is impossible, or a drum."""
+        """Raise ValueError: the tuning is impossible, or a drum."""
         assert isinstance(patch.strings, Drums)
         self.patch, self.ear, self.drums = patch, ear, patch.strings
         self._tuning = Tuning(patch.tuning)

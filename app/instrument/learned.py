@@ -61,7 +61,7 @@ def learn_files(
     anyway: bool = False,
     progress: Callable[[float], None] = lambda share: None,
 ) -> list[Learned]:
-    """Learns recordings; the first is the note that gives the string, and those of its pitch are fitted together.
+    """Learn recordings; the first is the note that gives the string, and those of its pitch are fitted together.
 
     Args:
         progress: is called with the share that is done; may raise, to cancel: the same call continues later, with
@@ -146,7 +146,7 @@ def check_name(name: str) -> str:
 
 
 def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
-    """Writes preset, body, patch and report of an instrument.
+    """Write preset, body, patch and report of an instrument.
 
     Raises:
         PatchError: the name is taken or impossible.

@@ -148,7 +148,7 @@ class _Reader:
         return kind == b"MTrk" or (named and place + 8 + length <= len(self._raw))
 
     def _read_track(self, place: int, end: int) -> int:
-        """Reads a track of a length that may be wrong.
+        """Read a track of a length that may be wrong.
 
         Returns the place at which the next chunk is to be looked for.
         """
@@ -212,7 +212,7 @@ class _Reader:
         return running, place, False
 
     def _take(self, tick: int, status: int, data: bytes) -> None:
-        """Keeps a channel message; values are at most 127."""
+        """Keep a channel message; values are at most 127."""
         first, second = data[0], data[1] if len(data) > 1 else 0
         if first > LARGEST_VALUE and status < 0xC0:  # another key, or controller, would be played
             self.skipped += 1

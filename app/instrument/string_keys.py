@@ -25,7 +25,7 @@ class StringKeys:
     """
 
     def __init__(self, patch: Patch, ear: Ear, preset: PresetInfo, near: StringKeys | None = None) -> None:
-        """Raises ValueError: the tuning is impossible, or the patch has drums."""
+        """Raise ValueError: the tuning is impossible, or the patch has drums."""
         if isinstance(patch.strings, Drums):
             raise ValueError(f"{patch.name} has drums, and no strings; choose an instrument of strings")
         self.patch, self.ear = patch, ear

@@ -45,7 +45,7 @@ class Strings:
     """The strings of a patch, by key."""
 
     def __init__(self, patch: Patch) -> None:
-        """Raises ValueError: the tuning is impossible."""
+        """Raise ValueError: the tuning is impossible."""
         self._patch = patch
         self._tuning = Tuning(patch.tuning)
 

@@ -155,7 +155,7 @@ class Tail:
 
 
 def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int) -> None:
-    """Fills in strings, their pitches and what a recording adds to them."""
+    """Fill in strings, their pitches and what a recording adds to them."""
     patch = loud.patch
     if loud.recorded is not None:
         put_recorded(table, tail, loud.recorded, grid_points)
@@ -180,7 +180,7 @@ def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int
 
 
 def put_recorded(table: np.void, tail: Tail, own: RecordedString, grid_points: int) -> None:
-    """Puts what a recording adds to strings behind a table."""
+    """Put what a recording adds to strings behind a table."""
     header = np.zeros(1, RECORDED)
     pitch_hz, rest, hz, ratios, rows = own.additions
     header["pitch_hz"], header["rest"], header["modes"] = pitch_hz, rest, grid_points - 2

@@ -60,7 +60,7 @@ class Tuning:
     """
 
     def __init__(self, choice: TuningChoice) -> None:
-        """Raises ValueError: the scale or the mapping is damaged, or gives no pitch; the message names the field."""
+        """Raise ValueError: the scale or the mapping is damaged, or gives no pitch; the message names the field."""
         self._transpose = choice.transpose
         self._a4_hz = choice.a4_hz
         self._table: tuple[np.ndarray, np.ndarray] | None = None  # mapped keys, and log₂ of their pitch in Hz

@@ -111,7 +111,7 @@ class AheadVoice:
             self.voice.fade_out_by(self.seconds)
 
     def advance(self) -> None:
-        """Renders the next block; `finished` after the last one."""
+        """Render the next block; `finished` after the last one."""
         began_s = time.monotonic()
         if self._state is None:
             self._state = self.source.start(self.initial_m[None])
@@ -138,7 +138,7 @@ class AheadVoice:
         return self._state, tuple(self._frames), self._spent_s, self.finished
 
     def take_known(self, known: Known) -> None:
-        """Takes what is known of the same pluck, and continues from there."""
+        """Take what is known of the same pluck, and continue from there."""
         self._state, frames, self._spent_s, whole = known
         self._frames = list(frames)
         for samples in frames:
@@ -166,7 +166,7 @@ class Ahead:
         self._thread: threading.Thread | None = None
 
     def render(self, voice: AheadVoice) -> None:
-        """Starts to render a voice; what is known of the same pluck need not be rendered again."""
+        """Start to render a voice; what is known of the same pluck need not be rendered again."""
         with self._mailbox:
             self._voices.append(voice)
             self._mailbox.notify()
@@ -175,7 +175,7 @@ class Ahead:
                 self._thread.start()
 
     def close(self) -> None:
-        """Ends the thread, waiting 10 s at most; may be called again."""
+        """End the thread, waiting 10 s at most; may be called again."""
         with self._mailbox:
             self._closing = True
             self._mailbox.notify()

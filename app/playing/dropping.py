@@ -14,7 +14,7 @@ DROPPED_S = 0.03  # of its fade
 
 
 def drop(note: Note | KeyNote | None, error: Exception, report: Callable[[str, str], None]) -> None:
-    """Ends a note, as far as it was made; the report has always the same message, which is shown once."""
+    """End a note, as far as it was made; the report has always the same message, which is shown once."""
     report(DROPPED, log_fault(error, "while a note was played"))
     if note is not None:
         note.cut = True

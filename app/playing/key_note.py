@@ -58,7 +58,7 @@ class KeyNote:
         self._playing = Playing(0.0, 0, None)
 
     def take(self, report: Report) -> None:
-        """Follows a report of the player."""
+        """Follow a report of the player."""
         if report.kind == of.BEGAN:
             self._begun, self.gain = report, report.gain
             self.string = report.string if report.string >= 0 else None
@@ -73,7 +73,7 @@ class KeyNote:
             self.cut = self.cut or report.kind == of.REFUSED
 
     def look(self) -> None:
-        """Reads how far it is. Any thread."""
+        """Read how far it is. Any thread."""
         if self._begun is not None and not self.over:
             self._playing = self.player.compiled.playing(self._begun) or self._playing
 
@@ -130,17 +130,17 @@ class KeyNote:
         return self.began_frame + round(seconds * self.mixer.rate_hz)
 
     def release_at(self, frame: int) -> None:
-        """Lets it fade out from a frame of the mixer on; 0: not any more."""
+        """Let it fade out from a frame of the mixer on; 0: not any more."""
         self.player.cancel(self.id)
         if frame > 0:
             self.player.release(self.id, frame=frame)
 
     def release(self, seconds: float) -> None:
-        """Lets it fade out within so many seconds, from now on; one that waits for its frame never begins."""
+        """Let it fade out within so many seconds, from now on; one that waits for its frame never begins."""
         self.released = True
         self.player.cancel(self.id)
         self.player.release(self.id, max(seconds, 1e-3))
 
     def end(self) -> None:
-        """Marks it as cut, where no device plays its voices any more."""
+        """Mark it as cut, where no device plays its voices any more."""
         self.cut = True

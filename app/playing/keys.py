@@ -155,7 +155,7 @@ class Keys:
     def handle(
         self, event: Event, due: Due | None, struck_s: float, begun: Callable[[KeyNote], None]
     ) -> KeyNote | None:
-        """Plays an event, at once or when it is due; the note of a key that is struck, or None.
+        """Play an event, at once or when it is due; the note of a key that is struck, or None.
 
         Args:
             struck_s: the device clock's time of the gesture; 0: it is none.
@@ -185,7 +185,7 @@ class Keys:
             return note
 
     def _release_before(self, event: Event, frame: int) -> None:
-        """Releases of keys and pedals damp what players before have struck, too. Under the lock."""
+        """Release of keys and pedals damp what players before have struck, too. Under the lock."""
         released = isinstance(event, NoteOff) or (isinstance(event, Controller) and event.number in RELEASES)
         for player in self._playing if released else []:
             if player is not self._player:
@@ -198,7 +198,7 @@ class Keys:
             self._switches = {at: each for at, each in self._switches.items() if each.channel != event.channel}
 
     def look(self) -> list[KeyNote]:
-        """Follows the player's reports; the notes that began since it was asked for the last time. Any thread."""
+        """Follow the player's reports; the notes that began since it was asked for the last time. Any thread."""
         found = []
         with self._lock:  # a note is known before its report is read
             for player in self._playing:
@@ -230,7 +230,7 @@ class Keys:
             self.recorder.cancel()
 
     def stop(self, seconds: float) -> None:
-        """Lets all strings fade out, also those that ring in sympathy."""
+        """Let all strings fade out, also those that ring in sympathy."""
         with self._lock:
             for player in self._playing:
                 player.stop(seconds)
@@ -300,14 +300,14 @@ class Keys:
         return self._player
 
     def _give(self, player: InstrumentPlayer, mixer: Mixer) -> None:
-        """Lets keys play a player. Under the lock."""
+        """Let keys play a player. Under the lock."""
         player.set_gains(self._gains, self._compared)
         mixer.set_player(player.compiled)
         self._player, self._in = player, mixer
         self._playing.append(player)
 
     def _follow_wish(self) -> None:
-        """Plays what is wanted; what takes milliseconds of it, in the background."""
+        """Play what is wanted; what takes milliseconds of it, in the background."""
         wanted, player = self._wanted, self._player
         if wanted is not None and player is not None and not player.of_drums:
             self._bring(player, wanted, nearly=not is_another(wanted.patch, player.patch))
@@ -325,7 +325,7 @@ class Keys:
         self._set_present_effects()
 
     def _bring(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
-        """Lets keys play what is wanted, unless something else is by now. `nearly`: as of `keys_of`."""
+        """Let keys play what is wanted, unless something else is by now. `nearly`: as of `keys_of`."""
         try:
             keys = player.keys_of(wanted.patch, wanted.ear, nearly)
             if isinstance(keys, DrumKeys) and not self._all_computed(keys):
@@ -345,7 +345,7 @@ class Keys:
                     self.recorder.take(_turned(player))
 
     def _all_computed(self, keys: DrumKeys) -> bool:
-        """Computes a patch's drums, which takes up to seconds; False: another patch is wanted by now."""
+        """Compute a patch's drums, which takes up to seconds; False: another patch is wanted by now."""
         low, high = keys.patch.range
         for key in range(low, high + 1):
             if self._wanted is None or self._wanted.patch is not keys.patch:
@@ -355,7 +355,7 @@ class Keys:
         return True
 
     def _begin(self, wanted: _Wanted) -> None:
-        """Loads the preset of what is wanted."""
+        """Load the preset of what is wanted."""
         patch, path = wanted.patch, self._find(wanted.patch.preset)
         if path is None:
             self._report(f"{patch.name} is played by the preset {patch.preset}, which was not found.", "")

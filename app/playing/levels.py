@@ -41,7 +41,7 @@ class Levels:
         return self._known.get(note.matching_key) if note.match is None else note.match
 
     def ask(self, note: Note, rate_hz: int, found: Callable[[tuple[object, ...], Mapping[str, float]], None]) -> None:
-        """Computes the gains where they are not known and enough of the note is rendered; `found` is then called."""
+        """Compute the gains where they are not known and enough of the note is rendered; `found` is then called."""
         key = note.matching_key
         if note.match is not None or not all(each.finished or each.rendered_s >= MATCHED_S for each in note.ahead):
             return

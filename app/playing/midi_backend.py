@@ -81,7 +81,7 @@ class RtMidi:
                 client.delete()
 
     def open_input(self, name: str, *, callback: Callable[[Sequence[int]], None]) -> RtMidiInput:
-        """Opens an input; the bytes of its messages go to `callback`, in a thread of its own. Raises OSError."""
+        """Open an input; the bytes of its messages go to `callback`, in a thread of its own. Raises OSError."""
         with self._faults():
             client = self._client()
             try:
@@ -139,7 +139,7 @@ class RtMidiInput:
         self._thread.start()
 
     def close(self) -> None:
-        """Closes the input; no message comes afterwards."""
+        """Close the input; no message comes afterwards."""
         self._open = False
         self._thread.join()
         with contextlib.suppress(Exception):  # a device that is gone has nothing to close

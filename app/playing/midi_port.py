@@ -46,7 +46,7 @@ class MidiInput:
             raise MidiUnavailable(f"The system's MIDI does not answer ({error}).") from error
 
     def open(self, name: str) -> None:
-        """Opens the input of that name, else one of the same device, and closes any other, whose keys are released.
+        """Open the input of that name, else one of the same device, and close any other, whose keys are released.
 
         One that cannot be opened is tried again by `look`, until `close`.
 
@@ -68,7 +68,7 @@ class MidiInput:
         self.name, self._awaited = found, ""
 
     def look(self) -> str:
-        """Releases the keys of an input that was disconnected, and opens it when it is back; to be called often.
+        """Release the keys of an input that was disconnected, and open it when it is back; to be called often.
 
         Returns: what happened, for the player; "" for nothing.
         """
@@ -87,14 +87,14 @@ class MidiInput:
         return f"The MIDI input {self.name} is connected again."
 
     def close(self) -> None:
-        """Closes the input, if one is open, and lets its keys go; may be called again."""
+        """Close the input, if one is open, and let its keys go; may be called again."""
         port, self._port, self.name, self._awaited = self._port, None, "", ""
         if port is not None:
             port.close()
         self.release_all()
 
     def release_all(self) -> None:
-        """Releases the keys that are held through the input, and leaves its wheels and pedals at rest."""
+        """Release the keys that are held through the input, and leave its wheels and pedals at rest."""
         channels, self._channels = self._channels, set()
         for event in release_all(channels):
             self._on_release_all(event)

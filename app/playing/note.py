@@ -106,13 +106,13 @@ class Note:
         return self._began_frame or max((voice.began_frame for voice in self.voices.values()), default=0)
 
     def replace_voices(self, ahead: list[AheadVoice], voices: Mapping[str, Voice]) -> None:
-        """Takes voices that are as far in its motion in the place of others, by source."""
+        """Take voices that are as far in its motion in the place of others, by source."""
         assert self.mixer is not None
         self._began_frame = self.began_frame + round(self._starved_s * self.mixer.rate_hz)
         self.ahead, self.voices = ahead, {**self.voices, **voices}
 
     def begin_again(self, ahead: list[AheadVoice], voices: dict[str, Voice]) -> None:
-        """Takes voices that are to begin together."""
+        """Take voices that are to begin together."""
         self._began_frame, self.ahead, self.voices = 0, ahead, voices
 
     @property
@@ -135,24 +135,24 @@ class Note:
         return self.began_frame + round((seconds + self._starved_s) * rate_hz) - skipped
 
     def set_begin(self, struck_s: float) -> None:
-        """Gives its voices the time of their gesture, by the sound's clock (0: none), and the frame they begin at."""
+        """Give its voices the time of their gesture, by the sound's clock (0: none), and the frame they begin at."""
         for voice in self.voices.values():
             voice.set_struck(struck_s)
             voice.begin_at(self.begin_frame)
 
     def release_at(self, frame: int) -> None:
-        """Lets it fade out from a frame of the mixer on; 0: not any more."""
+        """Let it fade out from a frame of the mixer on; 0: not any more."""
         for voice in self.voices.values():
             voice.release_at(frame)
 
     def end(self) -> None:
-        """Cuts it, where no device plays its voices any more; they are over."""
+        """Cut it, where no device plays its voices any more; they are over."""
         self.cut = True
         for voice in self.voices.values():
             voice.refuse()
 
     def release(self, seconds: float) -> None:
-        """Lets it fade out within so many seconds, from now on."""
+        """Let it fade out within so many seconds, from now on."""
         self.released = True
         for voice in self.voices.values():
             voice.release(seconds)

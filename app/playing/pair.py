@@ -25,13 +25,13 @@ class Pair:
         self._heard = ""
 
     def select(self, name: str) -> None:
-        """Sets which one is heard; where they sound, it is a cross-fade."""
+        """Set which one is heard; where they sound, it is a cross-fade."""
         self._heard = name
         for each, voice in self._voices.items():
             voice.set_gain(float(each == name))
 
     def play(self, restart: bool = False) -> None:
-        """Starts both where nothing sounds, or `again`; otherwise they continue."""
+        """Start both where nothing sounds, or `again`; otherwise they continue."""
         if self._voices and not restart:
             return
         self.stop()
@@ -44,7 +44,7 @@ class Pair:
         self.mixer.add(*self._voices.values())
 
     def stop(self) -> None:
-        """Fades out."""
+        """Fade out."""
         for voice in self._voices.values():
             voice.release(STOP_S)
         self._voices = {}

@@ -54,7 +54,7 @@ class Playback:
         return thread is not None and thread.is_alive()
 
     def play(self, events: Sequence[TimedEvent]) -> None:
-        """Plays these events from their beginning; stops what is being played."""
+        """Play these events from their beginning; stops what is being played."""
         self.stop()
         self._stopping = threading.Event()
         work = (sorted(events, key=lambda each: each.time_s), self._stopping)
@@ -110,7 +110,7 @@ class _Beginning:
         return Due(mixer, self._frame + round(time_s * mixer.rate_hz), self._began_s + time_s)
 
     def wait(self, time_s: float, ahead_s: float, stopping: threading.Event) -> Due:
-        """Waits until `ahead_s` before an event is due, or until it is to stop."""
+        """Wait until `ahead_s` before an event is due, or until it is to stop."""
         while True:
             due = self.due(time_s)
             early_s = (due.frame - due.mixer.frames) / due.mixer.rate_hz - ahead_s

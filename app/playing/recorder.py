@@ -60,7 +60,7 @@ class EventRecorder:
             self._report(FULL, "")
 
     def cancel(self, event: Event | None = None) -> None:
-        """Forgets events whose time is still to come, or this one of them."""
+        """Forget events whose time is still to come, or this one of them."""
         with self._lock:
             if self._recorded is not None:
                 played_s = time.monotonic() - self._began_s

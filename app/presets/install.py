@@ -34,7 +34,7 @@ class Installed:
 
 
 def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> Installed:
-    """Checks a preset file and copies it into `folder`, which is made if needed.
+    """Check a preset file and copy it into `folder`, which is made if needed.
 
     Args:
         present: the files of all presets; where one of them has the same name, a number is appended.

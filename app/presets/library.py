@@ -99,7 +99,7 @@ class Library:
         return min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae, default=None)
 
     def refresh(self) -> list[str]:
-        """Reads the folders again and replaces `entries` where they have changed.
+        """Read the folders again and replace `entries` where they have changed.
 
         Returns a line for each file that cannot be used, without those of the last time.
         """

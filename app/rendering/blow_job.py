@@ -86,7 +86,7 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
         take.ready_frames = first + count
 
     def _listen(self, take: BlowTake) -> None:
-        """Renders the signals for other listening points; those that are there stay until these are complete."""
+        """Render the signals for other listening points; those that are there stay until these are complete."""
         if self._coming is None:
             self._coming, self._weights = (_listened(self.request), self._set_out()), _weights(self.request)
         listened, movers = self._coming
@@ -114,7 +114,7 @@ class _Mover:
         return np.concatenate([np.zeros((1, found.shape[1])), found])
 
     def show(self, block: Array, motion: ModalMotion, omega: Array) -> None:
-        """Takes the flashes of these frames, which follow those of the last call; a speed needs the next frame.
+        """Take the flashes of these frames, which follow those of the last call; a speed needs the next frame.
 
         Modes that the frames leave out rest from now on.
         """

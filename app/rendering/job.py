@@ -71,7 +71,7 @@ class Job(Rendering[RenderRequest, Take]):
         return take
 
     def _find_others(self, take: Take) -> None:
-        """Begins the models of other presets that are newly requested."""
+        """Begin the models of other presets that are newly requested."""
         for path in self.request.others:
             name = OTHER + path.stem
             if name in self._lines:
@@ -92,7 +92,7 @@ class Job(Rendering[RenderRequest, Take]):
             take.motions[name] = motion
 
     def _show(self, take: Take) -> None:
-        """Begins new flashes where the slow motion has changed; flashes that are under way are finished first."""
+        """Begin new flashes where the slow motion has changed; flashes that are under way are finished first."""
         behind = any(self._lines[name].behind for name in self._wanted() if name in self._lines)
         if self._strobe != (strobe := self._wanted_strobe(take)) and not behind:
             self._strobe = strobe
@@ -100,7 +100,7 @@ class Job(Rendering[RenderRequest, Take]):
                 line.show(strobe)
 
     def _listen(self, take: Take) -> None:
-        """Begins new signals where the listening points have changed.
+        """Begin new signals where the listening points have changed.
 
         Complete signals stay until the new ones are complete, so that plots follow a point that is dragged as often
         as it can be rendered.
@@ -124,7 +124,7 @@ class Job(Rendering[RenderRequest, Take]):
         return Strobe(self.request.speed, take.fundamental_hz, take.seconds)
 
     def _advance_lines(self, take: Take) -> None:
-        """Renders a block of model and truth, and others up to its end.
+        """Render a block of model and truth, and others up to its end.
 
         The model is rendered here, the rest in the helper.
         """
@@ -145,7 +145,7 @@ class Job(Rendering[RenderRequest, Take]):
         return [*SOURCES, *(OTHER + path.stem for path in self.request.others)]
 
     def _measure(self, take: Take) -> None:
-        """Adds the error of new pictures."""
+        """Add the error of new pictures."""
         first, stop = self._measured, take.ready_frames
         if stop > first:
             model, truth = (take.motions[name].read(first, stop)[None] for name in SOURCES)

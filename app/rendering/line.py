@@ -77,7 +77,7 @@ class Line:
         return max(0, min(self.frames, int(np.ceil(time_s * self.rate_hz))) - self.done)
 
     def show(self, strobe: Strobe) -> None:
-        """Begins the flashes of another strobe; they replace the present ones when they have caught up."""
+        """Begin the flashes of another strobe; they replace the present ones when they have caught up."""
         flashes = self._flashes = Flashes(strobe, self.rate_hz, self.frames, self._initial.shape[1])
         if self.stride > 1 and self.done:
             self._shown = _Frames(self._source, self._initial)
@@ -87,7 +87,7 @@ class Line:
         self.motion.flashes = flashes
 
     def listen(self, ear: Ear) -> Signal:
-        """Begins a new signal for these listening points, and returns it; the present one is not continued."""
+        """Begin a new signal for these listening points, and return it; the present one is not continued."""
         signal = Signal(self.rate_hz, len(ear.points), self._seconds)
         if self._source is None or self._program is None:
             signal.end_in_silence()
@@ -98,7 +98,7 @@ class Line:
         return signal
 
     def advance(self, samples: int) -> None:
-        """Renders pictures and flashes of the next samples, flashes that are behind, and a block of the signal."""
+        """Render pictures and flashes of the next samples, flashes that are behind, and a block of the signal."""
         first, stop, flashes = self.done, self.done + samples, self._flashes
         if samples:
             numbers = np.arange(-(-first // self.stride) * self.stride, stop, self.stride)

@@ -54,7 +54,7 @@ class Listening:
         self._state: SourceState | None = None
 
     def advance(self) -> None:
-        """Appends a block to the signal, or less where less is available; silence where the source runs away."""
+        """Append a block to the signal, or less where less is available; silence where the source runs away."""
         signal = self.signal
         readable = signal.ready_frames + min(max(FIRST_FRAMES, signal.ready_frames), BLOCK_FRAMES)
         try:

@@ -21,7 +21,7 @@ class Loaded:
 
     @cached_property
     def model(self) -> ModelSource:
-        """Raises ValueError where the model cannot start from a displaced string at rest alone."""
+        """Raise ValueError where the model cannot start from a displaced string at rest alone."""
         return ModelSource(self.preset)
 
     @cached_property

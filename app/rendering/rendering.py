@@ -39,11 +39,11 @@ class Rendering(ABC, Generic[Request, Made]):
         self._begun_s = time.monotonic()
 
     def ask_again(self, request: Request) -> None:
-        """Takes a request for the same motion: see `same_motion` for what may differ."""
+        """Take a request for the same motion: see `same_motion` for what may differ."""
         self.request = request
 
     def announce(self) -> None:
-        """Reports again what there is: the window may have shown another motion in between."""
+        """Report again what there is: the window may have shown another motion in between."""
         if self.take is not None:
             self._listener.take_started(self.take)
             if self._finished:
@@ -65,7 +65,7 @@ class Rendering(ABC, Generic[Request, Made]):
         return self.take is not None and self._finished and self._satisfied(self.take)
 
     def advance(self) -> None:
-        """Renders a block of each source.
+        """Render a block of each source.
 
         Raises:
             PresetError: the preset cannot be used.

@@ -73,7 +73,7 @@ class Flashes:
         return self._needed[np.searchsorted(self._needed, first) : np.searchsorted(self._needed, stop)]
 
     def take(self, stop: int, numbers: NDArray[np.int64], frames_m: NDArray[np.float32]) -> None:
-        """Adds frames with these ascending numbers, (frames, grid_points).
+        """Add frames with these ascending numbers, (frames, grid_points).
 
         All frames needed before `stop` must be among these or have been added before.
         """

@@ -22,7 +22,7 @@ Subject = Path | StringOf
 
 
 def load_subject(subject: Subject) -> Preset:
-    """Loads and checks the preset.
+    """Load and check the preset.
 
     Raises:
         PresetError: the file cannot be used, or it is not of many strings, or this string is not possible.

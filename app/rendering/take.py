@@ -72,7 +72,7 @@ class Signal(Series):
     rate_hz: int
 
     def end_in_silence(self) -> None:
-        """Completes the signal with zeros."""
+        """Complete the signal with zeros."""
         self._values[self.ready_frames :] = 0.0
         self.ready_frames = self.frames
 

@@ -57,13 +57,13 @@ class RenderWorker:
         self._thread.start()
 
     def submit(self, request: RenderRequest | BlowRequest) -> None:
-        """Replaces a request that waits and abandons another motion being rendered. Any thread; returns at once."""
+        """Replace a request that waits and abandon another motion being rendered. Any thread; returns at once."""
         with self._mailbox:
             self._request = request
             self._mailbox.notify()
 
     def close(self) -> None:
-        """Ends the thread; may be called again."""
+        """End the thread; may be called again."""
         with self._mailbox:
             self._closing = True
             self._mailbox.notify()

@@ -178,7 +178,7 @@ class Session:
         return self._choices
 
     def update(self, **changes: Any) -> None:
-        """Takes new values, all or none, as `Choices.changed`; the preset of the patch chooses the patch.
+        """Take new values, all or none, as `Choices.changed`; the preset of the patch chooses the patch.
 
         Raises:
             ValueError: a value is out of its range or a field is unknown; nothing has changed then.
@@ -191,28 +191,28 @@ class Session:
             self.changed.emit(names)
 
     def play(self, **changes: Any) -> None:
-        """Takes the values that a note brings: as `update`, but no step of undo."""
+        """Take the values that a note brings: as `update`, but no step of undo."""
         if names := self._take(changes):
             self.played.emit(names)
             self.changed.emit(names)
 
     def _take(self, changes: Mapping[str, Any]) -> frozenset[str]:
-        """Returns the names that have new values."""
+        """Return the names that have new values."""
         before, self._choices = self._choices, self._choices.changed(changes)
         return frozenset(name for name in OBSERVED if getattr(before, name) != getattr(self._choices, name))
 
     def play_patch(self) -> None:
-        """Makes the patch that is there the instrument: keys are pitches."""
+        """Make the patch that is there the instrument: keys are pitches."""
         if (patch := self._choices.patch) is not None:
             self.update(instrument=patch)
 
     def play_string(self) -> None:
-        """Makes the string that is shown the instrument: keys are places along it."""
+        """Make the string that is shown the instrument: keys are places along it."""
         choices = self._choices
         self.update(instrument=SingleString(preset=choices.preset), string=choices.string)
 
     def move_pluck(self, position: float, amplitude_mm: float) -> None:
-        """Takes the nearest allowed pluck: for gestures, which may go past the limits. `position` as in `Choices`."""
+        """Take the nearest allowed pluck: for gestures, which may go past the limits. `position` as in `Choices`."""
         self.update(
             position=OF_CHOICES["position"].clamped(position),
             amplitude_mm=OF_CHOICES["amplitude_mm"].clamped(amplitude_mm),

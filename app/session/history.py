@@ -81,7 +81,7 @@ class History:
         self._open_fields = None
 
     def undo(self) -> None:
-        """Takes the last step back; does nothing where there is none."""
+        """Take the last step back; does nothing where there is none."""
         self._restore(self._undo, self._redo)
 
     def redo(self) -> None:

@@ -17,7 +17,7 @@ _M_MMAP_THRESHOLD = -3  # of glibc's mallopt
 
 
 def collect_between_events() -> GarbageCollector:
-    """Collects garbage in the calling thread, the window's, every `COLLECT_EVERY_S`, as long as the result is kept.
+    """Collect garbage in the calling thread, the window's, every `COLLECT_EVERY_S`, as long as the result is kept.
 
     Python itself collects in whichever thread happens to allocate, and would delete parts of closed views there, for
     which Qt ends the process. Objects that exist by now are left out of every later collection: to look through all
@@ -30,13 +30,13 @@ def collect_between_events() -> GarbageCollector:
 
 
 def collect_anywhere() -> None:
-    """Takes `collect_between_events` back: Python collects in any thread, as it does by default."""
+    """Take `collect_between_events` back: Python collects in any thread, as it does by default."""
     gc.unfreeze()
     gc.enable()
 
 
 def return_large_blocks() -> None:
-    """Makes glibc give blocks of `LARGE_BYTES` and more back to the system when they are freed.
+    """Make glibc give blocks of `LARGE_BYTES` and more back to the system when they are freed.
 
     By default it raises this threshold once large blocks are freed, and keeps later ones. Takes of many sizes would
     then fragment the heap, by a hundred MiB and more.
@@ -47,7 +47,7 @@ def return_large_blocks() -> None:
 
 
 def return_free_pages() -> None:
-    """Makes glibc give every wholly free page back to the system, which takes a few milliseconds.
+    """Make glibc give every wholly free page back to the system, which takes a few milliseconds.
 
     It does not do so by itself: the heap that it keeps for each thread stays at its largest size.
     """

@@ -99,7 +99,7 @@ def crashes_written() -> Iterator[None]:
 
 
 def log_fault(error: BaseException, where: str) -> str:
-    """Writes an exception that was caught to the log, and returns what was written.
+    """Write an exception that was caught to the log, and return what was written.
 
     Args:
         where: a line before it: what was being done.

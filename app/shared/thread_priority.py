@@ -24,7 +24,7 @@ class Rank(IntEnum):
 
 
 def lower_priority(rank: Rank) -> None:
-    """Lowers the priority of the calling thread, and of those that it starts later, by `rank`.
+    """Lower the priority of the calling thread, and of those that it starts later, by `rank`.
 
     Only Linux gives each thread a niceness of its own; elsewhere this does nothing.
     """
@@ -36,7 +36,7 @@ def lower_priority(rank: Rank) -> None:
 
 
 def wait_asleep() -> None:
-    """Makes OpenMP's threads, which compute for torch, sleep between operations; call it before torch is loaded.
+    """Make OpenMP's threads, which compute for torch, sleep between operations; call it before torch is loaded.
 
     By default each spins on its core and keeps it from other work: beside other busy processes a command took two to
     three times as long, and as much processor time, as with one thread.
@@ -53,7 +53,7 @@ def native_threads() -> set[int]:
 
 
 def put_first(threads: set[int]) -> bool:
-    """Schedules threads, the device's own, in real time; whether Linux has granted it to at least one.
+    """Schedule threads, the device's own, in real time; whether Linux has granted it to at least one.
 
     Other systems do so by themselves.
     """

@@ -44,7 +44,7 @@ class Job:
         self._reported_s = 0.0
 
     def cancel(self) -> None:
-        """Asks the work to end at its next call; returns at once."""
+        """Ask the work to end at its next call; returns at once."""
         self._stop.set()
 
     def wait(self, seconds: float = 0.0) -> None:
@@ -57,7 +57,7 @@ class Job:
             raise Cancelled
 
     def check(self) -> None:
-        """Returns when the job may continue.
+        """Return when the job may continue.
 
         Raises:
             Cancelled: see `wait`.
@@ -67,7 +67,7 @@ class Job:
             self.wait(LOOK_AGAIN_S)
 
     def report(self, share: float, text: str = "", so_far: object = None) -> None:
-        """Reports the share that is done, 0 … 1, the present step, and a result that can be shown already.
+        """Report the share that is done, 0 … 1, the present step, and a result that can be shown already.
 
         Raises:
             Cancelled: see `wait`.
@@ -76,7 +76,7 @@ class Job:
         self._report(share, text, so_far, at_once=so_far is not None)
 
     def progress(self, share: float, text: str = "", left_s: float | None = None, /) -> None:
-        """Reports as a `Progress`, without a breath: for compiled work. In place of a result: the seconds left.
+        """Report as a `Progress`, without a breath: for compiled work. In place of a result: the seconds left.
 
         Raises:
             Cancelled: see `wait`.
@@ -132,12 +132,12 @@ class Worker:
         return job
 
     def cancel(self) -> None:
-        """Asks the job under way to end; one that waits is not begun."""
+        """Ask the job under way to end; one that waits is not begun."""
         if self._job is not None:
             self._job.cancel()
 
     def close(self, seconds: float | None = 10.0, *, cancel: bool = True) -> None:
-        """Ends the thread, waiting so long for it (None: as long as it takes); may be called again.
+        """End the thread, waiting so long for it (None: as long as it takes); may be called again.
 
         `cancel`: whether a job under way is cancelled, and not waited for to its end.
         """

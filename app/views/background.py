@@ -50,16 +50,16 @@ class Background(QObject):
         self._job = self._worker.start(work)
 
     def stop(self) -> None:
-        """Asks the job under way to end; its end is still reported."""
+        """Ask the job under way to end; its end is still reported."""
         self._worker.cancel()
 
     def cancel(self) -> None:
-        """Abandons the job under way: nothing of it arrives any more."""
+        """Abandon the job under way: nothing of it arrives any more."""
         self._worker.cancel()
         self._job = None
 
     def close(self, seconds: float | None = 10.0, *, cancel: bool = True) -> None:
-        """Abandons the job and ends the thread, as `Worker.close`; may be called again."""
+        """Abandon the job and end the thread, as `Worker.close`; may be called again."""
         self._job = None
         self._worker.close(seconds, cancel=cancel)
 

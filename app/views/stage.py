@@ -80,7 +80,7 @@ class StageView(QWidget):
         self.update()
 
     def set_plain(self, plain: bool) -> None:
-        """Draws string or drum alone, without scale, legend and time."""
+        """Draw string or drum alone, without scale, legend and time."""
         self._plain = plain
         for button in self._toggles:
             button.setVisible(not plain)
@@ -106,7 +106,7 @@ class StageView(QWidget):
         return side if side is not None and near[side] < GRAB_PIXELS else None
 
     def _step_mark(self, held: Qt.KeyboardModifier, steps: int) -> None:
-        """Moves the left mark, with Ctrl the right one."""
+        """Move the left mark, with Ctrl the right one."""
         side = "right" if held & Qt.KeyboardModifier.ControlModifier else "left"
         if side in self._listening:
             self.listening_point_moved.emit(side, min(max(self._listening[side] + STEP * steps, 0.0), 1.0))
@@ -185,7 +185,7 @@ def paint_backdrop(painter: QPainter, width: float, height: float) -> None:
 def paint_legend(
     painter: QPainter, sources: tuple[ShownSource, ...], warning: str, colour: str, right: float
 ) -> None:
-    """Paints the sources and, to their right, the warning in its colour, as far as `right` in pixels.
+    """Paint the sources and, to their right, the warning in its colour, as far as `right` in pixels.
 
     Where both do not fit, the titles of the sources are cut first, but they keep LEGEND_SHARE of the line.
     """
@@ -201,7 +201,7 @@ def paint_legend(
 
 
 def paint_remark(painter: QPainter, width: float, text: str) -> None:
-    """Paints a line in the upper left corner, why nothing is heard."""
+    """Paint a line in the upper left corner, why nothing is heard."""
     painter.setPen(QColor(theme.FAINT))
     painter.setFont(theme.small_font(11))
     room = width - 2 * MARGIN_X

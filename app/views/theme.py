@@ -121,7 +121,7 @@ changes = _Changes()
 
 
 def use(new: Theme) -> None:
-    """Makes `new` the present theme and emits `changes.theme_changed`; the style sheet is set by `apply_theme`."""
+    """Make `new` the present theme and emit `changes.theme_changed`; the style sheet is set by `apply_theme`."""
     global present
     old, present = present, new
     SOURCE_COLOURS.update({kind: getattr(new, kind) for kind in SOURCE_COLOURS})
@@ -173,7 +173,7 @@ def _palette() -> QPalette:
 
 
 def apply_theme(app: QApplication, choice: ThemeChoice = "dark", size_percent: int = 100) -> None:
-    """Sets Fusion with the theme's palette and style sheet for the application; "system" follows the desktop.
+    """Set Fusion with the theme's palette and style sheet for the application; "system" follows the desktop.
 
     `size_percent`: of text.
     """
@@ -213,7 +213,7 @@ class _Fixed(QObject):
 
 
 def fix_size(widget: QWidget, width: int | None = None, height: int | None = None) -> None:
-    """Fixes a widget's size in pixels that grow with the text."""
+    """Fix a widget's size in pixels that grow with the text."""
     _Fixed(widget, width, height)
 
 

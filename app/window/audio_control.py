@@ -52,7 +52,7 @@ class AudioControl(QObject):
         self._dialog: AudioDialog | None = None
 
     def open(self, rescan: bool = False) -> None:
-        """Opens the output as chosen. Returns at once; `show` sees what became of it."""
+        """Open the output as chosen. Returns at once; `show` sees what became of it."""
         device, sound = self._wish
         self._changes += 1
         self._output.open(
@@ -64,7 +64,7 @@ class AudioControl(QObject):
         )
 
     def report(self, problem: AudioProblem) -> None:
-        """Shows a fault of the output as a notice, with what plays on; an internal one stays, for its report."""
+        """Show a fault of the output as a notice, with what plays on; an internal one stays, for its report."""
         if problem.kind is ProblemKind.INTERNAL:
             self._window.notices.report(str(problem), problem.detail)
             return
@@ -79,7 +79,7 @@ class AudioControl(QObject):
         self._window.notices.report(self._notice, problem.detail)
 
     def show(self, status: SoundStatus, notes: Notes, take: Take | None) -> None:
-        """Shows the present state; to be called ten times a second."""
+        """Show the present state; to be called ten times a second."""
         if status.problem is None:
             if self._notice:
                 self._window.notices.withdraw(self._notice)  # the sound is back
@@ -131,7 +131,7 @@ class AudioControl(QObject):
         self._last_known = gaps[-1] if gaps else None
 
     def _list_devices(self) -> None:
-        """Lists the devices when they have changed. Without PortAudio they are asked for once: that takes long."""
+        """List the devices when they have changed. Without PortAudio they are asked for once: that takes long."""
         first = self._listed is None
         try:
             found = output_devices(rescan=first and self._output.status().device is None)

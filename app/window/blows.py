@@ -38,7 +38,7 @@ class Blows:
         )
 
     def follow(self, note: KeyNote) -> None:
-        """Shows the latest blow, once its motion is rendered."""
+        """Show the latest blow, once its motion is rendered."""
         if self._asked is not None and self._asked[1] is note:
             return
         keys = note.player.keys
@@ -56,7 +56,7 @@ class Blows:
         self._submit(request)
 
     def listen(self) -> None:
-        """Renders the shown blow again where its duration or the listening points have changed.
+        """Render the shown blow again where its duration or the listening points have changed.
 
         That of another instrument is forgotten.
         """
@@ -72,7 +72,7 @@ class Blows:
             self._submit(request)
 
     def started(self, take: BlowTake) -> bool:
-        """Takes a motion that was begun; whether it is of the latest blow and not shown yet."""
+        """Take a motion that was begun; whether it is of the latest blow and not shown yet."""
         if self._asked is None or take is self.shown.take or not take.request.same_motion(self._asked[0]):
             return False
         note, before = self._asked[1], self.shown

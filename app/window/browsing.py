@@ -45,7 +45,7 @@ class BrowserDesk(QObject):
         browser.folder_asked.connect(self._open_folder)
 
     def show(self) -> None:
-        """Lists what there is now."""
+        """List what there is now."""
         self.browser.show_rows(self._rows(), self.favourites, self._chosen(), str(self._folder()))
 
     def show_chosen(self) -> None:
@@ -53,7 +53,7 @@ class BrowserDesk(QObject):
         self.browser.set_chosen(self._chosen())
 
     def toggle(self) -> None:
-        """Opens the browser, or closes it."""
+        """Open the browser, or close it."""
         if self.browser.isVisible():
             self.browser.dismiss()
         else:

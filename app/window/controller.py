@@ -219,7 +219,7 @@ class Controller(QObject):
         panel.reported.connect(self.window.notices.report)
 
     def _fill_decks(self) -> None:
-        """Makes the views of the Lab when they are first needed. They and their plots take a fifth of a second."""
+        """Make the views of the Lab when they are first needed. They and their plots take a fifth of a second."""
         if any(not panel.on_stage for panel in self.panels):
             return
         from app.window.panels.rack import decks
@@ -329,7 +329,7 @@ class Controller(QObject):
             self.window.transport.show_playing(self.performance.playing)
 
     def listening_test(self) -> None:
-        """Opens the ABX test of what an export would write; until it is closed nothing else plays."""
+        """Open the ABX test of what an export would write; until it is closed nothing else plays."""
         entry, choices, struck = self.entry, self.session.choices, self.instruments.struck
         if entry is None:
             self.window.notices.report("The listening test needs a preset that can be plucked: choose one first.")
@@ -367,7 +367,7 @@ class Controller(QObject):
         self._help.raise_()
 
     def take_file(self, file: Path) -> None:
-        """Takes a dropped file: installs and chooses a preset, restores a WAV's recipe; asks what other sounds are.
+        """Take a dropped file: installs and chooses a preset, restores a WAV's recipe; asks what other sounds are.
 
         Patches, scales and MIDI files go to `patches`.
         """
@@ -410,7 +410,7 @@ class Controller(QObject):
             dialog.deleteLater()
 
     def _play_learned(self, kept: Kept) -> None:
-        """Chooses an instrument that was just learned."""
+        """Choose an instrument that was just learned."""
         self.library.refresh()
         self.patches.reload()
         self.patches.take_file(kept.patch)
@@ -422,7 +422,7 @@ class Controller(QObject):
         return self.performance.entry
 
     def close(self) -> None:
-        """Saves the settings and ends every thread."""
+        """Save the settings and end every thread."""
         if self._abx is not None:
             self._abx.abandon()
         if self._learning is not None:
@@ -491,7 +491,7 @@ class Controller(QObject):
         self._wake()
 
     def _show_kind(self) -> None:
-        """Shows the string or the drum; views of a string say that they do not show drums."""
+        """Show the string or the drum; views of a string say that they do not show drums."""
         drums = self.session.choices.drums
         if (key := self.instruments.drum_key) is not None:
             self.drum.show_key(key)
@@ -502,7 +502,7 @@ class Controller(QObject):
                 panel.cover("" if drums is None else DRUMS_PLAYED)
 
     def _show_struck(self) -> None:
-        """Shows the drum that was struck last, and where."""
+        """Show the drum that was struck last, and where."""
         latest, drums = self.instruments.latest, self.session.choices.drums
         if drums is None or not isinstance(latest, KeyNote) or not latest.of_drum or latest is self._struck:
             return
@@ -545,7 +545,7 @@ class Controller(QObject):
             self._timer.setInterval(wanted_ms)
 
     def _show_deck(self) -> None:
-        """Shows the left and the right deck by turns, between two frames of the string.
+        """Show the left and the right deck by turns, between two frames of the string.
 
         So each painting is short: a key that is played waits for it.
         """

@@ -13,7 +13,7 @@ class NoDisplay(RuntimeError):
 
 
 def check_display() -> None:
-    """Raises NoDisplay on Linux without a screen that answers, unless Qt has another way to show itself."""
+    """Raise NoDisplay on Linux without a screen that answers, unless Qt has another way to show itself."""
     if sys.platform != "linux" or os.environ.get("QT_QPA_PLATFORM") or os.environ.get("WAYLAND_DISPLAY"):
         return
     name = os.environ.get("DISPLAY")

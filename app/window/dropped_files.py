@@ -40,7 +40,7 @@ class Dropped:
 
 
 def receive(file: Path, library: Library) -> Dropped:
-    """Takes a dropped file: a preset is in the library afterwards. Errors become notices."""
+    """Take a dropped file: a preset is in the library afterwards. Errors become notices."""
     ending = file.suffix.lower()
     try:
         if ending == SUFFIX:
@@ -69,7 +69,7 @@ def _other_sound(file: Path) -> Dropped:
 
 
 def receive_body(file: Path) -> Dropped:
-    """Installs an impulse response as a body, which the patch then has. Errors become notices."""
+    """Install an impulse response as a body, which the patch then have. Errors become notices."""
     try:
         return Dropped(body=install_body(file), notice=cut_words(file))
     except (ImpulseError, WriteError) as error:

@@ -65,7 +65,7 @@ class Exports(QObject):
         return self._choices if self.dialog is None else (self.dialog.choices(), self.dialog.sampled_choices())
 
     def open(self, kind: Kind) -> None:
-        """Opens the dialog at a page, or brings it to the front."""
+        """Open the dialog at a page, or bring it to the front."""
         subjects = self._subjects()
         if subjects[kind] is None:
             self.reported.emit(PAGES[kind].missing)
@@ -93,7 +93,7 @@ class Exports(QObject):
         return self.dialog is not None and self.dialog.job is not None
 
     def close(self) -> None:
-        """Ends an export that has begun; what is whole is kept. May be called again."""
+        """End an export that has begun; what is whole is kept. May be called again."""
         if self.dialog is not None:
             self.dialog.accept()
 

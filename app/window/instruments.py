@@ -97,7 +97,7 @@ class Instruments(QObject):
         self.midi.informed.connect(self.informed)
 
     def start(self) -> None:
-        """Opens the remembered MIDI input, if any."""
+        """Open the remembered MIDI input, if any."""
         self.midi.start()
 
     def close(self) -> None:
@@ -119,7 +119,7 @@ class Instruments(QObject):
             self._own_timer.start()
 
     def _show_own_string(self) -> None:
-        """Shows string and pluck of an instrument before it is played, and its pluck when that is turned.
+        """Show string and pluck of an instrument before it is played, and its pluck when that is turned.
 
         What was chosen with the instrument stays, as what undo or a file restores.
         """
@@ -142,7 +142,7 @@ class Instruments(QObject):
                 self._session.play(**shown, **({"string": found.parameters} if own else {}))
 
     def play(self, event: Event, due: Due | None = None, drawn: bool = False) -> None:
-        """Plays an event, at once or when it is due. Any thread. `drawn`: its pluck is the one of the session."""
+        """Play an event, at once or when it is due. Any thread. `drawn`: its pluck is the one of the session."""
         note = self._handle(event, due)
         if note is None:
             return
@@ -245,7 +245,7 @@ class Instruments(QObject):
             self.play(NoteOff(key, KEYS))
 
     def _play_note(self, event: NoteOn, mode: str) -> None:
-        """Plays a note of MIDI that says where the string is plucked, or which preset. In the input's thread."""
+        """Play a note of MIDI that says where the string is plucked, or which preset. In the input's thread."""
         pluck, reach = self._session.choices.pluck, self.reach
         if mode == "position":
             pluck = reach.pluck(event.key, event.velocity, pluck)
@@ -260,7 +260,7 @@ class Instruments(QObject):
         self.play(self._by_hand(pluck))
 
     def _look_at_key(self) -> None:
-        """Takes the string and the pluck of a key from the player's report, within a quantum of the device."""
+        """Take the string and the pluck of a key from the player's report, within a quantum of the device."""
         self._look()
         note = self._unknown
         if note is not None and not note.known:
@@ -280,7 +280,7 @@ class Instruments(QObject):
             self.played.emit()
 
     def _tell_session(self) -> None:
-        """Updates the session, once for all notes that have begun meanwhile."""
+        """Update the session, once for all notes that have begun meanwhile."""
         if self._unknown is not None and not self._look_timer.isActive():
             self._look_timer.start()
             self._look_at_key()

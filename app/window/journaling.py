@@ -76,7 +76,7 @@ class Journaling(QObject):
                 return
 
     def _write(self) -> None:
-        """Appends what is new. After a fault nothing more: what follows would stand behind a torn line."""
+        """Append what is new. After a fault nothing more: what follows would stand behind a torn line."""
         journal, heard = self._journal, self._heard
         assert journal is not None
         try:

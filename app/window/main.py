@@ -78,7 +78,7 @@ class _Start(QObject):
         window.first_painted.connect(self._thread.start)
 
     def wait(self) -> None:
-        """Returns when the loading has ended."""
+        """Return when the loading has ended."""
         if self._thread.ident is not None:
             self._thread.join()
 
@@ -109,7 +109,7 @@ class _Start(QObject):
         self._follow_up()
 
     def _follow_up(self) -> None:
-        """Loads torch when keys would sound, then takes one file after another: of MIDI files, all notes sound."""
+        """Load torch when keys would sound, then take one file after another: of MIDI files, all notes sound."""
         controller = self._controller
         assert controller is not None
         if controller.performance.playable or time.monotonic() > self._patience_s:
@@ -122,14 +122,14 @@ class _Start(QObject):
         QTimer.singleShot(LOOK_MS, self, self._follow_up)
 
     def _failed(self, error: Exception) -> None:
-        """Shows the error as a notice; the window stays until its user closes it."""
+        """Show the error as a notice; the window stays until its user closes it."""
         collect_anywhere()
         self._window.show_failed()
         self._window.notices.faulted.emit(CANNOT_START, log_fault(error, "while the engine was loaded"))
 
 
 def load_engine() -> None:
-    """Loads what the first sound needs and the first paint does not."""
+    """Load what the first sound needs and the first paint does not."""
     threading.Thread(target=_find_devices, name="sound-finder", daemon=True).start()
     from threadpoolctl import threadpool_limits
 
@@ -141,14 +141,14 @@ def load_engine() -> None:
 
 
 def load_torch() -> None:
-    """Loads what pictures need, and models that are rendered ahead."""
+    """Load what pictures need, and models that are rendered ahead."""
     import torch
 
     torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
 
 
 def _find_devices() -> None:
-    """Loads PortAudio, which looks for devices as it is loaded and may take long, beside the rest."""
+    """Load PortAudio, which looks for devices as it is loaded and may take long, beside the rest."""
     with contextlib.suppress(Exception):  # raised again where it is used
         import sounddevice  # noqa: F401
 
@@ -158,7 +158,7 @@ def run(
     alive: Alive = lambda controller: None,
     files: Sequence[Path] = (),
 ) -> int:
-    """Opens the app and returns its exit status when it is closed.
+    """Open the app and return its exit status when it is closed.
 
     Args:
         watch: is given the window before it is shown.
@@ -185,7 +185,7 @@ def run(
     start = _Start(window, settings, path, notice, alive, files)
 
     def end() -> None:
-        """Ends the app without a question: what is not saved is offered at the next start."""
+        """End the app without a question: what is not saved is offered at the next start."""
         window.may_close = lambda: True
         window.close()
         application.quit()  # also loops of dialogs

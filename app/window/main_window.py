@@ -230,7 +230,7 @@ class MainWindow(QMainWindow):
         theme.changes.theme_changed.connect(self._fit)
 
     def show_stage(self, *views: QWidget) -> None:
-        """Puts the views of string and drum above the decks and enables the window, which was loading."""
+        """Put the views of string and drum above the decks and enable the window, which was loading."""
         self._loading.hide()
         for view in views:
             self._shown.addWidget(view)
@@ -239,7 +239,7 @@ class MainWindow(QMainWindow):
         self._set_alive(True)
 
     def show_on_stage(self, view: QWidget, focus: QWidget) -> None:
-        """Shows one of these; `focus` in it gets the focus that the other had."""
+        """Show one of these; `focus` in it gets the focus that the other had."""
         before = self._shown.currentWidget()
         if view is before:
             return
@@ -254,7 +254,7 @@ class MainWindow(QMainWindow):
         self._loading.setText(FAILED)
 
     def order_tabs(self) -> None:
-        """Sets the order of the Tab key: header, notice, string, views, controls. Call it once all parts exist."""
+        """Set the order of the Tab key: header, notice, string, views, controls. Call it once all parts exist."""
         header = (self._menu_button, self.faces, self.presets, self._keys_button, self._test_button, self._more)
         aside = (self.notices.bell, self._audio_button)
         chain: list[QWidget] = []
@@ -278,7 +278,7 @@ class MainWindow(QMainWindow):
         return moved
 
     def _press_or_pluck(self) -> None:
-        """Presses the button, or opens the box, that the Tab key went to; after a click elsewhere, Enter plucks."""
+        """Press the button, or open the box, that the Tab key went to; after a click elsewhere, Enter plucks."""
         aimed = self.focusWidget()
         if aimed is self._tabbed_to and isinstance(aimed, QAbstractButton):
             aimed.animateClick()
@@ -299,7 +299,7 @@ class MainWindow(QMainWindow):
     # Faces
 
     def show_face(self, face: Face) -> None:
-        """Shows the areas of a face, and hides the others."""
+        """Show the areas of a face, and hide the others."""
         self.face = face
         self.faces.show_key(face)
         for area, widgets in self._areas.items():
@@ -322,7 +322,7 @@ class MainWindow(QMainWindow):
         return self._keys_button.isChecked()
 
     def show_keys(self, shown: bool) -> None:
-        """Shows the keys in the Lab, or hides them."""
+        """Show the keys in the Lab, or hide them."""
         self._keys_button.setChecked(shown)
         self.instrument.setVisible(shown or self.face == "play")
         self._share_height()
@@ -421,7 +421,7 @@ class MainWindow(QMainWindow):
         self._solo.setVisible(mode > 0)
 
     def say_briefly(self, text: str) -> None:
-        """Shows a text over the window for BRIEFLY_MS: what a key did, which may not be visible."""
+        """Show a text over the window for BRIEFLY_MS: what a key did, which may not be visible."""
         place = self.mapToGlobal(QPoint(self.width() // 2, self._head.geometry().bottom()))
         QToolTip.showText(place, plain_tip(text), self, QRect(), BRIEFLY_MS)
 
@@ -430,7 +430,7 @@ class MainWindow(QMainWindow):
         return bytes(self.saveGeometry().toBase64().data()).decode("ascii")
 
     def restore_geometry(self, text: str) -> None:
-        """Restores size and place ("": none), no larger than the present screen."""
+        """Restore size and place ("": none), no larger than the present screen."""
         if text:
             self.restoreGeometry(QByteArray.fromBase64(text.encode("ascii", "ignore")))
         if not self.isMaximized() and not self.isFullScreen():

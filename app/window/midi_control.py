@@ -58,7 +58,7 @@ class MidiControl(QObject):
         self._look_timer.timeout.connect(self._look)
 
     def start(self) -> None:
-        """Opens the remembered input, if any, now or when it is connected; emits `reported` where it cannot."""
+        """Open the remembered input, if any, now or when it is connected; emits `reported` where it cannot."""
         self._look_timer.start()
         if self.choices.port:
             try:
@@ -71,7 +71,7 @@ class MidiControl(QObject):
         self.input.close()
 
     def _look(self) -> None:
-        """Follows an input that was disconnected, or is connected again."""
+        """Follow an input that was disconnected, or is connected again."""
         if not (happened := self.input.look()):
             return
         (self.informed if self.input.name else self.reported).emit(happened)
@@ -81,7 +81,7 @@ class MidiControl(QObject):
     # The dialog
 
     def show_dialog(self, window: QWidget) -> None:
-        """Opens the dialog, which does not block the window, or brings it to the front."""
+        """Open the dialog, which does not block the window, or bring it to the front."""
         if self._dialog is None:
             dialog = self._dialog = MidiDialog(
                 {id: f"instrument: {each.name}" if id in OF_PATCHES else each.name for id, each in LEARNABLE.items()},
@@ -146,7 +146,7 @@ class MidiControl(QObject):
         self._remember(self.choices.model_copy(update={"notes": mode}))
 
     def _learn(self, field: str) -> None:
-        """Assigns the next controller that moves to `field`; "", or the same field again: ends waiting for one."""
+        """Assign the next controller that moves to `field`; "", or the same field again: ends waiting for one."""
         self._learning = field if field and field != self._learning else None
         if self._dialog is not None and self._learning is not None:
             self._dialog.show_problem("")

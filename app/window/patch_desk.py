@@ -167,7 +167,7 @@ class PatchDesk(QObject):
         return next((each for each in self._entries if patch is not None and each.patch.name == patch.name), None)
 
     def reload(self) -> None:
-        """Reads patches and bodies again: the user may have added files."""
+        """Read patches and bodies again: the user may have added files."""
         if self._panel.bar.compare.isChecked():  # the saved patch may have changed
             self.compare(False)
         self._entries, problems = list_patches()
@@ -180,13 +180,13 @@ class PatchDesk(QObject):
     # Intents
 
     def choose(self, name: str) -> None:
-        """Makes a patch, by the name of its entry, the one that keys play."""
+        """Make a patch, by the name of its entry, the one that keys play."""
         for entry in self._entries:
             if entry.name == name:
                 self._session.update(instrument=entry.patch)
 
     def audition(self, name: str) -> None:
-        """Chooses a patch, unless it is there already, maybe changed, and plays a note in the middle of its range."""
+        """Choose a patch, unless it is there already, maybe changed, and play a note in the middle of its range."""
         if self.entry is None or self.entry.name != name:
             self.choose(name)
         self._session.play_patch()
@@ -197,7 +197,7 @@ class PatchDesk(QObject):
             self._playback.play(_note(key))
 
     def change(self, field: str, value: float | str) -> None:
-        """Changes a field of the patch, by its path; a value beyond its bounds is ignored."""
+        """Change a field of the patch, by its path; a value beyond its bounds is ignored."""
         patch = self.patch
         if patch is None:
             return
@@ -214,7 +214,7 @@ class PatchDesk(QObject):
         self._session.update(patch=changed)
 
     def turn_to(self, field: str, figure: float) -> None:
-        """Turns a knob of the string to a figure of the shown string, or as near as it goes."""
+        """Turn a knob of the string to a figure of the shown string, or as near as it goes."""
         patch = self.patch
         if patch is None:
             return
@@ -224,7 +224,7 @@ class PatchDesk(QObject):
             self.reported.emit(one_line(str(error)))
 
     def save(self) -> None:
-        """Saves the patch: under its name where it is the user's own, else asks for one."""
+        """Save the patch: under its name where it is the user's own, else asks for one."""
         patch, entry = self.patch, self.entry
         if patch is None:
             return
@@ -239,7 +239,7 @@ class PatchDesk(QObject):
             )
 
     def _ask(self, title: str, question: str, name: str, do: Callable[[str], None]) -> None:
-        """Asks for a name and does what it is for; again, with the reason, where the name is impossible."""
+        """Ask for a name and do what it is for; again, with the reason, where the name is impossible."""
         reason = ""
         while True:
             name, wanted = QInputDialog.getText(self._panel, title, f"{reason}{question}", text=name)
@@ -252,7 +252,7 @@ class PatchDesk(QObject):
                 reason = f"{one_line(explained(error))}.\n\n"
 
     def _save_as(self, patch: Patch, name: str) -> None:
-        """Raises ValueError: the name is impossible or taken."""
+        """Raise ValueError: the name is impossible or taken."""
         self._save(Patch.model_validate({**dict(patch), "name": name}))
 
     def _save(self, patch: Patch, replace: Path | None = None) -> None:
@@ -267,7 +267,7 @@ class PatchDesk(QObject):
         self.browser.reveal(saved.name)
 
     def rename(self, name: str = "") -> None:
-        """Asks for a new name of one of the user's own patches, by default the present one."""
+        """Ask for a new name of one of the user's own patches, by default the present one."""
         entry = next((each for each in self._entries if each.name == name), self.entry)
         if entry is None or not entry.own:
             self.reported.emit("Only instruments of your own can be renamed: save this one first.")
@@ -275,7 +275,7 @@ class PatchDesk(QObject):
         self._ask("Rename instrument", "New name:", entry.patch.name, lambda new: self._rename(entry, new))
 
     def _rename(self, entry: PatchEntry, name: str) -> None:
-        """Raises ValueError: the name is impossible or taken."""
+        """Raise ValueError: the name is impossible or taken."""
         try:
             renamed = rename_patch(entry, name)
         except WriteError as error:
@@ -289,7 +289,7 @@ class PatchDesk(QObject):
         self.browser.reveal(renamed.name)
 
     def delete(self, name: str) -> None:
-        """Deletes one of the user's own patches."""
+        """Delete one of the user's own patches."""
         entry = next((each for each in self._entries if each.name == name and each.own), None)
         if entry is None:
             return
@@ -302,12 +302,12 @@ class PatchDesk(QObject):
         self.reload()
 
     def revert(self) -> None:
-        """Goes back to the patch as it was saved."""
+        """Go back to the patch as it was saved."""
         if (entry := self.entry) is not None:
             self._session.update(instrument=entry.patch)
 
     def compare(self, saved: bool) -> None:
-        """Lets keys play the patch as it was saved, or as it is now. The choices stay; any change of them ends it."""
+        """Let keys play the patch as it was saved, or as it is now. The choices stay; any change of them ends it."""
         entry = self.entry if saved else None
         self._performance.hear_patch(None if entry is None else entry.patch)
         self._panel.bar.show_comparing(entry is not None)
@@ -325,7 +325,7 @@ class PatchDesk(QObject):
             self.reported.emit(one_line(str(error)))
 
     def _add(self, file: Path) -> None:
-        """Adds a patch's file to the library, and chooses it; where it cannot be added, it is only chosen."""
+        """Add a patch's file to the library, and choose it; where it cannot be added, it is only chosen."""
         try:
             entry, added = add_patch(file)
         except WriteError as error:
@@ -346,7 +346,7 @@ class PatchDesk(QObject):
         self._song.load(file.name, song.events)
 
     def _tune(self, file: Path) -> None:
-        """Tunes the patch by a Scala file: a mapping joins the scale that it has, and a scale its mapping."""
+        """Tune the patch by a Scala file: a mapping joins the scale that it has, and a scale its mapping."""
         patch, text = self.patch, read_scala(file)
         if patch is None:
             self.reported.emit(f"{file.name} tunes an instrument, and none is chosen; choose one first.")
@@ -360,13 +360,13 @@ class PatchDesk(QObject):
         self.informed.emit(f"{file.name} tunes {patch.name}{joined}.")
 
     def remove_scala(self) -> None:
-        """Tunes the patch in twelve equal steps again."""
+        """Tune the patch in twelve equal steps again."""
         if (patch := self.patch) is not None:
             tuning = TuningChoice(a4_hz=patch.tuning.a4_hz, transpose=patch.tuning.transpose)
             self._session.update(patch=patch.model_copy(update={"tuning": tuning}))
 
     def take_body(self, name: str) -> None:
-        """Gives the patch one of the user's own bodies, which was just installed."""
+        """Give the patch one of the user's own bodies, which was just installed."""
         self._panel.bar.set_bodies(body_titles())
         if self.patch is None:
             self.informed.emit(f"The body {name} was added; choose an instrument, then this body in its bar.")
@@ -377,7 +377,7 @@ class PatchDesk(QObject):
         self.informed.emit(f"{self.patch.name} now has the body {name}.")
 
     def stop(self) -> None:
-        """Stops the MIDI file that is played, or the note of an audition."""
+        """Stop the MIDI file that is played, or the note of an audition."""
         self._song.stop()
         self._playback.stop()
 
@@ -412,7 +412,7 @@ class PatchDesk(QObject):
         return (LOWEST_OCTAVE, HIGHEST_OCTAVE) if self.patch is None else octaves_of(*self.patch.range)
 
     def _keep_octave_in_range(self, asked: bool) -> None:
-        """Moves the octave of the computer's keys to where one sounds, or most do with another range; says why.
+        """Move the octave of the computer's keys to where one sounds, or most do with another range; says why.
 
         `asked`: the octave was to change; otherwise another patch made it change.
         """
@@ -446,12 +446,12 @@ class PatchDesk(QObject):
             self._reported_other = other
 
     def show_played(self) -> None:
-        """Says soon in the bar what of the latest note, which the session knows by now, lies outside the training."""
+        """Say soon in the bar what of the latest note, which the session knows by now, lies outside the training."""
         if not self._note_timer.isActive():  # of a chord, of fast notes, or of a knob, once: it takes milliseconds
             self._note_timer.start()
 
     def _judge_again(self) -> None:
-        """Says soon what of the latest note lies outside the training with the knobs as they are now.
+        """Say soon what of the latest note lies outside the training with the knobs as they are now.
 
         Another patch, or keys that choose places, leave nothing to say.
         """
@@ -472,7 +472,7 @@ class PatchDesk(QObject):
         self._say("; ".join(self._outside()), of_shown=not turned)
 
     def _say(self, outside: str, of_shown: bool = True) -> None:
-        """Reports what is outside the training; in the bar, how pitches are had where there is no patch."""
+        """Report what is outside the training; in the bar, how pitches are had where there is no patch."""
         self.outside_changed.emit(outside, of_shown)
         self._panel.bar.show_note("" if self.patch is not None else NO_PATCH)
 
@@ -492,7 +492,7 @@ class PatchDesk(QObject):
         return outside_of_string(entry.info, string, choices.pluck)
 
     def _show_string(self, patch: Patch) -> KeyString | None:
-        """Shows that string in figures, or why there is none; None where it is silent or impossible."""
+        """Show that string in figures, or why there is none; None where it is silent or impossible."""
         found: KeyString | None = None
         facts: dict[str, str] = {}
         knobs = self._panel.knobs
@@ -511,7 +511,7 @@ class PatchDesk(QObject):
         return found
 
     def tick(self) -> None:
-        """Shows the MIDI file's position and which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
+        """Show the MIDI file's position and which keys sound, every SHOWN_EVERY_S; called by the window's timer."""
         now_s = time.monotonic()
         if now_s - self._shown_s < SHOWN_EVERY_S:
             return
@@ -525,7 +525,7 @@ class PatchDesk(QObject):
         self.recordings.tick(now_s)
 
     def close(self) -> None:
-        """Ends the playback and a recording, which is kept; may be called again."""
+        """End the playback and a recording, which is kept; may be called again."""
         self._note_timer.stop()
         self.stop()
         self.recordings.close()
@@ -547,7 +547,7 @@ class PatchDesk(QObject):
         self.desk.show_chosen()
 
     def _press(self, key: int, velocity: int, string: int | None) -> None:
-        """Plays a key on the screen, which is one of the patch, where there is one."""
+        """Play a key on the screen, which is one of the patch, where there is one."""
         self._session.play_patch()
         self._instruments.play(NoteOn(key, velocity, KEYS, string=string))
 

@@ -142,7 +142,7 @@ class Performance(QObject):
         return Moment(self.take, self.position_s, self.moving, elapsed_s, blow, self._playhead.audible)
 
     def catch_up(self, panel: Panel) -> None:
-        """Shows a panel that was made late the motion that it has missed."""
+        """Show a panel that was made late the motion that it has missed."""
         if self._of_drums and (blow := self._blows.shown.take) is not None:
             if not panel.of_strings:
                 panel.take_started(blow)
@@ -154,7 +154,7 @@ class Performance(QObject):
     # Intents
 
     def follow(self) -> None:
-        """Shows the latest note while it rings, if its motion is rendered; otherwise `_take_started` does."""
+        """Show the latest note while it rings, if its motion is rendered; otherwise `_take_started` does."""
         latest = self.notes.latest
         if isinstance(latest, KeyNote) and latest.of_drum:
             if self._of_drums:
@@ -173,7 +173,7 @@ class Performance(QObject):
         self.notes.stop()
 
     def seek(self, position_s: float) -> None:
-        """Moves the playhead; while notes ring, one that begins there replaces them."""
+        """Move the playhead; while notes ring, one that begins there replaces them."""
         if (take := self._playhead.take) is None:
             return
         position_s = min(max(position_s, 0.0), take.seconds)
@@ -183,7 +183,7 @@ class Performance(QObject):
             self.notes.latest = self._shown.note = note
 
     def choices_changed(self, names: frozenset[str]) -> None:
-        """Applies changed fields of `Choices` to the notes, and asks for another motion where that has changed."""
+        """Apply changed fields of `Choices` to the notes, and ask for another motion where that has changed."""
         choices, entry = self._session.choices, self.entry
         if names & {"face", *Monitor.model_fields}:
             self.notes.set_monitor(choices, compared=choices.face == "lab")
@@ -217,23 +217,23 @@ class Performance(QObject):
         self.follow()
 
     def play_preset(self, name: str) -> None:
-        """Lets events pluck this preset's string from now on. Any thread; the choices must follow."""
+        """Let events pluck this preset's string from now on. Any thread; the choices must follow."""
         choices = self._session.choices
         self.notes.set_instrument(SingleString(preset=name), choices.ear, choices.patch)
 
     def hear_dry(self, dry: bool) -> None:
-        """Leaves body and room out where `dry` is True; else only while the difference is heard."""
+        """Leave body and room out where `dry` is True; else only while the difference is heard."""
         self.notes.hear_dry(dry or self._session.choices.source_heard == DIFFERENCE)
 
     def hear_patch(self, patch: Patch | None) -> None:
-        """Lets keys play this patch until another is chosen; None: the chosen one. The choices stay."""
+        """Let keys play this patch until another is chosen; None: the chosen one. The choices stay."""
         choices = self._session.choices
         if patch is not None:
             choices = choices.changed({"patch": patch})
         self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
 
     def close(self) -> None:
-        """Ends the threads; may be called again."""
+        """End the threads; may be called again."""
         self.notes.stop()
         self._worker.close()
         self.notes.close()
@@ -241,7 +241,7 @@ class Performance(QObject):
     # Sixty times a second
 
     def tick(self) -> None:
-        """Forgets notes that ended, continues with the loop, and updates the header."""
+        """Forget notes that ended, continue with the loop, and update the header."""
         self.notes.poll()
         if self._session.choices.loop:
             self._turn()
@@ -260,7 +260,7 @@ class Performance(QObject):
         return f"{name}: buffering, starts in {latest.waits_s:.1f} s"
 
     def _turn(self) -> None:
-        """Hands the next turn of the loop to the mixer, shortly before it begins."""
+        """Hand the next turn of the loop to the mixer, shortly before it begins."""
         # once another pluck is chosen, the note that rings is not the shown one, and its turn is the new pluck's
         note, take, turn = self._shown.note or self.notes.latest, self._shown.take, self._next_turn
         if note is None or take is None or note.request is None or not note.began:

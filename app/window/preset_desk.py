@@ -53,13 +53,13 @@ class PresetDesk(BrowserDesk):
         self._bar.filtered.show_listed(len(browser.listed), browser.total)
 
     def _library_changed(self) -> None:
-        """Shows what there is now; a filter that hides an added preset is cleared."""
+        """Show what there is now; a filter that hides an added preset is cleared."""
         added, self._known = set(self._library.names) - self._known, set(self._library.names)
         self.show()
         for name in added:
             self.browser.reveal(name)
 
     def _reload(self) -> None:
-        """Reads the folders again: the user may have added files."""
+        """Read the folders again: the user may have added files."""
         for problem in self._library.refresh():
             self.reported.emit(problem)

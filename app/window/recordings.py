@@ -64,7 +64,7 @@ class Recordings(QObject):
         return bool(self._unsaved) or self._keys.recorder.recording
 
     def record(self) -> None:
-        """Begins to record; or ends it and has it saved, as a recording that is not saved yet."""
+        """Begin to record; or end it and have it saved, as a recording that is not saved yet."""
         if self._keys.recorder.recording:
             self.end()
             if self._unsaved:
@@ -80,7 +80,7 @@ class Recordings(QObject):
             self._choices_changed(frozenset())
 
     def discard(self) -> None:
-        """Forgets the latest recording."""
+        """Forget the latest recording."""
         if (latest := self.latest) is not None:
             self.forget(latest)
 
@@ -99,7 +99,7 @@ class Recordings(QObject):
             self.forget(played)
 
     def close(self) -> None:
-        """Leaves what is not saved to the next start; may be called again."""
+        """Leave what is not saved to the next start; may be called again."""
         self._reading.close()
         self.end()
         for journal in self._unsaved.values():
@@ -107,7 +107,7 @@ class Recordings(QObject):
                 journal.close()
 
     def offer_left(self) -> None:
-        """Reads what an earlier run has left, in the background, then asks whether to recover or discard it."""
+        """Read what an earlier run has left, in the background, then ask whether to recover or discard it."""
         self._reading.start(lambda job: _read_left(job.check))
 
     def _ask_about(self, found: dict[Played, Journal], problems: list[str]) -> None:
@@ -136,12 +136,12 @@ class Recordings(QObject):
             self.save_asked.emit()
 
     def tick(self, now_s: float) -> None:
-        """Shows how long it has been recording. `now_s`: of `time.monotonic`."""
+        """Show how long it has been recording. `now_s`: of `time.monotonic`."""
         if self._keys.recorder.recording:
             self._bar.show_recording(now_s - self._began_s)
 
     def end(self) -> None:
-        """Ends the recording that is being made, if any; it is kept, and not saved yet."""
+        """End the recording that is being made, if any; it is kept, and not saved yet."""
         if not self._keys.recorder.recording:
             return
         events = self._keys.recorder.end()

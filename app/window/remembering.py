@@ -44,7 +44,7 @@ class SettingsSaver(QObject):
         self._writing.start()
 
     def close(self) -> None:
-        """Stops looking, and writes what has not been written yet."""
+        """Stop looking, and write what has not been written yet."""
         self._timer.stop()
         if self._writing is not None:
             self._writing.join()

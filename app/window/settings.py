@@ -122,7 +122,7 @@ def _usable(text: bytes) -> Settings | None:
 
 
 def _drop(data: dict[str, Any], field: list[str]) -> None:
-    """Removes the value at a path of keys; where a necessary key is missing, the object that lacks it."""
+    """Remove the value at a path of keys; where a necessary key is missing, the object that lacks it."""
     key, *rest = field
     inner = data.get(key)
     if rest and isinstance(inner, dict) and rest[0] in inner:
@@ -132,7 +132,7 @@ def _drop(data: dict[str, Any], field: list[str]) -> None:
 
 
 def save_settings(path: Path, settings: Settings) -> None:
-    """Writes whole or not at all. Raises OSError."""
+    """Write whole or not at all. Raises OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with whole_file(path) as unfinished, unfinished.open("wb") as file:
         file.write(settings.model_dump_json(indent=2).encode())

@@ -40,7 +40,7 @@ class Song(QObject):
         return min(self._from_s + time.monotonic() - self._began_s, self.length_s)
 
     def load(self, name: str, events: Sequence[TimedEvent]) -> None:
-        """Shows a file and plays it from its beginning."""
+        """Show a file and play it from its beginning."""
         self._events = tuple(sorted(events, key=lambda each: each.time_s))
         self._strip.show_song(name, self.length_s)
         self.play(0.0)
@@ -51,7 +51,7 @@ class Song(QObject):
         self.tick()
 
     def stop(self) -> None:
-        """Stops where it is."""
+        """Stop where it is."""
         if self._plays:
             self._from_s, self._plays = self.position_s, False
             self._playback.stop()
@@ -64,7 +64,7 @@ class Song(QObject):
             self.play(0.0 if self._from_s >= self.length_s else self._from_s)
 
     def seek(self, position_s: float) -> None:
-        """Goes to a time, and plays on from there where it was playing."""
+        """Go to a time, and play on from there where it was playing."""
         position_s = min(max(position_s, 0.0), self.length_s)
         if self.playing:
             self.play(position_s)
@@ -73,13 +73,13 @@ class Song(QObject):
             self.tick()
 
     def close(self) -> None:
-        """Stops and hides it."""
+        """Stop and hide it."""
         self.stop()
         self._events, self._from_s = (), 0.0
         self._strip.hide()
 
     def tick(self) -> None:
-        """Shows the state; to be called a few times a second."""
+        """Show the state; to be called a few times a second."""
         if not self._events:
             return
         if self._plays and not self._playback.playing:  # it came to its end

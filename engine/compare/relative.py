@@ -57,7 +57,7 @@ class ErrorSums:
         self._row = 0  # of the last block
 
     def add(self, predicted: Motion, truth: Motion, first: int = 0, row: int | None = None) -> None:
-        """Adds trajectories (batch, steps, points) of equal shape; frame 0 (the input) is not among them.
+        """Add trajectories (batch, steps, points) of equal shape; frame 0 (the input) is not among them.
 
         Args:
             predicted, truth: two arrays, or two tensors of one device.

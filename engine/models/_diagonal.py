@@ -167,7 +167,7 @@ def linear_string_encoder(analysis: Tensor) -> Tensor:
 
 
 def store_eigenvalues(nu_log: Tensor, theta_log: Tensor, log_eigenvalues: Tensor) -> None:
-    """Writes log λ = -exp(ν_log) + i exp(θ_log) into the two parameters."""
+    """Write log λ = -exp(ν_log) + i exp(θ_log) into the two parameters."""
     nu, theta = eigenvalues.stored(log_eigenvalues)
     nu_log.copy_(nu)
     theta_log.copy_(theta)

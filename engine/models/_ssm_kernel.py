@@ -47,7 +47,7 @@ def add_and_gelu(outputs: np.ndarray, frames: np.ndarray, scale: np.ndarray, shi
 
 @njit(**COMPILED)
 def add_gated(frames: np.ndarray, gates: np.ndarray) -> None:
-    """Adds the gated linear unit of `gates`, float32 (rows, 2 features), to `frames`, float32 (rows, features)."""
+    """Add the gated linear unit of `gates`, float32 (rows, 2 features), to `frames`, float32 (rows, features)."""
     rows, features = frames.shape
     for r in range(rows):
         y, value, gate = frames[r], gates[r, :features], gates[r, features:]

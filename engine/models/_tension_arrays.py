@@ -55,7 +55,7 @@ def resonator_arrays(
 
 
 def check_resonator(found: Mapping[str, Array], expected: Mapping[str, Array]) -> None:
-    """Raises ValueError, naming the array, where one is of another resonator than expected."""
+    """Raise ValueError, naming the array, where one is of another resonator than expected."""
     for name, array in expected.items():
         atol = 1e-3 * SAME_RESONATOR * float(np.abs(array).max())
         if not np.allclose(found[name], array, rtol=SAME_RESONATOR, atol=atol):

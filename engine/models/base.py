@@ -67,7 +67,7 @@ class StringModel(nn.Module, ABC, Generic[State]):
 
     @abstractmethod
     def initialise(self, how: str, physics: Physics, generator: torch.Generator) -> None:
-        """Sets every weight in place; `how` is one of `initialisations` and is recorded in the preset.
+        """Set every weight in place; `how` is one of `initialisations` and is recorded in the preset.
 
         Raises:
             ValueError: an unknown `how`, or one that these sizes do not allow.
@@ -135,7 +135,7 @@ class KoopmanModel(Protocol):
 
 
 def check_initialisation(model: StringModel[State], how: str) -> None:
-    """Raises ValueError, naming what there is, where a model does not know `how`."""
+    """Raise ValueError, naming what there is, where a model does not know `how`."""
     bounds.check_choice("initialisation", how, model.initialisations)
 
 

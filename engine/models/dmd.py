@@ -104,7 +104,7 @@ class DMD(DiagonalModel):
         self._store(eigenvalues, torch.cat([frame * eigenvalues**-lag for lag in range(c.lags)]))
 
     def _store(self, eigenvalues: Tensor, modes: Tensor) -> None:
-        """Takes eigenvalues (n,) and modes of the embedding (lags · grid_points, n) with n ≤ rank; others vanish."""
+        """Take eigenvalues (n,) and modes of the embedding (lags · grid_points, n) with n ≤ rank; others vanish."""
         points, r, n = self.grid_points, self.configuration.rank, len(eigenvalues)
         magnitude_log = eigenvalues.abs().log().clamp(min=_VANISHED)
         encoder = _encoder(self.configuration, magnitude_log, eigenvalues.angle(), modes)

@@ -118,7 +118,7 @@ def _store_linear_map(
     held_at: float = HELD_AT,
     spare: bool = True,
 ) -> None:
-    """Makes dense layers with SELU between `matrix` (outputs, inputs), where no unit leaves SELU's straight part.
+    """Make dense layers with SELU between `matrix` (outputs, inputs), where no unit leaves SELU's straight part.
 
     Biases hold every hidden unit at a positive value. The first layer's rows hold what `matrix` reads, in a random
     rotation; the hidden layers after it stay as they were drawn, orthogonal; the last undoes them.

@@ -179,11 +179,11 @@ class DiagonalSSM(nn.Module, ABC):
 
     @abstractmethod
     def initialise(self, how: str, generator: torch.Generator) -> None:
-        """Draws every weight: for "paper" as the source does, for "physics" what the string is then written into."""
+        """Draw every weight: for "paper" as the source does, for "physics" what the string is then written into."""
 
     @abstractmethod
     def set_modes(self, log_eigenvalues: Tensor, input_matrix: Tensor) -> None:
-        """Stores the first states so that they have these λ, complex128 (modes,), and this B̄, in the layout of B."""
+        """Store the first states so that they have these λ, complex128 (modes,), and this B̄, in the layout of B."""
 
     def input(self, inputs: Tensor, matrix: Tensor) -> Tensor:
         """`matrix` u, complex (..., states), of real inputs (..., inputs)."""

@@ -79,7 +79,7 @@ class Preset:
 
 
 def save_preset(path: Path, info: PresetInfo, model: StringModel[Any]) -> None:
-    """Writes a preset whole or not at all.
+    """Write a preset whole or not at all.
 
     Raises:
         PresetError: a weight is not finite.
@@ -195,7 +195,7 @@ class _open:
 
 
 def _check_kind(path: Path, state: os.stat_result) -> None:
-    """Raises PresetError where it is a folder, a pipe, which would keep a reader waiting, or too large."""
+    """Raise PresetError where it is a folder, a pipe, which would keep a reader waiting, or too large."""
     if not stat.S_ISREG(state.st_mode):
         raise PresetError(f"{path}: not a file; give a .safetensors preset")
     if state.st_size > bounds.LARGEST_PRESET_BYTES:
@@ -207,7 +207,7 @@ def _check_kind(path: Path, state: os.stat_result) -> None:
 
 
 def check_header(path: Path) -> None:
-    """Raises SafetensorError where the header of a safetensors file is longer than any of ours."""
+    """Raise SafetensorError where the header of a safetensors file is longer than any of ours."""
     with path.open("rb") as file:
         length = int.from_bytes(file.read(8), "little")
     if length > bounds.LARGEST_HEADER_BYTES:

@@ -32,7 +32,7 @@ def advance(
     omega_squared: Array,
     silence: float,
 ) -> None:
-    """Advances amplitudes q and velocities v (batch, modes) in place by `steps` samples.
+    """Advance amplitudes q and velocities v (batch, modes) in place by `steps` samples.
 
     Writes out (batch, frames, modes), the amplitudes after as many samples as `frames` (frames,) say, ascending.
     flows (levels, stages, 4, modes): exact rotations; kicks (levels, stages - 1): lengths in s of the kicks between

@@ -62,7 +62,7 @@ class StringParameters:
         return law.modes_below(self.row, frequency_hz)
 
     def check_motion(self, modes: int, grid_points: int, rate_hz: float, tension_modulated: bool) -> None:
-        """Checks that its motion can be computed in ordinary memory and time, in closed form.
+        """Check that its motion can be computed in ordinary memory and time, in closed form.
 
         Raises:
             ValueError: it cannot, or a mode does not oscillate; the message names the fields.

@@ -82,7 +82,7 @@ class Mixer:
         return int(self.memory.ctypes.data)
 
     def add(self, *voices: Voice) -> None:
-        """Hands voices over: they begin together, with the next quantum. Any thread, at once.
+        """Hand voices over: they begin together, with the next quantum. Any thread, at once.
 
         They are heard as they are: an instrument that is played in the same mixer adds nothing to them.
         Those for which there is no room are refused, and over.
@@ -104,7 +104,7 @@ class Mixer:
             self._publish("pushed", pushed + min(len(voices), room))
 
     def _publish(self, field: str, whole: int) -> None:
-        """Writes a whole number after all that was written before."""
+        """Write a whole number after all that was written before."""
         publish(self.memory.view(np.int64), slot(MIXER, field), whole)
 
     def set_player(self, player: CompiledPlayer) -> None:
@@ -130,7 +130,7 @@ class Mixer:
             self._players.append((player, self.frames))
 
     def _forget_players(self) -> None:
-        """Frees those that play nothing any more. Under the lock."""
+        """Free those that play nothing any more. Under the lock."""
         for each, _ in self._players:
             if each.address == int(self.record["player_before"]) and each.rests:
                 self._publish("player_before", 0)
@@ -170,13 +170,13 @@ class Mixer:
             self._forget_impulses()
 
     def _forget_impulses(self) -> None:
-        """Frees those that the kernels use no more; in the order in which none that moves up is missed."""
+        """Free those that the kernels use no more; in the order in which none that moves up is missed."""
         in_use = [int(self.record[name]) for name in ("effects", "effects_next", "effects_now")]
         # one that the kernel has just turned away from may be reported once more, after it was freed
         self._impulses = {address: self._impulses[address] for address in in_use if address in self._impulses}
 
     def forget_ended(self) -> None:
-        """Frees what is over. Any thread, now and then."""
+        """Free what is over. Any thread, now and then."""
         with self._lock:
             self._voices = [voice for voice in self._voices if not voice.over]
             self._forget_players()

@@ -130,7 +130,7 @@ def voice_blocks(
 
 
 def _fill(voice: Voice, source: ModelSource, initial_m: Array, ear: Ear, advanced: Callable[[float], None]) -> None:
-    """Renders all samples of a voice beforehand."""
+    """Render all samples of a voice beforehand."""
     weights = voice.program.grid_weights(ear)
     state = source.start(initial_m[None])
     voice.append((initial_m @ weights)[None] / FULL_SCALE_M)

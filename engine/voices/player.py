@@ -198,7 +198,7 @@ class CompiledPlayer:
         struck: NDArray[np.float64] | None = None,
         string: int | None = None,
     ) -> int:
-        """Hands an event over; its number, which reports of a note carry. Any thread, at once; none is lost.
+        """Hand an event over; its number, which reports of a note carry. Any thread, at once; none is lost.
 
         Args:
             kind: one of `constants`, as all that follows.
@@ -222,7 +222,7 @@ class CompiledPlayer:
         return number
 
     def take(self, table: Table, frame: int = 0) -> None:
-        """Plays another table from a frame on; strings that ring glide to it. Any thread."""
+        """Play another table from a frame on; strings that ring glide to it. Any thread."""
         with self._lock:
             self._tables.append(table)
             while self._tables[0].serial < int(self.record["serial"]):
@@ -234,7 +234,7 @@ class CompiledPlayer:
         self._flush()
 
     def _flush(self) -> None:
-        """Hands over what waits, as far as the ring has room. Under the lock."""
+        """Hand over what waits, as far as the ring has room. Under the lock."""
         pushed = int(self.record["pushed"])
         room = of.EVENTS - (pushed - int(self.record["taken"]))
         for number in range(min(room, len(self._backlog))):
@@ -250,7 +250,7 @@ class CompiledPlayer:
             return ring + int(self.record["queued"]) + len(self._backlog)
 
     def catch_up(self, mixer_address: int) -> None:
-        """Plays what is due in the mixer's next quantum now, where no device takes its frames."""
+        """Play what is due in the mixer's next quantum now, where no device takes its frames."""
         from engine.kernels.playing.events import play
 
         with self._lock:
@@ -358,7 +358,7 @@ class CompiledPlayer:
         return not any(self._alive(number, note) for number, note in enumerate(self._notes()))
 
     def release(self, seconds: float) -> None:
-        """Lets all voices fade out, where no mixer plays its events any more; one of them may still have them."""
+        """Let all voices fade out, where no mixer plays its events any more; one of them may still have them."""
         for number, note in enumerate(self._notes()):
             for voice in self._alive(number, note).values():
                 if voice["release"] == 0:

@@ -144,7 +144,7 @@ def plain_program(rate_hz: int) -> Program:
 def _samples_program(
     source_rate_hz: int, rate_hz: int, grid_points: int, ends_s: float, force: Array | None = None
 ) -> Program:
-    """Converts by a Kaiser-windowed sinc in `FILTER_PHASES` phases; equal rates leave every sample as it is."""
+    """Convert by a Kaiser-windowed sinc in `FILTER_PHASES` phases; equal rates leave every sample as it is."""
     ratio = source_rate_hz / rate_hz
     cutoff = min(1.0, 1 / ratio)
     phase = np.arange(FILTER_PHASES + 1)[:, None] / FILTER_PHASES

@@ -156,7 +156,7 @@ class Voice:
         self.record["struck_s"] = time_s
 
     def set_gain(self, gain: float) -> None:
-        """Fades to another gain."""
+        """Fade to another gain."""
         self.record["wanted_gain"] = gain
 
     def start_with_gain(self, gain: float) -> None:
@@ -193,12 +193,12 @@ class Voice:
         return max(0, int(self.record["began_frame"]))
 
     def release(self, seconds: float) -> None:
-        """Fades to silence and ends; a release under way continues."""
+        """Fade to silence and end; a release under way continues."""
         if self.record["release"] == 0:
             self.record["release"] = max(1, round(seconds * self.program.rate_hz))
 
     def listen(self, ear: Ear) -> bool:
-        """Fades to other points. False where it cannot now: a fade is under way; ask again.
+        """Fade to other points. False where it cannot now: a fade is under way; ask again.
 
         One that is rendered ahead, and one that is picked up otherwise, stay as they are: True.
         """

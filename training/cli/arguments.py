@@ -52,7 +52,7 @@ StringModes = Annotated[
 
 
 def check_range(option: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """Checks that low ≤ value ≤ high.
+    """Check that low ≤ value ≤ high.
 
     Raises:
         typer.BadParameter: it is not: the command ends with exit status 2 and names option, value and range.
@@ -63,13 +63,13 @@ def check_range(option: str, value: float, low: float, high: float, unit: str = 
 
 
 def check_suffix(option: str, path: Path, suffix: str) -> None:
-    """Raises typer.BadParameter: the name of a file that is written does not end with `suffix`."""
+    """Raise typer.BadParameter: the name of a file that is written does not end with `suffix`."""
     if path.suffix.lower() != suffix:
         raise typer.BadParameter(f"must end with {suffix}, not {path.suffix or 'nothing'}", param_hint=option)
 
 
 def open_preset(name_or_path: str) -> Preset:
-    """Loads a preset by its name, of the shipped ones and the user's own, or by its path. Raises PresetError."""
+    """Load a preset by its name, of the shipped ones and the user's own, or by its path. Raises PresetError."""
     from engine.folders import usable_files
     from engine.presets import find_preset, load_preset
 
@@ -79,7 +79,7 @@ def open_preset(name_or_path: str) -> Preset:
 def open_preset_of_string(
     name_or_path: str, string: str | None, rate_hz: int | None = None, modes: int | None = None
 ) -> Preset:
-    """Loads a preset, and chooses string, rate and number of modes of one of many strings; None: the preset's own.
+    """Load a preset, and choose string, rate and number of modes of one of many strings; None: the preset's own.
 
     Raises:
         PresetError, SchemaError: there is no such preset or string, or the preset is not of many strings.

@@ -31,7 +31,7 @@ class Shares:
         self._report, self._pieces, self._begun = report, pieces, 0
 
     def next(self) -> Callable[[float], None]:
-        """Begins the next piece; returns a function that is called with the share of it that is done, 0 … 1."""
+        """Begin the next piece; returns a function that is called with the share of it that is done, 0 … 1."""
         before, self._begun = self._begun, self._begun + 1
         return lambda share: self._report((before + share) / self._pieces)
 
@@ -44,25 +44,25 @@ class Failure(Exception):
 
 
 def say(text: str) -> None:
-    """Prints one line on standard error; line breaks and control characters in `text` are escaped."""
+    """Print one line on standard error; line breaks and control characters in `text` are escaped."""
     print(f"learned-strings: {one_line(text)}", file=sys.stderr, flush=True)
 
 
 def use_any_output() -> None:
-    """Makes output in an encoding without some characters print their codes instead of failing."""
+    """Make output in an encoding without some characters print their codes instead of failing."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")
 
 
 def print_json(value: Any) -> None:
-    """Prints JSON, with null for infinity and not-a-number, and unprintable characters escaped."""
+    """Print JSON, with null for infinity and not-a-number, and unprintable characters escaped."""
     text = json.dumps(_finite(value), indent=2, allow_nan=False, ensure_ascii=False)
     print("".join(c if c.isprintable() or c == "\n" else json.dumps(c)[1:-1] for c in text))
 
 
 def print_table(columns: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
-    """Prints a table; columns of numbers are aligned to the right."""
+    """Print a table; columns of numbers are aligned to the right."""
     from rich import box
     from rich.console import Console
     from rich.table import Table

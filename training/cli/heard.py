@@ -15,7 +15,7 @@ COLUMNS = ("preset", "heard", "spectra dB", "level dB", "rise dB", "cents", "sec
 
 
 def show_heard(files: Iterable[Path], write: bool, json: bool) -> None:
-    """Compares the sound of presets with the truth and prints the differences, the truest preset first.
+    """Compare the sound of presets with the truth and print the differences, the truest preset first.
 
     Presets that cannot be used are reported and left out.
 
@@ -54,7 +54,7 @@ def show_heard(files: Iterable[Path], write: bool, json: bool) -> None:
 
 
 def measure(path: Path, write: bool, report: Callable[[float], None] = lambda share: None) -> Heard:
-    """Compares the sound of a preset with the truth.
+    """Compare the sound of a preset with the truth.
 
     Args:
         write: add the result to the table in the preset's folder.

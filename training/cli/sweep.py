@@ -155,7 +155,7 @@ def _list(plan: Plan, known: list[Row], json: bool) -> None:
 
 
 def _tell(rows: list[Row], json: bool) -> None:
-    """Prints the rows.
+    """Print the rows.
 
     Raises:
         Failure: one has failed.

@@ -189,7 +189,7 @@ def print_known(known: Known) -> None:
 
 
 def _tell_heard(file: Path) -> None:
-    """Compares the sound of the preset with the truth, and adds the result to the table beside it."""
+    """Compare the sound of the preset with the truth, and add the result to the table beside it."""
     from training.cli.heard import measure
     from training.heard_words import heard_sentence
 

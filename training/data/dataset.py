@@ -138,7 +138,7 @@ def _map(file: Path, shape: tuple[int, int, int], checksum: int) -> np.ndarray[A
 
 
 def _generate(configuration: DatasetConfiguration, folder: Path, report: Callable[[float], None]) -> None:
-    """Writes into another folder that is renamed when it is whole; the caller holds the lock."""
+    """Write into another folder that is renamed when it is whole; the caller holds the lock."""
     unfinished = folder.with_suffix(".unfinished")
     shutil.rmtree(unfinished, ignore_errors=True)
     try:
@@ -157,7 +157,7 @@ def _generate(configuration: DatasetConfiguration, folder: Path, report: Callabl
 
 
 def _simulate(c: DatasetConfiguration, file: Path, report: Callable[[float], None]) -> int:
-    """Writes the amplitudes row by row, so that a full disk is an OSError and no broken mapping; their checksum."""
+    """Write the amplitudes row by row, so that a full disk is an OSError and no broken mapping; their checksum."""
     solver = SplittingSolver(c.resonator, c.rate_hz, substeps=c.substeps)
     initial = draw_initial(c)
     checksum = 0

@@ -432,7 +432,7 @@ def _mean(errors: Iterable[float | None]) -> float | None:
 
 
 def store(rows: Iterable[DrumsRow], path: Path = ROWS) -> None:
-    """Adds rows to the table of results; a row of the same player, drums, rate and seed is replaced."""
+    """Add rows to the table of results; a row of the same player, drums, rate and seed is replaced."""
     with FileLock(f"{path}.lock"):
         present = list(checked(read_table(DrumsRow, path, "table of drums", LARGEST_BYTES))) if path.exists() else []
         by_key = {(row.player, row.drums, row.rate_hz, row.seed): row for row in (*present, *rows)}

@@ -47,7 +47,7 @@ def fit_curves(
     seed: int,
     report: Callable[[float, str, float], None] = lambda share, text, left_s: None,
 ) -> float:
-    """Sets the model's curves in place to those that are best on validation; its geometric mean there.
+    """Set the model's curves in place to those that are best on validation; its geometric mean there.
 
     Args:
         first_frames: in reach of the first step; they grow to all within the first half of the steps.

@@ -61,7 +61,7 @@ class FamilyConfiguration:
 
 
 def read_configuration(path: Path = CONFIGURATION) -> FamilyConfiguration:
-    """Raises SchemaError, naming file and field."""
+    """Raise SchemaError, naming file and field."""
     if not path.is_file():
         raise SchemaError(f"{path}: no such configuration; give a .toml file")
     return read(FamilyConfiguration, read_toml(path), str(path))
@@ -73,7 +73,7 @@ def train_preset(
     *,
     report: Callable[[float, str, float | None], None] = lambda share, text, left_s: None,
 ) -> PresetInfo:
-    """Makes the preset's file, in some minutes.
+    """Make the preset's file, in some minutes.
 
     Args:
         report: receives the share that is done, what is being done, and the time left, where it is known.

@@ -40,7 +40,7 @@ TITLES = {
 
 
 def put_on_shelf(preset: Preset, folder: Path) -> list[Path]:
-    """Writes a preset for each string of `TITLES`; the errors that it holds are those of the family."""
+    """Write a preset for each string of `TITLES`; the errors that it holds are those of the family."""
     written = []
     for name, title in TITLES.items():
         string, description = read_described_string(STRINGS / f"{name}.toml")

@@ -36,7 +36,7 @@ class Checkpoint:
     facts: Mapping[str, Any]
 
     def save(self, path: Path) -> None:
-        """Writes whole or not at all. Raises OSError."""
+        """Write whole or not at all. Raises OSError."""
         tensors = {f"model/{name}": t for name, t in self.model.items()}
         tensors |= {f"best/{name}": t for name, t in self.best_model.items()}
         tensors |= {f"average/{name}": t for name, t in self.average.items()}
@@ -55,7 +55,7 @@ class Checkpoint:
 
     @classmethod
     def load(cls, path: Path) -> Checkpoint:
-        """Raises ValueError, naming the file and the remedy, where it is damaged, or no file of ours."""
+        """Raise ValueError, naming the file and the remedy, where it is damaged, or no file of ours."""
         model: dict[str, Tensor] = {}
         best: dict[str, Tensor] = {}
         average: dict[str, Tensor] = {}

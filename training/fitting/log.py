@@ -48,7 +48,7 @@ class TrainingLog:
         self._trimmed = False
 
     def add(self, progress: Progress) -> None:
-        """Adds the epoch that has ended; later ones of an earlier run are dropped."""
+        """Add the epoch that has ended; later ones of an earlier run are dropped."""
         validation = progress.validation
         ended = Epoch(
             progress.epoch,

@@ -112,7 +112,7 @@ class LatentFit:
 
     @torch.no_grad()
     def yield_latents(self, model: StringModel) -> None:
-        """Makes an encoder that has learned the coordinates yield the latents."""
+        """Make an encoder that has learned the coordinates yield the latents."""
         assert isinstance(model, Koopman)
         last = model.encoder[-1]
         assert isinstance(last, nn.Linear)
@@ -123,7 +123,7 @@ class LatentFit:
 def pursue(
     model: StringModel, dataset: Dataset, steps: int, generator: torch.Generator, blind: bool = False
 ) -> LatentFit:
-    """Gives a Koopman its eigenvalues and its decoder, and returns what its encoder shall learn.
+    """Give a Koopman its eigenvalues and its decoder, and return what its encoder shall learn.
 
     Args:
         steps: frames of the horizon.

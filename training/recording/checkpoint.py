@@ -78,7 +78,7 @@ def checkpoint_of(folder: Path, notes: Sequence[tuple[Note, Series]]) -> Path:
 
 
 def save(path: Path, takes: Takes, steps: int) -> None:
-    """Writes whole or not at all. Raises WriteError."""
+    """Write whole or not at all. Raises WriteError."""
     state = State(
         steps,
         tuple(takes.damping.tolist()),
@@ -95,7 +95,7 @@ def save(path: Path, takes: Takes, steps: int) -> None:
 
 
 def restore(path: Path, takes: Takes, steps: int) -> int:
-    """Sets the takes to a checkpoint; returns how many of all `steps` are done, 0 where there is no file.
+    """Set the takes to a checkpoint; returns how many of all `steps` are done, 0 where there is no file.
 
     Raises:
         SchemaError: the file is damaged; the message names it and the remedy.

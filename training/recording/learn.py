@@ -76,7 +76,7 @@ class Examined:
 
 
 def examined(samples: Array, rate_hz: int) -> Examined:
-    """Examines a recording, as `learn` does first.
+    """Examine a recording, as `learn` does first.
 
     Raises:
         RecordingError: it is no recording of one note in any case.
@@ -96,7 +96,7 @@ def learn(
     progress: Progress = lambda share: None,
     checkpoints: Path | None = None,
 ) -> list[Learned]:
-    """Learns recordings of one instrument: those of the first's pitch jointly, each other alone.
+    """Learn recordings of one instrument: those of the first's pitch jointly, each other alone.
 
     Args:
         recordings: each with its file; the first gives the string.
@@ -155,7 +155,7 @@ def usable(found: Examined, anyway: bool, name: str) -> tuple[Note, Series]:
 
 
 def require_found(learned: Sequence[Learned]) -> None:
-    """Raises NotFound, which names the file, where a fit is of no string."""
+    """Raise NotFound, which names the file, where a fit is of no string."""
     for each in learned:
         if not each.verdict.found:
             raise NotFound(each.source.name, each.verdict)

@@ -84,7 +84,7 @@ def recorded_string(
 
 
 def write_preset(path: Path, title: str, strung: Strung, recorded: RecordedString) -> PresetInfo:
-    """Writes the preset's file: the curves of the shipped model of many strings, with this string.
+    """Write the preset's file: the curves of the shipped model of many strings, with this string.
 
     Raises:
         PresetError: the shipped preset is missing, or the string cannot be played.

@@ -91,7 +91,7 @@ class Report:
 
 
 def report_of(note: Note, learned: LearnedNote, physics: Physics) -> Report:
-    """Compares a note with its recording."""
+    """Compare a note with its recording."""
     truth = note.fitted()
     found = learned.render(np.arange(len(truth)) / note.rate_hz)
     errors = errors_of(truth, found, note.rate_hz, note.noise_power)

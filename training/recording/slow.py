@@ -27,7 +27,7 @@ SPREAD = 0.5  # standard deviation of log σ, an estimate
 
 
 def settle_slow(fits: Sequence[Fit]) -> None:
-    """Settles the slow poles of takes, which share them."""
+    """Settle the slow poles of takes, which share them."""
     least = FALL / max(len(fit.samples) / fit.rate_hz for fit in fits)
     residuals = [fit.data - fit.model() for fit in fits]
     for number in range(len(fits[0].bands)):

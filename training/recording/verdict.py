@@ -59,7 +59,7 @@ class Verdict:
 
 
 def verdict_of(note: Note, series: Series, learned: LearnedNote, report: Report) -> Verdict:
-    """Judges a note's fit by its errors, against a linear fit, and by its partials."""
+    """Judge a note's fit by its errors, against a linear fit, and by its partials."""
     truth = note.fitted()
     t = np.arange(len(truth)) / note.rate_hz
     whole = max(float(truth @ truth), 1e-30)

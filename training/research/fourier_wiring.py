@@ -36,7 +36,7 @@ ENDS = 2  # modes a channel that is read from the ends
 
 
 def store_in_fgru(model: FGRU, modes: StringModes) -> None:
-    """Sets its weights to those of a string of these modes, whose frequencies follow the squares.
+    """Set its weights to those of a string of these modes, whose frequencies follow the squares.
 
     Raises:
         ValueError: see `wire_fgru`.
@@ -45,7 +45,7 @@ def store_in_fgru(model: FGRU, modes: StringModes) -> None:
 
 
 def store_in_frnn(model: FRNN, modes: StringModes) -> None:
-    """Sets its weights to those of a linear string: its frequencies follow nothing.
+    """Set its weights to those of a linear string: its frequencies follow nothing.
 
     Raises:
         ValueError: see `wire_frnn`.

@@ -46,7 +46,7 @@ def build_plugin(
     *,
     replace: bool = False,
 ) -> Path:
-    """Builds a plug-in that holds these instruments: the file, or the folder of the bundle.
+    """Build a plug-in that holds these instruments: the file, or the folder of the bundle.
 
     One that is there is replaced as a whole.
 
@@ -119,7 +119,7 @@ def _built(
 
 
 def _placed(library: Path, images: Sequence[Image], form: str, target: str, path: Path) -> Path:
-    """Puts the linked library where hosts look for it within what is built."""
+    """Put the linked library where hosts look for it within what is built."""
     system = target.partition("-")[0]
     inside: dict[str, Path | str] = {}
     if form == "lv2":

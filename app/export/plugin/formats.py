@@ -98,6 +98,6 @@ def install_folder(form: str, target: str) -> Path:
 
 
 def check_compiler() -> None:
-    """Raises PluginError: the compiler is not installed."""
+    """Raise PluginError: the compiler is not installed."""
     if find_spec("ziglang") is None:
         raise PluginError(f"building a plug-in needs a C compiler: pip install '{EXTRA}' brings one")

@@ -66,7 +66,7 @@ def lost_with(path: Path, ids: Collection[str]) -> frozenset[str]:
 
 
 def check_kept(path: Path, ids: Collection[str]) -> None:
-    """Raises PluginError: something would be lost where a plug-in of `ids` takes this place."""
+    """Raise PluginError: something would be lost where a plug-in of `ids` takes this place."""
     if lost := lost_with(path, ids):
         raise PluginError(f"{path}: {holding(lost)}; build in another folder (--out), or replace it (--replace)")
 

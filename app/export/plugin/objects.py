@@ -106,7 +106,7 @@ def _texts(folder: Path, advanced: Callable[[float], None]) -> dict[str, Path]:
 
 
 def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Callable[[float], None]) -> None:
-    """Runs a module with each of these arguments, all at once, in processes of their own.
+    """Run a module with each of these arguments, all at once, in processes of their own.
 
     Numba's settings hold for a whole process, and a process can be ended.
 
@@ -216,7 +216,7 @@ def _without_counts(text: str) -> str:
 
 
 def _check_names(module: object, entries: set[str]) -> None:
-    """Raises ObjectError where the code refers to anything that the shell or the C library does not give."""
+    """Raise ObjectError where the code refers to anything that the shell or the C library does not give."""
     functions = module.functions  # type: ignore[attr-defined]
     asked = {each.name for each in functions if each.is_declaration and not each.name.startswith("llvm.")}
     unknown = asked - ALLOWED - STUBS - entries

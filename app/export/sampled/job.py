@@ -82,7 +82,7 @@ def planned(plan: SampledPlan, out: Path) -> SampledPlan:
 def export_sampled(
     plan: SampledPlan, out: Path, render: NoteRenderer, *, progress: Progress = lambda *_: None
 ) -> SampledReport:
-    """Renders the samples of a plan and writes OUT.sfz beside their folder, or OUT.sf2 with all of them in it.
+    """Render the samples of a plan and write OUT.sfz beside their folder, or OUT.sf2 with all of them in it.
 
     Until all samples are rendered, nothing else is changed.
 
@@ -123,7 +123,7 @@ def export_sampled(
 
 
 def _check_replaceable(folder: Path, out: Path) -> None:
-    """Raises WriteError where a folder of samples is not of this instrument, or holds anything else."""
+    """Raise WriteError where a folder of samples is not of this instrument, or holds anything else."""
     try:
         others = [path for path in folder.iterdir() if not _OURS.fullmatch(path.name)]
     except FileNotFoundError:
@@ -135,7 +135,7 @@ def _check_replaceable(folder: Path, out: Path) -> None:
 
 
 def _rendered(plan: SampledPlan, folder: Path, render: NoteRenderer, progress: Progress) -> dict[Zone, StoredSample]:
-    """Writes the sample of each zone into a folder."""
+    """Write the sample of each zone into a folder."""
     made = {}
     started = time.monotonic()
     for done, zone in enumerate(plan.zones):
@@ -158,7 +158,7 @@ def _rendered(plan: SampledPlan, folder: Path, render: NoteRenderer, progress: P
 
 
 def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:
-    """Renders notes of a patch by its model, or by the solved string of the same keys."""
+    """Render notes of a patch by its model, or by the solved string of the same keys."""
     from app.instrument.offline import render_note  # compiled code, and torch
 
     def rendered(

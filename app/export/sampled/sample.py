@@ -57,7 +57,7 @@ class StoredSample:
 
 
 def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
-    """Prepares a rendered note, (frames, channels), where ±1 is full scale.
+    """Prepare a rendered note, (frames, channels), where ±1 is full scale.
 
     Raises:
         ValueError: there are no frames, or a value is not finite.

@@ -62,7 +62,7 @@ class _Channel:
 
 
 def check_sf2(plan: SampledPlan) -> None:
-    """Raises ValueError where a plan does not fit into one SoundFont; the message names the remedy."""
+    """Raise ValueError where a plan does not fit into one SoundFont; the message names the remedy."""
     low, high = RATE_RANGE_HZ
     if not low <= plan.rate_hz <= high:
         raise ValueError(f"a SoundFont's rate must lie in {low} … {high} Hz, not {plan.rate_hz}; lower it")
@@ -82,7 +82,7 @@ def write_sf2(
     folder: Path,
     progress: Progress = lambda *_: None,
 ) -> float:
-    """Writes the whole file; the stored samples are read one after the other.
+    """Write the whole file; the stored samples are read one after the other.
 
     Returns:
         By how much the whole was raised, in dB: the loudest sample is at the full level of 16 bits.

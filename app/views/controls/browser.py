@@ -191,7 +191,7 @@ class Browser(QFrame):
         self._fill()
 
     def _fill(self) -> None:
-        """Lists what passes the filter."""
+        """List what passes the filter."""
         kinds = [box.currentData() for box in self.filters.values()]
         order = max(0, self.order.currentIndex())
         self._filling = True
@@ -216,7 +216,7 @@ class Browser(QFrame):
         return len(self._rows)
 
     def clear_filter(self) -> None:
-        """Lists all again; the order is no filter. Emits `listed_changed` once."""
+        """List all again; the order is no filter. Emits `listed_changed` once."""
         parts = (self.search, *self.filters.values(), self.starred)
         blockers = [QSignalBlocker(part) for part in parts]
         self.search.clear()
@@ -231,7 +231,7 @@ class Browser(QFrame):
         self._fill()
 
     def show_card(self, name: str) -> None:
-        """Shows the card of a row; "" of none."""
+        """Show the card of a row; "" of none."""
         row = next((row for row in self.list.rows if row.name == name), None)
         self.delete.setText(DELETE)
         for button in (self.play_button, self.star):
@@ -243,7 +243,7 @@ class Browser(QFrame):
         self.star.setText("★  Favourite" if name in self._favourites else "☆  Favourite")
 
     def place(self) -> None:
-        """Sets the geometry within the parent, under its notice; called when opened and when either changes."""
+        """Set the geometry within the parent, under its notice; called when opened and when either changes."""
         parent = self.parentWidget()
         if parent is not None:
             for notices in self.window().findChildren(NoticeBar):
@@ -253,7 +253,7 @@ class Browser(QFrame):
             self.setGeometry(14, self.top, width, max(300, height))
 
     def show_over(self) -> None:
-        """Opens with the focus in the search field."""
+        """Open with the focus in the search field."""
         self._before = QApplication.focusWidget()
         self.opened.emit()
         self.select()
@@ -274,12 +274,12 @@ class Browser(QFrame):
             self.clear_filter()
 
     def reveal(self, name: str) -> None:
-        """Clears a filter that hides an entry."""
+        """Clear a filter that hides an entry."""
         if name not in self.listed:
             self.clear_filter()
 
     def take_typed(self, event: QKeyEvent) -> bool:
-        """Gives a key that writes to the search, wherever the focus is; False for another key."""
+        """Give a key that writes to the search, wherever the focus is; False for another key."""
         held = event.modifiers() & _COMMAND
         writes = event.key() == KEYS.Key_Backspace or (event.text().strip() and event.text().isprintable())
         if not writes or (held and held != _ALT_GR):
@@ -316,13 +316,13 @@ class Browser(QFrame):
         return self.loaded if self.loaded in hits else next(iter(hits), "")
 
     def set_chosen(self, name: str) -> None:
-        """Selects an entry that was loaded, if it is listed."""
+        """Select an entry that was loaded, if it is listed."""
         if name != self.loaded:
             self.loaded = name
             self.select(name)
 
     def select(self, name: str = "") -> None:
-        """Selects an entry, or the best hit where it is not listed. Loads nothing."""
+        """Select an entry, or the best hit where it is not listed. Loads nothing."""
         self.selected = name if name in self.listed else self.best_hit
         self._filling = True
         self.list.setCurrentIndex(self.list.index_of(self.selected))
@@ -330,7 +330,7 @@ class Browser(QFrame):
         self.show_card(self.selected)
 
     def load(self, name: str) -> None:
-        """Selects a listed entry and has it loaded, unless it is loaded already."""
+        """Select a listed entry and have it loaded, unless it is loaded already."""
         if name:
             self.select(name)
         if name not in ("", self.loaded):
@@ -338,7 +338,7 @@ class Browser(QFrame):
             self.chosen.emit(name)
 
     def move_selection(self, key: Qt.Key) -> None:
-        """Loads the selected entry, or, where it is loaded already, the one that one of MOVES goes to."""
+        """Load the selected entry, or, where it is loaded already, the one that one of MOVES goes to."""
         listed = self.listed
         if listed:
             self.list.setFocus()  # where Space plays
@@ -360,11 +360,11 @@ class Browser(QFrame):
             self.dismiss()
 
     def ask_favourite(self) -> None:
-        """Asks for the selected row to become a favourite, or none."""
+        """Ask for the selected row to become a favourite, or none."""
         self._tell(self.favourite_asked)
 
     def play(self) -> None:
-        """Loads the selected row, and has it played."""
+        """Load the selected row, and have it played."""
         self._rest.stop()
         self.load(self.selected)
         self._tell(self.played)

@@ -97,7 +97,7 @@ class RowList(QTreeWidget):
         self._lines: list[Row | str] = []  # a row, or a heading's text
 
     def show_rows(self, rows: Sequence[Row], favourites: Collection[str]) -> None:
-        """Lists rows in their order, each heading before the first of its own."""
+        """List rows in their order, each heading before the first of its own."""
         self.clear()
         self._lines = []
         for heading, under in groupby(rows, lambda row: row.heading):

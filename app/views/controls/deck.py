@@ -27,7 +27,7 @@ class Deck(QTabWidget):
             self.addTab(view, title)
 
     def show_key(self, key: str) -> None:
-        """Brings a view to the front; a key that is none of this deck's changes nothing."""
+        """Bring a view to the front; a key that is none of this deck's changes nothing."""
         if key in self._keys:
             with QSignalBlocker(self):
                 self.setCurrentIndex(self._keys.index(key))

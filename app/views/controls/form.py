@@ -105,7 +105,7 @@ class FilePicker(QWidget):
         return str(Path(self.edit.text().strip()).parent)
 
     def follow(self, folder: str) -> None:
-        """Suggests names in this folder from now on, where another file was saved; keeps a name that was given."""
+        """Suggest names in this folder from now on, where another file was saved; keeps a name that was given."""
         self._folder = folder
         typed = self.edit.text().strip()
         if typed:
@@ -113,14 +113,14 @@ class FilePicker(QWidget):
 
     @property
     def path(self) -> Path:
-        """Raises ValueError: no name is given."""
+        """Raise ValueError: no name is given."""
         path = Path(self.edit.text().strip())
         if not path.name:
             raise ValueError("file: choose where it is written")
         return path if path.suffix.lower() == self.suffix else path.with_name(path.name + self.suffix)
 
     def suggest(self, name: str) -> None:
-        """Sets a name with its suffix, unless the user has given one; that gets the suffix of the format."""
+        """Set a name with its suffix, unless the user has given one; that gets the suffix of the format."""
         typed = self.edit.text().strip()
         if not self._named_by_user:
             self.edit.setText(str(Path(self._folder) / name))

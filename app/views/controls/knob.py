@@ -51,7 +51,7 @@ class _Editor(QLineEdit):
             super().keyPressEvent(event)
 
     def focusOutEvent(self, event: QFocusEvent) -> None:
-        """Ends typing also where only the first digit was typed, which Qt does not count as an edit."""
+        """End typing also where only the first digit was typed, which Qt does not count as an edit."""
         super().focusOutEvent(event)
         if event.reason() not in (Qt.FocusReason.ActiveWindowFocusReason, Qt.FocusReason.PopupFocusReason):
             self.editingFinished.emit()
@@ -110,7 +110,7 @@ class Knob(QWidget):
         return self.parameter.shown(self._value)
 
     def show_figure(self, figure: str) -> None:
-        """Shows what the value amounts to, with its unit, in its place; "" shows the value again.
+        """Show what the value amounts to, with its unit, in its place; "" shows the value again.
 
         The value itself is in the tooltip, and `figure_asked` reports a typed number.
         """
@@ -119,14 +119,14 @@ class Knob(QWidget):
             self._tell()
 
     def set_barred(self, why: str) -> None:
-        """Greys it out and says why in the tooltip; "" frees it."""
+        """Grey it out and say why in the tooltip; "" frees it."""
         if why != self._why_barred:
             self._why_barred = why
             self.setEnabled(not why)
             self._tell()
 
     def _tell(self) -> None:
-        """Says its state to the eye, in the tooltip and to a screen reader."""
+        """Say its state to the eye, in the tooltip and to a screen reader."""
         both = f"{self._figure} ({self.text})" if self._figure else self.text
         self.setAccessibleDescription(both)
         hands = "Drag, wheel or arrow keys; Shift for fine steps; type a number; double-click resets"
@@ -198,7 +198,7 @@ class Knob(QWidget):
         event.accept()
 
     def event(self, event: QEvent) -> bool:
-        """Keeps Page up and Page down, which are shortcuts of the window, while the knob has the focus."""
+        """Keep Page up and Page down, which are shortcuts of the window, while the knob has the focus."""
         return keeps_keys(event, Qt.Key.Key_PageUp, Qt.Key.Key_PageDown) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
@@ -225,7 +225,7 @@ class Knob(QWidget):
             super().keyPressEvent(event)
 
     def focusInEvent(self, event: QFocusEvent) -> None:
-        """Remembers whether keys brought the focus: then it stays here when a number was typed."""
+        """Remember whether keys brought the focus: then it stays here when a number was typed."""
         reason = Qt.FocusReason
         if event.reason() in (reason.TabFocusReason, reason.BacktabFocusReason, reason.ShortcutFocusReason):
             self._stays = True
@@ -269,7 +269,7 @@ class Knob(QWidget):
             self._close_editor()
 
     def _close_editor(self) -> None:
-        """Ends typing. The focus returns to playing, or to the knob where keys had brought it there."""
+        """End typing. The focus returns to playing, or to the knob where keys had brought it there."""
         if self._editor is not None:
             editor, self._editor = self._editor, None
             if editor.hasFocus():

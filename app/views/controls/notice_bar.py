@@ -66,7 +66,7 @@ class NoticeBar(QFrame):
         return list(self._notices)
 
     def report(self, message: str, details: str = "") -> None:
-        """Shows an error; the message says what to do about it."""
+        """Show an error; the message says what to do about it."""
         self._take(Notice(message, details))
 
     def _report_fault(self, sentence: str, text: str) -> None:
@@ -74,16 +74,16 @@ class NoticeBar(QFrame):
         self.report(f"{sentence} {one_line(error)}", f"{text}\nPlease report it. It is also in {log_file()}.")
 
     def inform(self, message: str, details: str = "") -> None:
-        """Shows a message that is no error."""
+        """Show a message that is no error."""
         self._take(Notice(message, details, error=False))
 
     def withdraw(self, message: str) -> None:
-        """Hides a notice that is no longer true; it stays in the list."""
+        """Hide a notice that is no longer true; it stays in the list."""
         if self.text == message:
             self.hide()
 
     def show_all(self) -> None:
-        """Opens the list of all notices of this run, with their details."""
+        """Open the list of all notices of this run, with their details."""
         if self._list is None:
             self._list = NoticeList(self.window())
         self._list.set_notices(self.notices)
@@ -92,7 +92,7 @@ class NoticeBar(QFrame):
         self.bell.set_unseen(0)
 
     def place(self, corner: QPoint, width: int) -> None:
-        """Sets its upper left corner and its width; it is as high as its text needs."""
+        """Set its upper left corner and its width; it is as high as its text needs."""
         self.move(corner)
         self.setFixedWidth(width)
         self._fit()
@@ -103,7 +103,7 @@ class NoticeBar(QFrame):
         return super().event(event)
 
     def _dismiss(self) -> None:
-        """Hides the notice, which has been read."""
+        """Hide the notice, which has been read."""
         self.hide()
         self.bell.set_unseen(max(0, self.bell.unseen - 1))
 

@@ -20,7 +20,7 @@ TIP_ABOVE = 44  # pixels over a widget, out of the way of the hand
 
 
 def say_above(widget: QWidget, words: str) -> None:
-    """Shows words above a widget for a while, as plain text."""
+    """Show words above a widget for a while, as plain text."""
     QToolTip.showText(widget.mapToGlobal(QPoint(0, -TIP_ABOVE)), plain_tip(words), widget)
 
 
@@ -67,7 +67,7 @@ class _Typed(QAbstractSpinBox if TYPE_CHECKING else object):  # type: ignore[mis
         return (state.Intermediate if self.understood(text) is None else state.Acceptable), text, position
 
     def fixup(self, text: str) -> str:
-        """Says that a text is refused, as it would count; Qt then shows the value again."""
+        """Say that a text is refused, as it would count; Qt then shows the value again."""
         kept = self.specialValueText() if self.value() == self.minimum() else ""
         kept = kept or f"{self.prefix()}{self.textFromValue(self.value())}{self.suffix()}"
         number = typed_number(
@@ -107,7 +107,7 @@ class CountBox(_Typed, QSpinBox):
 
 
 def prepared(box: QAbstractSpinBox, name: str, tip: str, width: int) -> None:
-    """Sets what all of these fields have: name, tooltip, least width, and that only a whole text counts."""
+    """Set what all of these fields have: name, tooltip, least width, and that only a whole text counts."""
     box.setAccessibleName(name)
     box.setToolTip(tip)
     box.setMinimumWidth(width)

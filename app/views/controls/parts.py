@@ -84,7 +84,7 @@ def words_label() -> ElidedLabel:
 
 
 def keeps_keys(event: QEvent, *keys: Qt.Key) -> bool:
-    """Accepts the override of a shortcut on one of these, so that the widget gets the key.
+    """Accept the override of a shortcut on one of these, so that the widget gets the key.
 
     Returns True if it was one.
     """

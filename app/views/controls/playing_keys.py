@@ -95,7 +95,7 @@ class PlayingKeys(QObject):
         return notes
 
     def _let_go(self, *numbers: int) -> None:
-        """Releases keys."""
+        """Release keys."""
         for number in numbers:
             self._leaving.pop(number, None)
             if (press := self._down.pop(number, None)) is not None:
@@ -114,7 +114,7 @@ class PlayingKeys(QObject):
         return (semitone_of(press) if self.piano else place_of(press)) is not None
 
     def _leave(self, number: int, time_ms: int) -> None:
-        """Releases a key that was not pressed again, once the events that have come meanwhile are taken."""
+        """Release a key that was not pressed again, once the events that have come meanwhile are taken."""
 
         def leave() -> None:
             if self._leaving.get(number) == time_ms:

@@ -31,7 +31,7 @@ class Sideways(QScrollArea):
         return super().event(event)
 
     def _renew(self) -> None:
-        """Forgets the sizes that rows had with another text. It asks for a layout, so `_fit` must not do it."""
+        """Forget the sizes that rows had with another text. It asks for a layout, so `_fit` must not do it."""
         part = self.widget()
         if part is not None and (layout := part.layout()) is not None:
             layout.invalidate()

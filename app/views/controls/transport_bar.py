@@ -76,7 +76,7 @@ class TransportBar(QFrame):
         row.addLayout(self._build_output())
 
     def add_group(self, group: QWidget) -> None:
-        """Puts controls of others behind its own, before the volume."""
+        """Put controls of others behind its own, before the volume."""
         self._row.insertWidget(self._row.indexOf(self._space), group)
 
     def set_compact(self, compact: bool, tight: bool = False) -> None:

@@ -107,7 +107,7 @@ class AbxDialog(QDialog):
         return AbxChoices(trials=setup.trials.value(), restart=setup.restart.isChecked(), folder=self._folder)
 
     def abandon(self) -> None:
-        """Closes without a question; a test under way is recorded as incomplete."""
+        """Close without a question; a test under way is recorded as incomplete."""
         if self.testing:
             self._end(CLOSED)
         self._leave()
@@ -127,12 +127,12 @@ class AbxDialog(QDialog):
     # Sound
 
     def _ask_for_sound(self) -> None:
-        """Starts the rendering, at the present rate of the device."""
+        """Start the rendering, at the present rate of the device."""
         self._rate_hz = self._output.rate_hz
         self._rendering = self._render(self._rate_hz)
 
     def _prepare(self) -> None:
-        """Makes A and B, if the pluck has been rendered."""
+        """Make A and B, if the pluck has been rendered."""
         self._hush()
         self._stimuli = self._pair = None
         self._silence = RENDERING
@@ -193,7 +193,7 @@ class AbxDialog(QDialog):
             self._begin_trial()
 
     def _end(self, remark: str = "") -> None:
-        """Saves the result of the run, complete or not; of one without an answer there is none."""
+        """Save the result of the run, complete or not; of one without an answer there is none."""
         run, self._run = self._run, None
         self._hush()
         assert run is not None

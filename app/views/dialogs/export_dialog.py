@@ -122,7 +122,7 @@ class ExportDialog(GrowingDialog):
         return self.sampler.choices()
 
     def open_at(self, kind: Kind) -> None:
-        """Shows a page, unless an export is under way, and brings the dialog to the front."""
+        """Show a page, unless an export is under way, and bring the dialog to the front."""
         if self.job is None:
             self.tabs.setCurrentIndex(KINDS.index(kind))
             self._turn()
@@ -232,7 +232,7 @@ class ExportDialog(GrowingDialog):
             self._tell(f"No file manager was found here; the folder is {self._job.folder}.")
 
     def done(self, result: int) -> None:
-        """Closes the dialog. A job under way is cancelled and waited for; what is whole is kept."""
+        """Close the dialog. A job under way is cancelled and waited for; what is whole is kept."""
         self._background.close(None)
         super().done(result)
 

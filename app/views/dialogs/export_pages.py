@@ -131,7 +131,7 @@ class ExportPage(QWidget):
     file: FilePicker
 
     def show_subject(self, subject: Any) -> None:
-        """Follows what the window plays; None: there is nothing of this kind."""
+        """Follow what the window plays; None: there is nothing of this kind."""
         raise NotImplementedError
 
     def job(self) -> ExportJob:
@@ -506,7 +506,7 @@ def _lay_out(page: QWidget, rows: Rows) -> QFormLayout:
 
 
 def _watch(controls: Iterable[QWidget], changed: SignalInstance) -> list[SignalInstance]:
-    """Connects every change of a control to `changed`, and returns the signals."""
+    """Connect every change of a control to `changed`, and return the signals."""
     signals: list[SignalInstance] = []
     for control in controls:
         if isinstance(control, QComboBox):

@@ -53,7 +53,7 @@ class HelpDialog(QDialog):
         filled(QVBoxLayout(self), self.tabs, filled(QHBoxLayout(), None, close))
 
     def open_at(self, topic: str) -> None:
-        """Shows the tab of this title; "": the one that was shown last."""
+        """Show the tab of this title; "": the one that was shown last."""
         titles = [self.tabs.tabText(place) for place in range(self.tabs.count())]
         if topic in titles:
             self.tabs.setCurrentIndex(titles.index(topic))

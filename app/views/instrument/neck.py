@@ -70,7 +70,7 @@ class Neck(Playable):
         self._set_cursor(Spot(60))
 
     def show_notes(self, notes: Iterable[SoundingNote]) -> None:
-        """Shows strings of a neck where they are stopped, which lies between two frets while they slide."""
+        """Show strings of a neck where they are stopped, which lies between two frets while they slide."""
         shown: dict[tuple[int, float], int] = {}
         for note in notes if self.in_rows else ():
             string = len(self._strings) - 1 - note.string
@@ -233,7 +233,7 @@ class Neck(Playable):
             self._put_finger(string, key - self._strings[string][1])
 
     def _put_finger(self, string: int, fret: int) -> None:
-        """Lifts it where it is already, or at the nut."""
+        """Lift it where it is already, or at the nut."""
         if fret <= 0 or self._fingers.get(string) == fret:
             self._fingers.pop(string, None)
         else:
@@ -241,7 +241,7 @@ class Neck(Playable):
         self._show_fingers()
 
     def lift(self) -> None:
-        """Takes all fingers away."""
+        """Take all fingers away."""
         self._fingers = {}
         self._show_fingers()
 

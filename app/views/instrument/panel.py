@@ -212,7 +212,7 @@ class InstrumentPanel(QFrame):
         self._share_room()
 
     def show_patch_area(self, shown: bool) -> None:
-        """Shows the bar and the knobs of the string, or only what is played on."""
+        """Show the bar and the knobs of the string, or only what is played on."""
         self._patch_area = shown
         self._bar_row.setVisible(shown)
         self._fold.setVisible(shown)
@@ -303,7 +303,7 @@ class InstrumentPanel(QFrame):
             self._hint.setVisible(self.isEnabled() and not self._hinted)
 
     def release_all(self) -> None:
-        """Releases all keys that are down."""
+        """Release all keys that are down."""
         self.keys.release_all()
         self.neck.release_all()
 

@@ -231,7 +231,7 @@ class PatchBar(QFrame):
         self._share_width()
 
     def _share_width(self) -> None:
-        """Shows what there is room for; `more` has the rest.
+        """Show what there is room for; `more` has the rest.
 
         Where there is very little, a tuning or a sixth macro takes the place of the number of voices.
         """
@@ -291,7 +291,7 @@ class PatchBar(QFrame):
         self._share_width()
 
     def show_macros(self, shown: bool) -> None:
-        """Shows the macros; else, with all knobs of the string, what they turn: the mixes of body and room."""
+        """Show the macros; else, with all knobs of the string, what they turn: the mixes of body and room."""
         self._shows_macros = shown
         self._share_knobs()
 
@@ -345,7 +345,7 @@ class PatchBar(QFrame):
         self._higher.setEnabled(octave < highest)
 
     def say_octave(self, text: str) -> None:
-        """Shows above the octave, for SAID_MS, why it is what it is."""
+        """Show above the octave, for SAID_MS, why it is what it is."""
         if self.octave.isVisible():
             place = self.octave.mapToGlobal(QPoint(0, -SAID_ABOVE))
             QToolTip.showText(place, plain_tip(text), self.octave, QRect(), SAID_MS)

@@ -125,11 +125,11 @@ class Playable(QWidget):
 
     @abstractmethod
     def paint_rest(self, painter: QPainter) -> None:
-        """Paints the surface while nothing sounds and no key is down. Kept as a picture until `rest_changed`."""
+        """Paint the surface while nothing sounds and no key is down. Kept as a picture until `rest_changed`."""
 
     @abstractmethod
     def paint_marks(self, painter: QPainter, dirty: QRectF) -> None:
-        """Paints what sounds, what is down, and the cursor, as far as they lie in `dirty`."""
+        """Paint what sounds, what is down, and the cursor, as far as they lie in `dirty`."""
 
     # What is shown
 
@@ -146,7 +146,7 @@ class Playable(QWidget):
         """Lay the keys out; called when the range has changed."""
 
     def rest_changed(self) -> None:
-        """Discards the picture of `paint_rest`."""
+        """Discard the picture of `paint_rest`."""
         self._rest = QPixmap()
         self.update()
 
@@ -173,7 +173,7 @@ class Playable(QWidget):
         return frozenset(spot.key for spot in self._held)
 
     def release_all(self) -> None:
-        """Releases all keys that are down."""
+        """Release all keys that are down."""
         self._release_typed()
         self._release_mouse()
         for spot in sorted(self._held):
@@ -294,7 +294,7 @@ class Playable(QWidget):
         self._show_velocity(self._at, self._played)
 
     def _move_to(self, spot: Spot, velocity: int) -> None:
-        """Plays what the mouse has met next."""
+        """Play what the mouse has met next."""
         before, self._down = self._down, spot
         assert before is not None
         for left in [each for each in self._strummed if each.string == spot.string]:
@@ -311,7 +311,7 @@ class Playable(QWidget):
             self._press(spot, velocity)
 
     def _release_left(self, spot: Spot) -> None:
-        """Releases what the mouse has left. On a string that was given one release is enough, when no finger is left.
+        """Release what the mouse has left. On a string that was given one release is enough, when no finger is left.
 
         Where the key chooses the string, each stroke of the key has a release of its own.
         """
@@ -323,14 +323,14 @@ class Playable(QWidget):
             self._release_mouse()
 
     def _release_mouse(self) -> None:
-        """Releases what the mouse has pressed."""
+        """Release what the mouse has pressed."""
         down, self._down = self._down, None
         left, self._strummed = [*self._strummed, *([] if down is None else [down])], []
         for spot in left:
             self._release_left(spot)
 
     def event(self, event: QEvent) -> bool:
-        """Keeps Enter, which is a shortcut of the window, while the surface has the focus."""
+        """Keep Enter, which is a shortcut of the window, while the surface has the focus."""
         return keeps_keys(event, *ENTER_KEYS) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

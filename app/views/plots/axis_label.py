@@ -45,7 +45,7 @@ class UprightLabel:
 
 
 def fit_foot(plot: pg.PlotWidget) -> None:
-    """Shows the label beneath a plot only where it is high enough; to be called when it is resized."""
+    """Show the label beneath a plot only where it is high enough; to be called when it is resized."""
     plot.getPlotItem().getAxis("bottom").showLabel(plot.height() >= LABELLED_HEIGHT)
 
 
@@ -93,6 +93,6 @@ def frequency_ticks() -> list[tuple[float, str]]:
 
 
 def keep_axes(plot: pg.PlotItem) -> None:
-    """Paints axes again only when they change. They are most of a painting, and a key that is played waits for it."""
+    """Paint axes again only when they change. They are most of a painting, and a key that is played waits for it."""
     for side in ("left", "bottom"):
         plot.getAxis(side).setCacheMode(pg.GraphicsObject.CacheMode.DeviceCoordinateCache)

@@ -95,7 +95,7 @@ class FiguresTable(QTableWidget):
         theme.changes.theme_changed.connect(self._take_theme)
 
     def show_rows(self, rows: Sequence[TableRow]) -> None:
-        """Replaces all rows; the chosen one stays chosen where it is still there."""
+        """Replace all rows; the chosen one stays chosen where it is still there."""
         chosen = self.chosen_key
         self._fill(rows)
         self.choose(chosen)
@@ -112,7 +112,7 @@ class FiguresTable(QTableWidget):
         self._fill(self.rows)
 
     def set_dimmed(self, dimmed: bool) -> None:
-        """Makes all rows grey: they are of an earlier pluck."""
+        """Make all rows grey: they are of an earlier pluck."""
         self._dimmed = dimmed
         self._fill(self.rows)
 
@@ -128,7 +128,7 @@ class FiguresTable(QTableWidget):
         return self._key(index) if index.isValid() else None
 
     def choose(self, key: object) -> None:
-        """Marks the row of a key; one that is not there clears the mark."""
+        """Mark the row of a key; one that is not there clears the mark."""
         for place, row in enumerate(self.rows):
             if row.key == key:
                 if place != self.currentIndex().row():
@@ -147,7 +147,7 @@ class FiguresTable(QTableWidget):
         QGuiApplication.clipboard().setText(self.text())
 
     def event(self, event: QEvent) -> bool:
-        """Keeps Enter and Esc, which are shortcuts of the window, while the table has the focus."""
+        """Keep Enter and Esc, which are shortcuts of the window, while the table has the focus."""
         return keeps_keys(event, *ENTER_KEYS, Qt.Key.Key_Escape) or super().event(event)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:

@@ -21,7 +21,7 @@ _GAP, _BETWEEN = 6, 18
 
 
 def paint_sources(painter: QPainter, sources: Sequence[ShownSource], x: float, middle: float, right: float) -> float:
-    """Paints a row from `x` to `right` at most, in pixels; cuts titles that do not fit. Returns the row's end."""
+    """Paint a row from `x` to `right` at most, in pixels; cuts titles that do not fit. Returns the row's end."""
     painter.setFont(theme.small_font(12, bold=True))
     metrics = painter.fontMetrics()
     for source, text in zip(sources, _texts(sources, metrics, right - x), strict=True):
@@ -113,7 +113,7 @@ def _width(texts: Sequence[str], metrics: QFontMetrics) -> int:
 def set_curves(
     plot: pg.PlotItem, curves: dict[str, pg.PlotDataItem], sources: Sequence[ShownSource], faint_alpha: int
 ) -> None:
-    """Adds curves that `curves` lacks, removes those of other sources, and sets the pen and the order of all."""
+    """Add curves that `curves` lacks, remove those of other sources, and set the pen and the order of all."""
     shown = {source.source for source in sources}
     for gone in [name for name in curves if name not in shown]:
         plot.removeItem(curves.pop(gone))

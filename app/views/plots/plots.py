@@ -17,14 +17,14 @@ from app.views import theme
 
 
 def dress_plots() -> None:
-    """Sets the options of plots made from now on, and lets all plots follow the theme. To be called once."""
+    """Set the options of plots made from now on, and let all plots follow the theme. To be called once."""
     pg.setConfigOptions(antialias=True, useOpenGL=False)
     _set_ground()
     theme.changes.theme_changed.connect(recolour)
 
 
 def recolour(old: theme.Theme, new: theme.Theme) -> None:
-    """Exchanges the colours of every plot there is."""
+    """Exchange the colours of every plot there is."""
     _set_ground()
     swap = _Swap(old, new)
     for view in QApplication.allWidgets():

@@ -38,5 +38,5 @@ class PointedPlot(pg.PlotWidget):
             fit_foot(self)
 
     def event(self, event: QEvent) -> bool:
-        """Keeps Enter and Esc, which are shortcuts of the window, while the plot has the focus."""
+        """Keep Enter and Esc, which are shortcuts of the window, while the plot has the focus."""
         return keeps_keys(event, *ENTER_KEYS, Qt.Key.Key_Escape) or bool(super().event(event))

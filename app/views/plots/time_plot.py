@@ -85,7 +85,7 @@ class TimePlot(KeptPlot):
         self._untrained.setVisible(inside and self._shaded)
 
     def show_playhead(self, position_s: float) -> None:
-        """Moves the playhead; costs nothing where it is there already."""
+        """Move the playhead; costs nothing where it is there already."""
         if position_s != self.line_at:
             self.move_line(position_s)
 
@@ -106,20 +106,20 @@ class TimePlot(KeptPlot):
         self.show_times(0.0, self._seconds)
 
     def show_times(self, low_s: float, high_s: float) -> None:
-        """Sets the view, moved into the take where it lies beyond its ends."""
+        """Set the view, moved into the take where it lies beyond its ends."""
         span = min(max(high_s - low_s, SHORTEST_VIEW_S), self._seconds)
         low_s = min(max(low_s, 0.0), self._seconds - span)
         self.getPlotItem().setXRange(low_s, low_s + span, padding=0)
 
     def zoom(self, factor: float, about_s: float | None = None) -> None:
-        """Shows `factor` times as much; about the playhead by default, or the middle if that is not in view."""
+        """Show `factor` times as much; about the playhead by default, or the middle if that is not in view."""
         low, high = self.times_s
         if about_s is None:
             about_s = self.line_at if low <= self.line_at <= high else (low + high) / 2
         self.show_times(about_s - (about_s - low) * factor, about_s + (high - about_s) * factor)
 
     def pan(self, by_s: float) -> None:
-        """Moves the view to later times; to earlier ones where `by_s` is negative."""
+        """Move the view to later times; to earlier ones where `by_s` is negative."""
         low, high = self.times_s
         self.show_times(low + by_s, high + by_s)
 

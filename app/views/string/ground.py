@@ -27,7 +27,7 @@ class TrainedPlucks:
 
 
 def paint_ground(painter: QPainter, axes: StringAxes, trained: TrainedPlucks | None, pluck: int | None) -> None:
-    """Paints the grid, the scale and the hatching; nothing where `trained` is None.
+    """Paint the grid, the scale and the hatching; nothing where `trained` is None.
 
     `pluck`: the end of the string, 0 or 1, that the pluck is nearer to; None while the motion is shown. Only for a
     pluck are amplitudes hatched, which a string in motion all crosses, and words written, which it would cover.

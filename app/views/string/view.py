@@ -273,7 +273,7 @@ class StringView(StageView):
         return axes.at(self._pluck.position, min(self._pluck.amplitude_mm, self._span_mm))
 
     def _fit_span(self) -> None:
-        """Sets the span from the pluck at rest, or from the motion; while a pluck is dragged it only grows."""
+        """Set the span from the pluck at rest, or from the motion; while a pluck is dragged it only grows."""
         if self._drag == "pluck":
             self._span_mm = max(self._span_mm, _span_mm(self._pluck.amplitude_mm))
         elif self._frame is None:

@@ -104,7 +104,7 @@ class Panel(QWidget):
         self._grown = (-1, 0.0)  # its frames when it last grew, and when that was
 
     def cover(self, words: str) -> None:
-        """Shows these words instead of the view; "": the view again."""
+        """Show these words instead of the view; "": the view again."""
         self._cover.setText(words)
         self._cover.setVisible(bool(words))
         self._cover.raise_()
@@ -136,7 +136,7 @@ class Panel(QWidget):
         self.background.close()
 
     def compute(self, work: Work) -> None:
-        """Starts a long job in place of the one under way; `background` has its signals."""
+        """Start a long job in place of the one under way; `background` has its signals."""
 
         def on_one_core(job: Job) -> object:
             with _one_core():
@@ -153,7 +153,7 @@ class Panel(QWidget):
         self._seen_s = time.monotonic()
 
     def solo(self, mode: int) -> None:
-        """Solos a mode; all modes where it is soloed already, or 0."""
+        """Solo a mode; all modes where it is soloed already, or 0."""
         self.session.update(solo=0 if mode == self.session.choices.solo else mode)
 
     def _rests(self) -> bool:
@@ -174,7 +174,7 @@ class StagePanel(Panel):
     on_stage = True
 
     def _put_on_stage(self, view: StageView) -> None:
-        """Lays out the picture, and lets its gestures change the listening points."""
+        """Lay out the picture, and let its gestures change the listening points."""
         lay_out_alone(self, view)
         view.listening_point_moved.connect(self._move_listening_point)
         view.listening_point_reset.connect(self._reset_listening_point)

@@ -211,7 +211,7 @@ class ComparePanel(Panel):
         self._show()
 
     def _abandon(self) -> None:
-        """Ends what is computed for other choices than the present ones; where they come back, it is begun again."""
+        """End what is computed for other choices than the present ones; where they come back, it is begun again."""
         self.background.cancel()
         self._tried, self._stopped = (), False
         self._set_computing(None)

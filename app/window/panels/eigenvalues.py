@@ -129,7 +129,7 @@ class EigenvaluesPanel(Panel):
         self._tell(-1)
 
     def _tell(self, point: int) -> None:
-        """Writes the values of a point above the plane; -1: the note of the figure."""
+        """Write the values of a point above the plane; -1: the note of the figure."""
         figure, solo = self._figure, self.session.choices.solo
         if figure is None:
             return

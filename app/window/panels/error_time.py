@@ -144,7 +144,7 @@ class ErrorTimePanel(TimePanel[ErrorWindows]):
         self._show_legend()
 
     def _fit(self, shown: list[NDArray[np.float64]]) -> None:
-        """Widens the axis to whole decades, or a span in dB, around what is shown."""
+        """Widen the axis to whole decades, or a span in dB, around what is shown."""
         finite = [values[np.isfinite(values)] for values in shown]
         values = np.concatenate([*finite, self._always_in_view()])
         if self._level:

@@ -124,7 +124,7 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
             self.show_columns(self._rows.of(made.levels_db[self.quantities.key][self._drawn : last]))
 
     def begin_picture(self, columns: int, rows: int, hop_s: float) -> None:
-        """Clears the picture; the columns to come are `rows` high, the k-th at the time k·hop_s."""
+        """Clear the picture; the columns to come are `rows` high, the k-th at the time k·hop_s."""
         self._levels_db = np.zeros((columns, rows), np.float32)
         self._pixels = np.zeros((columns, rows), np.uint8)
         self._hop_s = hop_s
@@ -132,7 +132,7 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         self._image.clear()
 
     def show_columns(self, levels_db: NDArray[np.float32]) -> None:
-        """Draws the next levels (columns, rows)."""
+        """Draw the next levels (columns, rows)."""
         first, self._drawn = self._drawn, self._drawn + len(levels_db)
         self._levels_db[first : self._drawn] = levels_db
         self._colour(first)

@@ -214,7 +214,7 @@ class SpectrumPanel(Panel):
         self.legend.show_sources(sources, part)
 
     def show_signal(self, source: str, signal: NDArray[np.float32], analyser: Analyser) -> None:
-        """Draws the spectrum of a window of signal, (frames,), in units of full scale."""
+        """Draw the spectrum of a window of signal, (frames,), in units of full scale."""
         levels = analyser.level_db(signal)
         self._levels_db[source], self._analysers[source] = levels, analyser
         self._curves[source].setData(analyser.column_hz, levels)
@@ -245,7 +245,7 @@ class SpectrumPanel(Panel):
         self._show_readout()
 
     def _show_readout(self) -> None:
-        """Writes the frequency under the mouse, its levels, and the nearest partial of a quiet pluck."""
+        """Write the frequency under the mouse, its levels, and the nearest partial of a quiet pluck."""
         frequency_hz, text = self._hovered_hz, ""
         nearest = None
         if math.isfinite(frequency_hz):

@@ -120,7 +120,7 @@ class StringPanel(StagePanel):
         self.view.show_frame(frame)
 
     def _judge(self) -> None:
-        """Sets the warning again once the signals are complete: only then is a silent difference known."""
+        """Set the warning again once the signals are complete: only then is a silent difference known."""
         take = self._take
         if take is not None and take.listened is not self._judged and take.listened.complete:
             self._judged = take.listened

@@ -45,7 +45,7 @@ class TimePanel(Panel, Generic[G]):
 
     @abstractmethod
     def _draw(self, made: G) -> None:
-        """Shows it as far as it is ready."""
+        """Show it as far as it is ready."""
 
     @abstractmethod
     def _words(self, made: G, time_s: float, place: float) -> Iterable[str]:
@@ -56,7 +56,7 @@ class TimePanel(Panel, Generic[G]):
         return True
 
     def take_started(self, take: Take | BlowTake) -> None:
-        """Discards what was computed of the take before."""
+        """Discard what was computed of the take before."""
         self.background.cancel()
         self._made, self._shown = None, ()
         self.plot.set_times(take.seconds, take.horizon_s)

@@ -47,7 +47,7 @@ class _Drawn:
         self.signal = np.empty(self.heard.frames, np.float32)
 
     def catch_up(self) -> bool:
-        """Reads on, MOST_FRAMES at most; whether there was something to read."""
+        """Read on, MOST_FRAMES at most; whether there was something to read."""
         new = self.heard.read(self.ready, self.ready + MOST_FRAMES)
         self.signal[self.ready : self.ready + len(new)] = new
         self.ready += len(new)
@@ -124,7 +124,7 @@ class WaveformPanel(Panel):
             self._draw(take)
 
     def _follow(self, take: Sounding) -> bool:
-        """Reads on what the slots hold; a signal that is new from its start.
+        """Read on what the slots hold; a signal that is new from its start.
 
         Whether there was anything to read: there may be more.
         """
