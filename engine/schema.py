@@ -74,6 +74,15 @@ def read_toml(path: Path) -> dict[str, Any]:
     return data
 
 
+def _text_of(data: Any) -> str:
+    """Return JSON of plain data that pydantic reads.
+
+    Half characters, of names of files that are no text, become U+FFFD.
+    """
+    text = json.dumps(data, ensure_ascii=False)
+    return text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
+
+
 def check_nesting(data: object, where: str) -> None:
     """Raise SchemaError where lists and tables lie deeper in each other, or hold more, than anything of ours."""
     level, entries = [data], 0
@@ -103,7 +112,7 @@ def read(kind: type[T], data: object, where: str) -> T:
     _check_bounds(data, where)
     try:  # as JSON: in Python's own data a strict reader takes no list for a tuple
         found: T = _adapter(kind).validate_json(  # type: ignore[arg-type]
-            json.dumps(data), strict=True, extra="forbid"
+            _text_of(data), strict=True, extra="forbid"
         )
         return found
     except ValidationError as error:
