@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Collection, Mapping
+from typing import Any
 
 # Files
 LARGEST_PRESET_BYTES = 64 * 2**20
@@ -126,11 +127,19 @@ def check(name: str, value: float, limits: tuple[float, float], unit: str = "") 
         raise ValueError(f"{name} must lie in {low:.10g} … {high:.10g}{reported}, not {shown}")
 
 
-def check_all(value: object, limits: Mapping[str, tuple[float, float]], of: str = "") -> None:
-    """Raise ValueError as `check`, for fields of a value that have limits and are not None; `of` precedes names."""
+def check_all(value: Any, limits: Mapping[str, tuple[float, float]], of: str = "") -> None:
+    """Raise ValueError as `check`, for fields of a dataclass that have limits; `of` precedes names.
+
+    None passes where it is the default.
+    """
+    defaults = {field.name: field.default for field in dataclasses.fields(value)}
     for name, low_high in limits.items():
-        if (found := getattr(value, name)) is not None:
-            check(f"{of}{name}", found, low_high)
+        found = getattr(value, name)
+        if found is None and defaults[name] is None:
+            continue
+        if found is None or isinstance(found, bool):
+            raise ValueError(f"{of}{name} must be a number, not {found}")
+        check(f"{of}{name}", found, low_high)
 
 
 def check_choice(name: str, value: object, known: Collection[str]) -> None:

@@ -52,12 +52,15 @@ INFO = PresetInfo(
     seed=0,
 )
 PRESET = Preset("", Path(), INFO, dict.fromkeys(CURVES, np.zeros(1)))
+LATENTS = {"grid_points": INFO.grid_points, "state_size": 4}
+MODULATED = {"modulation": True, "adiabatic": True, "physical_units": True}
+BANKS: tuple[dict[str, Any], ...] = ({}, MODULATED)
 EARS = (Ear((0.3,)), Ear((0.3, 0.7), "velocity"))
 FRAMES = 4 * QUANTUM
 
 
 def warm() -> None:
-    """Load what a pluck needs at once; where not all has been compiled yet, compiles all."""
+    """Load what a pluck needs at once; where not all has been compiled yet, compile all."""
     if cache.is_whole():
         _sound(_struck(model_program(PRESET, RATE_HZ), EARS[0]))
     else:
@@ -116,7 +119,7 @@ def responses() -> None:
 
 
 def _each() -> Iterator[Voice]:
-    for program in (model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
+    for program in (*map(_bank, BANKS), model_program(PRESET, RATE_HZ), truth_program(INFO, RATE_HZ)):
         for ear in EARS:
             yield _struck(program, ear)
 
@@ -167,6 +170,14 @@ def _loudness() -> None:
     loudness.gain(sound, 1, 1, no_body, 0.0)
     loudness.limit(loudness.peak(sound, 1, False, no_body, 0.0, 0.0))
     loudness.looked_at(0, 1, 0)
+
+
+def _bank(sizes: dict[str, Any]) -> Program:
+    from engine.voices.banks import bank_program
+
+    program = bank_program(_model("koopman_integrated", LATENTS | sizes), INFO, RATE_HZ)
+    assert program is not None
+    return program
 
 
 def _struck(program: Program, ear: Ear) -> Voice:

@@ -18,7 +18,7 @@ class Growing(Protocol):
         """Return True if all results are ready."""
 
     def advance(self) -> bool:
-        """Compute the next few results; returns False where the take has nothing new for them yet."""
+        """Compute the next few results; return False where the take has nothing new for them yet."""
 
 
 def keep_up(growing: Growing, job: Job) -> None:

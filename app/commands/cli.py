@@ -92,7 +92,7 @@ cli.add_typer(drums.drums, name="drums")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command line (default: the process's own) and returns the exit status."""
+    """Run a command line (default: the process's own) and return the exit status."""
     return carry_out(cli, arguments, NAME)
 
 

@@ -317,7 +317,7 @@ class InstrumentPlayer:
     # What became of them
 
     def reports(self) -> list[Report]:
-        """Report of what became of notes since the last call. One thread asks."""
+        """The reports of what became of notes since the last call. One thread asks."""
         return self.compiled.reports()
 
     def ringing(self) -> list[Ringing]:

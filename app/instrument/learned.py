@@ -24,6 +24,7 @@ from app.instrument.learned_attack import attack_of, with_attack
 from app.patches.library import PatchError, file_stem, own_patches, save_patch
 from app.patches.patch import Body, Category, Fretted, Patch, Pickup, PluckChoices
 from engine.folders import usable_files, user_folder
+from engine.kernels import velocities
 from engine.presets import load_preset
 from engine.result_file import WriteError, explain, whole_file
 from engine.schema import explained
@@ -188,7 +189,7 @@ def _patch(name: str, stem: str, learned: Learned, partials: int, kind: Kind) ->
     key = round(69 + 12 * math.log2(learned.physics.f0_hz / 440))
     amplitude_mm = 1000 * learned.strung.amplitude_m
     hardest_mm = min(10.0, HARDEST * amplitude_mm)
-    share = (RECORDED_VELOCITY - 1) / 126
+    share = velocities.share(RECORDED_VELOCITY, 0.0)
     softest_mm = (amplitude_mm / hardest_mm**share) ** (1 / (1 - share))
     try:
         return Patch(

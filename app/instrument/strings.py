@@ -6,7 +6,7 @@ alone; both are solved for the pitch in closed form, so that it is exact.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch
@@ -19,7 +19,6 @@ from engine.resonators.losses import loss_rates
 from engine.resonators.string import decay_rates as law_rates
 from engine.values.string import StringParameters
 
-STRING = tuple(field.name for field in fields(StringParameters))
 KNOBS = tuple(id.removeprefix("knobs.") for id in of.PLAYED[: of.KNOBS])
 
 
@@ -99,8 +98,10 @@ class Strings:
             if key < chosen.note:
                 slackened = pitch_hz / self._tuning.hz(chosen.note)
         knobs = [getattr(self._patch.knobs, name) for name in KNOBS]
-        whole, own = [0.0] * len(STRING), [0.0] * len(STRING)
+        whole, own = [0.0] * of.STRING, [0.0] * of.STRING
         law.stop(string.row, knobs, slackened, pitch_hz, whole, own)
+        if not whole[of.TENSION] > 0:
+            raise ValueError(f"key {key}: no tension slackens its string so far; choose a higher key")
         parameters = StringParameters(*own)  # or what is out of bounds is named
         return parameters, parameters.length_m / whole[LENGTH]
 

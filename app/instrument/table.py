@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from app.instrument.drum_keys import DrumKeys, block_of
 from app.instrument.string_keys import StringKeys
-from app.instrument.strings import STRING
 from app.patches.drums import Drums
 from app.patches.patch import Fretted, Patch, StringSet
 from app.shared.parameters import OF_PATCHES
@@ -170,11 +169,11 @@ def _fill_strings(table: np.void, tail: Tail, loud: StringKeys, grid_points: int
     strings = patch.strings
     assert not isinstance(strings, Drums)
     if isinstance(strings, Fretted):
-        table["open"][0]["string"] = _row(strings.string)
+        table["open"][0]["string"] = strings.string.row
     else:
         table["strings"] = len(strings.strings)
         for number, string in enumerate(strings.strings[::-1]):
-            table["open"][number] = string.note, loud.strings.open_hz(string.note), _row(string.string)
+            table["open"][number] = string.note, loud.strings.open_hz(string.note), string.string.row
     turn = 2 * (grid_points - 1)
     table["sines"] = tail.put(np.sin(2 * np.pi * np.arange(turn) / turn))
 
@@ -207,7 +206,3 @@ def strings_of(patch: Patch) -> int:
     """The number of strings of a set that channels of a guitar may choose."""
     chosen = patch.mode == "guitar" and isinstance(patch.strings, StringSet)
     return min(of.GUITAR_STRINGS, len(patch.strings.strings)) if chosen else 0  # type: ignore[union-attr]
-
-
-def _row(string: object) -> list[float]:
-    return [getattr(string, name) for name in STRING]

@@ -185,7 +185,7 @@ class Keys:
             return note
 
     def _release_before(self, event: Event, frame: int) -> None:
-        """Release of keys and pedals damp what players before have struck, too. Under the lock."""
+        """Let releases of keys and pedals damp what players before have struck, too. Under the lock."""
         released = isinstance(event, NoteOff) or (isinstance(event, Controller) and event.number in RELEASES)
         for player in self._playing if released else []:
             if player is not self._player:

@@ -9,7 +9,6 @@ from app.rendering import RenderRequest
 from app.rendering.subject import Subject
 from app.shared.vocabulary import OTHER
 from engine.kernels.constants import QUANTUM
-from engine.values.ear import Ear
 from engine.voices import Mixer, Voice
 
 
@@ -44,7 +43,6 @@ class Note:
         self.voices: dict[str, Voice] = {}
         self.match: Mapping[str, float] | None = None
         self.ahead: list[AheadVoice] = []
-        self._began_frame = 0  # of voices that others have replaced
         self.pending = True
         self.handed_over = False  # or about to be
         self.released = False
@@ -57,17 +55,6 @@ class Note:
         """The preset or string whose sound a source is."""
         others = (path for path in self.request.others if source == f"{OTHER}{path.stem}")
         return next(others, self.request.preset)
-
-    def source_of(self, voice: Voice) -> str:
-        """The source whose voice it is."""
-        return next(source for source, each in self.voices.items() if each is voice)
-
-    def asks_again(self, ear: Ear) -> bool:
-        """Return True if what is rendered ahead is to be rendered at these points, which are of the same kind."""
-        own = self.request.ear
-        same = (len(own.points), own.pickup) == (len(ear.points), ear.pickup)
-        ready = bool(self.ahead) and all(each.begun and each.voice.ear == own for each in self.ahead)
-        return ready and same and own != ear
 
     @property
     def matching_key(self) -> tuple[object, ...]:
@@ -103,21 +90,7 @@ class Note:
     @property
     def began_frame(self) -> int:
         """The frame of the mixer at which it began; 0 before that."""
-        return self._began_frame or max((voice.began_frame for voice in self.voices.values()), default=0)
-
-    def replace_voices(self, ahead: list[AheadVoice], voices: Mapping[str, Voice]) -> None:
-        """Take voices that are as far in its motion in the place of others, by source."""
-        assert self.mixer is not None
-        self._began_frame = self.began_frame + round(self._starved_s * self.mixer.rate_hz)
-        self.ahead, self.voices = ahead, {**self.voices, **voices}
-
-    def begin_again(self, ahead: list[AheadVoice], voices: dict[str, Voice]) -> None:
-        """Take voices that are to begin together."""
-        self._began_frame, self.ahead, self.voices = 0, ahead, voices
-
-    @property
-    def _starved_s(self) -> float:
-        return min(voice.starved_s for voice in self.voices.values())
+        return max((voice.began_frame for voice in self.voices.values()), default=0)
 
     @property
     def latency_s(self) -> float | None:
@@ -132,27 +105,28 @@ class Note:
         assert self.mixer is not None
         rate_hz = self.mixer.rate_hz
         skipped = (round(self.from_s * rate_hz) + QUANTUM // 2) // QUANTUM * QUANTUM
-        return self.began_frame + round((seconds + self._starved_s) * rate_hz) - skipped
+        starved_s = min(voice.starved_s for voice in self.voices.values())
+        return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
 
     def set_begin(self, struck_s: float) -> None:
-        """Give its voices the time of their gesture, by the sound's clock (0: none), and the frame they begin at."""
+        """Gives its voices the time of their gesture, by the sound's clock (0: none), and the frame they begin at."""
         for voice in self.voices.values():
             voice.set_struck(struck_s)
             voice.begin_at(self.begin_frame)
 
     def release_at(self, frame: int) -> None:
-        """Let it fade out from a frame of the mixer on; 0: not any more."""
+        """Lets it fade out from a frame of the mixer on; 0: not any more."""
         for voice in self.voices.values():
             voice.release_at(frame)
 
     def end(self) -> None:
-        """Cut it, where no device plays its voices any more; they are over."""
+        """Cuts it, where no device plays its voices any more; they are over."""
         self.cut = True
         for voice in self.voices.values():
             voice.refuse()
 
     def release(self, seconds: float) -> None:
-        """Let it fade out within so many seconds, from now on."""
+        """Lets it fade out within so many seconds, from now on."""
         self.released = True
         for voice in self.voices.values():
             voice.release(seconds)

@@ -52,7 +52,6 @@ BUSY = 0.75  # load of the device: above it the oldest notes end, so that the ot
 LOOKS = 10  # at the load, 0.5 s or more, all of which it is above: another program's burst raises it for less
 LEAST_RELIEF = 2  # notes that end then
 MOST_CARRIED = 4  # notes that ring on when the device changes its rate
-RINGS_S = 12.0  # of a model that is rendered ahead, at most
 LOOP_AHEAD_S = 0.5  # lead of the next turn of a loop when it is handed to the mixer
 
 Report = Callable[[str, str], None]  # a message and its details
@@ -127,7 +126,7 @@ class Notes:
         self._hear_effects()
 
     def listen(self, ear: Ear) -> None:
-        """Set where all notes are heard; those that ring are cross-faded, but keep their kind of pick-up."""
+        """Sets where all notes are heard; those that ring are cross-faded, but keep their kind of pick-up."""
         with self._lock:
             self._ear = ear
             if self._chosen is not None:
@@ -140,7 +139,7 @@ class Notes:
             self._chosen = request
 
     def set_monitor(self, monitor: Monitor, compared: bool = True) -> None:
-        """Set the sources of all notes; those that ring are cross-faded.
+        """Sets the sources of all notes; those that ring are cross-faded.
 
         Args:
             compared: whether keys that are struck from now on can be switched to another source while they ring.
@@ -165,7 +164,7 @@ class Notes:
     # Events
 
     def handle(self, event: Event, due: Due | None = None) -> Note | KeyNote | None:
-        """Play an event, at once or when it is due; the note that it began, or None.
+        """Plays an event, at once or when it is due; the note that it began, or None.
 
         Keys of a single string are places along it. Its note sounds with the next quantum of the device, unless
         presets must be loaded or a model is rendered ahead. An event that fails costs itself alone, and is reported.
@@ -201,7 +200,7 @@ class Notes:
         return PluckAt(reach.pluck(event.key, event.velocity, Pluck() if chosen is None else chosen.pluck))
 
     def ring(self, from_s: float = 0.0, begin_frame: int = 0, alone: bool = False) -> Note | None:
-        """Begin a note of the chosen pluck, while others ring on; None where nothing is chosen.
+        """Begins a note of the chosen pluck, while others ring on; None where nothing is chosen.
 
         Args:
             from_s: where in its motion it begins.
@@ -227,7 +226,7 @@ class Notes:
         return note
 
     def turn(self, note: Note | KeyNote, seconds: float, event: NoteOn | PluckAt) -> Note | KeyNote | None:
-        """Hand the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early.
+        """Hands the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early.
 
         Args:
             event: the chosen pluck, as a note of its instrument or of the string alone.
@@ -251,7 +250,7 @@ class Notes:
                     note.release(0.0)
 
     def stop(self, seconds: float = STOP_S) -> None:
-        """Let all notes fade out; those that wait will not sound."""
+        """Lets all notes fade out; those that wait will not sound."""
         with self._lock:
             self._each(self._notes, lambda note: note.release(seconds))
         self.keys.stop(seconds)
@@ -271,14 +270,14 @@ class Notes:
             return chosen is not None and self._loaded(Note(chosen, self._voices_of(chosen)))
 
     def prepare(self, *subjects: Subject) -> None:
-        """Load presets in the background, so that a pluck need not wait."""
+        """Loads presets in the background, so that a pluck need not wait."""
         rate_hz = self._sound.rate_hz
         for subject in subjects:
             if not self._sources.has(subject, rate_hz):
                 self.in_background(partial(self._sources.prepare, subject, rate_hz))
 
     def prepare_plucks(self, subject: Subject, plucks: Sequence[Pluck]) -> None:
-        """Compute in the background where voices of these plucks start; the latest call counts."""
+        """Computes in the background where voices of these plucks start; the latest call counts."""
         rate_hz = self._sound.rate_hz
         wish = self._wished_plucks = object()
 
@@ -329,7 +328,7 @@ class Notes:
         self._latencies_s.clear()
 
     def poll(self) -> None:
-        """Forget notes that ended, and move listening points. The window calls it at each frame."""
+        """Forgets notes that ended, and moves listening points. The window calls it at each frame."""
         self.look()
         with self._lock:
             self._move_to_new_mixer()
@@ -338,7 +337,7 @@ class Notes:
             self._each(self._plucks(), self._follow)
 
     def close(self) -> None:
-        """End the threads; may be called again."""
+        """Ends the threads; may be called again."""
         self._closed = True
         self._helper.shutdown(wait=True, cancel_futures=True)
         self._ahead.close()
@@ -360,17 +359,15 @@ class Notes:
             self._latencies_s.append(latency_s)
 
     def _follow(self, note: Note) -> None:
-        """Let a note be heard where all are, and as loud as the truth once that is known."""
+        """Lets a note be heard where all are, and as loud as the truth once that is known."""
         if note.ahead and note.match is None and not note.pending:
             self._ask_match(note)
         if self._ear is not None:
             for voice in note.voices.values():
                 voice.listen(self._ear)
-        if not note.pending and not note.released:
-            self._listen_again(note)
 
     def _set_gains_of_keys(self) -> None:
-        """Set which sources of keys are heard; both are of one string, whose levels match as they are."""
+        """Sets which sources of keys are heard; both are of one string, whose levels match as they are."""
         gains = {source: self._monitor.gain(source, SOURCES, None) for source in SOURCES}
         self.keys.set_gains(gains, self._compared)
 
@@ -379,7 +376,7 @@ class Notes:
         return [note for note in self._notes if isinstance(note, Note)]
 
     def look(self) -> None:
-        """Follow what the player reports of notes of keys: the latest that began is the string that is shown.
+        """Follows what the player reports of notes of keys: the latest that began is the string that is shown.
 
         One that is reported after a single string was chosen, which its instrument is not, changes nothing.
         """
@@ -434,13 +431,13 @@ class Notes:
                 note.end()
 
     def _adopt(self, note: KeyNote) -> None:
-        """Keep the note of a key, which the player has been given."""
+        """Keeps the note of a key, which the player has been given."""
         with self._lock:
             self._notes.append(note)
             self._make_room(MOST_NOTES)
 
     def _begin(self, note: Note, struck_s: float) -> None:
-        """Make the voices and hand them over; again where the device changes its rate meanwhile."""
+        """Makes the voices and hands them over; again where the device changes its rate meanwhile."""
         for _ in range(3):
             mixer = self._sound.mixer
             self._make_voices(note, mixer.rate_hz, struck_s)
@@ -475,72 +472,25 @@ class Notes:
             if model is None:
                 voices[source] = Voice(program, initial_m, asked.ear, 0.0, begin=begin)
                 continue
-            each = self._ahead_voice(
-                note, source, rate_hz, note.from_s, lambda: self._rendered_enough(note, ahead, struck_s)
+            voice = voices[source] = Voice(program, initial_m, asked.ear, 0.0, asked.seconds, model.rate_hz, begin)
+            voice.fade_out_by(asked.seconds)  # behind it there are no samples
+            ahead.append(
+                AheadVoice(
+                    voice,
+                    model,
+                    initial_m,
+                    program.grid_weights(asked.ear),
+                    (subject, asked.pluck, asked.ear, asked.seconds),
+                    lambda: self._rendered_enough(note, ahead, struck_s),
+                    lambda error: self._cannot_render(note, error),
+                    lambda: note.over,
+                    note.from_s,
+                )
             )
-            voices[source] = each.voice
-            ahead.append(each)
-        note.begin_again(ahead, voices)
-
-    def _ahead_voice(
-        self, note: Note, source: str, rate_hz: int, from_s: float, begin: Callable[[], None]
-    ) -> AheadVoice:
-        """The voice of a model that is rendered ahead, with its renderer."""
-        asked, subject = note.request, note.subject(source)
-        program, model = self._sources.program(subject, source, rate_hz), self._sources.load(subject).model
-        initial_m, start = self._sources.begin(subject, source, rate_hz, asked.pluck)
-        return AheadVoice(
-            Voice(program, initial_m, asked.ear, 0.0, RINGS_S, model.rate_hz, start),
-            model,
-            initial_m,
-            program.grid_weights(asked.ear),
-            asked.seconds,
-            (subject, asked.pluck, asked.ear),
-            begin,
-            lambda error: self._cannot_render(note, error),
-            lambda: note.over,
-            from_s,
-        )
-
-    def _listen_again(self, note: Note) -> None:
-        """Render what is rendered ahead at the present points as well, and cross-fade to it when it is ready."""
-        ear, ahead = self._ear, note.ahead
-        if ear is None or not note.asks_again(ear):
-            return
-        note.request = replace(note.request, ear=ear)
-
-        def work() -> None:
-            assert note.mixer is not None
-            rate_hz, sources = note.mixer.rate_hz, [note.source_of(each.voice) for each in ahead]
-            again: list[AheadVoice] = []
-            for source in sources:
-                begin = partial(self._heard_elsewhere, note, sources, again)
-                again.append(self._ahead_voice(note, source, rate_hz, note.seconds, begin))
-            for each in again:
-                self._ahead.render(each)
-
-        self.in_background(work)
-
-    def _heard_elsewhere(self, note: Note, sources: Sequence[str], again: list[AheadVoice]) -> None:
-        """Put voices at other points in the place of a note's, where all are rendered as far as it has rung."""
-        mixer = note.mixer
-        if mixer is None or not all(each.begun for each in again):
-            return
-        unheard = Mixer(mixer.rate_hz)
-        with self._lock:
-            if note.over or note.released or mixer is not self._sound.mixer:
-                return
-            left = [note.voices[source] for source in sources]
-            for each in again:
-                each.voice.skip(note.seconds, unheard)
-            note.replace_voices(again, {source: each.voice for source, each in zip(sources, again, strict=True)})
-            self._apply_monitor(note)
-            mixer.add(*(each.voice for each in again))
-            for voice in left:
-                voice.release(REPLACED_S)
+        note.ahead, note.voices = ahead, voices
 
     def _rendered_enough(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
-        """Hand the note over once all its models are rendered far enough. Any thread."""
+        """Hands the note over once all its models are rendered far enough. Any thread."""
         with self._lock:
             if note.handed_over or ahead is not note.ahead or not all(each.begun for each in ahead):
                 return
@@ -573,7 +523,7 @@ class Notes:
         return True
 
     def _bound_load(self, status: SoundStatus) -> None:
-        """End the oldest notes where the device has no time for all. In the caretaker's thread of the sound.
+        """Ends the oldest notes where the device has no time for all. In the caretaker's thread of the sound.
 
         Bursts of other programs raise the load as well: what they cost is their own length, and no note ends.
         It looks at the keys' notes too, so that their ends are reported while the window is busy.
@@ -592,7 +542,7 @@ class Notes:
                 self._make_room(max(1, min(ringing - LEAST_RELIEF, int(ringing * BUSY / load))))
 
     def _make_room(self, most: int) -> None:
-        """Release the oldest notes where more than `most` ring."""
+        """Releases the oldest notes where more than `most` ring."""
         ringing = [note for note in self._notes if not note.over and not note.released]
         self._each(ringing[: max(0, len(ringing) - most)], lambda note: note.release(STOLEN_S))
 

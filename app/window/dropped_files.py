@@ -69,7 +69,7 @@ def _other_sound(file: Path) -> Dropped:
 
 
 def receive_body(file: Path) -> Dropped:
-    """Install an impulse response as a body, which the patch then have. Errors become notices."""
+    """Install an impulse response as a body, which the patch then has. Errors become notices."""
     try:
         return Dropped(body=install_body(file), notice=cut_words(file))
     except (ImpulseError, WriteError) as error:

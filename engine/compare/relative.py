@@ -213,6 +213,8 @@ class ErrorWindows:
         if "mae" in self.curves:
             terms += [np.abs(part).sum(1, dtype=np.float64) for part in (error, truth)]
         for row, values in enumerate(terms):
+            if row in (0, 3):  # a prediction that is not a number is an infinite error
+                values[np.isnan(values)] = math.inf
             self._sums[row] += np.bincount(np.minimum(window, self.windows), values, self.windows + 1)
         self._done += len(model)
         ready = min(self._done // self._window_frames, self.windows)

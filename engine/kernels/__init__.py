@@ -4,6 +4,7 @@
     strings, recorded, rotation, pulses, velocities
                laws of physics: plain functions, which Python calls as they are
     records    what is played; voice_records, mixer_records: what sounds
+    bank       a voice of complex exponentials whose phases follow their energies: models with a linear decoder
     tension    a voice of latents that share one tension: the model of every string
     lanes      its inner loops, as vector instructions
     truth      a voice of the solved string

@@ -40,7 +40,7 @@ TAPS = LAGS * OVERSAMPLING
 
 @njit(**COMPILED)
 def drive(mixer: Mixer, drive_db: float, tone_db: float, level_db: float) -> None:
-    """Set the amplifier of a mixer, see `engine.effects.Amp`; a tone of the peak NOMINAL keeps its level.
+    """Set the amplifier of a mixer, see `engine.values.effects.Amp`; a tone of the peak NOMINAL keeps its level.
 
     The input is scaled to the level that it would have without `level_db`, so that it changes no drive.
     """

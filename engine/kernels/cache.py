@@ -77,7 +77,7 @@ def is_whole() -> bool:
 
 
 def set_whole() -> None:
-    """Notes that everything has been compiled."""
+    """Note that everything has been compiled."""
     if (mark := _mark()) is not None:
         mark.touch()
 

@@ -64,7 +64,7 @@ def _speed_of(player: Player, drum: Drum, velocity: float) -> float:
 def contact_of(player: Player, table: Table, key: int, velocity: float) -> tuple[float, float]:
     """Strength and hardness of a blow on a key's drum, for the noise of the contact; see `engine.kernels.contact`."""
     drum = drum_of(table, key)
-    reference = _speed(drum, (of.REFERENCE_VELOCITY - 1) / 126)
+    reference = _speed(drum, velocities.share(of.REFERENCE_VELOCITY, 0.0))
     return _speed_of(player, drum, velocity) / reference, min(FIRM_S / drum.contact_s, MOST_HARDER)
 
 
@@ -87,7 +87,7 @@ def gain_of(player: Player, table: Table, key: int) -> float:
         sound = player.sound[: of.SOUND_ROWS * n]
         speeds = sound[of.SOUND_X * n : (of.SOUND_X + 1) * n]  # behind the rows below, which have no more modes
         loud = sound[of.SOUND_Y * n : (of.SOUND_Y + 1) * n]
-        _blow(drum, rows[STRUCK], _speed(drum, (of.REFERENCE_VELOCITY - 1) / 126), speeds)
+        _blow(drum, rows[STRUCK], _speed(drum, velocities.share(of.REFERENCE_VELOCITY, 0.0)), speeds)
         stereo, loudest, modes = table.points == 2, 0.0, 0
         for mode in range(n):
             speeds[mode] /= math.sqrt(rows[SQUARE, mode])

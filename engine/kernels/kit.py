@@ -36,7 +36,6 @@ KEY_TUNED = 6  # R its drum as it is tuned
 KEY = KEY_TUNED + DRUM
 LIST, LISTED, AIR, LOW, AIR_TERMS = range(DRUM, DRUM + 5)  # W slots of list and table, and their sizes
 AIR_REACH = DRUM + 5  # R
-DRUM_SLOTS = DRUM + 6
 
 FOLLOWED = (of.MODULUS_FACTOR, of.DECAY, of.BRIGHTNESS_DECAY, of.POINT, of.POINT + 1)
 MODES_MOVED, LOSSES_MOVED, PLACES_MOVED = 1, 2, 4

@@ -163,7 +163,7 @@ _turn, _turn_1, _turn_2, _turn_4 = (_sweep(True, ears) for ears in (0, 1, 2, 4))
 def turn(
     memory: np.ndarray, first: int, near: int, far: int, ears: int, linear: float, squared: float, heard: np.ndarray
 ) -> tuple[float, float]:
-    """Kicks and turns blocks; returns their sums at the next node, as `_sweep` says.
+    """Kick and turn blocks; return their sums at the next node, as `_sweep` says.
 
     It takes each number by itself, so that all stay in registers.
 

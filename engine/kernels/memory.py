@@ -99,7 +99,7 @@ drum_at, recorded_at, attack_at = map(record_at, (records.DRUM, records.RECORDED
 body_at, responses_at, needs_at = map(record_at, (records.BODY, records.RESPONSES, records.NEEDS))
 voice_at, wish_at = record_at(voice_records.VOICE), record_at(voice_records.WISH)
 truth_program_at, tension_program_at = map(record_at, (voice_records.TRUTH_PROGRAM, voice_records.TENSION_PROGRAM))
-rendered_program_at = record_at(voice_records.RENDERED_PROGRAM)
+bank_program_at, rendered_program_at = map(record_at, (voice_records.BANK_PROGRAM, voice_records.RENDERED_PROGRAM))
 mixer_at, convolver_at = record_at(mixer_records.MIXER), record_at(mixer_records.CONVOLVER)
 impulse_at = record_at(mixer_records.IMPULSE)
 

@@ -20,7 +20,7 @@ from engine.kernels.contact import sound
 from engine.kernels.convolver import convolve
 from engine.kernels.limiter import limit
 from engine.kernels.memory import address_of, fence, mixer_at, voice_at
-from engine.kernels.mixer_records import CAUSE_DEVICE, MOST_VOICES, RING, Mixer
+from engine.kernels.mixer_records import CAUSE_DEVICE, LARGEST, MOST_VOICES, RING, Mixer
 from engine.kernels.playing.events import play
 from engine.kernels.sympathy import sympathise
 from engine.kernels.voice import add, note_gap, take_over
@@ -137,7 +137,7 @@ def _finish(mixer: Mixer) -> None:
             if mixer.tone_side & 2:
                 right += wave
             mixer.tone_frame = now + 1
-        if not (abs(left) < 1e6 and abs(right) < 1e6):  # voices are watched; this is the last line of defence
+        if not (abs(left) < LARGEST and abs(right) < LARGEST):  # voices are watched; this is the last line of defence
             left = right = 0.0
             mixer.non_finite += 1
         mix[frame, 0], mix[frame, 1] = left, right

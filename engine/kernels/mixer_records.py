@@ -26,9 +26,9 @@ CAUSE_DEVICE, CAUSE_STARVED, CAUSE_RUNAWAY = 1, 2, 3
 MOST_COURSE = 3  # strings of a key
 MOST_EARS = 4  # two sets of weights at two points
 REACH = 32  # frames of the differentiator to either side
-SCRATCH_MODES = 512  # for which the scratch has room
+MOST_LATENTS = 512  # of a bank
 SCRATCH_ROWS = 40
-SCRATCH_SLOTS = SCRATCH_ROWS * SCRATCH_MODES + 4 * QUANTUM * SCRATCH_MODES
+SCRATCH_SLOTS = SCRATCH_ROWS * MOST_LATENTS + 4 * QUANTUM * MOST_LATENTS
 
 OVERSAMPLING = 12  # of the amplifier
 LAGS = 52  # of its filters to the higher rate and back, in frames

@@ -1,4 +1,4 @@
-"""The laws of plucks and blows: their shapes on a string, their force over time, and how hard a velocity is.
+"""The laws of plucks and blows: their shapes on a string and their force over time.
 
 Plain functions for Python and compiled code, as `engine.kernels.strings`; a `Number` may be an array in Python.
 """

@@ -17,7 +17,7 @@ from engine.kernels.fourier import ONE, SPARE, TWO, power_of_two, row, silence, 
 from engine.kernels.memory import matrix
 
 FADE_SHARE = 0.1  # of a response that is cut: its end
-FINEST_RATIO = 1000  # denominators of ratios of rates: to thousandths of a cent
+FINEST_RATIO = 1000  # denominators of ratios of rates: within a cent
 CURVES_FINEST_HZ = 0.75  # of the spectrum that a body's curves are taken from
 _LEAST = 1e-30
 _DRY, _BODY, _ROOM, _BOTH = range(4)  # parts of a mix; the three cases that something is heard of are numbered alike
@@ -94,7 +94,7 @@ def fade(sound: np.ndarray) -> None:
 
 @njit(**COMPILED)
 def fraction(ratio: float) -> tuple[int, int]:
-    """The nearest fraction with a denominator up to FINEST_RATIO, of a ratio in 2⁻⁹ … 2⁹.
+    """The nearest fraction with a denominator up to FINEST_RATIO, of a ratio in 2⁻¹⁰ … 2¹⁰.
 
     By continued fractions, as Python's `Fraction.limit_denominator`.
     """

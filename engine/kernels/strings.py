@@ -26,7 +26,6 @@ if TYPE_CHECKING:  # what has strings does without NumPy
 Mode = TypeVar("Mode", float, "np.ndarray")
 
 _BOUNDS = tuple(bounds.STRING.values())
-_MAY_BE_ZERO = (of.MOMENT, of.MODULUS, of.D1, of.D3)
 ROUNDS = 4  # σ₁ depends on the length, a little
 MUTED_M, MUTED_SHARE, MUTED_SIGMA = 0.05, 0.25, 300.0  # of a palm mute: m, of the string at most, 1/s
 TOUCH_RESISTANCE = 1.0  # of a finger that touches a string, over the string's own √(TρA): an estimate
@@ -37,7 +36,7 @@ def possible(string: Row) -> bool:
     for place in range(of.STRING):
         value = string[place]
         low, high = _BOUNDS[place]
-        if not low <= value <= high or (value == 0.0 and place not in _MAY_BE_ZERO):
+        if not low <= value <= high:
             return False
     return True
 

@@ -300,7 +300,7 @@ def _wake(voice: Voice) -> None:
 
 @njit(**COMPILED)
 def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray) -> None:
-    """Orders the modes of a drum: those that are heard, others that stretch it, and those that rest.
+    """Order the modes of a drum: those that are heard, others that stretch it, and those that rest.
 
     The highest that are silent are laid to rest for good.
 

@@ -19,7 +19,7 @@ def contact_s(softest_ms: float, hardest_ms: float, share: float) -> float:
     """The time in which a pluck releases the string, or a hammer touches it; 0: at once."""
     if softest_ms <= 0.0 or hardest_ms <= 0.0:
         return 0.0
-    return softest_ms / 1000 * (hardest_ms / softest_ms) ** share
+    return between(softest_ms, hardest_ms, share) / 1000
 
 
 def velocity(softest: float, hardest: float, value: float, curve: float) -> int:

@@ -7,11 +7,12 @@ import math
 import numpy as np
 from numba import njit
 
-from engine.kernels import javari, rendered, tension, truth
+from engine.kernels import bank, javari, rendered, tension, truth
 from engine.kernels import voice_records as at
 from engine.kernels.compiled import COMPILED
 from engine.kernels.constants import QUANTUM
 from engine.kernels.memory import (
+    bank_program_at,
     fence,
     rendered_program_at,
     tension_program_at,
@@ -38,7 +39,9 @@ def _generate(voice: Voice, heard: bool, rate_hz: float, out: np.ndarray, scratc
         return
     fading = voice.next_weights == 1
     fence()
-    if voice.javari.steps > 0:
+    if kind == at.BANK:
+        bank.generate(voice, bank_program_at(voice.program), fading, heard, out, scratch)
+    elif voice.javari.steps > 0:
         javari.generate(voice, fading, heard, out, scratch)
     elif kind == at.TENSION:
         tension.generate(voice, tension_program_at(voice.program), fading, heard, out, scratch)
@@ -92,7 +95,7 @@ def remember(voice: Voice, heard: bool, first: bool, out: np.ndarray) -> None:
     """Keep the quantum that was generated, and the flux that it is to a magnetic pick-up.
 
     That grows as (exp(x/δ) - 1) δ with the displacement x, to third order.
-    What the filter needs is there when `WARM` has reached `WARMED`: at the pluck at once, else two quanta later.
+    What the filter needs is there when `warm` has reached `WARMED`: at the pluck at once, else two quanta later.
     """
     quantum = QUANTUM
     if first:

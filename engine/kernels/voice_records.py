@@ -15,7 +15,7 @@ from engine.kernels.fields import R, W, slots
 
 # Records, as annotations of kernels
 Voice: TypeAlias = Any
-Wish: TypeAlias = Any
+BankProgram: TypeAlias = Any
 TruthProgram: TypeAlias = Any
 TensionProgram: TypeAlias = Any
 RenderedProgram: TypeAlias = Any
@@ -30,7 +30,7 @@ BRIGHTER = 10.0  # times as much of full scale a narrow pluck may be as velocity
 # A voice's state
 WAITING, SOUNDING, OVER, RUNAWAY = 0, 1, 2, 3
 # A voice's kind
-TRUTH, RENDERED, TENSION = 1, 2, 3
+BANK, TRUTH, RENDERED, TENSION = 0, 1, 2, 3
 
 JAVARI_EDGE = np.dtype(  # of the bridge, which a string may meet
     [
@@ -64,23 +64,29 @@ VOICE = np.dtype(
         ("struck_s", R),  # the device clock's time of the gesture
         ("began_s", R),  # and of the callback that gave the device its first samples
         ("starved", W),  # frames in which it should have sounded and had nothing to
-        ("modes", W),  # 0 of a rendered voice
+        ("modes", W),  # latents, or modes, or 0
         ("moving", W),  # modes of the truth, or latents that share a tension, up to the highest that is not silent
+        ("node", W),  # the node from which a bank's integral continues
+        ("segment_valid", W),  # whether a bank knows where its last segment ended
         ("loudness", R),  # nepers below full scale that the loudest latent, or all of the string, has now
         ("gain_from", R),  # where the present change of gain began
         ("gain_to", R),  # and where it leads
         ("gain_done", W),  # frames of it
         ("silent", R),  # nepers of full scale: a voice whose loudness has fallen below is over
+        ("modulated", W),  # whether a bank's modulation can still be heard
         ("samples", W),  # address of a rendered voice's samples, float32 (frames, points)
         ("ready", W),  # of them, set by the renderer
         ("length", W),  # of them in all; after the last the voice is over
         ("dry", W),  # whether it had nothing to play in the last quantum
         ("attack", W),  # frames of the fade-in at the pluck
         ("began_frame", W),  # the mixer's frame at which it began, after any samples it waited for; -1 until then
-        ("refresh", W),  # quanta until it looks again: at a drum's modes, a string's nodes
+        ("refresh", W),  # quanta until it looks again: at a bank's modulation, a drum's modes, a string's nodes
+        ("rows", W),  # latents whose modulation can be heard
+        ("columns", W),  # latents that can be heard in others' modulation
         ("begin_at", W),  # the mixer's frame at which it begins; in the past: with the next quantum
         ("release_at", W),  # the mixer's frame from which it fades out; 0: none
         ("looped", W),  # whether a rendered voice, of the device's own rate, begins again after its last sample
+        ("audible_count", W),  # latents up to the last that can be heard
         ("warm", W),  # quanta of its own displacement that a velocity voice has behind it, without an unheard one
         ("resonator", W),  # address of the latest of these that are due; the kernel glides there
         ("current_modes", W),  # the one that it is gliding to, or has reached
@@ -99,7 +105,7 @@ VOICE = np.dtype(
         ("late", W),  # frames after the beginning of the mixer's quantum at which its own begins, below QUANTUM
         ("pending_modes", W),  # address of the first modes that it was to have; each names the next
         ("heard", W),  # modes that move and are heard, the first of the row ORDER
-        ("felt", W),  # those and the next, which stretch a drum; the others, up to MOVING, rest
+        ("felt", W),  # those and the next, which stretch a drum; the others, up to `moving`, rest
         ("rested", W),  # quanta in which those did not even decay
         ("rest_stretch", R),  # what they add to S on average, and
         ("rest_second", R),  # to R
@@ -119,6 +125,16 @@ VOICE = np.dtype(
 )
 """Weights follow, (2 sets, 2 points, 2 parts, modes), real parts and imaginary ones; then rows (modes,)."""
 WEIGHT_ROWS = 8
+
+# Rows (modes,) of a bank
+LEVEL_0, ANGLE_0, ENERGY_0 = 0, 1, 2
+CONSTANT = 3  # two: what the linear term adds up to in the end
+INTEGRAL = 5  # two: of the higher orders up to the node
+AT_LEFT, AT_MIDDLE, AT_RIGHT = 7, 9, 11  # two each: the higher orders at the node, half-way and at the next
+LEVEL, PHASE, LEVEL_RATE, PHASE_RATE = 13, 14, 15, 16  # where the last segment ended
+ROW_LIST, COLUMN_LIST = 17, 18  # whole numbers
+CHANGE = 19  # of the level by the amplitude's share of the action, at the segment's left and right end: two
+BANK_ROWS = 21
 
 # Rows of a voice with modes (the truth, or latents that share a tension): two that move, amplitude and speed or x and
 # y; five of its resonator as it is now; and what follows from them
@@ -142,6 +158,37 @@ WISH = np.dtype(  # the modes that a voice is to have
     ]
 )
 """Rows (modes,) follow, RESONATOR_ROWS of them."""
+
+MOST_WIDTHS = 8
+BANK_PROGRAM = np.dtype(
+    [
+        ("modes", W),
+        ("ratio", R),  # trained samples a frame
+        ("spacing", R),  # trained samples between nodes
+        ("limit", R),  # the gain's limit in nepers
+        ("second_order", W),
+        ("higher", W),  # whether there are higher orders at all
+        ("adiabatic", W),  # whether f follows the mean tension to all orders, and A is there
+        ("layers", W),  # of the network g; 0: none
+        ("modulates", W),  # whether M is there
+        ("loudness", R),  # nepers: log of full scale's share of a latent of 1
+        ("early", W),  # frames in which segments are short
+        ("widths", W, MOST_WIDTHS),  # sizes of the network's layers, from the input on
+        ("sigma", W),  # slots of what follows, from here on
+        ("omega", W),
+        ("coupling", W),
+        ("largest", W),
+        ("shares", W),
+        ("energy_units", W),
+        ("rate_units", W),
+        ("at_zero", W),
+        ("network", W),
+        ("modulation", W),  # M
+        ("largest_modulation", W),
+        ("change", W),  # A, transposed
+    ]
+)
+BANK_PARTS = BANK_PROGRAM.names[12:] if BANK_PROGRAM.names else ()
 
 TRUTH_PROGRAM = np.dtype(
     [

@@ -32,7 +32,7 @@ def advance_fgru(
     convolutions: Pair,
     out: Pair,
 ) -> None:
-    """Advance `hidden` (points, width) in place; writes frames (steps, points).
+    """Advance `hidden` (points, width) in place; write frames (steps, points).
 
     Each pair is weights and biases. convolutions, of z, r and the candidate: (3, frequencies, width in, 2, width
     out) and, as fields, (3, points, width). out: (1, width, 1) and (1, 1).

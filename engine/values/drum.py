@@ -47,8 +47,7 @@ class DrumParameters:
     shell_m: Number = 0.0
 
     def __post_init__(self) -> None:
-        if self.shape not in SHAPES:
-            raise ValueError(f"drum parameter shape must be one of {', '.join(SHAPES)}, not {self.shape!r}")
+        bounds.check_choice("drum parameter shape", self.shape, SHAPES)
         bounds.check_all(self, bounds.DRUM, "drum parameter ")
         if self.shell_m and (self.cavity_m3 or not self.air_kg_m3):
             raise ValueError(

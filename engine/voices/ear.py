@@ -38,7 +38,7 @@ def weights_of(ear: Ear, grid_points: int, force: Array | None = None) -> Array:
 
 
 def largest(ear: Ear, displacement_m: Array, force: Array | None = None) -> float:
-    """A bound of the signal after a release from this shape, in the unit of `weights`; narrow plucks pass it.
+    """A bound of the signal after a release from this shape, in the unit of `weights_of`; narrow plucks pass it.
 
     A velocity is bounded by ten times the displacement of full scale. The force at an end never passes tension
     times the steepest slope: waves to both sides have half of it each, and the end doubles it.

@@ -266,7 +266,7 @@ class CompiledPlayer:
             self.record["source_gains"][source] = gain
 
     def set_spares(self, spares: bool) -> None:
-        """Set if notes begin without voices of sources that are not heard: these cost nothing, and stay silent."""
+        """Set whether notes begin without voices of sources that are unheard: these cost nothing, and stay silent."""
         self.record["spares"] = spares
 
     def source_gain(self, source: int) -> float:

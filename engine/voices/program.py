@@ -29,7 +29,7 @@ class Program:
     """See the module; the kernels read `memory`.
 
     Attributes:
-        modes: of the string; 0 where samples are rendered.
+        modes: latents of a bank, modes of a solver, 0 where samples are rendered.
         start: initial displacement (grid_points,) in m to the two rows (modes,) that a voice sets out from.
         read: weights (grid_points, points) of displacement to weights (points, 2 modes) and bias (points,), of full
             scale.
@@ -61,7 +61,7 @@ class Program:
         return found
 
     def grid_weights(self, ear: Ear) -> Array:
-        """The weights on the grid for its string, as `Ear.weights`; displacement @ weights is the signal."""
+        """The weights on the grid for its string, as `weights_of`; displacement @ weights is the signal."""
         return weights_of(ear, self.grid_points, self.force)
 
     @property

@@ -1,7 +1,7 @@
 """Programs: what all voices of one source share, at one sample rate.
 
-The model of many strings and the string itself, a solver, are compiled and sound at once, at the device's own rate.
-Any other model is rendered ahead at its own rate, and converted.
+A model whose decoder is linear becomes a bank of latents, and the string itself a solver; both are compiled and
+sound at once, at the device's own rate. Any other model is rendered ahead at its own rate, and converted.
 """
 
 from __future__ import annotations
@@ -126,6 +126,11 @@ def model_program(preset: Preset, rate_hz: int) -> Program:
     """The compiled voice of a model where it has one, otherwise for samples that are rendered ahead."""
     if preset.info.of_many_strings:
         return tension_program(preset.weights, preset.configuration, preset.info.resonator, rate_hz)
+    if preset.info.model in ("dmd", "koopman_integrated"):
+        from engine.voices.banks import bank_program  # and torch, which a preset of many strings plays without
+
+        if (bank := bank_program(preset.model, preset.info, rate_hz)) is not None:
+            return bank
     return rendered_program(preset.info, rate_hz)
 
 

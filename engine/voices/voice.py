@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from engine.kernels import voice_records as at
 from engine.kernels.fields import record_of, slot, slots
 from engine.kernels.memory import publish
+from engine.kernels.mixer_records import SCRATCH_SLOTS
 from engine.kernels.voice_records import (
     ATTACK_S,
+    BANK_PROGRAM,
     END_FADE_S,
     FADE_S,
     LONGEST_S,
@@ -59,7 +61,7 @@ class Voice:
         begin: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None,
     ) -> None:
         n = program.modes
-        rows = {at.TRUTH: at.TRUTH_ROWS, at.TENSION: at.TENSION_ROWS}.get(program.kind, 0)
+        rows = {at.BANK: at.BANK_ROWS, at.TRUTH: at.TRUTH_ROWS, at.TENSION: at.TENSION_ROWS}.get(program.kind, 0)
         self.program, self.ear = program, ear
         self.memory = np.zeros(slots(VOICE) + (WEIGHT_ROWS + rows) * n)
         self.record = record = record_of(self.memory, VOICE)
@@ -82,6 +84,10 @@ class Voice:
         if program.resonator is not None:
             record["moving"] = n
             self.rows[at.OMEGA_SQUARED : at.FOLLOWING] = resonator_rows(program.resonator)
+        elif program.kind == at.BANK:
+            from engine.kernels.bank import strike
+
+            strike(record, record_of(program.memory, BANK_PROGRAM), np.empty(SCRATCH_SLOTS))
         else:
             seconds = min(seconds, program.ends_s + END_FADE_S + SPARE_S)
             length = max(1, math.ceil(seconds * source_rate_hz) + 1)
@@ -148,7 +154,7 @@ class Voice:
 
     @property
     def level_db(self) -> float:
-        """The level of all of the string, in dB of full scale."""
+        """The level of the loudest latent, or of all of the string, in dB of full scale."""
         return float(self.record["loudness"]) * 20 / math.log(10)
 
     def set_struck(self, time_s: float) -> None:

@@ -29,7 +29,7 @@ def keys() -> list[int]:
 
 def played(keys: list[int], gain: float) -> tuple[NDArray[np.float32], float]:
     """The sound, (frames, 2), and the limiter's strongest reduction in dB."""
-    preset = load_preset(SHIPPED / "studio_any_nylon_b3.safetensors")
+    preset = load_preset(SHIPPED / "studio_nylon_b3.safetensors")
     program, ear, random = model_program(preset, RATE_HZ), Ear((0.37,)), np.random.default_rng(2)
     begins = []
     for place in PLACES:

@@ -26,7 +26,7 @@ from engine.compare.relative import error_to_signal
 from engine.kernels.constants import MOST_NOTES, MOST_PAIRS
 from engine.levels import FULL_SCALE_M
 from engine.pluck import DEFAULT_LISTEN, Pluck
-from engine.presets import SHIPPED, Preset, load_preset, preset_files, read_info
+from engine.presets import SHIPPED, Preset, load_preset, preset_files
 from engine.resonators.sine_transform import project
 from engine.sources import ModelSource, StringSource, TruthSource
 from engine.values.ear import Ear
@@ -126,10 +126,8 @@ class VoicesBenchmark:
 
 
 def measure(report: Callable[[float, str], None]) -> VoicesBenchmark:
-    """Measures every studio preset whose model has a compiled voice."""
-    paths = [
-        path for path in preset_files(SHIPPED) if path.stem.startswith(STUDIO) and read_info(path).of_many_strings
-    ]
+    """Measures every studio preset."""
+    paths = [path for path in preset_files(SHIPPED) if path.stem.startswith(STUDIO)]
     voices: list[VoiceCost] = []
     strikes = []
     with one_thread():

@@ -41,7 +41,7 @@ def _shipped(name: str) -> Preset:
 
 
 @cache
-def _program(name: str, rate_hz: int) -> Program:
+def _bank(name: str, rate_hz: int) -> Program:
     preset = _shipped(name)
     return model_program(preset, rate_hz)
 
@@ -92,7 +92,7 @@ def strike() -> Callable[..., Voice]:
     """A voice of a shipped preset's model: strike(name, pluck=…, rate_hz=…, ear=…, gain=…)."""
 
     def made(name: str, pluck: Pluck = PLUCK, rate_hz: int = 48_000, ear: Ear = EAR, gain: float = 1.0) -> Voice:
-        return Voice(_program(name, rate_hz), _initial_m(_shipped(name).info, pluck), ear, gain)
+        return Voice(_bank(name, rate_hz), _initial_m(_shipped(name).info, pluck), ear, gain)
 
     return made
 

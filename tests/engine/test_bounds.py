@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -107,3 +108,9 @@ def test_modes_below_costs_nothing_of_any_string() -> None:
     """The table of all modes would take 15 TB here."""
     string = StringParameters(length_m=100.0, tension_n=1e-3, area_m2=1e-2, density_kg_m3=1e5, second_moment_m4=0)
     assert string.modes_below(1e9) > 10**12
+
+
+@pytest.mark.parametrize("value", [None, True, math.nan, -1.0])
+def test_a_number_of_a_string_is_a_number_within_its_bounds(value: object) -> None:
+    with pytest.raises(ValueError, match="string parameter length_m must"):
+        StringParameters(length_m=value)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""`python -m training.cli PLAN`: the command `sweep` alone, where no app is."""
+"""One command alone, where no app is: `python -m training.cli PLAN` is `sweep`."""
 
 import sys
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from training.cli.sweep import sweep
 
 
 def main(command: Callable[..., Any]) -> None:
-    """Run one command with the words of this process, as the app's command line does."""
+    """Run one command with the words of this process; what it refuses is one line."""
     commands = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
     commands.command()(command)
     try:

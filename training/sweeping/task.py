@@ -115,7 +115,7 @@ def read_progress(folder: Path) -> Progress | None:
     from training.fitting.fit import Progress
 
     with suppress(OSError, SchemaError):
-        return read(Progress, parse_json((folder / PROGRESS).read_text(encoding="utf-8"), PROGRESS), PROGRESS)
+        return read(Progress, parse_json((folder / PROGRESS).read_bytes(), PROGRESS), PROGRESS)
     return None
 
 

@@ -27,7 +27,7 @@ from engine.effects.room import NOISE_FRAMES
 from engine.kernels import constants as of
 from engine.kernels import mixer_records as mixed
 from engine.kernels.fields import record_of, slot, slots
-from engine.kernels.records import CHANNEL, EVENT, NEEDS, PLAYER, REPORT, RESPONSES, TABLE
+from engine.kernels.records import EVENT, NEEDS, PLAYER, REPORT, RESPONSES, TABLE
 from engine.kernels.voice_records import TENSION_PROGRAM, TRUTH_PROGRAM, voice_bytes
 from engine.levels import FULL_SCALE_M, FULL_SCALE_M_S
 from engine.presets import Preset
@@ -332,11 +332,9 @@ def layout_header(version: str) -> str:
         ("EVENT", EVENT),
         ("REPORT", REPORT),
         ("TABLE", TABLE),
-        ("CHANNEL", CHANNEL),
         ("RESPONSES", RESPONSES),
         ("NEEDS", NEEDS),
         ("MIXER", mixed.MIXER),
-        ("AMPLIFIER", mixed.AMPLIFIER),
         ("CONVOLVER", mixed.CONVOLVER),
         ("IMPULSE", mixed.IMPULSE),
         ("TENSION_PROGRAM", TENSION_PROGRAM),

@@ -66,9 +66,10 @@ def text(part: str) -> str:
 
     compiled.COMPILED["cache"] = False
     compiled.COMPILED["no_cpython_wrapper"] = compiled.COMPILED["no_cfunc_wrapper"] = True
-    from engine.kernels import mixer, plugin, rendered
+    from engine.kernels import bank, mixer, plugin, rendered
 
-    rendered.generate = njit(lambda *_: None)  # of voices that the compiled player does not make
+    for kind in (bank, rendered):  # of voices, which the compiled player does not make
+        kind.generate = njit(lambda *_: None)  # type: ignore[attr-defined]
     for name in (each for entries in PARTS.values() for each in entries if hasattr(mixer, each)):
         if name not in PARTS[part]:
             setattr(mixer, name, _elsewhere(name))

@@ -217,19 +217,19 @@ def place_of(player: Player, table: Table, event: Event) -> int:
 
 @njit(**COMPILED)
 def hold(player: Player, channel: int, key: int, down: bool) -> None:
-    """Notes that a key is down, or is not."""
+    """Note whether a key is down."""
     player.channels[channel].held[key] = down
 
 
 @njit(**COMPILED)
 def strike(player: Player, channel: int, key: int) -> None:
-    """Counts a stroke of a key."""
+    """Count a stroke of a key."""
     player.channels[channel].strokes[key] += 1
 
 
 @njit(**COMPILED)
 def release_latest(player: Player, channel: int, key: int) -> bool:
-    """Take a release of a key for its earliest stroke that has none; whether that is the latest."""
+    """Take a release of a key for its earliest stroke that has none; return whether that is the latest."""
     strokes = player.channels[channel].strokes
     strokes[key] = max(strokes[key] - 1, 0)
     return strokes[key] == 0

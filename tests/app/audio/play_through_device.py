@@ -26,7 +26,7 @@ from engine.resonators.sine_transform import project
 from engine.values.ear import Ear
 from engine.voices import Mixer, Program, Voice, model_program, truth_program
 
-PRESET = "studio_any_nylon_b3"
+PRESET = "nylon_nonlinear_gaussian_4k_koopman_integrated"
 EAR = Ear((0.37, 0.7))
 PLUCKS = (Pluck(0.3), Pluck(0.6, 3.0))
 SECOND_S, SWITCH_S, RELEASE_S, END_S = 0.3, 0.7, 1.1, 1.3  # after the first note began
@@ -35,8 +35,8 @@ SECOND_S, SWITCH_S, RELEASE_S, END_S = 0.3, 0.7, 1.1, 1.3  # after the first not
 def notes(rate_hz: int, first_frame: int) -> tuple[Voice, Voice, Voice]:
     """The first note as model and, unheard, as truth, and the second one. They know when they begin and end."""
     preset = load_preset(SHIPPED / f"{PRESET}.safetensors")
-    program = model_program(preset, rate_hz)
-    assert program is not None
+    bank = model_program(preset, rate_hz)
+    assert bank is not None
     truth = truth_program(preset.info, rate_hz)
 
     def struck(program: Program, pluck: Pluck, gain: float, begin_s: float) -> Voice:
@@ -47,7 +47,7 @@ def notes(rate_hz: int, first_frame: int) -> tuple[Voice, Voice, Voice]:
         return voice
 
     first, second = PLUCKS
-    return struck(program, first, 0.5, 0.0), struck(truth, first, 0.0, 0.0), struck(truth, second, 0.5, SECOND_S)
+    return struck(bank, first, 0.5, 0.0), struck(truth, first, 0.0, 0.0), struck(truth, second, 0.5, SECOND_S)
 
 
 def switch(model: Voice, truth: Voice) -> None:

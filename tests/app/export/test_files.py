@@ -59,7 +59,7 @@ def test_the_sound_is_the_whole_motion_at_the_listening_point_behind_its_attack(
     assert (np.abs(found[:attack]) < np.abs(whole_m[:attack]) / FULL_SCALE_M).all()
 
 
-COMPILED = SHIPPED / "studio_any_nylon_b3.safetensors"
+COMPILED = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 
 
 @pytest.mark.parametrize(("preset", "kind"), [("compiled", "model"), ("compiled", "truth"), ("small", "model")])
@@ -78,7 +78,7 @@ def test_what_is_exported_is_what_a_device_is_given_bit_for_bit(
     voice = Voice(program, initial_m, ear, 1.0, 0.4, info.rate_hz)
     if program.rendered:
         source = ModelSource(asked.preset)
-        ahead = AheadVoice(voice, source, initial_m, weights_of(ear, 101), 0.4, (), lambda: None, lambda error: None)
+        ahead = AheadVoice(voice, source, initial_m, weights_of(ear, 101), (), lambda: None, lambda error: None)
         while not ahead.finished:
             ahead.advance()
     mixer = Mixer(48_000)

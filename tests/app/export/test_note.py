@@ -27,7 +27,7 @@ from engine.sources import ModelSource
 from engine.values.ear import Ear
 from engine.voices import Mixer, Voice, model_program, voice_blocks
 
-PRESET = SHIPPED / "studio_any_nylon_b3.safetensors"
+PRESET = SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 GUITAR = read_patch(PATCHES / "classical_guitar.json")
 FIXED = ExportChoices(until_decayed=False, seconds=0.3, bits="32f", normalise=False)
 

@@ -53,6 +53,13 @@ def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guit
     assert abs(low.parameters.length_m / lowest.parameters.length_m - 1) < 1e-3
 
 
+def test_a_key_that_no_tension_reaches_says_so(guitar: Patch) -> None:
+    rod = OpenString(note=60, string=replace(STEEL, second_moment_m4=1e-9))
+    strings = Strings(Patch.model_validate({**dict(guitar), "strings": StringSet(strings=(rod,))}))
+    with pytest.raises(ValueError, match="key 31: no tension slackens its string so far; choose a higher key"):
+        strings._stopped(31, None, 440 * 2 ** ((31 - 69) / 12))
+
+
 def test_a_set_may_be_reported_on_which_string(guitar: Patch) -> None:
     strings = [
         OpenString(note=note, string=replace(STEEL, tension_n=tension_n))

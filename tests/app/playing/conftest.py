@@ -60,16 +60,16 @@ def sound() -> StandingSound:
 
 
 @pytest.fixture(scope="session")
-def compiled() -> Path:
+def bank() -> Path:
     """A model that sounds at once."""
-    return SHIPPED / "studio_any_nylon_b3.safetensors"
+    return SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 
 
 @pytest.fixture(scope="session")
-def sources(compiled: Path, small_preset: Path) -> Sources:
+def sources(bank: Path, small_preset: Path) -> Sources:
     """With both presets loaded at 48 kHz; nobody may change it."""
     made = Sources()
-    for path in (compiled, small_preset):
+    for path in (bank, small_preset):
         made.prepare(path, 48_000)
     return made
 

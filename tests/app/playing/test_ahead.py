@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.playing.ahead import CARE, LEAD_S, LEAST_S, Ahead, AheadVoice
+from app.playing.ahead import CARE, LEAST_S, Ahead, AheadVoice
 from app.playing.sources import Sources
 from engine.levels import FULL_SCALE_M
 from engine.models.koopman_var import KoopmanState, KoopmanVar
@@ -54,7 +54,6 @@ def make(sources: Sources, small_preset: Path) -> Make:
 
     def made(
         seconds: float = 1.0,
-        pictures_s: float = 0.0,
         from_s: float = 0.0,
         key: object = None,
         model: ModelSource = loaded.model,
@@ -67,7 +66,6 @@ def make(sources: Sources, small_preset: Path) -> Make:
             model,
             initial_m,
             weights_of(EAR, info.grid_points),
-            pictures_s or seconds,
             (key or object(),),
             lambda: reported.begun_s.append(voice.rendered_s),
             reported.errors.append,
@@ -126,47 +124,14 @@ def test_a_slow_model_begins_when_the_rest_will_be_ready_in_time(
     assert voice.waits_s == 0
 
 
-def test_a_model_rings_on_behind_its_pictures(ahead: Ahead, make: Make, wait: Wait) -> None:
-    """It is rendered no further ahead than it may be wanted."""
-    voice, _ = make(seconds=8.0, pictures_s=0.25)
-    ahead.render(voice)
-    mixer, whole = Mixer(RATE_HZ, limited=False), []
-    wait(lambda: voice.begun)
-    voice.voice.never_ends()
-    mixer.add(voice.voice)
-    for _ in range(12):
-        wait(lambda: voice.finished or not voice.wants_more)
-        assert voice.finished or voice.lead_s < LEAD_S + 1.0
-        whole.append(mixer.render(RATE_HZ // 2)[:, 0])
-    frames, _ = voice.source.advance(voice.source.start(voice.initial_m[None]), 6 * RATE_HZ, voice.weights)
-    expected, found = frames[0, :, 0] / FULL_SCALE_M, np.concatenate(whole)
-    assert np.abs(found[RATE_HZ:]).max() > 1e-3
-    assert found[17:] == pytest.approx(expected[16 : len(found) - 1], abs=1e-5)
-    assert mixer.new_gaps() == []
-
-
-def test_a_slow_model_ends_with_its_pictures(
-    ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    slow_down(monkeypatch, speed=0.8)
-    voice, _ = make(seconds=8.0, pictures_s=0.5)
-    ahead.render(voice)
-    wait(lambda: voice.begun)
-    wait(lambda: voice.rendered_s > 0.7)
-    sound = heard(voice.voice, 2 * RATE_HZ)
-    assert np.abs(sound[: RATE_HZ // 2]).max() > 0.01
-    assert not sound[RATE_HZ // 2 :].any()
-
-
 def test_what_was_rendered_once_is_there_at_once(ahead: Ahead, make: Make, wait: Wait) -> None:
     first, _ = make(key="a")
     ahead.render(first)
     wait(lambda: first.finished)
     wait(lambda: ("a",) in ahead._known)
-    again, _ = make(key="a")
+    again, reported = make(key="a")
     ahead.render(again)
-    wait(lambda: again.begun)
-    assert again.finished and again.done == first.done
+    assert reported.begun_s == [first.rendered_s]
     np.testing.assert_array_equal(heard(again.voice, 3_000), heard(first.voice, 3_000))
     other, _ = make(key="b")
     ahead.render(other)
@@ -202,10 +167,12 @@ def test_a_model_that_runs_away_ends_there(
     ahead.render(voice)
     wait(lambda: voice.finished)
     wait(lambda: voice.begun)
+    assert voice.ends_s == pytest.approx(voice.rendered_s, abs=1 / RATE_HZ)
     samples = heard(voice.voice, 4_000)
     assert np.abs(samples[voice.done - 200 : voice.done]).max() > 0.01
     assert not samples[voice.done + 128 :].any()
     assert reported.errors == []
+    assert ahead._known == {}
 
 
 def test_a_fault_is_reported_and_the_others_go_on(

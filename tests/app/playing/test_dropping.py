@@ -101,7 +101,7 @@ def test_a_key_that_fails_costs_its_own_note(
 def test_a_pluck_that_cannot_be_changed_or_ended_costs_itself(
     notes: Notes,
     sound: Any,
-    compiled: Path,
+    bank: Path,
     pluck_of: PluckOf,
     reports: list[tuple[str, str]],
     monkeypatch: pytest.MonkeyPatch,
@@ -109,7 +109,7 @@ def test_a_pluck_that_cannot_be_changed_or_ended_costs_itself(
     kind: type,
     name: str,
 ) -> None:
-    struck = [strike(pluck_of(compiled)) for _ in range(3)]
+    struck = [strike(pluck_of(bank)) for _ in range(3)]
     sound.mixer.render(4800)
     monkeypatch.setattr(kind, name, once(getattr(kind, name), at=2))
     if name == "_follow":
@@ -118,25 +118,25 @@ def test_a_pluck_that_cannot_be_changed_or_ended_costs_itself(
         notes.set_monitor(hears("truth"))
     else:
         monkeypatch.setattr(module, "MOST_NOTES", 1)
-        strike(pluck_of(compiled))
+        strike(pluck_of(bank))
     assert [message for message, _ in reports] == [DROPPED]
     assert [note.cut for note in struck] == [False, True, False]
     notes.poll()
-    again = strike(pluck_of(compiled))
+    again = strike(pluck_of(bank))
     sound.mixer.render(4800)
     assert again.began and not again.over
     assert is_loud(sound)
 
 
 def test_a_report_that_fails_stops_nothing(
-    sound: Any, sources: Sources, compiled: Path, pluck_of: PluckOf, monkeypatch: pytest.MonkeyPatch
+    sound: Any, sources: Sources, bank: Path, pluck_of: PluckOf, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def broken(*_: str) -> None:
         raise ZeroDivisionError("a mistake")
 
     notes = Notes(sound, sources, lambda name: None, broken)
     notes.set_monitor(hears("model"))
-    notes.choose(pluck_of(compiled))
+    notes.choose(pluck_of(bank))
     monkeypatch.setattr(Notes, "_begin", once(Notes._begin, at=1))
     try:
         first, second = notes.ring(), notes.ring()

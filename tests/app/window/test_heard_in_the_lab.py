@@ -134,7 +134,7 @@ def heard(qtbot: QtBot, lab: Controller, slot: str) -> Samples:
     lab.pluck()
     note = lab.instruments.latest
     assert isinstance(note, Note)
-    qtbot.waitUntil(lambda: not note.pending and not any(each.wants_more for each in note.ahead))
+    qtbot.waitUntil(lambda: not note.pending and all(each.finished for each in note.ahead))
     sound = take(lab, SECONDS)
     lab.performance.stop()
     take(lab, 0.05)

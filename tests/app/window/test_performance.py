@@ -45,7 +45,7 @@ def window(
     """With a device that makes no sound, a preset that sounds at once and one that is rendered first."""
     folder = tmp_path / "presets"
     folder.mkdir()
-    shutil.copy(SHIPPED / "studio_any_nylon_b3.safetensors", folder / "compiled.safetensors")
+    shutil.copy(SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors", folder / "bank.safetensors")
     shutil.copy(small_preset, folder / "rendered.safetensors")
     monkeypatch.setattr("app.presets.library.SHIPPED", folder)
     monkeypatch.setattr("app.playing.notes.LOOP_AHEAD_S", TURN_S)
@@ -53,7 +53,7 @@ def window(
     qtbot.addWidget(made)
     controller = Controller(
         made,
-        Settings(choices=Choices(instrument=SingleString(preset="compiled"), seconds=1.0)),
+        Settings(choices=Choices(instrument=SingleString(preset="bank"), seconds=1.0)),
         tmp_path / "settings.json",
         lambda on_problem: Sound(on_problem, look_up=lambda *_: SPEAKERS, open_output=numb_output),
     )
@@ -163,7 +163,7 @@ def next_turn(qtbot: QtBot, performance: Performance, before: Note) -> Note:
     return performance._shown.note
 
 
-@pytest.mark.parametrize("preset", ["compiled", "rendered"])
+@pytest.mark.parametrize("preset", ["bank", "rendered"])
 def test_a_loop_begins_each_turn_at_its_frame(
     qtbot: QtBot, window: Controller, performance: Performance, preset: str
 ) -> None:

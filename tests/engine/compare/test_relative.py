@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 import torch
 
-from engine.compare.relative import NULL_FLOOR_DB, ErrorSums, RelativeError, error_to_signal, relative_error
+from engine.compare.relative import (
+    NULL_FLOOR_DB,
+    ErrorSums,
+    ErrorWindows,
+    RelativeError,
+    error_to_signal,
+    relative_error,
+)
 
 
 def test_by_hand() -> None:
@@ -194,3 +201,10 @@ def test_an_error_to_signal_ratio(of: Callable[..., Any]) -> None:
     assert error_to_signal(of([3.0, -3.0]), truth) == pytest.approx(1 / 25)
     assert error_to_signal(truth, 0 * truth, least=50) == 0.5
     assert error_to_signal(of([math.nan, 0.0]), truth) == math.inf
+
+
+def test_a_prediction_that_is_not_a_number_is_an_infinite_error_in_its_window() -> None:
+    windows, truth = ErrorWindows(20, 0.01, 1_000), np.ones((20, 3))
+    windows.add(np.where(np.arange(20)[:, None] == 15, np.nan, truth), truth)
+    assert windows.curves["rmse"].tolist() == windows.curves["mae"].tolist() == [0.0, math.inf]
+    assert windows.rel_mse == math.inf

@@ -12,20 +12,19 @@ import pytest
 from numpy.typing import NDArray
 
 from engine.kernels.constants import AHEAD, QUANTUM
+from engine.kernels.fields import record_of
+from engine.kernels.voice_records import BANK_PROGRAM
 from engine.levels import FULL_SCALE_M
 from engine.pluck import Pluck
 from engine.presets import Preset, PresetInfo, load_preset
-from engine.resonators.string import resonator_of
 from engine.sources import ModelSource, Runaway
 from engine.values.ear import Ear
-from engine.values.string import StringParameters
 from engine.voices import Mixer, Program, Voice, model_program, render_voice, rendered_program, truth_program
 from engine.voices.ear import weights_of
 from engine.voices.program import voice_ends_s
-from engine.voices.programs import solver_program
 from engine.voices.voice import END_FADE_S
 
-NAME, PLUCK, SECONDS = "studio_any_nylon_b3", Pluck(0.3), 0.2
+NAME, PLUCK, SECONDS = "nylon_nonlinear_gaussian_4k_koopman_integrated", Pluck(0.3), 0.2
 RATE_HZ = 44_100
 Initial = Callable[[PresetInfo, Pluck], NDArray[np.float64]]
 
@@ -41,7 +40,7 @@ def program_of(kind: str, preset: Preset) -> Program:
     return model_program(preset, RATE_HZ)
 
 
-@pytest.mark.parametrize("kind", ["tension", "truth"])
+@pytest.mark.parametrize("kind", ["bank", "truth"])
 @pytest.mark.parametrize("ear", [Ear((0.37,)), Ear((0.3, 0.6), "velocity", 2)])
 def test_it_is_a_mixer_with_that_one_voice(kind: str, ear: Ear, preset: Preset, initial_m: Initial) -> None:
     program, frames = program_of(kind, preset), round(SECONDS * RATE_HZ)
@@ -53,7 +52,7 @@ def test_it_is_a_mixer_with_that_one_voice(kind: str, ear: Ear, preset: Preset, 
     assert mixer.take_reduction_db() == 0.0
 
 
-def test_a_model_of_one_string_is_rendered_and_converted(small_preset: Path, initial_m: Initial) -> None:
+def test_a_model_that_is_no_bank_is_rendered_and_converted(small_preset: Path, initial_m: Initial) -> None:
     preset, ear = load_preset(small_preset), Ear((0.3, 0.6))
     info, source = preset.info, ModelSource(preset)
     assert model_program(preset, RATE_HZ).rendered
@@ -69,7 +68,7 @@ def test_a_model_of_one_string_is_rendered_and_converted(small_preset: Path, ini
 
 def test_progress_is_reported_and_may_end_it(preset: Preset) -> None:
     shares: list[float] = []
-    arguments = (program_of("tension", preset), ModelSource(preset), preset.info, PLUCK, Ear((0.37,)), SECONDS)
+    arguments = (program_of("bank", preset), ModelSource(preset), preset.info, PLUCK, Ear((0.37,)), SECONDS)
     render_voice(*arguments, shares.append)
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
@@ -81,57 +80,53 @@ def test_progress_is_reported_and_may_end_it(preset: Preset) -> None:
         render_voice(*arguments, refuse)
 
 
-def humming(preset: Preset, growth: float = 0.0) -> ModelSource:
-    """A model that does not decay; it grows by an e-fold in 1 / `growth` samples."""
-    source, done = ModelSource(preset), 0
-
-    def hum(state: object, steps: int, weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], object]:
-        nonlocal done
-        time = np.arange(done, done + steps)
-        done += steps
-        wave = 1e-4 * np.exp(np.minimum(growth * time, 50.0)) * np.cos(time * math.pi / 4)
-        return np.tile(wave[None, :, None], (1, 1, weights.shape[1])), state
-
-    source.advance = hum  # type: ignore[assignment, method-assign]
-    return source
-
-
 def test_a_runaway_is_reported_with_its_time(preset: Preset) -> None:
-    source, rate_hz = humming(preset, 1e-3), preset.info.rate_hz
+    program = program_of("bank", preset)
+    program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"]] = -5e-3  # an e-fold in 50 ms
     with pytest.raises(Runaway) as caught:
-        render_voice(rendered_program(preset.info, rate_hz), source, preset.info, PLUCK, Ear((0.37,)), 2.0)
+        render_voice(program, ModelSource(preset), preset.info, PLUCK, Ear((0.37,)), 2.0)
     assert 0.05 < caught.value.time_s < 1.0
 
 
-def undying(preset: Preset) -> Program:
-    """The program of voices that end after 0.3 s."""
-    return replace(rendered_program(preset.info, RATE_HZ), ends_s=0.3)
+def undying(kind: str, preset: Preset) -> tuple[Program, ModelSource]:
+    """Of a model that does not decay, compiled or rendered ahead, whose voice ends after 0.3 s."""
+    source = ModelSource(preset)
+    if kind == "bank":
+        program = program_of("bank", preset)
+        program.memory[record_of(program.memory, BANK_PROGRAM)["sigma"] :][: program.modes] = 1e-9
+    else:
+        program = rendered_program(preset.info, RATE_HZ)
+
+        def hum(state: object, steps: int, weights: NDArray[np.float64]) -> tuple[NDArray[np.float64], object]:
+            wave = 1e-4 * np.cos(np.arange(steps) * math.pi / 4)
+            return np.tile(wave[None, :, None], (1, 1, weights.shape[1])), state
+
+        source.advance = hum  # type: ignore[assignment, method-assign]
+    return replace(program, ends_s=0.3), source
 
 
+@pytest.mark.parametrize("kind", ["bank", "rendered"])
 @pytest.mark.parametrize("ear", [Ear((0.37,)), Ear((0.3, 0.6), "velocity", 2)])
-def test_a_voice_ends_though_its_model_hums_on(ear: Ear, preset: Preset, initial_m: Initial) -> None:
-    program = undying(preset)
-    found = render_voice(program, humming(preset), preset.info, PLUCK, ear, 1.0)
-    endless = render_voice(replace(program, ends_s=math.inf), humming(preset), preset.info, PLUCK, ear, 1.0)
+def test_a_voice_ends_though_its_model_hums_on(kind: str, ear: Ear, preset: Preset, initial_m: Initial) -> None:
+    program, source = undying(kind, preset)
+    found = render_voice(program, source, preset.info, PLUCK, ear, 1.0)
+    endless = render_voice(replace(program, ends_s=math.inf), source, preset.info, PLUCK, ear, 1.0)
     assert np.abs(endless[-RATE_HZ // 10 :]).max() > 1e-3
     first, faded = -(-round(0.3 * RATE_HZ) // QUANTUM) * QUANTUM, round(END_FADE_S * RATE_HZ)
     done = (np.arange(len(found)) - first + 1).clip(0, faded)[:, None] / faded
     np.testing.assert_array_equal(found[:first], endless[:first])
     np.testing.assert_allclose(found, (1 - done**2 * (3 - 2 * done)) * endless, atol=1e-7)
-    cut = render_voice(program, humming(preset), preset.info, PLUCK, ear, 5.0, until_db=60.0)
+    cut = render_voice(program, source, preset.info, PLUCK, ear, 5.0, until_db=60.0)
     assert first + faded < len(cut) < RATE_HZ
 
 
 @pytest.mark.parametrize("skipped_s", [0.0, 0.2, 0.4])
 def test_what_is_played_ends_as_in_a_file(skipped_s: float, preset: Preset, initial_m: Initial) -> None:
     """Also where it begins later in its motion, or behind its end."""
-    program, ear, rate_hz = undying(preset), Ear((0.37,)), preset.info.rate_hz
-    file = render_voice(program, humming(preset), preset.info, PLUCK, ear, 1.0)[:, 0]
-    initial = initial_m(preset.info, PLUCK)
-    voice = Voice(program, initial, ear, 0.0 if skipped_s else 1.0, 1.1, rate_hz)
-    weights = weights_of(ear, preset.info.grid_points)
-    wave, _ = humming(preset).advance(None, voice.room, weights)  # type: ignore[arg-type]
-    voice.append(np.concatenate([(initial @ weights)[None], wave[0]]) / FULL_SCALE_M)
+    program, source = undying("bank", preset)
+    ear = Ear((0.37,))
+    file = render_voice(program, source, preset.info, PLUCK, ear, 1.0)[:, 0]
+    voice = Voice(program, initial_m(preset.info, PLUCK), ear, 0.0 if skipped_s else 1.0)
     mixer = Mixer(RATE_HZ, limited=False)
     if skipped_s:
         voice.skip(skipped_s, mixer)
@@ -151,7 +146,8 @@ def test_it_ends_where_its_string_is_silent_and_not_within_its_training(preset: 
     info = preset.info
     slowest = float(info.resonator.sigma.min())
     assert voice_ends_s(info) == pytest.approx(2 * math.log(1e3) / slowest)  # twice 60 dB
-    assert rendered_program(info, RATE_HZ).ends_s == voice_ends_s(info)
+    for program in (program_of("bank", preset), rendered_program(info, RATE_HZ)):
+        assert program.ends_s == voice_ends_s(info)
     assert program_of("truth", preset).ends_s == math.inf
     damped = replace(info, string=replace(info.string, damping_d1_kg_m_s=1e3 * info.string.damping_d1_kg_m_s))
     assert voice_ends_s(damped) == info.horizon_s
@@ -159,12 +155,11 @@ def test_it_ends_where_its_string_is_silent_and_not_within_its_training(preset: 
     assert voice_ends_s(endless) == math.inf
 
 
-def test_a_voice_of_a_string_without_losses_rings_on() -> None:
-    string = StringParameters(damping_d1_kg_m_s=0.0, damping_d3_kg_m_s=0.0)
-    program = solver_program(resonator_of(string, 1, tension_modulated=False), RATE_HZ)
-    voice = Voice(program, PLUCK.displacement(program.grid_points), Ear((0.37,)))
+def test_a_voice_of_a_string_without_losses_rings_on(preset: Preset, initial_m: Initial) -> None:
+    program, _ = undying("bank", preset)
+    voice = Voice(replace(program, ends_s=math.inf), initial_m(preset.info, PLUCK), Ear((0.37,)))
     mixer = Mixer(RATE_HZ, limited=False)
-    voice.skip(60.0, mixer)
+    voice.skip(3600.0, mixer)
     voice.start_with_gain(1.0)
     mixer.add(voice)
     assert np.abs(mixer.render(RATE_HZ // 10)).max() > 1e-3
@@ -172,5 +167,6 @@ def test_a_voice_of_a_string_without_losses_rings_on() -> None:
 
 
 def test_no_more_samples_are_wanted_than_are_heard(preset: Preset, initial_m: Initial) -> None:
-    voice = Voice(undying(preset), initial_m(preset.info, PLUCK), Ear((0.37,)), 1.0, 600.0, preset.info.rate_hz)
+    program, _ = undying("rendered", preset)
+    voice = Voice(program, initial_m(preset.info, PLUCK), Ear((0.37,)), 1.0, 600.0, preset.info.rate_hz)
     assert voice.room < preset.info.rate_hz

@@ -108,3 +108,9 @@ def test_two_tasks_never_train_in_one_folder(task: Task, capfd: pytest.CaptureFi
         assert not (folder_of(task) / "log.csv").exists()
     second.join()
     assert (folder_of(task) / "log.csv").exists()
+
+
+@pytest.mark.parametrize("damaged", [b"\xff\xfe", b"{", b'{"epoch": "one"}', b"[" * 100_000])
+def test_a_damaged_progress_is_none(tmp_path: Path, damaged: bytes) -> None:
+    (tmp_path / PROGRESS).write_bytes(damaged)
+    assert read_progress(tmp_path) is None

@@ -100,6 +100,11 @@ static void mix_on(instrument *own, int64_t most) {
 enum { MIXED_A_QUANTUM = 16384 }; /* slots: some ten microseconds */
 _Static_assert(IMPULSE_SLOTS + 4 * EARLY * (QUANTUM + 1) < MIXED_A_QUANTUM, "the first quantum hears no more");
 
+static void take_curves(instrument *own) {
+  int64_t body = own->table[TABLE_BODY].whole;
+  if (body) memcpy(own->table + body, own->effects.heard->found + RESPONSES_CURVES, BODY_SLOTS * sizeof(slot));
+}
+
 /* Takes up what the thread has made. */
 static bool adopt(instrument *own) {
   effects *e = &own->effects;
@@ -108,8 +113,7 @@ static bool adopt(instrument *own) {
   e->heard = e->made;
   e->made = NULL;
   e->spent = before;
-  int64_t body = own->table[TABLE_BODY].whole;
-  if (body) memcpy(own->table + body, e->heard->found + RESPONSES_CURVES, BODY_SLOTS * sizeof(slot));
+  take_curves(own);
   return true;
 }
 
@@ -166,8 +170,7 @@ bool effects_begin(instrument *own) {
     effects_free(own);
     if (!(e->heard = prepare(own, size, t60_s))) return false;
   }
-  int64_t body = own->table[TABLE_BODY].whole;
-  if (body) memcpy(own->table + body, e->heard->found + RESPONSES_CURVES, BODY_SLOTS * sizeof(slot));
+  take_curves(own);
   e->ends = false;
   e->thread = thread_begin(work, own); /* without it, size and time stay as they are */
   return true;
