@@ -10,6 +10,8 @@ Fields are (points, batch, width), spectra (frequencies, batch, 2·width) with t
 
 from __future__ import annotations
 
+from functools import cache
+
 import torch
 from torch import Tensor
 from torch.nn import functional
@@ -31,7 +33,12 @@ def joined(first: Tensor, second: Tensor) -> Tensor:
 
 def _matrices(field: Tensor) -> tuple[Tensor, Tensor]:
     """The folded transform and its inverse for fields like this one."""
-    forward, inverse = (torch.from_numpy(matrix).to(field) for matrix in exact_matrices(len(field)))
+    return _matrices_on(len(field), field.dtype, field.device)
+
+
+@cache
+def _matrices_on(points: int, dtype: torch.dtype, device: torch.device) -> tuple[Tensor, Tensor]:
+    forward, inverse = (torch.from_numpy(matrix).to(device, dtype) for matrix in exact_matrices(points))
     return forward, inverse
 
 

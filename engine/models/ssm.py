@@ -199,8 +199,8 @@ class DiagonalSSM(nn.Module, ABC):
 
     def output(self, states: Tensor) -> Tensor:
         """Re(C̄ x), (..., outputs)."""
-        signs = self.conjugates * self.C.new_tensor([1.0, -1.0])  # Re(c x) = c_re x_re - c_im x_im
-        return linear(torch.view_as_real(states).flatten(-2), (self.C * signs).flatten(1))
+        real, imaginary = (self.conjugates * self.C).unbind(-1)  # Re(c x) = c_re x_re - c_im x_im
+        return linear(torch.view_as_real(states).flatten(-2), torch.stack([real, -imaginary], dim=-1).flatten(1))
 
     def forward(self, inputs: Tensor, state: Tensor) -> tuple[Tensor, Tensor]:
         """y (steps, batch, outputs) for u (steps, batch, inputs), and the last x."""

@@ -107,11 +107,18 @@ def train(
     source: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="A clone of rodrigodzf/physmodjax, the authors' code.")
     ] = None,
+    gpu: Annotated[bool, typer.Option("--gpu", help="Measure several seeds at once on the GPU.")] = False,
 ) -> None:
     """Time and kernel launches of a training step of every model; or its time compared with the authors' code.
 
     With --against and --source steps of both are taken in turns, on as many threads.
     """
+    if gpu:
+        from tests.bench.train import measure_on_gpu
+
+        with progress("bench train") as report:
+            show(measure_on_gpu(report), json)
+        return
     if against is None and source is None:
         _measure("train", json)
         return

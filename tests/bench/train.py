@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import statistics
+import time
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
+from unittest.mock import patch
 
 import torch
 from torch.utils._python_dispatch import TorchDispatchMode
@@ -14,8 +17,12 @@ from engine.models.base import Physics, StringModel
 from engine.resonators.string import resonator_of
 from engine.values.string import StringParameters
 from tests.bench.machine import Machine, median_s
+from training.cell import Cell, configuration_of
 from training.configuration import Recipe
 from training.data.batches import Batch
+from training.data.dataset import Dataset
+from training.fitting import recorded
+from training.fitting.fit import Run, Steps, take_step
 from training.fitting.losses import backward, training_loss
 
 BATCH = 50
@@ -24,6 +31,8 @@ REPEATS = 5
 # DMD is fitted, not trained
 MODELS = ("koopman", "koopman_var", "koopman_integrated", "lru", "s5", "fgru", "frnn")
 FEWER_FRAMES = {"fgru": 50, "frnn": 50}  # their cost is proportional to the number of frames
+SEEDS = {"koopman_var": 5, "koopman": 5, "lru": 5, "s5": 5, "fgru": 1}  # on a GPU
+STEPS = 5  # for a difference, of which `recorded.BEFORE` are not yet repeated
 TEXT = Recipe(epochs=1)  # with the loss of the paper's text
 NO_KERNEL = ("empty", "new_empty", "_unsafe_view", "_local_scalar_dense", "lift_fresh")  # beside views
 
@@ -49,6 +58,33 @@ class TrainBenchmark:
     models: tuple[TrainTiming, ...]
 
 
+@dataclass(frozen=True)
+class SeedsTiming:
+    """Time of a step of several seeds at once on a GPU, by the recipe of the paper's text.
+
+    Attributes:
+        launched_ms: with each kernel launched by itself.
+        step_ms: recorded and repeated, as training does it.
+        difference: of the loss after `STEPS` steps, repeated and launched, relative; both without tensor cores.
+        prepare_s: from the first step to the end of the recording.
+    """
+
+    model: str
+    seeds: int
+    frames: int
+    launched_ms: float
+    step_ms: float
+    difference: float
+    prepare_s: float
+
+
+@dataclass(frozen=True)
+class SeedsBenchmark:
+    machine: Machine
+    device: str
+    models: tuple[SeedsTiming, ...]
+
+
 def measure(report: Callable[[float, str], None]) -> TrainBenchmark:
     """Measures each model at the paper's size, on random data, on which its cost does not depend."""
     found = []
@@ -58,6 +94,61 @@ def measure(report: Callable[[float, str], None]) -> TrainBenchmark:
         _, step = training_step(name, frames)
         found.append(TrainTiming(name, BATCH, frames, median_s(step, REPEATS), launches(name, frames)))
     return TrainBenchmark(Machine.here(), tuple(found))
+
+
+def measure_on_gpu(report: Callable[[float, str], None], models: Mapping[str, int] = SEEDS) -> SeedsBenchmark:
+    """Measure steps of several seeds at once on the GPU.
+
+    Args:
+        models: how many seeds of each.
+    """
+    found = []
+    for number, (name, seeds) in enumerate(models.items()):
+        report(number / len(models), name)
+        found.append(_seeds_timing(name, seeds))
+    return SeedsBenchmark(Machine.here(), torch.cuda.get_device_name(), tuple(found))
+
+
+def _seeds_timing(name: str, seeds: int) -> SeedsTiming:
+    """See `SeedsTiming`. The random data have the paper's size."""
+    cells = [Cell(name, True, "noise", 4000, FRAMES, "paper", seed) for seed in range(seeds)]
+    configurations = [configuration_of(cell, recipe={"batch_size": BATCH}) for cell in cells]
+    modes = torch.randn(1000, FRAMES + 1, configurations[0].data.modes, generator=torch.Generator().manual_seed(0))
+    dataset = Dataset(configurations[0].data, modes / 1000, 1e-3)
+
+    def made() -> list[Run]:
+        return [Run(each, dataset, torch.device("cuda")) for each in configurations]
+
+    with patch.object(recorded, "PRECISION", "highest"):
+        launched, repeated = made(), made()
+        _launch(launched)
+        launched_s = _seconds(lambda: _launch(launched), STEPS - 1)
+        steps = Steps()
+        for _ in range(STEPS):
+            steps.take(repeated)
+    difference = max(abs(two.loss / one.loss - 1) for one, two in zip(launched, repeated, strict=True))
+    runs, steps = made(), Steps()
+    prepare_s = (recorded.BEFORE + 1) * _seconds(lambda: steps.take(runs), recorded.BEFORE + 1)
+    step_s = statistics.median(_seconds(lambda: steps.take(runs), 2 * STEPS) for _ in range(REPEATS))
+    return SeedsTiming(name, seeds, FRAMES, 1000 * launched_s, 1000 * step_s, difference, prepare_s)
+
+
+def _launch(runs: list[Run]) -> None:
+    for run in runs:
+        run.begin_step()
+    take_step(runs)
+    for run in runs:
+        run.end_step()
+
+
+def _seconds(work: Callable[[], None], times: int) -> float:
+    """Seconds of one of some calls, none of which waits for the GPU."""
+    torch.cuda.synchronize()
+    started = time.perf_counter()
+    for _ in range(times):
+        work()
+    torch.cuda.synchronize()
+    return (time.perf_counter() - started) / times
 
 
 def training_step(name: str, frames: int) -> tuple[StringModel[Any], Callable[[], None]]:

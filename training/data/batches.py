@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import torch
 from torch import Tensor
+from torch.nn import functional
 
 from training.configuration import Recipe
 from training.data.dataset import Dataset
@@ -23,16 +24,23 @@ class Batch:
         initial: the frame that a model sets out from, (batch, grid_points).
         frames: int64 (frames,), any selection of 1 … N, counted from `initial`.
         target: the truth at these frames, (batch, frames, grid_points).
+        every: True where `frames` are known to be 1 … N in order, so that nobody need read them from a GPU.
     """
 
     initial: Tensor
     frames: Tensor
     target: Tensor
+    every: bool = False
+
+    @property
+    def last(self) -> int:
+        """The last of the frames."""
+        return len(self.frames) if self.every else int(self.frames[-1])
 
     def split(self, count: int) -> Iterator[Batch]:
         """Split the batch into parts of at most `count` trajectories."""
         for initial, target in zip(self.initial.split(count), self.target.split(count), strict=True):
-            yield Batch(initial, self.frames, target)
+            yield Batch(initial, self.frames, target, self.every)
 
 
 class TrainingData:
@@ -48,18 +56,25 @@ class TrainingData:
         self.count = len(self._amplitudes)
 
     def draw(self, recipe: Recipe, rows: Tensor, horizon: int, iteration: int) -> Batch:
-        """A batch of the trajectories `rows`, over at most `horizon` frames."""
+        """A batch of the trajectories `rows`, on the data's device, over at most `horizon` frames.
+
+        All frames without flips need nothing from the host.
+        """
         device = self._amplitudes.device
         generator = torch.Generator().manual_seed((recipe.seed + 1) * 1_000_003 + iteration)
         kept = max(1, horizon // self._stride)
-        frames = _frames(recipe, kept, generator)
-        rows, wanted = rows.to(device), torch.cat([torch.zeros(1, dtype=torch.long), frames]).to(device)
-        amplitudes = self._amplitudes[rows[:, None], wanted]
+        every = keeps_every_frame(recipe, kept)
+        if every:
+            frames = torch.arange(1, kept + 1, device=device)
+            amplitudes = self._amplitudes[rows, : kept + 1]
+        else:
+            frames = _some_frames(recipe.steps_per_batch, kept, generator).to(device)
+            amplitudes = self._amplitudes[rows[:, None], functional.pad(frames, (1, 0))]
         if recipe.flip:
             sign, mirrored = flips(len(rows), generator, device)
             amplitudes = amplitudes * (sign[..., None] * torch.where(mirrored[..., None], self._mirror, 1.0))
         displacement = amplitudes @ self._synthesis
-        return Batch(displacement[:, 0], self._stride * wanted[1:], displacement[:, 1:])
+        return Batch(displacement[:, 0], self._stride * frames, displacement[:, 1:], every and self._stride == 1)
 
 
 def flips(count: int, generator: torch.Generator, device: torch.device) -> tuple[Tensor, Tensor]:
@@ -77,11 +92,13 @@ def batches(recipe: Recipe, count: int, epoch: int) -> tuple[Tensor, ...]:
     return torch.randperm(count, generator=generator).split(recipe.batch_size)
 
 
-def _frames(recipe: Recipe, horizon: int, generator: torch.Generator) -> Tensor:
-    """The frames that are kept of 1 … horizon, all or a random choice, ascending."""
-    if not recipe.steps_per_batch or recipe.steps_per_batch >= horizon:
-        return torch.arange(1, horizon + 1)
-    count = recipe.steps_per_batch
+def keeps_every_frame(recipe: Recipe, horizon: int) -> bool:
+    """Return True if a batch has all frames of 1 … horizon."""
+    return not recipe.steps_per_batch or recipe.steps_per_batch >= horizon
+
+
+def _some_frames(count: int, horizon: int, generator: torch.Generator) -> Tensor:
+    """A random choice of the frames 1 … horizon, ascending."""
     # one frame from each of `count` equal parts of the horizon: less noise than independent draws
     edges = torch.arange(count) * horizon / count
     return (edges + torch.rand(count, generator=generator) * horizon / count).long().clamp(max=horizon - 1) + 1

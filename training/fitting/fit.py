@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any, cast
@@ -25,12 +26,13 @@ from engine.models.base import StringModel
 from engine.plain_text import one_line
 from engine.schema import SchemaError, read, write
 from training.configuration import Recipe, TrainingConfiguration, read_configuration
-from training.data.batches import Batch, TrainingData, batches
+from training.data.batches import Batch, TrainingData, batches, keeps_every_frame
 from training.data.dataset import Dataset
 from training.evaluate import evaluate_model
 from training.fitting import together
 from training.fitting.checkpoint import Checkpoint, optimiser_moments, restore_moments
 from training.fitting.losses import backward
+from training.fitting.recorded import RecordedWork
 from training.fitting.soap import SOAP
 from training.fitting.start import begin
 from training.start import LEAST_SQUARES
@@ -153,12 +155,13 @@ def fit_seeds(
         return [_fit_at_once(each.configuration, dataset, each.report) for each in seeds]
     every_s = CHECKPOINT_EVERY_S if checkpoint_every_s is None else checkpoint_every_s
     under_way = [_UnderWay(each, dataset, torch.device(device)) for each in seeds]
+    steps = Steps()
     started = before = time.monotonic()
     iterations = 0
     while left := [each for each in under_way if not each.ended]:
         step = min(each.run.step for each in left)
         group = [each for each in left if each.run.step == step]
-        train_step([each.run for each in group])
+        steps.take([each.run for each in group])
         now, iterations = time.monotonic(), iterations + 1
         for each in group:
             each.run.seconds += (now - before) / len(group)
@@ -172,7 +175,7 @@ class _UnderWay:
 
     def __init__(self, seed: Seed, dataset: Dataset, device: torch.device) -> None:
         begun = time.monotonic()
-        self.run = _Run(seed.configuration, dataset, device)
+        self.run = Run(seed.configuration, dataset, device)
         self._path, self._report = seed.run_folder / "checkpoint.safetensors", seed.report
         self.diverged: Diverged | None = None
         if self._path.exists():
@@ -230,32 +233,56 @@ def horizon_at(recipe: Recipe, share: float, steps: int) -> int:
     return round(first * (steps / first) ** (share / recipe.grow_until))
 
 
-def train_step(runs: Sequence[_Run]) -> None:
-    """Take the next step of runs that are at the same one, in one pass where their model allows it."""
-    for run in runs:
-        run.begin_step()
-    models = [run.model for run in runs]
-    batches = [] if len(runs) == 1 or runs[0].learns_latents else [run.draw() for run in runs]
-    if not batches or not together.can_be_mapped(models, batches):
+class Steps:
+    """The steps of runs that are at the same one: in one pass where their model allows it, recorded on a GPU."""
+
+    def __init__(self) -> None:
+        self._runs: list[Run] = []
+        self._work: Callable[[], None] = lambda: None
+
+    def take(self, runs: list[Run]) -> None:
+        """Take the next step of `runs`."""
+        if runs != self._runs:
+            self._runs = runs
+            work = partial(take_step, runs)
+            recorded = runs[0].device.type == "cuda" and all(run.repeats_itself for run in runs)
+            self._work = RecordedWork(work) if recorded else work
         for run in runs:
-            run.train_alone()
+            run.begin_step()
+        self._work()
+        for run in runs:
+            run.end_step()
+
+
+def take_step(runs: Sequence[Run]) -> None:
+    """Move the weights of runs by the step that was begun: all of it that a GPU does."""
+    if any(run.learns_latents for run in runs):
+        for run in runs:
+            run.learn_latents()
         return
-    for run, error in zip(runs, together.backward(models, batches, runs[0].recipe), strict=True):
+    models, batches = [run.model for run in runs], [run.draw() for run in runs]
+    if len(runs) > 1 and together.can_be_mapped(models, batches):
+        errors: Iterable[Tensor] = together.backward(models, batches, runs[0].recipe)
+    else:
+        errors = (run.backward(batch) for run, batch in zip(runs, batches, strict=True))
+    for run, error in zip(runs, errors, strict=True):
         run.descend(error)
 
 
-class _Run:
+class Run:
     """A training between two steps: all that a checkpoint holds."""
 
     def __init__(self, configuration: TrainingConfiguration, dataset: Dataset, device: torch.device) -> None:
         recipe = configuration.recipe
         self._configuration, self.recipe, self._dataset = configuration, recipe, dataset
+        self.device = device
         self.model, latents = begin(configuration, dataset)
         self._latents = latents.to(device) if latents else None
         self.model.to(device)
         self._data = TrainingData(dataset, device)
         self._per_epoch = -(-self._data.count // recipe.batch_size)
         self._optimiser = _optimiser(self.model, recipe)
+        self._rows = torch.zeros(0, dtype=torch.int64, device=device)
         self._average: AveragedModel | None = None
         if recipe.average_decay:
             mean = get_ema_multi_avg_fn(recipe.average_decay)
@@ -305,43 +332,57 @@ class _Run:
     def learns_latents(self) -> bool:
         return self._latents is not None and self.step < self._latent_steps
 
+    @property
+    def repeats_itself(self) -> bool:
+        """Return True if every step is the same work on other trajectories."""
+        recipe, steps = self.recipe, self._configuration.steps
+        same_frames = recipe.first_horizon >= steps and keeps_every_frame(recipe, steps)
+        same_sizes = self._data.count % recipe.batch_size == 0
+        same_work = same_frames and same_sizes and not (recipe.flip or recipe.latent_epochs or recipe.average_decay)
+        same_layers = recipe.batch_statistics_until == 1 and recipe.optimiser == "adamw"
+        return same_work and same_layers
+
     def begin_step(self) -> None:
-        """Set the next step's rates, and draw its epoch's batches."""
+        """Set the next step's rates and trajectories, where a recorded step reads them."""
         recipe, model = self.recipe, self.model
         epoch, number = divmod(self.step, self._per_epoch)
         if number == 0:
-            self._batches = batches(recipe, self._data.count, epoch)
+            self._lay_out(epoch)
             self._total.zero_()
+        rows = self._batches[number]
+        self._rows = self._rows.copy_(rows) if self._rows.shape == rows.shape else rows.clone()
         _, learning_rate = self._schedules()
         for group in self._optimiser.param_groups:
-            group["lr"] = learning_rate * group["share"]
+            rate = learning_rate * group["share"]
+            group["lr"] = group["lr"].fill_(rate) if isinstance(group["lr"], Tensor) else rate
         model.train()
         if self.step >= recipe.batch_statistics_until * recipe.epochs * self._per_epoch:
             _keep_statistics(model)
 
-    def train_alone(self) -> None:
-        """Take the step that was begun."""
-        if not self.learns_latents:
-            self._optimiser.zero_grad(set_to_none=True)
-            self.descend(backward(self.model, self.draw(), self.recipe))
-        elif self.step >= self._latent_steps - self.recipe.latent_polish:
-            assert self._latents is not None
-            self.end_step(self._latents.polish(self.model, self.recipe))
+    def _lay_out(self, epoch: int) -> None:
+        """Draw the batches of an epoch."""
+        self._batches = [rows.to(self.device) for rows in batches(self.recipe, self._data.count, epoch)]
+
+    def learn_latents(self) -> None:
+        """Move the encoder towards the fitted latents."""
+        assert self._latents is not None
+        if self.step >= self._latent_steps - self.recipe.latent_polish:
+            self._total += self._latents.polish(self.model, self.recipe)
         else:
-            assert self._latents is not None
-            rows = self._batches[self.step % self._per_epoch]
-            self._descend(*self._latents.loss(self.model, self.recipe, rows, self.step))
+            loss, error = self._latents.loss(self.model, self.recipe, self._rows, self.step)
+            self._optimiser.zero_grad(set_to_none=True)
+            loss.backward()
+            self.descend(error)
 
     def draw(self) -> Batch:
         """The batch of the step that was begun."""
         horizon, _ = self._schedules()
-        return self._data.draw(self.recipe, self._batches[self.step % self._per_epoch], horizon, self.step)
+        return self._data.draw(self.recipe, self._rows, horizon, self.step)
 
-    def _descend(self, loss: Tensor, error: Tensor) -> None:
-        """A step of the optimiser against `loss`; `error` is reported."""
+    def backward(self, batch: Batch) -> Tensor:
+        """Set the weights' gradients, and return the mean square of the prediction's error."""
         self._optimiser.zero_grad(set_to_none=True)
-        loss.backward()
-        self.descend(error)
+        return backward(self.model, batch, self.recipe)
 
     def descend(self, error: Tensor) -> None:
         """A step of the optimiser against the gradients that the weights have; `error` is reported."""
@@ -349,11 +390,10 @@ class _Run:
         bounded = [*chain.from_iterable(faster), *(slow if self.recipe.clip_eigenvalues else ())]
         torch.nn.utils.clip_grad_norm_(bounded, self.recipe.clip_norm)
         self._optimiser.step()
-        self.end_step(error)
-
-    def end_step(self, error: Tensor) -> None:
-        """Count the step, whose mean square of the prediction's error is `error`."""
         self._total += error
+
+    def end_step(self) -> None:
+        """Count the step that was taken."""
         self.step += 1
         if self._latents is not None and self.step == self._latent_steps:
             self._latents.yield_latents(self.model)
@@ -443,7 +483,7 @@ class _Run:
             message = one_line(f"{path}: damaged checkpoint ({error}); delete it to start the run again")
             raise ValueError(message) from error
         self._best_model = {name: t.to(device) for name, t in checkpoint.best_model.items()}
-        self._batches = batches(self.recipe, self._data.count, self.step // self._per_epoch)
+        self._lay_out(self.step // self._per_epoch)
 
     def _measured(self) -> StringModel[Any]:
         """The model that the run is judged by: the running mean of its weights, where it keeps one."""
@@ -487,8 +527,14 @@ def _optimiser(model: StringModel[Any], recipe: Recipe) -> torch.optim.Optimizer
             "weight_decay": recipe.weight_decay if recipe.eigenvalue_decay else 0.0,
         },
     ]
-    kind = SOAP if recipe.optimiser == "soap" else torch.optim.AdamW
-    return kind(groups, lr=recipe.peak_learning_rate, weight_decay=recipe.weight_decay)
+    device = next(model.parameters()).device
+    if recipe.optimiser == "soap":
+        return SOAP(groups, lr=recipe.peak_learning_rate, weight_decay=recipe.weight_decay)
+    if device.type == "cpu":
+        return torch.optim.AdamW(groups, lr=recipe.peak_learning_rate, weight_decay=recipe.weight_decay)
+    for group in groups:  # tensors that a recorded step reads
+        group["lr"] = torch.tensor(recipe.peak_learning_rate, device=device)
+    return torch.optim.AdamW(groups, weight_decay=recipe.weight_decay, fused=True, capturable=True)
 
 
 def _keep_statistics(model: torch.nn.Module) -> None:

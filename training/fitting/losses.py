@@ -122,10 +122,8 @@ def _consistency(states: Tensor, encoded: Tensor) -> Tensor:
 
 
 def _predicted(model: StringModel[Any], batch: Batch) -> Tensor:
-    last = int(batch.frames[-1])
-    frames, _ = model.advance(model.encode(batch.initial), last)
-    every = torch.arange(1, last + 1, device=batch.frames.device)  # some may be drawn twice, and others not
-    return frames if torch.equal(batch.frames, every) else frames[:, batch.frames - 1]
+    frames, _ = model.advance(model.encode(batch.initial), batch.last)
+    return frames if batch.every else frames[:, batch.frames - 1]
 
 
 def _mean_square(found: Tensor, wanted: Tensor) -> Tensor:

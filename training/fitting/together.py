@@ -37,6 +37,8 @@ def can_be_mapped(models: Sequence[StringModel[Any]], batches: Sequence[Batch]) 
 
 
 def _same_frames(batches: Sequence[Batch]) -> bool:
+    if all(batch.every for batch in batches):
+        return True
     return all(torch.equal(batch.frames, batches[0].frames) for batch in batches)
 
 
@@ -45,8 +47,9 @@ def backward(models: Sequence[StringModel[Any]], batches: Sequence[Batch], recip
 
     Running statistics of batch norm move as in a pass of each model alone.
     """
-    template = _Loss(models[0], recipe)
-    parameters, buffers = stack_module_state([_Loss(model, recipe) for model in models])
+    every = batches[0].every
+    template = _Loss(models[0], recipe, every)
+    parameters, buffers = stack_module_state([_Loss(model, recipe, every) for model in models])
     initial, target = (torch.stack([getattr(b, name) for b in batches]) for name in ("initial", "target"))
     same = _same_frames(batches)
     frames = batches[0].frames if same else torch.stack([batch.frames for batch in batches])
@@ -72,9 +75,9 @@ def backward(models: Sequence[StringModel[Any]], batches: Sequence[Batch], recip
 class _Loss(nn.Module):
     """`training_loss` as a module's output, for `functional_call`."""
 
-    def __init__(self, model: StringModel[Any], recipe: Recipe) -> None:
+    def __init__(self, model: StringModel[Any], recipe: Recipe, every: bool) -> None:
         super().__init__()
-        self.model, self._recipe = model, recipe
+        self.model, self._recipe, self._every = model, recipe, every
 
-    def forward(self, *batch: Tensor) -> tuple[Tensor, Tensor]:
-        return training_loss(self.model, Batch(*batch), self._recipe)
+    def forward(self, initial: Tensor, frames: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
+        return training_loss(self.model, Batch(initial, frames, target, self._every), self._recipe)

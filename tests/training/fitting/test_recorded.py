@@ -1,0 +1,133 @@
+"""Steps that a GPU records: which can be, and what becomes of them."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+import torch
+from torch.utils._python_dispatch import TorchDispatchMode
+
+from engine.models import build_model
+from training.cell import Cell, configuration_of
+from training.configuration import Recipe, TrainingConfiguration
+from training.data.batches import TrainingData
+from training.data.dataset import Dataset
+from training.fitting import recorded, together
+from training.fitting.fit import Run, Steps, take_step
+from training.fitting.losses import backward
+
+CPU, META = torch.device("cpu"), torch.device("meta")
+MODELS = ("koopman", "koopman_var", "lru", "s5", "fgru", "frnn")
+EVERY = Recipe(epochs=1, steps_per_batch=0, flip=False, koopman_terms="published")
+READS = ("_local_scalar_dense", "equal", "is_nonzero", "nonzero")  # by the host, which waits for them
+
+
+class _Apart(TorchDispatchMode):
+    """Refuse what a recording cannot hold: a value that the host reads, or one that it sends."""
+
+    def __torch_dispatch__(self, func: Any, types: Any, args: Any = (), kwargs: Any = None) -> Any:
+        name = func.overloadpacket.__name__
+        assert name not in READS, f"{name}: the host reads a value"
+        given = [each for each in args if isinstance(each, torch.Tensor)]
+        sent = [each for each in given if each.device != META and (each.ndim or name in ("copy_", "_to_copy"))]
+        assert not sent, f"{name}: the host sends a value"
+        return func(*args, **(kwargs or {}))
+
+
+@pytest.mark.parametrize("name", MODELS)
+def test_a_step_asks_nothing_of_the_host(name: str, small_dataset: Dataset, monkeypatch: pytest.MonkeyPatch) -> None:
+    """On tensors without values, which no host can read."""
+    monkeypatch.setattr(together, "MAPPED_ON", ("meta",))
+    data = TrainingData(small_dataset, META)
+    models = [build_model(name).to(META) for _ in range(2)]
+
+    def step() -> None:
+        batches = [data.draw(EVERY, torch.zeros(4, dtype=torch.int64, device=META), 8, 0) for _ in models]
+        if together.can_be_mapped(models, batches):
+            together.backward(models, batches, EVERY)
+        for model, batch in zip(models, batches, strict=True):
+            backward(model, batch, EVERY)
+            torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
+
+    step()  # which makes the constants that are kept
+    with _Apart():
+        step()
+
+
+@pytest.mark.parametrize(
+    "asks",
+    [lambda: float(torch.zeros((), device=META)), lambda: torch.tensor([1.0]).to(META)],
+    ids=["reads", "sends"],
+)
+def test_what_is_asked_of_the_host_is_noticed(asks: Any) -> None:
+    with _Apart(), pytest.raises(AssertionError, match="the host"):
+        asks()
+
+
+def configuration(recipe: str, **changes: Any) -> TrainingConfiguration:
+    data = {"modes": 5, "steps": 450, "count": 20}
+    return configuration_of(
+        Cell("koopman_var", True, "gaussian", 4000, 400, recipe), data, {"batch_size": 4, **changes}
+    )
+
+
+@pytest.mark.parametrize(
+    ("made", "repeats"),
+    [
+        (configuration("published"), True),
+        (configuration("paper"), True),
+        (configuration("ours"), False),  # other frames each time
+        (configuration("published", flip=True), False),
+        (configuration("published", batch_size=5), False),  # 16 trajectories: the last batch has one
+    ],
+)
+def test_a_step_on_all_frames_of_as_many_strings_repeats_itself(
+    small_dataset: Dataset, made: TrainingConfiguration, repeats: bool
+) -> None:
+    assert Run(made, small_dataset, CPU).repeats_itself is repeats
+
+
+def test_work_is_done_some_times_then_recorded_and_repeated(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each call is one time; what the recording itself runs is not a further one."""
+    seen: list[str] = []
+    stream = SimpleNamespace(wait_stream=lambda other: None)
+    graph = SimpleNamespace(replay=lambda: seen.append("repeated"))
+    for name, stub in {
+        "Stream": lambda: stream,
+        "current_stream": lambda: stream,
+        "stream": lambda which: nullcontext(),
+        "CUDAGraph": lambda: graph,
+        "graph": lambda which: nullcontext(seen.append("recorded")),
+    }.items():
+        monkeypatch.setattr(torch.cuda, name, stub)
+    precision = torch.get_float32_matmul_precision()
+    work = recorded.RecordedWork(lambda: seen.append(torch.get_float32_matmul_precision()))
+    for _ in range(recorded.BEFORE + 2):
+        work()
+    assert seen == [recorded.PRECISION] * recorded.BEFORE + ["recorded", recorded.PRECISION, "repeated", "repeated"]
+    assert torch.get_float32_matmul_precision() == precision
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="there is no CUDA device")
+@pytest.mark.parametrize("name", MODELS)
+def test_a_repeated_step_is_the_launched_one(
+    name: str, small_dataset: Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorded, "PRECISION", "highest")
+    cells = [Cell(name, True, "gaussian", 4000, 20, "paper", seed) for seed in range(2)]
+    changes = {"batch_size": 4, "schedule": "one_cycle"}
+    made = [configuration_of(cell, {"modes": 5, "steps": 450, "count": 20}, changes) for cell in cells]
+    repeated, launched = ([Run(each, small_dataset, torch.device("cuda")) for each in made] for _ in range(2))
+    steps = Steps()
+    for _ in range(11):
+        steps.take(repeated)
+        for run in launched:
+            run.begin_step()
+        take_step(launched)
+        for run in launched:
+            run.end_step()
+    for one, other in zip(repeated, launched, strict=True):
+        assert one.loss == pytest.approx(other.loss, rel=1e-4)
