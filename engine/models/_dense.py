@@ -1,8 +1,12 @@
-"""Dense layers over many frames in training on a CPU, as convolutions of width one.
+"""Dense layers over many frames in training, as other calls than `torch.nn.functional.linear` for the same product.
 
-That is the same product, taken by oneDNN instead of the BLAS: on processors of another make than the BLAS's it is
-two to three times as fast (AMD EPYC, one thread, 20,000 × 128 by 128 × 128, timed by hand: 58 GFLOP/s as a product,
-185 as a convolution), and a training step takes a third less time. On an Intel Xeon both have 97 GFLOP/s.
+On a CPU they are convolutions of width one, taken by oneDNN instead of the BLAS: on processors of another make than
+the BLAS's that is two to three times as fast (AMD EPYC, one thread, 20,000 × 128 by 128 × 128, timed by hand:
+58 GFLOP/s as a product, 185 as a convolution), and a training step takes a third less time. On an Intel Xeon both
+have 97 GFLOP/s.
+
+On a GPU the rows go in parts, each with a copy of the weight. The weight's gradient is a sum over all rows for few
+weights, which would leave most of the GPU idle.
 """
 
 from __future__ import annotations
@@ -12,14 +16,19 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 FEWEST_ROWS = 2048  # below, the calls cost as much
+PARTS = range(32, 1, -1)  # of the rows, on a GPU
 WIDTHS = range(128, 31, -1)  # rows of an image: all in one image is slower than a product
 
 
 def linear(inputs: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor:
     """`torch.nn.functional.linear`: (..., in) to (..., out)."""
     rows = inputs.numel() // weight.shape[1]
-    width = _width(rows) if _in_training(inputs, rows) else 0
-    if not width:
+    if not _in_training(inputs, rows):
+        return functional.linear(inputs, weight, bias)
+    if inputs.device.type == "cuda":
+        return _in_parts(inputs, weight, bias, _largest_divisor(rows, PARTS))
+    width = _largest_divisor(rows, WIDTHS)
+    if width == 1:
         return functional.linear(inputs, weight, bias)
     images = inputs.reshape(rows // width, 1, width, -1).permute(0, 3, 1, 2)  # channels last: no copy
     outputs = functional.conv2d(images, weight[:, :, None, None], bias)
@@ -33,11 +42,19 @@ class Dense(nn.Linear):
         return linear(inputs, self.weight, self.bias)
 
 
+def _in_parts(inputs: Tensor, weight: Tensor, bias: Tensor | None, parts: int) -> Tensor:
+    """`linear` of `parts` of the rows, in one call."""
+    split = inputs.reshape(parts, -1, weight.shape[1])
+    outputs = torch.bmm(split, weight.T.expand(parts, -1, -1))
+    outputs = outputs if bias is None else outputs + bias
+    return outputs.view(*inputs.shape[:-1], len(weight))
+
+
 def _in_training(inputs: Tensor, rows: int) -> bool:
-    plain = inputs.device.type == "cpu" and inputs.dtype == torch.float32
+    plain = inputs.device.type in ("cpu", "cuda") and inputs.dtype == torch.float32
     return plain and rows >= FEWEST_ROWS and torch.is_grad_enabled()
 
 
-def _width(rows: int) -> int:
-    """The most of `WIDTHS` that divide the rows; 0: none does."""
-    return next((width for width in WIDTHS if rows % width == 0), 0)
+def _largest_divisor(rows: int, choices: range) -> int:
+    """The first of `choices` that divides the rows; 1: none does."""
+    return next((choice for choice in choices if rows % choice == 0), 1)
