@@ -16,6 +16,7 @@ from torch import Tensor, nn
 from torch.nn import functional
 
 FEWEST_ROWS = 2048  # below, the calls cost as much
+PARTED_ON = ("cuda",)  # kinds of device
 PARTS = range(32, 1, -1)  # of the rows, on a GPU
 WIDTHS = range(128, 31, -1)  # rows of an image: all in one image is slower than a product
 
@@ -25,7 +26,7 @@ def linear(inputs: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor
     rows = inputs.numel() // weight.shape[1]
     if not _in_training(inputs, rows):
         return functional.linear(inputs, weight, bias)
-    if inputs.device.type == "cuda":
+    if inputs.device.type in PARTED_ON:
         return _in_parts(inputs, weight, bias, _largest_divisor(rows, PARTS))
     width = _largest_divisor(rows, WIDTHS)
     if width == 1:

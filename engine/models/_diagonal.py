@@ -100,14 +100,6 @@ class LearnedEigenvalues(DiagonalModel):
         return [eigenvalues.log_eigenvalues(self.nu_log, self.theta_log)]
 
 
-def product(first: Tensor, second: Tensor) -> Tensor:
-    """The product of complex tensors, which a compiler is shown as the real one: it has no code for others."""
-    if not torch.compiler.is_compiling():
-        return first * second
-    (re, im), (other_re, other_im) = (torch.view_as_real(each).unbind(-1) for each in (first, second))
-    return torch.view_as_complex(torch.stack([re * other_re - im * other_im, re * other_im + im * other_re], dim=-1))
-
-
 def dense(latents: Tensor, weight: Tensor, bias: Tensor | None = None) -> Tensor:
     """A dense layer on complex latents (..., n), whose `weight` (out, 2n) has the real parts first.
 

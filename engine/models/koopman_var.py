@@ -23,7 +23,6 @@ from engine.models._diagonal import (
     linear_string_eigenvalues,
     linear_string_encoder,
     perceptron,
-    product,
     read_layer,
     store_eigenvalues,
     store_ring,
@@ -56,7 +55,7 @@ class KoopmanVar(LearnedEigenvalues):
     def states(self, latents: Tensor, origin: Tensor, powers: Tensor) -> Tensor:
         """See the contract; |λᵏ|² |z₀|² costs a training step less than |λᵏz₀|²."""
         radii = _squared_radius(origin)[:, None] * _squared_radius(powers)
-        return product(latents, complex_outputs(self.multiplier, radii))
+        return latents * complex_outputs(self.multiplier, radii)
 
     def read(self, states: Tensor, readout: Tensor | None = None) -> Tensor:
         return dense(states, *read_layer(self.decoder, readout))

@@ -18,7 +18,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from engine.models._diagonal import product
 from engine.models.base import KoopmanModel, StringModel
 from training.configuration import Recipe
 from training.data.batches import Batch
@@ -53,7 +52,7 @@ def training_loss(
         if recipe.koopman_terms == "published":
             return _published_loss(model, batch, recipe, powers)
         origin = model.encode(batch.initial).origin
-        latents = product(origin[:, None], powers)
+        latents = origin[:, None] * powers
         found = model.read(model.states(latents, origin, powers))
         return _text_loss(model, batch, recipe, origin, latents, found)
     if isinstance(model, KoopmanModel):
@@ -92,7 +91,7 @@ def _is_a_mean(model: nn.Module, recipe: Recipe) -> bool:
 
 
 def _powers(model: ObservedModel, batch: Batch) -> Tensor:
-    return model.powers(batch.frames).to(torch.complex64 if batch.target.dtype == torch.float32 else torch.complex128)
+    return model.powers(batch.frames).to(batch.target.dtype.to_complex())
 
 
 def _text_loss(
@@ -112,7 +111,7 @@ def _published_loss(model: ObservedModel, batch: Batch, recipe: Recipe, powers: 
     frames = torch.cat([batch.initial[:, None], batch.target], dim=1)
     encoded = model.encode(frames.flatten(0, 1)).origin.unflatten(0, frames.shape[:2])
     origin, others = encoded.split([1, len(batch.frames)], dim=1)
-    states = model.states(product(origin, powers), origin[:, 0], powers)
+    states = model.states(origin * powers, origin[:, 0], powers)
     loss, prediction = _prediction(model.read(states), batch.target, recipe)
     loss = loss + _mean_square(model.read(encoded), frames)
     return loss + recipe.consistency_weight * _consistency(states, others), prediction

@@ -10,8 +10,7 @@ checkpoint, so that one trained with others is the one trained alone, up to the 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import lru_cache
+from collections.abc import Sequence
 from typing import Any
 
 import torch
@@ -48,11 +47,20 @@ def backward(models: Sequence[StringModel[Any]], batches: Sequence[Batch], recip
 
     Running statistics of batch norm move as in a pass of each model alone.
     """
-    every, same = batches[0].every, _same_frames(batches)
+    every = batches[0].every
+    template = _Loss(models[0], recipe, every)
     parameters, buffers = stack_module_state([_Loss(model, recipe, every) for model in models])
     initial, target = (torch.stack([getattr(b, name) for b in batches]) for name in ("initial", "target"))
+    same = _same_frames(batches)
     frames = batches[0].frames if same else torch.stack([batch.frames for batch in batches])
-    losses, errors = _mapped(models[0], recipe, every, same)(parameters, buffers, initial, frames, target)
+
+    def loss(weights: dict[str, Tensor], statistics: dict[str, Tensor], *batch: Tensor) -> tuple[Tensor, Tensor]:
+        found: tuple[Tensor, Tensor] = functional_call(template, (weights, statistics), batch)
+        return found
+
+    losses, errors = vmap(loss, in_dims=(0, 0, 0, None if same else 0, 0))(
+        parameters, buffers, initial, frames, target
+    )
     losses.sum().backward()
     with torch.no_grad():
         for number, model in enumerate(models):
@@ -62,20 +70,6 @@ def backward(models: Sequence[StringModel[Any]], batches: Sequence[Batch], recip
             for name, buffer in model.named_buffers(prefix="model"):
                 buffer.copy_(buffers[name][number])
     return errors
-
-
-@lru_cache(maxsize=1)
-def _mapped(model: StringModel[Any], recipe: Recipe, every: bool, same: bool) -> Callable[..., tuple[Tensor, Tensor]]:
-    """`training_loss` of stacked weights, statistics and batches; on a GPU its many small kernels are a few."""
-    template = _Loss(model, recipe, every)
-
-    def loss(weights: dict[str, Tensor], statistics: dict[str, Tensor], *batch: Tensor) -> tuple[Tensor, Tensor]:
-        found: tuple[Tensor, Tensor] = functional_call(template, (weights, statistics), batch)
-        return found
-
-    mapped: Callable[..., tuple[Tensor, Tensor]] = vmap(loss, in_dims=(0, 0, 0, None if same else 0, 0))
-    on_gpu = next(model.parameters()).device.type == "cuda"
-    return torch.compile(mapped, dynamic=False) if on_gpu and isinstance(model, ObservedModel) else mapped
 
 
 class _Loss(nn.Module):

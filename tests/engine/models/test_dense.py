@@ -9,8 +9,12 @@ from engine.models._dense import FEWEST_ROWS, WIDTHS, linear
 
 @pytest.mark.parametrize("shape", [(32, 100), (100, 32), (3200,), (2053,), (4, 8)])
 @pytest.mark.parametrize("has_bias", [True, False])
-def test_it_is_torch_s_layer_with_its_gradients(shape: tuple[int, ...], has_bias: bool) -> None:
-    """Rows that make images, a prime number of them, and few."""
+@pytest.mark.parametrize("on_gpu", [False, True])
+def test_it_is_torch_s_layer_with_its_gradients(
+    shape: tuple[int, ...], has_bias: bool, on_gpu: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Rows that make images or parts, a prime number of them, and few."""
+    monkeypatch.setattr("engine.models._dense.PARTED_ON", ("cpu",) if on_gpu else ())
     generator = torch.Generator().manual_seed(0)
     inputs = torch.randn(*shape, 101, generator=generator, requires_grad=True)
     weight = torch.randn(64, 101, generator=generator, requires_grad=True)
