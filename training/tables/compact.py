@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from training.cell import MODEL_NAMES
 from training.results import Row
 from training.tables.paper import COLUMNS, HORIZONS, Column, Figure, factor, mark
-from training.tables.sections import NOT_RUN, Line, RecipeChoice, Section, rows_of, sections
+from training.tables.sections import NOT_RUN, Line, Section, rows_of, sections
 
 NONE = "—"
 METRIC_NAMES = {"rel_mse": "MSE", "rel_mae": "MAE"}
@@ -23,7 +23,7 @@ STARTS = {
 RECIPE_WORDS = {"paper": ", paper's recipe", "published": ", authors' script"}
 
 
-def as_compact(rows: Sequence[Row], recipe: RecipeChoice = "all", metric: str = "rel_mse") -> str:
+def as_compact(rows: Sequence[Row], recipe: str = "all", metric: str = "rel_mse") -> str:
     """The tables of one metric, a line per model and recipe that was trained on the table's own horizon."""
     found = sections(rows, recipe)
     parts = [LEGEND.format(metric=METRIC_NAMES[metric], none=NONE)]

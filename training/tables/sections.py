@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import astuple, dataclass
 from statistics import fmean, stdev
-from typing import Literal
 
 from engine.schema import SchemaError
 from training.cell import HORIZON, load
@@ -26,7 +25,6 @@ from training.tables.paper import (
 
 NOT_RUN = "not run"  # what is said in place of a figure
 NO_ERRORS = Errors(None, None)
-RecipeChoice = Literal["ours", "blind", "hinted", "paper", "published", "all"]
 
 
 @dataclass(frozen=True)
@@ -92,7 +90,7 @@ class Section:
         return found.figure(metric) if found else None
 
 
-def sections(rows: Iterable[Row], recipe: RecipeChoice = "all") -> list[Section]:
+def sections(rows: Iterable[Row], recipe: str = "all") -> list[Section]:
     """The tables of the rows that belong to them, by string and horizon.
 
     A row counts as long as its name means the configuration that it was made with: rows of a trial, and of a recipe

@@ -9,10 +9,10 @@ from typing import Any
 
 from training.results import Row
 from training.tables.paper import COLUMNS, METRICS, Column, mark
-from training.tables.sections import NOT_RUN, Entry, Line, RecipeChoice, Section, sections
+from training.tables.sections import NOT_RUN, Entry, Line, Section, sections
 
 
-def as_csv(rows: Sequence[Row], recipe: RecipeChoice = "all") -> str:
+def as_csv(rows: Sequence[Row], recipe: str = "all") -> str:
     """All tables as tidy data: a line for every cell, run or not, with our figures and the paper's."""
     records = [
         _record(section, model, line, column)
