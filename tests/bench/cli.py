@@ -21,6 +21,7 @@ from training.cli.console import Failure, progress
 
 if TYPE_CHECKING:
     from app.audio.choices import Buffer
+    from app.patches.instrument import SingleString
     from app.patches.patch import Patch
 
 bench = typer.Typer(
@@ -180,6 +181,9 @@ def play(
     ] = None,
     seed: Seed = 0,
     patch: PatchName = "concert_harp",
+    preset: Annotated[
+        str | None, typer.Option(metavar="PRESET", help="A string's preset instead, in the Lab: ten keys pluck it.")
+    ] = None,
 ) -> None:
     """Holes, clicks and latency of the app's sound, recorded.
 
@@ -188,9 +192,9 @@ def play(
     """
     from tests.bench.play.measure import measure
 
-    chosen, found_patch = _buffer(buffer), _patch(patch)
+    chosen, instrument = _buffer(buffer), _patch(patch) if preset is None else _single(preset)
     with progress("bench play") as report:
-        found = measure(seconds, rate, chosen, (False, True) if busy is None else (busy,), seed, found_patch, report)
+        found = measure(seconds, rate, chosen, (False, True) if busy is None else (busy,), seed, instrument, report)
     show(found, json)
 
 
@@ -304,6 +308,17 @@ def _patch(name: str) -> Patch:
         return find_patch(name).patch
     except PatchError as error:
         raise Failure(str(error)) from error
+
+
+def _single(name: str) -> SingleString:
+    from app.patches.instrument import SingleString
+    from engine.folders import usable_files
+    from engine.presets import find_preset
+
+    files = usable_files()
+    if (found := find_preset(name, files)) not in files:
+        raise typer.BadParameter("the name of a preset, as `learned-strings presets` lists it", param_hint="--preset")
+    return SingleString(preset=found.stem)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -9,11 +9,13 @@ from typing import Protocol
 
 from app.instrument.events import Event, NoteOff, NoteOn, TimedEvent
 from app.patches.drums import Drums
+from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from tests.bench.play.midi import Cable
 from tests.bench.play.screen import Screen
 
 KEYS = ("a", "w", "s", "e", "d", "f", "t", "g", "y", "h", "u", "j", "k", "o", "l", "p", "semicolon")
+ROW = ("a", "s", "d", "f", "g", "h", "j", "k", "l", "semicolon")  # places along a single string
 LOWEST = 48  # the MIDI key that the first of them plays
 OCTAVE_DOWN, OCTAVE_UP = "z", "x"
 DIGITS = {round(1 + (digit - 1) / 8 * 126): str(digit) for digit in range(1, 10)}  # by the velocity that they set
@@ -21,14 +23,18 @@ HELD_S = 0.03
 SHORTEST_STEP_S = 0.04
 
 
-def octave_of(patch: Patch) -> int:
+def octave_of(instrument: Instrument) -> int:
     """That to which the computer's keys are transposed so that most of them sound, the nearest to 0."""
-    return max(range(-LOWEST // 12, 5), key=lambda octave: (len(_sounding(patch, octave)), -abs(octave)))
+    if isinstance(instrument, SingleString):
+        return 0
+    return max(range(-LOWEST // 12, 5), key=lambda octave: (len(_sounding(instrument, octave)), -abs(octave)))
 
 
-def keys_of(patch: Patch) -> tuple[str, ...]:
+def keys_of(instrument: Instrument) -> tuple[str, ...]:
     """The computer's keys that sound then."""
-    return tuple(KEYS[place] for place in _sounding(patch, octave_of(patch)))
+    if isinstance(instrument, SingleString):
+        return ROW
+    return tuple(KEYS[place] for place in _sounding(instrument, octave_of(instrument)))
 
 
 def _sounding(patch: Patch, octave: int) -> list[int]:
