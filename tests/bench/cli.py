@@ -41,7 +41,7 @@ Seed = Annotated[int, typer.Option(min=0, help="Of the random keys and changes."
 
 
 def _measure(name: str, json: bool) -> None:
-    """Runs and shows a benchmark without options."""
+    """Run and show a benchmark without options."""
     from importlib import import_module
 
     with progress(f"bench {name}") as report:
@@ -322,5 +322,5 @@ def _single(name: str) -> SingleString:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a benchmark's command line (default: the process's own) and returns the exit status."""
+    """Run a benchmark's command line (default: the process's own) and return the exit status."""
     return carry_out(bench, arguments, "run.py bench")

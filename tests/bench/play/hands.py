@@ -44,13 +44,13 @@ def _sounding(patch: Patch, octave: int) -> list[int]:
 
 
 def press(screen: Screen, key: str) -> None:
-    """Presses a key and releases it at once."""
+    """Press a key and release it at once."""
     screen.key(key, True)
     screen.key(key, False)
 
 
 def tap(screen: Screen, key: str) -> float:
-    """Presses and releases a key; returns when it was pressed."""
+    """Press and release a key; return when it was pressed."""
     pressed_s = screen.key(key, True)
     time.sleep(HELD_S)
     screen.key(key, False)
@@ -58,7 +58,7 @@ def tap(screen: Screen, key: str) -> float:
 
 
 def play(screen: Screen, random: Random, steps_s: Sequence[float], keys: Sequence[str] = KEYS) -> list[float]:
-    """Taps random keys of these, `steps_s` apart; returns when each was pressed."""
+    """Tap random keys of these, `steps_s` apart; return when each was pressed."""
     pressed_s = []
     due_s = time.monotonic()
     for step_s in steps_s:
@@ -69,7 +69,7 @@ def play(screen: Screen, random: Random, steps_s: Sequence[float], keys: Sequenc
 
 
 def play_in_turn(screen: Screen, keys: Sequence[str], step_s: float) -> list[float]:
-    """Taps these keys, `step_s` apart, each held for most of it; returns when each was pressed."""
+    """Tap these keys, `step_s` apart, each held for most of it; return when each was pressed."""
     pressed_s = []
     for key in keys:
         pressed_s.append(screen.key(key, True))
@@ -92,7 +92,7 @@ class Hand(Protocol):
     turns: bool
 
     def do(self, event: Event) -> float:
-        """Plays an event; returns when (`time.monotonic`)."""
+        """Play an event; return when (`time.monotonic`)."""
 
 
 class MidiHand:
@@ -119,7 +119,7 @@ class KeyHand:
         self._down: dict[int, str] = {}
 
     def do(self, event: Event) -> float:
-        """Raises ValueError for an event that the computer's keys cannot play."""
+        """Raise ValueError for an event that the computer's keys cannot play."""
         if isinstance(event, NoteOff):
             return self._screen.key(self._down.pop(event.key), False)
         if not isinstance(event, NoteOn):
@@ -137,7 +137,7 @@ class KeyHand:
 
 
 def perform(hand: Hand, events: Sequence[TimedEvent], seconds: float) -> list[TimedEvent]:
-    """Plays events at their times; returns them with the times at which they were played (`time.monotonic`)."""
+    """Play events at their times; return them with the times at which they were played (`time.monotonic`)."""
     began_s, played = time.monotonic(), []
     for each in events:
         time.sleep(max(began_s + each.time_s - time.monotonic(), 0))
