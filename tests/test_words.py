@@ -41,6 +41,11 @@ NAMES = {"told", "tells", "anew", "whoever", "errs", "obey", "believed", "tired"
 CLAUSES = re.compile(
     r"(What|Whether|Of|How|Where|As|Which|Those|By|One|For|From|In|With|To|When|On|If|Whose|Who|That|Until)\b"
 )
+# third person, of functions
+THIRD = re.compile(
+    r"(Adds|Begins|Closes|Computes|Draws|Ends|Fills|Finds|Follows|Forgets|Gives|Keeps|Lets|Loads|Makes|Moves|Opens|Puts"
+    r"|Raises|Reads|Renders|Returns|Says|Sends|Sets|Shows|Starts|Stops|Takes|Tells|Turns|Waits|Writes)\b"
+)
 LONGEST = 30  # words of a sentence
 LONGEST_SUBJECT = 72
 SINCE = "5d41648"  # the last commit before subjects were checked
@@ -117,8 +122,12 @@ def test_docstrings_begin_with_a_noun_or_a_verb(name: str) -> None:
     found = []
     for path in [path for path in CODE if path.is_relative_to(ROOT / name)]:
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
-            documented = isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef)
-            if documented and (first := CLAUSES.match(ast.get_docstring(node) or "")):
+            wrong = [CLAUSES]
+            if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+                wrong.append(THIRD)
+            elif not isinstance(node, ast.Module | ast.ClassDef):
+                continue
+            for first in filter(None, (each.match(ast.get_docstring(node) or "") for each in wrong)):
                 found.append(f"{path.relative_to(ROOT)}: {getattr(node, 'name', 'the module')}: {first[0]} …")
     assert found == []
 

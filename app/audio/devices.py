@@ -84,7 +84,7 @@ def find(name: str, host_api: str, rescan: bool = False) -> AudioDevice:
 
 
 def open_device(device: AudioDevice, buffer_s: float, mixer: Mixer) -> RawStream:
-    """Opens, but does not start, a float32 stream at `device.default_rate_hz`, of two channels at most.
+    """Open, but do not start, a float32 stream at `device.default_rate_hz`, of two channels at most.
 
     The device calls the compiled mixer in its own thread, without the Python interpreter. Its buffer is `buffer_s`,
     or the latency that the device calls low where that is longer.

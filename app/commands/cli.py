@@ -97,7 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def carry_out(commands: typer.Typer, arguments: Sequence[str] | None, name: str) -> int:
-    """Run a command line of some commands; failures are printed in one line. Returns the exit status."""
+    """Run a command line of some commands; failures are printed in one line. Return the exit status."""
     wait_asleep()
     use_any_output()
     words = list(sys.argv[1:] if arguments is None else arguments)
@@ -122,7 +122,7 @@ def is_file_name(word: str) -> bool:
 
 
 def open_files(words: Sequence[str]) -> int:
-    """Open the app with files, as if they were dropped on its window. Returns its exit status, or 2 for no file."""
+    """Open the app with files, as if they were dropped on its window. Return its exit status, or 2 for no file."""
     files = [Path(word).absolute() for word in words]
     for word, file in zip(words, files, strict=True):
         if not file.is_file():

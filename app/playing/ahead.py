@@ -94,7 +94,7 @@ class AheadVoice:
         return self.rendered_s - (self.voice.seconds if self.begun else -1.0)
 
     def advance(self) -> None:
-        """Renders the next block; `finished` after the last one."""
+        """Render the next block; `finished` after the last one."""
         began_s = time.monotonic()
         if self._state is None:
             self._state = self.source.start(self.initial_m[None])
@@ -118,7 +118,7 @@ class AheadVoice:
             self.finished = True
 
     def take_known(self, samples: NDArray[np.float32]) -> None:
-        """Takes all samples, which are known from an earlier pluck."""
+        """Take all samples, which are known from an earlier pluck."""
         self._take(samples)
         self.voice.end_here()
         self.finished = True
@@ -144,7 +144,7 @@ class Ahead:
         self._thread: threading.Thread | None = None
 
     def render(self, voice: AheadVoice) -> None:
-        """Starts to render a voice; where the same pluck is known, it begins at once."""
+        """Start to render a voice; where the same pluck is known, it begins at once."""
         with self._mailbox:
             known = self._known.get(voice.key)
             if known is None:
@@ -159,7 +159,7 @@ class Ahead:
         voice.begin()
 
     def close(self) -> None:
-        """Ends the thread, waiting 10 s at most; may be called again."""
+        """End the thread, waiting 10 s at most; may be called again."""
         with self._mailbox:
             self._closing = True
             self._mailbox.notify()

@@ -267,7 +267,7 @@ class Keys:
         return None if wanted is None else wanted.patch
 
     def begin_recording(self) -> None:
-        """Records events from now on, wheels and pedals as they stand; an earlier recording is discarded."""
+        """Record events from now on, wheels and pedals as they stand; an earlier recording is discarded."""
         with self._lock:
             player = self._player
             self.recorder.begin([] if player is None else [_turned(player), *player.at_hand])

@@ -109,24 +109,24 @@ class Note:
         return self.began_frame + round((seconds + starved_s) * rate_hz) - skipped
 
     def set_begin(self, struck_s: float) -> None:
-        """Gives its voices the time of their gesture, by the sound's clock (0: none), and the frame they begin at."""
+        """Give its voices the time of their gesture, by the sound's clock (0: none), and the frame they begin at."""
         for voice in self.voices.values():
             voice.set_struck(struck_s)
             voice.begin_at(self.begin_frame)
 
     def release_at(self, frame: int) -> None:
-        """Lets it fade out from a frame of the mixer on; 0: not any more."""
+        """Let it fade out from a frame of the mixer on; 0: not any more."""
         for voice in self.voices.values():
             voice.release_at(frame)
 
     def end(self) -> None:
-        """Cuts it, where no device plays its voices any more; they are over."""
+        """Cut it, where no device plays its voices any more; they are over."""
         self.cut = True
         for voice in self.voices.values():
             voice.refuse()
 
     def release(self, seconds: float) -> None:
-        """Lets it fade out within so many seconds, from now on."""
+        """Let it fade out within so many seconds, from now on."""
         self.released = True
         for voice in self.voices.values():
             voice.release(seconds)

@@ -126,7 +126,7 @@ class Notes:
         self._hear_effects()
 
     def listen(self, ear: Ear) -> None:
-        """Sets where all notes are heard; those that ring are cross-faded, but keep their kind of pick-up."""
+        """Set where all notes are heard; those that ring are cross-faded, but keep their kind of pick-up."""
         with self._lock:
             self._ear = ear
             if self._chosen is not None:
@@ -139,7 +139,7 @@ class Notes:
             self._chosen = request
 
     def set_monitor(self, monitor: Monitor, compared: bool = True) -> None:
-        """Sets the sources of all notes; those that ring are cross-faded.
+        """Set the sources of all notes; those that ring are cross-faded.
 
         Args:
             compared: whether keys that are struck from now on can be switched to another source while they ring.
@@ -164,7 +164,7 @@ class Notes:
     # Events
 
     def handle(self, event: Event, due: Due | None = None) -> Note | KeyNote | None:
-        """Plays an event, at once or when it is due; the note that it began, or None.
+        """Play an event, at once or when it is due; the note that it began, or None.
 
         Keys of a single string are places along it. Its note sounds with the next quantum of the device, unless
         presets must be loaded or a model is rendered ahead. An event that fails costs itself alone, and is reported.
@@ -200,7 +200,7 @@ class Notes:
         return PluckAt(reach.pluck(event.key, event.velocity, Pluck() if chosen is None else chosen.pluck))
 
     def ring(self, from_s: float = 0.0, begin_frame: int = 0, alone: bool = False) -> Note | None:
-        """Begins a note of the chosen pluck, while others ring on; None where nothing is chosen.
+        """Begin a note of the chosen pluck, while others ring on; None where nothing is chosen.
 
         Args:
             from_s: where in its motion it begins.
@@ -226,7 +226,7 @@ class Notes:
         return note
 
     def turn(self, note: Note | KeyNote, seconds: float, event: NoteOn | PluckAt) -> Note | KeyNote | None:
-        """Hands the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early.
+        """Hand the next turn of a loop to the mixer, LOOP_AHEAD_S before `note` is so long; None: it is early.
 
         Args:
             event: the chosen pluck, as a note of its instrument or of the string alone.
@@ -250,7 +250,7 @@ class Notes:
                     note.release(0.0)
 
     def stop(self, seconds: float = STOP_S) -> None:
-        """Lets all notes fade out; those that wait will not sound."""
+        """Let all notes fade out; those that wait will not sound."""
         with self._lock:
             self._each(self._notes, lambda note: note.release(seconds))
         self.keys.stop(seconds)
@@ -270,14 +270,14 @@ class Notes:
             return chosen is not None and self._loaded(Note(chosen, self._voices_of(chosen)))
 
     def prepare(self, *subjects: Subject) -> None:
-        """Loads presets in the background, so that a pluck need not wait."""
+        """Load presets in the background, so that a pluck need not wait."""
         rate_hz = self._sound.rate_hz
         for subject in subjects:
             if not self._sources.has(subject, rate_hz):
                 self.in_background(partial(self._sources.prepare, subject, rate_hz))
 
     def prepare_plucks(self, subject: Subject, plucks: Sequence[Pluck]) -> None:
-        """Computes in the background where voices of these plucks start; the latest call counts."""
+        """Compute in the background where voices of these plucks start; the latest call counts."""
         rate_hz = self._sound.rate_hz
         wish = self._wished_plucks = object()
 
@@ -328,7 +328,7 @@ class Notes:
         self._latencies_s.clear()
 
     def poll(self) -> None:
-        """Forgets notes that ended, and moves listening points. The window calls it at each frame."""
+        """Forget notes that ended, and move listening points. The window calls it at each frame."""
         self.look()
         with self._lock:
             self._move_to_new_mixer()
@@ -337,7 +337,7 @@ class Notes:
             self._each(self._plucks(), self._follow)
 
     def close(self) -> None:
-        """Ends the threads; may be called again."""
+        """End the threads; may be called again."""
         self._closed = True
         self._helper.shutdown(wait=True, cancel_futures=True)
         self._ahead.close()
@@ -359,7 +359,7 @@ class Notes:
             self._latencies_s.append(latency_s)
 
     def _follow(self, note: Note) -> None:
-        """Lets a note be heard where all are, and as loud as the truth once that is known."""
+        """Let a note be heard where all are, and as loud as the truth once that is known."""
         if note.ahead and note.match is None and not note.pending:
             self._ask_match(note)
         if self._ear is not None:
@@ -367,7 +367,7 @@ class Notes:
                 voice.listen(self._ear)
 
     def _set_gains_of_keys(self) -> None:
-        """Sets which sources of keys are heard; both are of one string, whose levels match as they are."""
+        """Set which sources of keys are heard; both are of one string, whose levels match as they are."""
         gains = {source: self._monitor.gain(source, SOURCES, None) for source in SOURCES}
         self.keys.set_gains(gains, self._compared)
 
@@ -376,7 +376,7 @@ class Notes:
         return [note for note in self._notes if isinstance(note, Note)]
 
     def look(self) -> None:
-        """Follows what the player reports of notes of keys: the latest that began is the string that is shown.
+        """Follow what the player reports of notes of keys: the latest that began is the string that is shown.
 
         One that is reported after a single string was chosen, which its instrument is not, changes nothing.
         """
@@ -431,13 +431,13 @@ class Notes:
                 note.end()
 
     def _adopt(self, note: KeyNote) -> None:
-        """Keeps the note of a key, which the player has been given."""
+        """Keep the note of a key, which the player has been given."""
         with self._lock:
             self._notes.append(note)
             self._make_room(MOST_NOTES)
 
     def _begin(self, note: Note, struck_s: float) -> None:
-        """Makes the voices and hands them over; again where the device changes its rate meanwhile."""
+        """Make the voices and hand them over; again where the device changes its rate meanwhile."""
         for _ in range(3):
             mixer = self._sound.mixer
             self._make_voices(note, mixer.rate_hz, struck_s)
@@ -490,7 +490,7 @@ class Notes:
         note.ahead, note.voices = ahead, voices
 
     def _rendered_enough(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
-        """Hands the note over once all its models are rendered far enough. Any thread."""
+        """Hand the note over once all its models are rendered far enough. Any thread."""
         with self._lock:
             if note.handed_over or ahead is not note.ahead or not all(each.begun for each in ahead):
                 return
@@ -523,7 +523,7 @@ class Notes:
         return True
 
     def _bound_load(self, status: SoundStatus) -> None:
-        """Ends the oldest notes where the device has no time for all. In the caretaker's thread of the sound.
+        """End the oldest notes where the device has no time for all. In the caretaker's thread of the sound.
 
         Bursts of other programs raise the load as well: what they cost is their own length, and no note ends.
         It looks at the keys' notes too, so that their ends are reported while the window is busy.
@@ -542,7 +542,7 @@ class Notes:
                 self._make_room(max(1, min(ringing - LEAST_RELIEF, int(ringing * BUSY / load))))
 
     def _make_room(self, most: int) -> None:
-        """Releases the oldest notes where more than `most` ring."""
+        """Release the oldest notes where more than `most` ring."""
         ringing = [note for note in self._notes if not note.over and not note.released]
         self._each(ringing[: max(0, len(ringing) - most)], lambda note: note.release(STOLEN_S))
 

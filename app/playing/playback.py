@@ -54,7 +54,7 @@ class Playback:
         return thread is not None and thread.is_alive()
 
     def play(self, events: Sequence[TimedEvent]) -> None:
-        """Play these events from their beginning; stops what is being played."""
+        """Play these events from their beginning; stop what is being played."""
         self.stop()
         self._stopping = threading.Event()
         work = (sorted(events, key=lambda each: each.time_s), self._stopping)
@@ -62,7 +62,7 @@ class Playback:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stops, lets every key go and leaves wheels and pedals at rest; may be called again."""
+        """Stop, let every key go and leave wheels and pedals at rest; may be called again."""
         self._stopping.set()
         thread, self._thread = self._thread, None
         if thread is not None and thread is not threading.current_thread():

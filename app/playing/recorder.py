@@ -37,7 +37,7 @@ class EventRecorder:
         return self._recorded is not None
 
     def begin(self, first: Iterable[Event]) -> None:
-        """Records from now on, after the events `first`; an earlier recording is discarded."""
+        """Record from now on, after the events `first`; an earlier recording is discarded."""
         with self._lock:
             self._recorded, self._unfetched = [], []
             self._began_s, self._reported_full = time.monotonic(), False
@@ -45,7 +45,7 @@ class EventRecorder:
             self.take(event)
 
     def take(self, event: Event, time_s: float | None = None) -> None:
-        """Records an event, played at a time of `time.monotonic`; None: now."""
+        """Record an event, played at a time of `time.monotonic`; None: now."""
         with self._lock:
             if self._recorded is None:
                 return

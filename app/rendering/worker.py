@@ -57,7 +57,7 @@ class RenderWorker:
         self._thread.start()
 
     def submit(self, request: RenderRequest | BlowRequest) -> None:
-        """Replace a request that waits and abandon another motion being rendered. Any thread; returns at once."""
+        """Replace a request that waits and abandon another motion being rendered. Any thread; return at once."""
         with self._mailbox:
             self._request = request
             self._mailbox.notify()

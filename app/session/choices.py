@@ -222,7 +222,7 @@ class Session:
         self.update(listen=OF_CHOICES["listen"].clamped(listen))
 
     def switch_source(self) -> None:
-        """Switches the sound from slot A to slot B, or back."""
+        """Switch the sound from slot A to slot B, or back."""
         self.update(heard="b" if self._choices.heard == "a" else "a")
 
 

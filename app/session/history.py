@@ -81,7 +81,7 @@ class History:
         self._open_fields = None
 
     def undo(self) -> None:
-        """Take the last step back; does nothing where there is none."""
+        """Take the last step back; do nothing where there is none."""
         self._restore(self._undo, self._redo)
 
     def redo(self) -> None:

@@ -40,7 +40,7 @@ PICKUP = {"pickup.points", "pickup.kind"}  # fields of a patch that are those of
 
 
 def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
-    """Names what changed; "" where nothing did.
+    """Name what changed; "" where nothing did.
 
     Args:
         before, after: the same fields of `Choices` with their values before and after the step.

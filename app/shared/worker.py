@@ -44,11 +44,11 @@ class Job:
         self._reported_s = 0.0
 
     def cancel(self) -> None:
-        """Ask the work to end at its next call; returns at once."""
+        """Ask the work to end at its next call; return at once."""
         self._stop.set()
 
     def wait(self, seconds: float = 0.0) -> None:
-        """Waits, less where the job is cancelled.
+        """Wait, less where the job is cancelled.
 
         Raises:
             Cancelled: the result is no longer wanted.

@@ -52,7 +52,7 @@ class AudioControl(QObject):
         self._dialog: AudioDialog | None = None
 
     def open(self, rescan: bool = False) -> None:
-        """Open the output as chosen. Returns at once; `show` sees what became of it."""
+        """Open the output as chosen. Return at once; `show` sees what became of it."""
         device, sound = self._wish
         self._changes += 1
         self._output.open(
@@ -100,7 +100,7 @@ class AudioControl(QObject):
                 self._list_devices()
 
     def _watch_gaps(self, status: SoundStatus) -> None:
-        """Names the remedy once for a buffer, when gaps have come close together."""
+        """Name the remedy once for a buffer, when gaps have come close together."""
         if not self._advised and len(status.gaps) >= FREQUENT:
             last = status.gaps[-FREQUENT:]
             if last[-1].time_s - last[0].time_s < FREQUENT_WITHIN_S:

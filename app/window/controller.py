@@ -300,7 +300,7 @@ class Controller(QObject):
         self.window.say_briefly(f"Redone: {words}" if words else "Nothing to redo")
 
     def pluck(self) -> None:
-        """Plucks the string as chosen, or strikes the drum that is shown."""
+        """Pluck the string as chosen, or strike the drum that is shown."""
         if self._abx is not None:
             return
         if self.session.choices.drums is None:
@@ -309,7 +309,7 @@ class Controller(QObject):
             self.instruments.strike(*self.drum.place, self.session.choices.velocity)
 
     def strike(self, x: float, y: float, velocity: float) -> None:
-        """Strikes the drum at a place, in half-lengths from its centre."""
+        """Strike the drum at a place, in half-lengths from its centre."""
         self.instruments.strike(x, y, velocity)
 
     def _handle(self, event: Event, due: Due | None) -> Note | KeyNote | None:
@@ -367,7 +367,7 @@ class Controller(QObject):
         self._help.raise_()
 
     def take_file(self, file: Path) -> None:
-        """Take a dropped file: installs and chooses a preset, restores a WAV's recipe; asks what other sounds are.
+        """Take a dropped file: install and choose a preset, restore a WAV's recipe; ask what other sounds are.
 
         Patches, scales and MIDI files go to `patches`.
         """

@@ -206,7 +206,7 @@ class Instruments(QObject):
         return self._by_hand(self._session.choices.pluck)
 
     def pluck(self) -> None:
-        """Plucks the string that is shown as it is chosen."""
+        """Pluck the string that is shown as it is chosen."""
         if self._own_timer.isActive():
             self._show_own_string()
         self.play(self.by_hand(), drawn=True)
@@ -231,7 +231,7 @@ class Instruments(QObject):
         return Struck(patch, event) if isinstance(event, NoteOn) else None
 
     def strike(self, x: float | None = None, y: float | None = None, velocity: float | None = None) -> None:
-        """Strikes the drum that is shown.
+        """Strike the drum that is shown.
 
         Args:
             x, y: where, from its centre in half-lengths; None: at its own place.

@@ -25,7 +25,7 @@ class Leaving(QObject):
         exports.ended.connect(self._export_ended)
 
     def may_close(self) -> bool:
-        """Return True if the window may be closed now; asks where work would be lost."""
+        """Return True if the window may be closed now; ask where work would be lost."""
         if self._asking:  # closed once more under the question
             return False
         self._asking = True

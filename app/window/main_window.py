@@ -250,7 +250,7 @@ class MainWindow(QMainWindow):
             focus.setFocus()
 
     def show_failed(self) -> None:
-        """Says, in the place of the string, that the models cannot be loaded."""
+        """Say, in the place of the string, that the models cannot be loaded."""
         self._loading.setText(FAILED)
 
     def order_tabs(self) -> None:

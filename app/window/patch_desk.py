@@ -412,7 +412,7 @@ class PatchDesk(QObject):
         return (LOWEST_OCTAVE, HIGHEST_OCTAVE) if self.patch is None else octaves_of(*self.patch.range)
 
     def _keep_octave_in_range(self, asked: bool) -> None:
-        """Move the octave of the computer's keys to where one sounds, or most do with another range; says why.
+        """Move the octave of the computer's keys to where one sounds, or most do with another range; say why.
 
         `asked`: the octave was to change; otherwise another patch made it change.
         """

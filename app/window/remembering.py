@@ -35,7 +35,7 @@ class SettingsSaver(QObject):
         self._timer.start()
 
     def look(self) -> None:
-        """Writes, in a thread of its own, where the settings have changed, but not since the last look."""
+        """Write, in a thread of its own, where the settings have changed, but not since the last look."""
         now = self._current()
         rested, self._seen = now == self._seen, now
         if not rested or now == self._base or (self._writing is not None and self._writing.is_alive()):

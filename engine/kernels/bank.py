@@ -151,7 +151,7 @@ def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scr
 
 @njit(**COMPILED)
 def strike(voice: Voice, program: BankProgram, scratch: np.ndarray) -> None:
-    """Fills in what follows from z(0), which `LEVEL_0` and `ANGLE_0` hold."""
+    """Fill in what follows from z(0), which `LEVEL_0` and `ANGLE_0` hold."""
     n = program.modes
     sigma, coupling = behind(program, program.sigma, n), behind(program, program.coupling, 2 * n * n)
     energy, levels, constant = row(voice, at.ENERGY_0), row(voice, at.LEVEL_0), rows(voice, at.CONSTANT, 2)
@@ -192,7 +192,7 @@ def _integrate_from(voice: Voice, program: BankProgram, node: int, scratch: np.n
 
 @njit(**COMPILED)
 def _integrate_to(voice: Voice, program: BankProgram, time: float, scratch: np.ndarray) -> None:
-    """Moves on to the node before a time."""
+    """Move on to the node before a time."""
     n = program.modes
     spacing = program.spacing
     energy, more = scratch[4 * MOST_LATENTS : 4 * MOST_LATENTS + n], scratch[5 * MOST_LATENTS :]
@@ -441,7 +441,7 @@ def _segment(
 
 @njit(**COMPILED)
 def _sum(voice: Voice, which: int, point: int, z: np.ndarray, out: np.ndarray, scratch: np.ndarray) -> None:
-    """Adds Re Σ w z at each frame of the quantum."""
+    """Add Re Σ w z at each frame of the quantum."""
     n, alive = voice.modes, voice.audible_count
     reals, imaginaries = weights(voice, which, point, 0), weights(voice, which, point, 1)
     w, v = scratch[32 * MOST_LATENTS :].view(np.float32), scratch[33 * MOST_LATENTS :].view(np.float32)
@@ -513,7 +513,7 @@ def _modulate(
     out: np.ndarray,
     scratch: np.ndarray,
 ) -> None:
-    """Adds what the latents that are modulated differ by from themselves: w z (e^g - 1), for the whole quantum."""
+    """Add what the latents that are modulated differ by from themselves: w z (e^g - 1), for the whole quantum."""
     n = program.modes
     quantum = QUANTUM
     matrix, limit = behind(program, program.modulation, 4 * n * n), program.limit

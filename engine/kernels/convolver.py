@@ -75,7 +75,7 @@ def convolve(mixer: Mixer) -> None:
 
 @njit(**COMPILED)
 def _clean(mixer: Mixer, mix: np.ndarray) -> bool:
-    """Leave only what may ring on. Returns whether there is anything."""
+    """Leave only what may ring on. Return True if there is anything."""
     heard = False
     for frame in range(QUANTUM):
         left, right = mix[frame, 0], mix[frame, 1]

@@ -229,7 +229,7 @@ def _look_at_wishes(voice: Voice, now: int) -> None:
 
 @njit(**COMPILED)
 def add(voice: Voice, mixer: Mixer, now_s: float) -> int:
-    """Add the next quantum of a voice to the mix, (QUANTUM, 2). Returns its state, which it leaves to the caller."""
+    """Add the next quantum of a voice to the mix, (QUANTUM, 2). Return its state, which it leaves to the caller."""
     state = begin(voice, mixer)
     if state != at.SOUNDING:
         return state

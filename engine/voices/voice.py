@@ -158,7 +158,7 @@ class Voice:
         return float(self.record["loudness"]) * 20 / math.log(10)
 
     def set_struck(self, time_s: float) -> None:
-        """Notes when the gesture was, on the device's clock."""
+        """Note when the gesture was, on the device's clock."""
         self.record["struck_s"] = time_s
 
     def set_gain(self, gain: float) -> None:

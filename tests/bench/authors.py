@@ -49,7 +49,7 @@ class AuthorsBenchmark:
 
 
 def measure(python: Path, source: Path, report: Callable[[float, str], None]) -> AuthorsBenchmark:
-    """Takes steps of ours and of theirs in turns, on as many threads, with AdamW and the loss of the paper's text.
+    """Take steps of ours and of theirs in turns, on as many threads, with AdamW and the loss of the paper's text.
 
     Args:
         python: has jax, flax, optax and einops.

@@ -21,6 +21,7 @@ from training.cli.console import Failure, progress
 
 if TYPE_CHECKING:
     from app.audio.choices import Buffer
+    from app.patches.instrument import SingleString
     from app.patches.patch import Patch
 
 bench = typer.Typer(
@@ -40,7 +41,7 @@ Seed = Annotated[int, typer.Option(min=0, help="Of the random keys and changes."
 
 
 def _measure(name: str, json: bool) -> None:
-    """Runs and shows a benchmark without options."""
+    """Run and show a benchmark without options."""
     from importlib import import_module
 
     with progress(f"bench {name}") as report:
@@ -187,6 +188,9 @@ def play(
     ] = None,
     seed: Seed = 0,
     patch: PatchName = "concert_harp",
+    preset: Annotated[
+        str | None, typer.Option(metavar="PRESET", help="A string's preset instead, in the Lab: ten keys pluck it.")
+    ] = None,
 ) -> None:
     """Holes, clicks and latency of the app's sound, recorded.
 
@@ -195,9 +199,9 @@ def play(
     """
     from tests.bench.play.measure import measure
 
-    chosen, found_patch = _buffer(buffer), _patch(patch)
+    chosen, instrument = _buffer(buffer), _patch(patch) if preset is None else _single(preset)
     with progress("bench play") as report:
-        found = measure(seconds, rate, chosen, (False, True) if busy is None else (busy,), seed, found_patch, report)
+        found = measure(seconds, rate, chosen, (False, True) if busy is None else (busy,), seed, instrument, report)
     show(found, json)
 
 
@@ -313,6 +317,17 @@ def _patch(name: str) -> Patch:
         raise Failure(str(error)) from error
 
 
+def _single(name: str) -> SingleString:
+    from app.patches.instrument import SingleString
+    from engine.folders import usable_files
+    from engine.presets import find_preset
+
+    files = usable_files()
+    if (found := find_preset(name, files)) not in files:
+        raise typer.BadParameter("the name of a preset, as `learned-strings presets` lists it", param_hint="--preset")
+    return SingleString(preset=found.stem)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs a benchmark's command line (default: the process's own) and returns the exit status."""
+    """Run a benchmark's command line (default: the process's own) and return the exit status."""
     return carry_out(bench, arguments, "run.py bench")

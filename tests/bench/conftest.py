@@ -43,7 +43,7 @@ class Outcome:
 
 @pytest.fixture
 def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
-    """Runs a benchmark's command line in this process."""
+    """Run a benchmark's command line in this process."""
 
     def run(*words: object) -> Outcome:
         capsys.readouterr()
@@ -55,7 +55,7 @@ def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Outcome]:
 
 @pytest.fixture
 def bench(small_presets: None, capsys: pytest.CaptureFixture[str]) -> Callable[..., Any]:
-    """Runs a benchmark by its command; what it prints as JSON."""
+    """Run a benchmark by its command; what it prints as JSON."""
 
     def bench(*words: object) -> Any:
         status = main([*map(str, words), "--json"])

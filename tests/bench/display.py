@@ -7,7 +7,7 @@ import sys
 
 
 def choose_display() -> None:
-    """Makes Qt draw offscreen on a Linux machine without a screen. Call it before the QApplication is made."""
+    """Make Qt draw offscreen on a Linux machine without a screen. Call it before the QApplication is made."""
     screens = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
     if sys.platform.startswith("linux") and not any(map(os.environ.get, screens)):
         os.environ["QT_QPA_PLATFORM"] = "offscreen"

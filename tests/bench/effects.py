@@ -67,7 +67,7 @@ class EffectsBenchmark:
 
 
 def measure(report: Callable[[float, str], None]) -> EffectsBenchmark:
-    """Measures body and rooms, and one room that is exchanged without a pause."""
+    """Measure body and rooms, and one room that is exchanged without a pause."""
     with one_thread():
         costs = []
         names = [*CHOICES, f"{EXCHANGED}, exchanged"]

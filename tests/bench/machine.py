@@ -56,7 +56,7 @@ def median_s(work: Callable[[], object], repeats: int, *, warm_up: bool = True) 
 
 @contextmanager
 def one_thread() -> Iterator[None]:
-    """Limits torch to one thread, as in the app, where the window and the sound need the other cores."""
+    """Limit torch to one thread, as in the app, where the window and the sound need the other cores."""
     before = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

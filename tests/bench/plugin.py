@@ -61,7 +61,7 @@ class PluginBenchmark:
 
 
 def measure(report: Callable[[float, str], None]) -> PluginBenchmark:
-    """Builds a plug-in of all INSTRUMENTS, and plays each."""
+    """Build a plug-in of all INSTRUMENTS, and play each."""
     patches = [find_patch(name).patch for name in INSTRUMENTS]
     presets = [load_preset(SHIPPED / f"{patch.preset}.safetensors") for patch in patches]
     images = [image_of(patch, preset) for patch, preset in zip(patches, presets, strict=True)]

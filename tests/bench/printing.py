@@ -20,7 +20,7 @@ def target(value: object) -> dict[str, object]:
 
 
 def show(found: Any, as_json: bool) -> None:
-    """Prints what a benchmark measured.
+    """Print what a benchmark measured.
 
     Args:
         found: a dataclass: the machine, figures, and tuples of dataclasses, of which each becomes a table. Its

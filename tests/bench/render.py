@@ -84,7 +84,7 @@ class RenderBenchmark:
 
 
 def measure(report: Callable[[float, str], None]) -> RenderBenchmark:
-    """Measures every model, untrained, as its cost does not depend on its weights."""
+    """Measure every model, untrained, as its cost does not depend on its weights."""
     found = []
     with one_thread():
         machine = Machine.here()

@@ -216,7 +216,7 @@ def _holes(file: Path, tone: Path, playing: bool, reported: Counter[str], late_m
 
 
 def _play(stage: Stage, random: Random, seconds: float) -> int:
-    """Presses keys from another thread, as they come from outside; returns how many."""
+    """Press keys from another thread, as they come from outside; return how many."""
     steps_s = hands.steady(random, RATE_OF_PLAYING_HZ, seconds)
     thread = threading.Thread(target=hands.play, args=(_Keys(stage.window), random, steps_s), name="hands")
     thread.start()
@@ -248,7 +248,7 @@ class _Keys(QObject):
 
 
 def _be_restless(stage: Stage, random: Random, seconds: float, memory_mib: list[float]) -> tuple[int, int]:
-    """Returns how many changes and plucks there were, and adds what the process weighs at each rest."""
+    """Return how many changes and plucks there were, and add what the process weighs at each rest."""
     user = _User(stage, random)
     parts = max(2, round(seconds / PART_S))
     for _ in range(parts):
@@ -357,7 +357,7 @@ def _weighed_at_rest(stage: Stage) -> float:
 
 @contextmanager
 def collected_faults() -> Iterator[Counter[str]]:
-    """Collects what would be printed: exceptions of slots and threads, warnings of Python and Qt."""
+    """Collect what would be printed: exceptions of slots and threads, warnings of Python and Qt."""
     found: Counter[str] = Counter()
 
     def failed(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:

@@ -82,7 +82,7 @@ class SolverBenchmark:
 
 
 def measure(batch: int, steps: int, report: Callable[[float, str], None]) -> SolverBenchmark:
-    """Measures the solver. `batch`: trajectories at once for the speed; `steps`: samples of each."""
+    """Measure the solver. `batch`: trajectories at once for the speed; `steps`: samples of each."""
     protocol = []
     for number, data in enumerate(PROTOCOL):
         report(number / (len(PROTOCOL) + 1), f"{data.initial} {data.rate_hz} Hz")

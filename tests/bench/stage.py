@@ -43,7 +43,7 @@ class Stage:
         loop.exec()
 
     def wait_for(self, condition: Callable[[], bool], what: str, seconds: float = 0.0) -> None:
-        """Waits until `condition` holds.
+        """Wait until `condition` holds.
 
         Args:
             what: is waited for, in words.
@@ -62,7 +62,7 @@ class Stage:
             raise TimeoutError(f"{what} did not come within {patience_s:g} s; {self.window.notices.text}")
 
     def wait_until_rendered(self) -> None:
-        """Waits until the take of what is chosen is complete, and a pluck of it would sound at once."""
+        """Wait until the take of what is chosen is complete, and a pluck of it would sound at once."""
         stage = self.controller.performance
         self.wait_for(lambda: stage.ready and stage.settled and stage.at_hand, "the rendering of a pluck")
 
@@ -80,7 +80,7 @@ def silent(on_problem: ProblemListener) -> Sound:
 def opened(
     settings: Settings, size: tuple[int, int], make_sound: Callable[[ProblemListener], Sound] = Sound
 ) -> Iterator[Stage]:
-    """Opens the window with its first pluck rendered, and closes and deletes it afterwards. `size`: in pixels."""
+    """Open the window with its first pluck rendered, and close and delete it afterwards. `size`: in pixels."""
     choose_display()
     application = QApplication.instance() or QApplication(sys.argv[:1])
     assert isinstance(application, QApplication)

@@ -69,7 +69,7 @@ def _measure() -> dict[str, float]:
 
 
 def main() -> int:
-    """Starts the app as its command does, prints the times (`time.time`) as JSON, and ends it."""
+    """Start the app as its command does, print the times (`time.time`) as JSON, and end it."""
     from app.shared.thread_priority import wait_asleep
     from app.window.main import run
     from tests.bench.display import choose_display

@@ -66,7 +66,7 @@ class _Nobody:
 
 
 def measure(report: Callable[[float, str], None]) -> TakeBenchmark:
-    """Measures `PRESETS`."""
+    """Measure `PRESETS`."""
     found = []
     with one_thread(), ThreadPoolExecutor(1) as helper:
         machine = Machine.here()
@@ -99,7 +99,7 @@ def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
 
 
 def _finish(job: Job) -> tuple[float, float]:
-    """Finishes the job; returns processor time and wall-clock time in s."""
+    """Finish the job; return processor time and wall-clock time in s."""
     began_s, began_wall_s = time.process_time(), time.perf_counter()
     while not job.idle:
         job.advance()

@@ -3,10 +3,15 @@ from __future__ import annotations
 import json
 import sys
 from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
+from app.patches.instrument import Instrument, SingleString
+from app.patches.patch import Patch
+from engine.presets import SHIPPED
 from tests.bench.printing import show, target
+from training.cli.console import Failure
 
 
 def test_bench_solver_reports_cost_and_error(run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -118,6 +123,26 @@ def test_bench_notes_says_what_is_missing(run, monkeypatch: pytest.MonkeyPatch) 
     rings = run("notes", "--instrument", "concert_harp")
     assert rings.status == 1 and "ring on" in rings.err
     assert run("notes", "--buffer", "huge").status == 2
+
+
+def test_bench_play_plays_an_instrument_or_a_single_string(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    played: list[Instrument] = []
+
+    def measure(*options: Any) -> None:
+        played.append(options[5])
+        raise Failure("enough")
+
+    monkeypatch.setattr("tests.bench.play.measure.measure", measure)
+    assert run("play").status == run("play", "--preset", "studio_nylon_b3").status == 1
+    assert [each.name if isinstance(each, Patch) else each for each in played] == [
+        "Concert harp",
+        SingleString(preset="studio_nylon_b3"),
+    ]
+    nobody = run("play", "--preset", "studio_nylon_b4")
+    assert nobody.status == 1 and "did you mean studio_nylon_b3" in nobody.err
+    assert run("play", "--preset", str(SHIPPED / "studio_nylon_b3.safetensors")).status == 1
+    assert run("play", "--preset", str(SHIPPED)).status == 2
+    assert len(played) == 3
 
 
 @pytest.mark.parametrize("words", [[], ["solver"], ["train"], ["play"], ["tour"], ["soak"]])

@@ -86,7 +86,7 @@ class SeedsBenchmark:
 
 
 def measure(report: Callable[[float, str], None]) -> TrainBenchmark:
-    """Measures each model at the paper's size, on random data, on which its cost does not depend."""
+    """Measure each model at the paper's size, on random data, on which its cost does not depend."""
     found = []
     for number, name in enumerate(MODELS):
         report(number / len(MODELS), name)

@@ -86,7 +86,7 @@ def loudness_db(sound: NDArray[np.floating], rate_hz: int = RATE_HZ) -> float:
 def measure(
     patches: Sequence[tuple[Patch, Preset]], every: int, report: Callable[[float, str], None]
 ) -> TuneBenchmark:
-    """Measures one of every so many keys of each patch."""
+    """Measure one of every so many keys of each patch."""
     found = []
     for number, (patch, preset) in enumerate(patches):
         report(number / len(patches), patch.name)

@@ -126,7 +126,7 @@ class VoicesBenchmark:
 
 
 def measure(report: Callable[[float, str], None]) -> VoicesBenchmark:
-    """Measures every studio preset."""
+    """Measure every studio preset."""
     paths = [path for path in preset_files(SHIPPED) if path.stem.startswith(STUDIO)]
     voices: list[VoiceCost] = []
     strikes = []

@@ -1,4 +1,4 @@
-"""One command alone, where no app is: `python -m training.cli PLAN` is `sweep`."""
+"""A command by itself, where no app is: `python -m training.cli PLAN` is `sweep`."""
 
 import sys
 from collections.abc import Callable

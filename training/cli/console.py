@@ -31,7 +31,7 @@ class Shares:
         self._report, self._pieces, self._begun = report, pieces, 0
 
     def next(self) -> Callable[[float], None]:
-        """Begin the next piece; returns a function that is called with the share of it that is done, 0 … 1."""
+        """Begin the next piece; return a function that is called with the share of it that is done, 0 … 1."""
         before, self._begun = self._begun, self._begun + 1
         return lambda share: self._report((before + share) / self._pieces)
 

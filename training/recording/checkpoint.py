@@ -95,7 +95,7 @@ def save(path: Path, takes: Takes, steps: int) -> None:
 
 
 def restore(path: Path, takes: Takes, steps: int) -> int:
-    """Set the takes to a checkpoint; returns how many of all `steps` are done, 0 where there is no file.
+    """Set the takes to a checkpoint; return how many of all `steps` are done, 0 where there is no file.
 
     Raises:
         SchemaError: the file is damaged; the message names it and the remedy.

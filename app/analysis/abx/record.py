@@ -127,7 +127,7 @@ def default_folder() -> Path:
 
 
 def save_record(folder: Path, record: AbxRecord) -> Path:
-    """Write a new file, whole or not at all, and return its path; makes the folder, overwrites no earlier result.
+    """Write a new file, whole or not at all, and return its path; make the folder, overwrite no earlier result.
 
     Raises:
         WriteError: the folder or the file cannot be written.

@@ -265,7 +265,7 @@ class Browser(QFrame):
         self.list.scrollTo(self.list.currentIndex())
 
     def dismiss(self) -> None:
-        """Closes, and gives the focus back; a filter that nothing passes is cleared."""
+        """Close, and give the focus back; a filter that nothing passes is cleared."""
         self._rest.stop()
         self.hide()
         if self._before is not None and self._before.isVisible():
@@ -322,7 +322,7 @@ class Browser(QFrame):
             self.select(name)
 
     def select(self, name: str = "") -> None:
-        """Select an entry, or the best hit where it is not listed. Loads nothing."""
+        """Select an entry, or the best hit where it is not listed. Load nothing."""
         self.selected = name if name in self.listed else self.best_hit
         self._filling = True
         self.list.setCurrentIndex(self.list.index_of(self.selected))
@@ -347,7 +347,7 @@ class Browser(QFrame):
             self._start_rest()
 
     def press(self, key: Qt.Key) -> None:
-        """Handles one of MOVES, Space, D or one of CLOSES."""
+        """Handle one of MOVES, Space, D or one of CLOSES."""
         if key in MOVES:
             self.move_selection(key)
         elif key == KEYS.Key_Space:

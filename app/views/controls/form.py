@@ -105,7 +105,7 @@ class FilePicker(QWidget):
         return str(Path(self.edit.text().strip()).parent)
 
     def follow(self, folder: str) -> None:
-        """Suggest names in this folder from now on, where another file was saved; keeps a name that was given."""
+        """Suggest names in this folder from now on, where another file was saved; keep a name that was given."""
         self._folder = folder
         typed = self.edit.text().strip()
         if typed:

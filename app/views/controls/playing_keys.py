@@ -53,7 +53,7 @@ class PlayingKeys(QObject):
         application.focusChanged.connect(self._watch)
 
     def _watch(self, _: QWidget | None, now: QWidget | None) -> None:
-        """Filters the focused widget alone: every event of a filtered one comes here, which costs time."""
+        """Filter the focused widget alone: every event of a filtered one comes here, which costs time."""
         if self._watched is not None:
             self._watched.removeEventFilter(self)
         self._watched = None

@@ -21,7 +21,7 @@ _GAP, _BETWEEN = 6, 18
 
 
 def paint_sources(painter: QPainter, sources: Sequence[ShownSource], x: float, middle: float, right: float) -> float:
-    """Paint a row from `x` to `right` at most, in pixels; cuts titles that do not fit. Returns the row's end."""
+    """Paint a row from `x` to `right` at most, in pixels; cut titles that do not fit. Return the row's end."""
     painter.setFont(theme.small_font(12, bold=True))
     metrics = painter.fontMetrics()
     for source, text in zip(sources, _texts(sources, metrics, right - x), strict=True):

@@ -85,7 +85,7 @@ class TimePlot(KeptPlot):
         self._untrained.setVisible(inside and self._shaded)
 
     def show_playhead(self, position_s: float) -> None:
-        """Move the playhead; costs nothing where it is there already."""
+        """Move the playhead, at no cost where it is there already."""
         if position_s != self.line_at:
             self.move_line(position_s)
 

@@ -138,7 +138,7 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
         self._colour(first)
 
     def _colour(self, first: int) -> None:
-        """Colours the levels from a column on. A line says so where all are below the range, and nothing is seen."""
+        """Colour the levels from a column on. A line says so where all are below the range, and nothing is seen."""
         share = self._levels_db[first : self._drawn] / self.range_db + 1
         self._pixels[first : self._drawn] = np.clip(share, 0, 1) * 255
         if self._drawn:

@@ -198,7 +198,7 @@ class SpectrumPanel(Panel):
         self.show_signal(heard.source, signal, analyser)
 
     def set_rate(self, rate_hz: int) -> None:
-        """Fits the frequency axis to a rate."""
+        """Fit the frequency axis to a rate."""
         if rate_hz != self._rate_hz:
             self._rate_hz = rate_hz
             self._fit()

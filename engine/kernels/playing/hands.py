@@ -201,7 +201,7 @@ def _is_meant(event: Event, note: Note) -> bool:
 
 @njit(**COMPILED)
 def tune(player: Player, table: Table, event: Event, frame: int, now: int) -> None:
-    """Bends single notes."""
+    """Bend single notes."""
     semitones = min(max(event.value, -channels.WIDEST_SEMITONES), channels.WIDEST_SEMITONES)
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
@@ -278,7 +278,7 @@ def _pluck_again(
     note: Note,
     frame: int,
 ) -> None:
-    """Plucks the string of a note again: another note with its number, which ends without a report of its own."""
+    """Pluck the string of a note again: another note with its number, which ends without a report of its own."""
     event = player.again
     clear(event)
     event.frame, event.kind = frame, of.NOTE_ON

@@ -13,7 +13,7 @@ from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import HARMONICS, MOD_WHEEL, SLIDE, Controller, Event, NoteOn, PatchTurned
 from app.instrument.strings import KNOBS
-from app.instrument.table import _row, wheeled
+from app.instrument.table import wheeled
 from app.patches.drums import Drums
 from app.patches.library import SHIPPED, list_patches
 from app.patches.patch import ASSIGNABLE, VELOCITIES, WHEEL, Fretted, Patch
@@ -84,7 +84,7 @@ def test_no_knob_turns_a_string_into_an_impossible_one(patch: Patch) -> None:
         return
     own = [chosen.string] if isinstance(chosen, Fretted) else [each.string for each in chosen.strings]
     for string, knobs in itertools.product(own[:: max(len(own) - 1, 1)], itertools.product(*limits)):
-        strings.turned(np.array(_row(string)), np.array(knobs), found)
+        strings.turned(np.array(string.row), np.array(knobs), found)
         assert strings.possible(found), (knobs, found)
 
 

@@ -103,7 +103,7 @@ def fit_baseline(
     made: Callable[[float], None] = lambda share: None,
     report: Callable[[BaselineProgress], None] = lambda progress: None,
 ) -> TrainedBaseline:
-    """Trains, or continues with the run whose checkpoint is at `path`; the best model on the validation strings.
+    """Train, or continue with the run whose checkpoint is at `path`; the best model on the validation strings.
 
     Args:
         minutes: of processor time of one thread, the making of the motions not counted.

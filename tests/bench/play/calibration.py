@@ -68,7 +68,7 @@ class Transit:
 
 
 def click_through(server: SoundServer) -> list[Handed]:
-    """Plays clicks at several buffers, one after the other, while nothing else plays.
+    """Play clicks at several buffers, one after the other, while nothing else plays.
 
     Raises:
         RuntimeError: PortAudio does not play into the server.

@@ -27,7 +27,7 @@ SOUND_AND_SCREEN = ("pulseaudio", "pacat", "parec", "pactl", "Xvfb")
 
 
 def need_programs(*programs: str) -> None:
-    """Raises `Missing` with the names of those that are absent, and what to install."""
+    """Raise `Missing` with the names of those that are absent, and what to install."""
     absent = [program for program in programs if shutil.which(program) is None]
     if absent:
         packages = " ".join(sorted({PACKAGES[program] for program in absent}))

@@ -38,7 +38,7 @@ LATE_S = 0.003
 
 @contextlib.contextmanager
 def steady_tone(server: SoundServer, folder: Path, buffer: Buffer) -> Iterator[Recording]:
-    """Plays and records it until the block ends."""
+    """Play and record it until the block ends."""
     _make_sink(server)
     with recording(server, folder / "control", SINK) as recorded, _tone(server, folder, buffer):
         recorded.wait_for_sound(0.0, PATIENCE_S)  # so that it does not start while the app does
@@ -85,7 +85,7 @@ def holes_ms(tone: Recording, begin_s: float, end_s: float) -> list[float]:
 
 
 def main(buffer: str) -> None:
-    """Plays until the process is ended. `buffer`: see `Buffer`."""
+    """Play until the process is ended. `buffer`: see `Buffer`."""
     from app.audio.sound import Sound
     from app.playing.pair import Pair
     from app.window.audio_control import LATENCY_S

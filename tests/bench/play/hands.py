@@ -9,11 +9,13 @@ from typing import Protocol
 
 from app.instrument.events import Event, NoteOff, NoteOn, TimedEvent
 from app.patches.drums import Drums
+from app.patches.instrument import Instrument, SingleString
 from app.patches.patch import Patch
 from tests.bench.play.midi import Cable
 from tests.bench.play.screen import Screen
 
 KEYS = ("a", "w", "s", "e", "d", "f", "t", "g", "y", "h", "u", "j", "k", "o", "l", "p", "semicolon")
+ROW = ("a", "s", "d", "f", "g", "h", "j", "k", "l", "semicolon")  # places along a single string
 LOWEST = 48  # the MIDI key that the first of them plays
 OCTAVE_DOWN, OCTAVE_UP = "z", "x"
 DIGITS = {round(1 + (digit - 1) / 8 * 126): str(digit) for digit in range(1, 10)}  # by the velocity that they set
@@ -21,14 +23,18 @@ HELD_S = 0.03
 SHORTEST_STEP_S = 0.04
 
 
-def octave_of(patch: Patch) -> int:
+def octave_of(instrument: Instrument) -> int:
     """That to which the computer's keys are transposed so that most of them sound, the nearest to 0."""
-    return max(range(-LOWEST // 12, 5), key=lambda octave: (len(_sounding(patch, octave)), -abs(octave)))
+    if isinstance(instrument, SingleString):
+        return 0
+    return max(range(-LOWEST // 12, 5), key=lambda octave: (len(_sounding(instrument, octave)), -abs(octave)))
 
 
-def keys_of(patch: Patch) -> tuple[str, ...]:
+def keys_of(instrument: Instrument) -> tuple[str, ...]:
     """The computer's keys that sound then."""
-    return tuple(KEYS[place] for place in _sounding(patch, octave_of(patch)))
+    if isinstance(instrument, SingleString):
+        return ROW
+    return tuple(KEYS[place] for place in _sounding(instrument, octave_of(instrument)))
 
 
 def _sounding(patch: Patch, octave: int) -> list[int]:
@@ -38,13 +44,13 @@ def _sounding(patch: Patch, octave: int) -> list[int]:
 
 
 def press(screen: Screen, key: str) -> None:
-    """Presses a key and releases it at once."""
+    """Press a key and release it at once."""
     screen.key(key, True)
     screen.key(key, False)
 
 
 def tap(screen: Screen, key: str) -> float:
-    """Presses and releases a key; returns when it was pressed."""
+    """Press and release a key; return when it was pressed."""
     pressed_s = screen.key(key, True)
     time.sleep(HELD_S)
     screen.key(key, False)
@@ -52,7 +58,7 @@ def tap(screen: Screen, key: str) -> float:
 
 
 def play(screen: Screen, random: Random, steps_s: Sequence[float], keys: Sequence[str] = KEYS) -> list[float]:
-    """Taps random keys of these, `steps_s` apart; returns when each was pressed."""
+    """Tap random keys of these, `steps_s` apart; return when each was pressed."""
     pressed_s = []
     due_s = time.monotonic()
     for step_s in steps_s:
@@ -63,7 +69,7 @@ def play(screen: Screen, random: Random, steps_s: Sequence[float], keys: Sequenc
 
 
 def play_in_turn(screen: Screen, keys: Sequence[str], step_s: float) -> list[float]:
-    """Taps these keys, `step_s` apart, each held for most of it; returns when each was pressed."""
+    """Tap these keys, `step_s` apart, each held for most of it; return when each was pressed."""
     pressed_s = []
     for key in keys:
         pressed_s.append(screen.key(key, True))
@@ -86,7 +92,7 @@ class Hand(Protocol):
     turns: bool
 
     def do(self, event: Event) -> float:
-        """Plays an event; returns when (`time.monotonic`)."""
+        """Play an event; return when (`time.monotonic`)."""
 
 
 class MidiHand:
@@ -113,7 +119,7 @@ class KeyHand:
         self._down: dict[int, str] = {}
 
     def do(self, event: Event) -> float:
-        """Raises ValueError for an event that the computer's keys cannot play."""
+        """Raise ValueError for an event that the computer's keys cannot play."""
         if isinstance(event, NoteOff):
             return self._screen.key(self._down.pop(event.key), False)
         if not isinstance(event, NoteOn):
@@ -131,7 +137,7 @@ class KeyHand:
 
 
 def perform(hand: Hand, events: Sequence[TimedEvent], seconds: float) -> list[TimedEvent]:
-    """Plays events at their times; returns them with the times at which they were played (`time.monotonic`)."""
+    """Play events at their times; return them with the times at which they were played (`time.monotonic`)."""
     began_s, played = time.monotonic(), []
     for each in events:
         time.sleep(max(began_s + each.time_s - time.monotonic(), 0))

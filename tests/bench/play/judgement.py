@@ -71,7 +71,7 @@ class Judgement:
 
 
 def judge(played: Played, patch: Patch, sound: Sound, at: At) -> Judgement:
-    """Judges the recording of a patch without body and room, whose strings are damped when keys are released."""
+    """Judge the recording of a patch without body and room, whose strings are damped when keys are released."""
     tuning = Tuning(patch.tuning)
     faults = _faults(played, sound, at)
     gaps = [*faults.holes, *(analysis.Span(click, click + 1) for click in faults.clicks)]

@@ -21,7 +21,7 @@ import numpy as np
 import psutil
 
 from app.audio.choices import Buffer, SoundChoice
-from app.patches.patch import Patch
+from app.patches.instrument import Instrument, SingleString
 from app.session.choices import Choices
 from app.window.settings import Settings
 from tests.bench.machine import Machine
@@ -94,6 +94,7 @@ class PlayBenchmark:
     """The whole measurement.
 
     Attributes:
+        instrument: its name, or that of a single string's preset.
         rate_hz: plucks per second.
         buffer: as chosen; `buffer_ms`: its length where it was chosen in frames.
         size: of the window in pixels.
@@ -106,7 +107,7 @@ class PlayBenchmark:
 
     machine: Machine
     seed: int
-    patch: str
+    instrument: str
     rate_hz: float
     buffer: Buffer
     buffer_ms: float | None
@@ -140,10 +141,12 @@ def measure(
     buffer: Buffer,
     busy: tuple[bool, ...],
     seed: int,
-    patch: Patch,
+    instrument: Instrument,
     report: Callable[..., None],
 ) -> PlayBenchmark:
-    """Plays a patch for `seconds` at `rate_hz` notes per second, once for each entry of `busy`.
+    """Play `instrument` for `seconds` at `rate_hz` notes per second, once for each entry of `busy`.
+
+    A single string is played in the Lab.
 
     Raises:
         Missing: a program or library is not there.
@@ -169,7 +172,8 @@ def measure(
         shown("clicks")
         clicks = click_through(server)
         shown("start")
-        choices, keys = Choices(instrument=patch, octave=hands.octave_of(patch)), hands.keys_of(patch)
+        single, keys = isinstance(instrument, SingleString), hands.keys_of(instrument)
+        choices = Choices(instrument=instrument, octave=hands.octave_of(instrument), face="lab" if single else "play")
         settings = Settings(choices=choices, sound=SoundChoice(rate_hz=RATE_HZ, buffer=buffer))
         control = stack.enter_context(steady_tone(server, folder, buffer))
         started_s = time.monotonic()
@@ -197,7 +201,7 @@ def measure(
         return PlayBenchmark(
             Machine.here(),
             seed,
-            patch.name,
+            instrument.preset if isinstance(instrument, SingleString) else instrument.name,
             rate_hz,
             buffer,
             1000 * buffer / RATE_HZ if isinstance(buffer, int) else None,

@@ -44,7 +44,7 @@ class Cable:
     _arrived_s: list[float] = field(default_factory=list)
 
     def send(self, event: Event) -> float:
-        """Sends an event; returns when (`time.monotonic`)."""
+        """Send an event; return when (`time.monotonic`)."""
         sent_s = time.monotonic()
         for message in messages_of(event):
             self._sent_s.append(time.monotonic())
@@ -56,7 +56,7 @@ class Cable:
         return load_backend().virtual_output(name)
 
     def hear(self, _message: Any) -> None:
-        """Receives a message at the other end, in the port's thread."""
+        """Receive a message at the other end, in the port's thread."""
         self._arrived_s.append(time.monotonic())
 
     @property
@@ -74,7 +74,7 @@ class Cable:
 
 @contextlib.contextmanager
 def cable(folder: Path) -> Iterator[Cable]:
-    """Starts the server, with its files in `folder`, and ends it afterwards. The user's own MIDI is left alone.
+    """Start the server, with its files in `folder`, and end it afterwards. The user's own MIDI is left alone.
 
     Raises:
         Missing: it did not start, or MIDI or JACK is not supported here.

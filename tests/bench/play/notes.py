@@ -99,7 +99,7 @@ class _Played:
 
 
 def measure(by: By, buffer: Buffer, seed: int, patch: Patch, report: Callable[..., None]) -> NotesBenchmark:
-    """Plays the piece by MIDI, keys or both, and judges the recording.
+    """Play the piece by MIDI, keys or both, and judge the recording.
 
     Raises:
         Missing: a program, a library or a MIDI port is not there.

@@ -93,11 +93,11 @@ class Recording:
                     self.sounded_s = now_s
 
     def wait_for_sound(self, since_s: float, seconds: float) -> bool:
-        """Waits until something audible came after `since_s`; False where nothing did within `seconds`."""
+        """Wait until something audible came after `since_s`; False where nothing did within `seconds`."""
         return self._wait(lambda: self.sounded_s > since_s, seconds)
 
     def wait_for_silence(self, silence_s: float, seconds: float) -> bool:
-        """Waits until nothing audible came for `silence_s`; False where it did not end within `seconds`."""
+        """Wait until nothing audible came for `silence_s`; False where it did not end within `seconds`."""
         return self._wait(lambda: time.monotonic() - self.sounded_s > silence_s, seconds)
 
     def wait_for_end(self) -> None:
@@ -124,7 +124,7 @@ class Recording:
 
 @contextlib.contextmanager
 def recording(server: SoundServer, path: Path, sink: str = SINK) -> Iterator[Recording]:
-    """Records what a sink is given into `path` until the block ends."""
+    """Record what a sink is given into `path` until the block ends."""
     reading, writing = _pipe()
     with reading:
         with child(_recorder(CHANNELS, sink), server.environment, stdout=writing):
@@ -136,7 +136,7 @@ def recording(server: SoundServer, path: Path, sink: str = SINK) -> Iterator[Rec
 
 @contextlib.contextmanager
 def recording_aside(server: SoundServer, path: Path, sink: str = SINK) -> Iterator[None]:
-    """Records the mean of both channels, float32 (frames,), into `path`, by another process alone."""
+    """Record the mean of both channels, float32 (frames,), into `path`, by another process alone."""
     with path.open("wb") as file, child(_recorder(1, sink), server.environment, stdout=file):
         yield
 

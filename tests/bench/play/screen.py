@@ -51,7 +51,7 @@ class Screen:
         return None
 
     def take(self, window: Window) -> None:
-        """Makes a window as large as the screen and gives it the keyboard, as a window manager does."""
+        """Make a window as large as the screen and give it the keyboard, as a window manager does."""
         from Xlib import X
 
         window.configure(x=0, y=0, width=SIZE[0], height=SIZE[1], stack_mode=X.Above)
@@ -63,7 +63,7 @@ class Screen:
         return found.width, found.height
 
     def key(self, name: str, down: bool) -> float:
-        """Presses or releases a key, by the name of its keysym; returns when it was sent (`time.monotonic`)."""
+        """Press or release a key, by the name of its keysym; return when it was sent (`time.monotonic`)."""
         from Xlib import XK, X
         from Xlib.ext import xtest
 
@@ -85,7 +85,7 @@ class Screen:
 
 @contextlib.contextmanager
 def private_screen() -> Iterator[Screen]:
-    """Starts an X server on a free display number, and ends it afterwards.
+    """Start an X server on a free display number, and end it afterwards.
 
     Raises:
         Missing: it did not start, or python-xlib is missing.

@@ -115,7 +115,7 @@ class SoundServer:
 
 @contextlib.contextmanager
 def sound_server(folder: Path) -> Iterator[SoundServer]:
-    """Starts the server, with its files in `folder`, and ends it afterwards. The user's own sound is left alone.
+    """Start the server, with its files in `folder`, and end it afterwards. The user's own sound is left alone.
 
     Raises:
         Missing: it did not start.

@@ -96,7 +96,7 @@ class _Stay:
 
 
 def measure(patches: Sequence[Patch], buffer: Buffer, out: Path | None, report: Callable[..., None]) -> Tour:
-    """Plays all of them in turn; `out` becomes the recording.
+    """Play all of them in turn; `out` becomes the recording.
 
     Raises:
         Missing: a program or library is not there.
@@ -145,14 +145,14 @@ def measure(patches: Sequence[Patch], buffer: Buffer, out: Path | None, report: 
 
 
 def _silence(screen: Screen, recorded: Recording) -> None:
-    """Waits for silence, and stops what rings on."""
+    """Wait for silence, and stop what rings on."""
     if not recorded.wait_for_silence(SILENCE_S, PATIENCE_S):
         hands.tap(screen, STOP)  # which in silence would pluck
         recorded.wait_for_silence(SILENCE_S, DECAY_PATIENCE_S)
 
 
 def _choose(screen: Screen, settings: Path, patch: Patch, process: subprocess.Popen[bytes]) -> None:
-    """Chooses an instrument in the browser by its name, and the octave in which most of its keys sound."""
+    """Choose an instrument in the browser by its name, and the octave in which most of its keys sound."""
     _with_control(screen, "i")
     time.sleep(0.3)
     for letter in re.sub(r"[^a-z0-9]+", " ", patch.name.lower()):

@@ -85,7 +85,7 @@ class Unplugged:
 
 
 def measure(times: int, seed: int, patch: Patch, report: Callable[..., None]) -> Unplugged:
-    """Takes the device away so many times.
+    """Take the device away so many times.
 
     Raises:
         Missing: A program or library is not there.

@@ -30,7 +30,7 @@ class Outcome:
 
 
 def outcome(case: Case, fitted: bool) -> Outcome:
-    """Examines a case, and learns it where it is `fitted`, as the command does."""
+    """Examine a case, and learn it where it is `fitted`, as the command does."""
     try:
         found = examined(*case.sound)
     except RecordingError as error:

@@ -146,7 +146,7 @@ def test_a_pulse_is_a_kick_at_its_middle() -> None:
         ({"thickness_m": -1.0}, "thickness_m must lie in"),
         ({"tension_n_m": 1e9}, "tension_n_m must lie in"),
         ({"width_m": 0.2}, "two diameters, nearly the same"),
-        ({"shape": "square"}, "must be one of circle, rectangle"),
+        ({"shape": "square"}, "drum parameter shape 'square' is not one of circle, rectangle, bar"),
         ({"shell_m": 0.2}, "shell_m is of an open shell in air"),
         ({"shell_m": 0.2, "air_kg_m3": 1.2, "cavity_m3": 0.1}, "shell_m is of an open shell in air"),
         ({"thickness_m": 0.02, "length_m": 0.1, "width_m": 0.1}, "below a tenth of the sides"),

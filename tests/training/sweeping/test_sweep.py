@@ -238,27 +238,35 @@ def wait_until(reached: Callable[[], bool]) -> None:
 
 
 class Killer(Record):
-    """Kills a worker's process some epochs into its run."""
+    """Kills the process of the first run that is found some epochs into its training."""
 
     def __init__(self, runs: Path) -> None:
         super().__init__()
         self._runs = runs
-        self.killed = 0
-        self.resumed_at = 0  # the first epoch that is reported of the victim after that
-
-    def _are_under_way(self) -> bool:
-        """Return True if both processes are some epochs into their runs, whichever is killed."""
-        logs = [log.read_text(encoding="utf-8") for log in self._runs.glob("*/log.csv")]
-        return len(logs) > 1 and all(log.count("\n") > 3 for log in logs)
+        self.victim = ""
+        self.kept: list[str] = []  # lines of the victim's log whose epochs its checkpoint had
 
     def progressed(self, run: Any, progress: Progress) -> None:
-        if not self.killed:
-            wait_until(self._are_under_way)
-            victim = multiprocessing.active_children()[0]
-            self.killed = victim.pid or 0
-            victim.kill()
-        elif self.failures and self.failures[0][0] == run.name and not self.resumed_at:
-            self.resumed_at = progress.epoch
+        if self.victim:
+            return
+        wait_until(lambda: len(self.lines_of(run.name)) > 4)
+        for process in map(psutil.Process, (child.pid for child in multiprocessing.active_children())):
+            process.suspend()  # or it could end its run meanwhile
+            *lines, _ = self.lines_of(run.name)
+            if _trains(process, run.name) and len(lines) < progress.epochs:
+                self.victim, self.kept = run.name, lines
+                process.kill()
+                return
+            process.resume()
+
+    def lines_of(self, name: str) -> list[str]:
+        log = self._runs / name / "log.csv"
+        return log.read_text(encoding="utf-8").splitlines() if log.exists() else []
+
+
+def _trains(process: psutil.Process, name: str) -> bool:
+    """Return True if a process holds the lock of a run's folder."""
+    return any(Path(file.path).parts[-2:] == (name, "run.lock") for file in process.open_files())
 
 
 def measured(file: Path) -> list[list[Any]]:
@@ -285,14 +293,12 @@ def test_a_sweep_whose_worker_is_killed_is_that_of_one_left_alone(
     assert not multiprocessing.active_children()
     assert [(row.name, row.status) for row in rows] == [(run.name, "done") for run in made.runs]
     assert len(rows) == 8
-    ((victim, error),) = killer.failures
+    ((_, error),) = killer.failures
     assert error.startswith("its worker died") and "BrokenProcessPool" in error
     assert measured(options.results) == expected
-    assert killer.resumed_at > 1  # from its checkpoint
-    log = options.runs / made.name / victim / "log.csv"
-    assert [line.split(",")[0] for line in log.read_text(encoding="utf-8").split()[1:]] == [
-        str(epoch) for epoch in range(1, 16)
-    ]
+    log = killer.lines_of(killer.victim)
+    assert log[: len(killer.kept)] == killer.kept  # continued from its checkpoint: their seconds would be others
+    assert [line.split(",")[0] for line in log[1:]] == [str(epoch) for epoch in range(1, 16)]
 
     # the same plan again: nothing to do, nothing changed
     before = options.results.read_bytes()
