@@ -44,7 +44,7 @@ CLAUSES = re.compile(
 # third person, of functions
 THIRD = re.compile(
     r"(Adds|Begins|Closes|Computes|Draws|Ends|Fills|Finds|Follows|Forgets|Gives|Keeps|Lets|Loads|Makes|Moves|Opens|Puts"
-    r"|Raises|Reads|Renders|Returns|Says|Sends|Sets|Shows|Starts|Stops|Takes|Tells|Turns|Waits|Writes)\b"
+    r"|Raises|Reads|Renders|Returns|Says|Sends|Sets|Shows|Starts|Stops|Takes|Tells|Trains|Turns|Waits|Writes)\b"
 )
 LONGEST = 30  # words of a sentence
 LONGEST_SUBJECT = 72

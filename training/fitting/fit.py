@@ -100,7 +100,7 @@ def fit(
     report: Callable[[Progress], None] = lambda progress: None,
     checkpoint_every_s: float | None = None,
 ) -> FitResult:
-    """Trains, or continues with the run in `run_folder`; what has a closed form (DMD) is computed at once.
+    """Train, or continue the run in `run_folder`; what has a closed form (DMD) is computed at once.
 
     Args:
         report: called after every epoch, and every few seconds within.
