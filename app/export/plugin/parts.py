@@ -16,8 +16,8 @@ from app.shared.parameters import OF_PATCHES
 from engine.effects.body_record import body_memory
 from engine.kernels import constants as of
 from engine.kernels import drum_modes as kernel
-from engine.kernels import kit
-from engine.kernels.fields import slots
+from engine.kernels.fields import record_of, slots
+from engine.kernels.kit_records import KIT, KIT_DRUM
 from engine.kernels.records import DRUM, DRUM_ROWS
 from engine.resonators.base import Array
 from engine.resonators.drum import around as around_of
@@ -74,7 +74,7 @@ def kit_of(own: DrumKeys) -> Kit:
         if air.size < known_air.size:
             air, reach = known_air, known_reach
         around[kind] = max(rows, longest, key=np.size), air, reach
-    memory, slots, furthest = np.zeros(kit.FIRST_KEY + of.KEYS * kit.KEY), dict[int, int](), 0.0
+    memory, places_of, furthest = np.zeros(slots(KIT)), dict[int, int](), 0.0
 
     def put(part: Array) -> int:
         nonlocal memory
@@ -86,20 +86,22 @@ def kit_of(own: DrumKeys) -> Kit:
         kind = drum.shape, drum.aspect
         (rows, air, reach), (rows_at, air_at) = around[kind], places[kind]
         furthest = max(furthest, reach / 2, rows[0, -1] * math.hypot(*played.place))
-        whole = np.array([rows_at, rows.shape[1], air_at, *air.shape[1:]])
-        slots[played.note] = put(np.concatenate([struck_drum(played, drum), whole.view(np.float64), [reach]]))
-    counts = memory.view(np.int64)
+        struck = np.zeros(1, KIT_DRUM)
+        struck[0] = struck_drum(played, drum), rows_at, rows.shape[1], air_at, *air.shape[1:], reach
+        places_of[played.note] = put(struck.view(np.float64))
+    kit = record_of(memory, KIT)
     for key in range(of.KEYS):
         if (tuned := own.tuned_to(key)) is not None:
             played, ratio = tuned
-            first = kit.FIRST_KEY + key * kit.KEY
-            counts[first + kit.KEY_DRUM] = slots[played.note]
-            memory[first + kit.KEY_RATIO : first + kit.KEY_STALE] = ratio, played.softest_m_s, played.hardest_m_s
+            written = kit["keys"][key]
+            written["drum"], written["ratio"] = places_of[played.note], ratio
+            written["softest_m_s"], written["hardest_m_s"] = played.softest_m_s, played.hardest_m_s
     modes = min(of.MOST_DRUM_MODES, round(MORE * most) + 1)
     surface = max(rows.shape[1] for rows, *_ in around.values())
     steps, columns = int(furthest / kernel.STEP) + 2, int(furthest + 12 * math.cbrt(furthest)) + 20 + 2 * kernel.TERMS
     work = len(memory) + steps * columns
     first_mode = work + 4 * surface + kernel.ORDERS
-    memory[kit.HIGHEST_HZ] = highest_hz
-    counts[kit.CAPACITY : kit.STALE] = modes, surface, len(memory), steps, columns, work, first_mode
+    kit["highest_hz"], kit["capacity"], kit["most"] = highest_hz, modes, surface
+    kit["bessels"], kit["steps"], kit["columns"] = len(memory), steps, columns
+    kit["work"], kit["found"] = work, first_mode
     return Kit(memory, first_mode + of.KEYS * kernel.ROWS * modes - len(memory), modes)
