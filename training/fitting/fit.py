@@ -360,8 +360,9 @@ class Run:
             _keep_statistics(model)
 
     def _lay_out(self, epoch: int) -> None:
-        """Draw the batches of an epoch."""
-        self._batches = [rows.to(self.device) for rows in batches(self.recipe, self._data.count, epoch)]
+        """Draw the batches of an epoch, which go to the device at once."""
+        drawn = torch.cat(batches(self.recipe, self._data.count, epoch))
+        self._batches = drawn.to(self.device).split(self.recipe.batch_size)
 
     def learn_latents(self) -> None:
         """Move the encoder towards the fitted latents."""
