@@ -32,7 +32,8 @@ from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
 if TYPE_CHECKING:
     from engine.models import _fno_kernel as kernel
 
-KEPT_BYTES = {"cpu": 2_000_000_000, "cuda": 20_000_000_000}  # of a roll-out, for its gradient
+KEPT_BYTES = 2_000_000_000  # of a roll-out, for its gradient, on a CPU …
+KEPT_SHARE = 0.2  # … and of a GPU's memory
 
 
 @dataclass(frozen=True)
@@ -105,7 +106,7 @@ class _FourierRecurrent(StringModel[FieldState]):
         fields, parts = hidden.transpose(0, 1).contiguous(), []
         # a gradient needs much of every step: more than fits is kept for one stretch, computed again for the others
         step_bytes = self.kept_fields * fields.numel() * fields.element_size()
-        length = min(steps, max(1, KEPT_BYTES.get(hidden.device.type, KEPT_BYTES["cpu"]) // step_bytes))
+        length = min(steps, max(1, _kept_bytes(hidden.device) // step_bytes))
         for first in range(0, steps, length):
             count = min(length, steps - first)
             if length == steps:
@@ -205,6 +206,12 @@ class FRNN(_FourierRecurrent):
         out = _dense_arrays(self.out_mapping)
         for field, trajectory in zip(hidden, frames, strict=True):
             kernel.advance_frnn(field, trajectory, transforms, convolutions, pointwise, out)
+
+
+def _kept_bytes(device: torch.device) -> int:
+    if device.type != "cuda":
+        return KEPT_BYTES
+    return int(KEPT_SHARE * torch.cuda.get_device_properties(device).total_memory)
 
 
 @torch.no_grad()

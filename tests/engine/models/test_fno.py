@@ -11,7 +11,7 @@ import torch
 from engine.models._fno_transform import transform_matrices
 from engine.models.base import Physics, count_parameters
 from engine.models.configurations import FGRUConfiguration, FRNNConfiguration
-from engine.models.fno import FGRU, FRNN, KEPT_BYTES, FieldState, FourierConvolution
+from engine.models.fno import FGRU, FRNN, FieldState, FourierConvolution
 from engine.resonators.string import resonator_of
 from engine.values.string import StringParameters
 from tests.engine.tensors import convolved, listening_weights
@@ -156,7 +156,7 @@ def test_what_learns_agrees_with_the_definition(
     make: Make, points: int, kept_bytes: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Frames, last state and every gradient; also where steps are computed again for want of memory."""
-    monkeypatch.setitem(KEPT_BYTES, "cpu", kept_bytes)
+    monkeypatch.setattr("engine.models.fno.KEPT_BYTES", kept_bytes)
     model = drawn(make(points, 6)).double()
     start, wanted = initial(3, points).double(), torch.randn(3, 7, points, generator=torch.Generator().manual_seed(2))
     found = []
