@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from app.audio.impulse_file import ImpulseError, cut_words
+from app.audio.impulse_file import LONGEST_FILE_S, ImpulseError, cut_words
 from app.audio.note_file import NOTE_LENGTHS_S
 from app.audio.sound_file import UnreadableSound, open_sound
 from app.export.recipe import NoRecipe, Recipe, RecipeError, changed_notices, preset_of, read_recipe
@@ -65,6 +65,9 @@ def _other_sound(file: Path) -> Dropped:
     except UnreadableSound:
         seconds = 0.0
     shortest_s, longest_s = NOTE_LENGTHS_S
+    if seconds > longest_s:
+        lengths = f"a note of at most {longest_s:g} s, or a body's response of at most {LONGEST_FILE_S:g} s"
+        return Dropped(notice=f"{file}: lasts {seconds:.0f} s; cut out {lengths}, and drop that")
     return Dropped(sound=True) if shortest_s <= seconds <= longest_s else receive_body(file)
 
 

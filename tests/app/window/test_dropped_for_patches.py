@@ -149,13 +149,15 @@ def test_a_dropped_sound_without_a_recipe_is_a_body_and_the_patch_stands_on_it(
     assert patched.patches.patch == before
 
 
-def test_a_sound_that_is_no_body_is_reported_and_changes_nothing(
+def test_a_sound_longer_than_a_note_or_body_is_refused_with_what_to_cut_out(
     own_folder: Path, patched: Controller, tmp_path: Path
 ) -> None:
     before = patched.session.choices
     for path in (knock(tmp_path / "long.wav", seconds=61.0), knock(tmp_path / "long.flac", seconds=61.0)):
         drop(patched, path)
-        assert f"{path}: no impulse response that can be used" in patched.window.notices.text
+        assert (
+            f"{path}: lasts 61 s; cut out a note of at most 60 s, or a body's response" in patched.window.notices.text
+        )
     assert patched.session.choices == before
     assert not own_bodies().exists()
 
