@@ -46,7 +46,7 @@ def about_text(settings: Path, presets: Path) -> str:
             f"After {CITATION}",
             "",
             f"Settings: {settings}",
-            f"Shipped presets: {presets}",
+            f"Factory presets: {presets}",
             f"Your own presets: {user_folder()}",
             f"Log: {log_file()}",
             "",

@@ -85,7 +85,7 @@ def _preset(file: Path, library: Library) -> Dropped:
     entry = library.find(installed.name)
     if entry is None:
         return Dropped(notice=f"{installed.path}: cannot be used; check that the file still exists")
-    whose = "your own" if installed.path.parent == user_folder() else "the shipped"
+    whose = "your own" if installed.path.parent == user_folder() else "the factory"
     notice = f"{file.name} is {whose} preset “{entry.info.title}” already; nothing was copied."
     return Dropped({"preset": entry.name}, notice if installed.was_there else "")
 
