@@ -113,7 +113,7 @@ def test_a_dropped_preset_that_is_there_is_chosen_and_reported(
 ) -> None:
     dropped = receive(small_preset, library)
     assert dropped.choices == {"preset": "first"}
-    assert "is the shipped preset “A small string" in dropped.notice
+    assert "is the factory preset “A small string" in dropped.notice
     assert not own.exists()
     new = other_preset(small_preset, tmp_path / "New.safetensors")
     for notice in ("", "New.safetensors is your own preset “Another string"):

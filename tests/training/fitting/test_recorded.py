@@ -52,7 +52,8 @@ def test_a_step_asks_nothing_of_the_host(name: str, small_dataset: Dataset, monk
             backward(model, batch, EVERY)
             torch.nn.utils.clip_grad_norm_(model.parameters(), 1.0)
 
-    step()  # which makes the constants that are kept
+    if name in ("fgru", "frnn"):
+        step()  # which makes the constants that are kept
     with _Apart():
         step()
 
