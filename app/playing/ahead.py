@@ -19,9 +19,10 @@ from app.shared.thread_priority import Rank, lower_priority
 from engine.levels import FULL_SCALE_M
 from engine.sources import ModelSource, Runaway, SourceState
 from engine.voices import Voice
-from engine.voices.offline import AHEAD_FIRST, AHEAD_FRAMES
+from engine.voices.offline import AHEAD_FIRST, ahead_frames
 
 LEAST_S = 0.06  # rendered before it begins
+SAFE_S = 0.25  # lead of voices that sound, above which one that has not begun goes first
 CARE = 0.75  # the part of the measured speed that is counted on, for the load may rise
 SILENT = 1e-5  # of full scale
 KEPT = 32  # plucks that need not be rendered again
@@ -90,8 +91,8 @@ class AheadVoice:
 
     @property
     def lead_s(self) -> float:
-        """The lead of the rendering ahead of playback, in s."""
-        return self.rendered_s - (self.voice.seconds if self.begun else -1.0)
+        """The lead of the rendering ahead of playback, in s; the voice with the least is rendered next."""
+        return self.rendered_s - (self.voice.seconds if self.begun else -SAFE_S)
 
     def advance(self) -> None:
         """Render the next block; `finished` after the last one."""
@@ -100,7 +101,7 @@ class AheadVoice:
             self._state = self.source.start(self.initial_m[None])
             block = (self.initial_m @ self.weights)[None]
         else:
-            steps = min(AHEAD_FRAMES if self.done > AHEAD_FIRST else AHEAD_FIRST, self.voice.room)
+            steps = min(ahead_frames(self.done - 1), self.voice.room)
             try:
                 frames, self._state = self.source.advance(self._state, steps, self.weights)
                 block = frames[0].astype(np.float64)

@@ -27,7 +27,7 @@ class Note:
         match: by source, the factor that brings it to the level of the truth; None until it is known.
         pending: it was not handed to a mixer yet.
         released: whether it was asked to fade out.
-        mixer: to which it was handed.
+        mixer: to which it was handed, or whose frame it waits for.
         cut: it is not heard any more: its mixer was replaced, or it could not be played.
     """
 

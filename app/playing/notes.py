@@ -216,6 +216,8 @@ class Notes:
     ) -> Note:
         note = Note(chosen, self._voices_of(chosen), from_s, begin_frame)
         note.ahead_of_event, loaded = waits, self._loaded(note)
+        if begin_frame:
+            note.mixer = self._sound.mixer  # whose frame it is
         with self._lock:
             self._notes.append(note)
         begin = partial(self._begin, note, struck_s)

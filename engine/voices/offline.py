@@ -22,7 +22,7 @@ from engine.voices.voice import Voice
 
 SILENCE_S = 0.2  # after the end of one that is rendered until it has decayed
 BLOCK_FRAMES = 4096  # between two looks at `advanced`
-AHEAD_FIRST, AHEAD_FRAMES = 256, 1024  # at a time of samples that are rendered ahead: for ears and files alike
+AHEAD_FIRST, AHEAD_FRAMES = 256, 1024  # of a block of samples that are rendered ahead, at first and later
 FILLING = 0.9  # share of the work that these samples are
 
 
@@ -129,6 +129,14 @@ def voice_blocks(
             return
 
 
+def ahead_frames(rendered: int) -> int:
+    """The frames of the next block of a voice that is rendered ahead, after so many: for ears and files alike.
+
+    Two short ones let it begin soon: the first prepares the model, the second tells its speed.
+    """
+    return AHEAD_FIRST if rendered < 2 * AHEAD_FIRST else AHEAD_FRAMES
+
+
 def _fill(voice: Voice, source: ModelSource, initial_m: Array, ear: Ear, advanced: Callable[[float], None]) -> None:
     """Render all samples of a voice beforehand."""
     weights = voice.program.grid_weights(ear)
@@ -136,7 +144,7 @@ def _fill(voice: Voice, source: ModelSource, initial_m: Array, ear: Ear, advance
     voice.append((initial_m @ weights)[None] / FULL_SCALE_M)
     total = voice.room
     while voice.room:
-        steps = AHEAD_FIRST if voice.room == total else AHEAD_FRAMES
-        frames, state = source.advance(state, min(steps, voice.room), weights)
+        steps = min(ahead_frames(total - voice.room), voice.room)
+        frames, state = source.advance(state, steps, weights)
         voice.append(frames[0].astype(np.float64) / FULL_SCALE_M)
         advanced(FILLING * (1 - voice.room / total))
