@@ -149,3 +149,23 @@ def test_the_run_of_the_documents_is_a_configuration(tmp_path: Path) -> None:
     path = tmp_path / "my_run.toml"
     path.write_text(example, encoding="utf-8")
     assert load(str(path)).model == "koopman_var"
+
+
+def test_the_smallest_instrument_of_the_documents_is_one() -> None:
+    from app.patches.patch import Patch
+
+    (example,) = re.findall(r"```json\n(.*?)```", text("docs/instruments.md"), re.DOTALL)
+    assert Patch.model_validate_json(example).strings.kind == "fretted"
+
+
+@pytest.mark.parametrize(
+    ("page", "title"), [("instruments", "### Other fields"), ("drums", "## Write a drum by hand")]
+)
+def test_the_fields_that_a_page_names_exist(page: str, title: str) -> None:
+    from app.patches.patch import Patch
+
+    section = text(f"docs/{page}.md").partition(title)[2].partition("\n#")[0]
+    named = " ".join(line.split("|")[1] for line in section.splitlines() if line.startswith("| `"))
+    names = re.findall(r"\w+(?=[`.\[])", named)
+    schema = json.dumps(Patch.model_json_schema())
+    assert len(names) > 5 and [name for name in names if f'"{name}"' not in schema] == []

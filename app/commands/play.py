@@ -34,7 +34,7 @@ def play(
 ) -> None:
     """Render a MIDI file, played by an instrument, to WAV.
 
-    The same files give the same samples. Drums (channel 10) are left out, except with an instrument for MPE.
+    The same files give the same samples. Strings leave out channel 10, except in MPE; a kit of drums plays it alone.
     """
     from app.export.sound import LONGEST_S
     from app.export.wav import RATE_RANGE_HZ
