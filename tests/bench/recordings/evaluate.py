@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -82,7 +83,7 @@ def _errors(name: str, samples: NDArray[np.float64], rate_hz: int, quick: bool) 
         raise RecordingError(f"refused: {kinds}")
     truth = note.fitted()
     t = np.arange(len(truth)) / note.rate_hz
-    linear = {"free": 0, "glides": False}
+    linear = partial(fit_note, note, series, free=0, glides=False)
 
     def error(learned: LearnedNote, begin_s: float = 0.0) -> float:
         first = round(begin_s * note.rate_hz)
@@ -91,10 +92,10 @@ def _errors(name: str, samples: NDArray[np.float64], rate_hz: int, quick: bool) 
     errors = errors_of(truth, fit_note(note, series).render(t), note.rate_hz, note.noise_power)
     found: list[float | None] = [errors.esr, errors.late_esr, errors.distance_db]
     if not quick:
-        found += [error(fit_note(note, series, poles_a_partial=count, **linear)) for count in (1, 2)]  # type: ignore[arg-type]
+        found += [error(linear(poles_a_partial=count)) for count in (1, 2)]
         if len(truth) > 1.3 * HALF_S * note.rate_hz:
             half = fit_note(note, series, seconds=HALF_S)
-            linear_half = fit_note(note, series, seconds=HALF_S, poles_a_partial=2, **linear)  # type: ignore[arg-type]
+            linear_half = linear(seconds=HALF_S, poles_a_partial=2)
             found += [error(half, HALF_S), error(linear_half, HALF_S)]
     return NoteErrors(name, kinds, *found)
 
