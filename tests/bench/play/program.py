@@ -80,9 +80,10 @@ class Program:
         return sum(self._of_each(lambda one: one.memory_info().rss / 2**20))
 
     def _of_each(self, figure: Callable[[psutil.Process], float]) -> list[float]:
-        parent, found = psutil.Process(self.process.pid), []
-        for one in (parent, *parent.children(recursive=True)):
-            with contextlib.suppress(psutil.NoSuchProcess):
+        found: list[float] = []
+        with contextlib.suppress(psutil.NoSuchProcess):  # one that has ended
+            parent = psutil.Process(self.process.pid)
+            for one in (parent, *parent.children(recursive=True)):
                 found.append(figure(one))
         return found
 
