@@ -28,7 +28,7 @@ def default_substeps(resonator: Resonator, rate_hz: float) -> int:
     """Sub-steps per sample that keep the paper's protocol within 1e-7 relative L2 of the oracle.
 
     At least 36 sub-steps in a period of the highest mode: measured against DOP853 over 4000 samples on the
-    strings with the largest tension rise of each data set (`run.py bench solver`). The error falls
+    strings with the largest tension rise of each data set. The error falls
     with about the fourth power of the sub-step: a quarter of the sub-steps is still near 1e-5. Pass
     `substeps` to choose.
     """

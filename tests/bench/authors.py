@@ -10,13 +10,13 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from subprocess import PIPE
+from typing import Any
 
 import torch
 
 from engine.models.base import count_parameters
 from tests.bench import train
-from tests.bench.machine import Machine
-from training.cli.console import Failure
+from training.cli.console import Failure, Report
 
 MODELS = ("koopman_var", "koopman", "s5", "lru")
 DRIVER = Path(__file__).with_name("physmodjax_step.py")
@@ -42,13 +42,7 @@ class AuthorsTiming:
     processor_ratio: float
 
 
-@dataclass(frozen=True)
-class AuthorsBenchmark:
-    machine: Machine
-    models: tuple[AuthorsTiming, ...]
-
-
-def measure(python: Path, source: Path, report: Callable[[float, str], None]) -> AuthorsBenchmark:
+def measure(python: Path, source: Path, report: Report) -> dict[str, Any]:
     """Take steps of ours and of theirs in turns, on as many threads, with AdamW and the loss of the paper's text.
 
     Args:
@@ -77,7 +71,7 @@ def measure(python: Path, source: Path, report: Callable[[float, str], None]) ->
         authors_s, authors_busy_s = map(min, zip(*others[1:], strict=True))
         ratios = step_s / authors_s, busy_s / authors_busy_s
         found.append(AuthorsTiming(name, train.BATCH, train.FRAMES, parameters, step_s, authors_s, *ratios))
-    return AuthorsBenchmark(Machine.here(), tuple(found))
+    return {"models": tuple(found)}
 
 
 @contextmanager

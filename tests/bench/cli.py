@@ -1,23 +1,21 @@
 """The benchmarks' command line: `python3 run.py bench NAME`.
 
-Exit status: as of `learned-strings`; `tour`, `unplug` and `soak` exit with 1 where a target is missed.
+Exit status: as of `learned-strings`; `soak` exits with 1 where the program failed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from app.commands.cli import carry_out
-from tests.bench.baselines.command import baseline
-from tests.bench.instruments import timbre
-from tests.bench.printing import show
-from tests.bench.recordings.command import recordings
 from training.cli.arguments import Json
-from training.cli.console import Failure, progress
+from training.cli.console import Failure, Report, progress, say
 
 if TYPE_CHECKING:
     from app.audio.choices import Buffer
@@ -36,67 +34,44 @@ bench = typer.Typer(
 BufferName = Annotated[
     str, typer.Option("--buffer", help="The device's: low, medium, high, or 128, 256, 512, 1024 or 2048 frames.")
 ]
-PatchName = Annotated[str, typer.Option("--instrument", metavar="INSTRUMENT", help="The instrument that is played.")]
-Seed = Annotated[int, typer.Option(min=0, help="Of the random keys and changes.")]
+Seed = Annotated[int, typer.Option(min=0, help="Of the random keys.")]
+
+PLAIN = {  # benchmarks without options, on one thread, as in the app, where window and sound need the others
+    "render": "Real-time factor and first-block latency of every model.",
+    "voices": "Cost of a voice and of 64 notes of an instrument, and how many voices fit on a core.",
+    "plugin": "Voices of a plug-in compared with the app: how many times faster than real time each plays 30 notes.",
+    "drums": "Frequencies and pitch drops of drums compared with published ones; cost of drums, a kit, and choosing.",
+    "effects": "Cost of body and room: shares of a core, and the slowest quantum.",
+    "take": "Time and memory of a pluck's pictures and signals, and after its listening point has moved.",
+}
 
 
-def _measure(name: str, json: bool) -> None:
-    """Run and show a benchmark without options."""
-    from importlib import import_module
+def run(
+    name: str, work: Callable[[Report], Mapping[str, Any]], json: bool, threads: int | None = None
+) -> Mapping[str, Any]:
+    """Carry out a benchmark with its progress, and print its figures below the machine.
 
-    with progress(f"bench {name}") as report:
-        found = import_module(f"tests.bench.{name}").measure(report)
+    Args:
+        threads: to which torch is limited.
+    """
+    from tests.bench import machine
+    from tests.bench.printing import show
+
+    with progress(f"bench {name}") as report, machine.threads(threads):
+        found = {"machine": machine.Machine.here(), **work(report)}
     show(found, json)
+    return found
 
 
-@bench.command()
-def solver(
-    json: Json = False,
-    batch: Annotated[int, typer.Option(min=1, max=1000, help="Trajectories at once.")] = 100,
-    steps: Annotated[int, typer.Option(min=1, help="Samples of each trajectory.")] = 4000,
-) -> None:
-    """Cost and error of the fast solver against DOP853, on the worst trajectory of each of the paper's data sets."""
-    from tests.bench.solver import measure
+def _plain(name: str) -> Callable[[bool], None]:
+    def command(json: Json = False) -> None:
+        run(name, lambda report: import_module(f"tests.bench.{name}").measure(report), json, threads=1)
 
-    with progress("bench solver") as report:
-        found = measure(batch, steps, report)
-    show(found, json)
+    return command
 
 
-@bench.command()
-def render(json: Json = False) -> None:
-    """Real-time factor and first-block latency of every model, on one thread."""
-    _measure("render", json)
-
-
-@bench.command()
-def voices(json: Json = False) -> None:
-    """Cost and error of a voice, the cost of a pluck, and how many voices fit on a core."""
-    _measure("voices", json)
-
-
-@bench.command()
-def plugin(json: Json = False) -> None:
-    """Voices of a plug-in compared with the app: how many times faster than real time each plays 30 notes."""
-    _measure("plugin", json)
-
-
-@bench.command()
-def drums(json: Json = False) -> None:
-    """Cost of a drum's voice by its modes, of a kit of 16 with 8 strings, of pictures, and of choosing drums."""
-    _measure("drums", json)
-
-
-@bench.command()
-def effects(json: Json = False) -> None:
-    """Cost of body and room: shares of a core, the slowest quantum, and the time to set them."""
-    _measure("effects", json)
-
-
-@bench.command()
-def take(json: Json = False) -> None:
-    """Time and memory of a pluck's pictures and signals, and after its listening point has moved."""
-    _measure("take", json)
+for _name, _help in PLAIN.items():
+    bench.command(_name, help=_help)(_plain(_name))
 
 
 @bench.command()
@@ -114,22 +89,15 @@ def train(
 
     With --against and --source steps of both are taken in turns, on as many threads.
     """
-    if gpu:
-        from tests.bench.train import measure_on_gpu
+    from tests.bench import authors
+    from tests.bench import train as of_train
 
-        with progress("bench train") as report:
-            show(measure_on_gpu(report), json)
-        return
-    if against is None and source is None:
-        _measure("train", json)
-        return
-    if against is None or source is None:
+    if (against is None) != (source is None):
         raise typer.BadParameter("--against and --source go together")
-    from tests.bench.authors import measure
-
-    with progress("bench train") as report:
-        found = measure(against.absolute(), source.absolute(), report)
-    show(found, json)
+    if against is not None and source is not None:
+        run("train", partial(authors.measure, against.absolute(), source.absolute()), json)
+    else:
+        run("train", of_train.measure_on_gpu if gpu else of_train.measure, json)
 
 
 @bench.command()
@@ -140,38 +108,59 @@ def tune(
     every: Annotated[int, typer.Option(min=1, max=24, help="Semitones from one measured key to the next.")] = 6,
     json: Json = False,
 ) -> None:
-    """Pitch and loudness of patches over their range.
-
-    Also the level of a chord, and the model's error against the truth while a key is bent and plucked again.
-    """
+    """Pitch and loudness of patches over their range, and the level of a chord."""
     from app.patches.library import list_patches
     from tests.bench.tune import measure
     from training.cli.arguments import open_preset
 
     chosen = [_patch(name) for name in patch] if patch else [entry.patch for entry in list_patches()[0]]
     presets = {name: open_preset(name) for name in {each.preset for each in chosen}}
-    with progress("bench tune") as report:
-        found = measure([(each, presets[each.preset]) for each in chosen], every, report)
-    show(found, json)
+    run("tune", partial(measure, [(each, presets[each.preset]) for each in chosen], every), json)
 
 
-bench.command()(timbre)
-bench.command()(recordings)
-bench.command()(baseline)
+@bench.command()
+def recordings(
+    folder: Annotated[Path | None, typer.Argument(metavar="FOLDER", help="Of recordings, one note each.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="No baselines, no halves; with --gate no fit.")] = False,
+    most: Annotated[int | None, typer.Option("--most", min=1, metavar="N", help="The first N files alone.")] = None,
+    gate: Annotated[
+        int | None,
+        typer.Option(min=0, metavar="N", help="Only which of N synthetic notes, and the folder's, are kept."),
+    ] = None,
+    fit_every: Annotated[
+        int, typer.Option("--fit-every", min=1, metavar="N", help="With --gate: one of N notes is fitted.")
+    ] = 20,
+    synthetic: Annotated[
+        int | None,
+        typer.Option(min=1, metavar="N", help="Instead: N synthetic notes, and how intervals hold them."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Errors of a folder's recordings: own note, linear baselines, unseen half; or which sounds the gate keeps."""
+    from tests.bench.recordings import coverage, evaluate
+    from tests.bench.recordings import gate as of_gate
+
+    if synthetic is not None:
+        run("recordings", partial(coverage.measure, synthetic), json)
+        return
+    if folder is None and not gate:
+        raise typer.BadParameter("give a folder of recordings, or --synthetic or --gate", param_hint="FOLDER")
+    found = _notes(folder, most) if folder is not None else {}
+    if gate is not None:
+        run("recordings", partial(of_gate.measure, found, gate, 0 if quick else fit_every), json)
+    else:
+        run("recordings", partial(evaluate.measure, found, quick), json)
 
 
 @bench.command()
 def app(
     json: Json = False,
-    seconds: Annotated[float, typer.Option(min=0.1, metavar="S", help="Observation of the picture, in s.")] = 5.0,
     starts: Annotated[int, typer.Option(min=1, help="Timed starts, after one that is not.")] = 3,
 ) -> None:
-    """Time until the window can be played, and its frame rate. A window opens for a minute."""
-    from tests.bench.app import measure
+    """Time from the start until the window is shown, and until keys sound. Windows open."""
+    from tests.bench.start import measure
 
-    with progress("bench app") as report:
-        found = measure(starts, seconds, report)
-    show(found, json)
+    run("app", partial(measure, starts), json)
 
 
 @bench.command()
@@ -180,14 +169,11 @@ def play(
     seconds: Annotated[float, typer.Option(min=1.0, metavar="S", help="Duration of playing, in s.")] = 60.0,
     rate: Annotated[float, typer.Option(min=0.5, max=20.0, help="Plucks per second.")] = 12.0,
     buffer: BufferName = "medium",
-    busy: Annotated[
-        bool | None,
-        typer.Option(
-            "--busy/--alone", help="Only with a process that keeps a core busy, or only without; default both."
-        ),
-    ] = None,
+    busy: Annotated[bool, typer.Option("--busy", help="Beside a process that keeps a core busy.")] = False,
     seed: Seed = 0,
-    patch: PatchName = "concert_harp",
+    patch: Annotated[
+        str, typer.Option("--instrument", metavar="INSTRUMENT", help="The instrument that is played.")
+    ] = "concert_harp",
     preset: Annotated[
         str | None, typer.Option(metavar="PRESET", help="A string's preset instead, in the Lab: ten keys pluck it.")
     ] = None,
@@ -199,102 +185,53 @@ def play(
     """
     from tests.bench.play.measure import measure
 
-    chosen, instrument = _buffer(buffer), _patch(patch) if preset is None else _single(preset)
-    with progress("bench play") as report:
-        found = measure(seconds, rate, chosen, (False, True) if busy is None else (busy,), seed, instrument, report)
-    show(found, json)
-
-
-@bench.command()
-def tour(
-    patch: Annotated[
-        list[str] | None, typer.Argument(metavar="INSTRUMENT", help="Names or files of instruments; default: all.")
-    ] = None,
-    buffer: BufferName = "medium",
-    out: Annotated[Path | None, typer.Option(help="WAV file of the recording.")] = None,
-    json: Json = False,
-) -> None:
-    """Holes, clicks and levels of every factory instrument. Status 1 where one has a hole, or a key is not heard.
-
-    Each is chosen in the window's browser and plays a phrase by keys. Linux only. Needs PulseAudio and Xvfb; starts a
-    sound server and a screen of its own, and leaves yours alone.
-    """
-    from app.patches.library import SHIPPED, list_patches
-    from tests.bench.play.tour import measure
-
-    chosen = [_patch(name) for name in patch] if patch else [entry.patch for entry in list_patches(SHIPPED)[0]]
-    with progress("bench tour") as report:
-        found = measure(chosen, _buffer(buffer), out, report)
-    show(found, json)
-    if not found.passed:
-        raise typer.Exit(1)
-
-
-@bench.command()
-def notes(
-    json: Json = False,
-    by: Annotated[Literal["midi", "keys", "both"], typer.Option(help="What plays the notes.")] = "both",
-    buffer: BufferName = "medium",
-    seed: Seed = 0,
-    patch: PatchName = "classical_guitar",
-) -> None:
-    """Pitch, loudness, damping and latency of notes, recorded, without body and room.
-
-    A melody, chords, repeats, bends and a pedal are played by MIDI and by keys. Linux only. Needs PulseAudio, Xvfb
-    and, for MIDI, JACK; starts a sound server and a screen of its own, and leaves yours alone.
-    """
-    from tests.bench.play.notes import measure
-
-    chosen, found_patch = _buffer(buffer), _patch(patch)
-    if found_patch.damping.let_ring:
-        raise Failure(f"{found_patch.name}: its strings ring on after a key's release; choose one with dampers")
-    with progress("bench notes") as report:
-        found = measure(by, chosen, seed, found_patch, report)
-    show(found, json)
-
-
-@bench.command()
-def unplug(
-    json: Json = False,
-    times: Annotated[int, typer.Option(min=1, max=1000, help="How often the device goes and comes back.")] = 20,
-    seed: Seed = 0,
-    patch: PatchName = "concert_harp",
-) -> None:
-    """The sound device is taken away and given back while the app is played. Status 1 where sound is not back in 2 s.
-
-    In turn the card goes, and the sound server. Linux only; needs PulseAudio and Xvfb, and touches nothing of the
-    sound and the screen in use.
-    """
-    from tests.bench.play.unplug import measure
-
-    found_patch = _patch(patch)
-    with progress("bench unplug") as report:
-        found = measure(times, seed, found_patch, report)
-    show(found, json)
-    if not found.passed:
-        raise typer.Exit(1)
+    instrument = _patch(patch) if preset is None else _single(preset)
+    run("play", partial(measure, seconds, rate, _buffer(buffer), busy, seed, instrument), json)
 
 
 @bench.command()
 def soak(
     json: Json = False,
     minutes: Annotated[float, typer.Option(min=0.01, metavar="MIN", help="Duration in minutes.")] = 10.0,
-    playing: Annotated[bool, typer.Option("--playing", help="Twelve keys per second, without a pause.")] = False,
     seed: Seed = 0,
     buffer: BufferName = "medium",
+    patch: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="INSTRUMENT", help="Names or files of instruments; default: the harp."),
+    ] = None,
+    every: Annotated[bool, typer.Option("--every-instrument", help="Play all of the factory in turn.")] = False,
 ) -> None:
-    """Holes, memory, threads and faults of a long session.
+    """Holes, memory and faults of a long session: twelve keys per second, on one instrument or several in turn.
 
-    Of random plucks and changes, or, with --playing, of keys alone. Exit status 1 where there are faults. Linux only.
-    Needs PulseAudio; starts a sound server of its own, and leaves yours alone.
+    It needs the same as `play`. Exit status 1 where there are faults.
     """
-    from tests.bench.soak import soak as run_soak
+    from app.patches.library import SHIPPED, list_patches
+    from tests.bench.soak import measure
 
-    with progress("bench soak") as report:
-        found = run_soak(60 * minutes, seed, playing, _buffer(buffer), report)
-    show(found, json)
-    if found.faults or found.threads_left:
+    patches = [_patch(name) for name in patch or ["concert_harp"]]
+    if every:
+        patches = [entry.patch for entry in list_patches(SHIPPED)[0]]
+    if run("soak", partial(measure, 60 * minutes, seed, _buffer(buffer), patches), json)["soak"].faults:
         raise typer.Exit(1)
+
+
+def _notes(folder: Path, most: int | None) -> dict[str, Any]:
+    """Samples and rate of a folder's recordings by name; those that cannot be read are named."""
+    from app.audio.note_file import NoteFileError, read_note
+
+    kinds = (".wav", ".flac", ".aif", ".aiff")
+    files = sorted(path for path in folder.glob("*") if path.suffix.lower() in kinds)
+    if not files:
+        raise Failure(f"{folder}: no WAV, FLAC or AIFF file; give a folder of recordings")
+    found = {}
+    for path in files[:most]:
+        try:
+            read = read_note(path)
+        except NoteFileError as error:
+            say(f"note: {error}")
+            continue
+        found[path.stem] = (read.samples, read.rate_hz)
+    return found
 
 
 def _buffer(text: str) -> Buffer:

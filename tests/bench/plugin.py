@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -24,13 +25,12 @@ from app.patches.patch import Patch
 from engine.kernels import cache
 from engine.presets import SHIPPED, Preset, load_preset
 from tests.app.export.plugin.host import Instance, Library, note_on
-from tests.bench.machine import Machine, one_thread
+from tests.bench.machine import RATE_HZ
+from training.cli.console import Report
 
-RATE_HZ = 48_000
 INSTRUMENTS = ("electric_bass", "classical_guitar", "concert_harp")
 NOTES, VELOCITY = 30, 102
 BLOCK_FRAMES, BLOCKS, ROUNDS = 512, 4, 40
-PLUGIN = "plugin"
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,7 @@ class PluginCost:
     Attributes:
         modes: of the lowest note.
         app_faster, plugin_faster: than real time, at 48 kHz in blocks of 512.
+        ratio: of the plug-in to the app.
     """
 
     instrument: str
@@ -47,35 +48,22 @@ class PluginCost:
     modes: int
     app_faster: float
     plugin_faster: float
-
-    @property
-    def met(self) -> bool:
-        """Whether the plug-in plays no fewer voices on a core than the app."""
-        return self.plugin_faster >= self.app_faster
+    ratio: float
 
 
-@dataclass(frozen=True)
-class PluginBenchmark:
-    machine: Machine
-    plugins: tuple[PluginCost, ...]
-
-
-def measure(report: Callable[[float, str], None]) -> PluginBenchmark:
+def measure(report: Report) -> dict[str, Any]:
     """Build a plug-in of all INSTRUMENTS, and play each."""
     patches = [find_patch(name).patch for name in INSTRUMENTS]
     presets = [load_preset(SHIPPED / f"{patch.preset}.safetensors") for patch in patches]
     images = [image_of(patch, preset) for patch, preset in zip(patches, presets, strict=True)]
-    with one_thread(), tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / PLUGIN
-        kept = cache.folder() or Path(folder)
+    with tempfile.TemporaryDirectory() as folder:
+        path, kept = Path(folder) / "plugin", cache.folder() or Path(folder)
         library = Library(
             build_plugin(images, "clap", this_target(), path, kept, lambda step, share: report(share, step))
         )
-        found = tuple(
-            _cost(name, patch, preset, Instance(library, image.id))
-            for name, patch, preset, image in zip(INSTRUMENTS, patches, presets, images, strict=True)
-        )
-        return PluginBenchmark(Machine.here(), found)
+        parts = zip(INSTRUMENTS, patches, presets, images, strict=True)
+        costs = tuple(_cost(name, patch, preset, Instance(library, image.id)) for name, patch, preset, image in parts)
+    return {"plugins": costs}
 
 
 def _cost(name: str, patch: Patch, preset: Preset, instance: Instance) -> PluginCost:
@@ -93,7 +81,7 @@ def _cost(name: str, patch: Patch, preset: Preset, instance: Instance) -> Plugin
     app_s, plugin_s = (min(times) for times in zip(*rounds, strict=True))
     string, sound_s = Strings(patch).of_key(low), BLOCK_FRAMES * BLOCKS / RATE_HZ
     modes = string.modes if string is not None else 0
-    return PluginCost(name, len(keys), modes, sound_s / app_s, sound_s / plugin_s)
+    return PluginCost(name, len(keys), modes, sound_s / app_s, sound_s / plugin_s, app_s / plugin_s)
 
 
 def _taken_s(render: Callable[[], object]) -> float:

@@ -1,4 +1,4 @@
-"""Results of a benchmark as tables or JSON: one printer for every dataclass that a benchmark returns."""
+"""Figures of a benchmark as tables or JSON: one printer for all dataclasses that benchmarks return."""
 
 from __future__ import annotations
 
@@ -19,28 +19,23 @@ def target(value: object) -> dict[str, object]:
     return {TARGET: value}
 
 
-def show(found: Any, as_json: bool) -> None:
-    """Print what a benchmark measured.
-
-    Args:
-        found: a dataclass: the machine, figures, and tuples of dataclasses, of which each becomes a table. Its
-            properties are printed too.
-    """
-    values = plain(found)
+def show(found: Mapping[str, Any], as_json: bool) -> None:
+    """Print figures by name: the machine, dataclasses, tuples of dataclasses, numbers. Properties count as fields."""
     if as_json:
-        print_json(values)
+        print_json(plain(found))
         return
-    machine = values.pop("machine")
-    print(", ".join(f"{_label(name)} {value}" for name, value in machine.items()))
-    own, targets = {}, _targets(found)
-    for name, value in values.items():
-        entries = getattr(found, name)
-        if isinstance(entries, tuple) and entries and is_dataclass(entries[0]):
-            _print_records([_flat(entry) for entry in value], _targets(entries[0]))
+    single: dict[str, Any] = {}
+    for name, value in found.items():
+        if name == "machine":
+            print(", ".join(f"{_label(field)} {entry}" for field, entry in plain(value).items()))
+        elif isinstance(value, tuple) and value and is_dataclass(value[0]):
+            _print_records([_flat(plain(each)) for each in value], _targets(value[0]))
+        elif is_dataclass(value):
+            _print_rows([""], [_flat(plain(value))], _targets(value))
         else:
-            own.update(_flat({name: value}))
-    if own:
-        _print_records([own], targets, always_rows=True)
+            single[name] = plain(value)
+    if single:
+        _print_rows([""], [_flat(single)], {})
 
 
 def plain(value: Any) -> Any:
@@ -53,17 +48,21 @@ def plain(value: Any) -> Any:
     return [plain(entry) for entry in value] if isinstance(value, list | tuple) else value
 
 
-def _print_records(records: list[dict[str, Any]], targets: Mapping[str, object], always_rows: bool = False) -> None:
-    """A table with a column per field, or, for records of many fields, a row per field."""
+def _print_records(records: list[dict[str, Any]], targets: Mapping[str, object]) -> None:
+    """Print a column per field, or, for records of many fields, a row per field."""
     names = list(records[0])
-    if not always_rows and len(names) <= MOST_COLUMNS:
+    if len(names) <= MOST_COLUMNS:
         print_table([_label(name) for name in names], [tuple(record[name] for name in names) for record in records])
-        return
-    rows = [(_label(name), *(record[name] for record in records)) for name in names]
-    columns = ["", *(str(record[names[0]]) for record in records)] if not always_rows else ["", "here"]
+    else:
+        _print_rows([str(record[names[0]]) for record in records], records, targets)
+
+
+def _print_rows(heads: list[str], records: list[dict[str, Any]], targets: Mapping[str, object]) -> None:
+    rows = [(_label(name), *(record[name] for record in records)) for name in records[0]]
+    columns = ["", *heads]
     if targets:
         columns.append("target")
-        rows = [(*row, targets.get(name)) for row, name in zip(rows, names, strict=True)]
+        rows = [(*row, targets.get(name)) for row, name in zip(rows, records[0], strict=True)]
     print_table(columns, rows)
 
 
@@ -92,12 +91,4 @@ def _label(name: str) -> str:
 
 
 def _targets(found: Any) -> dict[str, object]:
-    """Targets by the names that `_flat` gives; those of nested dataclasses too."""
-    targets = {}
-    for each in fields(found):
-        value = getattr(found, each.name)
-        if TARGET in each.metadata:
-            targets[each.name] = each.metadata[TARGET]
-        if is_dataclass(value):
-            targets.update({f"{each.name}, {name}": entry for name, entry in _targets(value).items()})
-    return targets
+    return {each.name: each.metadata[TARGET] for each in fields(found) if TARGET in each.metadata}

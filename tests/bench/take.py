@@ -6,10 +6,10 @@ Processor times are of all threads of this process; other processes have little 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from app.playing.sources import Sources
 from app.rendering import RenderRequest
@@ -17,7 +17,7 @@ from app.rendering.job import Job
 from engine.pluck import DEFAULT_LISTEN, Pluck
 from engine.presets import SHIPPED
 from engine.values.ear import Ear
-from tests.bench.machine import Machine, one_thread
+from training.cli.console import Report
 
 PRESETS = ("studio_any_string", "studio_nylon_b3", "studio_nylon_g3", "studio_steel_ds3", "studio_steel_e4")
 SECONDS = 10.0
@@ -47,12 +47,6 @@ class TakeCost:
     moved_wall_s: float
 
 
-@dataclass(frozen=True)
-class TakeBenchmark:
-    machine: Machine
-    takes: tuple[TakeCost, ...]
-
-
 class _Nobody:
     """A listener that does nothing."""
 
@@ -65,15 +59,14 @@ class _Nobody:
     def render_failed(self, message: str, detail: str) -> None: ...
 
 
-def measure(report: Callable[[float, str], None]) -> TakeBenchmark:
-    """Measure `PRESETS`."""
+def measure(report: Report) -> dict[str, Any]:
+    """Measure PRESETS."""
     found = []
-    with one_thread(), ThreadPoolExecutor(1) as helper:
-        machine = Machine.here()
+    with ThreadPoolExecutor(1) as helper:
         for number, name in enumerate(PRESETS):
             report(number / len(PRESETS), name)
             found.append(_measure(SHIPPED / f"{name}.safetensors", helper))
-    return TakeBenchmark(machine, tuple(found))
+    return {"takes": tuple(found)}
 
 
 def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
@@ -88,14 +81,9 @@ def _measure(path: Path, helper: ThreadPoolExecutor) -> TakeCost:
     for ear in EARS[1:]:
         job.ask_again(replace(request, ear=ear))
         moved.append(_finish(job))
-    return TakeCost(
-        path.stem,
-        SECONDS,
-        take.picture_hz,
-        rendered_s,
-        take.bytes("model") / MEGABYTE,
-        *map(min, zip(*moved, strict=True)),
-    )
+    moved_s, moved_wall_s = map(min, zip(*moved, strict=True))
+    megabytes = take.bytes("model") / MEGABYTE
+    return TakeCost(path.stem, SECONDS, take.picture_hz, rendered_s, megabytes, moved_s, moved_wall_s)
 
 
 def _finish(job: Job) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 from unittest.mock import patch
@@ -16,8 +16,9 @@ from engine.models import build_model
 from engine.models.base import Physics, StringModel
 from engine.resonators.string import resonator_of
 from engine.values.string import StringParameters
-from tests.bench.machine import Machine, median_s
+from tests.bench.machine import REPEATS, median_s
 from training.cell import Cell, configuration_of
+from training.cli.console import Report
 from training.configuration import Recipe
 from training.data.batches import Batch
 from training.data.dataset import Dataset
@@ -27,7 +28,6 @@ from training.fitting.losses import backward, training_loss
 
 BATCH = 50
 FRAMES = 400
-REPEATS = 5
 # DMD is fitted, not trained
 MODELS = ("koopman", "koopman_var", "koopman_integrated", "lru", "s5", "fgru", "frnn")
 FEWER_FRAMES = {"fgru": 50, "frnn": 50}  # their cost is proportional to the number of frames
@@ -53,12 +53,6 @@ class TrainTiming:
 
 
 @dataclass(frozen=True)
-class TrainBenchmark:
-    machine: Machine
-    models: tuple[TrainTiming, ...]
-
-
-@dataclass(frozen=True)
 class SeedsTiming:
     """Time of a step of several seeds at once on a GPU, by the recipe of the paper's text.
 
@@ -78,35 +72,24 @@ class SeedsTiming:
     prepare_s: float
 
 
-@dataclass(frozen=True)
-class SeedsBenchmark:
-    machine: Machine
-    device: str
-    models: tuple[SeedsTiming, ...]
-
-
-def measure(report: Callable[[float, str], None]) -> TrainBenchmark:
+def measure(report: Report) -> dict[str, Any]:
     """Measure each model at the paper's size, on random data, on which its cost does not depend."""
     found = []
     for number, name in enumerate(MODELS):
         report(number / len(MODELS), name)
         frames = min(FRAMES, FEWER_FRAMES.get(name, FRAMES))
         _, step = training_step(name, frames)
-        found.append(TrainTiming(name, BATCH, frames, median_s(step, REPEATS), launches(name, frames)))
-    return TrainBenchmark(Machine.here(), tuple(found))
+        found.append(TrainTiming(name, BATCH, frames, median_s(step), launches(name, frames)))
+    return {"models": tuple(found)}
 
 
-def measure_on_gpu(report: Callable[[float, str], None], models: Mapping[str, int] = SEEDS) -> SeedsBenchmark:
-    """Measure steps of several seeds at once on the GPU.
-
-    Args:
-        models: how many seeds of each.
-    """
+def measure_on_gpu(report: Report) -> dict[str, Any]:
+    """Measure steps of several seeds at once on the GPU."""
     found = []
-    for number, (name, seeds) in enumerate(models.items()):
-        report(number / len(models), name)
+    for number, (name, seeds) in enumerate(SEEDS.items()):
+        report(number / len(SEEDS), name)
         found.append(_seeds_timing(name, seeds))
-    return SeedsBenchmark(Machine.here(), torch.cuda.get_device_name(), tuple(found))
+    return {"device": torch.cuda.get_device_name(), "models": tuple(found)}
 
 
 def _seeds_timing(name: str, seeds: int) -> SeedsTiming:

@@ -15,7 +15,7 @@ from app.instrument.midi_file import midi_bytes
 from app.patches.library import SHIPPED as PATCHES
 from engine.plain_text import name_text
 from engine.presets import SHIPPED as PRESETS
-from tests.bench.recordings.synthetic import synthetic_note
+from tests.training.recording.synthetic import synthetic_note
 
 PRESET = PRESETS / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 CAFE = os.fsdecode(b"caf\xe9")

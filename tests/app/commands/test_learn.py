@@ -14,8 +14,8 @@ import pytest
 import soundfile
 
 from app.shared.parameters import NOISE_DB
-from tests.bench.recordings.sounds import membrane
-from tests.bench.recordings.synthetic import synthetic_note
+from tests.training.recording.sounds import membrane
+from tests.training.recording.synthetic import synthetic_note
 from training.recording.checkpoint import restore, save
 
 

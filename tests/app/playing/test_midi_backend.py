@@ -24,7 +24,7 @@ import faulthandler, json, sys, threading, time
 from pathlib import Path
 faulthandler.dump_traceback_later(120, exit=True)
 from tests.bench.play.children import Missing
-from tests.bench.play.midi import cable
+from tests.app.playing.midi_cable import cable
 from app.instrument.events import Bend, Controller, NoteOff, NoteOn
 from app.playing.midi_port import MidiInput, MidiUnavailable
 

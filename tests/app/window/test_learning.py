@@ -16,8 +16,8 @@ from app.views.dialogs.learn_dialog import NOT_FOUND, ON_KEYS, LearnDialog
 from app.window.controller import Controller
 from engine.presets import find_preset, read_info
 from tests.app.questions import answered
-from tests.bench.recordings.sounds import membrane
-from tests.bench.recordings.synthetic import synthetic_note
+from tests.training.recording.sounds import membrane
+from tests.training.recording.synthetic import synthetic_note
 
 LEARNED_MS = 90_000
 

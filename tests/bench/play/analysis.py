@@ -1,4 +1,4 @@
-"""Finds holes, unintended fades, clicks and the beginnings of plucks in a recording of plucked strings.
+"""Holes, clicks and the beginnings of plucks in a recording of plucked strings.
 
 Ringing strings are predictable: a linear prediction fitted to a few hundredths of a second leaves almost no residual.
 What is not predictable stands out of the residual, however loud the strings ring: a new pluck, after which the
@@ -20,11 +20,7 @@ from threadpoolctl import threadpool_limits
 ZERO = 1e-7  # samples below it are silence
 SHORTEST_HOLE_S = 0.001
 SOUNDS_S = 0.5  # for how long a pluck is heard at least
-LEVEL_S = 0.002
-FADE_DB = 40.0
-ORDINARY_DB = 20.0  # a fade is so far below all levels nearby; strings are often quiet for a moment by themselves
 NEARBY_S = 0.025
-LONGEST_FADE_S = 0.3
 ORDER = 32  # of the prediction
 FIT_S = 0.01
 FITTED_STEPS = 4
@@ -33,10 +29,6 @@ STANDS_OUT = 6.0  # an event's residual is so many times the residual nearby
 MOSTLY = 0.9  # quantile of the residual nearby
 FAINTEST_CLICK = 1e-4
 FAINTEST_PLUCK = 1e-6
-LOOKED_AT = 1 << 20  # frames of a long file at a time
-EDGE_S, AROUND_S = 0.00025, 0.03
-AT_ONCE = 0.08  # an edge is sharp if it reaches this share of the level around it within `EDGE_S`, as no fade does
-FAINTEST_EDGE = 1e-6
 ATTACK_S = 0.006  # of a pluck
 LATEST_S = 0.5  # from a key to the beginning of its pluck, at most
 EARLY_OR_LATE_S = 0.04  # deviation of a pluck's latency from the usual one, at most
@@ -65,41 +57,9 @@ def holes(sound: NDArray[np.float32], expected: Sequence[Span], rate_hz: int) ->
     return [run for run in found if run.frames >= shortest]
 
 
-@dataclass(frozen=True)
-class Silence(Span):
-    """A silence of a millisecond or more between sounds.
-
-    `sharp`: it begins or ends abruptly, not by a fade.
-    """
-
-    sharp: bool
-
-
-def silences(sound: NDArray[np.float32], rate_hz: int) -> list[Silence]:
-    """Silences of one channel, (frames,), which may be a memory-mapped file of any length."""
-    runs: list[Span] = []
-    for first in range(0, len(sound), LOOKED_AT):
-        for run in _runs(np.abs(sound[first : first + LOOKED_AT]) < ZERO):
-            here = _moved(run, first)
-            if runs and runs[-1].end == here.start:
-                here = Span(runs.pop().start, here.end)
-            runs.append(here)
-    shortest, around = round(SHORTEST_HOLE_S * rate_hz), round(AROUND_S * rate_hz)
-
-    def sharp(edge: NDArray[np.float32]) -> bool:
-        """Whether the sound at an edge, given from the edge outwards, is loud at once."""
-        level = np.abs(edge[: round(EDGE_S * rate_hz)]).max()
-        return bool(level > max(AT_ONCE * np.abs(edge).max(), FAINTEST_EDGE))
-
-    return [
-        Silence(
-            run.start,
-            run.end,
-            sharp(sound[max(run.start - around, 0) : run.start][::-1]) or sharp(sound[run.end : run.end + around]),
-        )
-        for run in runs
-        if run.frames >= shortest and run.start > 0 and run.end < len(sound)
-    ]
+def tone_holes(sound: NDArray[np.float32], rate_hz: int) -> list[Span]:
+    """Silences of a millisecond or more in a steady tone (frames, channels)."""
+    return holes(sound, [Span(0, len(sound))], rate_hz)
 
 
 def expected_sound(sound: NDArray[np.float32], keys: Sequence[int], rate_hz: int) -> list[Span]:
@@ -115,39 +75,6 @@ def expected_sound(sound: NDArray[np.float32], keys: Sequence[int], rate_hz: int
         if place < sounds.size and sounds[place] < end:
             spans.append(Span(int(sounds[place]), end))
     return spans
-
-
-def fades(sound: NDArray[np.floating], expected: Sequence[Span], rate_hz: int) -> list[Span]:
-    """Where the level of one channel drops far below all levels nearby, and recovers.
-
-    A low string is silent between two of its pulses, too, but then in every period, so that not all levels nearby are
-    higher. A drop to silence is found as well.
-    """
-    size = round(LEVEL_S * rate_hz)
-    hop = size // 2
-    near = round(NEARBY_S * rate_hz / hop)
-    longest = round(LONGEST_FADE_S * rate_hz / hop)
-    found = []
-    for span in expected:
-        part = np.abs(np.asarray(sound[span.start : span.end], float))
-        if part.size < size * 4:
-            continue
-        level = sliding_window_view(part, size)[::hop].max(axis=1)
-        around = sliding_window_view(np.pad(level, near, mode="edge"), 2 * near + 1)
-        # What a long fade's middle is compared with is beyond its ends.
-        reach = longest // 2 + near
-        loud = _highest(np.median(around, axis=1), -reach, reach)
-        for run in _runs(level < loud * 10 ** (-FADE_DB / 20)):
-            left = level[max(run.start - near, 0) : max(run.start - 2, 0)]
-            right = level[run.end + 2 : run.end + near]
-            if run.start < near or run.end + near > level.size or run.frames > longest:
-                continue
-            deepest = level[run.start : run.end].min()
-            ordinary = min(left.min(), right.min()) * 10 ** (-ORDINARY_DB / 20)
-            comes_back = right.max() > 0.1 * left.max()
-            if deepest < ordinary and comes_back:
-                found.append(Span(span.start + run.start * hop, span.start + (run.end - 1) * hop + size))
-    return found
 
 
 @dataclass(frozen=True)
@@ -261,7 +188,7 @@ def untimely(found: Events, plucked: Sequence[int | None], rate_hz: int) -> list
 def clicks(
     found: Events, plucked: Sequence[int | None], gaps: Sequence[Span], expected: Sequence[Span], rate_hz: int
 ) -> list[int]:
-    """Spikes while sound is expected that are no attack of a pluck and no edge of a hole or fade."""
+    """Spikes while sound is expected that are no attack of a pluck and no edge of a hole."""
     apart = round(ATTACK_S * rate_hz)
     known = [Span(place - apart, place + apart) for place in plucked if place is not None]
     known += [Span(gap.start - apart, gap.end + apart) for gap in gaps]
@@ -275,37 +202,31 @@ def clicks(
 
 @dataclass(frozen=True)
 class Faults:
-    """What is wrong with the sound of some keys, as places in it.
+    """Faults of the sound of some keys, as places in it.
 
     Attributes:
-        expected: where something must sound.
-        plucked: for each key the beginning of its pluck; None: it was not found at the usual time.
-        fades: those that meet no hole.
+        untimely: beginnings of plucks that are no key's.
     """
 
-    expected: tuple[Span, ...]
-    plucked: tuple[int | None, ...]
     holes: tuple[Span, ...]
-    fades: tuple[Span, ...]
     untimely: tuple[int, ...]
     clicks: tuple[int, ...]
 
 
 def faults(sound: NDArray[np.float32], keys: Sequence[int], usual: int, rate_hz: int) -> Faults:
-    """Those of the sound (frames, channels) of keys that were pressed at these frames.
+    """Find those of the sound (frames, channels) of keys that were pressed at these frames.
 
     Args:
         usual: frames from a key to its pluck.
     """
     expected = expected_sound(sound, keys, rate_hz)
     silent = holes(sound, expected, rate_hz)
-    gaps = [fade for fade in fades(sound[:, 0], expected, rate_hz) if not any(map(fade.meets, silent))]
     rest = unpredicted(sound[:, 0], rate_hz)
     found = events(rest, rate_hz)
     plucked = matched(keys, found, rest.by_past, usual, rate_hz)
     late = untimely(found, plucked, rate_hz)
-    clicked = clicks(found, [*plucked, *late], [*silent, *gaps], expected, rate_hz)
-    return Faults(*map(tuple, (expected, plucked, silent, gaps, late, clicked)))  # type: ignore[arg-type]
+    clicked = clicks(found, [*plucked, *late], silent, expected, rate_hz)
+    return Faults(tuple(silent), tuple(late), tuple(clicked))
 
 
 def onset(sound: NDArray[np.floating], key: int, rate_hz: int) -> int | None:

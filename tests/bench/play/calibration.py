@@ -1,4 +1,4 @@
-"""How much of the latency is the sound server's and the recorder's, measured with clicks whose times are known.
+"""The share of the latency that is the sound server's and the recorder's, measured with clicks of known times.
 
 A program's latency is given twice: until its sound is in the recording, and less the time that the device's buffer
 and the way to the recorder take. That time is found from outside the program: the server reports how much sound it
@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,9 @@ CLICKS = 8
 LOOK_S = 0.03
 LEAST = 0.1  # quantile of what the server has buffered: programs hand over sound when that is least
 PATIENCE_S = 20.0
+BLOCK_FRAMES = 256
+FIRST_S = 0.5
+EVERY_S = 0.107  # no multiple of a block
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,7 @@ class Handed:
 
 @dataclass
 class Holding:
-    """How much of a client's sound the server has buffered, in s, sampled repeatedly."""
+    """The sound of a client that the server has buffered, in s, sampled repeatedly."""
 
     looks_s: list[float] = field(default_factory=list)
 
@@ -75,14 +79,7 @@ def click_through(server: SoundServer) -> list[Handed]:
     """
     found = []
     for latency_s in LATENCIES_S:
-        command = [
-            sys.executable,
-            "-m",
-            "tests.bench.play.click",
-            str(RATE_HZ),
-            str(latency_s),
-            str(CLICKS),
-        ]
+        command = [sys.executable, "-m", "tests.bench.play.calibration", str(latency_s)]
         holding = Holding()
         with child(command, server.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
             deadline_s = time.monotonic() + PATIENCE_S
@@ -118,3 +115,28 @@ def transit(clicks: Sequence[Handed], recorded: Recording) -> Transit:
     return Transit(
         tuple(np.array(held_s)[order]), tuple(np.array(transit_s)[order]), float(np.quantile(apart_s, 0.9))
     )
+
+
+def main(latency_s: float) -> None:
+    """Play clicks through PortAudio and print the times (`time.monotonic`) at which the device was handed each."""
+    import sounddevice
+
+    times_s: list[float] = []
+    started_s = time.monotonic()
+
+    def callback(out: Any, frames: int, _times: Any, _status: Any) -> None:
+        now_s = time.monotonic()
+        out[:] = bytes(len(out))
+        if len(times_s) < CLICKS and now_s > started_s + FIRST_S + EVERY_S * len(times_s):
+            memoryview(out).cast("B").cast("f")[0] = 0.5  # the first frame's left sample
+            times_s.append(now_s)
+
+    with sounddevice.RawOutputStream(
+        RATE_HZ, BLOCK_FRAMES, channels=2, dtype="float32", latency=latency_s, callback=callback
+    ):
+        time.sleep(FIRST_S + EVERY_S * (CLICKS + 2))
+    print(json.dumps(times_s))
+
+
+if __name__ == "__main__":
+    main(float(sys.argv[1]))

@@ -23,9 +23,6 @@ class Missing(RuntimeError):
     """Something of the computer that the benchmark cannot do without."""
 
 
-SOUND_AND_SCREEN = ("pulseaudio", "pacat", "parec", "pactl", "Xvfb")
-
-
 def need_programs(*programs: str) -> None:
     """Raise `Missing` with the names of those that are absent, and what to install."""
     absent = [program for program in programs if shutil.which(program) is None]

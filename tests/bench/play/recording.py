@@ -101,7 +101,7 @@ class Recording:
         return self._wait(lambda: time.monotonic() - self.sounded_s > silence_s, seconds)
 
     def wait_for_end(self) -> None:
-        """Of the recorder, and all that it still brought."""
+        """Wait for the recorder's end, and all that it still brought."""
         self._thread.join()
 
     def _wait(self, holds: Callable[[], bool], seconds: float) -> bool:
@@ -113,9 +113,9 @@ class Recording:
         return True
 
     def sound(self) -> NDArray[np.float32]:
-        """What is recorded so far, shape (frames, channels)."""
-        whole = self._path.stat().st_size // FRAME_BYTES * CHANNELS
-        return np.fromfile(self._path, np.float32, whole).reshape(-1, CHANNELS)
+        """All that is recorded so far, mapped from the file, shape (frames, channels)."""
+        frames = self._path.stat().st_size // FRAME_BYTES
+        return np.memmap(self._path, np.float32, "r", shape=(frames, CHANNELS))
 
     def clock(self) -> CardClock:
         frames, times_s = np.array(self._arrivals[1:], float).T
@@ -125,28 +125,13 @@ class Recording:
 @contextlib.contextmanager
 def recording(server: SoundServer, path: Path, sink: str = SINK) -> Iterator[Recording]:
     """Record what a sink is given into `path` until the block ends."""
-    reading, writing = _pipe()
-    with reading:
-        with child(_recorder(CHANNELS, sink), server.environment, stdout=writing):
-            writing.close()
+    command = ["parec", "--raw", "-d", f"{sink}.monitor", f"--format={FORMAT}", f"--rate={RATE_HZ}"]
+    command += [f"--channels={CHANNELS}", f"--latency-msec={LATENCY_MS}"]
+    read_end, write_end = os.pipe()
+    with os.fdopen(read_end, "rb", buffering=0) as reading:
+        with contextlib.ExitStack() as stack:
+            with os.fdopen(write_end, "wb", buffering=0) as writing:
+                stack.enter_context(child(command, server.environment, stdout=writing))
             recorded = Recording(reading, path)
             yield recorded
         recorded.wait_for_end()
-
-
-@contextlib.contextmanager
-def recording_aside(server: SoundServer, path: Path, sink: str = SINK) -> Iterator[None]:
-    """Record the mean of both channels, float32 (frames,), into `path`, by another process alone."""
-    with path.open("wb") as file, child(_recorder(1, sink), server.environment, stdout=file):
-        yield
-
-
-def _recorder(channels: int, sink: str) -> list[str]:
-    command = ["parec", "--raw", "-d", f"{sink}.monitor", f"--format={FORMAT}", f"--rate={RATE_HZ}"]
-    return [*command, f"--channels={channels}", f"--latency-msec={LATENCY_MS}"]
-
-
-def _pipe() -> tuple[IO[bytes], IO[bytes]]:
-    """Unbuffered ends of a pipe."""
-    reading, writing = os.pipe()
-    return os.fdopen(reading, "rb", buffering=0), os.fdopen(writing, "wb", buffering=0)

@@ -1,4 +1,4 @@
-"""A private X screen (Xvfb): windows are drawn on it, keys are sent to it, and pictures are taken of it."""
+"""A private X screen (Xvfb): windows are drawn on it, and keys are sent to it."""
 
 from __future__ import annotations
 
@@ -8,9 +8,6 @@ import subprocess
 import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
-
-import numpy as np
-from numpy.typing import NDArray
 
 from tests.bench.play.children import Missing, child
 
@@ -58,10 +55,6 @@ class Screen:
         window.set_input_focus(X.RevertToParent, X.CurrentTime)
         self._display.sync()
 
-    def size(self, window: Window) -> tuple[int, int]:
-        found = window.get_geometry()
-        return found.width, found.height
-
     def key(self, name: str, down: bool) -> float:
         """Press or release a key, by the name of its keysym; return when it was sent (`time.monotonic`)."""
         from Xlib import XK, X
@@ -74,13 +67,6 @@ class Screen:
         xtest.fake_input(self._display, X.KeyPress if down else X.KeyRelease, code)
         self._display.flush()
         return now_s
-
-    def grab(self, x: int, y: int, width: int, height: int) -> NDArray[np.uint8]:
-        """The picture of a part of the screen, (height, width, 4): blue, green, red, unused."""
-        from Xlib import X
-
-        data = self._root.get_image(x, y, width, height, X.ZPixmap, 0xFFFFFFFF).data
-        return np.frombuffer(data, np.uint8).reshape(height, -1)[:, : 4 * width].reshape(height, width, 4)
 
 
 @contextlib.contextmanager

@@ -1,13 +1,15 @@
-"""How often the 95 % intervals of partials hold the truth on synthetic notes, and how far their middles are off."""
+"""Shares of 95 % intervals of partials that hold the truth on synthetic notes, and the errors of their middles."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
 
-from tests.bench.recordings.synthetic import synthetic_note
+from tests.training.recording.synthetic import synthetic_note
+from training.cli.console import Report
 from training.recording.fit import fit_note
 from training.recording.note import note_of
 from training.recording.numbering import number_note
@@ -16,6 +18,11 @@ QUIETEST_DB = -50.0  # below a note's loudest partial: those below are not count
 NUMBERED_CENTS = 50.0
 FIRST_SEED = 3_000  # `intervals.MODEL_ERRORS` was measured on notes of seeds below it
 UNITS = {"hz": 1200 / math.log(2), "decay": 1.0, "level_db": 1.0}  # of the errors: cents, a share, dB
+
+
+def measure(count: int, report: Report) -> dict[str, Any]:
+    """Measure so many notes that no threshold was set on."""
+    return {"intervals": coverage(range(FIRST_SEED, FIRST_SEED + count), lambda done: report(done / count))}
 
 
 def coverage(seeds: Iterable[int], progress: Callable[[int], None] = lambda done: None) -> dict[str, float]:

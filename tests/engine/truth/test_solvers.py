@@ -38,7 +38,7 @@ def random_state(batch: int, modes: int) -> ModalState:
 
 @pytest.mark.parametrize(("initial", "rate_hz", "modes"), PROTOCOL)
 def test_default_accuracy_on_the_worst_of_the_protocol(initial: str, rate_hz: int, modes: int) -> None:
-    """1e-7 over 4000 samples is the promise; a shorter stretch keeps the suite quick (`bench solver` has it all)."""
+    """1e-7 over 4000 samples was measured once, with the same strings; a shorter stretch keeps the suite quick."""
     state = worst_of_protocol(initial, modes)
     truth = solve_dop853(resonator_of(STRING, state.modes), state, rate_hz, 600)
     found = SplittingSolver(resonator_of(STRING, modes), rate_hz).solve(state, 600)

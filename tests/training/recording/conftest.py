@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
+from tests.training.recording.synthetic import SyntheticNote, synthetic_note
 from training.recording.learn import Learned, examined, learn
 from training.recording.preset import Source
 

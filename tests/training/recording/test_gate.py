@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
-from tests.bench.recordings.sounds import CHANGES, membrane
-from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
+from tests.training.recording.sounds import CHANGES, membrane
+from tests.training.recording.synthetic import SyntheticNote, synthetic_note
 from training.recording.gate import second_series
 from training.recording.learn import Learned, NotFound, Refused, examined, learn, require_found
 from training.recording.note import note_of

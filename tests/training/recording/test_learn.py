@@ -11,8 +11,8 @@ from scipy.interpolate import CubicSpline
 
 from engine.presets import load_preset
 from tests.bench.recordings.coverage import coverage
-from tests.bench.recordings.synthetic import SyntheticNote, synthetic_note
 from tests.training.recording.conftest import SEED
+from tests.training.recording.synthetic import SyntheticNote, synthetic_note
 from training.recording.fit import fit_note, fit_takes
 from training.recording.glide import CENTS, Glide, rate_basis
 from training.recording.learn import Learned, examined, learn

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.bench.recordings.synthetic import SyntheticNote
+from tests.training.recording.synthetic import SyntheticNote
 from training.recording.note import RecordingError, note_of
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from tests.bench.recordings.synthetic import SyntheticNote
+from tests.training.recording.synthetic import SyntheticNote
 from training.recording.note import note_of
 from training.recording.numbering import followed, number_note, peaks_of, series_at
 

@@ -1,4 +1,4 @@
-"""What a player hears of loud plucks that overlap, judged as a recording is: the limiter makes no clicks."""
+"""Loud plucks that overlap, judged as a recording of them is: the limiter makes no clicks."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ import soundfile
 from numpy.typing import NDArray
 from scipy import signal
 
-from tests.bench.recordings.synthetic import synthetic_note
+from tests.training.recording.synthetic import synthetic_note
 from training.recording.note import note_of, onset_of
 from training.recording.numbering import number_note
 

@@ -1,7 +1,6 @@
 """A private MIDI cable: messages go through a real port from this process into the app's own MIDI input.
 
-It is carried by a JACK server with the dummy driver, which needs neither a device nor the kernel's sequencer. This
-process receives the messages too, which shows how long the cable itself takes and what it loses.
+It is carried by a JACK server with the dummy driver, which needs neither a device nor the kernel's sequencer.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -28,48 +27,20 @@ START_PATIENCE_S = 10.0
 SETTLE_S = 0.3
 
 
-@dataclass
+@dataclass(frozen=True)
 class Cable:
-    """Both ends of the cable.
-
-    Attributes:
-        name: of the input port that a program opens.
-        environment: variables for a program that is to find it.
-    """
+    """The sending end. `name`: of the input port that a program opens."""
 
     name: str
-    environment: dict[str, str]
     _output: Any
-    _sent_s: list[float] = field(default_factory=list)
-    _arrived_s: list[float] = field(default_factory=list)
 
-    def send(self, event: Event) -> float:
-        """Send an event; return when (`time.monotonic`)."""
-        sent_s = time.monotonic()
+    def send(self, event: Event) -> None:
         for message in messages_of(event):
-            self._sent_s.append(time.monotonic())
             self._output.send_message(message.bytes())
-        return sent_s
 
     def plug(self, name: str) -> Any:
         """A further port, which `delete` unplugs."""
         return load_backend().virtual_output(name)
-
-    def hear(self, _message: Any) -> None:
-        """Receive a message at the other end, in the port's thread."""
-        self._arrived_s.append(time.monotonic())
-
-    @property
-    def lost(self) -> int:
-        """How many messages have not arrived."""
-        return len(self._sent_s) - len(self._arrived_s)
-
-    @property
-    def transits_s(self) -> list[float]:
-        """The time from one end to the other of each message; empty where some were lost."""
-        if self.lost:
-            return []
-        return [arrived_s - sent_s for sent_s, arrived_s in zip(self._sent_s, self._arrived_s, strict=True)]
 
 
 @contextlib.contextmanager
@@ -92,17 +63,15 @@ def cable(folder: Path) -> Iterator[Cable]:
         try:
             backend = load_backend()
         except MidiUnavailable as error:
-            raise Missing(f"{error} Or play by keys") from error
+            raise Missing(str(error)) from error
         with _quiet(folder / "jack.log"):
             output = _opened(backend, process, folder / "jackd.log")
         stack.callback(output.delete)
         names = [name for name in backend.get_input_names() if name.endswith(PORT)]
         if not names:
-            raise Missing("JACK does not show the MIDI port that was made; play by keys")
-        made = Cable(names[0], ours, output)
-        stack.callback(backend.open_input(names[0], callback=made.hear).close)
+            raise Missing("JACK does not show the MIDI port that was made")
         time.sleep(SETTLE_S)
-        yield made
+        yield Cable(names[0], output)
 
 
 def _opened(backend: RtMidi, process: subprocess.Popen[bytes], log: Path) -> Any:
@@ -114,7 +83,7 @@ def _opened(backend: RtMidi, process: subprocess.Popen[bytes], log: Path) -> Any
         except OSError as error:
             if process.poll() is not None or time.monotonic() > deadline_s:
                 said = log.read_text(errors="replace").strip()[-300:]
-                raise Missing(f"no MIDI port can be had of JACK ({error}; it said: {said}); play by keys") from error
+                raise Missing(f"no MIDI port can be had of JACK ({error}; it said: {said})") from error
             time.sleep(0.1)
 
 
