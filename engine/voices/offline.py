@@ -132,7 +132,7 @@ def voice_blocks(
 def ahead_frames(rendered: int) -> int:
     """The frames of the next block of a voice that is rendered ahead, after so many: for ears and files alike.
 
-    Two short ones let it begin soon: the first prepares the model, the second tells its speed.
+    Two short ones let it begin soon: the first prepares the model, the second shows its speed.
     """
     return AHEAD_FIRST if rendered < 2 * AHEAD_FIRST else AHEAD_FRAMES
 
