@@ -64,7 +64,10 @@ def _fours(
     stride: int,
     unit: int,
 ) -> None:
-    """Compute one pass of butterflies of four: x[q + stride (p + count j)] to y[q + stride (4p + j)]."""
+    """Compute one pass of butterflies of four: x[q + stride (p + count j)] to y[q + stride (4p + j)].
+
+    Real and imaginary parts are arrays by themselves, so that a processor takes several numbers at once.
+    """
     apart = stride * count
     for p in range(count):
         c1, s1 = cosines[p * unit], -sines[p * unit]

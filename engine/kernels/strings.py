@@ -294,7 +294,8 @@ def rows(
 ) -> None:
     """ω², σ, k and η² of the lowest modes, one after the other, (4 modes,).
 
-    Of two polarisations, see `engine.values.string.Polarisations`.
+    Of two polarisations, see `engine.values.string.Polarisations`. Each value is a number by itself, since tables,
+    notes and Python's classes hold them in records of different kinds.
 
     Args:
         pairs: partials of two modes, whose ω² are in the ratio `detuning`; 0: there is one direction.
