@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import os
 import sys
 import threading
 import time
@@ -22,6 +21,7 @@ from PySide6.QtWidgets import QApplication
 from app.patches.library import SHIPPED, PatchError, read_patch
 from app.shared.heap import collect_anywhere, collect_between_events, return_large_blocks
 from app.shared.log import crashes_written, faults_logged, log_fault
+from app.shared.thread_priority import leave_a_core
 from app.views.theme import apply_theme
 from app.window.display import check_display
 from app.window.main_window import MainWindow
@@ -71,7 +71,6 @@ class _Start(QObject):
         self._window, self._settings, self._path, self._notice = window, settings, path, notice
         self._alive = alive
         self._thread = threading.Thread(target=self._load, name="engine-loader")
-        self._torch = threading.Thread(target=load_torch, name="torch-loader", daemon=True)
         self._controller: Controller | None = None
         self.failure: Exception | None = None
         self._loaded.connect(self._begin, Qt.ConnectionType.QueuedConnection)
@@ -109,14 +108,12 @@ class _Start(QObject):
         self._follow_up()
 
     def _follow_up(self) -> None:
-        """Load torch when keys would sound, then take one file after another: of MIDI files, all notes sound."""
+        """Take one file after another when keys would sound: of MIDI files, all notes sound."""
         controller = self._controller
         assert controller is not None
+        if not self._files:
+            return
         if controller.performance.playable or time.monotonic() > self._patience_s:
-            if self._torch.ident is None:
-                self._torch.start()
-            if not self._files:
-                return
             controller.take_file(self._files.pop(0))
             self._patience_s = time.monotonic() + PATIENCE_S
         QTimer.singleShot(LOOK_MS, self, self._follow_up)
@@ -138,13 +135,6 @@ def load_engine() -> None:
     # NumPy's products are small here; the threads of its BLAS, one a core, would spin between them for nothing.
     threadpool_limits(limits=1, user_api="blas")
     warm()
-
-
-def load_torch() -> None:
-    """Load what pictures need, and models that are rendered ahead."""
-    import torch
-
-    torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
 
 
 def _find_devices() -> None:
@@ -172,6 +162,7 @@ def run(
     check_display()
     gc.disable()  # until `collect_between_events`, or until loading fails: there is hardly any garbage before
     return_large_blocks()
+    leave_a_core()
     path = settings_file()
     settings, notice = load_settings(path)
     settings = with_patch(settings)

@@ -7,6 +7,8 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
+import torch
+
 from engine.compare.relative import error_to_signal
 from engine.pluck import Pluck
 from engine.resonators.string import resonator_of
@@ -94,8 +96,8 @@ def measure(batch: int, steps: int, report: Callable[[float, str], None]) -> Sol
 
 
 def _measure_protocol(data: DatasetConfiguration, batch: int) -> SolverTiming:
-    initial = draw_initial(data)
-    rise = data.resonator.relative_tension_rise(initial)
+    drawn = draw_initial(data)
+    rise, initial = data.resonator.relative_tension_rise(drawn), torch.from_numpy(drawn)
     worst = ModalState.at_rest(initial[rise.argmax()][None])
     started = time.perf_counter()
     truth = solve_dop853(data.resonator, worst, data.rate_hz, data.steps)
@@ -138,7 +140,7 @@ def _measure_audio(substeps: int | None, silence: float = 0.0) -> AudioTiming:
     string = StringParameters()
     modes = string.modes_below(HIGHEST_AUDIBLE_HZ)
     resonator = resonator_of(string, modes, grid_points=modes + 2)
-    state = ModalState.at_rest(resonator.to_modes(Pluck().displacement(modes + 2)[None]))
+    state = ModalState.at_rest(torch.from_numpy(resonator.to_modes(Pluck().displacement(modes + 2)[None])))
     samples = math.ceil(AUDIO_S * AUDIO_RATE_HZ)
     whole, solver = (
         SplittingSolver(resonator, AUDIO_RATE_HZ, substeps=substeps, silence=share) for share in (0.0, silence)
