@@ -1,4 +1,4 @@
-"""NumPy or torch, whichever made what is given: a law is written once for arrays and for tensors.
+"""NumPy or torch, whichever made the values: a law is written once for arrays and for tensors.
 
 Both have the same names for what such a law uses. Torch is never imported here: who gives tensors has it.
 """

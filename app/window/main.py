@@ -71,6 +71,7 @@ class _Start(QObject):
         self._window, self._settings, self._path, self._notice = window, settings, path, notice
         self._alive = alive
         self._thread = threading.Thread(target=self._load, name="engine-loader")
+        self._torch = threading.Thread(target=load_torch, name="torch-loader", daemon=True)
         self._controller: Controller | None = None
         self.failure: Exception | None = None
         self._loaded.connect(self._begin, Qt.ConnectionType.QueuedConnection)
@@ -105,18 +106,25 @@ class _Start(QObject):
         self._alive(self._controller)
         QTimer.singleShot(0, self._controller.patches.recordings.offer_left)
         self._patience_s = time.monotonic() + PATIENCE_S
+        self._window.face_asked.connect(self._prepare)
         self._follow_up()
 
     def _follow_up(self) -> None:
-        """Take one file after another when keys would sound: of MIDI files, all notes sound."""
+        """Prepare for the face when keys would sound, then take one file after another: of MIDI files, all notes."""
         controller = self._controller
         assert controller is not None
-        if not self._files:
-            return
         if controller.performance.playable or time.monotonic() > self._patience_s:
+            self._prepare(controller.session.choices.face)
+            if not self._files:
+                return
             controller.take_file(self._files.pop(0))
             self._patience_s = time.monotonic() + PATIENCE_S
         QTimer.singleShot(LOOK_MS, self, self._follow_up)
+
+    def _prepare(self, face: str) -> None:
+        """Load torch for the Lab, where models of one string are chosen; Play needs none, and saves its 200 MB."""
+        if face == "lab" and self._torch.ident is None:
+            self._torch.start()
 
     def _failed(self, error: Exception) -> None:
         """Show the error as a notice; the window stays until its user closes it."""
@@ -135,6 +143,11 @@ def load_engine() -> None:
     # NumPy's products are small here; the threads of its BLAS, one a core, would spin between them for nothing.
     threadpool_limits(limits=1, user_api="blas")
     warm()
+
+
+def load_torch() -> None:
+    """Load torch before a model needs it."""
+    import torch  # noqa: F401
 
 
 def _find_devices() -> None:

@@ -77,7 +77,7 @@ Run = Callable[[KoopmanTensionState, Step], tuple[Values, KoopmanTensionState]] 
 
 
 class TensionLaw:
-    """The law; what is given to it is made by the library that made its weights.
+    """The law. All values that it takes are of the library that made its weights.
 
     Attributes:
         A, r, p: what is learned; A is that of (A - 1)/(hω)².
