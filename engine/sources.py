@@ -2,21 +2,26 @@
 
 A source is given initial displacements, yields frames in blocks, and keeps nothing: the state is passed. Rendering,
 comparing, the command line and the app treat model and truth alike through it. Torch is imported with the first
-source that is made: voices that are compiled need none.
+model that needs it: strings of `koopman_tension` and the truth do not.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from engine.levels import LEAST_PEAK_M, RUNAWAY_FACTOR
+from engine.models._tension_law import TensionArrays
 from engine.presets import Preset, PresetInfo
 from engine.resonators.base import Array
+from engine.truth import ModalState, SplittingSolver
+
+if TYPE_CHECKING:
+    from engine.models.base import StringModel
 
 Floats = NDArray[np.floating[Any]]
 SILENCE = 1e-9  # of a mode, of all: what the truth leaves out is 180 dB down
@@ -75,44 +80,63 @@ class StringSource(ABC):
         """
 
 
+class _TorchModel:
+    """A model of torch that is given arrays and gives arrays, as `TensionArrays` does."""
+
+    def __init__(self, model: StringModel[Any]) -> None:
+        self._model: Any = model
+
+    def encode(self, displacement: NDArray[np.float32]) -> Any:
+        import torch
+
+        with torch.inference_mode():
+            return self._model.encode(torch.from_numpy(displacement))
+
+    def advance(self, state: Any, steps: int, readout: Array | None = None) -> tuple[Floats, Any]:
+        import torch
+
+        with torch.inference_mode():
+            frames, after = self._model.advance(state, steps, None if readout is None else torch.from_numpy(readout))
+        return frames.numpy(), after
+
+    def sample(self, state: Any, frames: NDArray[np.int64], steps: int) -> tuple[Floats, Any]:
+        import torch
+
+        with torch.inference_mode():
+            found, after = self._model.sample(state, torch.from_numpy(frames), steps)
+        return found.numpy(), after
+
+
 class ModelSource(StringSource):
     """A preset's model."""
 
     def __init__(self, preset: Preset) -> None:
-        from engine.models.base import AnyFrameModel
+        self._model: TensionArrays | _TorchModel
+        if preset.info.of_many_strings:
+            self._model, self.any_frame = TensionArrays(preset.configuration, preset.weights), True
+        else:
+            from engine.models.base import AnyFrameModel
 
-        self._model = preset.model
-        self._sampled = self._model if isinstance(self._model, AnyFrameModel) else None
+            self._model, self.any_frame = _TorchModel(preset.model), isinstance(preset.model, AnyFrameModel)
         self._scale_m = preset.info.scale_m
         self.rate_hz = preset.info.rate_hz
         self.grid_points = preset.info.grid_points
-        self.any_frame = self._sampled is not None
 
     def start(self, displacement_m: Array) -> SourceState:
-        import torch
-
         _check_grid(displacement_m, self.grid_points)
-        with torch.inference_mode():
-            inner = self._model.encode(torch.from_numpy(displacement_m / self._scale_m).float())
+        inner = self._model.encode((displacement_m / self._scale_m).astype(np.float32))
         return SourceState(inner, 0, RUNAWAY_FACTOR * max(float(np.abs(displacement_m).max()), LEAST_PEAK_M))
 
     def advance(self, state: SourceState, steps: int, readout: Array | None = None) -> tuple[Floats, SourceState]:
-        import torch
-
-        with torch.inference_mode():
-            points = None if readout is None else torch.from_numpy(readout)
-            frames, inner = self._model.advance(state.inner, steps, points)
-        return self._checked(frames.numpy(), np.arange(1, steps + 1), state), self._after(state, inner, steps)
+        frames, inner = self._model.advance(state.inner, steps, readout)
+        return self._checked(frames, np.arange(1, steps + 1), state), self._after(state, inner, steps)
 
     def sample(self, state: SourceState, frames: NDArray[np.int64], steps: int) -> tuple[Floats, SourceState]:
-        import torch
-
-        if self._sampled is None or len(frames) == steps:
+        if not self.any_frame or len(frames) == steps:
             every, after = self.advance(state, steps)
             return every if len(frames) == steps else every[:, frames - 1], after
-        with torch.inference_mode():
-            found, inner = self._sampled.sample(state.inner, torch.from_numpy(frames), steps)
-        return self._checked(found.numpy(), frames, state), self._after(state, inner, steps)
+        found, inner = self._model.sample(state.inner, frames, steps)
+        return self._checked(found, frames, state), self._after(state, inner, steps)
 
     def _checked(self, found: Floats, frames: NDArray[np.int64], state: SourceState) -> Floats:
         """The displacement in m, checked. Raises Runaway."""
@@ -136,8 +160,6 @@ class TruthSource(StringSource):
     """
 
     def __init__(self, info: PresetInfo, substeps: int | None = None) -> None:
-        from engine.truth import SplittingSolver
-
         self.rate_hz = info.rate_hz
         self.grid_points = info.grid_points
         self.any_frame = True  # it steps through all of them; their shapes are most of the cost
@@ -145,8 +167,6 @@ class TruthSource(StringSource):
         self._solver = SplittingSolver(self._resonator, info.rate_hz, substeps=substeps, silence=SILENCE)
 
     def start(self, displacement_m: Array) -> SourceState:
-        from engine.truth import ModalState
-
         _check_grid(displacement_m, self.grid_points)
         return SourceState(ModalState.at_rest(self._resonator.to_modes(displacement_m)), 0, float("inf"))
 
@@ -154,13 +174,11 @@ class TruthSource(StringSource):
         amplitudes, inner = self._solver.advance(state.inner, steps)
         shapes = self._resonator.shapes
         to_points = shapes if readout is None else shapes @ readout
-        return amplitudes.numpy() @ to_points, SourceState(inner, state.frame + steps, state.limit_m)
+        return amplitudes @ to_points, SourceState(inner, state.frame + steps, state.limit_m)
 
     def sample(self, state: SourceState, frames: NDArray[np.int64], steps: int) -> tuple[Floats, SourceState]:
-        import torch
-
-        amplitudes, inner = self._solver.sample(state.inner, torch.from_numpy(frames), steps)
-        found = amplitudes.numpy() @ self._resonator.shapes
+        amplitudes, inner = self._solver.sample(state.inner, frames, steps)
+        found = amplitudes @ self._resonator.shapes
         return found, SourceState(inner, state.frame + steps, state.limit_m)
 
 

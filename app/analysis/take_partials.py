@@ -19,6 +19,7 @@ from engine.compare.partials import (
     segment_frames,
     track_partials,
 )
+from engine.compare.true_partials import true_phasors
 from engine.pluck import Pluck
 from engine.resonators.base import Array
 from engine.resonators.sine_transform import analysis_matrix, project, to_modes
@@ -58,8 +59,6 @@ def take_partials(take: Take, job: Job) -> dict[str, list[PartialRow]]:
     Raises:
         Cancelled: the job was cancelled.
     """
-    from engine.compare.true_partials import true_phasors  # and torch
-
     info = take.info
     last = round((take.seconds if take.model_ends_s is None else take.model_ends_s) * info.rate_hz)
     modes_hz = info.resonator.eigenvalues().imag / (2 * math.pi)

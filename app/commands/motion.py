@@ -262,10 +262,10 @@ def _fast(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None
 
     def motion(initial: Array) -> Iterator[Array]:
         state = ModalState.at_rest(resonator.to_modes(initial))
-        yield resonator.to_grid(state.amplitude.numpy()[:, None])
+        yield resonator.to_grid(state.amplitude[:, None])
         for count in blocks_of(steps):
             amplitudes, state = solver.advance(state, count)
-            yield resonator.to_grid(amplitudes.numpy())
+            yield resonator.to_grid(amplitudes)
 
     return motion
 
@@ -286,7 +286,7 @@ def _dop853(resonator: Resonator, rate_hz: float, steps: int, trajectories: int,
             steps,
             report=lambda share: report((before + share * len(initial)) / trajectories),
         )
-        yield resonator.to_grid(amplitudes.numpy())
+        yield resonator.to_grid(amplitudes)
 
     return motion
 

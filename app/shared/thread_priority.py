@@ -44,6 +44,14 @@ def wait_asleep() -> None:
     os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 
+def leave_a_core() -> None:
+    """Make torch leave one core to sound and picture, whether it is loaded already, as on Windows, or later."""
+    cores = max(1, (os.cpu_count() or 2) - 1)
+    os.environ.setdefault("OMP_NUM_THREADS", str(cores))
+    if (torch := sys.modules.get("torch")) is not None:
+        torch.set_num_threads(cores)
+
+
 def native_threads() -> set[int]:
     """The system's ids of this process's threads; empty where `/proc` cannot be read (not on Linux)."""
     try:

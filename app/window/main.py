@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import gc
-import os
 import sys
 import threading
 import time
@@ -22,6 +21,7 @@ from PySide6.QtWidgets import QApplication
 from app.patches.library import SHIPPED, PatchError, read_patch
 from app.shared.heap import collect_anywhere, collect_between_events, return_large_blocks
 from app.shared.log import crashes_written, faults_logged, log_fault
+from app.shared.thread_priority import leave_a_core
 from app.views.theme import apply_theme
 from app.window.display import check_display
 from app.window.main_window import MainWindow
@@ -106,20 +106,25 @@ class _Start(QObject):
         self._alive(self._controller)
         QTimer.singleShot(0, self._controller.patches.recordings.offer_left)
         self._patience_s = time.monotonic() + PATIENCE_S
+        self._window.face_asked.connect(self._prepare)
         self._follow_up()
 
     def _follow_up(self) -> None:
-        """Load torch when keys would sound, then take one file after another: of MIDI files, all notes sound."""
+        """Prepare for the face when keys would sound, then take one file after another: of MIDI files, all notes."""
         controller = self._controller
         assert controller is not None
         if controller.performance.playable or time.monotonic() > self._patience_s:
-            if self._torch.ident is None:
-                self._torch.start()
+            self._prepare(controller.session.choices.face)
             if not self._files:
                 return
             controller.take_file(self._files.pop(0))
             self._patience_s = time.monotonic() + PATIENCE_S
         QTimer.singleShot(LOOK_MS, self, self._follow_up)
+
+    def _prepare(self, face: str) -> None:
+        """Load torch for the Lab, where models of one string are chosen; Play needs none, and saves its 200 MB."""
+        if face == "lab" and self._torch.ident is None:
+            self._torch.start()
 
     def _failed(self, error: Exception) -> None:
         """Show the error as a notice; the window stays until its user closes it."""
@@ -141,10 +146,8 @@ def load_engine() -> None:
 
 
 def load_torch() -> None:
-    """Load what pictures need, and models that are rendered ahead."""
-    import torch
-
-    torch.set_num_threads(max(1, (os.cpu_count() or 2) - 1))  # one core stays for sound and picture
+    """Load torch before a model needs it."""
+    import torch  # noqa: F401
 
 
 def _find_devices() -> None:
@@ -172,6 +175,7 @@ def run(
     check_display()
     gc.disable()  # until `collect_between_events`, or until loading fails: there is hardly any garbage before
     return_large_blocks()
+    leave_a_core()
     path = settings_file()
     settings, notice = load_settings(path)
     settings = with_patch(settings)

@@ -35,7 +35,7 @@ def true_phasors(
     for first in range(0, steps, block):
         samples, state = solver.advance(state, OVERSAMPLING * min(block, steps - first))
         beyond, _ = solver.advance(state, 1)
-        every = np.concatenate([samples.numpy(), beyond.numpy()], axis=1)
+        every = np.concatenate([samples, beyond], axis=1)
         before, now, after = (every[:, OVERSAMPLING - 1 + offset :: OVERSAMPLING] for offset in (-1, 0, 1))
         count = now.shape[1]
         yield phasors(before[:, :count], now, after, 1 / sample_hz, resonator)

@@ -21,6 +21,32 @@ def compile_once_for_all_numbers() -> None:
     Dispatcher.get_call_template = template  # type: ignore[method-assign, assignment]
 
 
+def keep_bitcode_alone() -> None:
+    """Let a function that is loaded keep its bitcode, not the module parsed from it: 30 MB of all together.
+
+    The module is parsed again where another function that calls it is compiled.
+    """
+    from llvmlite import binding
+    from numba.core.codegen import CPUCodeLibrary
+
+    load, link = CPUCodeLibrary._unserialize.__func__, CPUCodeLibrary._get_module_for_linking
+
+    def unserialize(kind: Any, codegen: Any, state: Any) -> Any:
+        library = load(kind, codegen, state)
+        _, form, data = state
+        if form == "object":
+            library._bitcode, library._shared_module = data[1], None
+        return library
+
+    def module_for_linking(library: Any) -> Any:
+        if library._shared_module is None and hasattr(library, "_bitcode"):
+            library._shared_module = binding.parse_bitcode(library._bitcode)
+        return link(library)
+
+    CPUCodeLibrary._unserialize = classmethod(unserialize)
+    CPUCodeLibrary._get_module_for_linking = module_for_linking
+
+
 def stop_before_machine_code() -> None:
     """Leave Numba's code as it is lowered: not optimised, not linked, not made into machine code.
 

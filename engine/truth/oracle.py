@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-import torch
 from numpy.typing import NDArray
-from torch import Tensor
 
+from engine.array_library import Values, as_array, library_of
 from engine.resonators.base import Resonator
 from engine.truth.state import ModalState
 
@@ -24,7 +23,7 @@ def solve_dop853(
     rtol: float = 1e-12,
     atol: float = 1e-14,
     report: Callable[[float], None] = lambda share: None,
-) -> Tensor:
+) -> Values:
     """Modal amplitudes of frames 0 … steps, float64 (batch, steps + 1, modes), by DOP853 (Eq. 4).
 
     Args:
@@ -52,11 +51,11 @@ def solve_dop853(
 
     times_s = np.arange(steps + 1) / rate_hz
     span_s = (0.0, float(times_s[-1]))
-    starts = torch.cat([state.amplitude, state.velocity], dim=1).numpy()
+    starts = np.concatenate([as_array(state.amplitude), as_array(state.velocity)], axis=1)
     trajectories: list[NDArray[np.float64]] = []
     for start in starts:
         solution = solve_ivp(right_side, span_s, start, "DOP853", times_s, rtol=rtol, atol=atol)
         if not solution.success:
             raise RuntimeError(f"DOP853 failed: {solution.message}")
         trajectories.append(solution.y[:modes].T)
-    return torch.from_numpy(np.stack(trajectories))
+    return library_of(state.amplitude).asarray(np.stack(trajectories))

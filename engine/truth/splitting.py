@@ -11,16 +11,17 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-import torch
-from torch import Tensor
+from numpy.typing import NDArray
 
+from engine.array_library import Values, as_array, library_of
 from engine.bounds import MOST_SUBSTEPS, SUBSTEPS_IN_A_PERIOD
 from engine.kernels.rotation import rotation
 from engine.kernels.scheme import KICKS, ROTATIONS
-from engine.resonators.base import Resonator
+from engine.resonators.base import Array, Resonator
 from engine.truth.state import ModalState
 
 
@@ -37,7 +38,7 @@ def default_substeps(resonator: Resonator, rate_hz: float) -> int:
 
 
 class SplittingSolver:
-    """A resonator at a sample rate. It is immutable: the state is passed.
+    """A resonator at a sample rate. It is immutable: the state is passed, and what comes out is of its kind.
 
     Args:
         substeps: integration steps per sample; None takes `default_substeps`. What is linear needs one.
@@ -76,11 +77,11 @@ class SplittingSolver:
         # flows, kicks, coupling, η², sub-steps, levels and ω², see `_splitting_kernel`
         self.constants = flows, kicks, resonator.coupling, resonator.stretch, substeps_of, levels, omega**2
 
-    def advance(self, state: ModalState, steps: int) -> tuple[Tensor, ModalState]:
+    def advance(self, state: ModalState, steps: int) -> tuple[Values, ModalState]:
         """Modal amplitudes after 1 … steps samples, float64 (batch, steps, modes), and the last state."""
-        return self.sample(state, torch.arange(1, steps + 1), steps)
+        return self.sample(state, np.arange(1, steps + 1), steps)
 
-    def sample(self, state: ModalState, frames: Tensor, steps: int) -> tuple[Tensor, ModalState]:
+    def sample(self, state: ModalState, frames: Values, steps: int) -> tuple[Values, ModalState]:
         """Sample the motion, as `advance`, keeping only some frames: (batch, frames, modes).
 
         Args:
@@ -88,30 +89,33 @@ class SplittingSolver:
         """
         if state.modes != self.modes:
             raise ValueError(f"the solver holds {self.modes} modes, the state {state.modes}")
-        q, v = (part.double().clone().contiguous() for part in (state.amplitude, state.velocity))
-        out = q.new_empty(q.shape[0], len(frames), self.modes)
-        self._advance_compiled(q, v, steps, frames, out)
-        return out, ModalState(q, v)
+        q, v = (as_array(part).astype(np.float64, order="C") for part in (state.amplitude, state.velocity))
+        out = np.empty((len(q), len(frames), self.modes))
+        self._advance_compiled(q, v, steps, as_array(frames), out)
+        library = library_of(state.amplitude)
+        return library.asarray(out), ModalState(library.asarray(q), library.asarray(v))
 
-    def solve(self, state: ModalState, steps: int) -> Tensor:
+    def solve(self, state: ModalState, steps: int) -> Values:
         """Modal amplitudes of frames 0 … steps, float64 (batch, steps + 1, modes)."""
         frames, _ = self.advance(state, steps)
-        return torch.cat([state.amplitude.to(frames)[:, None], frames], dim=1)
+        return library_of(frames).concatenate([state.amplitude[:, None], frames], 1)
 
-    def _advance_compiled(self, q: Tensor, v: Tensor, steps: int, frames: Tensor, out: Tensor) -> None:
+    def _advance_compiled(self, q: Array, v: Array, steps: int, frames: NDArray[np.int64], out: Array) -> None:
         # compiles, or loads what it compiled earlier: only when it is needed
         from engine.truth._splitting_kernel import advance
 
-        numbers = frames.numpy()
-
         def run(rows: slice) -> None:
-            of_rows = q[rows].numpy(), v[rows].numpy()
-            advance(*of_rows, steps, numbers, out[rows].numpy(), *self.constants, self._silence)
+            advance(q[rows], v[rows], steps, frames, out[rows], *self.constants, self._silence)
 
-        workers = min(torch.get_num_threads(), os.cpu_count() or 1, q.shape[0])
+        workers = min(_threads(), os.cpu_count() or 1, len(q))
         if workers <= 1:
             run(slice(None))
             return
         share = -(-q.shape[0] // workers)
         with ThreadPoolExecutor(workers) as pool:  # the kernel holds no interpreter lock
             list(pool.map(run, (slice(i, i + share) for i in range(0, q.shape[0], share))))
+
+
+def _threads() -> int:
+    """Torch's number of threads, which its user may have limited; before torch is loaded, the number of cores."""
+    return getattr(sys.modules.get("torch"), "get_num_threads", os.cpu_count)() or 1

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import torch
-from torch import Tensor
-
-from engine.resonators.base import Array
+from engine.array_library import Values, in_double, library_of
 
 
 @dataclass(frozen=True)
 class ModalState:
-    """Modal amplitudes in m and their velocities in m/s, both float64 (batch, modes)."""
+    """Modal amplitudes in m and their velocities in m/s, both float64 (batch, modes): arrays, or tensors."""
 
-    amplitude: Tensor
-    velocity: Tensor
+    amplitude: Values
+    velocity: Values
 
     def __post_init__(self) -> None:
         if self.amplitude.ndim != 2 or self.amplitude.shape != self.velocity.shape:
@@ -25,11 +22,11 @@ class ModalState:
             )
 
     @classmethod
-    def at_rest(cls, amplitude: Tensor | Array) -> ModalState:
+    def at_rest(cls, amplitude: Values) -> ModalState:
         """A string released with zero velocity from `amplitude` (batch, modes) in m."""
-        released = torch.as_tensor(amplitude, dtype=torch.float64)
-        return cls(released, torch.zeros_like(released))
+        released = in_double(amplitude)
+        return cls(released, library_of(released).zeros_like(released))
 
     @property
     def modes(self) -> int:
-        return self.amplitude.shape[1]
+        return int(self.amplitude.shape[1])

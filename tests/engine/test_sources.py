@@ -1,5 +1,6 @@
 """Model and truth behind one face, in metres; runaway output is detected."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,19 @@ from numpy.typing import NDArray
 
 from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
-from engine.presets import Preset, load_preset, read_info
+from engine.presets import Preset, find_preset, load_preset, read_info
+from engine.presets.of_string import of_string
 from engine.resonators.sine_transform import listening_weights, project, to_grid, to_modes
 from engine.resonators.string import resonator_of
 from engine.sources import ModelSource, Runaway, StringSource, TruthSource
 from engine.truth import ModalState, solve_dop853
+from engine.values.string import StringParameters
+
+STEEL = StringParameters(0.648, 5.0671e-08, 2.0432e-16, 7850.0, 2.2e11, 8e-06, 1.4e-06, 72.2016)
+
+
+def any_string() -> Preset:
+    return of_string(load_preset(find_preset("studio_any_string")), STEEL, 16_000)
 
 
 def both(preset_file: Path) -> tuple[StringSource, StringSource, NDArray[np.float64]]:
@@ -40,7 +49,7 @@ def test_truth_is_the_oracle(preset_file: Path) -> None:
     _, truth, initial = both(preset_file)
     info = read_info(preset_file)
     state = ModalState.at_rest(to_modes(initial, info.modes))
-    expected = to_grid(solve_dop853(resonator_of(info.string, state.modes), state, info.rate_hz, 200).numpy(), 101)
+    expected = to_grid(solve_dop853(resonator_of(info.string, state.modes), state, info.rate_hz, 200), 101)
     found, _ = truth.advance(truth.start(initial), 200)
     assert float(np.linalg.norm(found - expected[:, 1:]) / np.linalg.norm(expected)) < 1e-8
 
@@ -77,3 +86,28 @@ def test_the_grid_is_checked(preset_file: Path) -> None:
     for source in both(preset_file)[:2]:
         with pytest.raises(ValueError, match=r"must have shape \(batch, 101\), not \(1, 50\)"):
             source.start(np.zeros((1, 50)))
+
+
+def test_a_model_of_many_strings_moves_in_numpy_as_in_torch() -> None:
+    preset = any_string()
+    plucks = [Pluck(0.17, 1.0), Pluck(0.3, 12.0, "triangular"), Pluck(0.03, 12.0, width=0.03)]
+    initial = project(np.stack([pluck.displacement(101) for pluck in plucks]), preset.info.modes)
+    source, frames = ModelSource(preset), np.arange(3, 2_401, 3)
+    found, state = source.sample(source.start(initial), frames, 2_400)
+    assert len(np.unique(state.inner.nodes)) > 1  # soft and hard plucks step differently
+    following, _ = source.advance(state, 100)
+    with torch.inference_mode():
+        released = torch.from_numpy(initial / preset.info.scale_m).float()
+        expected = preset.model(released, 2_500).numpy() * preset.info.scale_m
+    atol = 1e-9 * np.abs(expected).max()
+    np.testing.assert_allclose(found, expected[:, frames - 1], rtol=0, atol=atol)
+    np.testing.assert_allclose(following, expected[:, 2_400:], rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("size", [1e3, 1e308])
+def test_a_model_of_many_strings_stays_bounded_for_wild_weights(size: float) -> None:
+    preset = any_string()
+    wild = size * np.random.default_rng(0).choice([-1.0, 1.0], (3, len(preset.weights["A"])))
+    source = ModelSource(replace(preset, weights={**preset.weights, **dict(zip("Arp", wild, strict=True))}))
+    found, _ = source.advance(source.start(project(Pluck(0.3, 8.0).displacement(101), preset.info.modes)[None]), 500)
+    assert np.isfinite(found).all()

@@ -50,7 +50,7 @@ def test_the_linear_string_is_the_closed_form(run, u0: Path, folder: Path) -> No
     assert (found.status, found.out, found.err) == (0, "", "")
     motion_m = np.load(folder / "out.npy")
     assert (motion_m.dtype, motion_m.shape) == (np.float64, (3, 201, 101))
-    start = ModalState.at_rest(to_modes(np.load(u0), 10))
+    start = ModalState.at_rest(torch.from_numpy(to_modes(np.load(u0), 10)))
     truth = to_grid(
         solve_linear(resonator_of(StringParameters(), start.modes), start, torch.arange(201).double() / 4000).numpy(),
         101,

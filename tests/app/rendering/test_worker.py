@@ -147,7 +147,7 @@ def test_while_plucks_are_heard_a_motion_keeps_step_with_its_sound(
 
 
 def test_the_first_motion_waits_until_a_pluck_would_sound(small_preset: Path, heard: Heard) -> None:
-    """It loads torch, which would keep the sound waiting."""
+    """It may load torch, which would keep the sound waiting."""
     sounds = False
     worker = RenderWorker(heard, Sources().load, sounds=lambda: sounds)
     try:

@@ -92,7 +92,7 @@ def test_a_dmd_of_the_linear_string_is_the_linear_string(
     info = small_info(False)
     noise_m = 5e-3 * torch.rand(4, info.grid_points, generator=torch.Generator().manual_seed(0)).double().numpy()
     solver = SplittingSolver(resonator_of(info.string, info.modes, tension_modulated=False), info.rate_hz)
-    start = ModalState.at_rest(to_modes(noise_m, info.modes))
+    start = ModalState.at_rest(torch.from_numpy(to_modes(noise_m, info.modes)))
     trajectories = torch.from_numpy(to_grid(solver.solve(start, 400).numpy(), info.grid_points) / info.scale_m)
     model = DMD.fit(trajectories, DMDConfiguration(info.grid_points, 2, 2 * info.modes))
     program = bank_program(model, info, rate_hz)

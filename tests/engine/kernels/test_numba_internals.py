@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import inspect
+import os
 import subprocess
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -52,6 +54,39 @@ def test_a_function_is_compiled_once_for_all_numbers_that_calls_state() -> None:
 
     assert calls(1) == 9
     assert len(add.signatures) == 1
+
+
+CALLED = """
+from numba import njit
+from engine.kernels.compiled import COMPILED
+called = njit("int64(int64)", **COMPILED)(lambda x: 3 * x + 1)
+library = called.overloads[called.nopython_signatures[0].args].library
+"""
+
+
+def test_a_function_that_is_loaded_can_still_be_called_by_one_that_is_compiled(tmp_path: Path) -> None:
+    """Of what is loaded the bitcode alone is kept."""
+    (tmp_path / "called.py").write_text(CALLED)
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1])\n"
+        "from called import called, library\n"
+        "print(sum(called.stats.cache_hits.values()), library._shared_module is None, called(2))\n"
+        "from numba import njit\n"
+        "print(njit(lambda x: called(x) + called(x + 1))(4))\n"
+    )
+    for hits in (0, 1):
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(tmp_path)],
+            env={**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache")},
+            capture_output=True,
+            text=True,
+            timeout=120,
+        )
+        assert done.returncode == 0, done.stderr
+        loaded, calls = done.stdout.splitlines()
+        assert calls == "29"
+        if hits:
+            assert loaded == "1 True 7"
 
 
 def test_machine_code_is_not_made_where_text_alone_is_wanted() -> None:

@@ -68,7 +68,7 @@ def test_the_force_at_the_bridge_is_that_of_the_solvers_modes(
     found = rung(24_000, Voice(program, let_go_m, bridge), attack=False)
     q = info.resonator.to_modes(let_go_m)[None]
     amplitudes, _ = SplittingSolver(info.resonator, 48_000).advance(ModalState.at_rest(q), len(found) - 1)
-    expected = np.concatenate([q, amplitudes[0].numpy()]) @ info.resonator.end_force / FULL_SCALE_N
+    expected = np.concatenate([q, amplitudes[0]]) @ info.resonator.end_force / FULL_SCALE_N
     assert relative(found, expected[:, None]) < 1e-4
 
 
@@ -78,7 +78,7 @@ def ringing(info: PresetInfo, frames: int) -> tuple[NDArray[np.float64], NDArray
     amplitudes = amplitudes * np.sqrt(0.5 / info.resonator.relative_tension_rise(amplitudes))
     solver = SplittingSolver(info.resonator, info.rate_hz)
     _, state = solver.advance(ModalState.at_rest(amplitudes[None]), frames)
-    return state.amplitude[0].numpy(), state.velocity[0].numpy()
+    return state.amplitude[0], state.velocity[0]
 
 
 def test_a_voice_that_sets_out_from_a_ringing_string_is_the_model_and_the_string(

@@ -50,7 +50,7 @@ def test_after_a_second_it_is_the_oracles(small_info: Info, initial_m: Initial, 
     info = small_info(True)
     let_go_m = initial_m(info, Pluck(0.3, 8.0, width=0.15))
     found = rung(8000, Voice(truth_program(info, 8000), let_go_m, STEREO), attack=False)
-    start = ModalState.at_rest(to_modes(let_go_m[None], info.modes))
+    start = ModalState.at_rest(torch.from_numpy(to_modes(let_go_m[None], info.modes)))
     exact = solve_dop853(info.resonator, start, 8000, 7999, rtol=1e-7, atol=1e-10)
     expected = to_grid(exact[0].numpy(), info.grid_points) @ weights_of(STEREO, info.grid_points) / FULL_SCALE_M
     assert relative(found[7000:], expected[7000:]) < 1e-4
@@ -62,7 +62,7 @@ def test_the_linear_string_is_exact(rate_hz: int, small_info: Info, initial_m: I
     info = small_info(False)
     let_go_m = initial_m(info, Pluck(0.3, 8.0))
     found = rung(rate_hz // 2, Voice(truth_program(info, rate_hz), let_go_m, STEREO), attack=False)
-    start = ModalState.at_rest(to_modes(let_go_m[None], info.modes))
+    start = ModalState.at_rest(torch.from_numpy(to_modes(let_go_m[None], info.modes)))
     exact = solve_linear(info.resonator, start, torch.arange(len(found)).double() / rate_hz)
     expected = to_grid(exact[0].numpy(), info.grid_points) @ weights_of(STEREO, info.grid_points) / FULL_SCALE_M
     assert relative(found, expected) < 1e-7

@@ -52,7 +52,7 @@ def struck(drum: Resonator) -> ModalState:
     """Pulled off its middle, a millimetre high, and released."""
     x, y = (np.linspace(0, 1, points) for points in POINTS)
     bump = np.exp(-40 * ((x - 0.4)[:, None] ** 2 + (y - 0.3) ** 2)).flatten()
-    return ModalState.at_rest(1e-3 * drum.to_modes(bump)[None])
+    return ModalState.at_rest(torch.from_numpy(1e-3 * drum.to_modes(bump)[None]))
 
 
 def relative(found: torch.Tensor, truth: torch.Tensor) -> float:

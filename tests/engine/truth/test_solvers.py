@@ -2,6 +2,7 @@
 
 import math
 
+import numpy as np
 import pytest
 import torch
 
@@ -21,7 +22,7 @@ def worst_of_protocol(initial: str, modes: int, seed: int = 0) -> ModalState:
     """The string with the largest tension rise among a thousand draws: the hardest to integrate."""
     amplitudes = to_modes(DRAWS[initial](1000, 101, torch.Generator().manual_seed(seed)), modes)
     worst = int(resonator_of(STRING, amplitudes.shape[1]).relative_tension_rise(amplitudes).argmax())
-    return ModalState.at_rest(amplitudes[worst : worst + 1])
+    return ModalState.at_rest(torch.from_numpy(amplitudes[worst : worst + 1]))
 
 
 def relative_l2(found: torch.Tensor, expected: torch.Tensor) -> float:
@@ -147,6 +148,20 @@ def test_some_frames_are_those_of_all() -> None:
     assert torch.equal(end.velocity, last.velocity)
 
 
+def test_arrays_move_as_tensors_do() -> None:
+    solver, state = SplittingSolver(resonator_of(STRING, 10), 16_000), random_state(3, 10)
+    expected, ended = solver.advance(state, 200)
+    arrays = ModalState(state.amplitude.numpy(), state.velocity.numpy())
+    found, end = solver.advance(arrays, 200)
+    assert isinstance(found, np.ndarray) and isinstance(expected, torch.Tensor)
+    assert np.array_equal(found, expected.numpy())
+    assert np.array_equal(end.velocity, ended.velocity.numpy())
+    assert np.array_equal(solver.solve(arrays, 200)[:, 1:], found)
+    still = ModalState.at_rest(arrays.amplitude)
+    oracle = solve_dop853(resonator_of(STRING, 10), still, 16_000, 20)
+    np.testing.assert_allclose(solver.solve(still, 20), oracle, rtol=0, atol=1e-7 * np.abs(oracle).max())
+
+
 def test_going_on_from_a_state_is_the_same_motion() -> None:
     solver = SplittingSolver(resonator_of(STRING, 25), 16_000, substeps=3)
     state = random_state(3, 25)
@@ -181,7 +196,7 @@ def test_energy_decays_as_the_damping_says() -> None:
         return float(linear + tension)
 
     for string, low, high in ((free, 1 - 1e-7, 1 + 1e-7), (STRING, 0.0, 0.9)):
-        state = ModalState.at_rest(amplitudes)
+        state = ModalState.at_rest(torch.from_numpy(amplitudes))
         before = energy(string, state)
         _, state = SplittingSolver(resonator_of(string, 10), 16_000).advance(state, 4000)
         assert low < energy(string, state) / before < high

@@ -22,7 +22,7 @@ TINY = DatasetConfiguration("noise", 4000, 4, steps=30, count=10)
 def test_amplitudes_are_the_solvers(small_dataset: Dataset) -> None:
     c = small_dataset.configuration
     solver = SplittingSolver(c.resonator, c.rate_hz)
-    state = ModalState.at_rest(draw_initial(c))
+    state = ModalState.at_rest(torch.from_numpy(draw_initial(c)))
     assert torch.equal(small_dataset.amplitudes, solver.solve(state, c.steps).float())
 
 

@@ -98,7 +98,7 @@ def synthetic_note(
     q *= math.sqrt(max(wanted, 1e-9) / float(resonator.relative_tension_rise(q)))
     solver = SplittingSolver(resonator, RATE_HZ, substeps=SUBSTEPS, silence=1e-7)
     state = ModalState.at_rest(q[None])
-    modes = solver.solve(state, round(seconds * RATE_HZ))[0].numpy()
+    modes = solver.solve(state, round(seconds * RATE_HZ))[0]
     heard = np.repeat(k * np.sin(math.pi * k * listened), 2)
     sound = modes @ heard
     scale = 0.3 / float(np.abs(sound).max())

@@ -1,0 +1,69 @@
+"""The memory of the running app: in Play 20 s after its start, after 20 notes, then in the Lab.
+
+Run `python -m tests.bench.memory`. The window opens for 45 s with default settings.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import psutil
+
+if TYPE_CHECKING:
+    from app.window.controller import Controller
+
+START_S, LAB_S = 20.0, 15.0
+NOTES, NOTE_S = 20, 0.2
+FIRST_KEY = 45
+
+
+def main() -> int:
+    """Run the app as its command does, print what it takes, and end it."""
+    from app.shared.thread_priority import wait_asleep
+    from app.window.main import run
+
+    wait_asleep()
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["LEARNED_STRINGS_SETTINGS"] = str(Path(folder) / "settings.json")
+        return run(alive=_watch)
+
+
+def _watch(controller: Controller) -> None:
+    from PySide6.QtCore import QTimer
+
+    from app.instrument.events import NoteOff, NoteOn
+
+    def play(number: int) -> None:
+        key = FIRST_KEY + number
+        controller.instruments.play(NoteOn(key, 90))
+        QTimer.singleShot(round(900 * NOTE_S), lambda: controller.instruments.play(NoteOff(key)))
+
+    def lab() -> None:
+        _print(f"Play, after {NOTES} notes")
+        controller.window.face_asked.emit("lab")
+
+    def close() -> None:
+        _print("Lab")
+        controller.window.close()
+
+    for number in range(NOTES):
+        QTimer.singleShot(round(1000 * (START_S + number * NOTE_S)), lambda number=number: play(number))
+    played_s = START_S + NOTES * NOTE_S + 5
+    for time_s, work in (
+        (START_S, lambda: _print("Play")),
+        (played_s, lab),
+        (played_s + LAB_S, close),
+    ):
+        QTimer.singleShot(round(1000 * time_s), work)
+
+
+def _print(what: str) -> None:
+    process = psutil.Process()
+    print(f"{what}: {process.memory_info().rss / 2**20:.0f} MiB resident", flush=True)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
