@@ -16,6 +16,7 @@ RATES_HZ = (8_000, 384_000)
 NOTE_LENGTHS_S = SHORTEST_S, LONGEST_S = 0.15, 60.0
 MOST_CHANNELS = 8
 LARGEST_BYTES = 512 * 2**20
+LARGEST_SAMPLE = 2.0**15  # in full scales: of whole numbers of 16 bits in a file of floating point
 
 
 class NoteFileError(Exception):
@@ -59,6 +60,9 @@ def read_note(path: Path) -> NoteFile:
             rate_hz = file.samplerate
         if len(samples) == 0:
             raise NoteFileError(f"{path}: holds no samples; export it again")
+        peak = float(np.abs(samples).max())
+        if LARGEST_SAMPLE < peak < np.inf:  # what is no number is refused with the sound
+            raise NoteFileError(f"{path}: its largest sample is {peak:.3g} times full scale; normalise it")
         with path.open("rb") as data:
             digest = hashlib.file_digest(data, "sha256").hexdigest()
     except UnreadableSound as error:
