@@ -146,9 +146,15 @@ def explained(error: ValueError, where: str = "", kind: object = None) -> str:
         words += f"; known are {', '.join(_names(kind, path))}" if kind else ""
     elif first["type"] == "value_error":
         words = str(first["ctx"]["error"])
+    elif first["type"] == "union_tag_not_found":
+        words = f"field {first['ctx']['discriminator']} is missing"
+    elif first["type"] == "union_tag_invalid":
+        path.append(first["ctx"]["discriminator"].strip("'"))
+        words = f"must be one of {first['ctx']['expected_tags']}, found {bounds.brief(first['ctx']['tag'])}"
     else:
         shown = f", found {bounds.brief(found)}" if isinstance(found, str | float | int | None) else ""
-        words = first["msg"].replace("Input should be", "must be").replace("an object", "a table") + shown
+        words = _PLAIN.get(first["type"]) or re.sub(r"^\w+ should ", "must ", first["msg"])
+        words = words.replace(" after validation", "") + shown
     place = where + _place(path) if where else _place(path).removeprefix(".")
     return f"{place}: {words}" if place else words
 
@@ -159,6 +165,9 @@ def _place(path: Iterable[str | int]) -> str:
 
 
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+_TABLES, _LISTS = ("dict_type", "model_type", "model_attributes_type", "dataclass_type"), ("list_type", "tuple_type")
+_PLAIN = dict.fromkeys(_TABLES, "must be a table of fields") | dict.fromkeys(_LISTS, "must be a list")
+_PLAIN["bool_type"] = "must be true or false"
 
 
 def _names(kind: Any, path: Iterable[str | int]) -> list[str]:
