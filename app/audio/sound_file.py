@@ -128,10 +128,12 @@ def _flac_frames(head: bytes) -> int:
 
 def _counted(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
     """The beginning of a FLAC file that states no length, with the number of frames that it has."""
-    at, last = start + 4, False
-    while not last:  # what stands before the sound
+    at = start + 4
+    for _ in range(_MOST_CHUNKS):  # what stands before the sound
         block = _bytes_at(file, at, 4)
-        at, last = at + 4 + int.from_bytes(block[1:]), not block or block[0] >= 128
+        at += 4 + int.from_bytes(block[1:])
+        if not block or block[0] >= 128:
+            break
     first = _bytes_at(file, at, 4)
     place = max(at, end - _LARGEST_FLAC_BLOCK)
     rest = _bytes_at(file, place, max(0, end - place)) + bytes(16)
@@ -142,6 +144,8 @@ def _counted(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
             break
         if all(_agree(rest[found + place] & 15, first[place] & 15) for place in (2, 3)):  # rate and bits
             length = _end_of_flac_block(rest[found : found + 16], int.from_bytes(head[8:10]))
+    if length == 0:
+        raise UnreadableSound("it has no samples, or is cut off")
     return head[:21] + (int.from_bytes(head[21:26]) | min(length, _FLAC_FRAMES)).to_bytes(5) + head[26:]
 
 
@@ -184,6 +188,8 @@ def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, i
         if len(header) < 8:
             break
         name, size = struct.unpack(byte_order + "4sI", header)
+        if samples[1] > 0 and not _is_name(name):  # behind the file's end, as zeros up to a block of a disk
+            break
         at += 8
         if name == b"data":
             if size >= _UNKNOWN and stated > 0:

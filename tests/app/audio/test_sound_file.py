@@ -12,6 +12,7 @@ import pytest
 import soundfile
 from numpy.typing import NDArray
 
+from app.audio import sound_file
 from app.audio.impulse_file import ImpulseError, cut_words, read_impulse
 from app.audio.note_file import NoteFileError, read_note
 from app.audio.sound_file import UnreadableSound, open_sound
@@ -165,6 +166,26 @@ def remainder(data: bytes, polynomial: int, bits: int) -> int:
         if found >> place & 1:
             found ^= (polynomial | 1 << bits) << (place - bits)
     return found
+
+
+def test_a_flac_stream_without_an_end_costs_no_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Empty blocks up to the end of the file: each was read, and the length was 2^63 frames."""
+    about = struct.pack(">HH", 100, 100) + bytes(6) + (44_100 << 44 | 15 << 36).to_bytes(8) + bytes(16)
+    (tmp_path / "a.flac").write_bytes(b"fLaC\0\0\0\x22" + about + bytes(400_000))
+    reads = []
+    plain = sound_file._bytes_at
+    monkeypatch.setattr(sound_file, "_bytes_at", lambda *place: (reads.append(place), plain(*place))[1])
+    with pytest.raises(NoteFileError, match="no samples, or is cut off"):
+        read_note(tmp_path / "a.flac")
+    assert len(reads) < 11_000
+
+
+def test_zeros_behind_a_wav_are_no_chunks(tmp_path: Path) -> None:
+    """As of a recorder that fills its blocks; the RIFF chunk ends before them."""
+    head = chunk(b"fmt ", struct.pack("<HHIIHH", 1, 1, 8_000, 16_000, 2, 16))
+    body = b"WAVE" + head + chunk(b"data", struct.pack("<3h", 1, 2, 3))
+    (tmp_path / "a.wav").write_bytes(chunk(b"RIFF", body) + bytes(100_000))
+    assert list(read_note(tmp_path / "a.wav").samples[:, 0] * 32768) == [1, 2, 3]
 
 
 @pytest.mark.parametrize("bits", [4, 12, 20, 32])
