@@ -60,7 +60,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         OSError: it cannot be read.
     """
     try:
-        text = read_bounded(path, bounds.LARGEST_TOML_BYTES).decode("utf-8")
+        text = read_bounded(path, bounds.LARGEST_TOML_BYTES).decode("utf-8-sig")
         if _LONG_KEY.search(text):
             raise SchemaError(f"{path}: a key has more than {bounds.MOST_DOTS} dots")
         data = tomllib.loads(text)

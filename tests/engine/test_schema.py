@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass, field
 from datetime import date
+from pathlib import Path
 from typing import Literal
 
 import pytest
 
-from engine.schema import SchemaError, read, write
+from engine.schema import SchemaError, read, read_toml, write
 
 
 @dataclass(frozen=True)
@@ -69,3 +70,8 @@ def test_a_whole_number_serves_as_a_float() -> None:
 def test_what_does_not_fit_is_named(data: object, message: str) -> None:
     with pytest.raises(SchemaError, match=message):
         read(Outer, data, "here")
+
+
+def test_a_byte_order_mark_is_no_part_of_a_toml_file(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_bytes(b"\xef\xbb\xbflength_m = 0.65\r\n")  # as Windows' Notepad may write
+    assert read_toml(tmp_path / "a.toml") == {"length_m": 0.65}
