@@ -45,11 +45,21 @@ def parse_json(text: str | bytes, where: str, most_bytes: int = bounds.LARGEST_T
     if len(text) > most_bytes:
         raise SchemaError(f"{where}: longer than {most_bytes // 2**10} KiB")
     try:
-        data = json.loads(text)
+        data = json.loads(text, object_pairs_hook=_table)
     except (ValueError, RecursionError) as error:  # bad UTF-8 and integers of thousands of digits among them
         raise SchemaError(f"{where}: not JSON that can be read ({error or type(error).__name__})") from error
     check_nesting(data, where)
     return data
+
+
+def _table(fields: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The fields of a JSON object, of which none may be given twice: one of the two would be lost."""
+    found: dict[str, Any] = {}
+    for name, value in fields:
+        if name in found:
+            raise ValueError(f"field {bounds.brief(name)} is given twice")
+        found[name] = value
+    return found
 
 
 def read_toml(path: Path) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import Literal
 
 import pytest
 
-from engine.schema import SchemaError, read, read_toml, write
+from engine.schema import SchemaError, parse_json, read, read_toml, write
 
 
 @dataclass(frozen=True)
@@ -75,3 +75,9 @@ def test_what_does_not_fit_is_named(data: object, message: str) -> None:
 def test_a_byte_order_mark_is_no_part_of_a_toml_file(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_bytes(b"\xef\xbb\xbflength_m = 0.65\r\n")  # as Windows' Notepad may write
     assert read_toml(tmp_path / "a.toml") == {"length_m": 0.65}
+
+
+def test_a_field_that_is_given_twice_is_named() -> None:
+    assert parse_json('{"a": {"b": 1}, "b": 2}', "here") == {"a": {"b": 1}, "b": 2}
+    with pytest.raises(SchemaError, match=r"here: not JSON that can be read \(field 'b' is given twice\)"):
+        parse_json('{"a": {"b": 1, "c": 3, "b": 2}}', "here")
