@@ -158,6 +158,8 @@ def test_one_bad_file_hides_no_other(make_patch: Make, own: Path) -> None:
         ("strings", {"kind": "x"}, "strings.kind: must be one of 'fretted', 'set', 'drums', found 'x'"),
         ("room", -1, "room: must be a table of fields, found -1"),
         ("macros", "x", "macros: must be a list, found 'x'"),
+        ("name", "\t ", "name: must be one line of printable characters; remove the others"),
+        ("name", "  ", "name: must not be blank; give a name"),
         ("macros", [5], r"macros\[0\]: must be a table of fields, found 5"),
     ],
 )
