@@ -54,3 +54,15 @@ def test_samples_far_beyond_full_scale_are_refused_before_the_fit(tmp_path: Path
 def test_a_folder_is_not_called_missing(tmp_path: Path) -> None:
     with pytest.raises(NoteFileError, match="a folder or a device, no file"):
         read_note(tmp_path)
+
+
+def test_many_channels_at_a_high_rate_are_refused_before_they_fill_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A minute of silence of eight channels at 384 kHz is a small FLAC, and 1.5 GB of samples."""
+    with soundfile.SoundFile(tmp_path / "a.flac", "w", 384_000, 8, "PCM_16") as file:
+        for _ in range(6):
+            file.write(np.zeros((384_000 * 3, 8), np.int16))
+    monkeypatch.setattr(soundfile.SoundFile, "read", lambda *_, **__: pytest.fail("it was read"))
+    with pytest.raises(NoteFileError, match="has 8 channels of 384000 Hz for 18 s, which is too much; export one or"):
+        read_note(tmp_path / "a.flac")
