@@ -36,13 +36,19 @@ def whole_file(path: Path) -> Iterator[BinaryIO]:
             where the disk is full.
     """
     try:
-        target = path.resolve()  # through a link, to the file that it names
-        if target.exists() and not target.is_file():  # a folder, or a device that must not be replaced
-            raise WriteError(f"{path}: not a file that can be replaced; choose another name")
+        target = replaceable(path)
         with engine_files.whole_file(target) as unfinished, unfinished.open("w+b") as file:
             yield file
     except OSError as error:
         raise WriteError(explain(path, error)) from error
+
+
+def replaceable(path: Path) -> Path:
+    """The file that a path names, through links. Raises WriteError where it is a folder or a device."""
+    target = path.resolve()
+    if target.exists() and not target.is_file():
+        raise WriteError(f"{path}: not a file that can be replaced; choose another name")
+    return target
 
 
 def explain(path: Path, error: OSError) -> str:

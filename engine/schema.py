@@ -45,11 +45,21 @@ def parse_json(text: str | bytes, where: str, most_bytes: int = bounds.LARGEST_T
     if len(text) > most_bytes:
         raise SchemaError(f"{where}: longer than {most_bytes // 2**10} KiB")
     try:
-        data = json.loads(text)
+        data = json.loads(text, object_pairs_hook=_table)
     except (ValueError, RecursionError) as error:  # bad UTF-8 and integers of thousands of digits among them
         raise SchemaError(f"{where}: not JSON that can be read ({error or type(error).__name__})") from error
     check_nesting(data, where)
     return data
+
+
+def _table(fields: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The fields of a JSON object, of which none may be given twice: one of the two would be lost."""
+    found: dict[str, Any] = {}
+    for name, value in fields:
+        if name in found:
+            raise ValueError(f"field {bounds.brief(name)} is given twice")
+        found[name] = value
+    return found
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -60,7 +70,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         OSError: it cannot be read.
     """
     try:
-        text = read_bounded(path, bounds.LARGEST_TOML_BYTES).decode("utf-8")
+        text = read_bounded(path, bounds.LARGEST_TOML_BYTES).decode("utf-8-sig")
         if _LONG_KEY.search(text):
             raise SchemaError(f"{path}: a key has more than {bounds.MOST_DOTS} dots")
         data = tomllib.loads(text)
@@ -146,9 +156,15 @@ def explained(error: ValueError, where: str = "", kind: object = None) -> str:
         words += f"; known are {', '.join(_names(kind, path))}" if kind else ""
     elif first["type"] == "value_error":
         words = str(first["ctx"]["error"])
+    elif first["type"] == "union_tag_not_found":
+        words = f"field {first['ctx']['discriminator']} is missing"
+    elif first["type"] == "union_tag_invalid":
+        path.append(first["ctx"]["discriminator"].strip("'"))
+        words = f"must be one of {first['ctx']['expected_tags']}, found {bounds.brief(first['ctx']['tag'])}"
     else:
         shown = f", found {bounds.brief(found)}" if isinstance(found, str | float | int | None) else ""
-        words = first["msg"].replace("Input should be", "must be").replace("an object", "a table") + shown
+        words = _PLAIN.get(first["type"]) or re.sub(r"^\w+ should ", "must ", first["msg"])
+        words = words.replace(" after validation", "") + shown
     place = where + _place(path) if where else _place(path).removeprefix(".")
     return f"{place}: {words}" if place else words
 
@@ -159,6 +175,9 @@ def _place(path: Iterable[str | int]) -> str:
 
 
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden")
+_TABLES, _LISTS = ("dict_type", "model_type", "model_attributes_type", "dataclass_type"), ("list_type", "tuple_type")
+_PLAIN = dict.fromkeys(_TABLES, "must be a table of fields") | dict.fromkeys(_LISTS, "must be a list")
+_PLAIN["bool_type"] = "must be true or false"
 
 
 def _names(kind: Any, path: Iterable[str | int]) -> list[str]:

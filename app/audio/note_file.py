@@ -15,7 +15,9 @@ from engine.plain_text import one_line
 RATES_HZ = (8_000, 384_000)
 NOTE_LENGTHS_S = SHORTEST_S, LONGEST_S = 0.15, 60.0
 MOST_CHANNELS = 8
+MOST_NUMBERS = 50_000_000  # of all channels: 400 MB; a minute of two channels at 384 kHz
 LARGEST_BYTES = 512 * 2**20
+LARGEST_SAMPLE = 2.0**15  # in full scales: of whole numbers of 16 bits in a file of floating point
 
 
 class NoteFileError(Exception):
@@ -55,10 +57,16 @@ def read_note(path: Path) -> NoteFile:
             seconds = file.frames / file.samplerate
             if seconds > LONGEST_S:
                 raise NoteFileError(f"{path}: lasts {seconds:.0f} s; cut out one note, at most {LONGEST_S:.0f} s")
+            if file.frames * file.channels > MOST_NUMBERS:
+                held = f"{file.channels} channels of {file.samplerate} Hz for {seconds:.0f} s"
+                raise NoteFileError(f"{path}: has {held}, which is too much; export one or two")
             samples = file.read(file.frames, "float64", always_2d=True)
             rate_hz = file.samplerate
         if len(samples) == 0:
             raise NoteFileError(f"{path}: holds no samples; export it again")
+        peak = float(max(samples.max(), -samples.min()))
+        if LARGEST_SAMPLE < peak < np.inf:  # what is no number is refused with the sound
+            raise NoteFileError(f"{path}: its largest sample is {peak:.3g} times full scale; normalise it")
         with path.open("rb") as data:
             digest = hashlib.file_digest(data, "sha256").hexdigest()
     except UnreadableSound as error:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 KINDS = "WAV, FLAC, AIFF or Ogg"
 _PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
+_COMPRESSED = (2, 6, 7, 0x11, 0x31, 0x38, 0x40, 0x55)  # ADPCM, A-law, µ-law, GSM and MP3, which libsndfile reads
 _MOST_CHUNKS = 10_000
 _KEPT, _LARGEST_TEXT = (b"fmt ", b"fact"), 2**16  # chunks that are kept besides a list of texts; bytes of each
 _LARGEST_DATA = 2**32 - 2**20  # bytes that a header can state
@@ -30,6 +31,7 @@ _UNKNOWN = 2**32 - 2**12  # sizes from here on are those of streams
 _FLAC_HEAD = 42  # bytes up to the end of its first block, which states its length
 _FLAC_FRAMES = 2**36 - 1
 _LARGEST_FLAC_BLOCK = 2**22  # bytes
+_FLAC_BITS = (8, 16, 24)  # that libsndfile reads
 _KNOWN = frozenset(
     b"fmt |data|LIST|fact|bext|JUNK|junk|FLLR|PAD |ds64|id3 |ID3 |cue |smpl|inst|iXML|axml|chna|PEAK|acid".split(b"|")
 )
@@ -48,7 +50,9 @@ def open_sound(path: Path, largest_bytes: int | None = None) -> Iterator[soundfi
     """
     try:
         if not path.is_file():  # opening a pipe would block
-            raise UnreadableSound("there is no file of this name")
+            raise UnreadableSound(
+                "a folder or a device, no file" if path.exists() else "there is no file of this name"
+            )
         with path.open("rb") as file:
             size = file.seek(0, io.SEEK_END)
             if largest_bytes is not None and size > largest_bytes:
@@ -103,8 +107,15 @@ def _recognised(file: BinaryIO, end: int) -> _Spliced:
     kind, form = head[:4], head[8:12]
     if kind in (b"RIFF", b"RIFX", b"RF64", b"BW64") and form == b"WAVE":
         return _Spliced(*_wave(file, start, end))
-    if kind == b"fLaC" and not _flac_frames(head := _bytes_at(file, start, _FLAC_HEAD)):
-        return _Spliced(_counted(head, file, start, end), file, start + len(head), end - start - len(head))
+    if kind == b"fLaC":
+        head = _bytes_at(file, start, _FLAC_HEAD)
+        bits = (int.from_bytes(head[20:22]) >> 4) % 32 + 1
+        if len(head) == _FLAC_HEAD and bits not in _FLAC_BITS:
+            raise UnreadableSound(f"it is FLAC of {bits} bits, not of 8, 16 or 24")
+        if not _flac_frames(head):
+            return _Spliced(_counted(head, file, start, end), file, start + len(head), end - start - len(head))
+    if kind == b"OggS" and _bytes_at(file, start + 28, 5) == b"\x7fFLAC":
+        raise UnreadableSound("it is FLAC within Ogg")
     if kind in (b"fLaC", b"OggS") or (kind == b"FORM" and form in (b"AIFF", b"AIFC")):
         return _Spliced(b"", file, start, end - start)
     raise UnreadableSound(f"it is no {KINDS} file" if end else "it is empty")
@@ -117,10 +128,12 @@ def _flac_frames(head: bytes) -> int:
 
 def _counted(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
     """The beginning of a FLAC file that states no length, with the number of frames that it has."""
-    at, last = start + 4, False
-    while not last:  # what stands before the sound
+    at = start + 4
+    for _ in range(_MOST_CHUNKS):  # what stands before the sound
         block = _bytes_at(file, at, 4)
-        at, last = at + 4 + int.from_bytes(block[1:]), not block or block[0] >= 128
+        at += 4 + int.from_bytes(block[1:])
+        if not block or block[0] >= 128:
+            break
     first = _bytes_at(file, at, 4)
     place = max(at, end - _LARGEST_FLAC_BLOCK)
     rest = _bytes_at(file, place, max(0, end - place)) + bytes(16)
@@ -129,9 +142,16 @@ def _counted(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
         found = rest.rfind(first[:2], 0, max(found, 0)) if len(first) == 4 else -1
         if found < 0 or length:
             break
-        if (rest[found + 2] ^ first[2]) & 15 == 0 and (rest[found + 3] ^ first[3]) & 15 == 0:  # rate and bits
+        if all(_agree(rest[found + place] & 15, first[place] & 15) for place in (2, 3)):  # rate and bits
             length = _end_of_flac_block(rest[found : found + 16], int.from_bytes(head[8:10]))
+    if length == 0:
+        raise UnreadableSound("it has no samples, or is cut off")
     return head[:21] + (int.from_bytes(head[21:26]) | min(length, _FLAC_FRAMES)).to_bytes(5) + head[26:]
+
+
+def _agree(one: int, other: int) -> bool:
+    """Return True if two codes of rates or bits may mean the same; 0 is what the file's first block states."""
+    return one == other or not (one and other)
 
 
 def _end_of_flac_block(data: bytes, block_frames: int) -> int:
@@ -168,6 +188,8 @@ def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, i
         if len(header) < 8:
             break
         name, size = struct.unpack(byte_order + "4sI", header)
+        if samples[1] > 0 and not _is_name(name):  # behind the file's end, as zeros up to a block of a disk
+            break
         at += 8
         if name == b"data":
             if size >= _UNKNOWN and stated > 0:
@@ -208,8 +230,10 @@ def _format(given: bytes, byte_order: str) -> tuple[bytes, int, bool]:
         kind = struct.unpack(byte_order + "H", given[24:26])[0]
     if channels == 0 or rate_hz == 0:
         raise UnreadableSound(f"its format states {channels} channels at {rate_hz} Hz")
-    if kind not in (_PCM, _FLOAT):  # compressed
-        return given, max(frame_bytes, 1), True
+    if kind in _COMPRESSED:
+        return struct.pack(byte_order + "H", kind) + given[2:], max(frame_bytes, 1), True
+    if kind not in (_PCM, _FLOAT):
+        raise UnreadableSound(f"its samples are compressed as kind {kind:#x}")
     sample_bytes = -(-bits // 8)
     if kind == _PCM and frame_bytes % channels == 0 and sample_bytes <= frame_bytes // channels <= 4:
         sample_bytes = frame_bytes // channels  # fewer bits lie at the upper end of such a sample

@@ -23,7 +23,7 @@ from engine.folders import user_folder
 from engine.read_file import read_bounded
 from engine.result_file import WriteError, explain, whole_file
 
-ENDINGS = (".wav", ".flac", ".aif", ".aiff")
+ENDINGS = (".wav", ".wave", ".bwf", ".flac", ".aif", ".aiff", ".aifc")
 _NAME: TypeAdapter[str] = TypeAdapter(Reference)
 
 

@@ -8,7 +8,8 @@ from __future__ import annotations
 import io
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -16,12 +17,14 @@ from typing import Any
 import numpy as np
 import soundfile
 from numpy.typing import NDArray
+from pydantic import TypeAdapter
 from scipy.signal import resample_poly
 
 from app.audio.note_file import NoteFileError, read_note
 from app.instrument.bodies import own_bodies
 from app.instrument.learned_attack import attack_of, with_attack
-from app.patches.library import PatchError, file_stem, own_patches, save_patch
+from app.patches.fields import Name
+from app.patches.library import SHIPPED, SUFFIX, PatchError, file_stem, own_patches, save_patch
 from app.patches.patch import Body, Category, Fretted, Patch, Pickup, PluckChoices
 from engine.folders import usable_files, user_folder
 from engine.kernels import velocities
@@ -41,6 +44,7 @@ REACH_KEYS = 12  # an octave to both sides of the recorded note
 BODY_RATE_HZ = 48_000
 HARDEST = 1.5  # of the recorded pluck's amplitude
 RECORDED_VELOCITY = 100
+_NAME: TypeAdapter[str] = TypeAdapter(Name)
 
 
 @dataclass(frozen=True)
@@ -136,18 +140,23 @@ def both_sounds(learned: Learned, rate_hz: int) -> dict[str, NDArray[np.float32]
 
 
 def check_name(name: str) -> str:
-    """The stem of an instrument's files. Raises PatchError where one of them is there already."""
-    stem = file_stem(name)
+    """The stem of an instrument's files. Raises PatchError: the name is impossible, or one of the files is there."""
+    try:
+        stem = file_stem(_NAME.validate_python(name))
+    except ValueError as error:
+        raise PatchError(f"the name: {explained(error)}") from error
+    if (SHIPPED / f"{stem}{SUFFIX}").exists():
+        raise PatchError(f"{name}: a factory instrument has this name; choose another")
     if stem in {path.stem for path in usable_files()}:
         raise PatchError(f"{name}: a preset of this name exists already; choose another")
-    for path in (own_patches() / f"{stem}.json", own_bodies() / f"{stem}.wav"):
+    for path in (own_patches() / f"{stem}{SUFFIX}", own_bodies() / f"{stem}.wav"):
         if path.exists():
             raise PatchError(f"{path}: exists already; choose another name, or remove it")
     return stem
 
 
 def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
-    """Write preset, body, patch and report of an instrument.
+    """Write preset, body, patch and report of an instrument; where one fails, none is left.
 
     Raises:
         PatchError: the name is taken or impossible.
@@ -172,17 +181,30 @@ def keep(name: str, learned: Sequence[Learned], kind: Kind = "guitar") -> Kept:
     response = body_response(first.physics, first.strung, len(recorded.cents), BODY_RATE_HZ)
     encoded = io.BytesIO()  # libsndfile cannot pass on the error of a full disk
     soundfile.write(encoded, 0.9 * response, BODY_RATE_HZ, subtype="PCM_24", format="WAV")
-    with whole_file(body) as file:
-        file.write(encoded.getvalue())
-    attack = attack_of(patch, first.note, recorded.note)
-    if attack is not None:
-        recorded = replace(recorded, attack=attack[0])
-    write_preset(preset, name, first.strung, recorded)
-    if attack is not None:
-        patch = with_attack(patch, load_preset(preset), first.note, first.physics.f0_hz, attack[1])
-    with whole_file(report) as file:
-        file.write(json.dumps([as_data(each) for each in learned], indent=2).encode())
-    return Kept(preset, save_patch(patch).path, body, report)
+    with _all_or_none(body, preset, report):
+        with whole_file(body) as file:
+            file.write(encoded.getvalue())
+        attack = attack_of(patch, first.note, recorded.note)  # through the body
+        if attack is not None:
+            recorded = replace(recorded, attack=attack[0])
+        write_preset(preset, name, first.strung, recorded)
+        if attack is not None:
+            patch = with_attack(patch, load_preset(preset), first.note, first.physics.f0_hz, attack[1])
+        with whole_file(report) as file:
+            file.write(json.dumps([as_data(each) for each in learned], indent=2).encode())
+        return Kept(preset, save_patch(patch).path, body, report)
+
+
+@contextmanager
+def _all_or_none(*paths: Path) -> Iterator[None]:
+    """Remove new files where what is done within the context fails."""
+    try:
+        yield
+    except BaseException:
+        for path in paths:
+            with suppress(OSError):
+                path.unlink()
+        raise
 
 
 def _patch(name: str, stem: str, learned: Learned, partials: int, kind: Kind) -> Patch:

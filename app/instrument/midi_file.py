@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -44,7 +43,7 @@ LONGEST_S = 3_600.0
 AFTER_LAST_NOTE_S = 60.0  # later than a song's last note by more, no event counts
 TICKS, TEMPO = 960, 500_000  # of a quarter note; µs
 BEND_STEPS = 8_192
-NOTE_OFF, NOTE_ON, CONTROLLER, PROGRAM, BEND = 0x80, 0x90, 0xB0, 0xC0, 0xE0  # kinds of messages
+NOTE_OFF, NOTE_ON, KEY_PRESSURE, CONTROLLER, PROGRAM, PRESSURE, BEND = range(0x80, 0xF0, 0x10)  # kinds of messages
 MEMBER_SEMITONES = 48.0  # range of bends of MPE's members
 DRUMS = 9  # General MIDI's channel 10
 
@@ -104,7 +103,7 @@ def _messages_in(path: Path) -> MidiMessages:
     try:
         return read_messages(read_bounded(path, LARGEST_BYTES), MOST_EVENTS)
     except UnusableFile as error:
-        raise MidiFileError(f"{path}: {error.strerror}; give a smaller MIDI file") from error
+        raise MidiFileError(f"{path}: {error.strerror}; give another MIDI file") from error
     except OSError as error:
         raise MidiFileError(f"{path}: cannot be read ({error.strerror}); check the name") from error
     except NotMidi as error:
@@ -138,13 +137,12 @@ def _ignored(messages: MidiMessages) -> list[str]:
         found.append(f"{_count(messages.skipped, 'message')} of a key or a controller above 127")
     if messages.clipped:
         found.append(f"what exceeds 127 in {_count(messages.clipped, 'message')}")
-    sent = Counter(
-        message[1] if message[0] & 0xF0 == CONTROLLER else -1
-        for _, message in messages.timed
-        if message[0] & 0xF0 in (CONTROLLER, PROGRAM)
-    )
-    if sent.pop(-1, 0):
+    kinds = {message[0] & 0xF0 for _, message in messages.timed}
+    if PROGRAM in kinds:
         found.append("its program changes")
+    if kinds & {KEY_PRESSURE, PRESSURE}:
+        found.append("its pressure")
+    sent = {message[1] for _, message in messages.timed if message[0] & 0xF0 == CONTROLLER}
     if unknown := [str(number) for number in sorted(sent) if not is_obeyed(number)]:
         found.append(f"its controller{'s' if len(unknown) > 1 else ''} {', '.join(unknown)}")
     return found

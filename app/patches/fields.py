@@ -28,6 +28,14 @@ def plain(text: str) -> str:
     return text.strip()
 
 
+def filled(name: str) -> str:
+    """The text as of `plain`. Raises ValueError: it is white space alone, too."""
+    name = plain(name)
+    if not name:
+        raise ValueError("must not be blank; give a name")
+    return name
+
+
 def _safe(name: str) -> str:
     """A name that is a valid file name on every system, and no path."""
     name = plain(name)
@@ -54,7 +62,7 @@ def parameter(id: str) -> Any:
     return Field(declared.default, ge=low, le=high, strict=id in OF_PATCHES, allow_inf_nan=False)
 
 
-Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_safe)]
+Name = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(filled), AfterValidator(_safe)]
 Reference = Annotated[str, Field(max_length=LONGEST_NAME), AfterValidator(_safe)]  # a name elsewhere, "" for none
 Text = Annotated[str, Field(max_length=LONGEST_DESCRIPTION), AfterValidator(plain)]
 ScalaText = Annotated[str, Field(max_length=LONGEST_SCALE), AfterValidator(_lines)]

@@ -24,8 +24,8 @@ from app.patches.fields import (
     Share,
     String,
     Text,
+    filled,
     parameter,
-    plain,
     ranged,
 )
 from app.patches.tuning import TuningChoice
@@ -265,7 +265,7 @@ class Target(Value):
 class Macro(Value):
     """A knob that changes several fields; `value` is its position."""
 
-    name: Annotated[str, Field(min_length=1, max_length=24), AfterValidator(plain)]
+    name: Annotated[str, Field(max_length=24), AfterValidator(filled)]
     value: Share = 0.5
     targets: Annotated[tuple[Target, ...], Field(min_length=1, max_length=MOST_TARGETS)]
 

@@ -19,7 +19,8 @@ MOST_DIGITS = 400  # of a number
 HIGHEST_KEY = 127
 
 _LINE_END = re.compile(r"\r\n|\r|\n")
-_BEHIND = r"(?![0-9/\\^*]|[.,:][0-9]|[eE+-][+-]?[0-9])"  # text may follow a number, but nothing that would change it
+# Text may follow a number, but nothing that would change it.
+_BEHIND = r"(?![0-9/]|[\\^*][ \t]*[0-9(]|[.,:][0-9]|[eE+-][+-]?[0-9])"
 _COUNT = re.compile(r"[0-9]+(?=\s|!|$)")
 _WHOLE = re.compile(r"[+-]?[0-9]+(?=\s|!|$)")
 _FREQUENCY = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?" + _BEHIND)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import sys
 from collections.abc import Callable, Sequence
 
 from app.instrument.events import Event, channels_in, release_all
@@ -112,9 +113,10 @@ class MidiInput:
 
 
 def same_device(one: str, other: str) -> bool:
-    """Return True if two names differ only in ALSA's numbers. They change with each connection ("Keys:Keys 20:0")."""
+    """Return True if two names differ only in the system's numbers, which change with what else is connected."""
     return _without_numbers(one) == _without_numbers(other)
 
 
 def _without_numbers(name: str) -> str:
-    return re.sub(r"\s+\d+:\d+$", "", name)
+    """The name without RtMidi's ending: the port's place on Windows ("Keys 1"), ALSA's numbers ("Keys:Keys 20:0")."""
+    return re.sub({"win32": r"\s+\d+$"}.get(sys.platform, r"\s+\d+:\d+$"), "", name)

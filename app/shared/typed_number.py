@@ -28,11 +28,13 @@ def typed_number(text: str, unit: str = "", prefix: str = "") -> float | None:
         unit: as it is shown behind the number; it may be left out.
         prefix: the same before it.
     """
-    text, unit, prefix = _plain(text), _plain(unit), _plain(prefix)
+    text, prefix = _plain(text), _plain(prefix)
     if prefix and text.startswith(prefix):
         text = text[len(prefix) :].strip()
-    if unit and text.casefold().endswith(unit.casefold()):
-        text = text[: -len(unit)].strip()
+    for shown in _ways(unit):
+        if shown and text.casefold().endswith(shown):
+            text = text[: -len(shown)].strip()
+            break
     found = _NUMBER.fullmatch(text)
     if found is None:
         return None
@@ -46,17 +48,24 @@ def typed_number(text: str, unit: str = "", prefix: str = "") -> float | None:
 
 def begins_number(text: str, unit: str = "", prefix: str = "") -> bool:
     """Return True if more characters could make a number of a text, or it is one."""
-    text, unit, prefix = _plain(text), _plain(unit).casefold(), _plain(prefix)
+    text, prefix = _plain(text), _plain(prefix)
     if prefix.startswith(text):
         return True
     text = text.removeprefix(prefix).strip()
     return any(
-        unit.startswith(text[found:].strip().casefold())
+        shown.startswith(text[found:].strip().casefold())
+        for shown in _ways(unit)
         for found in range(len(text) + 1)
         if _BEGUN.fullmatch(text[:found])
     )
 
 
+def _ways(unit: str) -> tuple[str, ...]:
+    """The ways to type a unit: as it is shown, and with plain digits in place of raised ones."""
+    return _plain(unit).casefold(), unicodedata.normalize("NFKC", _plain(unit)).casefold()
+
+
 def _plain(text: str) -> str:
-    """Normalise a text: one kind of space, minus and apostrophe, no space around it; ³ as 3, µ as μ."""
-    return " ".join(unicodedata.normalize("NFKC", text).translate(_MINUS).split())
+    """Normalise a text: one kind of space, minus and apostrophe, no space around it; µ as μ. 10² is not 102."""
+    known = "".join(c if c.isdigit() and not c.isdecimal() else unicodedata.normalize("NFKC", c) for c in text)
+    return " ".join(known.translate(_MINUS).split())

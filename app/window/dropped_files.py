@@ -22,6 +22,8 @@ from engine.folders import user_folder
 from engine.plain_text import name_text
 from engine.result_file import WriteError
 
+SOUNDS = (*ENDINGS, ".ogg", ".oga", ".opus")
+
 
 @dataclass(frozen=True)
 class Dropped:
@@ -47,7 +49,7 @@ def receive(file: Path, library: Library) -> Dropped:
             return _preset(file, library)
         if ending == ".wav":
             return _recipe(file, library)
-        if ending in ENDINGS:
+        if ending in SOUNDS:
             return _other_sound(file)
     except NoRecipe:
         return _other_sound(file)

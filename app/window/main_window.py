@@ -74,7 +74,7 @@ BRIEFLY_MS = 1_800  # a text over the window
 LONGEST_NAME = 60  # characters of a file
 FILE_FILTER = (
     "Files that can be opened (*.mid *.midi *.kar *.rmi *.smf *.json *.scl *.kbm *.safetensors"
-    " *.wav *.flac *.aif *.aiff)"
+    " *.wav *.wave *.bwf *.flac *.aif *.aiff *.aifc *.ogg *.oga *.opus)"
     ";;All files (*)"
 )
 TITLE_BAR = 40  # pixels, at most; its height is known only once the window is shown

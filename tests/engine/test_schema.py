@@ -2,11 +2,12 @@
 
 from dataclasses import dataclass, field
 from datetime import date
+from pathlib import Path
 from typing import Literal
 
 import pytest
 
-from engine.schema import SchemaError, read, write
+from engine.schema import SchemaError, parse_json, read, read_toml, write
 
 
 @dataclass(frozen=True)
@@ -50,13 +51,13 @@ def test_a_whole_number_serves_as_a_float() -> None:
         ({"name": "x", "share": True}, "here.share: must be a valid number, found True"),
         ({"name": "x", "share": float("nan")}, "here.share: must be a finite number"),
         ({"name": "x", "share": 2.0}, "here: share must be at most 1"),
-        ({"name": "x", "on": 1}, "here.on: must be a valid boolean, found 1"),
+        ({"name": "x", "on": 1}, "here.on: must be true or false, found 1"),
         ({"name": "x", "sizes": [1, "2"]}, r"here.sizes\[1\]: must be a valid integer, found '2'"),
-        ({"name": "x", "sizes": 4}, "here.sizes: must be a valid array"),
+        ({"name": "x", "sizes": 4}, "here.sizes: must be a list, found 4"),
         ({"name": "x", "pair": [1.0]}, "here.pair: field 1 is missing"),
         ({"name": "x", "inner": {"sizes": 1}}, "here.inner: unknown field 'sizes'; known are size"),
-        ({"name": "x", "inner": 3}, "here.inner: must be a table, found 3"),
-        ({"name": "x", "pair": [1.0, 2.0, 3.0]}, "here.pair: Tuple should have at most 2 items"),
+        ({"name": "x", "inner": 3}, "here.inner: must be a table of fields, found 3"),
+        ({"name": "x", "pair": [1.0, 2.0, 3.0]}, "here.pair: must have at most 2 items"),
         ({"nome": "x"}, "here: unknown field 'nome'; known are name"),
         ({"name": "x", "share": 10**400}, "here.share: must be a number of at most 64 bits"),
         ({"name": "x", "sizes": [1] * 1001}, "here.sizes: has 1001 entries"),
@@ -69,3 +70,14 @@ def test_a_whole_number_serves_as_a_float() -> None:
 def test_what_does_not_fit_is_named(data: object, message: str) -> None:
     with pytest.raises(SchemaError, match=message):
         read(Outer, data, "here")
+
+
+def test_a_byte_order_mark_is_no_part_of_a_toml_file(tmp_path: Path) -> None:
+    (tmp_path / "a.toml").write_bytes(b"\xef\xbb\xbflength_m = 0.65\r\n")  # as Windows' Notepad may write
+    assert read_toml(tmp_path / "a.toml") == {"length_m": 0.65}
+
+
+def test_a_field_that_is_given_twice_is_named() -> None:
+    assert parse_json('{"a": {"b": 1}, "b": 2}', "here") == {"a": {"b": 1}, "b": 2}
+    with pytest.raises(SchemaError, match=r"here: not JSON that can be read \(field 'b' is given twice\)"):
+        parse_json('{"a": {"b": 1, "c": 3, "b": 2}}', "here")

@@ -19,7 +19,7 @@ from app.export.sampled.sf2 import check_sf2, write_sf2
 from app.export.sampled.sfz import sfz_gain_db, sfz_text
 from app.shared.key_names import note_name
 from app.shared.worker import Progress
-from engine.result_file import WriteError, explain, whole_file
+from engine.result_file import WriteError, explain, replaceable, whole_file
 from engine.whole_file import working_folder
 
 if TYPE_CHECKING:
@@ -96,6 +96,7 @@ def export_sampled(
     if not soundfont:
         _check_replaceable(folder, out)
     try:
+        replaceable(out)
         with working_folder(out.parent, folder.name) as unfinished:
             made = unfinished / folder.name
             made.mkdir()
@@ -106,11 +107,12 @@ def export_sampled(
                 size = out.stat().st_size
             else:
                 size = sum(path.stat().st_size for path in made.iterdir())
-                if folder.exists():
-                    shutil.rmtree(folder)
-                made.replace(folder)
                 with whole_file(out) as file:
                     size += file.write(sfz_text(plan, samples, folder.name).encode())
+                    file.flush()
+                    if folder.exists():
+                        shutil.rmtree(folder)
+                    made.replace(folder)
                 gain_db = sfz_gain_db(plan.patch, samples)
     except OSError as error:
         raise WriteError(explain(out, error)) from error

@@ -36,3 +36,33 @@ def test_other_files_are_named(tmp_path: Path, content: bytes, words: str) -> No
         read_note(path)
     with pytest.raises(NoteFileError, match="no file"):
         read_note(tmp_path / "missing.wav")
+
+
+@pytest.mark.parametrize("form", ["WAV", "AIFF"])
+def test_samples_far_beyond_full_scale_are_refused_before_the_fit(tmp_path: Path, form: str) -> None:
+    """As of whole numbers of 32 bits in a file of floating point. The fit overflowed, without the file's name."""
+    path, sound = tmp_path / "a.wav", np.sin(np.arange(8_000) / 20)
+    soundfile.write(path, 32_767 * sound, 8_000, subtype="FLOAT", format=form)
+    assert np.abs(read_note(path).samples).max() == pytest.approx(32_767, rel=1e-3)
+    soundfile.write(path, 2.0**31 * sound, 8_000, subtype="FLOAT", format=form)
+    with pytest.raises(
+        NoteFileError, match=r"a\.wav: its largest sample is 2.15e\+09 times full scale; normalise it"
+    ):
+        read_note(path)
+
+
+def test_a_folder_is_not_called_missing(tmp_path: Path) -> None:
+    with pytest.raises(NoteFileError, match="a folder or a device, no file"):
+        read_note(tmp_path)
+
+
+def test_many_channels_at_a_high_rate_are_refused_before_they_fill_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A minute of silence of eight channels at 384 kHz is a small FLAC, and 1.5 GB of samples."""
+    with soundfile.SoundFile(tmp_path / "a.flac", "w", 384_000, 8, "PCM_16") as file:
+        for _ in range(6):
+            file.write(np.zeros((384_000 * 3, 8), np.int16))
+    monkeypatch.setattr(soundfile.SoundFile, "read", lambda *_, **__: pytest.fail("it was read"))
+    with pytest.raises(NoteFileError, match="has 8 channels of 384000 Hz for 18 s, which is too much; export one or"):
+        read_note(tmp_path / "a.flac")

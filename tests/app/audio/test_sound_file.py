@@ -12,6 +12,7 @@ import pytest
 import soundfile
 from numpy.typing import NDArray
 
+from app.audio import sound_file
 from app.audio.impulse_file import ImpulseError, cut_words, read_impulse
 from app.audio.note_file import NoteFileError, read_note
 from app.audio.sound_file import UnreadableSound, open_sound
@@ -131,6 +132,70 @@ def test_compressed_files_are_read_as_before(subtype: str, tmp_path: Path) -> No
     np.testing.assert_array_equal(found[:8_000], whole[:8_000])  # behind are remains of a block
 
 
+@pytest.mark.parametrize(("subtype", "kind"), [("ULAW", 7), ("ALAW", 6)])
+def test_a_compressed_body_with_an_extensible_header(subtype: str, kind: int, tmp_path: Path) -> None:
+    sound = 0.9 * np.random.default_rng(0).uniform(-1, 1, 2_000) * np.geomspace(1, 1e-2, 2_000)
+    soundfile.write(tmp_path / "a.raw", sound, 48_000, subtype=subtype, format="RAW")
+    head = struct.pack("<HHIIHH", 0xFFFE, 1, 48_000, 48_000, 1, 8) + struct.pack("<HHIH", 22, 8, 0, kind) + GUID
+    body = b"WAVE" + chunk(b"fmt ", head) + chunk(b"data", (tmp_path / "a.raw").read_bytes())
+    (tmp_path / "a.wav").write_bytes(chunk(b"RIFF", body))
+    whole = soundfile.read(tmp_path / "a.raw", channels=1, samplerate=48_000, subtype=subtype, format="RAW")[0]
+    np.testing.assert_array_equal(read_impulse(tmp_path / "a.wav").samples[:, 0], whole)
+
+
+@pytest.mark.parametrize("code", [0, 4])
+def test_the_last_block_of_a_flac_stream_may_name_its_bits_another_way(code: int, tmp_path: Path) -> None:
+    """Blocks may state 16 bits, or refer to the file's first block for them. A stream's last one was left out."""
+    samples = np.arange(-90, 90, dtype=">i2")
+    blocks = [flac_block(samples[:100], 0, 4 - code), flac_block(samples[100:], 1, code)]
+    about = struct.pack(">HH", 100, 100) + bytes(6) + (44_100 << 44 | 15 << 36).to_bytes(8) + bytes(16)
+    (tmp_path / "a.flac").write_bytes(b"fLaC\x80\0\0\x22" + about + b"".join(blocks))
+    assert list(read_note(tmp_path / "a.flac").samples[:, 0] * 32_768) == list(samples)
+
+
+def flac_block(samples: NDArray[np.int16], number: int, code: int) -> bytes:
+    """A block of one channel as it is, after RFC 9639."""
+    head = bytes([0xFF, 0xF8, 0x60, code << 1, number, len(samples) - 1])
+    block = head + bytes([remainder(head, 0x07, 8)]) + b"\2" + samples.tobytes()
+    return block + remainder(block, 0x8005, 16).to_bytes(2)
+
+
+def remainder(data: bytes, polynomial: int, bits: int) -> int:
+    found = int.from_bytes(data) << bits
+    for place in range(8 * len(data) + bits - 1, bits - 1, -1):
+        if found >> place & 1:
+            found ^= (polynomial | 1 << bits) << (place - bits)
+    return found
+
+
+def test_a_flac_stream_without_an_end_costs_no_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Empty blocks up to the end of the file: each was read, and the length was 2^63 frames."""
+    about = struct.pack(">HH", 100, 100) + bytes(6) + (44_100 << 44 | 15 << 36).to_bytes(8) + bytes(16)
+    (tmp_path / "a.flac").write_bytes(b"fLaC\0\0\0\x22" + about + bytes(400_000))
+    reads = []
+    plain = sound_file._bytes_at
+    monkeypatch.setattr(sound_file, "_bytes_at", lambda *place: (reads.append(place), plain(*place))[1])
+    with pytest.raises(NoteFileError, match="no samples, or is cut off"):
+        read_note(tmp_path / "a.flac")
+    assert len(reads) < 11_000
+
+
+def test_zeros_behind_a_wav_are_no_chunks(tmp_path: Path) -> None:
+    """As of a recorder that fills its blocks; the RIFF chunk ends before them."""
+    head = chunk(b"fmt ", struct.pack("<HHIIHH", 1, 1, 8_000, 16_000, 2, 16))
+    body = b"WAVE" + head + chunk(b"data", struct.pack("<3h", 1, 2, 3))
+    (tmp_path / "a.wav").write_bytes(chunk(b"RIFF", body) + bytes(100_000))
+    assert list(read_note(tmp_path / "a.wav").samples[:, 0] * 32768) == [1, 2, 3]
+
+
+@pytest.mark.parametrize("bits", [4, 12, 20, 32])
+def test_flac_of_other_bits_is_refused_in_words(bits: int, tmp_path: Path) -> None:
+    about = struct.pack(">HH", 100, 100) + bytes(6) + (44_100 << 44 | bits - 1 << 36 | 100).to_bytes(8) + bytes(16)
+    (tmp_path / "a.flac").write_bytes(b"fLaC\x80\0\0\x22" + about + bytes(100))
+    with pytest.raises(NoteFileError, match=f"it is FLAC of {bits} bits, not of 8, 16 or 24"):
+        read_note(tmp_path / "a.flac")
+
+
 def test_a_sample_of_twelve_bits_lies_at_the_upper_end(tmp_path: Path) -> None:
     head = struct.pack("<HHIIHH", 1, 1, 8_000, 16_000, 2, 12)
     data = struct.pack("<3h", 16384, -16384, 16)
@@ -193,6 +258,11 @@ def test_other_kinds_are_named_and_not_opened(form: str, tmp_path: Path, monkeyp
         (b"RIFF\0\0\0\0WAVE" + chunk(b"fmt ", b"\1\0"), "no samples|cut off"),
         (b"RIFF\0\0\0\0WAVE" + chunk(b"fmt ", bytes(16)) + chunk(b"data", b"1234"), "0 channels"),
         (b"RIFF\0\0\0\0WAVE" + chunk(b"JUNK", b"") * 20_000, "chunks"),
+        (
+            b"RIFF\0\0\0\0WAVE" + chunk(b"fmt ", b"\x61\1\2\0" + bytes([64, 31]) * 6) + chunk(b"data", b"12"),
+            "kind 0x161",
+        ),
+        (b"OggS\0\2" + bytes(20) + b"\1\x33\x7fFLAC\1\0\0\2fLaC", "it is FLAC within Ogg"),
         (b"RIFF\0\0\0\0WAVE" + chunk(b"fmt ", ODD_FORMAT) + chunk(b"data", b"12"), "40 bits"),
     ],
 )

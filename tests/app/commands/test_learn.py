@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 import soundfile
 
+from app.instrument import learned
 from app.shared.parameters import NOISE_DB
+from engine.result_file import WriteError
 from tests.training.recording.sounds import membrane
 from tests.training.recording.synthetic import synthetic_note
 from training.recording.checkpoint import restore, save
@@ -150,3 +152,33 @@ def test_where_no_string_is_found_only_the_option_keeps_it(
 
 def test_only_a_learned_preset_has_a_recording(run, small_preset: Path, folder: Path) -> None:
     assert "was not learned" in run("render", small_preset, folder / "a.wav", "--as-recorded").err
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("Mandolin", "Mandolin: a factory instrument has this name; choose another"),
+        ("  ", "the name: must not be blank; give a name"),
+        ("x" * 300, "the name: must have at most 60 characters"),
+        ("a/b", "the name: must not begin or end with a full stop"),
+    ],
+)
+def test_an_impossible_name_is_refused_before_the_fit(
+    run, recording: Path, folder: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: str
+) -> None:
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
+    monkeypatch.setattr(learned, "learn_files", lambda *_, **__: pytest.fail("it was fitted"))
+    assert words in run("learn", recording, "--name", name).failure
+    assert list(folder.iterdir()) == []
+
+
+def test_where_an_instrument_cannot_be_written_none_of_its_files_stays(
+    run, recording: Path, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(*_: object) -> None:
+        raise WriteError("patches: cannot be written (No space left on device)")
+
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(folder))
+    monkeypatch.setattr(learned, "save_patch", full)
+    assert "No space left" in run("learn", recording, "--name", "My string").failure
+    assert [path for path in folder.rglob("*") if path.is_file()] == []

@@ -165,6 +165,18 @@ def test_what_a_song_is_played_without_is_reported_once(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize("pressure", [b"\0\xd0\x40", b"\0\xa0\x3c\x40"])
+def test_pressure_is_reported_as_left_out(pressure: bytes, tmp_path: Path) -> None:
+    file, track = tmp_path / "song.mid", pressure + b"\0\x90\x3c\x40"
+    file.write_bytes(b"MThd\0\0\0\6\0\0\0\1\0\x60MTrk" + len(track).to_bytes(4, "big") + track)
+    assert read_song(file, None).left_out == "song.mid is played without its pressure"
+
+
+def test_a_folder_is_not_called_too_large(tmp_path: Path) -> None:
+    with pytest.raises(MidiFileError, match="not an ordinary file; give another MIDI file"):
+        read_midi(tmp_path)
+
+
 def test_controllers_long_after_the_last_note_are_no_music(tmp_path: Path) -> None:
     file = tmp_path / "long.mid"
     timed = [TimedEvent(0.0, NoteOn(50, 90)), TimedEvent(0.5, NoteOff(50)), TimedEvent(1.0, Controller(64, 0))]

@@ -151,6 +151,25 @@ def test_one_bad_file_hides_no_other(make_patch: Make, own: Path) -> None:
         assert words in reported[f"{name}.json"], reported[f"{name}.json"]
 
 
+@pytest.mark.parametrize(
+    ("field", "value", "words"),
+    [
+        ("strings", {}, "strings: field 'kind' is missing"),
+        ("strings", {"kind": "x"}, "strings.kind: must be one of 'fretted', 'set', 'drums', found 'x'"),
+        ("room", -1, "room: must be a table of fields, found -1"),
+        ("macros", "x", "macros: must be a list, found 'x'"),
+        ("name", "\t ", "name: must be one line of printable characters; remove the others"),
+        ("name", "  ", "name: must not be blank; give a name"),
+        ("macros", [5], r"macros\[0\]: must be a table of fields, found 5"),
+    ],
+)
+def test_faults_are_named_in_plain_words(make_patch: Make, own: Path, field: str, value: object, words: str) -> None:
+    data = json.loads(save_patch(make_patch(name="One")).path.read_text())
+    (own / "a.json").write_text(json.dumps(data | {field: value}))
+    with pytest.raises(PatchError, match=f"a.json: {words}; mend this field"):
+        read_patch(own / "a.json")
+
+
 def test_of_two_patches_of_one_name_the_shipped_one_counts(own: Path) -> None:
     shipped = list_patches(SHIPPED)[0][0]
     write(own / shipped.path.name, json.loads(shipped.path.read_text(encoding="utf-8")))

@@ -15,6 +15,7 @@ from pytestqt.qtbot import QtBot
 from app.export.choices import ExportChoices
 from app.export.files import export_sound
 from app.export.sound import SoundRequest
+from app.instrument.bodies import body_names
 from app.patches.instrument import SingleString
 from app.presets.install import InstallError, install_preset
 from app.presets.library import Library, PresetEntry, display_title, list_presets
@@ -279,3 +280,18 @@ def test_the_filter_finds_words_in_any_order_and_every_kind(qtbot: QtBot, preset
         ("", (), True, [high]),
     ):
         assert listed_rows([low, high], {"high"}, words.split(), kinds, starred) == found, (words, kinds)
+
+
+@pytest.mark.parametrize(
+    ("name", "form"),
+    [("a.wave", "WAV"), ("a.BWF", "RF64"), ("a.aifc", "AIFF"), ("a.ogg", "OGG"), ("a.oga", "OGG"), ("a.opus", "OGG")],
+)
+def test_a_sound_is_taken_by_every_usual_ending(name: str, form: str, library: Library, tmp_path: Path) -> None:
+    subtype = "OPUS" if name == "a.opus" else None
+    soundfile.write(tmp_path / name, 0.5 * np.sin(np.arange(24_000) / 20), 48_000, format=form, subtype=subtype)
+    assert receive(tmp_path / name, library) == Dropped(sound=True)
+    if form != "OGG":
+        noise = np.random.default_rng(0).uniform(-0.5, 0.5, 4_000) * np.geomspace(1, 1e-3, 4_000)
+        soundfile.write(tmp_path / name, noise, 48_000, format=form)
+        assert receive(tmp_path / name, library).body == "a"
+        assert body_names()[-1] == "a"

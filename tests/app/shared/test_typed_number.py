@@ -24,6 +24,7 @@ from app.shared.typed_number import begins_number, typed_number
         ("\u22123\u00a0dB", "dB", -3),
         ("+ 6 dB", "dB", 6),
         ("7 kg/m\u00b3", "kg/m³", 7),
+        ("7 kg/m3", "kg/m³", 7),
         ("5 \u03bcm", "µm", 5),
         (".5", "", 0.5),
         (",5", "", 0.5),
@@ -51,7 +52,8 @@ def test_what_is_understood(text: str, unit: str, value: float) -> None:
     [("", ""), (".", ""), ("-", ""), ("s", "s"), ("1.2.3", ""), ("1,2,3", ""), ("1,000,5", ""), ("12.3456,7", ""),
      ("0.123,5", ""), ("1 0", ""), ("--3", ""), ("3-", ""), ("nan", ""), ("inf", ""), ("1e999", ""), ("1_000", ""),
      ("0x10", ""), ("\u0663", ""), ("0.3 cm", "m"), ("0.3 cm", "mm"), ("3 ms", "s"), ("3 kHz", "Hz"), ("20 %", ""),
-     ("3 m", "mm"), ("2 s s", "s"), ("1/2", ""), ("9" * 400, "")],
+     ("3 m", "mm"), ("2 s s", "s"), ("1/2", ""), ("9" * 400, ""), ("10\u00b2", ""), ("2\u00b3 kg/m\u00b3", "kg/m³"),
+     ("\u2460", ""), ("1\u2082", ""), ("\u00bd", "")],
 )  # fmt: skip
 def test_what_is_refused(text: str, unit: str) -> None:
     assert typed_number(text, unit) is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -66,6 +67,19 @@ def test_an_input_is_found_again_under_new_numbers() -> None:
     midi.close()
     assert (midi.name, backend.open_name) == ("", "")
     assert not same_device("Keys 1", "Keys 2")
+
+
+def test_on_windows_an_input_is_found_again_at_another_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """RtMidi ends names with the place in the list, which another device moves."""
+    monkeypatch.setattr(sys, "platform", "win32")
+    backend = FakeBackend()
+    backend.names = ["Pads 0", "Keys 61 1"]
+    midi = MidiInput(lambda event: None, lambda: backend)
+    midi.open("Keys 61 1")
+    backend.names = ["Keys 61 0"]
+    assert "Keys 61 1 was disconnected" in midi.look()
+    assert "Keys 61 0 is connected again" in midi.look()
+    assert not same_device("Keys 61 0", "Keys 49 0")
 
 
 def test_of_two_inputs_of_one_make_the_one_that_was_chosen_opens() -> None:

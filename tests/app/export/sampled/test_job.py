@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+import errno
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from app.export.sampled import sf2
+from app.export.sampled import job, sf2
 from app.export.sampled.job import export_sampled, sample_folder
 from app.export.sampled.plan import SampledPlan
 from app.export.wav import quantised
@@ -169,3 +170,26 @@ def test_a_place_that_cannot_be_written_is_reported(patch: Patch, render: Render
     (tmp_path / "file").write_bytes(b"")
     with pytest.raises(WriteError, match="choose another"):
         export_sampled(small(patch), tmp_path / "file" / "a.sfz", render)
+
+
+@pytest.mark.parametrize("name", ["a.sfz", "a.sf2"])
+def test_a_folder_of_that_name_is_reported_before_the_work(name: str, patch: Patch, tmp_path: Path) -> None:
+    (tmp_path / name).mkdir()
+    with pytest.raises(WriteError, match="not a file that can be replaced"):
+        export_sampled(small(patch), tmp_path / name, lambda *_, advanced: pytest.fail("it was rendered"))
+    assert [path.name for path in tmp_path.iterdir()] == [name]
+
+
+def test_where_the_text_cannot_be_written_earlier_samples_stay(
+    patch: Patch, render: Render, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    export_sampled(small(patch), tmp_path / "a.sfz", render)
+    before = contents(tmp_path)
+
+    def full(*_: object) -> str:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(job, "sfz_text", full)
+    with pytest.raises(WriteError, match="No space left"):
+        export_sampled(small(patch.with_value("level_db", -3.0)), tmp_path / "a.sfz", render)
+    assert contents(tmp_path) == before
