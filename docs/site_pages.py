@@ -102,7 +102,7 @@ def presets() -> str:
 
 
 def shipped() -> list[dict[str, Any]]:
-    """What `presets --json` reports of the presets of this repository."""
+    """Return what `presets --json` reports of the presets of this repository."""
     from app.commands.cli import main
 
     printed = io.StringIO()
@@ -112,7 +112,7 @@ def shipped() -> list[dict[str, Any]]:
 
 
 def sounds_and_spectra() -> Iterator[tuple[str, bytes]]:
-    """For the card of each preset: the name and the content of a FLAC and of a PNG."""
+    """Names and contents of a FLAC and a PNG for the card of each preset."""
     from app.commands.cli import main
 
     with tempfile.TemporaryDirectory() as folder:

@@ -110,7 +110,7 @@ class _Start(QObject):
         self._follow_up()
 
     def _follow_up(self) -> None:
-        """Prepare for the face when keys would sound, then take one file after another: of MIDI files, all notes."""
+        """Load what the face needs when keys would sound, then take one file after another: of MIDI, all notes."""
         controller = self._controller
         assert controller is not None
         if controller.performance.playable or time.monotonic() > self._patience_s:

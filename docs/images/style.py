@@ -1,4 +1,4 @@
-"""How figures look: light, legible from the back of a room, safe for the colour-blind."""
+"""The look of figures: light, legible from the back of a room, safe for the colour-blind."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def _steps(controller: Controller) -> Iterator[None]:
-    """What is done, a step each fifth of a second."""
+    """The steps of the film, one each fifth of a second."""
     performance, window = controller.performance, controller.window
     while not (performance.ready and performance.settled):
         yield
@@ -111,7 +111,7 @@ def _play(controller: Controller) -> Iterator[None]:
 
 
 def picture(widget: QWidget) -> Image.Image:
-    """What a widget shows, at two thirds of its size."""
+    """The picture of a widget, at two thirds of its size."""
     shot = widget.grab().toImage().convertToFormat(QImage.Format.Format_RGB888)
     image = Image.frombytes(
         "RGB", (shot.width(), shot.height()), bytes(shot.constBits()), "raw", "RGB", shot.bytesPerLine()
