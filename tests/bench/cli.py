@@ -75,6 +75,14 @@ for _name, _help in PLAIN.items():
 
 
 @bench.command()
+def memory() -> None:
+    """Resident memory of the running app: in Play, after 20 notes, in the Lab. Its window is open for 45 s."""
+    from tests.bench.memory import main as watch
+
+    raise typer.Exit(watch())
+
+
+@bench.command()
 def train(
     json: Json = False,
     against: Annotated[

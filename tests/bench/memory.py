@@ -1,6 +1,6 @@
 """The memory of the running app: in Play 20 s after its start, after 20 notes, then in the Lab.
 
-Run `python -m tests.bench.memory`. The window opens for 45 s with default settings.
+The window opens with default settings.
 """
 
 from __future__ import annotations
@@ -63,7 +63,3 @@ def _watch(controller: Controller) -> None:
 def _print(what: str) -> None:
     process = psutil.Process()
     print(f"{what}: {process.memory_info().rss / 2**20:.0f} MiB resident", flush=True)
-
-
-if __name__ == "__main__":
-    raise SystemExit(main())
