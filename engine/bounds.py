@@ -134,12 +134,12 @@ def check_all(value: Any, limits: Mapping[str, tuple[float, float]], of: str = "
     """
     defaults = {field.name: field.default for field in dataclasses.fields(value)}
     for name, low_high in limits.items():
-        found = getattr(value, name)
-        if found is None and defaults[name] is None:
+        number = getattr(value, name)
+        if number is None and defaults[name] is None:
             continue
-        if found is None or isinstance(found, bool):
-            raise ValueError(f"{of}{name} must be a number, not {found}")
-        check(f"{of}{name}", found, low_high)
+        if number is None or isinstance(number, bool):
+            raise ValueError(f"{of}{name} must be a number, not {number}")
+        check(f"{of}{name}", number, low_high)
 
 
 def check_choice(name: str, value: object, known: Collection[str]) -> None:

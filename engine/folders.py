@@ -15,8 +15,8 @@ def user_folder() -> Path:
 
     The folder need not exist.
     """
-    if given := os.environ.get(FOLDER_VARIABLE):
-        return Path(given)
+    if folder := os.environ.get(FOLDER_VARIABLE):
+        return Path(folder)
     from platformdirs import user_data_path
 
     return user_data_path("learned-strings", appauthor=False) / "presets"

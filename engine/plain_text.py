@@ -16,8 +16,8 @@ def printable(text: str) -> str:
 def one_line(text: str, most: int = LONGEST_MESSAGE) -> str:
     """The text in one line of printable characters, its middle left out where it is longer than `most`.
 
-    Control characters, escapes, line ends and marks that turn the direction of text become spaces, so that nothing
-    can forge a second line or command a terminal. Beginning and end stay: a message names its file at the beginning
+    Control characters, escapes, line ends and marks that turn the direction of text become spaces. Nothing can
+    forge a second line or command a terminal. Beginning and end stay: a message names its file at the beginning
     and the remedy at the end.
     """
     if len(text) > 4 * most:  # what is left out need not be looked at

@@ -20,7 +20,7 @@ def python_command(*words: str) -> list[str]:
 def python_environment() -> dict[str, str]:
     """The environment of a `python_command`, which finds modules where this process finds them.
 
-    `python -m` and an empty entry in PYTHONPATH put the current folder on the path, where a file that is named as a
+    `python -m` and an empty entry in PYTHONPATH put the current folder on the path. There a file that is named as a
     module would be run. It is left out, unless it holds this very code.
     """
     try:

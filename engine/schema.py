@@ -1,7 +1,7 @@
 """The checked reading of plain data (JSON, TOML) into frozen dataclasses, and back.
 
-Pydantic reads the types from the annotations. Here are the bounds on what any file may hold, and errors in one line
-that name the place and the field, and what was found.
+Pydantic reads the types from the annotations. Here are the bounds on what any file may hold, and errors in one line:
+place, field and the value found.
 """
 
 from __future__ import annotations
@@ -54,12 +54,12 @@ def parse_json(text: str | bytes, where: str, most_bytes: int = bounds.LARGEST_T
 
 def _table(fields: list[tuple[str, Any]]) -> dict[str, Any]:
     """The fields of a JSON object, of which none may be given twice: one of the two would be lost."""
-    found: dict[str, Any] = {}
+    pairs: dict[str, Any] = {}
     for name, value in fields:
-        if name in found:
+        if name in pairs:
             raise ValueError(f"field {bounds.brief(name)} is given twice")
-        found[name] = value
-    return found
+        pairs[name] = value
+    return pairs
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -121,10 +121,10 @@ def read(kind: type[T], data: object, where: str) -> T:
         raise SchemaError(f"{where}: must be a table of fields, found {_describe(data)}")
     _check_bounds(data, where)
     try:  # as JSON: in Python's own data a strict reader takes no list for a tuple
-        found: T = _adapter(kind).validate_json(  # type: ignore[arg-type]
+        checked: T = _adapter(kind).validate_json(  # type: ignore[arg-type]
             _text_of(data), strict=True, extra="forbid"
         )
-        return found
+        return checked
     except ValidationError as error:
         raise SchemaError(explained(error, where, kind)) from error
     except (TypeError, OverflowError) as error:
@@ -147,8 +147,8 @@ def explained(error: ValueError, where: str = "", kind: object = None) -> str:
         return str(error)
     first, *others = error.errors(include_url=False)
     if first["type"] == "missing":  # maybe because it is misspelled
-        first = next((each for each in others if each["type"] in _UNKNOWN), first)
-    path, found = list(first["loc"]), first["input"]
+        first = next((problem for problem in others if problem["type"] in _UNKNOWN), first)
+    path, value = list(first["loc"]), first["input"]
     if first["type"] == "missing":
         words = f"field {path.pop()!r} is missing"
     elif first["type"] in _UNKNOWN:
@@ -162,7 +162,7 @@ def explained(error: ValueError, where: str = "", kind: object = None) -> str:
         path.append(first["ctx"]["discriminator"].strip("'"))
         words = f"must be one of {first['ctx']['expected_tags']}, found {bounds.brief(first['ctx']['tag'])}"
     else:
-        shown = f", found {bounds.brief(found)}" if isinstance(found, str | float | int | None) else ""
+        shown = f", found {bounds.brief(value)}" if isinstance(value, str | float | int | None) else ""
         words = _PLAIN.get(first["type"]) or re.sub(r"^\w+ should ", "must ", first["msg"])
         words = words.replace(" after validation", "") + shown
     place = where + _place(path) if where else _place(path).removeprefix(".")
@@ -184,7 +184,9 @@ def _names(kind: Any, path: Iterable[str | int]) -> list[str]:
     """The names of the fields of the dataclass at a path in another."""
     for part in path:
         inner = get_type_hints(kind)[part] if isinstance(part, str) else kind
-        kind = next((each for each in (inner, *get_args(inner)) if dataclasses.is_dataclass(each)), inner)
+        kind = next(
+            (candidate for candidate in (inner, *get_args(inner)) if dataclasses.is_dataclass(candidate)), inner
+        )
     return [field.name for field in dataclasses.fields(kind)]
 
 

@@ -103,8 +103,8 @@ class _TorchModel:
         import torch
 
         with torch.inference_mode():
-            found, after = self._model.sample(state, torch.from_numpy(frames), steps)
-        return found.numpy(), after
+            motion, after = self._model.sample(state, torch.from_numpy(frames), steps)
+        return motion.numpy(), after
 
 
 class ModelSource(StringSource):
@@ -135,17 +135,17 @@ class ModelSource(StringSource):
         if not self.any_frame or len(frames) == steps:
             every, after = self.advance(state, steps)
             return every if len(frames) == steps else every[:, frames - 1], after
-        found, inner = self._model.sample(state.inner, frames, steps)
-        return self._checked(found, frames, state), self._after(state, inner, steps)
+        motion, inner = self._model.sample(state.inner, frames, steps)
+        return self._checked(motion, frames, state), self._after(state, inner, steps)
 
-    def _checked(self, found: Floats, frames: NDArray[np.int64], state: SourceState) -> Floats:
+    def _checked(self, displacement: Floats, frames: NDArray[np.int64], state: SourceState) -> Floats:
         """The displacement in m, checked. Raises Runaway."""
-        found = found * found.dtype.type(self._scale_m)
-        possible = np.abs(found) <= state.limit_m  # False for a NaN
+        displacement = displacement * displacement.dtype.type(self._scale_m)
+        possible = np.abs(displacement) <= state.limit_m  # False for a NaN
         if not possible.all():
             first = int(np.argmin(possible.all(axis=(0, 2))))
             raise Runaway((state.frame + int(frames[first])) / self.rate_hz)
-        return found
+        return displacement
 
     @staticmethod
     def _after(state: SourceState, inner: Any, steps: int) -> SourceState:
@@ -178,8 +178,8 @@ class TruthSource(StringSource):
 
     def sample(self, state: SourceState, frames: NDArray[np.int64], steps: int) -> tuple[Floats, SourceState]:
         amplitudes, inner = self._solver.sample(state.inner, frames, steps)
-        found = amplitudes @ self._resonator.shapes
-        return found, SourceState(inner, state.frame + steps, state.limit_m)
+        motion = amplitudes @ self._resonator.shapes
+        return motion, SourceState(inner, state.frame + steps, state.limit_m)
 
 
 def _check_grid(displacement: Array, grid_points: int) -> None:

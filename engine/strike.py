@@ -1,7 +1,7 @@
 """A blow on a surface: the force of a mallet over milliseconds, at a place, spread over the mallet's face.
 
 The force is a raised cosine of the time of contact. After a symmetrical pulse a mode moves as if it had been kicked
-at the pulse's middle with the pulse's spectrum at its own frequency, so that a blow is a start with speeds alone. The
+at the pulse's middle with the pulse's spectrum at its own frequency. So a blow is a start with speeds alone. The
 time of contact falls with the speed as v^(-1/5), Hertz's law for a ball on an elastic body (Johnson, Contact
 Mechanics (1985), 11.4). It is a period of the lowest mode at most, in which the surface throws the mallet off: an
 estimate, without which soft blows on small drums would be silent. Sticks touch drums for 3 to 6 ms (Wagner, Analysis

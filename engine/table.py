@@ -96,7 +96,10 @@ def _record(kind: type[T], columns: Sequence[str], texts: Sequence[str], where: 
     hints = get_type_hints(kind)
     values: dict[str, Any] = {}
     for name, text in zip(columns, texts, strict=True):
-        number = next((each for each in (int, float) if each in (hints[name], *get_args(hints[name]))), None)
+        number = next(
+            (number_kind for number_kind in (int, float) if number_kind in (hints[name], *get_args(hints[name]))),
+            None,
+        )
         if number is None:
             values[name] = text
         elif text:

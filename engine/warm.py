@@ -84,8 +84,8 @@ def playing() -> None:
     from engine.kernels import contact, sympathy
     from engine.kernels.playing import events
 
-    for each in (events.play, contact.sound, sympathy.sympathise):
-        each.compile("void(int64, int64)")
+    for function in (events.play, contact.sound, sympathy.sympathise):
+        function.compile("void(int64, int64)")
     CompiledPlayer(RATE_HZ, INFO.modes)
     _drum()
     _loudness()
@@ -112,8 +112,8 @@ def voices() -> None:
 
 def responses() -> None:
     """Compile the responses of bodies of either kind and of a room, and what a body does to loudness."""
-    given = Impulse(np.ones((1, 1)), RATE_HZ)
-    for body in (Body(), Body(impulse=given)):
+    impulse = Impulse(np.ones((1, 1)), RATE_HZ)
+    for body in (Body(), Body(impulse=impulse)):
         Mixer(RATE_HZ).set_effects(Effects(body, Room(0.2, 0.8)))
         curves_of(body)
 
@@ -153,12 +153,12 @@ def _drum() -> None:
     from engine.resonators.surface import tools
 
     drum = tune(DrumParameters(air_kg_m3=1.2), 1.1, 400)
-    found, blow = modes_of(drum, 400), np.append(numbers_of(drum), np.zeros(drum_modes.DRUM - drum_modes.X))
-    found.struck((0.0, 0.0), 0.01)
-    found.radiated((0.0, 0.0))
-    found.resonator(np.zeros((1, 2)))
-    block = np.zeros(drum_modes.HEADER + DRUM_ROWS * len(found))
-    drum_modes.write(blow, found.rows, np.zeros(1), tools(), block.ctypes.data, len(found))
+    modes, blow = modes_of(drum, 400), np.append(numbers_of(drum), np.zeros(drum_modes.DRUM - drum_modes.X))
+    modes.struck((0.0, 0.0), 0.01)
+    modes.radiated((0.0, 0.0))
+    modes.resonator(np.zeros((1, 2)))
+    block = np.zeros(drum_modes.HEADER + DRUM_ROWS * len(modes))
+    drum_modes.write(blow, modes.rows, np.zeros(1), tools(), block.ctypes.data, len(modes))
 
 
 def _loudness() -> None:

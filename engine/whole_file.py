@@ -102,8 +102,8 @@ def remove_left_over(folder: Path) -> None:
     pattern = re.compile(rf"\..+\.{this_computer()}-(\d{{1,9}})(-\w+)?{re.escape(ENDING)}", re.DOTALL)
     with suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
-            found = pattern.fullmatch(entry.name)
-            if not found or not _is_own(entry) or is_alive(int(found[1])):
+            match = pattern.fullmatch(entry.name)
+            if not match or not _is_own(entry) or is_alive(int(match[1])):
                 continue
             if entry.is_dir(follow_symlinks=False):
                 shutil.rmtree(entry.path, ignore_errors=True)

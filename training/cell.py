@@ -116,18 +116,18 @@ class Cell:
         """
         # the longest model first: koopman_var is not koopman by the recipe var
         models = "|".join(sorted(MODELS, key=len, reverse=True))
-        found = re.fullmatch(_NAME.pattern.replace("[a-z0-9_]+?", models), name) or _NAME.fullmatch(name)
-        if found is None:
+        match = re.fullmatch(_NAME.pattern.replace("[a-z0-9_]+?", models), name) or _NAME.fullmatch(name)
+        if match is None:
             return None
         try:
             cell = cls(
-                found["model"],
-                found["kind"] == "nonlinear",
-                "gaussian" if found["initial"] == "gaussian" else "noise",
-                1000 * int(found["rate"]),
-                int(found["horizon"] or HORIZON),
-                found["recipe"] or RECIPE,
-                int(found["seed"] or 0),
+                match["model"],
+                match["kind"] == "nonlinear",
+                "gaussian" if match["initial"] == "gaussian" else "noise",
+                1000 * int(match["rate"]),
+                int(match["horizon"] or HORIZON),
+                match["recipe"] or RECIPE,
+                int(match["seed"] or 0),
             )
         except ValueError as error:
             raise SchemaError(f"{name}: {error}") from error

@@ -172,8 +172,8 @@ class TrainingConfiguration:
         if self.start not in (BLIND_PURSUIT, PHASES):
             return ""
         counted = self.model == "koopman_integrated" and "state_size" in self.model_configuration
-        given = (SYMMETRIES if self.recipe.flip else "", COUNT if counted else "")
-        return ", and ".join(words for words in given if words)
+        parts = (SYMMETRIES if self.recipe.flip else "", COUNT if counted else "")
+        return ", and ".join(words for words in parts if words)
 
     @property
     def knowledge(self) -> str:
@@ -184,8 +184,8 @@ class TrainingConfiguration:
     def digest(self) -> str:
         """The digest of all that determines the run's result, the model's defaults among it. Its name does not count.
 
-        Of data and recipe, whose defaults are never changed, fields that have theirs are left out, so that one which
-        comes later leaves earlier runs their digest; sizes that are no longer there count with the value that they
+        Of data and recipe, whose defaults are never changed, fields that have theirs are left out. So one which comes
+        later leaves earlier runs their digest; sizes that are no longer there count with the value that they
         had.
         """
         sizes = write(read_model_configuration(self.model, self.model_configuration, "model_configuration"))
@@ -225,13 +225,13 @@ def read_configuration(plain: Any, where: str) -> TrainingConfiguration:
 
 def _with_start(recipe: dict[str, Any]) -> dict[str, Any]:
     """An earlier recipe with its start by name; before, `blind` and `latent_epochs` chose it."""
-    own = {
+    settings = {
         name: value for name, value in recipe.items() if name not in ("initialisation", "blind", "latents_per_mode")
     }
     blind, pursued = recipe.get("blind"), recipe.get("latent_epochs")
     if pursued:
-        return {**own, "start": BLIND_PURSUIT if blind else PURSUIT}
-    return {**own, "start": PHASES if blind else recipe.get("initialisation", "")}
+        return {**settings, "start": BLIND_PURSUIT if blind else PURSUIT}
+    return {**settings, "start": PHASES if blind else recipe.get("initialisation", "")}
 
 
 def non_default(value: DatasetConfiguration | Recipe) -> dict[str, Any]:

@@ -122,7 +122,9 @@ def evaluate_past_horizon(
     ear = torch.from_numpy(listening_weights(np.array([DEFAULT_LISTEN]), c.grid_points)).float()
     spans = [slice(*(min(round(edge * c.rate_hz), steps) for edge in window)) for window in windows_s]
     edges = [edge for span in spans for edge in (span.start, span.stop)]
-    string, sound, distances = ErrorSums(steps, edges), ErrorSums(steps), []
+    string = ErrorSums(steps, edges)
+    sound = ErrorSums(steps)
+    distances = []
     parts = _parts(c, split, trajectories)
     with _in_evaluation(model):
         for part, rows in enumerate(parts):
@@ -135,9 +137,9 @@ def evaluate_past_horizon(
                 predicted, state = model.advance(state, last - first)
                 predicted, truth = predicted.float().cpu(), (amplitudes @ synthesis).float()
                 string.add(predicted, truth, first)
-                heard = torch.stack([predicted @ ear, truth @ ear])
-                sound.add(heard[0], heard[1], first)
-                sounds[..., first + 1 : last + 1] = heard[..., 0]
+                at_ear = torch.stack([predicted @ ear, truth @ ear])
+                sound.add(at_ear[0], at_ear[1], first)
+                sounds[..., first + 1 : last + 1] = at_ear[..., 0]
                 first = last
                 report((part + first / steps) / len(parts))
             distances.append([spectral_distances(*sounds[..., 1:][..., span].numpy()) for span in spans])
@@ -171,7 +173,7 @@ def evaluate_partials(
     length = segment_frames(c.rate_hz, linear_hz[0])
     block = max(1, frames_at_once // length) * length
     steps = max(round(stop_s * c.rate_hz) for _, stop_s in windows_s)
-    initial, found = draw_initial(c), []
+    initial, errors = draw_initial(c), []
     parts = _parts(c, split, trajectories)
     with _in_evaluation(model):
         for part, rows in enumerate(parts):
@@ -188,8 +190,8 @@ def evaluate_partials(
                 predicted, state = model.advance(state, truth.shape[1], analysis)
                 tracks.append(track_partials(predicted.cpu().numpy() * np.float32(dataset.scale_m), truth, length))
                 report((part + (first + truth.shape[1]) / steps) / len(parts))
-            found.append(partial_errors(PartialTrack.join(tracks), c.rate_hz, linear_hz, windows_s))
-    return PartialErrors.join(found)
+            errors.append(partial_errors(PartialTrack.join(tracks), c.rate_hz, linear_hz, windows_s))
+    return PartialErrors.join(errors)
 
 
 @dataclass(frozen=True)

@@ -78,14 +78,14 @@ COLUMNS = columns_of(Heard)
 def read_heard(folder: Path) -> tuple[dict[str, Heard], list[str]]:
     """Read the audible errors of a folder's presets by digest, and a line for whatever is wrong. Raises nothing."""
     path = folder / NAME
-    found: dict[str, Heard] = {}
+    rows: dict[str, Heard] = {}
     problems: list[str] = []
     try:
-        for heard in read_table(Heard, path, "table of heard presets", LARGEST_BYTES, lines_apart=True):
-            if isinstance(heard, SchemaError):
-                problems.append(str(heard))
-            elif heard.method == METHOD:
-                found[heard.sha256] = heard
+        for row in read_table(Heard, path, "table of heard presets", LARGEST_BYTES, lines_apart=True):
+            if isinstance(row, SchemaError):
+                problems.append(str(row))
+            elif row.method == METHOD:
+                rows[row.sha256] = row
     except (FileNotFoundError, NotADirectoryError):
         return {}, []
     except SchemaError as error:
@@ -94,7 +94,7 @@ def read_heard(folder: Path) -> tuple[dict[str, Heard], list[str]]:
         return {}, [f"{path}: cannot be read ({error.strerror or error}); presets are listed without it"]
     if (more := len(problems) - MOST_REPORTED) > 0:
         problems = [*problems[:MOST_REPORTED], f"{path}: {more} more lines cannot be used"]
-    return found, problems
+    return rows, problems
 
 
 def add_heard(folder: Path, measured: Iterable[Heard]) -> None:
@@ -107,12 +107,12 @@ def add_heard(folder: Path, measured: Iterable[Heard]) -> None:
     """
     path = folder / NAME
     with FileLock(path.with_name(f".{NAME}.lock")):
-        known = {heard.name: heard for heard in read_heard(folder)[0].values()}
-        known |= {heard.name: heard for heard in measured}
+        known = {row.name: row for row in read_heard(folder)[0].values()}
+        known |= {row.name: row for row in measured}
         write_table(path, Heard, (_rounded(known[name]) for name in sorted(known)))
 
 
-def _rounded(heard: Heard) -> Heard:
+def _rounded(row: Heard) -> Heard:
     """Round to a thousandth, which is far less than can be heard; adding nothing makes -0 a 0."""
-    figures = {name: getattr(heard, name) for name in _BOUNDS}
-    return replace(heard, **{name: round(value, 3) + 0.0 for name, value in figures.items() if value is not None})
+    figures = {name: getattr(row, name) for name in _BOUNDS}
+    return replace(row, **{name: round(value, 3) + 0.0 for name, value in figures.items() if value is not None})

@@ -1,7 +1,7 @@
 """The fidelity of a preset's sound in a musician's words.
 
-Only what can be heard is named: 3 cents (0.2 %) and 1 dB are about the least that is noticed from one tone to the
-next (Moore, "An Introduction to the Psychology of Hearing"). For changes of level the threshold is 2 dB, because they
+Only what can be heard is named: 3 cents (0.2 %) and 1 dB are about the least that is noticed between two tones
+(Moore, "An Introduction to the Psychology of Hearing"). For changes of level the threshold is 2 dB, because they
 are heard over seconds of decay and not from one tone to the next.
 """
 
@@ -22,45 +22,43 @@ HEARD_TIP = (
 )
 
 
-def heard_word(heard: Heard | None) -> str:
+def heard_word(row: Heard | None) -> str:
     """The word for a list: "true", the worst fault, or the distance of the spectra in dB."""
-    if heard is None:
+    if row is None:
         return UNMEASURED
-    if found := faults(heard):
-        return found[0] if len(found) == 1 else f"{found[0]} …"
-    return "true" if heard.distance_db < NOTICED_DISTANCE_DB else f"{heard.distance_db:.1f} dB off"
+    if words := faults(row):
+        return words[0] if len(words) == 1 else f"{words[0]} …"
+    return "true" if row.distance_db < NOTICED_DISTANCE_DB else f"{row.distance_db:.1f} dB off"
 
 
-def heard_sentence(heard: Heard | None, name: str) -> str:
+def heard_sentence(row: Heard | None, name: str) -> str:
     """The sentence for a preset's card: all faults, and the distance of the spectra in dB. `name`: the preset's."""
-    if heard is None:
+    if row is None:
         return f"{UNMEASURED}; to measure it: learned-strings evaluate {name} --heard --write"
-    apart = f"spectra {heard.distance_db:.2g} dB apart over {heard.seconds:.2g} s"
-    if found := faults(heard):
-        return f"past training: {'; '.join(found)}; {apart}"
-    return f"{'true' if heard.distance_db < NOTICED_DISTANCE_DB else 'not quite true'}: {apart}"
+    apart = f"spectra {row.distance_db:.2g} dB apart over {row.seconds:.2g} s"
+    if words := faults(row):
+        return f"past training: {'; '.join(words)}; {apart}"
+    return f"{'true' if row.distance_db < NOTICED_DISTANCE_DB else 'not quite true'}: {apart}"
 
 
-def faults(heard: Heard) -> list[str]:
+def faults(row: Heard) -> list[str]:
     """Every fault above its threshold, in words; first the one that exceeds its threshold by the largest factor."""
-    found = []
-    if heard.runs_away_s is not None:
-        found.append((math.inf, f"diverges after {heard.runs_away_s:.1f} s"))
-    if abs(heard.level_db) >= NOTICED_CHANGE_DB:
-        louder = "grows" if heard.rise_db >= NOTICED_CHANGE_DB else "fades too slowly"
-        what = louder if heard.level_db > 0 else "decays too fast"
-        found.append((abs(heard.level_db) / NOTICED_CHANGE_DB, f"{what}, {_signed(heard.level_db)} dB"))
-    if heard.split_cents is not None:
-        found.append((heard.split_cents / NOTICED_CENTS, f"two pitches, {heard.split_cents:.0f} cents apart"))
-    if heard.pitch_cents is not None and abs(heard.pitch_cents) >= NOTICED_CENTS:
-        which = "high" if heard.pitch_cents > 0 else "low"
-        found.append(
-            (abs(heard.pitch_cents) / NOTICED_CENTS, f"pitch {abs(heard.pitch_cents):.0f} cents too {which}")
-        )
-    if heard.hum_db is not None and heard.hum_db >= NOTICED_HUM_DB:
-        loudness = 10 ** ((heard.hum_db - NOTICED_HUM_DB) / 20)
-        found.append((loudness, f"residual hum at {_signed(heard.hum_db)} dB"))
-    return [text for _, text in sorted(found, key=lambda fault: -fault[0])]
+    weighted = []
+    if row.runs_away_s is not None:
+        weighted.append((math.inf, f"diverges after {row.runs_away_s:.1f} s"))
+    if abs(row.level_db) >= NOTICED_CHANGE_DB:
+        louder = "grows" if row.rise_db >= NOTICED_CHANGE_DB else "fades too slowly"
+        what = louder if row.level_db > 0 else "decays too fast"
+        weighted.append((abs(row.level_db) / NOTICED_CHANGE_DB, f"{what}, {_signed(row.level_db)} dB"))
+    if row.split_cents is not None:
+        weighted.append((row.split_cents / NOTICED_CENTS, f"two pitches, {row.split_cents:.0f} cents apart"))
+    if row.pitch_cents is not None and abs(row.pitch_cents) >= NOTICED_CENTS:
+        which = "high" if row.pitch_cents > 0 else "low"
+        weighted.append((abs(row.pitch_cents) / NOTICED_CENTS, f"pitch {abs(row.pitch_cents):.0f} cents too {which}"))
+    if row.hum_db is not None and row.hum_db >= NOTICED_HUM_DB:
+        loudness = 10 ** ((row.hum_db - NOTICED_HUM_DB) / 20)
+        weighted.append((loudness, f"residual hum at {_signed(row.hum_db)} dB"))
+    return [text for _, text in sorted(weighted, key=lambda fault: -fault[0])]
 
 
 def _signed(value: float) -> str:

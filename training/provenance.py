@@ -47,5 +47,5 @@ def now() -> str:
 
 
 def _git(*words: str) -> str:
-    found = subprocess.run(["git", *words], cwd=_ROOT, capture_output=True, text=True, check=True, timeout=10)
-    return found.stdout.strip()
+    done = subprocess.run(["git", *words], cwd=_ROOT, capture_output=True, text=True, check=True, timeout=10)
+    return done.stdout.strip()

@@ -135,16 +135,16 @@ def add_rows(path: Path, rows: Iterable[Row]) -> list[Row]:
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     with FileLock(f"{path}.lock"):
-        found = {row.digest: row for row in read_results(path)}
+        by_digest = {row.digest: row for row in read_results(path)}
         for row in rows:
-            old = found.get(row.digest)
+            old = by_digest.get(row.digest)
             if old is None or _rank(row) > _rank(old):
-                found[row.digest] = row
+                by_digest[row.digest] = row
             elif _rank(row) == _rank(old):  # the same run, of which one may have been measured again
                 lacking = {name: value for name in COLUMNS if (value := getattr(old, name)) is not None}
-                given = {name: value for name in COLUMNS if (value := getattr(row, name)) is not None}
-                found[row.digest] = Row(**(lacking | given))
-        merged = sorted(found.values(), key=lambda row: (row.name, row.digest))
+                known = {name: value for name in COLUMNS if (value := getattr(row, name)) is not None}
+                by_digest[row.digest] = Row(**(lacking | known))
+        merged = sorted(by_digest.values(), key=lambda row: (row.name, row.digest))
         write_table(path, Row, merged)
     return merged
 

@@ -32,14 +32,14 @@ def row_errors(
     Args:
         whole: of "validation" and "test", over `steps` frames.
     """
-    found: dict[str, float | None] = {}
+    columns: dict[str, float | None] = {}
     for split, prefix in PREFIXES.items():
-        found |= _columns(prefix, "", whole[split])
+        columns |= _columns(prefix, "", whole[split])
         if steps >= SHORT_HORIZON and dataset.configuration.stride == 1:
             same = steps == SHORT_HORIZON
             short = whole[split] if same else evaluate_model(model, dataset, split, SHORT_HORIZON)
-            found |= _columns(prefix, f"_{SHORT_HORIZON}", short)
-    return found
+            columns |= _columns(prefix, f"_{SHORT_HORIZON}", short)
+    return columns
 
 
 def configuration_of(info: PresetInfo, where: str) -> TrainingConfiguration:

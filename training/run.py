@@ -260,7 +260,9 @@ def preset_info(
 def trained_range(data: DatasetConfiguration) -> TrainedRange:
     """The ranges of a data set's random draws; noise has neither a place nor a width."""
     if data.initial == "pluck":
-        position, width, peak_m = PLUCK_POSITION_RANGE, PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M
+        position = PLUCK_POSITION_RANGE
+        width = PLUCK_WIDTH_RANGE
+        peak_m = PLUCK_PEAK_RANGE_M
         widths = {"gaussian": width, "raised_cosine": width}
         return TrainedRange(position, widths, peak_m, data.largest_tension_rise)
     if data.initial == "noise":

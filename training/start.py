@@ -41,12 +41,12 @@ STARTS = {
 
 def starts_of(model: str) -> dict[str, Start]:
     """The starts of a model by name; the first is the default. A model declares its own, whose weights it draws."""
-    own = {how: Start(given, (model,)) for how, given in model_class(model).initialisations.items()}
-    found = {name: start for name, start in STARTS.items() if model in start.models}
-    return found | own if LEAST_SQUARES in found else own | found
+    of_model = {how: Start(uses, (model,)) for how, uses in model_class(model).initialisations.items()}
+    general = {name: start for name, start in STARTS.items() if model in start.models}
+    return general | of_model if LEAST_SQUARES in general else of_model | general
 
 
 def given_to(model: str, start: str) -> str:
     """The knowledge that a start of a model uses, in words; "" for none, or for an unknown start."""
-    found = starts_of(model).get(start)
-    return found.given if found else ""
+    start_entry = starts_of(model).get(start)
+    return start_entry.given if start_entry else ""

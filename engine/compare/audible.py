@@ -1,6 +1,6 @@
 """The audible differences between a model's sound and the truth: spectrum, level, pitch, second pitch; never phase.
 
-The frames of both sounds are long enough that the partials of a low string are apart, as the ear has them apart up to
+The frames of both sounds are long enough that the partials of a low string are apart; the ear separates them up to
 the fifth or eighth. Below 20 Hz nothing counts: a string that rests beside its place is not heard.
 
 Source of the log spectral distance: Gray, Markel, "Distance Measures for Speech Processing", IEEE TASSP 24 (1976);
@@ -74,12 +74,12 @@ def audible_errors(
     if len(truth) < frame_length(rate_hz):
         raise ValueError(f"{len(truth)} samples are less than a frame of {frame_length(rate_hz)}")
     sounds = [np.asarray(sound, np.float64) for sound in (model, truth)]
-    found, true = (_spectra(sound, rate_hz) for sound in sounds)
-    found_level, true_level = (np.maximum(power.sum(1), np.finfo(np.float64).tiny) for power in (found, true))
+    ours, theirs = (_spectra(sound, rate_hz) for sound in sounds)
+    found_level, true_level = (np.maximum(power.sum(1), np.finfo(np.float64).tiny) for power in (ours, theirs))
     first = min(round(after_s * rate_hz), len(truth) // 2)
     pitch, split = _pitch(sounds[0][first:], sounds[1][first:], rate_hz, partials_hz)
     return AudibleErrors(
-        distance_db=_distance(found, true),
+        distance_db=_distance(ours, theirs),
         level_db=_level_change(found_level, true_level, rate_hz),
         rise_db=_rise(found_level, true_level, rate_hz),
         pitch_cents=pitch,
@@ -107,30 +107,30 @@ def _spectra(sound: Array, rate_hz: int) -> Array:
     return np.square(magnitudes(sound, np.hanning(length), length // 2)[:, first:])
 
 
-def _distance(found: Array, true: Array) -> float:
+def _distance(model: Array, true: Array) -> float:
     floor = max(float(true.max()) * 10 ** (-FLOOR_DB / 10), np.finfo(np.float64).tiny)
-    heard = (found > floor) | (true > floor)
-    if not heard.any():
+    above_floor = (model > floor) | (true > floor)
+    if not above_floor.any():
         return 0.0
-    levels = [10 * np.log10(np.maximum(power[heard], floor)) for power in (found, true)]
+    levels = [10 * np.log10(np.maximum(power[above_floor], floor)) for power in (model, true)]
     return _within_floor(float(np.abs(levels[0] - levels[1]).mean()))
 
 
-def _level_change(found: Array, true: Array, rate_hz: int) -> float:
+def _level_change(model: Array, true: Array, rate_hz: int) -> float:
     early = max(1, round(EARLY_S / _hop_s(rate_hz)) - 1)
     late = -max(1, len(true) // 4)
     first, last = (
-        10 * (math.log10(found[part].mean()) - math.log10(true[part].mean()))
+        10 * (math.log10(model[part].mean()) - math.log10(true[part].mean()))
         for part in (slice(early), slice(late, None))
     )
     return _within_floor(last - first)
 
 
-def _rise(found: Array, true: Array, rate_hz: int) -> float:
+def _rise(power: Array, true: Array, rate_hz: int) -> float:
     """The rise in level of means over RISE_S; what lies under the truth's floor does not count."""
     length = max(1, round(RISE_S / _hop_s(rate_hz)))
-    count = max(1, len(found) // length)
-    means = np.array([part.mean() for part in np.array_split(found, count)])
+    count = max(1, len(power) // length)
+    means = np.array([part.mean() for part in np.array_split(power, count)])
     level = 10 * np.log10(np.maximum(means, true.max() * 10 ** (-FLOOR_DB / 10)))
     return _within_floor(float((level - np.minimum.accumulate(level)).max()))
 
@@ -149,13 +149,13 @@ def _pitch(
     """The error in cents, and the distance of a second pitch."""
     size = 4 * 2 ** math.ceil(math.log2(len(truth)))
     window = np.hanning(len(truth))
-    found, true = (np.square(np.abs(np.fft.rfft(sound * window, size))) for sound in (model, truth))
+    ours, theirs = (np.square(np.abs(np.fft.rfft(sound * window, size))) for sound in (model, truth))
     bands = [
         slice(math.ceil(low / rate_hz * size), math.floor(high / rate_hz * size) + 1)
         for low, high in _bands(partials_hz, rate_hz)
     ]
-    band = max(bands, key=lambda band: float(true[band].max()), default=slice(0))
-    found_peaks, true_peaks = (_peaks(power[band]) for power in (found, true))
+    band = max(bands, key=lambda band: float(theirs[band].max()), default=slice(0))
+    found_peaks, true_peaks = (_peaks(power[band]) for power in (ours, theirs))
     if not true_peaks or not found_peaks or found_peaks[0][1] < true_peaks[0][1] * 10 ** (-WEAK_DB / 10):
         return None, None
     true_pitch, *pitches = (band.start + place for place, _ in (true_peaks[0], *found_peaks[:2]))

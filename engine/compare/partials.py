@@ -54,9 +54,9 @@ def phasors(before: Array, now: Array, after: Array, spacing_s: float, resonator
 
 def _complex(real: Array, imaginary: Array) -> Phasors:
     """The complex numbers of two parts, also where these are not finite: a product with i would make others."""
-    found = real.astype(np.complex128)
-    found.imag = imaginary
-    return found
+    numbers = real.astype(np.complex128)
+    numbers.imag = imaginary
+    return numbers
 
 
 def segment_frames(rate_hz: float, lowest_hz: float) -> int:
@@ -177,13 +177,13 @@ class PartialErrors:
     def weighted(self, window: int) -> WeightedPartials:
         """The means of the magnitudes over all modes and trajectories, by the truth's energy."""
         weights = self.energy[:, window]
-        found = []
+        means = []
         for errors in (self.level_db, self.phase_cycles, self.cents, self.glide_error_cents):
             magnitudes = np.abs(errors[:, window])
             there = ~np.isnan(magnitudes)
             total = float(weights[there].sum())
-            found.append(float((weights[there] * magnitudes[there]).sum()) / total if total > 0 else None)
-        return WeightedPartials(*found)
+            means.append(float((weights[there] * magnitudes[there]).sum()) / total if total > 0 else None)
+        return WeightedPartials(*means)
 
 
 @dataclass(frozen=True)
@@ -247,11 +247,11 @@ def partial_errors(
         phase=_continued_cycles(gain, phased),
         frequency_hz=alias_hz + rate_hz * np.round((np.asarray(frequencies_hz) - alias_hz) / rate_hz),
     )
-    found = [motion.window(start_s, stop_s) for start_s, stop_s in windows_s]
-    if not found:
+    windows = [motion.window(start_s, stop_s) for start_s, stop_s in windows_s]
+    if not windows:
         empty = np.empty((len(power), 0, power.shape[2]))
         return PartialErrors(*(empty for _ in fields(PartialErrors)))
-    return PartialErrors(*(np.stack(values, axis=1) for values in zip(*found, strict=True)))
+    return PartialErrors(*(np.stack(values, axis=1) for values in zip(*windows, strict=True)))
 
 
 @dataclass(frozen=True)
@@ -270,7 +270,9 @@ class _Motion:
     def window(self, start_s: float, stop_s: float) -> list[Array]:
         """The fields of `PartialErrors` for one window, (batch, modes) each."""
         inside = slice(*np.searchsorted(self.time_s, (start_s, stop_s)))
-        time_s, power, level = self.time_s[inside], self.power[:, inside], self.level[:, inside]
+        time_s = self.time_s[inside]
+        power = self.power[:, inside]
+        level = self.level[:, inside]
         there, phased = self.there[:, inside], self.phased[:, inside]
         enough = there.sum(1) >= LEAST_SEGMENTS
         true_power = np.where(there, power, 0.0).sum(1)

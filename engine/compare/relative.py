@@ -93,12 +93,12 @@ class ErrorSums:
     def windows(self, rate_hz: float, edges_s: Sequence[float]) -> list[WindowError]:
         """Errors between successive edges; windows that lie past the last frame are left out."""
         steps = self._frames.shape[1]
-        found = []
+        errors = []
         for start_s, stop_s in pairwise(edges_s):
             first, last = (min(round(edge * rate_hz), steps) for edge in (start_s, stop_s))
             if last > first:
-                found.append(WindowError(*self._relative(slice(first, last)), start_s, stop_s))
-        return found
+                errors.append(WindowError(*self._relative(slice(first, last)), start_s, stop_s))
+        return errors
 
     def per_frame(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Relative MSE and MAE of each frame over all trajectories, (steps,) each (the paper's Fig. 4)."""
@@ -125,7 +125,7 @@ class ErrorSums:
     def spread(self) -> RelativeError:
         """The population's standard deviation of the trajectories' own errors; infinite where one of them is."""
         with np.errstate(over="ignore", invalid="ignore"):  # of errors that are infinite, or nearly
-            spreads = [float(own.std()) for own in self.per_trajectory()]
+            spreads = [float(errors.std()) for errors in self.per_trajectory()]
         return RelativeError(*(spread if math.isfinite(spread) else math.inf for spread in spreads))
 
     def standard_error(self, resamples: int = RESAMPLES, first: int = 0, last: int | None = None) -> RelativeError:
@@ -183,7 +183,9 @@ class ErrorWindows:
         self, frames: int, window_s: float, rate_hz: float, curves: Sequence[str] = ("rmse", "mae", "level_db")
     ) -> None:
         self._window_frames = max(round(window_s * rate_hz), 1)
-        self.windows, self.ready, self._done = frames // self._window_frames, 0, 0
+        self.windows = frames // self._window_frames
+        self.ready = 0
+        self._done = 0
         self.window_s = self._window_frames / rate_hz
         self.middle_s = (np.arange(self.windows, dtype=np.float64) + 0.5) * self.window_s + 1 / rate_hz
         self.curves = {name: np.full(self.windows, np.nan) for name in curves}
@@ -235,13 +237,13 @@ def relative_error(predicted: Motion, truth: Motion) -> RelativeError:
     return sums.total()
 
 
-def error_to_signal(found: Motion, truth: Motion, least: float = 1e-30) -> float:
+def error_to_signal(motion: Motion, truth: Motion, least: float = 1e-30) -> float:
     """Σ(û - u)²/Σu² of two sounds or motions of one shape; infinite where it is not a number.
 
     Args:
         least: what the truth's Σu² counts as at least, so that silence has an error too.
     """
-    error: Any = found - truth
+    error: Any = motion - truth
     squared: Any = truth**2
     ratio = float((error**2).sum()) / max(float(squared.sum()), least)
     return ratio if math.isfinite(ratio) else math.inf

@@ -54,29 +54,29 @@ def spectral_distances(
 
 def _at_resolution(predicted: NDArray[np.floating], truth: NDArray[np.floating], size: int) -> Array:
     """(2, batch)."""
-    found, true = (magnitudes(sounds, _hann(size), max(1, size // 4)) for sounds in (predicted, truth))
+    model, true = (magnitudes(sounds, _hann(size), max(1, size // 4)) for sounds in (predicted, truth))
     with np.errstate(divide="ignore", invalid="ignore"):
-        difference = np.sqrt(np.square(found - true).sum((1, 2)))
+        difference = np.sqrt(np.square(model - true).sum((1, 2)))
         norm = np.sqrt(np.square(true).sum((1, 2)))
         convergence = np.where(norm == 0, np.where(difference == 0, 0.0, math.inf), difference / norm)
         floor = _floor(true, (1, 2))
-        levels_db = 20 * np.abs(np.log10(np.maximum(found, floor)) - np.log10(np.maximum(true, floor)))
+        levels_db = 20 * np.abs(np.log10(np.maximum(model, floor)) - np.log10(np.maximum(true, floor)))
     distances = np.stack([convergence, levels_db.mean((1, 2))])
     return np.where(np.isnan(distances), math.inf, distances)
 
 
-def log_spectral_distance(truth: Array, found: Array, noise_power: float = 0.0) -> float:
+def log_spectral_distance(truth: Array, model: Array, noise_power: float = 0.0) -> float:
     """Root mean square over bins of the difference in dB, mean over frames, of sounds (samples,).
 
     Levels below the floor, or below the noise where that is higher, count as it.
     """
     window = _hann(LOG_DISTANCE_SIZE)
     missing = max(0, len(window) - len(truth))
-    ours, theirs = (magnitudes(np.pad(sound, (0, missing)), window, len(window) // 4) for sound in (found, truth))
+    ours, theirs = (magnitudes(np.pad(sound, (0, missing)), window, len(window) // 4) for sound in (model, truth))
     floor = np.maximum(_floor(theirs, (0, 1)), math.sqrt(noise_power * float(window @ window)))
     difference_db = 20 * np.log10(np.maximum(theirs, floor) / np.maximum(ours, floor))
-    heard = (np.maximum(theirs, ours) > floor).any(axis=0)
-    return float(np.sqrt(np.mean(difference_db[:, heard] ** 2, axis=1)).mean()) if heard.any() else 0.0
+    above_floor = (np.maximum(theirs, ours) > floor).any(axis=0)
+    return float(np.sqrt(np.mean(difference_db[:, above_floor] ** 2, axis=1)).mean()) if above_floor.any() else 0.0
 
 
 def _hann(size: int) -> Array:

@@ -21,11 +21,11 @@ def amplified(amp: Amp, sound: NDArray[np.float64], rate_hz: int, level_db: floa
     mix = mixer["mix"]
     mixer["rate_hz"] = rate_hz
     drive(mixer, float(amp.drive_db), float(amp.tone_db), float(level_db))
-    found = np.zeros((-(-len(sound) // QUANTUM) * QUANTUM, 2))
-    found[: len(sound)] = sound
-    for first in range(0, len(found), QUANTUM):
-        mix[:] = found[first : first + QUANTUM]
+    blocks = np.zeros((-(-len(sound) // QUANTUM) * QUANTUM, 2))
+    blocks[: len(sound)] = sound
+    for first in range(0, len(blocks), QUANTUM):
+        mix[:] = blocks[first : first + QUANTUM]
         amplify(mixer)
-        found[first : first + QUANTUM] = mix
+        blocks[first : first + QUANTUM] = mix
         mixer["frames"] += QUANTUM
-    return found[: len(sound)]
+    return blocks[: len(sound)]

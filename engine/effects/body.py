@@ -67,11 +67,11 @@ def _response(name: str, impulse: Impulse | None, size: float, rate_hz: int) -> 
 
     if impulse is None:
         wood = BODIES[name]
-        found = of_modes(modes_of(wood), wood.seconds, subsonic_hz(wood), size, rate_hz)
+        response = of_modes(modes_of(wood), wood.seconds, subsonic_hz(wood), size, rate_hz)
     else:
-        found = of_given(impulse.samples, impulse.rate_hz, size, rate_hz)
-    found.setflags(write=False)
-    return found
+        response = of_given(impulse.samples, impulse.rate_hz, size, rate_hz)
+    response.setflags(write=False)
+    return response
 
 
 def subsonic_hz(wood: Wood) -> float:

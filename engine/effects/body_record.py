@@ -29,5 +29,7 @@ def body_memory(body: Body | None) -> NDArray[np.float64]:
     elif body is not None:
         wood = BODIES[body.name]
         rows = modes_of(wood).ravel()
-        record["modes"], record["seconds"], record["subsonic_hz"] = rows.size // 4, wood.seconds, subsonic_hz(wood)
+        record["modes"] = rows.size // 4
+        record["seconds"] = wood.seconds
+        record["subsonic_hz"] = subsonic_hz(wood)
     return np.concatenate([memory, rows])

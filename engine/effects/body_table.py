@@ -5,7 +5,7 @@ in round numbers, of no particular instrument. "Estimate" marks figures that fol
 do all quality factors and levels without a source. They lie in the range measured on guitars (T. J. W. Hill,
 B. E. Richardson, S. J. Richardson, Acta Acustica 90 (2004) 335).
 
-The density of the higher modes is that of a thin orthotropic plate, √3 S / (h √(c_x c_y)) a hertz, or of a membrane,
+The higher modes are as dense as those of a thin orthotropic plate, √3 S / (h √(c_x c_y)) a hertz, or a membrane:
 2πS f / c² (L. Cremer, M. Heckl, "Structure-Borne Sound"; N. H. Fletcher, T. D. Rossing, "The Physics of Musical
 Instruments", 2nd ed., chapter 3). Speeds of waves in spruce along and across the grain: 5200 and 1400 m/s (there,
 chapter 22); in paulownia 4700 and 1300 m/s (estimate).

@@ -18,6 +18,6 @@ def curves_of(body: Body) -> NDArray[np.float64]:
 
     The array is remembered, and not to be written.
     """
-    found = responses.curves_of(body.response(CURVES_HZ))
-    found.setflags(write=False)
-    return found
+    curves = responses.curves_of(body.response(CURVES_HZ))
+    curves.setflags(write=False)
+    return curves

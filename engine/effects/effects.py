@@ -56,19 +56,19 @@ class Effects:
 def _impulse(effects: Effects, rate_hz: int) -> NDArray[np.float64]:
     body = effects.body if effects.body and effects.body.mix > 0 else None
     room = effects.room if effects.room and effects.room.mix > 0 else None
-    found = np.ones((1, 1))
+    impulse = np.ones((1, 1))
     if body or room:
         from engine.effects.responses import weights_of  # brings the compiler
 
         parts, powers = _parts(body and replace(body, mix=1.0), room and replace(room, mix=1.0), rate_hz)
         mono = room is None and body is not None and body.channels == 1
-        found = np.zeros((max(map(len, parts)), 1 if mono else 2))
+        impulse = np.zeros((max(map(len, parts)), 1 if mono else 2))
         weights = weights_of(powers, body.mix if body else 0.0, room.mix if room else 0.0)
-        found[0] = weights[0]
+        impulse[0] = weights[0]
         for weight, part in zip(weights[1:], parts, strict=True):
-            found[: len(part)] += weight * part[:, : found.shape[1]]
-    found.setflags(write=False)
-    return found
+            impulse[: len(part)] += weight * part[:, : impulse.shape[1]]
+    impulse.setflags(write=False)
+    return impulse
 
 
 @lru_cache(maxsize=4)
@@ -103,5 +103,5 @@ def apply(effects: Effects | None, sound: NDArray[np.floating], rate_hz: int) ->
         stereo = amplified(effects.amp, stereo, rate_hz, effects.level_db)
     if not effects.rings:
         return stereo
-    found: NDArray[np.float64] = oaconvolve(stereo, effects.impulse(rate_hz), axes=0)[: len(stereo)]
-    return found
+    wet: NDArray[np.float64] = oaconvolve(stereo, effects.impulse(rate_hz), axes=0)[: len(stereo)]
+    return wet

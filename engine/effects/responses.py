@@ -31,52 +31,54 @@ def stereo(samples: NDArray[np.float64]) -> Response:
 def resampled(samples: NDArray[np.float64], from_hz: float, to_hz: float) -> Response:
     """A response at another rate."""
     from_hz, to_hz = float(from_hz), float(to_hz)
-    found = np.empty((responses.resampled_frames(len(samples), from_hz, to_hz), 2))
+    resampled_samples = np.empty((responses.resampled_frames(len(samples), from_hz, to_hz), 2))
     work = work_space(responses.work_size(len(samples), from_hz, to_hz))
-    responses.resample(work, stereo(samples), from_hz, to_hz, found)
-    return found
+    responses.resample(work, stereo(samples), from_hz, to_hz, resampled_samples)
+    return resampled_samples
 
 
 def faded(samples: NDArray[np.float64]) -> Response:
     """A response of one or two channels with its end faded to nothing."""
-    found = stereo(samples)
-    responses.fade(found)
-    return found[:, : samples.shape[1]]
+    sound = stereo(samples)
+    responses.fade(sound)
+    return sound[:, : samples.shape[1]]
 
 
 def as_loud(samples: NDArray[np.float64], rate_hz: float) -> Response:
     """The response times a factor: noise of equal power in each octave keeps it, in the mean of both channels."""
-    found = stereo(samples)
-    responses.level(_work_at(len(found), rate_hz), found, float(rate_hz))
-    return found
+    sound = stereo(samples)
+    responses.level(_work_at(len(sound), rate_hz), sound, float(rate_hz))
+    return sound
 
 
 def of_modes(modes: NDArray[np.float64], seconds: float, subsonic_hz: float, size: float, rate_hz: float) -> Response:
     """The response of a body of modes, see `engine.kernels.bodies`."""
     size, rate_hz = float(size), float(rate_hz)
-    found = np.empty((bodies.rung_frames(seconds, size, rate_hz), 2))
-    bodies.respond(_work_at(len(found), rate_hz), modes, subsonic_hz, size, rate_hz, found)
-    return found
+    response = np.empty((bodies.rung_frames(seconds, size, rate_hz), 2))
+    bodies.respond(_work_at(len(response), rate_hz), modes, subsonic_hz, size, rate_hz, response)
+    return response
 
 
 def of_given(samples: NDArray[np.float64], own_hz: float, size: float, rate_hz: float) -> Response:
     """The response of a body that is given as one, at its size."""
-    own_hz, size, rate_hz = float(own_hz), float(size), float(rate_hz)
+    own_hz = float(own_hz)
+    size = float(size)
+    rate_hz = float(rate_hz)
     frames = bodies.given_frames(len(samples), own_hz, size, rate_hz, bounds.LONGEST_IMPULSE_S)
-    found = np.empty((frames, 2))
+    response = np.empty((frames, 2))
     work = work_space(max(responses.work_size(len(samples), own_hz / size, rate_hz), int(rate_hz)))
-    bodies.respond_as(work, stereo(samples), own_hz, size, rate_hz, found)
-    return found
+    bodies.respond_as(work, stereo(samples), own_hz, size, rate_hz, response)
+    return response
 
 
 def of_room(noise: Response, t60_s: float, rate_hz: float) -> Response:
     """The response of a room from noise of power 1."""
     t60_s, rate_hz = float(t60_s), float(rate_hz)
     made = np.array(noise[: rooms.room_frames(t60_s)])
-    found = np.empty((responses.resampled_frames(len(made), constants.ROOM_HZ, rate_hz), 2))
+    response = np.empty((responses.resampled_frames(len(made), constants.ROOM_HZ, rate_hz), 2))
     work = work_space(max(responses.work_size(len(made), constants.ROOM_HZ, rate_hz), int(rate_hz)))
-    rooms.respond(work, t60_s, made, rate_hz, found)
-    return found
+    rooms.respond(work, t60_s, made, rate_hz, response)
+    return response
 
 
 def in_series(one: Response, other: Response) -> Response:
@@ -88,21 +90,21 @@ def in_series(one: Response, other: Response) -> Response:
 
 def powers_of(body: Response, room: Response, rate_hz: float) -> NDArray[np.float64]:
     """The powers (4, 4, 4) that `weights_of` needs; what is not there has no frames."""
-    found = np.empty((4, 4, 4))
-    responses.all_powers(_work_at(len(body) + len(room), rate_hz), stereo(body), stereo(room), float(rate_hz), found)
-    return found
+    powers = np.empty((4, 4, 4))
+    responses.all_powers(_work_at(len(body) + len(room), rate_hz), stereo(body), stereo(room), float(rate_hz), powers)
+    return powers
 
 
 def weights_of(powers: NDArray[np.float64], body_mix: float, room_mix: float) -> NDArray[np.float64]:
     """The weights (4,) of the parts of a mix: nothing, body, room, and both in series."""
-    found = np.empty(4)
-    responses.weigh(powers, float(body_mix), float(room_mix), found)
-    return found
+    weights = np.empty(4)
+    responses.weigh(powers, float(body_mix), float(room_mix), weights)
+    return weights
 
 
 def curves_of(response: Response) -> NDArray[np.float64]:
     """The effect of a body on a key's loudness (BODY_SLOTS,), from its response at CURVES_HZ."""
-    found = np.empty(constants.BODY_SLOTS)
+    curve = np.empty(constants.BODY_SLOTS)
     work = work_space(responses.curves_size(len(response)))
-    responses.curves(work, stereo(response), found)
-    return found
+    responses.curves(work, stereo(response), curve)
+    return curve

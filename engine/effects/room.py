@@ -1,12 +1,12 @@
 """A gentle room: the stereo impulse response of a box of six walls, without its direct sound.
 
 Early reflections are its image sources (J. B. Allen and D. A. Berkley, "Image method for efficiently simulating
-small-room acoustics", J. Acoust. Soc. Am. 65 (1979) 943). Their number grows with the square of time, so that they
-soon are noise of a known power, 4πc/V a second at a metre from the source; it takes over at the mixing time. Both
+small-room acoustics", J. Acoust. Soc. Am. 65 (1979) 943). Their number grows with the square of time. They soon are
+noise of a known power, 4πc/V a second at a metre from the source; it takes over at the mixing time. Both
 decay with a T60 that falls with frequency, as air and walls have it.
 
-Why a response and not a network of delays: it goes through the one convolution that the body needs anyway, is the
-same to the sample in a file, and rings on unchanged while it is exchanged. `engine.kernels.rooms` computes it.
+Why a response and not a network of delays: it goes through the one convolution that the body needs anyway. It is
+the same to the sample in a file, and rings on unchanged while it is exchanged. `engine.kernels.rooms` computes it.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ def room_response(t60_s: float, rate_hz: int) -> NDArray[np.float64]:
     """The response of the reverberation alone, (frames, 2), as loud as what it is given; not to be written."""
     from engine.effects.responses import of_room  # brings the compiler
 
-    found = of_room(room_noise(), t60_s, rate_hz)
-    found.setflags(write=False)
-    return found
+    response = of_room(room_noise(), t60_s, rate_hz)
+    response.setflags(write=False)
+    return response
 
 
 def room_noise() -> NDArray[np.float64]:

@@ -65,8 +65,8 @@ def amplify(mixer: Mixer) -> None:
     if wanted > 0.0 and (first or share == 0.0):
         amp.drive = wanted
         amp.gain, amp.tone = amp.wanted_gain, amp.wanted_tone
-    heard = _take(mixer, amp)
-    amp.quiet = 0 if heard else amp.quiet + 1
+    sounds = _take(mixer, amp)
+    amp.quiet = 0 if sounds else amp.quiet + 1
     goal = 1.0 if wanted > 0.0 else 0.0
     step = 1.0 if first else QUANTUM / (FADE_S * mixer.rate_hz)
     reached = min(share + step, goal) if goal > share else max(share - step, goal)
@@ -84,7 +84,10 @@ def _begin(amp: Amplifier) -> None:
     All is at rest, which is where the bias has it.
     """
     rest = BIAS / math.sqrt(1 + BIAS * BIAS)
-    amp.low, amp.last, amp.mean, amp.low_out = 0.0, BIAS, rest, 0.0
+    amp.low = 0.0
+    amp.last = BIAS
+    amp.mean = rest
+    amp.low_out = 0.0
     amp.input[:] = 0.0
     amp.shaped[:] = rest
     filter, total = amp.filter, 0.0
@@ -114,25 +117,32 @@ def _bessel(x: float) -> float:
 @njit(**COMPILED)
 def _take(mixer: Mixer, amp: Amplifier) -> bool:
     """The next input behind the last one, through the high-pass. Returns whether there is any."""
-    heard, low, given, mix = False, amp.low, amp.input, mixer.mix
+    sounds = False
+    low = amp.low
+    raw = amp.input
+    mix = mixer.mix
     follows = 1 - math.exp(-2 * math.pi * COUPLING_HZ / mixer.rate_hz)
     for frame in range(LAGS):
-        given[frame] = given[QUANTUM + frame]
+        raw[frame] = raw[QUANTUM + frame]
     for frame in range(QUANTUM):
         value = 0.5 * (mix[frame, 0] + mix[frame, 1])
         if not abs(value) < LARGEST or abs(value) < SMALLEST:
             value = 0.0
-        heard = heard or value != 0.0
+        sounds = sounds or value != 0.0
         low += follows * (value - low)
-        given[LAGS + frame] = value - low
+        raw[LAGS + frame] = value - low
     amp.low = low if abs(low) >= SMALLEST else 0.0
-    return heard
+    return sounds
 
 
 @njit(**COMPILED)
 def _shape(amp: Amplifier) -> None:
     """Input to shaped output, at the higher rate: rows (OVERSAMPLING,) of frames, behind the last ones."""
-    last, rows, filter, given, all_shaped = LAGS, OVERSAMPLING, amp.filter, amp.input, amp.shaped
+    last = LAGS
+    rows = OVERSAMPLING
+    filter = amp.filter
+    raw = amp.input
+    all_shaped = amp.shaped
     drive, goal = amp.drive, amp.wanted_drive
     if goal == 0.0:  # it is switched off: as it was
         goal = drive
@@ -144,7 +154,7 @@ def _shape(amp: Amplifier) -> None:
         new[:] = 0.0
         for lag in range(last):
             tap = rows * filter[rows * lag + row]
-            delayed = given[last - lag : last - lag + QUANTUM]
+            delayed = raw[last - lag : last - lag + QUANTUM]
             for frame in range(QUANTUM):
                 new[frame] += tap * delayed[frame]
         for frame in range(QUANTUM):
@@ -163,7 +173,11 @@ def _shape(amp: Amplifier) -> None:
 @njit(**COMPILED)
 def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
     """Bring the sound back to the rate of the mixer, without the mean, through gain and tone."""
-    last, rows, filter, out, mix = LAGS, OVERSAMPLING, amp.filter, amp.out, mixer.mix
+    last = LAGS
+    rows = OVERSAMPLING
+    filter = amp.filter
+    out = amp.out
+    mix = mixer.mix
     out[:] = 0.0
     for row in range(rows):
         for lag in range(last):
@@ -171,10 +185,16 @@ def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
             shaped = amp.shaped[row, last - lag : last - lag + QUANTUM]
             for frame in range(QUANTUM):
                 out[frame] += tap * shaped[frame]
-    drive, gain, tone = amp.drive, amp.gain, amp.tone
-    drive_to, gain_to, tone_to = amp.wanted_drive, amp.wanted_gain, amp.wanted_tone
+    drive = amp.drive
+    gain = amp.gain
+    tone = amp.tone
+    drive_to = amp.wanted_drive
+    gain_to = amp.wanted_gain
+    tone_to = amp.wanted_tone
     if drive_to == 0.0:
-        drive_to, gain_to, tone_to = drive, gain, tone
+        drive_to = drive
+        gain_to = gain
+        tone_to = tone
     blocks = 1 - math.exp(-2 * math.pi * BLOCKING_HZ / mixer.rate_hz)
     follows = 1 - math.exp(-2 * math.pi * PIVOT_HZ / mixer.rate_hz)
     mean, low = amp.mean, amp.low_out
@@ -190,4 +210,6 @@ def _give(mixer: Mixer, amp: Amplifier, share: float, share_to: float) -> None:
             dry = mix[frame, side]
             mix[frame, side] = value if wet == 1.0 else dry + wet * (value - dry)
     amp.mean, amp.low_out = mean, low if abs(low) >= SMALLEST else 0.0
-    amp.drive, amp.gain, amp.tone = drive_to, gain_to, tone_to
+    amp.drive = drive_to
+    amp.gain = gain_to
+    amp.tone = tone_to

@@ -128,23 +128,21 @@ def higher_orders(program: BankProgram, energy: np.ndarray, out: np.ndarray, scr
     if program.adiabatic:
         shares = behind(program, program.shares, n * n)
         largest = behind(program, program.largest, n)
-        linear, share, found = (
-            scratch[:n],
-            scratch[MOST_LATENTS : MOST_LATENTS + n],
-            scratch[2 * MOST_LATENTS : 2 * MOST_LATENTS + n],
-        )
+        linear = scratch[:n]
+        share = scratch[MOST_LATENTS : MOST_LATENTS + n]
+        change = scratch[2 * MOST_LATENTS : 2 * MOST_LATENTS + n]
         for step in range(3):
-            found[:] = 0.0
+            change[:] = 0.0
             for m in range(n):
                 if energy[m] * largest[m] < 1e-15:
                     continue
                 e = energy[m] if step == 0 else energy[m] / math.sqrt(1 + 2 * max(share[m], -0.4))
                 row = shares[m * n : (m + 1) * n]
                 for j in range(n):
-                    found[j] += e * row[j]
+                    change[j] += e * row[j]
             if step == 0:
-                linear[:] = found
-            share[:] = found
+                linear[:] = change
+            share[:] = change
         for j in range(n):
             out[n + j] += omega[j] * (math.sqrt(1 + 2 * max(share[j], -0.4)) - 1 - linear[j])
 
@@ -154,7 +152,9 @@ def strike(voice: Voice, program: BankProgram, scratch: np.ndarray) -> None:
     """Fill in what follows from z(0), which `LEVEL_0` and `ANGLE_0` hold."""
     n = program.modes
     sigma, coupling = behind(program, program.sigma, n), behind(program, program.coupling, 2 * n * n)
-    energy, levels, constant = row(voice, at.ENERGY_0), row(voice, at.LEVEL_0), rows(voice, at.CONSTANT, 2)
+    energy = row(voice, at.ENERGY_0)
+    levels = row(voice, at.LEVEL_0)
+    constant = rows(voice, at.CONSTANT, 2)
     constant[:] = 0.0
     for m in range(n):
         level = levels[m]
@@ -200,11 +200,9 @@ def _integrate_to(voice: Voice, program: BankProgram, time: float, scratch: np.n
     while voice.node + _width(voice.node) <= wanted:
         width = _width(voice.node)
         total = rows(voice, at.INTEGRAL, 2)
-        left, middle, right = (
-            rows(voice, at.AT_LEFT, 2),
-            rows(voice, at.AT_MIDDLE, 2),
-            rows(voice, at.AT_RIGHT, 2),
-        )
+        left = rows(voice, at.AT_LEFT, 2)
+        middle = rows(voice, at.AT_MIDDLE, 2)
+        right = rows(voice, at.AT_RIGHT, 2)
         for j in range(2 * n):
             total[j] += width * spacing * (left[j] + 4 * middle[j] + right[j]) / 6
             left[j] = right[j]
@@ -223,30 +221,30 @@ def _change(program: BankProgram, level: np.ndarray, alive: int, out: np.ndarray
     n = program.modes
     weight = behind(program, program.change, n * n)  # transposed
     squares, energy = scratch[:alive], scratch[MOST_LATENTS : MOST_LATENTS + alive]
-    found = out[:alive]
+    change = out[:alive]
     most = 0.0
     for m in range(alive):
         energy[m] = _exp(2 * level[m])
         squares[m] = energy[m]
         most = max(most, energy[m])
     for _ in range(3):
-        found[:] = 0.0
+        change[:] = 0.0
         for m in range(alive):
             if squares[m] > 1e-7 * most:
                 share, row = squares[m], weight[m * n : m * n + alive]
                 for j in range(alive):
-                    found[j] += share * row[j]
+                    change[j] += share * row[j]
         lowest = 0.0
         for j in range(alive):
-            lowest = min(lowest, found[j])
+            lowest = min(lowest, change[j])
         if lowest > -NO_FIXED_POINT:
             break
         for m in range(alive):  # where the change falls, the square that counts is the amplitude's, not the action's
-            squares[m] = energy[m] / math.sqrt(1 + 4 * abs(found[m])) if found[m] < 0 else energy[m]
+            squares[m] = energy[m] / math.sqrt(1 + 4 * abs(change[m])) if change[m] < 0 else energy[m]
     for j in range(alive):
-        size = abs(found[j])
+        size = abs(change[j])
         grown = math.log1p(4 * size) / 4 if size > 1e-3 else size * (1 - size * (2 - size * 16 / 3))
-        found[j] = -grown if found[j] < 0 else grown
+        change[j] = -grown if change[j] < 0 else grown
 
 
 @njit(**COMPILED)
@@ -280,14 +278,17 @@ def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scra
             continue
         share = energy / (2 * sigma[m])
         for part in range(2):
-            given = coupling[(2 * m + part) * n : (2 * m + part + 1) * n]
+            couplings = coupling[(2 * m + part) * n : (2 * m + part + 1) * n]
             slopes, sums = f[part * n : (part + 1) * n], integral[part * n : (part + 1) * n]
             for j in range(alive):
-                slopes[j] += energy * given[j]
-                sums[j] -= share * given[j]
+                slopes[j] += energy * couplings[j]
+                sums[j] -= share * couplings[j]
     limit = program.limit
     level_0, angle_0 = row(voice, at.LEVEL_0), row(voice, at.ANGLE_0)
-    level, phase, level_rate, phase_rate = out[:n], out[n : 2 * n], out[2 * n : 3 * n], out[3 * n : 4 * n]
+    level = out[:n]
+    phase = out[n : 2 * n]
+    level_rate = out[2 * n : 3 * n]
+    phase_rate = out[3 * n : 4 * n]
     for j in range(alive):
         saturated = _tanh(integral[j] / limit)
         level[j] = level_0[j] - sigma[j] * time + limit * saturated
@@ -300,7 +301,7 @@ def _move(voice: Voice, program: BankProgram, time: float, out: np.ndarray, scra
 
 @njit(**COMPILED)
 def generate(
-    voice: Voice, program: BankProgram, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
+    voice: Voice, program: BankProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """The next quantum, (4, QUANTUM): two sets of weights, the second where `fading`, at two points.
 
@@ -317,7 +318,7 @@ def generate(
         if voice.modulated != program.modulates:
             voice.modulated, voice.segment_valid = program.modulates, 0
         voice.refresh = 0
-    if heard:
+    if audible:
         out[:] = 0.0
         length = SHORT if first < program.early else LONG
         z = scratch[SCRATCH_ROWS * MOST_LATENTS :].view(np.float32)[: 2 * QUANTUM * n]
@@ -340,12 +341,16 @@ def generate(
         voice.segment_valid = 0
     voice.generated = first + QUANTUM
     # Beyond those that were audible there is no level: what is dead stays so
-    loudest, alive, was_alive = -1e9, 1, voice.audible_count
-    sigma, levels, latest = behind(program, program.sigma, n), row(voice, at.LEVEL_0), row(voice, at.LEVEL)
+    loudest = -1e9
+    alive = 1
+    was_alive = voice.audible_count
+    sigma = behind(program, program.sigma, n)
+    levels = row(voice, at.LEVEL_0)
+    latest = row(voice, at.LEVEL)
     time = (first + QUANTUM) * ratio
     for m in range(n):
         level = levels[m] - sigma[m] * time
-        if heard and program.higher and m < was_alive:
+        if audible and program.higher and m < was_alive:
             level = max(level, latest[m])
         loudest = max(loudest, level)
         if level + program.loudness > DEAD:
@@ -388,8 +393,14 @@ def _segment(
     level_rate, phase_rate = row(voice, at.LEVEL_RATE), row(voice, at.PHASE_RATE)
     next_change = row(voice, at.CHANGE + 1)
     turns = scratch[16 * MOST_LATENTS :].view(np.float32)
-    zr, zi, rr, ri = turns[:n], turns[n : 2 * n], turns[2 * n : 3 * n], turns[3 * n : 4 * n]
-    sr, si, cr, ci = turns[4 * n : 5 * n], turns[5 * n : 6 * n], turns[6 * n : 7 * n], turns[7 * n : 8 * n]
+    zr = turns[:n]
+    zi = turns[n : 2 * n]
+    rr = turns[2 * n : 3 * n]
+    ri = turns[3 * n : 4 * n]
+    sr = turns[4 * n : 5 * n]
+    si = turns[5 * n : 6 * n]
+    cr = turns[6 * n : 7 * n]
+    ci = turns[7 * n : 8 * n]
     bent = 0.0
     for m in range(alive):
         held_left = min(max(level_rate[m] * width, -limit), limit) - sigma[m] * width
@@ -418,7 +429,10 @@ def _segment(
         for frame in range(length):
             real, imaginary = z[frame * 2 * n : frame * 2 * n + n], z[frame * 2 * n + n : (frame + 1) * 2 * n]
             for m in range(alive):
-                a, b, c, d = zr[m], zi[m], rr[m], ri[m]
+                a = zr[m]
+                b = zi[m]
+                c = rr[m]
+                d = ri[m]
                 real[m], imaginary[m] = a, b
                 zr[m], zi[m] = a * c - b * d, a * d + b * c
                 e, f = sr[m], si[m]
@@ -426,7 +440,10 @@ def _segment(
     for frame in range(length if curved else 0):
         real, imaginary = z[frame * 2 * n : frame * 2 * n + n], z[frame * 2 * n + n : (frame + 1) * 2 * n]
         for m in range(alive):
-            a, b, c, d = zr[m], zi[m], rr[m], ri[m]
+            a = zr[m]
+            b = zi[m]
+            c = rr[m]
+            d = ri[m]
             real[m], imaginary[m] = a, b
             zr[m], zi[m] = a * c - b * d, a * d + b * c
             e, f = sr[m], si[m]
@@ -434,7 +451,9 @@ def _segment(
             g, h = cr[m], ci[m]
             sr[m], si[m] = e * g - f * h, e * h + f * g
     for m in range(alive):
-        level[m], level_rate[m], phase_rate[m] = end[m], end[2 * n + m], end[3 * n + m]
+        level[m] = end[m]
+        level_rate[m] = end[2 * n + m]
+        phase_rate[m] = end[3 * n + m]
         phase[m] = end[n + m]
         next_change[m] = end[4 * n + m]
 
@@ -520,7 +539,9 @@ def _modulate(
     row_list, column_list = row(voice, at.ROW_LIST).view(np.int64), row(voice, at.COLUMN_LIST).view(np.int64)
     change, next_change = row(voice, at.CHANGE), row(voice, at.CHANGE + 1)
     squares = scratch[(SCRATCH_ROWS + 2 * quantum) * MOST_LATENTS :].view(np.float32)
-    alive, columns, rows_kept = voice.audible_count, voice.columns, voice.rows
+    alive = voice.audible_count
+    columns = voice.columns
+    rows_kept = voice.rows
     while columns > 0 and column_list[columns - 1] >= alive:  # died since the lists, which ascend, were made
         columns -= 1
     while rows_kept > 0 and row_list[rows_kept - 1] >= alive:
@@ -558,9 +579,9 @@ def _modulate(
         for which in range(2 if fading else 1):
             for point in range(points):
                 w, v = weights(voice, which, point, 0)[j], weights(voice, which, point, 1)[j]
-                given = out[2 * which + point]
+                signal = out[2 * which + point]
                 for frame in range(quantum):
-                    given[frame] += w * growth[frame] + v * turn[frame]
+                    signal[frame] += w * growth[frame] + v * turn[frame]
     if program.adiabatic:
         for m in range(n):
             change[m] = next_change[m]

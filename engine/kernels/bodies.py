@@ -85,14 +85,14 @@ def respond(
 
 @njit(**COMPILED)
 def respond_as(
-    work: np.ndarray, given: np.ndarray, own_hz: float, size: float, rate_hz: float, sound: np.ndarray
+    work: np.ndarray, recorded: np.ndarray, own_hz: float, size: float, rate_hz: float, sound: np.ndarray
 ) -> None:
     """Write the response of a body that is given as one.
 
     Args:
         sound: (`given_frames`, 2).
     """
-    resample(work, given, own_hz / size, rate_hz, sound)
-    if len(sound) < resampled_frames(len(given), own_hz / size, rate_hz):
+    resample(work, recorded, own_hz / size, rate_hz, sound)
+    if len(sound) < resampled_frames(len(recorded), own_hz / size, rate_hz):
         fade(sound)
     level(work, sound, rate_hz)

@@ -77,18 +77,20 @@ def touch(player: Player, table: Table, by: Touch) -> None:
     """Begin the noise of a stroke, a release or a slide. Where no place is free, the one heard longest ends."""
     if not by.level_db > OFF_DB:
         return
-    kind, rate_hz, which = table.contacts[by.which], player.rate_hz, by.which
+    kind = table.contacts[by.which]
+    rate_hz = player.rate_hz
+    which = by.which
     strength, hardness = by.strength, by.hardness
     energy = table.noise_level * rate_hz * 10.0 ** (by.level_db / 10)
     energy *= strength ** (2 * kind.follows) * (HARDEST / (1 + (HARDEST - 1) / hardness**3)) ** 2
     noise, longest = player.noises[0], -1
     for number in range(of.MOST_NOISES):
-        each = player.noises[number]
-        if each.left == 0:
-            noise = each
+        candidate = player.noises[number]
+        if candidate.left == 0:
+            noise = candidate
             break
-        if each.done > longest:
-            noise, longest = each, each.done
+        if candidate.done > longest:
+            noise, longest = candidate, candidate.done
     shorter = min(max(strength**SHORTENS, 1 / LARGEST_CHANGE), LARGEST_CHANGE)
     brighter = min(max(strength**BRIGHTENS, 1 / LARGEST_CHANGE), LARGEST_CHANGE)
     pulse_frames = max(2.0, kind.pulse_s * shorter / hardness * rate_hz)
@@ -140,12 +142,14 @@ def sound(player_address: int, mixer_address: int) -> None:
     player = player_at(player_address)
     if player.table == 0:
         return
-    table, gain, heard = table_at(player.table), 0.0, 0
+    table = table_at(player.table)
+    gain = 0.0
+    sounding = 0
     for source in range(table.sources):
         if player.source_gains[source] != 0.0:
             gain = player.source_gains[source]
-            heard += 1
-    if heard != 1 or table.solo != 0:
+            sounding += 1
+    if sounding != 1 or table.solo != 0:
         gain = 0.0
     before = player.noise_gain
     player.noise_gain = gain
@@ -200,10 +204,17 @@ def _run(
     pulse, pulse_frames = noise.pulse, noise.pulse_frames
     burst, attack_frames = noise.burst, noise.attack_frames
     shrinks, envelope = noise.shrinks, noise.envelope
-    b0, a1, a2 = noise.b0, noise.a1, noise.a2
+    b0 = noise.b0
+    a1 = noise.a1
+    a2 = noise.a2
     past = noise.past
-    x1, x2, y1, y2 = past[0], past[1], past[2], past[3]
-    seed, done, stops = noise.seed, noise.done, noise.stops
+    x1 = past[0]
+    x2 = past[1]
+    y1 = past[2]
+    y2 = past[3]
+    seed = noise.seed
+    done = noise.done
+    stops = noise.stops
     for frame in range(begin, end):
         x = math.sqrt(3.0) * float(mixed(seed + done) >> 11) / 2.0**52
         y = b0 * (x - x2) - a1 * y1 - a2 * y2
@@ -215,7 +226,10 @@ def _run(
             force += pulse * (0.5 - 0.5 * math.cos(2 * math.pi * (done + 0.5) / pulse_frames))
         _add(mix, frame, force, before, gain, stops)
         done += 1
-    past[0], past[1], past[2], past[3] = x1, x2, y1, y2
+    past[0] = x1
+    past[1] = x2
+    past[2] = y1
+    past[3] = y2
     noise.envelope = envelope
     noise.done = done
 
@@ -234,7 +248,9 @@ def _play(
     gain = player.noise_gain
     frames, step = attack.frames, attack.rate_hz / player.rate_hz
     samples = behind(attack, HEADER, frames)
-    amplitude, done, stops = noise.pulse, noise.done, noise.stops
+    amplitude = noise.pulse
+    done = noise.done
+    stops = noise.stops
     for frame in range(begin, end):
         place = done * step
         number = int(place)

@@ -50,17 +50,17 @@ def convolve(mixer: Mixer) -> None:
         return
     fence()
     convolver, mix = convolver_at(mixer.convolver), mixer.mix[:]
-    heard = _clean(mixer, mix)
+    sounds = _clean(mixer, mix)
     if not convolver.active or convolver.phase == 0:
         _exchange(mixer, convolver)
     step, now = convolver.step, mixer.effects_now
     if step < 0 and now == 0:
         return
     if not convolver.active:
-        if step < 0 and not heard:
+        if step < 0 and not sounds:
             return
         _wake(convolver)
-    convolver.quiet = 0 if heard else convolver.quiet + 1
+    convolver.quiet = 0 if sounds else convolver.quiet + 1
     _listen(convolver, mix, step == 0 and now == 0)
     lane, tail = convolver.lane, 0
     if now != 0:
@@ -76,7 +76,7 @@ def convolve(mixer: Mixer) -> None:
 @njit(**COMPILED)
 def _clean(mixer: Mixer, mix: np.ndarray) -> bool:
     """Leave only what may ring on. Return True if there is anything."""
-    heard = False
+    sounds = False
     for frame in range(QUANTUM):
         left, right = mix[frame, 0], mix[frame, 1]
         if not (abs(left) < LARGEST and abs(right) < LARGEST):
@@ -86,9 +86,9 @@ def _clean(mixer: Mixer, mix: np.ndarray) -> bool:
             left = 0.0
         if abs(right) < SMALLEST:
             right = 0.0
-        heard = heard or left != 0.0 or right != 0.0
+        sounds = sounds or left != 0.0 or right != 0.0
         mix[frame, 0], mix[frame, 1] = left, right
-    return heard
+    return sounds
 
 
 @njit(**COMPILED)
@@ -183,7 +183,10 @@ def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> 
         for frame in range(half):
             signal[frame] = signal[half + frame]
     transform(re, im, re2, im2, convolver.cosines[:], convolver.sines[:])
-    left_re, left_im, right_re, right_im = spectra[0, 0], spectra[0, 1], spectra[1, 0], spectra[1, 1]
+    left_re = spectra[0, 0]
+    left_im = spectra[0, 1]
+    right_re = spectra[1, 0]
+    right_im = spectra[1, 1]
     for k in range(half + 1):
         mirror = n - k if k > 0 else 0
         left_re[k], left_im[k] = 0.5 * (re[k] + re[mirror]), 0.5 * (im[k] - im[mirror])
@@ -193,7 +196,10 @@ def _analyse(convolver: Convolver, signals: np.ndarray, spectra: np.ndarray) -> 
 @njit(**COMPILED)
 def _play(convolver: Convolver, impulse: Impulse, lane: int, later: bool) -> int:
     """A quantum of a lane; `later`: the next window needs it too. Returns after how many quanta it has rung out."""
-    channels, early, late, spectra = impulse.channels, impulse.early, impulse.late, reals(address_of(impulse))
+    channels = impulse.channels
+    early = impulse.early
+    late = impulse.late
+    spectra = reals(address_of(impulse))
     response, sums = shaped(spectra, BEHIND_IMPULSE, (early, channels, 2, QUANTUM + 1)), convolver.early_sums[:]
     count = min(early, convolver.early_filled)
     _multiply(convolver.early[:], convolver.early_place, response[:count], 0, QUANTUM + 1, sums)
@@ -201,9 +207,9 @@ def _play(convolver: Convolver, impulse: Impulse, lane: int, later: bool) -> int
     _synthesise(convolver, sums, wet)
     if late > 0:
         for side in range(2):
-            given = convolver.given[lane, convolver.half, side, convolver.phase * QUANTUM :]
+            convolved = convolver.given[lane, convolver.half, side, convolver.phase * QUANTUM :]
             for frame in range(QUANTUM):
-                wet[side, frame] += given[frame]
+                wet[side, frame] += convolved[frame]
         if later:
             first = BEHIND_IMPULSE + early * channels * 2 * (QUANTUM + 1)
             _compute(convolver, shaped(spectra, first, (late, channels, 2, WINDOW + 1)), lane)
@@ -255,7 +261,10 @@ def _synthesise(convolver: Convolver, spectra: np.ndarray, goal: np.ndarray) -> 
     half = goal.shape[1]
     n, bins = 2 * half, half + 1
     re, im, re2, im2 = _work(convolver, n)
-    left_re, left_im, right_re, right_im = spectra[0, 0], spectra[0, 1], spectra[1, 0], spectra[1, 1]
+    left_re = spectra[0, 0]
+    left_im = spectra[0, 1]
+    right_re = spectra[1, 0]
+    right_im = spectra[1, 1]
     for k in range(bins):
         re[k], im[k] = left_re[k] - right_im[k], left_im[k] + right_re[k]
     for k in range(1, half):
@@ -341,9 +350,15 @@ def partition(work: np.ndarray, response: np.ndarray, frames: int, impulse: Impu
         frames: of it with silence at the end.
         impulse: of `partitioned_slots`.
     """
-    channels, early, late = response.shape[1], early_partitions(frames), late_partitions(frames)
-    impulse.channels, impulse.early, impulse.late = channels, early, late
-    memory, place, first = reals(address_of(impulse)), BEHIND_IMPULSE, 0
+    channels = response.shape[1]
+    early = early_partitions(frames)
+    late = late_partitions(frames)
+    impulse.channels = channels
+    impulse.early = early
+    impulse.late = late
+    memory = reals(address_of(impulse))
+    place = BEHIND_IMPULSE
+    first = 0
     for number in range(early + late):
         length = QUANTUM if number < early else WINDOW
         for channel in range(channels):

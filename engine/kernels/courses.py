@@ -1,7 +1,7 @@
 """Strings of a course that stand on one bridge, and ring in step: energy passes between them, both ways.
 
-The bridge, of conductance G, moves with the sum of the forces of all strings on it. For the same partial of strings
-that are nearly in unison that is one damper for the sum of their speeds v, in place of one for each:
+The bridge, of conductance G, moves with the sum of the forces of all strings on it. For one partial of strings nearly
+in unison that is one damper for the sum of their speeds v, in place of one for each:
 
     dv_i/dt = … - 2 s_i Σ_j s_j v_j,        s_i² = T_i G/ℓ_i,
 
@@ -59,18 +59,20 @@ def add(mixer: Mixer, place: int, now_s: float) -> int:
 
     Others of the course have theirs from here on, and only give it at their own places.
     """
-    own, now = voice_at(mixer.voices[place]), mixer.frames
-    if own.course_done == now + 1:
-        return own.state
-    state = begin(own, mixer)
+    first_voice, now = voice_at(mixer.voices[place]), mixer.frames
+    if first_voice.course_done == now + 1:
+        return first_voice.state
+    state = begin(first_voice, mixer)
     if state != at.SOUNDING:
         return state
-    course, late, strings = own.course, own.late, 1
+    course = first_voice.course
+    late = first_voice.late
+    strings = 1
     mixer.course[0].address = mixer.voices[place]
-    for each in range(place + 1, mixer.active):
-        other = voice_at(mixer.voices[each])
+    for later_place in range(place + 1, mixer.active):
+        other = voice_at(mixer.voices[later_place])
         if strings < MOST_COURSE and _joins(course, late, other, now) and begin(other, mixer) == at.SOUNDING:
-            mixer.course[strings].address = mixer.voices[each]
+            mixer.course[strings].address = mixer.voices[later_place]
             strings += 1
     for turn in range(2):  # those first that are behind the others, as a pick-up of velocity is as it begins
         generated = 0
@@ -89,13 +91,13 @@ def add(mixer: Mixer, place: int, now_s: float) -> int:
         voice.course_done = now + 1
         fence()
         voice.state = state
-    return own.state
+    return first_voice.state
 
 
 @njit(inline="always", **COMPILED)
-def _string(mixer: Mixer, each: int) -> CourseString:
+def _string(mixer: Mixer, number: int) -> CourseString:
     """A string that is generated now, by its number."""
-    return mixer.course[mixer.generated[each]]
+    return mixer.course[mixer.generated[number]]
 
 
 @njit(**COMPILED)
@@ -106,42 +108,46 @@ def _generate(mixer: Mixer, strings: int, first: bool) -> None:
         first: whether those that sense velocity are behind the others.
     """
     scratch = mixer.scratch[:]
-    place, solved, shared = lanes.aligned(scratch), False, 0
+    place = lanes.aligned(scratch)
+    solved = False
+    shared = 0
     sums = scratch[place : place + SHARED]
     place += SHARED
-    for each in range(strings):
-        voice = voice_at(_string(mixer, each).address)
+    for number in range(strings):
+        voice = voice_at(_string(mixer, number).address)
         solved = voice.kind == at.TRUTH
-        place = _set_up(_string(mixer, each), voice, scratch, place, solved)
+        place = _set_up(_string(mixer, number), voice, scratch, place, solved)
         shared = max(shared, min(voice.bridged, voice.moving))
     _take_parts(mixer, strings, shared, sums)
     if solved:
         _ring_solved(mixer, strings, shared, sums)
     else:
         _ring(mixer, strings, shared)
-    for each in range(strings):
-        string, out = _string(mixer, each), mixer.out[mixer.generated[each]]
+    for number in range(strings):
+        string, out = _string(mixer, number), mixer.out[mixer.generated[number]]
         voice = voice_at(string.address)
-        heard = is_heard(voice)
+        audible = is_heard(voice)
         if not solved:
             _put_back(string, voice, scratch)
         voice.generated += QUANTUM
         if voice.next_weights == 1:
-            move_points(voice, heard, mixer.rate_hz, out)
+            move_points(voice, audible, mixer.rate_hz, out)
         if voice.velocity:
-            remember(voice, heard, first, out)
+            remember(voice, audible, first, out)
 
 
 @njit(**COMPILED)
 def _ring(mixer: Mixer, strings: int, shared: int) -> None:
     """A quantum of latents that share a tension."""
     scratch, blocks = mixer.scratch[:], lanes.blocks_of(shared)
-    one, other, third = _string(mixer, 0), _string(mixer, min(1, strings - 1)), _string(mixer, strings - 1)
+    one = _string(mixer, 0)
+    other = _string(mixer, min(1, strings - 1))
+    third = _string(mixer, strings - 1)
     parts, modes = (one.parts, other.parts, third.parts), (one.first, other.first, third.first)
     for frame in range(QUANTUM):
-        for each in range(strings):
-            string = _string(mixer, each)
-            _advance(string, voice_at(string.address), scratch, frame, mixer.out[mixer.generated[each]])
+        for number in range(strings):
+            string = _string(mixer, number)
+            _advance(string, voice_at(string.address), scratch, frame, mixer.out[mixer.generated[number]])
         if strings == 1:
             lanes.meet_1(scratch, blocks, modes[0], modes[1], modes[2], parts[0], parts[1], parts[2])
         elif strings == 2:
@@ -155,19 +161,21 @@ def _ring_solved(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> N
     """A quantum of strings that are solved."""
     scratch = mixer.scratch[:]
     for frame in range(QUANTUM):
-        for each in range(strings):
-            string = _string(mixer, each)
-            voice, out = voice_at(string.address), mixer.out[mixer.generated[each]]
-            program, fading, heard = truth_program_at(voice.program), voice.next_weights == 1, is_heard(voice)
-            truth.advance(voice, program, string.sub_steps, frame, fading, heard, out)
+        for number in range(strings):
+            string = _string(mixer, number)
+            voice, out = voice_at(string.address), mixer.out[mixer.generated[number]]
+            program = truth_program_at(voice.program)
+            fading = voice.next_weights == 1
+            audible = is_heard(voice)
+            truth.advance(voice, program, string.sub_steps, frame, fading, audible, out)
         sums[:shared] = 0.0
-        for each in range(strings):
-            string = _string(mixer, each)
+        for number in range(strings):
+            string = _string(mixer, number)
             speeds, parts = _speeds(voice_at(string.address), shared), scratch[string.parts :]
             for mode in range(len(speeds)):
                 sums[mode] += parts[mode] * speeds[mode]
-        for each in range(strings):
-            string = _string(mixer, each)
+        for number in range(strings):
+            string = _string(mixer, number)
             speeds, parts = _speeds(voice_at(string.address), shared), scratch[string.parts + 2 * SHARED :]
             for mode in range(len(speeds)):
                 speeds[mode] -= parts[mode] * sums[mode]
@@ -193,7 +201,9 @@ def _set_up(string: CourseString, voice: Voice, scratch: np.ndarray, place: int,
     tension.bring_up_to_date(voice, program)
     moving = voice.moving
     voice.heard = voice.felt = moving
-    x, y, rows = row(voice, 0), row(voice, 1), following(voice)
+    x = row(voice, 0)
+    y = row(voice, 1)
+    rows = following(voice)
     order = row(voice, at.ORDER).view(np.int64)[:moving]
     first, near = string.first, lanes.blocks_of(moving)
     tension.load(x, y, rows, order, scratch, first)
@@ -204,7 +214,10 @@ def _set_up(string: CourseString, voice: Voice, scratch: np.ndarray, place: int,
     ears = (2 if voice.next_weights == 1 else 1) * points if is_heard(voice) else 0
     for ear in range(ears):
         tension.load_weights(weights(voice, ear // points, ear % points, 0), order, scratch, first, ear)
-    string.near, string.moving, string.nodes, string.ears = near, moving, voice.steps, ears
+    string.near = near
+    string.moving = moving
+    string.nodes = voice.steps
+    string.ears = ears
     string.apart = 2 if points == 1 else 1
     string.stretch, string.second = lanes.add_up(scratch, first, near, 0, ears, string.heard[:])
     string.total, string.silence = 0.0, program.silence
@@ -219,24 +232,26 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
     """
     scratch, step_s = mixer.scratch[:], 1 / mixer.rate_hz
     sums[:shared] = 0.0
-    for each in range(strings):
-        voice = voice_at(_string(mixer, each).address)
+    for number in range(strings):
+        voice = voice_at(_string(mixer, number).address)
         lost = row(voice, at.BRIDGE)
         for mode in range(min(shared, voice.bridged, voice.moving)):
             sums[mode] += lost[mode]
-    for each in range(strings):
-        first = _string(mixer, each).parts
-        voice = voice_at(_string(mixer, each).address)
-        own = min(shared, voice.bridged, voice.moving)
+    for number in range(strings):
+        first = _string(mixer, number).parts
+        voice = voice_at(_string(mixer, number).address)
+        modes = min(shared, voice.bridged, voice.moving)
         parts = scratch[first : first + PARTS].reshape(lanes.PARTS, SHARED)
         parts[:] = 0.0
-        lost, sigmas, squares = row(voice, at.BRIDGE), row(voice, at.SIGMA), following(voice)[6]
+        lost = row(voice, at.BRIDGE)
+        sigmas = row(voice, at.SIGMA)
+        squares = following(voice)[6]
         if voice.kind == at.TRUTH:
-            for mode in range(own):
+            for mode in range(modes):
                 part = math.sqrt(lost[mode])
                 parts[0, mode], parts[2, mode] = part, part * (2 * step_s / (1 + step_s * sums[mode]))
         else:
-            for mode in range(own):  # v = -(ω y + σ x)
+            for mode in range(modes):  # v = -(ω y + σ x)
                 part, omega = math.sqrt(lost[mode]), math.sqrt(squares[mode])
                 parts[0, mode], parts[1, mode] = part * omega, part * sigmas[mode]
                 parts[2, mode] = part / omega * (2 * step_s / (1 + step_s * sums[mode]))
@@ -245,14 +260,16 @@ def _take_parts(mixer: Mixer, strings: int, shared: int, sums: np.ndarray) -> No
 @njit(inline="always", **COMPILED)
 def _advance(string: CourseString, voice: Voice, scratch: np.ndarray, frame: int, out: np.ndarray) -> None:
     """Advance latents that share a tension by one frame, after it is heard: as `tension.generate`."""
-    first, near, ears = string.first, string.near, string.ears
-    heard, largest = string.heard[:], voice.largest_stretch
+    first = string.first
+    near = string.near
+    ears = string.ears
+    at_points, largest = string.heard[:], voice.largest_stretch
     sums, nothing = (string.stretch, string.second), (0.0, 0.0)
     for ear in range(ears):
-        out[string.apart * ear, frame] = heard[2 * ear] - sums[0] * heard[2 * ear + 1]
+        out[string.apart * ear, frame] = at_points[2 * ear] - sums[0] * at_points[2 * ear + 1]
     for _ in range(string.nodes - 1):
-        sums = tension.node(scratch, first, near, 0, 0, sums, nothing, largest, heard)
-    sums = tension.node(scratch, first, near, 0, ears, sums, nothing, largest, heard)
+        sums = tension.node(scratch, first, near, 0, 0, sums, nothing, largest, at_points)
+    sums = tension.node(scratch, first, near, 0, ears, sums, nothing, largest, at_points)
     voice.largest_energy *= voice.decay
     if frame % 16 == 15:
         total, held = tension.hold(scratch, first, near, voice.largest_energy)
@@ -260,8 +277,10 @@ def _advance(string: CourseString, voice: Voice, scratch: np.ndarray, frame: int
         moving = tension.trim(scratch, first, before, string.silence, total)
         near = lanes.blocks_of(moving)
         if held or moving < before or total < tension.NOTHING:
-            sums = lanes.add_up(scratch, first, near, 0, ears, heard)
-        string.near, string.moving, string.total = near, moving, total
+            sums = lanes.add_up(scratch, first, near, 0, ears, at_points)
+        string.near = near
+        string.moving = moving
+        string.total = total
     string.stretch, string.second = sums
 
 

@@ -40,7 +40,9 @@ APART = 1.5  # less than two zeros of a Bessel function are apart
 Around = tuple[np.ndarray, np.ndarray, float]
 Tools = tuple[np.ndarray, np.ndarray]
 LOWEST, HIGHEST = (np.array([limits[end] for limits in bounds.DRUM.values()]) for end in (0, 1))
-AIR_KG_M3, AIR_M_S, SIDES = 1.2, 343.0, 2
+AIR_KG_M3 = 1.2
+AIR_M_S = 343.0
+SIDES = 2
 EXACT = 16.0  # radians of κ√(A/π), above which waves are nearly plane
 ANGLES = 64  # of an integral over what radiates, and a quarter of those of a rectangle's directions
 ROUNDS, EXACT_ROUNDS = 4, 2  # the mass depends on the frequency, a little
@@ -72,7 +74,10 @@ def bessels(x: float, out: np.ndarray) -> float:
         return 2 * x * x / (3 * math.pi)
     orders = min(len(out), int(x + 12 * x ** (1 / 3)) + 20)
     most = max(float(orders), x)
-    above, here, total, struve = 0.0, 1e-300, 0.0, 0.0
+    above = 0.0
+    here = 1e-300
+    total = 0.0
+    struve = 0.0
     for m in range(2 * int(most / 2 + 4 * most ** (1 / 3) + 6), 0, -1):
         if m < orders:
             out[m] = here
@@ -97,7 +102,10 @@ def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray
         bessels(x, after)
         for m in range(len(after)):
             if before[m] * after[m] < 0:
-                low, high, z, slope = x - APART, x, x - APART / 2, 0.0
+                low = x - APART
+                high = x
+                z = x - APART / 2
+                slope = 0.0
                 for _ in range(60):
                     bessels(z, scratch[: m + 2])
                     slope = m / z * scratch[m] - scratch[m + 1]
@@ -114,7 +122,10 @@ def zeros(highest: float, out: np.ndarray, before: np.ndarray, after: np.ndarray
                         break
                 for sine in range(min(m, 1) + 1):
                     if z <= highest and count < out.shape[0]:
-                        out[count, Z], out[count, M], out[count, N], out[count, SLOPE] = z, m, sine, slope
+                        out[count, Z] = z
+                        out[count, M] = m
+                        out[count, N] = sine
+                        out[count, SLOPE] = slope
                         count += 1
         before[:] = after
     return count
@@ -141,15 +152,15 @@ def bessel(m: int, x: float, tools: Tools) -> float:
     if m >= table.shape[1] - 2 * TERMS:  # beyond the turning point
         return 0.0
     half = (x - step * STEP) / 2
-    found, power = 0.0, 1.0
+    value, power = 0.0, 1.0
     for derivative in range(TERMS + 1):  # of J_m: sums of (-1)^i (derivative over i) J_(m - derivative + 2i)
         part, over = 0.0, 1.0
         for i in range(derivative + 1):
             part += over * table[step, TERMS + m - derivative + 2 * i]
             over *= -(derivative - i) / (i + 1)
-        found += power * part
+        value += power * part
         power *= half / (derivative + 1)
-    return found
+    return value
 
 
 @njit(**COMPILED)
@@ -310,7 +321,9 @@ def air_at(
 def _chebyshev(row: np.ndarray, ka: float, reach: float) -> float:
     """The value at ka of one function of `air_at`: a Chebyshev series in the square of ka."""
     share = min(ka / reach, 1.0)
-    t, one, two = 2 * share * share - 1, 0.0, 0.0
+    t = 2 * share * share - 1
+    one = 0.0
+    two = 0.0
     for term in range(len(row) - 1, 0, -1):
         one, two = 2 * t * one - two + row[term], one
     return t * one - two + row[0]
@@ -332,11 +345,11 @@ def reach(drum: np.ndarray, highest_hz: float, most: int) -> float:
     """κ times size up to which modes are looked at for the lowest below a frequency, so many at most."""
     load = drum[DENSITY] * drum[THICKNESS] * (2 * math.pi * highest_hz) ** 2
     bending = stretching(drum) * drum[THICKNESS] ** 2 / 6
-    found = size(drum) * math.sqrt(2 * load / (drum[TENSION] + math.sqrt(drum[TENSION] ** 2 + 4 * bending * load)))
-    found *= 1.2 if drum[AIR] > 0 else 1.0
-    if found * found > 4 * bounds.MOST_SURFACE_MODES:  # Weyl's law
-        found = math.sqrt(10.0 * (most + 50))
-    return found
+    highest = size(drum) * math.sqrt(2 * load / (drum[TENSION] + math.sqrt(drum[TENSION] ** 2 + 4 * bending * load)))
+    highest *= 1.2 if drum[AIR] > 0 else 1.0
+    if highest * highest > 4 * bounds.MOST_SURFACE_MODES:  # Weyl's law
+        highest = math.sqrt(10.0 * (most + 50))
+    return highest
 
 
 @njit(**COMPILED)
@@ -347,69 +360,76 @@ def modes(drum: np.ndarray, around: Around, highest_hz: float, most: int, work: 
         work: of 4 modes of the surface, and ORDERS.
     """
     surface, air, air_reach = around
-    n, size_m, mu = surface.shape[1], size(drum), drum[DENSITY] * drum[THICKNESS]
-    omega, mass, radiated, order = work[:n], work[n : 2 * n], work[2 * n : 3 * n], work[3 * n : 4 * n]
-    area, bending, tools = (
-        math.pi * size_m * size_m,
-        stretching(drum) * drum[THICKNESS] ** 2 / 6,
-        (surface[:0], work[4 * n :]),
-    )
+    n = surface.shape[1]
+    size_m = size(drum)
+    mu = drum[DENSITY] * drum[THICKNESS]
+    omega = work[:n]
+    mass = work[n : 2 * n]
+    radiated = work[2 * n : 3 * n]
+    order = work[3 * n : 4 * n]
+    area = math.pi * size_m * size_m
+    bending = stretching(drum) * drum[THICKNESS] ** 2 / 6
+    tools = (surface[:0], work[4 * n :])
     last, circle = reach(drum, highest_hz, most) * (1 + 1e-9), drum[SHAPE] == CIRCLE
     ellipticity = (drum[LENGTH] - drum[WIDTH]) / (drum[LENGTH] + drum[WIDTH])
-    low, found = -1, 0
+    low, count = -1, 0
     for mode in range(n):
         z = surface[Z, mode]
         if z > last:
             break
         squared = (z / size_m) ** 2
         stiffness = drum[TENSION] * squared + bending * squared * squared
-        own, sigma = mu, 0.0
+        modal_mass, sigma = mu, 0.0
         if circle and mode > 0 and z == surface[Z, mode - 1]:
-            own, sigma = mass[mode - 1], radiated[mode - 1]  # the other of a pair
+            modal_mass, sigma = mass[mode - 1], radiated[mode - 1]  # the other of a pair
         elif drum[AIR] > 0:
             exact = z < EXACT
             low += 1
             for turn in range(ROUNDS):
-                k = math.sqrt(stiffness / own) / AIR_M_S
+                k = math.sqrt(stiffness / modal_mass) / AIR_M_S
                 if exact and turn >= ROUNDS - EXACT_ROUNDS:
                     load = size_m * _chebyshev(air[0, low], k * size_m, air_reach)
                 else:
                     load = 1 / math.sqrt(max(squared - k * k, 0.01 * squared))
-                own = mu + SIDES * drum[AIR] * load
+                modal_mass = mu + SIDES * drum[AIR] * load
             if exact:
-                here = math.sqrt(stiffness / own)
+                here = math.sqrt(stiffness / modal_mass)
                 ka = here / AIR_M_S * size_m
                 resistance = size_m * ka * _chebyshev(air[1, low], ka, air_reach)
-                sigma = SIDES * drum[AIR] * here * resistance / (2 * own)
-        mass[mode], radiated[mode] = own, sigma
+                sigma = SIDES * drum[AIR] * here * resistance / (2 * modal_mass)
+        mass[mode], radiated[mode] = modal_mass, sigma
         volume = transform(drum, surface, mode, 0.0, 0.0, tools) if drum[SHELL] + drum[CAVITY] > 0 else 0.0
         if drum[SHELL] > 0 and volume * volume > LEAST_VOLUME:
-            still, moved, real = own, drum[AIR] * volume * volume, 0.0
+            still = modal_mass
+            moved = drum[AIR] * volume * volume
+            real = 0.0
             for _ in range(COLUMN_ROUNDS):
-                k = math.sqrt(stiffness / own) / AIR_M_S
+                k = math.sqrt(stiffness / modal_mass) / AIR_M_S
                 real, imaginary = _column(k, size_m, drum[SHELL], tools[1])
-                own = (own + max(still + moved * imaginary / k, mu / 2)) / 2
-            mass[mode] = own
-            radiated[mode] = max(sigma * 2 * still + moved * AIR_M_S * real, 0.0) / (2 * own)
+                modal_mass = (modal_mass + max(still + moved * imaginary / k, mu / 2)) / 2
+            mass[mode] = modal_mass
+            radiated[mode] = max(sigma * 2 * still + moved * AIR_M_S * real, 0.0) / (2 * modal_mass)
         side = 0.0
         if circle and surface[M, mode] > 0:  # an ellipse parts the pairs of one nodal diameter, uneven tension all
             side = (ellipticity if surface[M, mode] == 1 else 0.0) / 2 + drum[UNEVEN] / 2
         spring = AIR_KG_M3 * AIR_M_S**2 / drum[CAVITY] * volume**2 * area if drum[CAVITY] > 0 else 0.0
-        omega[mode] = math.sqrt((stiffness + spring) / own) * (1 + side * (1 if surface[N, mode] > 0 else -1))
+        omega[mode] = math.sqrt((stiffness + spring) / modal_mass) * (1 + side * (1 if surface[N, mode] > 0 else -1))
         if omega[mode] < 2 * math.pi * highest_hz:
-            place = found  # they come nearly in order
+            place = count  # they come nearly in order
             while place > 0 and omega[int(order[place - 1])] > omega[mode]:
                 order[place] = order[place - 1]
                 place -= 1
             order[place] = mode
-            found += 1
-    found = min(found, most, out.shape[1])
-    for place in range(found):
+            count += 1
+    count = min(count, most, out.shape[1])
+    for place in range(count):
         mode = int(order[place])
         for row in range(SURFACE):
             out[row, place] = surface[row, mode]
-        out[OMEGA, place], out[MASS, place], out[RADIATED, place] = omega[mode], mass[mode], radiated[mode]
-    return found
+        out[OMEGA, place] = omega[mode]
+        out[MASS, place] = mass[mode]
+        out[RADIATED, place] = radiated[mode]
+    return count
 
 
 @njit(**COMPILED)
@@ -445,7 +465,9 @@ def tune(drum: np.ndarray, ratio: float, around: Around, work: np.ndarray, out: 
         drum[LENGTH] /= math.sqrt(ratio)
         drum[WIDTH] /= math.sqrt(ratio)
         return
-    wanted, at_rest, factor = ratio * _principal(drum, around, work, out), drum[TENSION], ratio**2
+    wanted = ratio * _principal(drum, around, work, out)
+    at_rest = drum[TENSION]
+    factor = ratio**2
     for _ in range(TUNINGS):
         drum[TENSION] = at_rest * factor
         off = wanted / _principal(drum, around, work, out)
@@ -456,22 +478,22 @@ def tune(drum: np.ndarray, ratio: float, around: Around, work: np.ndarray, out: 
 
 
 @njit(**COMPILED)
-def losses(drum: np.ndarray, found: np.ndarray, out: np.ndarray) -> None:
+def losses(drum: np.ndarray, modal: np.ndarray, out: np.ndarray) -> None:
     """σ: (d₁ + d₃κ²)/2μ, and what is radiated."""
     for mode in range(len(out)):
-        lost = drum[D1] + drum[D3] * (found[Z, mode] / size(drum)) ** 2
-        out[mode] = lost / (2 * found[MASS, mode]) + found[RADIATED, mode]
+        lost = drum[D1] + drum[D3] * (modal[Z, mode] / size(drum)) ** 2
+        out[mode] = lost / (2 * modal[MASS, mode]) + modal[RADIATED, mode]
 
 
 @njit(**COMPILED)
 def struck(
-    drum: np.ndarray, found: np.ndarray, x: float, y: float, radius_m: float, tools: Tools, out: np.ndarray
+    drum: np.ndarray, modal: np.ndarray, x: float, y: float, radius_m: float, tools: Tools, out: np.ndarray
 ) -> None:
     """Speeds in m/s that a sudden blow of 1 N s gives, spread over a disc at a place."""
     for mode in range(len(out)):
-        scale = math.sqrt(drum[DENSITY] * drum[THICKNESS] / found[MASS, mode]) / mass_kg(drum)
+        scale = math.sqrt(drum[DENSITY] * drum[THICKNESS] / modal[MASS, mode]) / mass_kg(drum)
         out[mode] = (
-            shape(drum, found, mode, x, y, tools) * spread(found[Z, mode] / size(drum) * radius_m, tools) * scale
+            shape(drum, modal, mode, x, y, tools) * spread(modal[Z, mode] / size(drum) * radius_m, tools) * scale
         )
 
 
@@ -504,31 +526,35 @@ def blow(
 
 
 @njit(**COMPILED)
-def radiated(drum: np.ndarray, found: np.ndarray, x: float, y: float, tools: Tools, out: np.ndarray) -> None:
+def radiated(drum: np.ndarray, modal: np.ndarray, x: float, y: float, tools: Tools, out: np.ndarray) -> None:
     """Sound pressure in Pa of modes at amplitude 1 m, 1 m off, as from a baffle: see `DrumModes.radiated`."""
     for mode in range(len(out)):
-        omega, scale = found[OMEGA, mode], math.sqrt(drum[DENSITY] * drum[THICKNESS] / found[MASS, mode])
+        omega, scale = modal[OMEGA, mode], math.sqrt(drum[DENSITY] * drum[THICKNESS] / modal[MASS, mode])
         moved = (
-            transform(drum, found, mode, omega / AIR_M_S * x, omega / AIR_M_S * y, tools) * size(drum) ** 2 * scale
+            transform(drum, modal, mode, omega / AIR_M_S * x, omega / AIR_M_S * y, tools) * size(drum) ** 2 * scale
         )
         out[mode] = AIR_KG_M3 * omega**2 / 2 * moved
 
 
 @njit(**COMPILED)
-def write(drum: np.ndarray, found: np.ndarray, points: np.ndarray, tools: Tools, address: int, n: int) -> None:
+def write(drum: np.ndarray, modal: np.ndarray, points: np.ndarray, tools: Tools, address: int, n: int) -> None:
     """Write the drum of a key, n modes and its blow, heard at points, as the player reads it: see `records.DRUM`."""
     mu, block = drum[DENSITY] * drum[THICKNESS], drum_at(address)
-    block.modes, block.mallet_kg, block.contact_s = n, drum[MALLET_KG], drum[CONTACT]
-    block.softest_m_s, block.hardest_m_s, block.mass_kg = drum[SOFTEST], drum[HARDEST], mass_kg(drum)
+    block.modes = n
+    block.mallet_kg = drum[MALLET_KG]
+    block.contact_s = drum[CONTACT]
+    block.softest_m_s = drum[SOFTEST]
+    block.hardest_m_s = drum[HARDEST]
+    block.mass_kg = mass_kg(drum)
     rows = behind(block, HEADER, DRUM_ROWS * n)
     for mode in range(n):
-        stretch = (found[Z, mode] / size(drum)) ** 2 * mu / found[MASS, mode]
-        rows[mode] = found[OMEGA, mode] ** 2
+        stretch = (modal[Z, mode] / size(drum)) ** 2 * mu / modal[MASS, mode]
+        rows[mode] = modal[OMEGA, mode] ** 2
         rows[2 * n + mode], rows[3 * n + mode] = stretching(drum) / mu * stretch, stretch
-    losses(drum, found, rows[n : 2 * n])
-    struck(drum, found, drum[X], drum[Y], drum[RADIUS], tools, rows[4 * n : 5 * n])
+    losses(drum, modal, rows[n : 2 * n])
+    struck(drum, modal, drum[X], drum[Y], drum[RADIUS], tools, rows[4 * n : 5 * n])
     for point in range(len(points)):
-        heard = rows[(5 + point) * n : (6 + point) * n]
-        radiated(drum, found, 2 * points[point] - 1, 0.0, tools, heard)
+        radiation = rows[(5 + point) * n : (6 + point) * n]
+        radiated(drum, modal, 2 * points[point] - 1, 0.0, tools, radiation)
         for mode in range(n):
-            heard[mode] /= FULL_SCALE_PA
+            radiation[mode] /= FULL_SCALE_PA

@@ -88,7 +88,9 @@ def gain_of(player: Player, table: Table, key: int) -> float:
         speeds = sound[of.SOUND_X * n : (of.SOUND_X + 1) * n]  # behind the rows below, which have no more modes
         loud = sound[of.SOUND_Y * n : (of.SOUND_Y + 1) * n]
         _blow(drum, rows[STRUCK], _speed(drum, velocities.share(of.REFERENCE_VELOCITY, 0.0)), speeds)
-        stereo, loudest, modes = table.points == 2, 0.0, 0
+        stereo = table.points == 2
+        loudest = 0.0
+        modes = 0
         for mode in range(n):
             speeds[mode] /= math.sqrt(rows[SQUARE, mode])
             weight = abs(rows[WEIGHTS, mode])
@@ -110,9 +112,9 @@ def gain_of(player: Player, table: Table, key: int) -> float:
                 sound[of.SOUND_RIGHT * modes + place] = right
                 place += 1
         body, mix = behind(table, table.body, of.BODY_SLOTS), player.values[of.BODY_MIX] if table.body != 0 else 0.0
-        found = loudness.gain(sound, modes, table.points, body, mix)
-        found *= loudness.limit(found * loudness.peak(sound, modes, True, body, mix, 0.0))
-        player.gains[key, 0] = found * table.level
+        gain = loudness.gain(sound, modes, table.points, body, mix)
+        gain *= loudness.limit(gain * loudness.peak(sound, modes, True, body, mix, 0.0))
+        player.gains[key, 0] = gain * table.level
     return player.gains[key, 0]
 
 
@@ -148,33 +150,33 @@ def _make(
     # What follows from the modes is prepared
     used = at.FOLLOWING if table.kinds[source] == at.TENSION else at.TRUTH_ROWS
     voice = slots.blank_voice(player, table, address, source, drum.modes, used)
-    given, speeds = rows_of(drum), row(voice, 1)
+    source_rows, speeds = rows_of(drum), row(voice, 1)
     for which in range(STRUCK):
-        own = row(voice, at.OMEGA_SQUARED + which)
+        target_row = row(voice, at.OMEGA_SQUARED + which)
         for mode in range(drum.modes):
-            own[mode] = given[which, mode]
+            target_row[mode] = source_rows[which, mode]
     weigh(player, table, voice, 0, drum)
     _blow(drum, struck, speed, speeds)
     widest, loudest = 0.0, 0.0
     for mode in range(drum.modes):
-        moved, omega = speeds[mode], math.sqrt(given[SQUARE, mode])
+        moved, omega = speeds[mode], math.sqrt(source_rows[SQUARE, mode])
         widest += abs(moved) / omega
-        heard = 0.0
+        weight = 0.0
         for point in range(voice.points):
-            heard = max(heard, abs(weights(voice, 0, point, 0)[mode]))
-        loudest += heard * abs(moved) / omega
+            weight = max(weight, abs(weights(voice, 0, point, 0)[mode]))
+        loudest += weight * abs(moved) / omega
     voice.peak, voice.limit = max(widest, 1e-9), max(RUNAWAY_FACTOR * loudest, 1e-3)
 
 
 @njit(**COMPILED)
 def weigh(player: Player, table: Table, voice: Voice, which: int, drum: Drum) -> None:
     """Set one of the two sets of weights of a voice; modes too high for the rate are not heard."""
-    highest, given = TOO_HIGH * player.rate_hz, rows_of(drum)
+    highest, source_rows = TOO_HIGH * player.rate_hz, rows_of(drum)
     for point in range(table.points):
-        own, imaginary = weights(voice, which, point, 0), weights(voice, which, point, 1)
+        real, imaginary = weights(voice, which, point, 0), weights(voice, which, point, 1)
         for mode in range(drum.modes):
-            heard = given[SQUARE, mode] <= highest * highest
-            own[mode] = given[WEIGHTS + point, mode] if heard else 0.0
+            audible = source_rows[SQUARE, mode] <= highest * highest
+            real[mode] = source_rows[WEIGHTS + point, mode] if audible else 0.0
             imaginary[mode] = 0.0
 
 

@@ -2,7 +2,7 @@
 
 Stockham's self-sorting form with factors of four and one of two: C. Van Loan, "Computational Frameworks for the Fast
 Fourier Transform", SIAM 1992, section 1.7. Libraries that Numba can call (rocket-fft) make a new array with each
-call and look their plan up behind a lock, which the device's thread must not do. Other lengths are convolutions of
+call and look their plan up behind a lock. The device's thread must do neither. Other lengths are convolutions of
 a power of two with a chirp (L. Bluestein, IEEE Trans. Audio Electroacoust. 18 (1970) 451).
 """
 
@@ -17,7 +17,12 @@ from engine.kernels.compiled import COMPILED
 from engine.kernels.memory import part
 
 # Rows of a work space, (ROWS, N), N a power of two: a circle, room for transforms, two signals of complex numbers
-COSINES, SINES, SPARE, ONE, TWO, ROWS = 0, 1, 2, 4, 6, 8
+COSINES = 0
+SINES = 1
+SPARE = 2
+ONE = 4
+TWO = 6
+ROWS = 8
 RUN = 16  # numbers of a chirp that are computed one from the other
 
 
@@ -35,7 +40,9 @@ def transform(
     """
     n = len(re)
     unit = len(cosines) // n
-    left, stride, exchanged = n, 1, False
+    left = n
+    stride = 1
+    exchanged = False
     while left > 1:
         if left % 4 == 0:
             _fours(re, im, re2, im2, cosines, sines, left // 4, stride, unit * stride)
@@ -96,10 +103,10 @@ def _fours(
 @njit(**COMPILED)
 def power_of_two(least: int) -> int:
     """The smallest power of two that is not below a number."""
-    found = 1
-    while found < least:
-        found *= 2
-    return found
+    power = 1
+    while power < least:
+        power *= 2
+    return power
 
 
 @njit(**COMPILED)
@@ -134,12 +141,14 @@ def turn(work: np.ndarray, real: int, imaginary: int, size: int) -> None:
 
     With its rows exchanged it is the inverse, times the size.
     """
-    re, im, spare = row(work, real, size), row(work, imaginary, size), row(work, SPARE, size)
+    re = row(work, real, size)
+    im = row(work, imaginary, size)
+    spare = row(work, SPARE, size)
     transform(re, im, spare, row(work, SPARE + 1, size), work[COSINES], work[SINES])
 
 
 @njit(**COMPILED)
-def turn_any(work: np.ndarray, period: int, given: int, wanted: int, behind: int, size: int) -> None:
+def turn_any(work: np.ndarray, period: int, count: int, wanted: int, behind: int, size: int) -> None:
     """Transform signal ONE in place at multiples of 1/period, as its convolution with a chirp; TWO is used.
 
     Places count modulo `size`, a power of two that is not below the number of all that is given and wanted.
@@ -149,7 +158,7 @@ def turn_any(work: np.ndarray, period: int, given: int, wanted: int, behind: int
         wanted: places from 0 on that are wanted; the others are negative.
         behind: the longest way from a place that is given down to one that is wanted.
     """
-    _fill_chirp(work, period, given, size)
+    _fill_chirp(work, period, count, size)
     _turn_back(work, size)
     _fill_chirp(work, period, size - behind, size)
     re, im = row(work, ONE, size), row(work, ONE + 1, size)

@@ -26,7 +26,7 @@ between these steps as they do without. A gap that is turned while string and ed
 
 Model and truth have the same steps, so that they differ by the tension alone. Steps are as many as keep the contact's
 phase, √(K Σ φ_n²/m) h, below `PHASE`, and K is no larger than `MOST_STEPS` resolve. Against many more steps a second
-of sound of the factory's instruments is then wrong by 4e-4 … 2e-3 of its energy, in phases of high modes.
+of sound of the factory's instruments is then wrong by 4e-4 … 2e-3 of its energy: in phases of high modes.
 
 The edge is where it was on the string as it was struck: bends and knobs change the modes' frequencies alone.
 """
@@ -97,12 +97,12 @@ def force(before: float, free: float, give: float, stiffness: float, loss: float
 
 
 @njit(**COMPILED)
-def generate(voice: Voice, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray) -> None:
+def generate(voice: Voice, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release. As `tension` and `truth` have it."""
     if voice.kind == at.TRUTH:
-        _ring_solved(voice, truth_program_at(voice.program), fading, heard, out)
+        _ring_solved(voice, truth_program_at(voice.program), fading, audible, out)
     else:
-        _ring(voice, tension_program_at(voice.program), fading, heard, out, scratch)
+        _ring(voice, tension_program_at(voice.program), fading, audible, out, scratch)
     first, second = row(voice, 0), row(voice, 1)
     for mode in range(voice.modes):  # or they would become denormal
         if first[mode] * first[mode] < tension.NOTHING:
@@ -115,29 +115,38 @@ def generate(voice: Voice, fading: bool, heard: bool, out: np.ndarray, scratch: 
 @njit(**COMPILED)
 def _prepare(voice: Voice, step_s: float) -> None:
     """Prepare the change by a force of 1 N within a step, of a string whose modes are new."""
-    shapes, given, speeds = row(voice, at.JAVARI), row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
-    squares, sigmas, give = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA), 0.0
+    shapes = row(voice, at.JAVARI)
+    compliance = row(voice, at.GIVEN)
+    speeds = row(voice, at.GIVEN_SPEED)
+    squares = row(voice, at.OMEGA_SQUARED)
+    sigmas = row(voice, at.SIGMA)
+    give = 0.0
     for mode in range(voice.modes):
         sigma = sigmas[mode]
         omega, part = damped(squares[mode], sigma), shapes[mode] / voice.javari.mass_kg
         left, moved, _, _ = rotation(sigma, omega, step_s)
-        given[mode], speeds[mode] = part * (1 - left) / (omega * omega + sigma * sigma), part * moved
-        give += shapes[mode] * given[mode]
+        compliance[mode], speeds[mode] = part * (1 - left) / (omega * omega + sigma * sigma), part * moved
+        give += shapes[mode] * compliance[mode]
     voice.javari.give = give
 
 
 @njit(**COMPILED)
 def _ring(
-    voice: Voice, program: TensionProgram, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
+    voice: Voice, program: TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """A quantum of latents that share a tension."""
     tension.bring_up_to_date(voice, program)
-    n, points, moving, steps = voice.modes, voice.points, voice.moving, voice.javari.steps
+    n = voice.modes
+    points = voice.points
+    moving = voice.moving
+    steps = voice.javari.steps
     step_s, nodes = 1 / (program.rate_hz * steps), voice.steps // steps
     if voice.javari.give == 0.0:
         _prepare(voice, step_s)
     voice.heard = voice.felt = moving
-    x, y, rows = row(voice, 0), row(voice, 1), following(voice)
+    x = row(voice, 0)
+    y = row(voice, 1)
+    rows = following(voice)
     order = row(voice, at.ORDER).view(np.int64)[:moving]
     first, near = lanes.aligned(scratch), lanes.blocks_of(moving)
     tension.load(x, y, rows, order, scratch, first)
@@ -145,18 +154,23 @@ def _ring(
     ear_sums = scratch[parts + lanes.PRESSED * lanes.LANES * near :][: 2 * lanes.MOST_EARS]
     for number in range(lanes.LANES * near):
         slot = parts + number // lanes.LANES * lanes.PRESSED * lanes.LANES + number % lanes.LANES
-        for each in range(lanes.PRESSED):
-            scratch[slot + each * lanes.LANES] = 0.0
+        for pressed in range(lanes.PRESSED):
+            scratch[slot + pressed * lanes.LANES] = 0.0
         if number < moving:
-            given, speed = row(voice, at.GIVEN)[number], row(voice, at.GIVEN_SPEED)[number]
-            scratch[slot], scratch[slot + lanes.LANES] = row(voice, at.JAVARI)[number], given
-            speed += row(voice, at.SIGMA)[number] * given
+            compliance, speed = row(voice, at.GIVEN)[number], row(voice, at.GIVEN_SPEED)[number]
+            scratch[slot], scratch[slot + lanes.LANES] = row(voice, at.JAVARI)[number], compliance
+            speed += row(voice, at.SIGMA)[number] * compliance
             scratch[slot + 2 * lanes.LANES] = -speed / math.sqrt(rows[6, number])  # v = -(ω y + σ x)
-    ears = (2 if fading else 1) * points if heard else 0
+    ears = (2 if fading else 1) * points if audible else 0
     for ear in range(ears):
         tension.load_weights(weights(voice, ear // points, ear % points, 0), order, scratch, first, ear)
-    largest, apart, nothing, total = voice.largest_stretch, 2 if points == 1 else 1, (0.0, 0.0), 0.0
-    gap, give, pushed = voice.javari.gap_m, voice.javari.give, voice.javari.force
+    largest = voice.largest_stretch
+    apart = 2 if points == 1 else 1
+    nothing = (0.0, 0.0)
+    total = 0.0
+    gap = voice.javari.gap_m
+    give = voice.javari.give
+    pushed = voice.javari.force
     sums = lanes.add_up(scratch, first, near, 0, ears, ear_sums)
     moved = lanes.felt(scratch, near, first, parts)
     before = sums[0] * moved[1] - moved[0] - gap
@@ -191,21 +205,27 @@ def _ring(
 
 
 @njit(**COMPILED)
-def _ring_solved(voice: Voice, program: TruthProgram, fading: bool, heard: bool, out: np.ndarray) -> None:
+def _ring_solved(voice: Voice, program: TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
     """A quantum of a string that is solved."""
-    sub_steps, points, steps = truth.set_up(voice, program), voice.points, voice.javari.steps
+    sub_steps = truth.set_up(voice, program)
+    points = voice.points
+    steps = voice.javari.steps
     step_s = 1 / (program.rate_hz * steps)
     if voice.javari.give == 0.0:
         _prepare(voice, step_s)
-    gap, give, moving = voice.javari.gap_m, voice.javari.give, voice.moving
-    q, v, shapes = row(voice, 0), row(voice, 1), row(voice, at.JAVARI)
-    given, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
+    gap = voice.javari.gap_m
+    give = voice.javari.give
+    moving = voice.moving
+    q = row(voice, 0)
+    v = row(voice, 1)
+    shapes = row(voice, at.JAVARI)
+    compliance, speeds = row(voice, at.GIVEN), row(voice, at.GIVEN_SPEED)
     before, pushed = -gap, voice.javari.force
     for mode in range(moving):
         before -= shapes[mode] * q[mode]
     for frame in range(QUANTUM):
-        truth.hear(voice, program, frame, fading, heard, out)
-        for which in range((2 if fading else 1) if heard else 0):
+        truth.hear(voice, program, frame, fading, audible, out)
+        for which in range((2 if fading else 1) if audible else 0):
             for point in range(points):
                 out[2 * which + point, frame] -= voice.javari.heard * pushed
         pushed = 0.0
@@ -217,7 +237,7 @@ def _ring_solved(voice: Voice, program: TruthProgram, fading: bool, heard: bool,
             if before > 0.0 or free > 0.0:
                 push = force(before, free, give, voice.javari.stiffness, voice.javari.loss / step_s)
                 for mode in range(moving):
-                    q[mode] += given[mode] * push
+                    q[mode] += compliance[mode] * push
                     v[mode] += speeds[mode] * push
                 free -= give * push
                 pushed += push / steps

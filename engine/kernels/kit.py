@@ -17,7 +17,9 @@ from engine.kernels.kit_records import FOLLOWED, KIT, KIT_DRUM
 from engine.kernels.memory import matrix, part, player_at, reals, record_at, table_at, voice_at, wholes
 from engine.kernels.records import DRUM_ROWS, Event
 
-MODES_MOVED, LOSSES_MOVED, PLACES_MOVED = 1, 2, 4
+MODES_MOVED = 1
+LOSSES_MOVED = 2
+PLACES_MOVED = 4
 MOVES = (MODES_MOVED, LOSSES_MOVED, LOSSES_MOVED, PLACES_MOVED, PLACES_MOVED)  # by the values of FOLLOWED
 
 kit_at, kit_drum_at = record_at(KIT), record_at(KIT_DRUM)
@@ -91,28 +93,30 @@ def _possible(drum: np.ndarray) -> bool:
 @njit(**COMPILED)
 def _update(kit_address: int, table_address: int, key: int) -> None:
     """Write the block of a key that is stale."""
-    kit, memory, table = kit_at(kit_address), reals(kit_address), table_at(table_address)
-    own, capacity = kit.keys[key], kit.capacity
-    stale, own.stale = own.stale, 0
-    if stale == 0 or own.drum == 0:
+    kit = kit_at(kit_address)
+    memory = reals(kit_address)
+    table = table_at(table_address)
+    kit_key, capacity = kit.keys[key], kit.capacity
+    stale, kit_key.stale = kit_key.stale, 0
+    if stale == 0 or kit_key.drum == 0:
         return
-    struck, tuned = kit_drum_at(kit_address + 8 * own.drum), own.tuned
-    found = matrix(memory, kit.found + key * ROWS * capacity, ROWS, capacity)
+    struck, tuned = kit_drum_at(kit_address + 8 * kit_key.drum), kit_key.tuned
+    modal = matrix(memory, kit.found + key * ROWS * capacity, ROWS, capacity)
     work = part(memory, kit.work, 4 * kit.most + ORDERS)
     if stale & MODES_MOVED:
         for value in range(DRUM):
             tuned[value] = struck.drum[value]
-        tuned[SOFTEST], tuned[HARDEST] = own.softest_m_s, own.hardest_m_s
+        tuned[SOFTEST], tuned[HARDEST] = kit_key.softest_m_s, kit_key.hardest_m_s
         tuned[MODULUS] *= kit.values[0]
-        own.modes = 0
+        kit_key.modes = 0
         if _possible(tuned):
             air = part(memory, struck.air, 2 * struck.low * struck.terms).reshape(2, struck.low, struck.terms)
             around = matrix(memory, struck.around, SURFACE, struck.listed), air, struck.reach
-            drums.tune(tuned, own.ratio, around, work, found)
+            drums.tune(tuned, kit_key.ratio, around, work, modal)
             if _possible(tuned):
-                own.modes = drums.modes(tuned, around, kit.highest_hz, of.MOST_DRUM_MODES, work, found)
+                kit_key.modes = drums.modes(tuned, around, kit.highest_hz, of.MOST_DRUM_MODES, work, modal)
     tuned[D1], tuned[D3] = struck.drum[D1] * kit.values[1], struck.drum[D3] * kit.values[2]
     slots, block = table.drums, table.drums + KEYS + key * (drums.HEADER + DRUM_ROWS * capacity)
     points, tools = kit.values[3 : 3 + table.points], (_bessels(kit_address), work)
-    drums.write(tuned, found, points, tools, table_address + 8 * block, own.modes)
-    wholes(table_address)[slots + key] = block if own.modes > 0 and _possible(tuned) else 0
+    drums.write(tuned, modal, points, tools, table_address + 8 * block, kit_key.modes)
+    wholes(table_address)[slots + key] = block if kit_key.modes > 0 and _possible(tuned) else 0

@@ -2,7 +2,7 @@
 
 A block is one piece of memory, `BLOCK` numbers: rows (LANES,) of four modes. All of a mode's numbers thus come from
 one stream, on a boundary that vector instructions like; unused lanes are zero. Loops that a compiler makes into
-vectors by itself must first find out whether two rows overlap, and take the last few modes one by one: at ten to a
+vectors by itself must first find out whether two rows overlap; they take the last few modes one by one: at ten to a
 hundred modes that took longer than the work.
 """
 
@@ -95,9 +95,9 @@ class _Blocks:
 
     def totals(self) -> list[Any]:
         """The sums, over the lanes too, always in one order."""
-        found = []
-        for each in self._sums:
-            total, width = self.builder.load(each), LANES
+        scalars = []
+        for pointer in self._sums:
+            total, width = self.builder.load(pointer), LANES
             while width > 1:
                 width //= 2
                 halves = [
@@ -105,24 +105,24 @@ class _Blocks:
                 ]
                 low, high = (self.builder.shuffle_vector(total, total, half) for half in halves)
                 total = self.builder.fadd(low, high)
-            found.append(self.builder.extract_element(total, _LANE(0)))
-        return found
+            scalars.append(self.builder.extract_element(total, _LANE(0)))
+        return scalars
 
 
 def _sweep(turns: bool, ears: int):
     """The kick of the common tension and the turn to the next node, or only the sums at the present one.
 
     Returns a function of `near` blocks, which ears hear, and the `far` ones behind them. It gives Σ η² A x² and
-    Σ η² κ r x² at the node where they are then, and writes two sums for each ear to `heard`: that of the weights, and
+    Σ η² κ r x² at the node where they are then. It writes two sums for each ear to `heard`: that of the weights, and
     that of the weights times κ p.
     """
 
     @intrinsic
-    def sweep(typing_context, memory, first, near, far, linear, squared, heard):
+    def sweep(typing_context, memory, first, near, far, linear, squared, at_points):
         def generate(context, builder, signature, arguments):
             code = _Blocks(context, builder, signature.args[0], arguments[0], 2 + 2 * ears)
             first, near, far = arguments[1:4]
-            linear, squared = (code.spread(each) for each in arguments[4:6])
+            linear, squared = (code.spread(ear) for ear in arguments[4:6])
             ones = ir.Constant(_VECTOR, [1.0] * LANES)
             behind = builder.add(first, builder.mul(near, _WHOLE(BLOCK)))
             for begin, blocks, hearing in ((first, near, ears), (behind, far, 0)):
@@ -140,17 +140,17 @@ def _sweep(turns: bool, ears: int):
                     code.add(0, stretch, ones)
                     code.add(1, stretch, ratio)
                     lifted = builder.fmul(code.row(SEEN), x) if hearing else x
-                    for each in range(hearing):
-                        weight = code.row(EARS + each)
-                        code.add(2 + 2 * each, weight, x)
-                        code.add(3 + 2 * each, weight, lifted)
-            stretch, second, *found = code.totals()
+                    for ear in range(hearing):
+                        weight = code.row(EARS + ear)
+                        code.add(2 + 2 * ear, weight, x)
+                        code.add(3 + 2 * ear, weight, lifted)
+            stretch, second, *ear_sums = code.totals()
             data = context.make_array(signature.args[6])(context, builder, arguments[6]).data
-            for slot, total in enumerate(found):
+            for slot, total in enumerate(ear_sums):
                 builder.store(total, builder.gep(data, [_WHOLE(slot)]))
             return context.make_tuple(builder, signature.return_type, (stretch, second))
 
-        return types.UniTuple(types.float64, 2)(memory, first, near, far, linear, squared, heard), generate
+        return types.UniTuple(types.float64, 2)(memory, first, near, far, linear, squared, at_points), generate
 
     return sweep
 
@@ -161,7 +161,14 @@ _turn, _turn_1, _turn_2, _turn_4 = (_sweep(True, ears) for ears in (0, 1, 2, 4))
 
 @njit(inline="always", **COMPILED)
 def turn(
-    memory: np.ndarray, first: int, near: int, far: int, ears: int, linear: float, squared: float, heard: np.ndarray
+    memory: np.ndarray,
+    first: int,
+    near: int,
+    far: int,
+    ears: int,
+    linear: float,
+    squared: float,
+    at_points: np.ndarray,
 ) -> tuple[float, float]:
     """Kick and turn blocks; return their sums at the next node, as `_sweep` says.
 
@@ -172,24 +179,26 @@ def turn(
         linear, squared: S (1 - 2R) and S².
     """
     if ears == 0:
-        return _turn(memory, first, near, far, linear, squared, heard)
+        return _turn(memory, first, near, far, linear, squared, at_points)
     if ears == 1:
-        return _turn_1(memory, first, near, far, linear, squared, heard)
+        return _turn_1(memory, first, near, far, linear, squared, at_points)
     if ears == 2:
-        return _turn_2(memory, first, near, far, linear, squared, heard)
-    return _turn_4(memory, first, near, far, linear, squared, heard)
+        return _turn_2(memory, first, near, far, linear, squared, at_points)
+    return _turn_4(memory, first, near, far, linear, squared, at_points)
 
 
 @njit(inline="always", **COMPILED)
-def add_up(memory: np.ndarray, first: int, near: int, far: int, ears: int, heard: np.ndarray) -> tuple[float, float]:
+def add_up(
+    memory: np.ndarray, first: int, near: int, far: int, ears: int, at_points: np.ndarray
+) -> tuple[float, float]:
     """The sums of blocks as they are, as `turn`."""
     if ears == 0:
-        return _sum(memory, first, near, far, 0.0, 0.0, heard)
+        return _sum(memory, first, near, far, 0.0, 0.0, at_points)
     if ears == 1:
-        return _sum_1(memory, first, near, far, 0.0, 0.0, heard)
+        return _sum_1(memory, first, near, far, 0.0, 0.0, at_points)
     if ears == 2:
-        return _sum_2(memory, first, near, far, 0.0, 0.0, heard)
-    return _sum_4(memory, first, near, far, 0.0, 0.0, heard)
+        return _sum_2(memory, first, near, far, 0.0, 0.0, at_points)
+    return _sum_4(memory, first, near, far, 0.0, 0.0, at_points)
 
 
 @intrinsic
@@ -243,7 +252,7 @@ def press(typing_context, memory, blocks, modes, parts, force):
         with cgutils.for_range(builder, arguments[1]) as loop:
             code.begin(arguments[2], loop.index)
             part.begin(arguments[3], loop.index, PRESSED * LANES)
-            x, y = (builder.fadd(code.row(each), builder.fmul(part.row(1 + each), force)) for each in (X, Y))
+            x, y = (builder.fadd(code.row(axis), builder.fmul(part.row(1 + axis), force)) for axis in (X, Y))
             code.set_row(X, x)
             code.set_row(Y, y)
             stretch = builder.fmul(code.row(STRETCH), builder.fmul(x, x))
@@ -261,22 +270,22 @@ def _meet(strings: int):
     """The bridge that strings share takes from each what its modes have in it, block by block.
 
     Returns a function of the first slots of their modes and of their parts (PARTS, PART_BLOCKS, LANES), each by
-    itself, so that all stay in registers.
+    itself. So all stay in registers.
     """
 
     @intrinsic
     def meet(typing_context, memory, blocks, one, other, third, of_one, of_other, of_third):
         def generate(context, builder, signature, arguments):
             codes = [_Blocks(context, builder, signature.args[0], arguments[0], 0) for _ in range(2 * strings)]
-            found = list(zip(codes[:strings], arguments[2:], codes[strings:], arguments[5:], strict=False))
+            pairs = list(zip(codes[:strings], arguments[2:], codes[strings:], arguments[5:], strict=False))
             with cgutils.for_range(builder, arguments[1]) as loop:
                 moved = ir.Constant(_VECTOR, [0.0] * LANES)
-                for code, modes, part, parts in found:
+                for code, modes, part, parts in pairs:
                     code.begin(modes, loop.index)
                     part.begin(parts, loop.index, LANES)
                     moved = builder.fadd(moved, builder.fmul(part.row(0), code.row(Y)))
                     moved = builder.fadd(moved, builder.fmul(part.row(PART_BLOCKS), code.row(X)))
-                for code, _, part, _ in found:
+                for code, _, part, _ in pairs:
                     code.set_row(Y, builder.fsub(code.row(Y), builder.fmul(part.row(2 * PART_BLOCKS), moved)))
             return context.get_dummy_value()
 

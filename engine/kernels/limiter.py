@@ -1,8 +1,8 @@
 """The safety limiter: its gain falls before the peak that it is for, so smoothly that nothing clicks.
 
-The input waits for `AHEAD` frames. The gain that a frame needs is held for as long (the highest of the last
-`AHEAD` + 1 frames, or what is left of an earlier peak by an exponential release) and then averaged over as many
-frames: of the gains averaged each has held what the delayed frame needs, so that their mean is low enough for it.
+The input waits for `AHEAD` frames. The gain that a frame needs is held for as long: the highest of the last
+`AHEAD` + 1 frames, or what is left of an earlier peak by an exponential release. Then it is averaged over as many
+frames. Each of these gains has held what the delayed frame needs, so their mean is low enough for it.
 The average is two moving averages, one of the other: a triangle of weights, so that the gain has no corners. It
 changes by `STEEPEST` a frame at most. The form is well known: peak hold, release, stacked moving averages and delay,
 as in G. Luff, "Designing a straightforward limiter", Signalsmith Audio, 2022.
@@ -28,7 +28,10 @@ def limit(mixer: Mixer) -> None:
 
     Where nothing within reach exceeds the ceiling, samples stay as they are.
     """
-    mix, waiting, peaks, gains = mixer.mix[:], mixer.waiting[:], mixer.peaks[:], mixer.gains[:]
+    mix = mixer.mix[:]
+    waiting = mixer.waiting[:]
+    peaks = mixer.peaks[:]
+    gains = mixer.gains[:]
     for frame in range(QUANTUM):
         left, right = mix[frame, 0], mix[frame, 1]
         waiting[AHEAD + frame, 0], waiting[AHEAD + frame, 1] = left, right
@@ -45,8 +48,13 @@ def limit(mixer: Mixer) -> None:
 
 @njit(**COMPILED)
 def _reduce(mixer: Mixer) -> None:
-    mix, waiting, peaks, gains = mixer.mix[:], mixer.waiting[:], mixer.peaks[:], mixer.gains[:]
-    level, release, reduction = mixer.limiter, mixer.release, mixer.reduction
+    mix = mixer.mix[:]
+    waiting = mixer.waiting[:]
+    peaks = mixer.peaks[:]
+    gains = mixer.gains[:]
+    level = mixer.limiter
+    release = mixer.release
+    reduction = mixer.reduction
     for frame in range(AHEAD, AHEAD + QUANTUM):
         level *= release
         for before in range(AHEAD + 1):

@@ -1,9 +1,9 @@
 """The loudness and peak of a key, from its modes as they set out: a few microseconds, without Python.
 
 Measured as loudness meters do: mean square after the K-weighting of ITU-R BS.1770-5, here over the first part of the
-note. The quiet instrument's modes decay each by itself, so that the mean square is a sum over them, each through the
-body's power at its frequency. The peak is looked for in the sum of the modes over one period of the lowest, each
-through the body as in its steady state; a body that is struck by the release itself may peak higher.
+note. The quiet instrument's modes decay each by itself. So the mean square is a sum over them, each through the
+body's power at its frequency. The peak is looked for in the sum of the modes over one period of the lowest; each
+passes through the body as in its steady state; a body that is struck by the release itself may peak higher.
 
 A sound is its modes, in rows of `constants`: ω, σ, and amplitudes left and right, re full scale, with room for
 the peak. `swings`: modes set out from rest at speeds, as sines, otherwise from their amplitudes, as cosines.
@@ -21,7 +21,9 @@ from engine.kernels import constants as of
 from engine.kernels.compiled import COMPILED
 
 # BS.1770: the shelf and the high-pass as analogue filters of second order
-_SHELF_HZ, _SHELF_DB, _SHELF_Q = 1681.97, 4.0, 0.7072
+_SHELF_HZ = 1681.97
+_SHELF_DB = 4.0
+_SHELF_Q = 0.7072
 _PASS_HZ, _PASS_Q = 38.135, 0.5003
 _FRAMES = (8, 256)  # of the period in which the peak is looked for
 _FRAMES_A_PERIOD = 2.5  # of the highest mode
@@ -38,7 +40,9 @@ def looked_at(low: int, high: int, number: int) -> int:
 @njit(**COMPILED)
 def k_weight(hz: Any) -> Any:
     """The square of the gain of K-weighting at a frequency, or at each of an array."""
-    gain, middle, squared = 10 ** (_SHELF_DB / 20), 10 ** (_SHELF_DB / 40), hz * hz
+    gain = 10 ** (_SHELF_DB / 20)
+    middle = 10 ** (_SHELF_DB / 40)
+    squared = hz * hz
     shelf, high_pass = _SHELF_HZ**2, _PASS_HZ**2
     above = (shelf - gain * squared) ** 2 + (middle / _SHELF_Q) ** 2 * shelf * squared
     below = (shelf - squared) ** 2 + shelf * squared / _SHELF_Q**2
@@ -115,8 +119,10 @@ def peak(sound: np.ndarray, modes: int, swings: bool, body: np.ndarray, mix: flo
             real = 1 - mix + mix * _at(body, of.BODY_REAL, place)
             imaginary = mix * _at(body, of.BODY_IMAGINARY, place)
             size = math.sqrt(_power(body, mix, place)) / noise
-            own = math.sqrt(real * real + imaginary * imaginary)
-            real, imaginary = (real / own * size, imaginary / own * size) if own > _TINY else (size, 0.0)
+            magnitude = math.sqrt(real * real + imaginary * imaginary)
+            real, imaginary = (
+                (real / magnitude * size, imaginary / magnitude * size) if magnitude > _TINY else (size, 0.0)
+            )
         left, right = sound[of.SOUND_LEFT * modes + mode], sound[of.SOUND_RIGHT * modes + mode]
         bound += max(abs(left), abs(right)) * math.sqrt(real * real + imaginary * imaginary)
         sum_left += left
@@ -146,7 +152,7 @@ def _highest(sound: np.ndarray, modes: int, frames: int) -> float:
     left, right = sound[of.SOUND_LEFT * modes :][:modes], sound[of.SOUND_RIGHT * modes :][:modes]
     x, y = sound[of.SOUND_X * modes :][:modes], sound[of.SOUND_Y * modes :][:modes]
     cosine, sine = sound[of.SOUND_COSINE * modes :][:modes], sound[of.SOUND_SINE * modes :][:modes]
-    found = 0.0
+    highest = 0.0
     for _ in range(frames):
         sum_left, sum_right = 0.0, 0.0
         for mode in range(modes):
@@ -155,8 +161,8 @@ def _highest(sound: np.ndarray, modes: int, frames: int) -> float:
             sum_right += right[mode] * before
             x[mode] = cosine[mode] * before - sine[mode] * y[mode]
             y[mode] = sine[mode] * before + cosine[mode] * y[mode]
-        found = max(found, abs(sum_left), abs(sum_right))
-    return found
+        highest = max(highest, abs(sum_left), abs(sum_right))
+    return highest
 
 
 @njit(**COMPILED)

@@ -40,12 +40,12 @@ def fence(typing_context: Any):
 
 def _array(context, builder, kind, data, shape):
     """Numbers of eight bytes at a pointer, which belong to somebody else: nobody counts references to them."""
-    found, size = context.make_array(kind)(context, builder), context.get_constant(types.intp, 8)
+    array, size = context.make_array(kind)(context, builder), context.get_constant(types.intp, 8)
     strides = [size]
     for length in reversed(shape[1:]):
         strides.insert(0, builder.mul(length, strides[0]))
-    populate_array(found, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)
-    return found._getvalue()
+    populate_array(array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)
+    return array._getvalue()
 
 
 def _at(number: Any):
@@ -131,7 +131,7 @@ def copy(typing_context: Any, into: Any, record: Any):
     """Write a record over another of its kind."""
 
     def generate(context, builder, signature, arguments):
-        to, source = (builder.bitcast(each, ir.IntType(8).as_pointer()) for each in arguments)
+        to, source = (builder.bitcast(pointer, ir.IntType(8).as_pointer()) for pointer in arguments)
         cgutils.memcpy(builder, to, source, context.get_constant(types.intp, into.size))
         return context.get_dummy_value()
 

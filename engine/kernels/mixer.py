@@ -25,14 +25,18 @@ from engine.kernels.playing.events import play
 from engine.kernels.sympathy import sympathise
 from engine.kernels.voice import add, note_gap, take_over
 
-TONE_HZ, TONE_LEVEL, TONE_FADE_S = 440.0, 0.1, 0.020
+TONE_HZ = 440.0
+TONE_LEVEL = 0.1
+TONE_FADE_S = 0.020
 UNDERFLOW = 4  # PortAudio's flag
 
 
 @njit(**COMPILED)
 def render(mixer: Mixer, frames: int, out: np.ndarray, now_s: float) -> None:
     """The next frames, float32 (frames * channels,)."""
-    channels, mix, done = mixer.channels, mixer.mix[:], 0
+    channels = mixer.channels
+    mix = mixer.mix[:]
+    done = 0
     while done < frames:
         if mixer.left == 0:
             _quantum(mixer, now_s)
@@ -55,7 +59,9 @@ def render(mixer: Mixer, frames: int, out: np.ndarray, now_s: float) -> None:
 
 @njit(inline="always", **COMPILED)
 def _quantum(mixer: Mixer, now_s: float) -> None:
-    here, player, before = address_of(mixer), mixer.player, mixer.player_before
+    here = address_of(mixer)
+    player = mixer.player
+    before = mixer.player_before
     mixer.mix[:] = 0.0
     _take_up(mixer)
     fence()
@@ -121,7 +127,10 @@ def _take_up(mixer: Mixer) -> None:
 @njit(**COMPILED)
 def _finish(mixer: Mixer) -> None:
     """Volume, test tone, limiter and meter."""
-    mix, volume, wanted, smoothing = mixer.mix[:], mixer.volume, mixer.wanted_volume, mixer.smoothing
+    mix = mixer.mix[:]
+    volume = mixer.volume
+    wanted = mixer.wanted_volume
+    smoothing = mixer.smoothing
     for frame in range(QUANTUM):
         if volume != wanted:
             volume = wanted + (volume - wanted) * smoothing
@@ -160,7 +169,9 @@ def call(_input, output, frames, times, flags, user):  # type: ignore[no-untyped
     """PaStreamCallback; `user` is the mixer."""
     mixer = mixer_at(user)
     clock = carray(times, (3,), np.float64)
-    now_s, dac_s, count = clock[1], clock[2], np.int64(frames)
+    now_s = clock[1]
+    dac_s = clock[2]
+    count = np.int64(frames)
     sounding = mixer.active > 0
     length_s = count / mixer.rate_hz
     missed_s = dac_s - mixer.dac_s - length_s

@@ -74,9 +74,9 @@ def glide(voice: Voice) -> None:
         voice.glide = max(1, wish_at(wanted).quanta)
         voice.current_modes = wanted
     present, left = rows(voice, at.OMEGA_SQUARED, at.RESONATOR_ROWS), voice.glide
-    wished = wished_rows(voice.current_modes, voice.modes)
+    target_rows = wished_rows(voice.current_modes, voice.modes)
     for place in range(len(present)):
-        present[place] += (wished[place] - present[place]) / left
+        present[place] += (target_rows[place] - present[place]) / left
     voice.glide = left - 1
 
 
@@ -92,7 +92,9 @@ def run_up(voice: Voice, seconds: float) -> None:
 
     Each mode moves alone, at rest's tension.
     """
-    q, v, squares = row(voice, 0), row(voice, 1), row(voice, at.OMEGA_SQUARED)
+    q = row(voice, 0)
+    v = row(voice, 1)
+    squares = row(voice, at.OMEGA_SQUARED)
     sigmas, lost = row(voice, at.SIGMA), row(voice, at.BRIDGE)
     for m in range(voice.modes):
         sigma = sigmas[m] + lost[m]
@@ -129,7 +131,10 @@ def turn(
     stretches: np.ndarray,
 ) -> float:
     """A kick of the tension, then the exact turn of each mode by `flow`, (4, modes), see `rotation`; the stretch."""
-    qq, qv, vq, vv = flow[0], flow[1], flow[2], flow[3]
+    qq = flow[0]
+    qv = flow[1]
+    vq = flow[2]
+    vv = flow[3]
     stretch = 0.0
     for m in range(moving):
         amplitude = q[m]
@@ -144,7 +149,10 @@ def turn(
 @njit(**COMPILED)
 def rest_above(voice: Voice, rate: float) -> int:
     """Lay modes to rest that lie too high for the rate; the highest of the others."""
-    squares, sigmas, first, second = row(voice, at.OMEGA_SQUARED), row(voice, at.SIGMA), row(voice, 0), row(voice, 1)
+    squares = row(voice, at.OMEGA_SQUARED)
+    sigmas = row(voice, at.SIGMA)
+    first = row(voice, 0)
+    second = row(voice, 1)
     last = voice.modes - 1
     while last > 0 and damped(squares[last], sigmas[last]) > TOO_HIGH * rate:
         last -= 1

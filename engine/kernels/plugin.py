@@ -47,8 +47,13 @@ def play(player_at: int, mixer_at: int) -> None:
     events.play(player_at, mixer_at)
 
 
-kit_begin, kit_follow, kit_prepare = kit.begin, kit.follow, kit.prepare
-measure, prepare, weigh, mix = prepared.measure, prepared.prepare, prepared.weigh, prepared.mix
+kit_begin = kit.begin
+kit_follow = kit.follow
+kit_prepare = kit.prepare
+measure = prepared.measure
+prepare = prepared.prepare
+weigh = prepared.weigh
+mix = prepared.mix
 
 
 @njit(**COMPILED)

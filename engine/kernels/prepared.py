@@ -55,14 +55,14 @@ def longest(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
 @njit(**COMPILED)
 def width(body: Body, rate_hz: float, size: float, t60_s: float) -> int:
     """The width of a work space for responses of a body and a room."""
-    found = max(2 * WINDOW, int(rate_hz), longest(body, rate_hz, size, t60_s))
-    found = max(found, work_size(rooms.room_frames(t60_s), of.ROOM_HZ, rate_hz))
+    slots = max(2 * WINDOW, int(rate_hz), longest(body, rate_hz, size, t60_s))
+    slots = max(slots, work_size(rooms.room_frames(t60_s), of.ROOM_HZ, rate_hz))
     for hz in (rate_hz, CURVES_HZ):
         frames = body_frames(body, size, hz)
-        found = max(found, curves_size(frames), 2 * frames)
+        slots = max(slots, curves_size(frames), 2 * frames)
         if body.frames > 0:
-            found = max(found, work_size(body.frames, body.hz / size, hz))
-    return power_of_two(found)
+            slots = max(slots, work_size(body.frames, body.hz / size, hz))
+    return power_of_two(slots)
 
 
 @njit(**COMPILED)
@@ -95,55 +95,57 @@ def prepare(
         noise_address: 32-bit whole numbers (frames, 2), of NOISE_UNIT.
         found_address: all 0.
     """
-    body, found, memory = body_at(body_address), responses_at(found_address), reals(memory_address)
+    body = body_at(body_address)
+    prepared = responses_at(found_address)
+    memory = reals(memory_address)
     wide = width(body, rate_hz, size, t60_s)
     work = matrix(memory, 0, ROWS, wide)
     fill_circle(work[COSINES], work[SINES])
-    own, frames = body_frames(body, size, rate_hz), longest(body, rate_hz, size, t60_s)
+    body_part, frames = body_frames(body, size, rate_hz), longest(body, rate_hz, size, t60_s)
     first, room_frames = ROWS * wide, rooms.room_frames(t60_s)
-    one = matrix(memory, first, own, 2)
-    other = matrix(memory, first + 2 * own, frames - max(own - 1, 0), 2)
+    one = matrix(memory, first, body_part, 2)
+    other = matrix(memory, first + 2 * body_part, frames - max(body_part - 1, 0), 2)
     both = matrix(memory, first + 2 * (frames + 1), frames, 2)
     scratch = part(memory, first + 2 * (2 * frames + 1), 1 << 40)
-    if own > 0:
+    if body_part > 0:
         _respond(work, body, size, rate_hz, scratch, one)
     noise, made = carray(pointer(noise_address), (room_frames, 2), np.int32), matrix(scratch, 0, room_frames, 2)
     for frame in range(room_frames):
         made[frame, 0], made[frame, 1] = NOISE_UNIT * noise[frame, 0], NOISE_UNIT * noise[frame, 1]
     rooms.respond(work, t60_s, made, rate_hz, other)
-    if own > 0:
+    if body_part > 0:
         responses.series(work, one, other, both)
-    responses.all_powers(work, one, other, rate_hz, found.powers)
-    found.part = partitioned_slots(frames, 2)
+    responses.all_powers(work, one, other, rate_hz, prepared.powers)
+    prepared.part = partitioned_slots(frames, 2)
     for number in range(3):
         response = one if number == 0 else other if number == 1 else both
-        if number == 1 or own > 0:
-            place = address_of(found) + 8 * (RESPONSES_SLOTS + number * found.part)
+        if number == 1 or body_part > 0:
+            place = address_of(prepared) + 8 * (RESPONSES_SLOTS + number * prepared.part)
             partition(work, response, frames, impulse_at(place))
-    heard = body_frames(body, size, CURVES_HZ)
-    if heard > 0:
-        response = matrix(scratch, 2 * body.frames, heard, 2)
+    curve_frames = body_frames(body, size, CURVES_HZ)
+    if curve_frames > 0:
+        response = matrix(scratch, 2 * body.frames, curve_frames, 2)
         _respond(work, body, size, CURVES_HZ, scratch, response)
-        responses.curves(work, response, found.curves)
+        responses.curves(work, response, prepared.curves)
 
 
 @njit(**COMPILED)
 def _respond(
-    work: np.ndarray, body: Body, size: float, rate_hz: float, scratch: np.ndarray, found: np.ndarray
+    work: np.ndarray, body: Body, size: float, rate_hz: float, scratch: np.ndarray, response: np.ndarray
 ) -> None:
     """Write the response of a body; `scratch` has room for the samples of one that is given."""
     if body.frames == 0:
         modes = matrix(reals(address_of(body)), BODY_SLOTS, 4, body.modes)
-        bodies.respond(work, modes, body.subsonic_hz, size, rate_hz, found)
+        bodies.respond(work, modes, body.subsonic_hz, size, rate_hz, response)
         return
     samples = carray(pointer(address_of(body) + 8 * BODY_SLOTS), (body.frames, body.channels), np.int32)
-    given = matrix(scratch, 0, body.frames, 2)
+    recorded = matrix(scratch, 0, body.frames, 2)
     for frame in range(body.frames):
-        given[frame, 0], given[frame, 1] = (
+        recorded[frame, 0], recorded[frame, 1] = (
             body.unit * samples[frame, 0],
             body.unit * samples[frame, body.channels - 1],
         )
-    bodies.respond_as(work, given, body.hz, size, rate_hz, found)
+    bodies.respond_as(work, recorded, body.hz, size, rate_hz, response)
 
 
 @njit(**COMPILED)
@@ -155,12 +157,17 @@ def weigh(found_address: int, body_mix: float, room_mix: float, weights_address:
 @njit(**COMPILED)
 def mix(found_address: int, weights_address: int, into_address: int, first: int, count: int) -> None:
     """Write some slots of a mix of responses as the convolver reads it."""
-    found, weights, into = responses_at(found_address), reals(weights_address), reals(into_address)
-    end = min(first + count, found.part)
+    prepared = responses_at(found_address)
+    weights = reals(weights_address)
+    into = reals(into_address)
+    end = min(first + count, prepared.part)
     for place in range(first, end):
         into[place] = 0.0
     for number in range(3):
-        weight, response = weights[1 + number], behind(found, RESPONSES_SLOTS + number * found.part, found.part)
+        weight, response = (
+            weights[1 + number],
+            behind(prepared, RESPONSES_SLOTS + number * prepared.part, prepared.part),
+        )
         if weight != 0.0:
             for place in range(first, end):
                 into[place] += weight * response[place]
@@ -169,6 +176,9 @@ def mix(found_address: int, weights_address: int, into_address: int, first: int,
         for place in range(max(begin, first), min(begin + QUANTUM + 1, end)):
             into[place] += weights[0] / (2 * QUANTUM)
     if first == 0:
-        counts, room = into.view(np.int64), behind(found, RESPONSES_SLOTS + found.part, found.part).view(np.int64)
+        counts, room = (
+            into.view(np.int64),
+            behind(prepared, RESPONSES_SLOTS + prepared.part, prepared.part).view(np.int64),
+        )
         for place in range(BEHIND_IMPULSE):
             counts[place] = room[place]

@@ -32,7 +32,7 @@ def spectrum(turns: Number) -> Number:
     """The Fourier transform of a raised cosine of area 1, at so many turns in its width, about its middle.
 
     It is sinc(t) / (1 - t²), and 1/2 at t = 1. Fingers, hammers and mallets push so: along the string, and in time. A
-    force that falls so in a time leaves this share of a mode that turns so often meanwhile, as if it had been
+    force that falls so in a time leaves this share of a mode that turns so often meanwhile: as if it had been
     released at once in the middle of that time: a slow release is mellow. (Released by a finger in milliseconds:
     D. Chadefaux et al., "Experimentally based description of harp plucking", JASA 131, 2012.) A blow gives the mode
     this share of the speed of a sudden one.

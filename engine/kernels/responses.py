@@ -52,7 +52,9 @@ def store(work: np.ndarray, signal: int, sound: np.ndarray, size: int) -> None:
 @njit(**COMPILED)
 def _channels(work: np.ndarray, signal: int, k: int, size: int) -> tuple[complex, complex]:
     """The spectra of left and right at a frequency, from that of both as one signal."""
-    re, im, mirror = row(work, signal, size), row(work, signal + 1, size), (size - k) % size
+    re = row(work, signal, size)
+    im = row(work, signal + 1, size)
+    mirror = (size - k) % size
     left = complex(0.5 * (re[k] + re[mirror]), 0.5 * (im[k] - im[mirror]))
     right = complex(0.5 * (im[k] + im[mirror]), 0.5 * (re[mirror] - re[k]))
     return left, right
@@ -100,21 +102,24 @@ def fraction(ratio: float) -> tuple[int, int]:
     """
     denominator = 1 << 54
     over, under = int(ratio * denominator), denominator
-    before, before_under, found, found_under = 0, 1, 1, 0
+    before = 0
+    before_under = 1
+    last = 1
+    last_under = 0
     while under > 0:
         whole = over // under
-        next_under = before_under + whole * found_under
+        next_under = before_under + whole * last_under
         if next_under > FINEST_RATIO:
             break
-        before, found = found, before + whole * found
-        before_under, found_under = found_under, next_under
+        before, last = last, before + whole * last
+        before_under, last_under = last_under, next_under
         over, under = under, over - whole * under
     if under == 0:
-        return found, found_under
-    more = (FINEST_RATIO - before_under) // found_under
-    if 2.0 * under * (before_under + more * found_under) <= float(denominator):
-        return found, found_under
-    return before + more * found, before_under + more * found_under
+        return last, last_under
+    more = (FINEST_RATIO - before_under) // last_under
+    if 2.0 * under * (before_under + more * last_under) <= float(denominator):
+        return last, last_under
+    return before + more * last, before_under + more * last_under
 
 
 @njit(**COMPILED)
@@ -134,41 +139,41 @@ def _periods(frames: int, from_hz: float, to_hz: float) -> tuple[int, int]:
 @njit(**COMPILED)
 def work_size(frames: int, from_hz: float, to_hz: float) -> int:
     """The width of a work space for a response, and for bringing it to another rate."""
-    found = resampled_frames(frames, from_hz, to_hz)
-    size = power_of_two(max(2 * frames, 2 * found, 4))
-    return size if from_hz == to_hz else max(size, _resampling_size(frames, found, from_hz, to_hz))
+    resampled = resampled_frames(frames, from_hz, to_hz)
+    size = power_of_two(max(2 * frames, 2 * resampled, 4))
+    return size if from_hz == to_hz else max(size, _resampling_size(frames, resampled, from_hz, to_hz))
 
 
 @njit(**COMPILED)
-def _resampling_size(frames: int, found: int, from_hz: float, to_hz: float) -> int:
+def _resampling_size(frames: int, resampled: int, from_hz: float, to_hz: float) -> int:
     """The size of transforms between a response and its frequencies at either rate."""
     padded, made = _periods(frames, from_hz, to_hz)
-    return power_of_two(max(frames, found) + min(padded, made))
+    return power_of_two(max(frames, resampled) + min(padded, made))
 
 
 @njit(**COMPILED)
-def resample(work: np.ndarray, sound: np.ndarray, from_hz: float, to_hz: float, found: np.ndarray) -> None:
+def resample(work: np.ndarray, sound: np.ndarray, from_hz: float, to_hz: float, resampled: np.ndarray) -> None:
     """Write a response at another rate, by its Fourier series with as much silence: any ratio, in bounded time.
 
     Args:
         found: its first frames, as many as there is room for.
     """
     if from_hz == to_hz:
-        for frame in range(len(found)):
-            found[frame, 0], found[frame, 1] = sound[frame, 0], sound[frame, 1]
+        for frame in range(len(resampled)):
+            resampled[frame, 0], resampled[frame, 1] = sound[frame, 0], sound[frame, 1]
         return
     padded, made = _periods(len(sound), from_hz, to_hz)
     kept = min(padded, made) // 2  # and not the last, whose phase is lost
-    size = _resampling_size(len(sound), len(found), from_hz, to_hz)
+    size = _resampling_size(len(sound), len(resampled), from_hz, to_hz)
     load(work, ONE, sound, size)
     turn_any(work, padded, len(sound), kept, len(sound) + kept - 2, size)
     re, im = row(work, ONE, size), row(work, ONE + 1, size)
     silence(work, ONE, kept, size - kept + 1)
     for k in range(size):
         im[k] = -im[k]  # back: the conjugate of the transform of the conjugate
-    turn_any(work, made, kept, len(found), kept - 1, size)
-    for frame in range(len(found)):
-        found[frame, 0], found[frame, 1] = re[frame] / padded, -im[frame] / padded
+    turn_any(work, made, kept, len(resampled), kept - 1, size)
+    for frame in range(len(resampled)):
+        resampled[frame, 0], resampled[frame, 1] = re[frame] / padded, -im[frame] / padded
 
 
 @njit(**COMPILED)
@@ -196,7 +201,7 @@ def level(work: np.ndarray, sound: np.ndarray, rate_hz: float) -> None:
 
 
 @njit(**COMPILED)
-def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float, found: np.ndarray) -> None:
+def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float, shares: np.ndarray) -> None:
     """The power of noise through each part of a mix, and what each two have in common, (4, 4).
 
     The parts are: nothing, the body, the room, both in series. A body or room without frames is not there.
@@ -207,7 +212,7 @@ def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float,
     total = 0.0
     for i in range(4):
         for j in range(4):
-            found[i, j] = 0.0
+            shares[i, j] = 0.0
     for k in range(first, last + 1):
         one, two = _channels(work, ONE, k, size), _channels(work, TWO, k, size)
         total += 2 / k
@@ -216,10 +221,10 @@ def powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float,
             parts = (dry, one[side], two[side], one[side] * two[side])
             for i in range(4):
                 for j in range(4):
-                    found[i, j] += (parts[i].real * parts[j].real + parts[i].imag * parts[j].imag) / k
+                    shares[i, j] += (parts[i].real * parts[j].real + parts[i].imag * parts[j].imag) / k
     for i in range(4):
         for j in range(4):
-            found[i, j] /= total
+            shares[i, j] /= total
 
 
 @njit(**COMPILED)
@@ -230,7 +235,9 @@ def series(work: np.ndarray, body: np.ndarray, room: np.ndarray, both: np.ndarra
     analyse(work, TWO, room, size)
     re, im = row(work, ONE, size), row(work, ONE + 1, size)
     for k in range(size // 2 + 1):
-        one, two, mirror = _channels(work, ONE, k, size), _channels(work, TWO, k, size), (size - k) % size
+        one = _channels(work, ONE, k, size)
+        two = _channels(work, TWO, k, size)
+        mirror = (size - k) % size
         left, right = one[0] * two[0], one[1] * two[1]
         re[k], im[k] = left.real - right.imag, left.imag + right.real
         re[mirror], im[mirror] = left.real + right.imag, right.real - left.imag
@@ -238,11 +245,11 @@ def series(work: np.ndarray, body: np.ndarray, room: np.ndarray, both: np.ndarra
 
 
 @njit(**COMPILED)
-def all_powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float, found: np.ndarray) -> None:
+def all_powers(work: np.ndarray, body: np.ndarray, room: np.ndarray, rate_hz: float, shares: np.ndarray) -> None:
     """Write `powers` of the cases that the body is heard, the room, and both, at their places of (4, 4, 4)."""
-    powers(work, body, room[:0], rate_hz, found[_BODY])
-    powers(work, body[:0], room, rate_hz, found[_ROOM])
-    powers(work, body, room, rate_hz, found[_BOTH])
+    powers(work, body, room[:0], rate_hz, shares[_BODY])
+    powers(work, body[:0], room, rate_hz, shares[_ROOM])
+    powers(work, body, room, rate_hz, shares[_BOTH])
 
 
 @njit(**COMPILED)
@@ -272,7 +279,7 @@ def curves_size(frames: int) -> int:
 
 
 @njit(**COMPILED)
-def curves(work: np.ndarray, body: np.ndarray, found: np.ndarray) -> None:
+def curves(work: np.ndarray, body: np.ndarray, curve: np.ndarray) -> None:
     """Write the effect of a body on the loudness of keys (BODY_SLOTS,), see `constants`.
 
     Each value is the mean of the spectrum half-way to its neighbours.
@@ -280,15 +287,15 @@ def curves(work: np.ndarray, body: np.ndarray, found: np.ndarray) -> None:
     Args:
         body: its response at CURVES_HZ.
     """
-    common = matrix(found, 0, 4, 4)
+    common = matrix(curve, 0, 4, 4)
     powers(work, body, body[:0], float(of.CURVES_HZ), common)
-    found[of.BODY_CROSS] = common[_DRY, _BODY]
+    curve[of.BODY_CROSS] = common[_DRY, _BODY]
     left = right = highest = 0.0
     for frame in range(len(body)):
         left += body[frame, 0]
         right += body[frame, 1]
         highest = max(highest, abs(left), abs(right))
-    found[of.BODY_STEP] = highest
+    curve[of.BODY_STEP] = highest
     size = curves_size(len(body))
     analyse(work, ONE, body, size)
     count, step_hz = size // 2 + 1, of.CURVES_HZ / size
@@ -309,7 +316,7 @@ def curves(work: np.ndarray, body: np.ndarray, found: np.ndarray) -> None:
             low_hz = of.BODY_LOWEST_HZ * 2 ** ((point - 0.5) / of.BODY_STEPS)
             high_hz = of.BODY_LOWEST_HZ * 2 ** ((point + 0.5) / of.BODY_STEPS)
             mean = (_between(area, high_hz / step_hz) - _between(area, low_hz / step_hz)) / (high_hz - low_hz)
-            found[of.BODY_HEADER + which * of.BODY_POINTS + point] = mean
+            curve[of.BODY_HEADER + which * of.BODY_POINTS + point] = mean
 
 
 @njit(**COMPILED)

@@ -15,7 +15,9 @@ def rotation(sigma: Number, omega: Number, time_s: Number) -> tuple[Number, Numb
     Args:
         omega: at which the mode swings, √(ω₀² - σ²).
     """
-    decay, cosine, sine = np.exp(-sigma * time_s), np.cos(omega * time_s), np.sin(omega * time_s) / omega
+    decay = np.exp(-sigma * time_s)
+    cosine = np.cos(omega * time_s)
+    sine = np.sin(omega * time_s) / omega
     stiffness = sigma * sigma + omega * omega
     return (
         decay * (cosine + sigma * sine),

@@ -27,7 +27,9 @@ Mode = TypeVar("Mode", float, "np.ndarray")
 
 _BOUNDS = tuple(bounds.STRING.values())
 ROUNDS = 4  # σ₁ depends on the length, a little
-MUTED_M, MUTED_SHARE, MUTED_SIGMA = 0.05, 0.25, 300.0  # of a palm mute: m, of the string at most, 1/s
+MUTED_M = 0.05
+MUTED_SHARE = 0.25
+MUTED_SIGMA = 300.0  # of a palm mute: m, of the string at most, 1/s
 TOUCH_RESISTANCE = 1.0  # of a finger that touches a string, over the string's own √(TρA): an estimate
 
 

@@ -6,7 +6,7 @@ a string at rest, whose own force on the bridge is, near its resonance,
     H(s) = -2 σ_b s / (s² + 2σ s + ω²),      σ_b = T G/ℓ ≤ σ,
 
 σ_b being what the partial itself loses to the bridge (`engine.values.string`), and σ all that it loses.
-Nothing rings up: |H| is at most σ_b/σ ≤ 1, the poles have the decay of the string, and nothing leads back from these
+Nothing rings up: |H| is at most σ_b/σ ≤ 1, the poles have the decay of the string. Nothing leads back from these
 strings to those that are played, or to one another. So all that is given is bounded by the sum of σ_b/σ times the
 largest input.
 
@@ -39,24 +39,30 @@ NOTHING = 1e-12  # of full scale: below it all rest
 @njit(**COMPILED)
 def tune(player: Player, table: Table) -> None:
     """Fill the bank with the strings of an instrument: of every key, or the open ones of a set."""
-    own, bank = player.own, player.sympathy
-    count, rate_hz, everyone = 0, player.rate_hz, table.sympathy == of.EVERY_KEY
+    string_row, bank = player.own, player.sympathy
+    count = 0
+    rate_hz = player.rate_hz
+    everyone = table.sympathy == of.EVERY_KEY
     for number in range(of.KEYS if everyone else table.strings):
         if everyone:
             inside = table.low <= number <= table.high
-            key, string, pitch_hz = number, -1, table.pitches_hz[number] if inside else 0.0
+            key = number
+            string = -1
+            pitch_hz = table.pitches_hz[number] if inside else 0.0
         else:
-            key, string, pitch_hz = int(table.open[number].note), number, table.open[number].pitch_hz
+            key = int(table.open[number].note)
+            string = number
+            pitch_hz = table.open[number].pitch_hz
         if not pitch_hz > 0.0:
             continue
-        modes, _ = string_of(player, table, key, string, pitch_hz, False, own)
-        lost = table.sympathy_s_kg * own[of.TENSION] / own[of.LENGTH]
+        modes, _ = string_of(player, table, key, string, pitch_hz, False, string_row)
+        lost = table.sympathy_s_kg * string_row[of.TENSION] / string_row[of.LENGTH]
         for partial in range(1, min(modes, PARTIALS) + 1):
-            omega = math.sqrt(strings.omega_squared(own, partial))
+            omega = math.sqrt(strings.omega_squared(string_row, partial))
             if count == of.MOST_SYMPATHETIC or omega > 2 * math.pi * HIGHEST_HZ:
                 break
             lossy = table.losses[0], table.losses[1], table.losses[2]
-            sigma = strings.decay_rate(own, partial) + lost + strings.loss(own, partial, *lossy)
+            sigma = strings.decay_rate(string_row, partial) + lost + strings.loss(string_row, partial, *lossy)
             shrunk = math.exp(-sigma / rate_hz)
             bank.owner[count] = number
             bank.cosine[count] = shrunk * math.cos(omega / rate_hz)
@@ -72,7 +78,10 @@ def tune(player: Player, table: Table) -> None:
 def ring(bank: Sympathy, force: np.ndarray, out: np.ndarray) -> float:
     """Add the force of partials that a force (frames,) drives to out (frames,); the largest of x² + y²."""
     count = bank.partials
-    x, y, cosine, sine = bank.x[:count], bank.y[:count], bank.cosine[:count], bank.sine[:count]
+    x = bank.x[:count]
+    y = bank.y[:count]
+    cosine = bank.cosine[:count]
+    sine = bank.sine[:count]
     gain, played = bank.gain[:count], bank.played[:count]
     for frame in range(len(force)):
         driven, total = force[frame], 0.0
@@ -105,14 +114,16 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     if count == 0:
         return
     mixer = mixer_at(mixer_address)
-    mix, force, out = mixer.mix[:], mixer.scratch[:QUANTUM], mixer.scratch[QUANTUM : 2 * QUANTUM]
-    heard = False
+    mix = mixer.mix[:]
+    force = mixer.scratch[:QUANTUM]
+    out = mixer.scratch[QUANTUM : 2 * QUANTUM]
+    driven = False
     for frame in range(QUANTUM):
-        given = 0.5 * (mix[frame, 0] + mix[frame, 1])
-        force[frame] = given if abs(given) < LARGEST else 0.0  # also where it is not a number
-        heard = heard or abs(given) > NOTHING
+        mono = 0.5 * (mix[frame, 0] + mix[frame, 1])
+        force[frame] = mono if abs(mono) < LARGEST else 0.0  # also where it is not a number
+        driven = driven or abs(mono) > NOTHING
         out[frame] = 0.0
-    if not heard and bank.rings == 0:
+    if not driven and bank.rings == 0:
         bank.stops = 0
         return
     everyone = table.sympathy == of.EVERY_KEY
@@ -136,7 +147,7 @@ def sympathise(player_address: int, mixer_address: int) -> None:
     largest = ring(bank, force, out)
     rings = largest > NOTHING * NOTHING
     bank.rings = rings
-    if not rings and not heard:
+    if not rings and not driven:
         bank.x[:count] = 0.0
         bank.y[:count] = 0.0
     for frame in range(QUANTUM):

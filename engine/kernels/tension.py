@@ -41,19 +41,19 @@ def load(x: np.ndarray, y: np.ndarray, rows: np.ndarray, order: np.ndarray, memo
         if number < len(order):
             mode = order[number]
             memory[slot], memory[slot + lanes.LANES] = x[mode], y[mode]
-            for each in range(7):
-                memory[slot + (lanes.COSINE + each) * lanes.LANES] = rows[each, mode]
+            for row in range(7):
+                memory[slot + (lanes.COSINE + row) * lanes.LANES] = rows[row, mode]
         else:
-            for each in range(lanes.EARS):
-                memory[slot + each * lanes.LANES] = 0.0
+            for row in range(lanes.EARS):
+                memory[slot + row * lanes.LANES] = 0.0
 
 
 @njit(**COMPILED)
-def load_weights(own: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
+def load_weights(point_weights: np.ndarray, order: np.ndarray, memory: np.ndarray, first: int, ear: int) -> None:
     """Copy the weights of one ear into the blocks that `load` fills."""
     for number in range(lanes.LANES * lanes.blocks_of(len(order))):
         slot = first + lanes.place(number) + (lanes.EARS + ear) * lanes.LANES
-        memory[slot] = own[order[number]] if number < len(order) else 0.0
+        memory[slot] = point_weights[order[number]] if number < len(order) else 0.0
 
 
 @njit(**COMPILED)
@@ -74,7 +74,7 @@ def node(
     sums: tuple[float, float],
     rest: tuple[float, float],
     largest_stretch: float,
-    heard: np.ndarray,
+    at_points: np.ndarray,
 ) -> tuple[float, float]:
     """The kick of the common tension and the turn to the next node, in place.
 
@@ -85,7 +85,7 @@ def node(
     """
     tension = min(sums[0] + rest[0], largest_stretch)
     linear, squared = tension * (1 - 2 * (sums[1] + rest[1])), tension * tension
-    return lanes.turn(memory, first, near, far, ears, linear, squared, heard)
+    return lanes.turn(memory, first, near, far, ears, linear, squared, at_points)
 
 
 @njit(**COMPILED)
@@ -147,7 +147,10 @@ def advance(
         rows: (7, modes): λ's parts, h k A/ω, η² A, κ r/A, κ p and ω².
     """
     batch, steps, modes = out.shape
-    memory, order, nobody, rest = np.empty(lanes.slots(modes)), np.arange(modes), np.empty(0), (0.0, 0.0)
+    memory = np.empty(lanes.slots(modes))
+    order = np.arange(modes)
+    nobody = np.empty(0)
+    rest = (0.0, 0.0)
     first = lanes.aligned(memory)
     for string in range(batch):
         load(x[string], y[string], rows, order, memory, first)
@@ -196,7 +199,9 @@ def _needs_fewer_nodes(voice: Voice, program: TensionProgram) -> bool:
     if voice.refresh > 0:
         return False
     voice.refresh = FEWER_QUANTA
-    x, y, kick = row(voice, 0), row(voice, 1), 0.0
+    x = row(voice, 0)
+    y = row(voice, 1)
+    kick = 0.0
     couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
     for m in range(voice.moving):
         kick += stretches[m] * couplings[m] * (x[m] * x[m] + y[m] * y[m])
@@ -234,7 +239,9 @@ def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray)
             now, before = (2 * argument * now - before, now)
         growth = min(max(1 + phase * phase * growth, 0.0), 2.0)
         r, p = min(max(r, -1.0), 1.0), min(max(p, -1.0), 1.0)
-        kappa, angle, shrunk = h * h * couplings[m], h * couplings[m] / omega, math.exp(-h * sigma)
+        kappa = h * h * couplings[m]
+        angle = h * couplings[m] / omega
+        shrunk = math.exp(-h * sigma)
         rows[0, m], rows[1, m] = shrunk * math.cos(phase), shrunk * math.sin(phase)
         rows[2, m], rows[3, m] = angle * growth, stretches[m] * growth
         rows[4, m] = kappa * r / growth if growth > 0.0 else 0.0
@@ -247,7 +254,9 @@ def prepare(voice: Voice, program: TensionProgram, q: np.ndarray, v: np.ndarray)
     for m in range(n):
         order[m] = m
     voice.heard = voice.felt = voice.moving
-    voice.nodes, voice.stretched, voice.javari.give = 0, 0.0, 0.0
+    voice.nodes = 0
+    voice.stretched = 0.0
+    voice.javari.give = 0.0
 
 
 @njit(**COMPILED)
@@ -258,7 +267,9 @@ def _turn(voice: Voice, mode: int, sign: float) -> None:
     """
     if voice.nodes == 0:
         return
-    x, y, rows = row(voice, 0), row(voice, 1), following(voice)
+    x = row(voice, 0)
+    y = row(voice, 1)
+    rows = following(voice)
     angle = voice.nodes * math.atan2(rows[1, mode], rows[0, mode]) + 0.5 * rows[2, mode] * voice.stretched
     cosine, sine = math.cos(angle), sign * math.sin(angle)
     x[mode], y[mode] = cosine * x[mode] - sine * y[mode], sine * x[mode] + cosine * y[mode]
@@ -270,12 +281,16 @@ def _fall(voice: Voice) -> None:
     frames = voice.rested * QUANTUM
     if frames == 0:
         return
-    x, y, rows = row(voice, 0), row(voice, 1), following(voice)
+    x = row(voice, 0)
+    y = row(voice, 1)
+    rows = following(voice)
     order = row(voice, at.ORDER).view(np.int64)
     steps = voice.steps * frames // 2  # a quantum is even
     for place in range(voice.felt, voice.moving):
         m = order[place]
-        square, left, power = rows[0, m] * rows[0, m] + rows[1, m] * rows[1, m], 1.0, steps
+        square = rows[0, m] * rows[0, m] + rows[1, m] * rows[1, m]
+        left = 1.0
+        power = steps
         while power > 0:  # square ** steps: of whole numbers in fewer steps than of any
             if power & 1:
                 left *= square
@@ -310,14 +325,19 @@ def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray)
     """
     _fall(voice)
     moving = voice.moving
-    x, y, rows, sigmas = row(voice, 0), row(voice, 1), following(voice), row(voice, at.SIGMA)
+    x = row(voice, 0)
+    y = row(voice, 1)
+    rows = following(voice)
+    sigmas = row(voice, at.SIGMA)
     stretches, order = rows[3], row(voice, at.ORDER).view(np.int64)
-    sizes, heard, rested = scratch[:moving], scratch[moving : 2 * moving], scratch[2 * moving : 3 * moving]
+    sizes = scratch[:moving]
+    largest_shares = scratch[moving : 2 * moving]
+    rested = scratch[2 * moving : 3 * moving]
     for place in range(moving):
         rested[order[place]] = 1.0 if place >= voice.felt else 0.0
     total = stretch = 0.0
     for m in range(moving):
-        sizes[m], heard[m] = x[m] * x[m] + y[m] * y[m], 0.0
+        sizes[m], largest_shares[m] = x[m] * x[m] + y[m] * y[m], 0.0
         total += sizes[m]
         stretch += stretches[m] * sizes[m]
     for which in range(sets):
@@ -327,20 +347,20 @@ def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray)
                 loudness += w[m] * w[m] * sizes[m]
             share = 1 / loudness if loudness > 0 else 0.0
             for m in range(moving):
-                heard[m] = max(heard[m], share * w[m] * w[m] * sizes[m])
+                largest_shares[m] = max(largest_shares[m], share * w[m] * w[m] * sizes[m])
     while moving > 1 and sizes[moving - 1] < program.silence**2 * total + NOTHING:
         moving -= 1
-        x[moving] = y[moving] = heard[moving] = 0.0
+        x[moving] = y[moving] = largest_shares[moving] = 0.0
         order[moving] = moving
     audible = program.unheard**2
     place = 0
     for m in range(moving):
-        if heard[m] > audible:
+        if largest_shares[m] > audible:
             order[place] = m
             place += 1
     voice.heard = place
     for m in range(moving):
-        if heard[m] <= audible and stretches[m] * sizes[m] > UNFELT * stretch:
+        if largest_shares[m] <= audible and stretches[m] * sizes[m] > UNFELT * stretch:
             order[place] = m
             place += 1
     voice.felt, voice.moving = place, moving
@@ -349,7 +369,7 @@ def _look(voice: Voice, program: TensionProgram, sets: int, scratch: np.ndarray)
             _turn(voice, order[felt], 1.0)
     rest = second = rate = 0.0
     for m in range(moving):
-        if heard[m] <= audible and not stretches[m] * sizes[m] > UNFELT * stretch:
+        if largest_shares[m] <= audible and not stretches[m] * sizes[m] > UNFELT * stretch:
             order[place] = m
             place += 1
             if not rested[m] > 0.0:
@@ -420,7 +440,9 @@ def set_out(voice: Voice, q: np.ndarray, v: np.ndarray, bounded: bool) -> None:
     n = voice.modes
     x, y = row(voice, 0), row(voice, 1)
     rows = following(voice)
-    sigmas, couplings, stretches = row(voice, at.SIGMA), row(voice, at.COUPLING), row(voice, at.STRETCH)
+    sigmas = row(voice, at.SIGMA)
+    couplings = row(voice, at.COUPLING)
+    stretches = row(voice, at.STRETCH)
     tension = held = energy = widest = 0.0
     for m in range(n):
         omega, square = math.sqrt(rows[6, m]), q[m] * q[m]
@@ -453,7 +475,9 @@ def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
     fewer = voice.prepared and _needs_fewer_nodes(voice, program)
     if voice.prepared and not gliding(voice) and not fewer:
         return
-    q, v, squares = row(voice, at.PHYSICAL), row(voice, at.PHYSICAL + 1), following(voice)[6]
+    q = row(voice, at.PHYSICAL)
+    v = row(voice, at.PHYSICAL + 1)
+    squares = following(voice)[6]
     if voice.prepared:
         physical(voice, q, v)
         if fewer:
@@ -471,8 +495,8 @@ def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
         if gliding(voice):
             glide(voice)
         if voice.javari.steps == 0:  # whose contact wakes them
-            own = row(voice, at.OMEGA_SQUARED)
-            voice.moving, _ = rest_silent(q, v, own, voice.moving, program.silence)
+            omega_squared = row(voice, at.OMEGA_SQUARED)
+            voice.moving, _ = rest_silent(q, v, omega_squared, voice.moving, program.silence)
     prepare(voice, program, q, v)
     for m in range(voice.moving, n):
         q[m] = v[m] = 0.0
@@ -482,13 +506,15 @@ def bring_up_to_date(voice: Voice, program: TensionProgram) -> None:
 
 @njit(**COMPILED)
 def generate(
-    voice: Voice, program: TensionProgram, fading: bool, heard: bool, out: np.ndarray, scratch: np.ndarray
+    voice: Voice, program: TensionProgram, fading: bool, audible: bool, out: np.ndarray, scratch: np.ndarray
 ) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     bring_up_to_date(voice, program)
-    n, nodes, points = voice.modes, voice.steps, voice.points
+    n = voice.modes
+    nodes = voice.steps
+    points = voice.points
     sets, rests = 2 if fading else 1, program.unheard > 0
-    ears = sets * points if heard else 0
+    ears = sets * points if audible else 0
     rest = (0.0, 0.0)
     if not rests:
         voice.heard = voice.felt = voice.moving
@@ -496,16 +522,23 @@ def generate(
         _look(voice, program, sets, scratch)
     if rests:
         rest = (voice.rest_stretch, voice.rest_second)
-    x, y, rows = row(voice, 0), row(voice, 1), following(voice)
+    x = row(voice, 0)
+    y = row(voice, 1)
+    rows = following(voice)
     order = row(voice, at.ORDER).view(np.int64)
     loud, quiet = order[: voice.heard], order[voice.heard : voice.felt]
-    first, near, far = lanes.aligned(scratch), lanes.blocks_of(len(loud)), lanes.blocks_of(len(quiet))
+    first = lanes.aligned(scratch)
+    near = lanes.blocks_of(len(loud))
+    far = lanes.blocks_of(len(quiet))
     ear_sums, behind = scratch[first + lanes.slots(n) :][: 2 * lanes.MOST_EARS], first + near * lanes.BLOCK
     load(x, y, rows, loud, scratch, first)
     load(x, y, rows, quiet, scratch, behind)
     for ear in range(ears):
         load_weights(weights(voice, ear // points, ear % points, 0), loud, scratch, first, ear)
-    moving, total, apart, largest = len(loud), 0.0, 2 if points == 1 else 1, voice.largest_stretch
+    moving = len(loud)
+    total = 0.0
+    apart = 2 if points == 1 else 1
+    largest = voice.largest_stretch
     stretched = QUANTUM * nodes * rest[0]
     sums = lanes.add_up(scratch, first, near, far, ears, ear_sums)
     for frame in range(QUANTUM):

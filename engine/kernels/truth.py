@@ -27,8 +27,8 @@ def _sub_steps(voice: Voice, program: TruthProgram) -> int:
     if couplings[n - 1] == 0.0:
         return steps
     highest = math.sqrt(squares[voice.moving - 1])
-    found = max(1, math.ceil(program.substeps * highest / (2 * math.pi * program.rate_hz)))
-    return found if steps == 0 else (found + steps - 1) // steps * steps
+    count = max(1, math.ceil(program.substeps * highest / (2 * math.pi * program.rate_hz)))
+    return count if steps == 0 else (count + steps - 1) // steps * steps
 
 
 @njit(**COMPILED)
@@ -43,7 +43,9 @@ def _prepare(voice: Voice, program: TruthProgram, sub_steps: int) -> None:
         vq, vv = row(voice, first + 2), row(voice, first + 3)
         for m in range(n):
             qq[m], qv[m], vq[m], vv[m] = rotation(sigmas[m], damped(squares[m], sigmas[m]), time_s)
-    voice.steps, voice.prepared, voice.javari.give = sub_steps, 1, 0.0
+    voice.steps = sub_steps
+    voice.prepared = 1
+    voice.javari.give = 0.0
 
 
 @njit(**COMPILED)
@@ -66,31 +68,33 @@ def advance(
     sub_steps: int,
     frame: int,
     fading: bool,
-    heard: bool,
+    audible: bool,
     out: np.ndarray,
 ) -> None:
     """Advance by one frame of a quantum, after it is heard."""
-    hear(voice, program, frame, fading, heard, out)
+    hear(voice, program, frame, fading, audible, out)
     ring(voice, program, sub_steps, max(sub_steps, 1))
 
 
 @njit(**COMPILED)
-def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, heard: bool, out: np.ndarray) -> None:
+def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, audible: bool, out: np.ndarray) -> None:
     """The output of a frame.
 
     The highest modes are left out from when they are below the program's silence: sub-steps follow those left. Where
     a contact may wake them they are not.
     """
-    q, v, squares = row(voice, 0), row(voice, 1), row(voice, at.OMEGA_SQUARED)
+    q = row(voice, 0)
+    v = row(voice, 1)
+    squares = row(voice, at.OMEGA_SQUARED)
     silence = program.silence if voice.javari.steps == 0 else 0.0
     moving = voice.moving
-    if heard:
+    if audible:
         for which in range(2 if fading else 1):
             for point in range(voice.points):
-                w, found = weights(voice, which, point, 0), 0.0
+                w, displacement = weights(voice, which, point, 0), 0.0
                 for m in range(moving):
-                    found += w[m] * q[m]
-                out[2 * which + point, frame] = found
+                    displacement += w[m] * q[m]
+                out[2 * which + point, frame] = displacement
     if frame % 16 == 0:
         voice.moving, total = rest_silent(q, v, squares, moving, silence)
         voice.loudness = (0.5 * math.log(total) if total > 0 else -1e9) + program.loudness
@@ -99,7 +103,9 @@ def hear(voice: Voice, program: TruthProgram, frame: int, fading: bool, heard: b
 @njit(**COMPILED)
 def ring(voice: Voice, program: TruthProgram, sub_steps: int, count: int) -> None:
     """Advance by so many of a frame's sub-steps; of what is linear, 0, it is the frame."""
-    moving, q, v = voice.moving, row(voice, 0), row(voice, 1)
+    moving = voice.moving
+    q = row(voice, 0)
+    v = row(voice, 1)
     couplings, stretches = row(voice, at.COUPLING), row(voice, at.STRETCH)
     step_s = 1 / (max(sub_steps, 1) * program.rate_hz)
     for _ in range(count):
@@ -111,9 +117,9 @@ def ring(voice: Voice, program: TruthProgram, sub_steps: int, count: int) -> Non
 
 
 @njit(**COMPILED)
-def generate(voice: Voice, program: TruthProgram, fading: bool, heard: bool, out: np.ndarray) -> None:
+def generate(voice: Voice, program: TruthProgram, fading: bool, audible: bool, out: np.ndarray) -> None:
     """The next quantum, (4, QUANTUM); frame 0 is the string at its release."""
     sub_steps = set_up(voice, program)
     for frame in range(QUANTUM):
-        advance(voice, program, sub_steps, frame, fading, heard, out)
+        advance(voice, program, sub_steps, frame, fading, audible, out)
     voice.generated += QUANTUM

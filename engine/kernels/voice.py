@@ -31,7 +31,7 @@ WARMED = 3  # quanta: the one that is heard, and those before and after it
 
 
 @njit(**COMPILED)
-def _generate(voice: Voice, heard: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
+def _generate(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray) -> None:
     """The next quantum of displacement at its points, (2, QUANTUM) of `out`, on the way to other points too."""
     kind = voice.kind
     if kind == at.RENDERED:
@@ -40,19 +40,19 @@ def _generate(voice: Voice, heard: bool, rate_hz: float, out: np.ndarray, scratc
     fading = voice.next_weights == 1
     fence()
     if kind == at.BANK:
-        bank.generate(voice, bank_program_at(voice.program), fading, heard, out, scratch)
+        bank.generate(voice, bank_program_at(voice.program), fading, audible, out, scratch)
     elif voice.javari.steps > 0:
-        javari.generate(voice, fading, heard, out, scratch)
+        javari.generate(voice, fading, audible, out, scratch)
     elif kind == at.TENSION:
-        tension.generate(voice, tension_program_at(voice.program), fading, heard, out, scratch)
+        tension.generate(voice, tension_program_at(voice.program), fading, audible, out, scratch)
     else:
-        truth.generate(voice, truth_program_at(voice.program), fading, heard, out)
+        truth.generate(voice, truth_program_at(voice.program), fading, audible, out)
     if fading:
-        move_points(voice, heard, rate_hz, out)
+        move_points(voice, audible, rate_hz, out)
 
 
 @njit(**COMPILED)
-def move_points(voice: Voice, heard: bool, rate_hz: float, out: np.ndarray) -> None:
+def move_points(voice: Voice, audible: bool, rate_hz: float, out: np.ndarray) -> None:
     """Fade what a quantum is at its points to what it is at others."""
     done, frames = voice.weights_faded, round(MOVE_S * rate_hz)
     for point in range(voice.points):
@@ -60,7 +60,7 @@ def move_points(voice: Voice, heard: bool, rate_hz: float, out: np.ndarray) -> N
             share = min((done + frame + 1) / frames, 1.0)
             out[point, frame] += share * (out[2 + point, frame] - out[point, frame])
     voice.weights_faded = done + QUANTUM
-    if voice.weights_faded >= frames or not heard:
+    if voice.weights_faded >= frames or not audible:
         for point in range(2):
             for part in range(2):
                 present, following = weights(voice, 0, point, part), weights(voice, 1, point, part)
@@ -74,13 +74,13 @@ def move_points(voice: Voice, heard: bool, rate_hz: float, out: np.ndarray) -> N
 
 @njit(**COMPILED)
 def _velocity(
-    voice: Voice, heard: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray
+    voice: Voice, audible: bool, rate_hz: float, out: np.ndarray, scratch: np.ndarray, taps: np.ndarray
 ) -> None:
     """Generate the motion of `_generate`, differentiated; the voice is generated a quantum ahead for that."""
     begins = is_first(voice)
     for turn in range(2 if begins else 1):
-        _generate(voice, heard, rate_hz, out, scratch)
-        remember(voice, heard, begins and turn == 0, out)
+        _generate(voice, audible, rate_hz, out, scratch)
+        remember(voice, audible, begins and turn == 0, out)
     differentiate(voice, out, taps)
 
 
@@ -91,7 +91,7 @@ def is_first(voice: Voice) -> bool:
 
 
 @njit(**COMPILED)
-def remember(voice: Voice, heard: bool, first: bool, out: np.ndarray) -> None:
+def remember(voice: Voice, audible: bool, first: bool, out: np.ndarray) -> None:
     """Keep the quantum that was generated, and the flux that it is to a magnetic pick-up.
 
     That grows as (exp(x/δ) - 1) δ with the displacement x, to third order.
@@ -100,7 +100,7 @@ def remember(voice: Voice, heard: bool, first: bool, out: np.ndarray) -> None:
     quantum = QUANTUM
     if first:
         voice.warm = 0
-    voice.warm = min(voice.warm + 1, WARMED) if heard else 0
+    voice.warm = min(voice.warm + 1, WARMED) if audible else 0
     for point in range(voice.points):
         past = voice.history[point]
         for frame in range(2 * quantum):
@@ -137,7 +137,9 @@ def take_over(voice: Voice, now: int, scratch: np.ndarray) -> None:
     the voice before that one, which is left as what is to be taken over.
     """
     before = voice_at(voice.previous_voice)
-    stops, waits, earlier = voice.stops_in, before.state == at.WAITING, 0
+    stops = voice.stops_in
+    waits = before.state == at.WAITING
+    earlier = 0
     later = before.begin_at >= now + QUANTUM and before.joins == 0
     if waits and (later or stops > 0):
         _never_begin(before)
@@ -176,7 +178,9 @@ def _join(voice: Voice, before: Voice, now: int, scratch: np.ndarray) -> None:
             tension.physical(before, q, v)
         else:
             q[:], v[:] = row(before, 0), row(before, 1)
-        amplitudes, speeds, squares = row(voice, 0), row(voice, 1), row(voice, at.OMEGA_SQUARED)
+        amplitudes = row(voice, 0)
+        speeds = row(voice, 1)
+        squares = row(voice, at.OMEGA_SQUARED)
         widest = 0.0
         for mode in range(min(n, m)):
             amplitudes[mode] += q[mode]
@@ -202,9 +206,9 @@ def _past(voice: Voice, before: Voice) -> None:
         weighed, held = weights(voice, 0, point, 0), 0.0
         for mode in range(voice.modes):
             held += weighed[mode] * pulled[mode]
-        own, other = voice.history[point], before.history[min(point, before.points - 1)]
+        history, other = voice.history[point], before.history[min(point, before.points - 1)]
         for frame in range(3 * QUANTUM):
-            own[frame] = other[frame] + held
+            history[frame] = other[frame] + held
 
 
 @njit(**COMPILED)
@@ -217,14 +221,14 @@ def _eased(share: float) -> float:
 def _look_at_wishes(voice: Voice, now: int) -> None:
     """Continue to the latest modes that are due. Wishes count in their order, and wait for those before them."""
     latest = voice.resonator
-    wished = voice.pending_modes if latest == 0 else wish_at(latest).next
-    while wished != 0:
+    address = voice.pending_modes if latest == 0 else wish_at(latest).next
+    while address != 0:
         fence()
-        wish = wish_at(wished)
+        wish = wish_at(address)
         if wish.at > now:
             break
-        voice.resonator = wished
-        wished = wish.next
+        voice.resonator = address
+        address = wish.next
 
 
 @njit(**COMPILED)
@@ -233,12 +237,15 @@ def add(voice: Voice, mixer: Mixer, now_s: float) -> int:
     state = begin(voice, mixer)
     if state != at.SOUNDING:
         return state
-    out, scratch, rate_hz, heard = mixer.out[0], mixer.scratch[:], mixer.rate_hz, is_heard(voice)
+    out = mixer.out[0]
+    scratch = mixer.scratch[:]
+    rate_hz = mixer.rate_hz
+    audible = is_heard(voice)
     was_dry, generated = voice.dry, voice.generated
     if voice.velocity:
-        _velocity(voice, heard, rate_hz, out, scratch, mixer.taps[:])
+        _velocity(voice, audible, rate_hz, out, scratch, mixer.taps[:])
     else:
-        _generate(voice, heard, rate_hz, out, scratch)
+        _generate(voice, audible, rate_hz, out, scratch)
     if voice.dry and not was_dry:
         note_gap(mixer, mixer.frames, 0.0, CAUSE_STARVED)
     return end(voice, mixer, now_s, out, voice.generated > generated)
@@ -287,9 +294,15 @@ def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) 
     Args:
         moved: whether it was generated, else it stands still.
     """
-    mix, left_over, quantum = mixer.mix[:], voice.left_over[:], QUANTUM
-    now, points, late, release, heard = mixer.frames, voice.points, voice.late, voice.release, is_heard(voice)
-    if heard and (not voice.velocity or voice.warm == WARMED):
+    mix = mixer.mix[:]
+    left_over = voice.left_over[:]
+    quantum = QUANTUM
+    now = mixer.frames
+    points = voice.points
+    late = voice.late
+    release = voice.release
+    audible = is_heard(voice)
+    if audible and (not voice.velocity or voice.warm == WARMED):
         limit = voice.limit
         for point in range(points):
             for frame in range(quantum):
@@ -297,7 +310,10 @@ def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) 
                     note_gap(mixer, mixer.frames, 0.0, CAUSE_RUNAWAY)
                     return at.RUNAWAY
         first, attack = voice.frame, voice.attack
-        source, goal, done, length = voice.gain_from, voice.gain_to, voice.gain_done, voice.fade_frames
+        source = voice.gain_from
+        goal = voice.gain_to
+        done = voice.gain_done
+        length = voice.fade_frames
         for frame in range(quantum):
             gain = goal
             if done + frame < length:
@@ -324,7 +340,7 @@ def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) 
             voice.began_s = now_s
         voice.frame += quantum
     faded = voice.gain == 0 and voice.gain_to == 0 and late == 0
-    if release > 0 and (not heard or faded):
+    if release > 0 and (not audible or faded):
         return at.OVER
     if release == 0 and voice.loudness < voice.silent:
         voice.release = max(1, round(END_S * mixer.rate_hz))
@@ -335,7 +351,9 @@ def end(voice: Voice, mixer: Mixer, now_s: float, out: np.ndarray, moved: bool) 
 def note_gap(mixer: Mixer, frame: int, milliseconds: float, cause: int) -> None:
     """Note one more silence that nobody asked for."""
     gap = mixer.gaps[mixer.gap_count % GAPS]
-    gap.frame, gap.milliseconds, gap.cause = frame, milliseconds, cause
+    gap.frame = frame
+    gap.milliseconds = milliseconds
+    gap.cause = cause
     fence()
     mixer.gap_count += 1
 

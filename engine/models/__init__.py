@@ -52,8 +52,8 @@ def model_class(name: str) -> type[StringModel[Any]]:
         KeyError: no such model.
     """
     module, _, kind = MODELS[name][0].partition(".")
-    found: type[StringModel[Any]] = getattr(importlib.import_module(f"{__name__}.{module}"), kind)
-    return found
+    cls: type[StringModel[Any]] = getattr(importlib.import_module(f"{__name__}.{module}"), kind)
+    return cls
 
 
 def build_model(name: str, configuration: Mapping[str, Any] | None = None) -> StringModel[Any]:

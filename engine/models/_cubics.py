@@ -18,11 +18,15 @@ def integrate_parabolas(samples: Tensor, positions: Tensor) -> tuple[Tensor, Ten
     Returns:
         (batch, times, values) each.
     """
-    left, middle, right = samples[:, :-1:2], samples[:, 1::2], samples[:, 2::2]
+    left = samples[:, :-1:2]
+    middle = samples[:, 1::2]
+    right = samples[:, 2::2]
     whole = torch.cumsum((left + 4 * middle + right) / 6, dim=1)
     segment = positions.floor().long().clamp(0, left.shape[1] - 1)
     u = (positions - segment)[:, None]
-    left, middle, right = left[:, segment], middle[:, segment], right[:, segment]
+    left = left[:, segment]
+    middle = middle[:, segment]
+    right = right[:, segment]
     before = nn.functional.pad(whole, (0, 0, 1, 0))[:, segment]
     # left + u slope + u² bend
     slope, bend = 4 * middle - 3 * left - right, 2 * (left + right) - 4 * middle

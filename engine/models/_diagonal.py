@@ -50,8 +50,8 @@ class DiagonalModel(AnyFrameModel[KoopmanState]):
         return torch.cat(blocks, dim=1), KoopmanState(state.origin, last)
 
     def sample(self, state: KoopmanState, frames: Tensor, steps: int) -> tuple[Tensor, KoopmanState]:
-        found = self.decode(self.latents(state.origin, state.step + frames))
-        return found, KoopmanState(state.origin, state.step + steps)
+        displacement = self.decode(self.latents(state.origin, state.step + frames))
+        return displacement, KoopmanState(state.origin, state.step + steps)
 
     def latents(self, origin: Tensor, frames: Tensor) -> Tensor:
         """z_k = λᵏ z₀ of any frames (int64, any order), complex (batch, frames, state_size)."""

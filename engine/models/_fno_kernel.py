@@ -1,7 +1,7 @@
 """The compiled recurrence of `fno`: one trajectory, step after step, in single precision.
 
 Compiled rather than written in tensor operations because a step must take less than the 250 µs between two samples
-at 4 kHz: the transforms of 2N points by FFT (2N = 202 = 2·101 has a large prime factor), the complex product and
+at 4 kHz: the transforms of 2N points by FFT (2N = 202 = 2·101 has a large prime factor); the complex product and
 some fifteen calls take ten times that. Nothing is allocated after the start, and the interpreter is free for others.
 
 Three things make it fast.

@@ -1,7 +1,7 @@
 """The recurrences of `fno`, which gradients pass through: any number of strings at once.
 
-As written, a step would spend most of its time on transforms of a length with a large prime factor, on complex
-products of single frequencies, and on calls. Here it is some ten matrix products: the folded transforms
+As written, a step would mostly compute transforms of a length with a large prime factor, multiply complex numbers of
+single frequencies, and call. Here it is some ten matrix products: the folded transforms
 (`_fno_transform`) of all strings together, and at each frequency one real matrix for real and imaginary parts of all
 channels; the gates z and r, which see the same field, in one.
 

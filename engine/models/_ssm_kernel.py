@@ -50,6 +50,8 @@ def add_gated(frames: np.ndarray, gates: np.ndarray) -> None:
     """Add the gated linear unit of `gates`, float32 (rows, 2 features), to `frames`, float32 (rows, features)."""
     rows, features = frames.shape
     for r in range(rows):
-        y, value, gate = frames[r], gates[r, :features], gates[r, features:]
+        y = frames[r]
+        value = gates[r, :features]
+        gate = gates[r, features:]
         for f in range(features):
             y[f] += value[f] * (HALF + HALF * tanh(HALF * gate[f]))

@@ -54,9 +54,9 @@ def resonator_arrays(
     }
 
 
-def check_resonator(found: Mapping[str, Array], expected: Mapping[str, Array]) -> None:
+def check_resonator(arrays: Mapping[str, Array], expected: Mapping[str, Array]) -> None:
     """Raise ValueError, naming the array, where one is of another resonator than expected."""
     for name, array in expected.items():
         atol = 1e-3 * SAME_RESONATOR * float(np.abs(array).max())
-        if not np.allclose(found[name], array, rtol=SAME_RESONATOR, atol=atol):
+        if not np.allclose(arrays[name], array, rtol=SAME_RESONATOR, atol=atol):
             raise ValueError(f"tensor {name!r} is of another string, or of other modes, rate_hz or scale_m")

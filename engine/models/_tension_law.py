@@ -222,7 +222,9 @@ class TensionLaw:
 
     def _set_out(self, state: KoopmanTensionState, step: Step) -> KoopmanTensionState:
         """The coordinates in which kicks act, half a kick before the first node."""
-        q, swing, (_, omega) = state.x, self._swing(state), self._rates()
+        q = state.x
+        swing = self._swing(state)
+        (_, omega) = self._rates()
         share = step.seen * (self._stretch * q**2).sum(-1)[..., None]
         x = q * (1 + share)
         # of w/ω, whose sum Σ η² q w follows from that of v
@@ -237,16 +239,19 @@ class TensionLaw:
     def _compiled(self, state: KoopmanTensionState, step: Step, steps: int) -> tuple[Values, KoopmanTensionState]:
         from engine.kernels.tension import advance  # Numba only when it is needed
 
-        x, y, largest = (as_array(each).copy() for each in (state.x, state.y, state.largest_energy))
+        x, y, largest = (as_array(part).copy() for part in (state.x, state.y, state.largest_energy))
         largest_stretch = np.ascontiguousarray(as_array(state.largest_stretch))
         out = np.empty((len(x), steps, x.shape[1]))
         advance(x, y, largest, largest_stretch, step.decay, step.nodes, SILENCE, as_array(step.rows), out)
-        given = library_of(state.x).asarray
-        return given(out), replace(state, x=given(x), y=given(y), largest_energy=given(largest))
+        restore = library_of(state.x).asarray
+        return restore(out), replace(state, x=restore(x), y=restore(y), largest_energy=restore(largest))
 
     def _plain(self, state: KoopmanTensionState, step: Step, steps: int) -> tuple[Values, KoopmanTensionState]:
         """The definition, which gradients pass through."""
-        library, x, y, largest = library_of(state.x), state.x, state.y, state.largest_energy
+        library = library_of(state.x)
+        x = state.x
+        y = state.y
+        largest = state.largest_energy
         frames = []
         for _ in range(steps):
             for _ in range(step.nodes):

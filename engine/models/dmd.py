@@ -105,21 +105,23 @@ class DMD(DiagonalModel):
 
     def _store(self, eigenvalues: Tensor, modes: Tensor) -> None:
         """Take eigenvalues (n,) and modes of the embedding (lags · grid_points, n) with n ≤ rank; others vanish."""
-        points, r, n = self.grid_points, self.configuration.rank, len(eigenvalues)
+        points = self.grid_points
+        r = self.configuration.rank
+        n = len(eigenvalues)
         magnitude_log = eigenvalues.abs().log().clamp(min=_VANISHED)
         encoder = _encoder(self.configuration, magnitude_log, eigenvalues.angle(), modes)
         with torch.no_grad():
             self.magnitude_log.fill_(_VANISHED)[:n] = magnitude_log
             self.angle.zero_()[:n] = eigenvalues.angle()
-            for stored, found in ((self.modes, modes[:points]), (self.encoder, encoder.T)):
+            for stored, complex_matrix in ((self.modes, modes[:points]), (self.encoder, encoder.T)):
                 stored.zero_()
-                stored[:, :n], stored[:, r : r + n] = found.real, found.imag
+                stored[:, :n], stored[:, r : r + n] = complex_matrix.real, complex_matrix.imag
 
 
 def _exact_dmd(trajectories: Tensor, c: DMDConfiguration) -> tuple[Tensor, Tensor]:
     """Eigenvalues and modes of the embedding, in float64, the slowest decay first.
 
-    With the Hankel matrix H = QR of `lags + 1` frames a row, both snapshot matrices are columns of H, and the SVD of
+    With the Hankel matrix H = QR of `lags + 1` frames a row, both snapshot matrices are columns of H. The SVD of
     R's columns is theirs: Q is never needed, R can be gathered block by block, and nothing is squared.
     """
     r = torch.empty(0, (c.lags + 1) * c.grid_points, dtype=torch.float64)
@@ -132,7 +134,9 @@ def _exact_dmd(trajectories: Tensor, c: DMDConfiguration) -> tuple[Tensor, Tenso
     kept = min(c.rank, int((s > noise).sum()))
     if kept == 0:
         return torch.empty(0, dtype=torch.complex128), torch.empty(len(before), 0, dtype=torch.complex128)
-    u, s, v = u[:, :kept], s[:kept], v[:kept].T
+    u = u[:, :kept]
+    s = s[:kept]
+    v = v[:kept].T
     carried = after @ v / s
     eigenvalues, w = torch.linalg.eig(u.T @ carried)
     order = eigenvalues.abs().argsort(descending=True)

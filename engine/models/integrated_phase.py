@@ -26,15 +26,15 @@ Units. K, g and M receive the tension that each mode adds, as a share of that at
 frequency: numbers of the order of 1 for every mode, which an optimiser and a network need. A start from the physics
 fills the units in.
 
-Adiabatic change. The mean tension raises ω_n² by 2 ω_n κ_n, so that f has ω√(1 + 2κ/ω) - ω in place of κ, which
+Adiabatic change. The mean tension raises ω_n² by 2 ω_n κ_n, so that f has ω√(1 + 2κ/ω) - ω in place of κ. This
 matters where the tension doubles. And what a falling tension leaves alone is a mode's action, ω q²: as the pitch
-falls the amplitude gains. So |z| may be the action's root, which decays by σ alone, for then E(s) above is right long
-after the start: κ = Im K q² is taken of the amplitudes that the actions E mean, q² = E / √(1 + 2κ/ω), and with A_in
+falls the amplitude gains. So |z| may be the action's root, which decays by σ alone; for then E(s) above is right long
+after the start: κ = Im K q² is taken of the amplitudes that the actions E mean, q² = E / √(1 + 2κ/ω). With A_in
 and A_out, real, the exponents have ± log(1 + 4|A q²|)/4 beside M z².
 
 Stability. |z_n(t)| ≤ |z_n(0)| e^{b - σ_n t} with σ_n = exp(ν_n) > 0, because |tanh| ≤ 1: for every value of every
 parameter a latent never exceeds e^b (`GAIN_LIMIT`) times its start and decays to zero. f may still change the
-decay either way: the eigenvalue at time t is -σ_n + iω_n + Re f_n sech²(Re I_n / b) + i Im f_n, which is -σ + iω + f
+decay either way: the eigenvalue at time t is -σ_n + iω_n + Re f_n sech²(Re I_n / b) + i Im f_n. It is -σ + iω + f
 while the change is small against b. And f(0) = 0: a quiet string is the linear one, so σ and ω are its own.
 
 Sources: Lusch, Kutz, Brunton 2018 for eigenvalues given by an auxiliary network; Lindstedt's averaging for the
@@ -91,7 +91,7 @@ class IntegratedPhaseState:
         origin: z(0), complex (batch, state_size).
         time: samples since then.
         integral: ∫ f(E) - K E from 0 to the node before the last one that `time` has reached, float64
-            (batch, 2 state_size) with the real parts first.
+            (batch, 2 state_size); the real parts come first.
     """
 
     origin: Tensor
@@ -183,7 +183,9 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         return torch.cat(blocks, dim=1), state
 
     def sample(self, state: IntegratedPhaseState, frames: Tensor, steps: int) -> tuple[Tensor, IntegratedPhaseState]:
-        rates, times, end = self._rates(), (state.time + frames).double(), state.time + steps
+        rates = self._rates()
+        times = (state.time + frames).double()
+        end = state.time + steps
         motion, integral = self._move(state, rates, times, end)
         latents = _latents(state.origin, rates, times, motion)
         return self.decode(latents), IntegratedPhaseState(state.origin, end, integral)
@@ -210,7 +212,7 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         """The next `count` frames and the state after them.
 
         Level and phase are computed at the ends of short segments, in float64, and are cubics with the right slopes
-        in between (Hermite), which leaves errors of the order of h|f| (2σh)³/384 for segments of h samples: a frame
+        in between (Hermite). This leaves errors of the order of h|f| (2σh)³/384 for segments of h samples: a frame
         costs a sine, a cosine and an exponential a latent.
         """
         length = min(SEGMENT, self.configuration.node_spacing)
@@ -322,8 +324,8 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         real, imag = self._modulate(self.M_out, self.A_out, real, imag, alive)
         weight, bias = read_layer(self.decoder, readout)
         of_real, of_imag = weight.chunk(2, dim=-1)
-        found = nn.functional.linear(real, of_real[:, alive], bias)
-        return found + nn.functional.linear(imag, of_imag[:, alive])
+        displacement = nn.functional.linear(real, of_real[:, alive], bias)
+        return displacement + nn.functional.linear(imag, of_imag[:, alive])
 
     def _modulate(
         self, matrix: Tensor, adiabatic: Tensor | None, real: Tensor, imag: Tensor, alive: Tensor | slice
@@ -397,7 +399,9 @@ class IntegratedPhase(AnyFrameModel[IntegratedPhaseState]):
         n, count = self.configuration.state_size, len(modes.shapes)
         if count > n:
             raise ValueError(f"state_size must be at least {count}, the modes that the data show, not {n}")
-        analysis, starts, omega = modes.analysis, modes.starts, modes.log_eigenvalues.imag
+        analysis = modes.analysis
+        starts = modes.starts
+        omega = modes.log_eigenvalues.imag
         self.nu_log[:count], self.theta_log[:count] = eigenvalues.stored(modes.log_eigenvalues)
         for linear in (self.encoder, self.decoder):
             nn.init.zeros_(linear.weight)

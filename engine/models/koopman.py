@@ -71,8 +71,8 @@ class Koopman(LearnedEigenvalues):
         paper: eigenvalues uniform in the ring 0.99 ≤ |λ| ≤ 1, orthogonal layers.
         physics: the linear string: its eigenvalues, and MLPs that are the sine transform and its inverse as long as
             no unit leaves the straight part of SELU. The other latents repeat the modes with other decay rates and
-            frequencies up to `SHARPEST` higher, which a tension-modulated string passes through, and are not yet
-            heard. Prior knowledge that the paper's model does not have: say so in a table.
+            frequencies up to `SHARPEST` higher, which a tension-modulated string passes through. They are not
+            heard at first. Prior knowledge that the paper's model does not have: say so in a table.
         """
         check_initialisation(self, how)
         with torch.no_grad():

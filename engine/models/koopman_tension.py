@@ -2,7 +2,7 @@
 
 A latent z_n = x_n + iy_n is a mode: with λ_n = e^{h(-σ_n + iω_n)} of the resonator it turns and decays as the linear
 string does, an eigenfunction of its Koopman operator. At nodes, h apart, the tension that the stretch of all modes
-adds turns them together (κ_n = h² k_n, which is a share of (hω_n)²):
+adds turns them together, with κ_n = h² k_n, a share of (hω_n)²:
 
     S = Σ_m η_m² A_m x_m²,    R = Σ_m η_m² κ_m r_m x_m²,
     y_n ← y_n + (h k_n/ω_n) [A_n S (1 - 2R) - κ_n r_n S²] x_n,      z_n ← λ_n z_n,
@@ -16,7 +16,7 @@ Momenta go with the coordinates. A string that rings sets out with the speed w i
 
     v_n = w_n (1 + p_n κ_n S₀) + 2 p_n κ_n q_n Σ_m η_m² q_m w_m,      y_n(0) = -(w_n + σ_n q_n)/ω_n,
 
-the momentum that belongs to x where p is one number (the lift of a point transformation, as the processor of Blanes,
+the momentum that belongs to x where p is one number (the lift of a point transformation; the processor of Blanes,
 Casas and Ros needs it). Half a kick before the first node follows. From rest, w = v = 0.
 
 A, r and p are what is learned: three curves over the phase hω that a mode turns between two nodes, even polynomials
@@ -29,13 +29,13 @@ period of the first mode leave 1e-7 to 1e-3 of a second's energy wrong. For h �
 them: r = p = 1/12 (Takahashi and Imada 1984; Blanes, Casas and Ros 1999 for a processed integrator), the start
 "series". A fit that sets out from 0 finds the twelfths by itself, and departs from them where hω is not small.
 
-Stability. A is held in 0 … 2, r and p in -1 … 1, S below what the energy at the start allows, and after each frame
+Stability. A is held in 0 … 2, r and p in -1 … 1, S below what the energy at the start allows; after each frame
 Σ ω² |z|² below 1.5 times that energy, falling as the slowest mode does: for every value of every weight the motion is
 bounded and decays to silence. A string never comes near that bound, and neither does a model that is any good.
 
-Any rate: nodes are a whole number to a frame, as many as keep ω₁h below `node_phase` and the highest mode's below
-`highest_phase` (where two modes' phases add up to 2π, kicks would pump them). A pluck that is hard and has its
-stretch in high modes takes more of them, as many as keep Σ η²κ (q² + v²/ω²) at its start below
+Any rate: nodes are a whole number to a frame, as many as keep ω₁h below `node_phase`, and the highest mode's below
+`highest_phase`. (Where two modes' phases add up to 2π, kicks would pump them.) A pluck that is hard and has its
+stretch in high modes takes more of them: as many as keep Σ η²κ (q² + v²/ω²) at its start below
 `HARDEST_KICK`²: that sum is the square of the phase of the modes that stretch the string, times how far they raise
 the tension.
 """

@@ -92,7 +92,9 @@ class S5(SSMString):
     eigenvalue_parameters: ClassVar = frozenset({"Lambda_re", "Lambda_im", "log_step"})
 
     def __init__(self, configuration: S5Configuration) -> None:
-        points, states, blocks = configuration.grid_points, configuration.state_size // 2, configuration.hippo_blocks
+        points = configuration.grid_points
+        states = configuration.state_size // 2
+        blocks = configuration.hippo_blocks
         super().__init__(
             S5Layer(states, points, points, blocks),
             [S5Layer(states, points, points, blocks) for _ in range(configuration.layers)],

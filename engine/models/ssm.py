@@ -1,7 +1,7 @@
 """The base of the state-space strings (LRU, S5): the recurrence, the block, the stack and its streaming state.
 
 Source: the paper, §3.2. A first linear layer takes the initial displacement u₀ as an impulse,
-x_{k+1} = Ā x_k + B̄ u_k δ_k, y_k = C̄ x_k, where y is one sample late. Blocks follow: batch norm, a diagonal
+x_{k+1} = Ā x_k + B̄ u_k δ_k, y_k = C̄ x_k; y is one sample late. Blocks follow: batch norm, a diagonal
 state-space layer, GELU, a gate (two dense layers, GLU), a skip connection. Between the non-linearities, which are
 pointwise in time, every layer is linear and time-invariant, so a whole stretch of time goes through layer by layer.
 
@@ -68,8 +68,8 @@ def recur(inputs: Tensor, log_eigenvalues: Tensor, state: Tensor) -> tuple[Tenso
         All states, like `inputs`, and the last one, complex128.
     """
     power = first_powers(log_eigenvalues.detach(), min(CHUNK, len(inputs)))
-    found: tuple[Tensor, Tensor] = _Recurrence.apply(inputs, log_eigenvalues, state, power)
-    return found
+    states: tuple[Tensor, Tensor] = _Recurrence.apply(inputs, log_eigenvalues, state, power)
+    return states
 
 
 class _Recurrence(torch.autograd.Function):
@@ -77,7 +77,7 @@ class _Recurrence(torch.autograd.Function):
 
     @staticmethod
     def vmap(
-        info: Any, in_dims: tuple[int | None, ...], *given: Tensor
+        info: Any, in_dims: tuple[int | None, ...], *arguments: Tensor
     ) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
         """Seeds that are trained together are more states."""
         seeds = info.batch_size
@@ -86,7 +86,7 @@ class _Recurrence(torch.autograd.Function):
             of_seeds = tensor.expand(seeds, *tensor.shape) if seed_dim is None else tensor.movedim(seed_dim, 0)
             return of_seeds.movedim(0, -2).flatten(-2)
 
-        states, last = _Recurrence.apply(*map(joined, given, in_dims))
+        states, last = _Recurrence.apply(*map(joined, arguments, in_dims))
         return (states.unflatten(-1, (seeds, -1)), last.unflatten(-1, (seeds, -1))), (2, 1)
 
     @staticmethod
@@ -112,7 +112,7 @@ class _Recurrence(torch.autograd.Function):
 def _scan(inputs: Tensor, power: Tensor, state: Tensor, backwards: bool = False) -> tuple[Tensor, Tensor]:
     """`recur` in two levels, or the same from the last step to the first: inside all chunks at once, then between.
 
-    The carry is complex128 and its powers of λ are exact, so the rounding of `inputs` is bounded by what one chunk
+    The carry is complex128 and its powers of λ are exact. So the rounding of `inputs` is bounded by what one chunk
     collects, however long the layer remembers and wherever a caller splits the time.
 
     Args:
@@ -127,8 +127,8 @@ def _scan(inputs: Tensor, power: Tensor, state: Tensor, backwards: bool = False)
     order = -1 if backwards else 1
     rows = states.unbind(1)[::order]  # (chunks, batch, n) each
     eigenvalue = power[0].to(inputs.dtype)
-    for before, each in pairwise(rows):
-        each.addcmul_(eigenvalue, before)
+    for before, later in pairwise(rows):
+        later.addcmul_(eigenvalue, before)
     carries = [state]
     for end in rows[-1].to(state.dtype).unbind(0)[::order][:-1]:
         carries.append(torch.addcmul(end, power[-1], carries[-1]))
@@ -343,7 +343,9 @@ class SSMString(StringModel[SSMState], ABC):
                 self._initialise_linear_string(physics)
 
     def _initialise_linear_string(self, physics: Physics) -> None:
-        points, modes, first = self.grid_points, physics.modes, self.first_layer
+        points = self.grid_points
+        modes = physics.modes
+        first = self.first_layer
         if first.B.shape[0] < modes:
             raise ValueError(
                 f"initialisation 'physics' needs a stored state for each of the {modes} modes, not {first.B.shape[0]}"

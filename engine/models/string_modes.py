@@ -15,7 +15,7 @@ from torch import Tensor
 class StringModes:
     """The modes of a string in normalised units, float64; times are in samples.
 
-    A mode n that starts at rest at q moves as q Re s exp[(log λ) t + i Σ_m κ_nm ∫ E_m], where E_m(t) is the square of
+    A mode n that starts at rest at q moves as q Re s exp[(log λ) t + i Σ_m κ_nm ∫ E_m]. Here E_m(t) is the square of
     mode m's start, decaying twice as fast as its motion.
 
     Attributes:

@@ -120,10 +120,10 @@ def load_preset(path: Path) -> Preset:
     with _open(path) as file:
         info = _info_of(path, file)
         expected = _forms(path, info)
-        found = set(file.keys())
-        if missing := sorted(set(expected) - found):
+        present = set(file.keys())
+        if missing := sorted(set(expected) - present):
             raise PresetError(f"{path}: tensor {missing[0]!r} is missing; get the preset again or train it again")
-        if unknown := sorted(found - set(expected)):
+        if unknown := sorted(present - set(expected)):
             raise PresetError(f"{path}: tensor {unknown[0]!r} is unknown to a {info.model}; get the preset again")
         for name, form in expected.items():
             _check_form(path, name, form, file.get_slice(name))
@@ -277,8 +277,8 @@ def _forms(path: Path, info: PresetInfo) -> dict[str, Form]:
     return {name: (tuple(tensor.shape), types[tensor.dtype]) for name, tensor in weights.items()}
 
 
-def _check_form(path: Path, name: str, expected: Form, found: Any) -> None:
-    shape, kind = tuple(found.get_shape()), found.get_dtype()
+def _check_form(path: Path, name: str, expected: Form, tensor: Any) -> None:
+    shape, kind = tuple(tensor.get_shape()), tensor.get_dtype()
     if shape != expected[0]:
         raise PresetError(f"{path}: tensor {name!r} has shape {shape}, expected {expected[0]}; get the preset again")
     if kind != expected[1]:

@@ -19,11 +19,11 @@ def preset_files(*folders: Path) -> list[Path]:
 
     A folder that is missing, or that nobody may look into, has none; `unreadable` gives the reason.
     """
-    found = []
+    paths = []
     for folder in folders or (SHIPPED,):
         with contextlib.suppress(OSError):
-            found += [path for path in folder.iterdir() if path.suffix == SUFFIX]
-    return sorted(found, key=lambda path: path.stem)
+            paths += [path for path in folder.iterdir() if path.suffix == SUFFIX]
+    return sorted(paths, key=lambda path: path.stem)
 
 
 def unreadable(folder: Path) -> str:

@@ -42,7 +42,7 @@ class TrainedRange:
             if shape not in SHAPES:
                 raise ValueError(f"width is of {bounds.brief(shape)}, not of one of {', '.join(SHAPES)}")
             ranges[f"width.{shape}"] = width
-        for name, (low, high) in ((name, found) for name, found in ranges.items() if found is not None):
+        for name, (low, high) in ((name, low_high) for name, low_high in ranges.items() if low_high is not None):
             if not 0 <= low <= high:
                 raise ValueError(f"{name} must be a range from 0 on, not {low:g} … {high:g}")
         if self.peak_m is None and self.tension_rise is None:
@@ -157,17 +157,17 @@ def outside_training(info: PresetInfo, pluck: Pluck) -> list[str]:
     trained = info.trained_range
     width = (trained.width or {}).get(pluck.shape)
     if info.initial == "noise":
-        found = [f"a {pluck.shape.replace('_', ' ')} pluck is not the noise that this preset was trained on"]
+        reasons = [f"a {pluck.shape.replace('_', ' ')} pluck is not the noise that this preset was trained on"]
     elif info.initial == "gaussian" and pluck.shape != "gaussian":
-        found = [f"shape {pluck.shape.replace('_', ' ')} is not the trained gaussian"]
+        reasons = [f"shape {pluck.shape.replace('_', ' ')} is not the trained gaussian"]
     elif width is None or (info.family and width[0] <= pluck.width <= _WIDEST.get(pluck.shape, math.inf)):
-        found = []
+        reasons = []
     else:
-        found = _beyond("width", pluck.width, width)
+        reasons = _beyond("width", pluck.width, width)
     peak_mm = None if trained.peak_m is None else info.trained_amplitudes_mm(pluck)
     return [
         *_beyond("position", pluck.position, trained.position),
-        *found,
+        *reasons,
         *_beyond("amplitude", pluck.amplitude_mm, peak_mm, " mm"),
         *_too_tense(info, pluck),
         *(info.family.warnings(info.string) if info.family else []),

@@ -71,7 +71,7 @@ _WITH_A_WIDTH = ("gaussian", "raised_cosine")
 
 def _pair(data: object) -> tuple[float, float]:
     """The two numbers of a pair; of anything else two zeros, for the family itself is refused."""
-    if isinstance(data, list) and len(data) == 2 and all(type(each) in (int, float) for each in data):
+    if isinstance(data, list) and len(data) == 2 and all(type(number) in (int, float) for number in data):
         return data[0], data[1]
     return 0.0, 0.0
 

@@ -47,14 +47,14 @@ def _read_described(kind: type[T], path: Path, what: str) -> tuple[T, str]:
     description = data.pop("description", "")
     if not isinstance(description, str):
         raise SchemaError(f"{path}: description must be a text; put it in quotes")
-    found = read(kind, data, str(path))
+    value = read(kind, data, str(path))
     names = [field.name for field in fields(kind)]  # type: ignore[arg-type]
     if missing := [name for name in names if name not in data]:
         raise SchemaError(
             f"{path}: {', '.join(missing)} {'is' if len(missing) == 1 else 'are'} missing; "
             f"{what}'s file gives all of {', '.join(names)}"
         )
-    return found, " ".join(description.split())
+    return value, " ".join(description.split())
 
 
 def find_string(name_or_path: str) -> Path:

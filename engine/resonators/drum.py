@@ -1,7 +1,7 @@
 """Membranes and thin plates as modes that share one tension, as the string's do.
 
 Berger (J. Appl. Mech. 22 (1955), 465) leaves out the second invariant of strain. With an edge that is held in its
-plane, displacement raises the tension evenly, by C (1/A) ∫|∇w|² dA with C = Eh/(2(1 - ν²)):
+plane, displacement raises the tension evenly: C (1/A) ∫|∇w|² dA with C = Eh/(2(1 - ν²)):
 
     μẅ + D∇⁴w - (T + ΔT)∇²w + losses = 0,      ω² = (Tκ² + Dκ⁴)/μ,   k = Cκ²/μ,   η² = κ².
 
@@ -64,7 +64,7 @@ def around(drum: DrumParameters, highest_hz: float, most: int = MOST_MODES) -> k
         max(kernel.reach(numbers, highest_hz, most), low),
         4 * math.pi * highest_hz / kernel.AIR_M_S * size_m,
     )
-    reach, ka = (2 ** (math.ceil(4 * math.log2(1.05 * each)) / 4) for each in needed)  # for its like too
+    reach, ka = (2 ** (math.ceil(4 * math.log2(1.05 * need)) / 4) for need in needed)  # for its like too
     air = surface.air_below(drum.shape, drum.aspect, ka, surface.POINTS) if drum.air_kg_m3 else np.zeros((2, 0, 0))
     return surface.modes_below(drum.shape, drum.aspect, reach), air, ka
 
@@ -121,9 +121,9 @@ class DrumModes:
 
     @cached_property
     def sigma(self) -> Array:
-        found = np.empty(len(self))
-        kernel.losses(self.numbers, self.rows, found)
-        return found
+        rates = np.empty(len(self))
+        kernel.losses(self.numbers, self.rows, rates)
+        return rates
 
     @property
     def scale(self) -> Array:
@@ -174,9 +174,9 @@ class DrumModes:
 
     def struck(self, place: tuple[float, float], radius_m: float) -> Array:
         """The speeds (modes,) in m/s from a sudden blow of 1 N s, spread over a disc at a place."""
-        found = np.empty(len(self))
-        kernel.struck(self.numbers, self.rows, *map(float, place), radius_m, tools(), found)
-        return found
+        amplitudes = np.empty(len(self))
+        kernel.struck(self.numbers, self.rows, *map(float, place), radius_m, tools(), amplitudes)
+        return amplitudes
 
     def blow(self, struck: Array, contact_s: float, mallet_kg: float, speed_m_s: float) -> Array:
         """The speeds (modes,) in m/s from a mallet's blow, see `engine.strike`.
@@ -185,9 +185,9 @@ class DrumModes:
             struck: those that 1 N s at once gives.
             contact_s: time of contact at 1 m/s.
         """
-        found = np.empty(len(self))
-        kernel.blow(self.omega**2, struck, contact_s, (self.mass_kg, mallet_kg), speed_m_s, found)
-        return found
+        amplitudes = np.empty(len(self))
+        kernel.blow(self.omega**2, struck, contact_s, (self.mass_kg, mallet_kg), speed_m_s, amplitudes)
+        return amplitudes
 
     def radiated(self, direction: tuple[float, float], distance_m: float = 1.0) -> Array:
         """Sound pressure in Pa (modes,) far off, of each mode at amplitude 1 m, as from a baffle.
@@ -198,6 +198,6 @@ class DrumModes:
         Args:
             direction: cosines along the two axes of the surface; (0, 0) is above the centre.
         """
-        found = np.empty(len(self))
-        kernel.radiated(self.numbers, self.rows, *map(float, direction), tools(), found)
-        return found / distance_m
+        weights = np.empty(len(self))
+        kernel.radiated(self.numbers, self.rows, *map(float, direction), tools(), weights)
+        return weights / distance_m

@@ -138,7 +138,7 @@ class RecordedAttack:
     @property
     def samples(self) -> Array:
         """The samples with an energy of 1 s of full scale squared, (frames,)."""
-        samples = np.array([each for row in self.rows for each in row], float)
+        samples = np.array([value for row in self.rows for value in row], float)
         return np.asarray(samples / math.sqrt(float(samples @ samples) / self.rate_hz))
 
 
@@ -206,9 +206,9 @@ class RecordedString:
         partial, shares = np.arange(modes) // 2, [1.0] * modes
         squares_and_sigma = np.concatenate([law.omega[partial] ** 2, law.sigma[partial]]).tolist()
         pitch_hz, *parts = self.additions
-        own: Any = pitch_hz, *(part.tolist() for part in parts)  # lists are faster, number by number
-        correct(own, string.row, modes, squares_and_sigma)
-        split(own, string.row, modes, shares)
+        additions: Any = pitch_hz, *(part.tolist() for part in parts)  # lists are faster, number by number
+        correct(additions, string.row, modes, squares_and_sigma)
+        split(additions, string.row, modes, shares)
         rows = np.array(squares_and_sigma)
         return Resonator(
             omega=np.sqrt(rows[:modes]),

@@ -66,9 +66,9 @@ class Surface:
 
     def shapes(self, places: Array) -> Array:
         """φ at places (places, 2): float64 (modes, places); 0 beyond the edge."""
-        found = np.empty((self.rows.shape[1], len(places)))
-        kernel.shapes(self.sides, self.rows, np.ascontiguousarray(places, np.float64), tools(), found)
-        return found
+        values = np.empty((self.rows.shape[1], len(places)))
+        kernel.shapes(self.sides, self.rows, np.ascontiguousarray(places, np.float64), tools(), values)
+        return values
 
     def inside(self, places: Array) -> bool:
         """Return True if all places lie within the edge."""
@@ -125,5 +125,5 @@ def air_below(shape: str, aspect: float, reach: float, points: int) -> Array:
         kernel.air_at(sides, low, reach * math.cos(angle / 2), points, out, work)  # even functions of ka
     basis = np.cos(np.outer(np.arange(terms), angles)) * (2 / terms)
     basis[0] /= 2
-    found: Array = np.ascontiguousarray(np.moveaxis(basis @ values.reshape(terms, -1), 0, -1))
-    return found.reshape(2, -1, terms)
+    pressure: Array = np.ascontiguousarray(np.moveaxis(basis @ values.reshape(terms, -1), 0, -1))
+    return pressure.reshape(2, -1, terms)

@@ -43,7 +43,7 @@ class SplittingSolver:
     Args:
         substeps: integration steps per sample; None takes `default_substeps`. What is linear needs one.
         silence: where above 0, the highest modes are left out from when their amplitudes fall below this share of all
-            modes' together (no mode moves another that rests), and the sub-steps follow the highest that is left: a
+            modes' together. No mode moves another that rests, and the sub-steps follow the highest that is left: a
             string that rings on costs a fraction of one that was just released.
     """
 

@@ -109,7 +109,7 @@ class Polarisations:
     heard, which is an estimate.
 
     The bridge treats the directions differently. A conductance G at the end of a string adds T G/ℓ to its decay
-    rates: a round trip of 2ℓ/c leaves 1 - 2 Z G of a wave, with Z = T/c (Fletcher and Rossing, "The Physics of
+    rates: a round trip of 2ℓ/c leaves 1 - 2 Z G of a wave; Z = T/c (Fletcher and Rossing, "The Physics of
     Musical Instruments", section 2.12). Along the board it is stiffer: that motion rings longer, and two-stage decay
     follows (G. Weinreich, "Coupled piano strings", JASA 62, 1977; J. Woodhouse, "A necessary condition for
     double-decay envelopes in stringed instruments", JASA 150, 2021). Slightly different frequencies beat.

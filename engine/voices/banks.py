@@ -40,7 +40,9 @@ def _integrated_phase_program(model: IntegratedPhase, info: PresetInfo, rate_hz:
         return None
     rates = model._rates()
     units = model.energy_units if model.energy_units is not None else torch.ones(n, dtype=torch.float64)
-    network, at_zero, sizes = np.zeros(0, np.float32), torch.zeros(2 * n), [0]
+    network = np.zeros(0, np.float32)
+    at_zero = torch.zeros(2 * n)
+    sizes = [0]
     if model.g is not None:
         at_zero = model.g(torch.zeros(n))
         layers = [layer for layer in model.g if isinstance(layer, nn.Linear)]

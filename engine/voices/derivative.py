@@ -14,7 +14,7 @@ _KAISER_BETA = 8.0
 def differentiator_taps(rate_hz: int) -> NDArray[np.float64]:
     """Taps of the derivative of a band-limited signal, per second: a Kaiser-windowed ideal differentiator.
 
-    Its phase is exact (the taps are odd about the middle) and its gain true within 0.12 % up to 0.9 of half the rate.
+    Its phase is exact, for the taps are odd about the middle. Its gain true within 0.12 % up to 0.9 of half the rate.
 
     Returns:
         `2 * REACH_FRAMES + 1` taps, the one for the earliest sample first.

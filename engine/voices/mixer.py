@@ -121,33 +121,33 @@ class Mixer:
             present, before = (int(self.record[name]) for name in ("player", "player_before"))
             if present == player.address:
                 return
-            self._players = [(each, self.frames) for each, _ in self._players if each is not player]
+            self._players = [(other, self.frames) for other, _ in self._players if other is not player]
             self._publish("player_before", present)
             self._publish("player", player.address)
-            for each, _ in self._players:
-                if each.address == before:
-                    each.release(LEFT_S)
+            for other, _ in self._players:
+                if other.address == before:
+                    other.release(LEFT_S)
             self._players.append((player, self.frames))
 
     def _forget_players(self) -> None:
         """Free those that play nothing any more. Under the lock."""
-        for each, _ in self._players:
-            if each.address == int(self.record["player_before"]) and each.rests:
+        for player, _ in self._players:
+            if player.address == int(self.record["player_before"]) and player.rests:
                 self._publish("player_before", 0)
-                self._players = [(one, self.frames if one is each else frame) for one, frame in self._players]
+                self._players = [(one, self.frames if one is player else frame) for one, frame in self._players]
         held = [int(self.record[name]) for name in ("player", "player_before")]
         # a quantum that has begun may still play one that was taken out
         self._players = [
-            (each, frame)
-            for each, frame in self._players
-            if each.address in held or self.frames <= frame + LEFT_FRAMES or not each.over
+            (player, frame)
+            for player, frame in self._players
+            if player.address in held or self.frames <= frame + LEFT_FRAMES or not player.over
         ]
 
     def set_effects(self, effects: Effects | None) -> None:
         """A player's voices sound through these from now on: amplifier, body and room, before the volume. Any thread.
 
         What has been played rings on in them. They are faded to within three windows of the convolver (64 ms at
-        48 kHz, of which the last is the fade), at once where nothing has been rendered yet. It takes the caller some
+        48 kHz, of which the last is the fade); at once where nothing has been rendered yet. It takes the caller some
         milliseconds, and tens where a body or a room has not been in use before.
         """
         effects = effects or Effects()
@@ -256,13 +256,13 @@ class Mixer:
 
     def new_gaps(self) -> list[Gap]:
         """The gaps since this was asked for the last time; of very many only the latest."""
-        found, total = [], int(self.record["gap_count"])
+        gaps, total = [], int(self.record["gap_count"])
         for number in range(max(self._gaps_read, total - GAPS), total):
             frame, milliseconds, cause = self.record["gaps"][number % GAPS].tolist()
             lasted_ms = 1000 * (possible_s(milliseconds / 1000) or 0.0)
-            found.append(Gap(float(frame) / self.rate_hz, CAUSES.get(int(cause), "unknown"), lasted_ms))
+            gaps.append(Gap(float(frame) / self.rate_hz, CAUSES.get(int(cause), "unknown"), lasted_ms))
         self._gaps_read = total
-        return found
+        return gaps
 
     @property
     def non_finite(self) -> int:

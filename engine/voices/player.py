@@ -175,7 +175,9 @@ class CompiledPlayer:
         self._struck: dict[int, NDArray[np.float64]] = {}  # by event, until it is reported
         self._read = 0
         self.missed = False
-        record["rate_hz"], record["modes"], record["most"] = rate_hz, modes + of.MOST_PAIRS, most_notes
+        record["rate_hz"] = rate_hz
+        record["modes"] = modes + of.MOST_PAIRS
+        record["most"] = most_notes
         record["source_gains"] = 1.0
         begin(self.address)
 
@@ -279,7 +281,7 @@ class CompiledPlayer:
         """The reports since this was asked for the last time; of very many only the latest. One thread asks."""
         with self._lock:
             self._flush()
-        total, found = int(self.record["reported"]), []
+        total, new_reports = int(self.record["reported"]), []
         self.missed |= total > self._read + of.REPORTS
         first, self._read = max(self._read, total - of.REPORTS), total
         for number in range(first, total):
@@ -289,15 +291,15 @@ class CompiledPlayer:
                 continue
             known = {name: record[name].item() for name in REPORTED}
             struck = record["kind"] == of.BEGAN and record["modes"] > 0
-            found.append(Report(**known, parameters=_string(record["own"]) if struck else None))
+            new_reports.append(Report(**known, parameters=_string(record["own"]) if struck else None))
         with self._lock:
-            for each in found:
-                self._struck.pop(each.id, None)
-        return found
+            for report in new_reports:
+                self._struck.pop(report.id, None)
+        return new_reports
 
     def ringing(self) -> list[Ringing]:
         """The notes that have their places and ring. Any thread; the levels are those of the latest quantum."""
-        found = []
+        notes = []
         for number, note in enumerate(self._notes()):
             if note["state"] != of.RINGS or not note["has_place"] or note["member"]:
                 continue
@@ -307,8 +309,8 @@ class CompiledPlayer:
                 frames = max(int(voice["frame"]) for voice in alive.values())
                 id, channel, key, string = (int(note[name]) for name in ("id", "channel", "key", "string"))
                 length_m = self._length_m(note, self.rows_of(number, min(alive)))
-                found.append(Ringing(id, channel, key, level, frames / self.rate_hz, string, length_m))
-        return found
+                notes.append(Ringing(id, channel, key, level, frames / self.rate_hz, string, length_m))
+        return notes
 
     def _length_m(self, note: np.void, rows: NDArray[np.float64]) -> float | None:
         """The length of a note's string in m.
@@ -317,11 +319,11 @@ class CompiledPlayer:
         """
         if note["drum"]:
             return None
-        own = _string(note["string_now"])
-        if own is None:
+        string = _string(note["string_now"])
+        if string is None:
             return None
         present = float(rows[OMEGA_SQUARED, 0])
-        return own.length_m * (own.undamped_frequency(1) / math.sqrt(present) if present > 0.0 else 1.0)
+        return string.length_m * (string.undamped_frequency(1) / math.sqrt(present) if present > 0.0 else 1.0)
 
     def missing(self, ids: Iterable[int]) -> list[int]:
         """The notes of these that have ended, where reports were missed.
@@ -400,25 +402,25 @@ class CompiledPlayer:
 
     def channel(self, number: int) -> Channel:
         """The positions of a channel's wheels and pedals."""
-        own = self.record["channels"][number].copy()
-        slide, wide = int(own["slide"]), float(own["range_semitones"])
-        legato, slides, harmonics, tremolo, strums = map(bool, own["switches"])
+        state = self.record["channels"][number].copy()
+        slide, wide = int(state["slide"]), float(state["range_semitones"])
+        legato, slides, harmonics, tremolo, strums = map(bool, state["switches"])
         return Channel(
-            float(own["bend"]),
-            bool(own["pedal"]),
+            float(state["bend"]),
+            bool(state["pedal"]),
             slide if slide >= 0 else None,
             wide if wide >= 0 else None,
-            round(127 * float(own["mute"])),
+            round(127 * float(state["mute"])),
             legato,
             slides,
-            int(own["slide_time"]),
+            int(state["slide_time"]),
             harmonics,
             tremolo,
             strums,
-            int(own["volume"]),
-            int(own["expression"]),
-            int(own["coarse_tuning"]),
-            int(own["fine_tuning"]),
+            int(state["volume"]),
+            int(state["expression"]),
+            int(state["coarse_tuning"]),
+            int(state["fine_tuning"]),
         )
 
 

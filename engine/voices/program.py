@@ -52,13 +52,13 @@ class Program:
 
     def weights(self, ear: Ear) -> tuple[Array, Array]:
         """The weights of a pair of listening points, as `read`; remembered. Any thread may ask."""
-        found = self._known.get(ear)
-        if found is None:
-            found = self.read(self.grid_weights(ear))
+        known = self._known.get(ear)
+        if known is None:
+            known = self.read(self.grid_weights(ear))
             if len(self._known) >= KEPT_WEIGHTS:
                 self._known.clear()
-            self._known[ear] = found
-        return found
+            self._known[ear] = known
+        return known
 
     def grid_weights(self, ear: Ear) -> Array:
         """The weights on the grid for its string, as `weights_of`; displacement @ weights is the signal."""
@@ -80,7 +80,8 @@ def voice_ends_s(info: PresetInfo) -> float:
     It is inf where its string has no losses.
 
     The string itself is silent by then. A model need not be: one that was trained on a part of a second may settle to
-    a hum of its own, and nothing it has learned makes it end. Latents that share a tension need no such end: their
+    a
+    hum of its own. Nothing it has learned makes it end. Latents that share a tension need no such end: their
     energy is held below that of the slowest mode.
     """
     return max(info.horizon_s, info.resonator.falls_s(STRING_SILENT_DB))

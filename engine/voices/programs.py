@@ -37,7 +37,9 @@ DRUM_SILENCE = 2e-7
 # amplitudes, below which it is laid to rest for good.
 DRUM_UNHEARD, DRUM_STILL = 1e-7, 1e-8
 HEARD_COARSER = 15  # times fewer sub-steps than data are made with: 1e-5 off after a second, far below audibility
-FILTER_TAPS, FILTER_PHASES, FILTER_BETA = 32, 512, 10.0
+FILTER_TAPS = 32
+FILTER_PHASES = 512
+FILTER_BETA = 10.0
 
 
 def tension_program(
@@ -116,8 +118,8 @@ def _with_modes(kind: int, memory: Array, resonator: Resonator, rate_hz: int, al
         return resonator.to_modes(displacement_m), np.zeros(n)
 
     def read(weights: Array) -> tuple[Array, Array]:
-        found = weights.T @ shapes.T / FULL_SCALE_M
-        return np.concatenate([found, np.zeros_like(found)], axis=1), np.zeros(len(found))
+        weighted = weights.T @ shapes.T / FULL_SCALE_M
+        return np.concatenate([weighted, np.zeros_like(weighted)], axis=1), np.zeros(len(weighted))
 
     return Program(kind, memory, n, rate_hz, resonator.points, start, read, resonator, force=resonator.force_weights)
 

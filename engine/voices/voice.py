@@ -65,7 +65,9 @@ class Voice:
         self.program, self.ear = program, ear
         self.memory = np.zeros(slots(VOICE) + (WEIGHT_ROWS + rows) * n)
         self.record = record = record_of(self.memory, VOICE)
-        record["kind"], record["program"], record["modes"] = program.kind, program.address, n
+        record["kind"] = program.kind
+        record["program"] = program.address
+        record["modes"] = n
         record["points"], record["velocity"] = len(ear.points), ear.pickup == "velocity"
         self.start_with_gain(gain)
         record["began_frame"] = -1
@@ -183,7 +185,7 @@ class Voice:
 
     def fade_out_by(self, seconds: float) -> None:
         """Fade it to silence by then, where it does not end earlier; call this before it is handed over."""
-        end, fade = (round(each * self.program.rate_hz) for each in (seconds, FADE_S))
+        end, fade = (round(time_s * self.program.rate_hz) for time_s in (seconds, FADE_S))
         if self.record["ends_at"] + self.record["ends_in"] > end:
             self.record["ends_at"] = max(0, min(int(self.record["ends_at"]), end - fade))
             self.record["ends_in"] = fade
@@ -269,9 +271,9 @@ class Voice:
     def _set_weights(self, which: int, ear: Ear) -> None:
         n = self.program.modes
         weights, bias = self.program.weights(ear)
-        own = self.memory[slots(VOICE) : slots(VOICE) + WEIGHT_ROWS * n].reshape(2, 2, 2 * n)
+        rows = self.memory[slots(VOICE) : slots(VOICE) + WEIGHT_ROWS * n].reshape(2, 2, 2 * n)
         for point in range(len(ear.points)):
-            own[which, point] = weights[point]
+            rows[which, point] = weights[point]
             self.record["bias"][which, point] = bias[point]
 
 

@@ -28,7 +28,9 @@ class Shares:
     """Progress of several pieces of work of equal length, one after the other."""
 
     def __init__(self, report: Report, pieces: int) -> None:
-        self._report, self._pieces, self._begun = report, pieces, 0
+        self._report = report
+        self._pieces = pieces
+        self._begun = 0
 
     def next(self) -> Callable[[float], None]:
         """Begin the next piece; return a function that is called with the share of it that is done, 0 … 1."""

@@ -92,11 +92,11 @@ def evaluate(
         ("--on", on),
         *of_string,
     )
-    for option, given in of_data if heard else of_heard:
-        if given:
+    for option, value in of_data if heard else of_heard:
+        if value:
             raise typer.BadParameter(f"does not go {'with' if heard else 'without'} --heard", param_hint=option)
-    for option, given in of_string if on is not None else ():
-        if given:
+    for option, value in of_string if on is not None else ():
+        if value:
             raise typer.BadParameter("does not go with --on, whose run has a string", param_hint=option)
     if heard:
         _evaluate_heard(preset, everything, write, json)
@@ -152,8 +152,8 @@ def evaluate(
         return
     for name, errors in measured.items():
         _print_errors(name, errors, info.horizon_s, known if name == "validation" else {})
-        for found in errors.get("partials", [])[: 2 if past else 1]:  # the whole horizon, and all past it
-            _print_partials(name, found)
+        for window_errors in errors.get("partials", [])[: 2 if past else 1]:  # the whole horizon, and all past it
+            _print_partials(name, window_errors)
 
 
 def _evaluate_heard(preset: str | None, everything: bool, write: bool, json: bool) -> None:
@@ -196,7 +196,7 @@ class _Measurement:
             report=self.report.next(),
         )
         whole, sound = motion.string.total(info.horizon_steps), motion.sound.total(info.horizon_steps)
-        found: dict[str, Any] = {
+        facts: dict[str, Any] = {
             "trajectories": len(motion.string.per_trajectory()[0]),
             "rel_mse": whole.rel_mse,
             "rel_mae": whole.rel_mae,
@@ -208,36 +208,36 @@ class _Measurement:
         }
         if not self.past_s:  # a trajectory's own error is over all that was measured
             spread = motion.string.spread()
-            found |= {"rel_mse_spread": spread.rel_mse, "rel_mae_spread": spread.rel_mae}
+            facts |= {"rel_mse_spread": spread.rel_mse, "rel_mae_spread": spread.rel_mae}
             batches = motion.string.mean_of_batches(SCRIPT_BATCH)
-            found |= {"rel_mse_batches": batches.rel_mse, "rel_mae_batches": batches.rel_mae}
+            facts |= {"rel_mse_batches": batches.rel_mse, "rel_mae_batches": batches.rel_mae}
             if info.tension_modulated:
                 groups = errors_by_rise(motion.string, self.data.configuration, split)
-                found["by_rise"] = [asdict(group) for group in groups]
+                facts["by_rise"] = [asdict(group) for group in groups]
         if info.horizon_steps > SHORT_HORIZON:
             short = motion.string.total(SHORT_HORIZON)
-            found |= {f"rel_mse_{SHORT_HORIZON}": short.rel_mse, f"rel_mae_{SHORT_HORIZON}": short.rel_mae}
+            facts |= {f"rel_mse_{SHORT_HORIZON}": short.rel_mse, f"rel_mae_{SHORT_HORIZON}": short.rel_mae}
         edges = [0.0, *(stop_s for _, stop_s in windows)]
         sums = (motion.string.windows(info.rate_hz, edges), motion.sound.windows(info.rate_hz, edges))
-        found["windows"] = [
+        facts["windows"] = [
             {
                 **asdict(window),
                 **self._label(window.start_s, window.stop_s),
                 **_with_se(motion.string, *(round(at_s * info.rate_hz) for at_s in (window.start_s, window.stop_s))),
-                "null_depth_db": heard.null_depth_db,
+                "null_depth_db": of_window.null_depth_db,
                 "spectral_convergence": spectrum.convergence,
                 "log_spectrum_db": spectrum.log_db,
             }
-            for window, heard, spectrum in zip(*sums, motion.spectra[1:], strict=True)
+            for window, of_window, spectrum in zip(*sums, motion.spectra[1:], strict=True)
         ]
         end_s = windows[-1][1]
         if self.past_s and end_s >= 2:  # whether it rings true: the question of every long run
             for name, start_s in (("first_second", 0.0), ("last_second", end_s - 1)):
                 (second,) = motion.string.windows(info.rate_hz, [start_s, start_s + 1])
-                found[name] = {"rel_mse": second.rel_mse, "rel_mae": second.rel_mae}
+                facts[name] = {"rel_mse": second.rel_mse, "rel_mae": second.rel_mae}
         if self.partials:
-            found["partials"] = self._partials(split, windows)
-        return found
+            facts["partials"] = self._partials(split, windows)
+        return facts
 
     def _stored(self, split: str) -> dict[str, float | None]:
         info = self.preset.info
@@ -295,10 +295,10 @@ def _on(preset: Preset, run: str) -> Preset:
 
     data = load(run).data
     reported = replace(preset.info, tension_modulated=data.tension_modulated)
-    own = of_string(replace(preset, info=reported), data.string, data.rate_hz, data.modes)
+    described = of_string(replace(preset, info=reported), data.string, data.rate_hz, data.modes)
     # the errors that it reports are those of the family
-    info = replace(own.info, rel_mse=None, rel_mae=None, test_rel_mse=None, test_rel_mae=None)
-    return replace(own, info=replace(info, horizon_steps=data.steps))
+    info = replace(described.info, rel_mse=None, rel_mae=None, test_rel_mse=None, test_rel_mae=None)
+    return replace(described, info=replace(info, horizon_steps=data.steps))
 
 
 def _data_of(preset: Preset, on: str | None = None) -> DatasetConfiguration:
@@ -387,13 +387,13 @@ def _by_rise(group: dict[str, Any]) -> list[object]:
     return [group["trajectories"], *rises, group["rel_mse"], group["rel_mae"], *shares]
 
 
-def _print_partials(split: str, found: dict[str, Any]) -> None:
-    past = ", past the training horizon" if found["past_horizon"] else ""
-    print(f"{split}, partials of {found['start_s']:g} … {found['stop_s']:g} s{past}: medians of the magnitudes")
+def _print_partials(split: str, partials: dict[str, Any]) -> None:
+    past = ", past the training horizon" if partials["past_horizon"] else ""
+    print(f"{split}, partials of {partials['start_s']:g} … {partials['stop_s']:g} s{past}: medians of the magnitudes")
     figures = ("Hz", "level dB", "phase cycles", "cents", "T60 s", "T60 error %", "glide cents", "glide error")
     columns = ("mode", "trajectories", *figures)
-    rows = [list(mode.values()) for mode in found["modes"]]
-    w = found["weighted"]
+    rows = [list(mode.values()) for mode in partials["modes"]]
+    w = partials["weighted"]
     mean = [
         "all, by energy",
         "",

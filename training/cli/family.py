@@ -105,9 +105,11 @@ def evaluate(
     with progress("family evaluate") as report:
         shares = Shares(report, 2 * (1 + (tenth > 0)))
         measured = measured_errors(players, strings, rate, seed, shares)
-        found = {column: {name: facts_of(one) for name, one in errors.items()} for column, errors in measured.items()}
+        facts_by_column = {
+            column: {name: facts_of(one) for name, one in errors.items()} for column, errors in measured.items()
+        }
         for column, errors in measured.items():
-            of_preset, facts = errors[loaded.name].strings, found[column][loaded.name]
+            of_preset, facts = errors[loaded.name].strings, facts_by_column[column][loaded.name]
             facts["by_rise"] = [
                 {"from": low, "to": high, "strings": len(part.strings), **facts_of(part)}
                 for (low, high), part in by_rise(of_preset, RISES)
@@ -118,9 +120,9 @@ def evaluate(
                 last = measure(alone, column, "test", tenth, rate, span_s, seed=seed, report=reported)[loaded.name]
                 facts["tenth_second"] = _tenth_second(of_preset[:tenth], last.strings)
     if json:
-        print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **found})
+        print_json({"preset": loaded.name, "strings": strings, "rate_hz": rate, "seed": seed, **facts_by_column})
         return
-    for column_name, of_column in found.items():
+    for column_name, of_column in facts_by_column.items():
         print_column(column_name, of_column, strings, rate)
         facts = of_column[loaded.name]
         rows = [

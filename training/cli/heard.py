@@ -26,29 +26,29 @@ def show_heard(files: Iterable[Path], write: bool, json: bool) -> None:
     from engine.schema import write as plain
     from training.heard_words import heard_word
 
-    found = []
+    rows = []
     files = list(files)
     with progress("listen") as report:
         for number, path in enumerate(files):
             try:
-                found.append(
+                rows.append(
                     measure(path, write, lambda share, number=number: report((number + share) / len(files)))  # type: ignore[misc]
                 )
             except (PresetError, ValueError) as error:
                 say(str(error))
-    found.sort(key=lambda heard: heard.distance_db)
+    rows.sort(key=lambda row: row.distance_db)
     if json:
-        print_json([{**plain(heard), "heard": heard_word(heard)} for heard in found])
+        print_json([{**plain(row), "heard": heard_word(row)} for row in rows])
         return
     print_table(
         COLUMNS,
         [
             [
-                heard.name,
-                heard_word(heard),
-                *(None if v is None else round(v, 2) + 0.0 for v in _figures(heard)),
+                row.name,
+                heard_word(row),
+                *(None if v is None else round(v, 2) + 0.0 for v in _figures(row)),
             ]
-            for heard in found
+            for row in rows
         ],
     )
 
@@ -67,19 +67,19 @@ def measure(path: Path, write: bool, report: Callable[[float], None] = lambda sh
     from training.heard import listen_to
     from training.heard_file import add_heard
 
-    heard = listen_to(load_preset(path), report)
+    row = listen_to(load_preset(path), report)
     if write:
-        add_heard(path.parent, [heard])
-    return heard
+        add_heard(path.parent, [row])
+    return row
 
 
-def _figures(heard: Heard) -> tuple[float | None, ...]:
+def _figures(row: Heard) -> tuple[float | None, ...]:
     return (
-        heard.distance_db,
-        heard.level_db,
-        heard.rise_db,
-        heard.pitch_cents,
-        heard.split_cents,
-        heard.runs_away_s,
-        heard.hum_db,
+        row.distance_db,
+        row.level_db,
+        row.rise_db,
+        row.pitch_cents,
+        row.split_cents,
+        row.runs_away_s,
+        row.hum_db,
     )

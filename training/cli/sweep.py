@@ -113,10 +113,10 @@ def sweep(
     rows = [row for row in known if row.digest in {run.digest for run in chosen.runs}]
     if left:
         try:
-            with opened as found:
-                say(f"on {found.description}")
+            with opened as pool:
+                say(f"on {pool.description}")
                 with bars(LINE_EVERY_S) as begin:
-                    rows = run(chosen, found, options, Shown(begin, left, found.capacity()))
+                    rows = run(chosen, pool, options, Shown(begin, left, pool.capacity()))
         except KeyboardInterrupt:
             say("stopped; the same command continues")
             raise
@@ -185,7 +185,9 @@ class Shown:
 
     def __init__(self, begin: Callable[[str], Report], left: int, at_once: int) -> None:
         """`left`: runs that have not ended; `at_once`: how many run at a time."""
-        self._begin, self._left, self._at_once = begin, left, at_once
+        self._begin = begin
+        self._left = left
+        self._at_once = at_once
         self._reports: dict[str, Report] = {}
         self._shown: dict[str, Callable[[Progress], None]] = {}
         self._last: dict[str, Progress] = {}  # of each run that is under way

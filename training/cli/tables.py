@@ -40,10 +40,10 @@ def table(
     from training.tables.tidy_csv import as_csv
 
     check_choice("--recipe", recipe, ("all", *recipe_names()))
-    found = read_results(results or RESULTS)
-    if not found:
+    rows = read_results(results or RESULTS)
+    if not rows:
         say(f"note: {results or RESULTS} has no rows; the tables hold the paper's figures only")
-    text = as_csv(found, recipe) if format == "csv" else as_compact(found, recipe, f"rel_{metric}")
+    text = as_csv(rows, recipe) if format == "csv" else as_compact(rows, recipe, f"rel_{metric}")
     if into is not None:
         text, output = _before(into) + text, into
     if output is None:

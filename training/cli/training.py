@@ -82,9 +82,9 @@ def train(
         with progress("train") as report:
             shown = training_report(report)
 
-            def follow(each: Progress) -> None:
-                begun.append(each)
-                shown(each)
+            def follow(latest: Progress) -> None:
+                begun.append(latest)
+                shown(latest)
 
             named = [_named(name, configuration, output, follow) for name, configuration in with_seeds]
             rows = run_rows(
@@ -158,7 +158,9 @@ def _tell_row(file: Path, row: Row) -> None:
 def _tell_mean(rows: Sequence[Row]) -> None:
     """Print mean and standard deviation of the validation errors, as the paper's tables state them."""
     errors = {"MSE": [row.rel_mse or 0.0 for row in rows], "MAE": [row.rel_mae or 0.0 for row in rows]}
-    words = ", ".join(f"rel. {name} {number(mean(found))} ± {number(stdev(found))}" for name, found in errors.items())
+    words = ", ".join(
+        f"rel. {name} {number(mean(values))} ± {number(stdev(values))}" for name, values in errors.items()
+    )
     print(f"{len(rows)} seeds{'':<4} {words} (validation)")
 
 
@@ -171,16 +173,16 @@ def known_errors(run: TrainingConfiguration) -> Known:
     from training.results import RESULTS, read_results
     from training.tables.paper import Column, paper_errors
 
-    found: Known = {}
+    known_by_source: Known = {}
     kind = "nonlinear" if run.data.tension_modulated else "linear"
     place = (kind, run.steps, run.model, Column(run.data.initial, run.data.rate_hz))
     paper = paper_errors().get(place) if follows_protocol(run.data) else None
     if paper is not None and paper.rel_mse and paper.rel_mae:
-        found["paper"] = paper.rel_mse.mean, paper.rel_mae.mean
+        known_by_source["paper"] = paper.rel_mse.mean, paper.rel_mae.mean
     for known in read_results(RESULTS):
         if known.digest == run.digest and known.status == "done":
-            found["project"] = known.rel_mse, known.rel_mae
-    return found
+            known_by_source["project"] = known.rel_mse, known.rel_mae
+    return known_by_source
 
 
 def print_known(known: Known) -> None:

@@ -129,10 +129,10 @@ def _map(file: Path, shape: tuple[int, int, int], checksum: int) -> np.ndarray[A
     values = np.load(file, mmap_mode="c")
     if values.shape != shape or values.dtype != np.float32:
         raise ValueError(f"{file.name} holds {values.dtype} {values.shape}, expected float32 {shape}")
-    found = 0
+    sum_so_far = 0
     for part in values:
-        found = zlib.crc32(part.tobytes(), found)
-    if found != checksum:
+        sum_so_far = zlib.crc32(part.tobytes(), sum_so_far)
+    if sum_so_far != checksum:
         raise ValueError(f"{file.name} does not have its checksum")
     return values
 

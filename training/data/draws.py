@@ -52,7 +52,9 @@ def draw_plucks(count: int, grid_points: int, generator: torch.Generator) -> Arr
         for low, high in (PLUCK_WIDTH_RANGE, PLUCK_PEAK_RANGE_M)
     )
     shapes = itertools.cycle(("gaussian", "triangular", "raised_cosine"))
-    return np.stack([displacement(*each, grid_points) for each in zip(shapes, position, width, peak_m, strict=False)])
+    return np.stack(
+        [displacement(*pluck, grid_points) for pluck in zip(shapes, position, width, peak_m, strict=False)]
+    )
 
 
 DRAWS = {"gaussian": draw_gaussians, "noise": draw_noise, "pluck": draw_plucks}

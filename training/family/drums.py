@@ -57,7 +57,11 @@ RANGES: Mapping[Kind, Ranges] = {
     "steel plate": ((0.15, 0.50), (0.4, 0.95), (3e-4, 1.2e-3), (0, 0)),
     "narrow plate": ((0.15, 0.40), (0.05, 0.15), (5e-4, 2e-3), (0, 0)),
 }
-T60_S, BRIGHT_T60_S, RISE, RADIUS_M, CONTACT_S = (0.4, 2.5), (0.08, 0.35), (0.02, 0.5), (0.005, 0.04), (1e-3, 5e-3)
+T60_S = (0.4, 2.5)
+BRIGHT_T60_S = (0.08, 0.35)
+RISE = (0.02, 0.5)
+RADIUS_M = (0.005, 0.04)
+CONTACT_S = (1e-3, 5e-3)
 SCATTER = 0.2
 NOWHERE = np.zeros((1, 2))  # a place, where none counts
 AIRLESS: tuple[Kind, ...] = ("steel plate", "narrow plate")
@@ -188,8 +192,8 @@ def _solved(resonator: Resonator, struck: StruckDrum, rate_hz: int) -> Blocks:
 
     def more(frames: int) -> Tensor:
         nonlocal state
-        found, state = solver.advance(state, frames)
-        return found[0]
+        motion, state = solver.advance(state, frames)
+        return motion[0]
 
     return more
 
@@ -203,14 +207,14 @@ def model_player(model: StringModel[Any]) -> DrumPlayer:
         raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
 
     def play(struck: StruckDrum, rate_hz: int) -> Blocks:
-        own = model.for_resonator(Physics(struck.resonator, rate_hz, SCALE_M))
+        of_drum = model.for_resonator(Physics(struck.resonator, rate_hz, SCALE_M))
         q, v = (torch.from_numpy(part)[None] / SCALE_M for part in (struck.amplitudes_m, struck.speeds_m_s))
-        state = own.encode_modes(q, v / rate_hz)
+        state = of_drum.encode_modes(q, v / rate_hz)
 
         def more(frames: int) -> Tensor:
             nonlocal state
-            found, state = own.advance_modes(state, frames)
-            return found[0] * SCALE_M
+            motion, state = of_drum.advance_modes(state, frames)
+            return motion[0] * SCALE_M
 
         return more
 
@@ -321,15 +325,15 @@ def motion_errors(
             energy[part] += float((expected.square() @ weight).sum())
             for place, more in enumerate(playing):
                 begun = time.process_time()
-                found = more(count)
+                motion = more(count)
                 spent[part, place] += time.process_time() - begun
-                wrong[part, place] += float(((found - expected).square() @ weight).sum())
+                wrong[part, place] += float(((motion - expected).square() @ weight).sum())
             report((begin + count) / frames)
 
     def window(first: int, stop: int, of: slice) -> Window:
         whole = float(energy[of].sum())
-        errors = [_finite(each / whole) if whole else math.nan for each in wrong[of].sum(0)]
-        by_player = (dict(zip(players, each, strict=True)) for each in (errors, spent[of].sum(0).tolist()))
+        errors = [_finite(sums / whole) if whole else math.nan for sums in wrong[of].sum(0)]
+        by_player = (dict(zip(players, sums, strict=True)) for sums in (errors, spent[of].sum(0).tolist()))
         return Window(first / rate_hz, stop / rate_hz, whole, *by_player)
 
     parts = [window(*ends, slice(place, place + 1)) for place, ends in enumerate(pairwise(edges))]
@@ -354,20 +358,20 @@ def measure_drums(
     Raises:
         SchemaError: the checkpoint is no table of errors.
     """
-    found: list[DrumError] = []
+    errors: list[DrumError] = []
     if checkpoint is not None and checkpoint.exists():
-        found = list(checked(read_table(DrumError, checkpoint, "table of drums", LARGEST_BYTES)))
+        errors = list(checked(read_table(DrumError, checkpoint, "table of drums", LARGEST_BYTES)))
     wanted = [(number, False) for number in range(count)] + [(number, True) for number in range(tenth)]
     for done, (number, slow) in enumerate(wanted, 1):
-        known = {one.player for one in found if (one.number, one.slow) == (number, slow)}
+        known = {one.player for one in errors if (one.number, one.slow) == (number, slow)}
         lacking = {name: play for name, play in players.items() if name not in known}
         if lacking:
-            found += measure_drum(number, lacking, rate_hz, slow, seed)
+            errors += measure_drum(number, lacking, rate_hz, slow, seed)
             if checkpoint is not None:
                 checkpoint.parent.mkdir(parents=True, exist_ok=True)
-                write_table(checkpoint, DrumError, found)
+                write_table(checkpoint, DrumError, errors)
         report(done / len(wanted))
-    return [one for one in found if (one.number, one.slow) in wanted and one.player in players]
+    return [one for one in errors if (one.number, one.slow) in wanted and one.player in players]
 
 
 def checkpoint_file(runs: Path, preset: str, rate_hz: int, seed: int) -> Path:
@@ -402,26 +406,26 @@ def summary(errors: Iterable[DrumError], player: str, rate_hz: int, seed: int) -
     `tenth_first` is the first second's mean of the drums that sound in the tenth.
     """
     of_player = [one for one in errors if one.player == player]
-    own, slow = ([one for one in of_player if one.slow == kind] for kind in (False, True))
-    worst = max(own, key=lambda one: one.first)
+    of_kind, slow = ([one for one in of_player if one.slow == kind] for kind in (False, True))
+    worst = max(of_kind, key=lambda one: one.first)
     late = [one for one in slow if one.tenth is not None]
-    modes = sorted(one.modes for one in own)
+    modes = sorted(one.modes for one in of_kind)
     return DrumsRow(
         player,
-        len(own),
+        len(of_kind),
         rate_hz,
         seed,
         f"{modes[0]} … {modes[-1]}",
-        _mean(one.first for one in own),
+        _mean(one.first for one in of_kind),
         worst.first,
         f"{worst.kind}, {worst.pitch_hz:.0f} Hz, {worst.modes} modes, rise {worst.tension_rise:.2f}",
-        _mean(one.first for one in own if one.blow == "blow"),
-        _mean(one.first for one in own if one.blow == "pressed"),
+        _mean(one.first for one in of_kind if one.blow == "blow"),
+        _mean(one.first for one in of_kind if one.blow == "pressed"),
         len(late),
         _mean(one.tenth for one in late),
         max((one.tenth for one in late if one.tenth is not None), default=None),
         _mean(one.first for one in late),
-        float(np.median([one.processor_s for one in own])),
+        float(np.median([one.processor_s for one in of_kind])),
         time.strftime("%Y-%m-%dT%H:%M:%SZ", time.gmtime()),
     )
 

@@ -84,7 +84,7 @@ def measure(
 ) -> dict[str, FamilyErrors]:
     """The errors of each player from one time to another after the pluck."""
     first, last = (round(edge * rate_hz) for edge in seconds)
-    found: dict[str, list[StringError]] = {name: [] for name in players}
+    errors_by_player: dict[str, list[StringError]] = {name: [] for name in players}
     for number in range(count):
         plucked = draw_string(column, split, number, seed)
         truth = solve(plucked, rate_hz, last)[first:]
@@ -96,9 +96,9 @@ def measure(
             error = error_to_signal(played[first:], truth, unheard)
             sounds = float(truth.square().sum()) > unheard
             reported = (plucked.pitch_hz, plucked.inharmonicity, plucked.tension_rise, plucked.resonator.modes)
-            found[name].append(StringError(*reported, error, processor_s, sounds))
+            errors_by_player[name].append(StringError(*reported, error, processor_s, sounds))
         report((number + 1) / count)
-    return {name: FamilyErrors(tuple(errors)) for name, errors in found.items()}
+    return {name: FamilyErrors(tuple(errors)) for name, errors in errors_by_player.items()}
 
 
 def player(model: StringModel[Any]) -> Player:
@@ -107,15 +107,17 @@ def player(model: StringModel[Any]) -> Player:
         raise ValueError("its model knows the one string that it learned; choose a preset of many strings")
 
     def play(plucked: PluckedString, rate_hz: int, steps: int) -> Tensor:
-        own = model.for_resonator(Physics(plucked.resonator, rate_hz, SCALE_M))
-        return rollout(own, plucked, steps)
+        of_string = model.for_resonator(Physics(plucked.resonator, rate_hz, SCALE_M))
+        return rollout(of_string, plucked, steps)
 
     return play
 
 
 def rollout(model: StringModel[Any], plucked: PluckedString, steps: int) -> Tensor:
     displacement = (displacement_m(plucked)[None] / SCALE_M).to(torch.get_default_dtype())
-    state, blocks, done = model.encode(displacement), [], 0
+    state = model.encode(displacement)
+    blocks = []
+    done = 0
     while done < steps:
         count = min(4_800, steps - done)
         frames, state = model.advance(state, count)
@@ -129,11 +131,11 @@ def by_rise(errors: Sequence[StringError], edges: Sequence[float]) -> list[tuple
 
     The last has both ends, and ranges without a string are left out.
     """
-    found = []
+    groups = []
     for low, high in pairwise(edges):
         inside = tuple(
             one for one in errors if low <= one.tension_rise < high or one.tension_rise == high == edges[-1]
         )
         if inside:
-            found.append(((low, high), FamilyErrors(inside)))
-    return found
+            groups.append(((low, high), FamilyErrors(inside)))
+    return groups

@@ -1,6 +1,6 @@
 """The curves of `koopman_tension` from the motions of many strings: Gauss and Newton with Levenberg's damping.
 
-There are a dozen numbers, and each string's error is close to quadratic in them, so that a step by least squares
+There are a dozen numbers, and each string's error is close to quadratic in them. A step by least squares
 does what a thousand steps along a gradient do. The loss is the mean logarithm of each string's relative error: a
 string on which it is 1e-9 counts as much as one on which it is 1e-3. Its Gauss–Newton matrix is that of the residuals
 divided by the present errors. Derivatives by the curves' numbers are differences, which the smooth motion allows.
@@ -56,7 +56,9 @@ def fit_curves(
     longest = len(train[0].truth)
     size = len(model.A)
     best, present = geometric_mean(errors(model, validation, rate_hz, longest)), _numbers(model)
-    best_numbers, damping, started = present.clone(), 1e-3, time.monotonic()
+    best_numbers = present.clone()
+    damping = 1e-3
+    started = time.monotonic()
     for step in range(steps):
         frames = min(longest, round(first_frames * (longest / first_frames) ** (2 * step / max(1, steps))))
         residual = [_motion(model, case, rate_hz, frames) - case.truth[:frames] for case in train]
@@ -71,8 +73,8 @@ def fit_curves(
             moved[number] += DIFFERENCE
             _set(model, moved)
             for place, case in enumerate(train):
-                found = _motion(model, case, rate_hz, frames)[chosen[place]] - case.truth[chosen[place]]
-                columns[place].append(((found - residual[place][chosen[place]]) / DIFFERENCE).flatten())
+                change = _motion(model, case, rate_hz, frames)[chosen[place]] - case.truth[chosen[place]]
+                columns[place].append(((change - residual[place][chosen[place]]) / DIFFERENCE).flatten())
         for place, case in enumerate(train):
             jacobian = torch.stack(columns[place], dim=1)
             weight = frames / len(chosen[place]) / float(case.truth[:frames].square().sum() * (before[place] + FLOOR))
@@ -104,8 +106,8 @@ def fit_curves(
 
 def errors(model: KoopmanTension, cases: Sequence[Case], rate_hz: int, frames: int) -> Tensor:
     """Relative squared error of each string's first frames, over the whole grid, (strings,)."""
-    found = [error_to_signal(_motion(model, case, rate_hz, frames), case.truth[:frames]) for case in cases]
-    return torch.tensor(found, dtype=torch.float64)
+    shares = [error_to_signal(_motion(model, case, rate_hz, frames), case.truth[:frames]) for case in cases]
+    return torch.tensor(shares, dtype=torch.float64)
 
 
 def geometric_mean(errors: Tensor) -> float:
@@ -115,8 +117,8 @@ def geometric_mean(errors: Tensor) -> float:
 @torch.no_grad()
 def _motion(model: KoopmanTension, case: Case, rate_hz: int, frames: int) -> Tensor:
     """Modal amplitudes in m, (frames, modes): sines are orthogonal, so that their errors are the grid's."""
-    own = model.for_resonator(Physics(case.plucked.resonator, rate_hz))
-    return own.amplitudes(own.encode(displacement_m(case.plucked)[None]), frames)[0]
+    of_string = model.for_resonator(Physics(case.plucked.resonator, rate_hz))
+    return of_string.amplitudes(of_string.encode(displacement_m(case.plucked)[None]), frames)[0]
 
 
 def _numbers(model: KoopmanTension) -> Tensor:

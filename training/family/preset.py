@@ -144,6 +144,6 @@ def mean_errors(model: KoopmanTension, cases: list[Case], rate_hz: int) -> tuple
     errors = []
     for case in cases:
         shapes = torch.from_numpy(case.plucked.resonator.shapes)
-        found = play(case.plucked, rate_hz, len(case.truth)) @ shapes
-        errors.append(relative_error(found[None], (case.truth @ shapes)[None]))
-    return mean(each.rel_mse for each in errors), mean(each.rel_mae for each in errors)
+        displacement = play(case.plucked, rate_hz, len(case.truth)) @ shapes
+        errors.append(relative_error(displacement[None], (case.truth @ shapes)[None]))
+    return mean(error.rel_mse for error in errors), mean(error.rel_mae for error in errors)

@@ -44,8 +44,8 @@ def put_on_shelf(preset: Preset, folder: Path) -> list[Path]:
     written = []
     for name, title in TITLES.items():
         string, description = read_described_string(STRINGS / f"{name}.toml")
-        own = of_string(preset, string)
-        info = replace(own.info, title=title, description=f"{description} Played by the model of every string.")
+        named = of_string(preset, string)
+        info = replace(named.info, title=title, description=f"{description} Played by the model of every string.")
         written.append(folder / f"studio_any_{name}.safetensors")
-        save_preset(written[-1], info, own.model)
+        save_preset(written[-1], info, named.model)
     return written

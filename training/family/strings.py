@@ -1,6 +1,6 @@
 """The family: strings with random pitch, inharmonicity and damping, each with a random pluck.
 
-A string's motion depends on three numbers of its own (inharmonicity B, two damping rates) and on the shape and the
+A string's motion depends on three numbers of its own (inharmonicity B, two damping rates), and on the shape and
 relative rise of tension of its pluck; pitch, length, density and tension rescale it exactly. So the ranges are those
 of audible properties, and strings of one length and density stand for all.
 """
@@ -30,7 +30,10 @@ FAMILY_VERSION = 1  # of what a seed means
 HIGHEST_HZ = 20_000.0
 MOST_MODES = 99
 GRID_POINTS = 101
-LENGTH_M, MASS_KG_M, AREA_M2, MODULUS_PA = 0.65, 5e-4, 5e-7, 2e10  # of every string: they change nothing but units
+LENGTH_M = 0.65
+MASS_KG_M = 5e-4
+AREA_M2 = 5e-7
+MODULUS_PA = 2e10  # of every string: they change nothing but units
 
 
 FAMILY: dict[Column, StringFamily] = {

@@ -1,7 +1,7 @@
 """Checkpoints of a run: safetensors with a JSON text, so that no pickle is ever read.
 
-A run's random numbers are functions of its seed and the iteration (see `fit`), so that weights, optimiser
-moments and the iteration are all that a bit-for-bit continuation needs.
+A run's random numbers are functions of its seed and the iteration (see `fit`). Weights, optimiser moments
+and the iteration are all that a bit-for-bit continuation needs.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Fitting a model to a data set: the loop, its schedules, its checkpoints.
 
-Every random choice is a function of (seed, iteration), and every schedule of the iteration alone, so that a run
+Every random choice is a function of (seed, iteration), and every schedule of the iteration alone. A run
 continued from a checkpoint is the run that was never interrupted, bit for bit (same machine, same threads).
 """
 
@@ -145,29 +145,29 @@ def fit_seeds(
         ValueError: a checkpoint is damaged or of another configuration, or the runs differ in more than their seeds.
     """
     first = seeds[0].configuration
-    if any(replace(each.configuration.recipe, seed=first.recipe.seed) != first.recipe for each in seeds) or any(
-        (each.configuration.model, each.configuration.data, each.configuration.steps)
+    if any(replace(seed.configuration.recipe, seed=first.recipe.seed) != first.recipe for seed in seeds) or any(
+        (seed.configuration.model, seed.configuration.data, seed.configuration.steps)
         != (first.model, first.data, first.steps)
-        for each in seeds
+        for seed in seeds
     ):
         raise ValueError("runs that are trained together must differ in their seeds alone")
     if first.start == LEAST_SQUARES:
-        return [_fit_at_once(each.configuration, dataset, each.report) for each in seeds]
+        return [_fit_at_once(seed.configuration, dataset, seed.report) for seed in seeds]
     every_s = CHECKPOINT_EVERY_S if checkpoint_every_s is None else checkpoint_every_s
-    under_way = [_UnderWay(each, dataset, torch.device(device)) for each in seeds]
+    under_way = [_UnderWay(seed, dataset, torch.device(device)) for seed in seeds]
     steps = Steps()
     started = before = time.monotonic()
     iterations = 0
-    while left := [each for each in under_way if not each.ended]:
-        step = min(each.run.step for each in left)
-        group = [each for each in left if each.run.step == step]
-        steps.take([each.run for each in group])
+    while left := [seed for seed in under_way if not seed.ended]:
+        step = min(seed.run.step for seed in left)
+        group = [seed for seed in left if seed.run.step == step]
+        steps.take([seed.run for seed in group])
         now, iterations = time.monotonic(), iterations + 1
-        for each in group:
-            each.run.seconds += (now - before) / len(group)
-            each.follow_step((now - started) / iterations, every_s)
+        for seed in group:
+            seed.run.seconds += (now - before) / len(group)
+            seed.follow_step((now - started) / iterations, every_s)
         before = now
-    return [each.outcome() for each in under_way]
+    return [seed.outcome() for seed in under_way]
 
 
 class _UnderWay:
@@ -274,7 +274,9 @@ class Run:
 
     def __init__(self, configuration: TrainingConfiguration, dataset: Dataset, device: torch.device) -> None:
         recipe = configuration.recipe
-        self._configuration, self.recipe, self._dataset = configuration, recipe, dataset
+        self._configuration = configuration
+        self.recipe = recipe
+        self._dataset = dataset
         self.device = device
         self.model, latents = begin(configuration, dataset)
         self._latents = latents.to(device) if latents else None

@@ -53,8 +53,8 @@ def training_loss(
             return _published_loss(model, batch, recipe, powers)
         origin = model.encode(batch.initial).origin
         latents = origin[:, None] * powers
-        found = model.read(model.states(latents, origin, powers))
-        return _text_loss(model, batch, recipe, origin, latents, found)
+        predicted = model.read(model.states(latents, origin, powers))
+        return _text_loss(model, batch, recipe, origin, latents, predicted)
     if isinstance(model, KoopmanModel):
         origin = model.encode(batch.initial).origin
         latents = model.latents(origin, batch.frames)
@@ -95,10 +95,15 @@ def _powers(model: ObservedModel, batch: Batch) -> Tensor:
 
 
 def _text_loss(
-    model: KoopmanModel | ObservedModel, batch: Batch, recipe: Recipe, origin: Tensor, latents: Tensor, found: Tensor
+    model: KoopmanModel | ObservedModel,
+    batch: Batch,
+    recipe: Recipe,
+    origin: Tensor,
+    latents: Tensor,
+    predicted: Tensor,
 ) -> tuple[Tensor, Tensor]:
     """The loss of the paper's text, of the frames `found`: encoding on the first frame, consistency of latents."""
-    loss, prediction = _prediction(found, batch.target, recipe)
+    loss, prediction = _prediction(predicted, batch.target, recipe)
     loss = loss + _mean_square(model.decode(origin), batch.initial)
     if recipe.consistency_weight:
         encoded = model.encode(batch.target.flatten(0, 1)).origin.view_as(latents)
@@ -126,16 +131,16 @@ def _predicted(model: StringModel[Any], batch: Batch) -> Tensor:
     return frames if batch.every else frames[:, batch.frames - 1]
 
 
-def _mean_square(found: Tensor, wanted: Tensor) -> Tensor:
-    return functional.mse_loss(found, wanted)
+def _mean_square(predicted: Tensor, wanted: Tensor) -> Tensor:
+    return functional.mse_loss(predicted, wanted)
 
 
-def _prediction(found: Tensor, wanted: Tensor, recipe: Recipe) -> tuple[Tensor, Tensor]:
+def _prediction(predicted: Tensor, wanted: Tensor, recipe: Recipe) -> tuple[Tensor, Tensor]:
     """The prediction's loss, and the mean square of its error."""
-    error = _mean_square(found, wanted)
+    error = _mean_square(predicted, wanted)
     if recipe.loss == "log10_mse":
         return error.log10(), error.detach()
     if recipe.loss == "relative_mse":
-        own = (found - wanted).square().mean((1, 2)) / wanted.square().mean((1, 2)).clamp(min=SILENT)
-        return own.mean(), error.detach()
+        relative = (predicted - wanted).square().mean((1, 2)) / wanted.square().mean((1, 2)).clamp(min=SILENT)
+        return relative.mean(), error.detach()
     return error, error.detach()

@@ -1,9 +1,9 @@
 """The modes that a matching pursuit works on: those of the string, or those that its motions show.
 
-Either way a mode is a shape over the grid, its motion in every trajectory, and a grid of exponentials that may be in
-that motion. What is known of the string says all of it at once: sines, linear frequencies, the range of the tension.
+Either way a mode is a shape over the grid, its motion in every trajectory, and the grid of exponentials that it may
+contain. What is known of the string says all of it at once: sines, linear frequencies, the range of the tension.
 A black box has the displacement alone: its shapes are those that the regression of u(t+1) + u(t-1) on u(t) leaves as
-they are, whatever their frequencies are and also where these move (a second-order dynamic mode decomposition;
+they are; whatever their frequencies are, and also where these move (a second-order dynamic mode decomposition;
 Schmid 2010); frequencies and decay are read off each shape's motions.
 """
 
@@ -53,10 +53,10 @@ def known_modes(dataset: Dataset, steps: int) -> Modes:
         rise = 0.5 * float(c.resonator.relative_tension_rise(amplitudes[:, 0].numpy() * dataset.scale_m).max())
     grids = []
     for eigenvalue in linear:
-        own = float(eigenvalue.imag)
-        reach = own - 4 * math.pi / steps, own * (1 + rise) + math.pi / steps
-        spacing = max(math.pi / 2 / steps, own * rise / FREQUENCIES)
-        grids.append(_grid(own, reach, spacing, -float(eigenvalue.real), steps))
+        linear_frequency = float(eigenvalue.imag)
+        reach = linear_frequency - 4 * math.pi / steps, linear_frequency * (1 + rise) + math.pi / steps
+        spacing = max(math.pi / 2 / steps, linear_frequency * rise / FREQUENCIES)
+        grids.append(_grid(linear_frequency, reach, spacing, -float(eigenvalue.real), steps))
     mirror = [1.0] * c.modes if c.resonator.mirror is None else c.resonator.mirror.tolist()
     return Modes(torch.from_numpy(c.resonator.shapes), amplitudes, tuple(grids), tuple(mirror))
 
@@ -76,9 +76,9 @@ def found_modes(dataset: Dataset, steps: int) -> Modes:
         now += middle.T @ middle
         next_to_it += (frames[:, 2:] + frames[:, :-2]).flatten(0, 1).T @ middle
     energies, directions = torch.linalg.eigh(now)
-    heard = energies > SILENT * energies[-1]
-    inside = directions[:, heard]
-    regression = (inside.T @ next_to_it @ inside) / energies[heard]
+    audible = energies > SILENT * energies[-1]
+    inside = directions[:, audible]
+    regression = (inside.T @ next_to_it @ inside) / energies[audible]
     cosines, vectors = torch.linalg.eig(regression / 2)
     if float(cosines.imag.abs().max()) > 1e-6 or float(cosines.real.abs().max()) >= 1:
         raise ValueError("the motions of the training data are no sum of vibrating shapes: no modes to be found")
@@ -114,9 +114,9 @@ def _seen_grid(motions: Tensor, steps: int) -> Tensor:
     return _grid(float(power.argmax()) * bin_width, reach, spacing, decay, steps)
 
 
-def _grid(own: float, reach: tuple[float, float], spacing: float, decay: float, steps: int) -> Tensor:
+def _grid(linear_frequency: float, reach: tuple[float, float], spacing: float, decay: float, steps: int) -> Tensor:
     """Frequencies in reach, and a mode's own, with each decay: log eigenvalues a sample."""
     frequencies = torch.arange(*reach, spacing, dtype=torch.float64)
-    frequencies = torch.cat([torch.tensor([own], dtype=torch.float64), frequencies[frequencies > 0]])
+    frequencies = torch.cat([torch.tensor([linear_frequency], dtype=torch.float64), frequencies[frequencies > 0]])
     decays = torch.tensor(DECAYS, dtype=torch.float64) / steps + decay
     return torch.complex(-decays.expand(len(frequencies), -1), frequencies[:, None].expand(-1, len(decays))).flatten()

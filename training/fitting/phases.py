@@ -2,13 +2,13 @@
 
 For an integrated phase, which has that form; `training.research.fourier_wiring` adds the Fourier cells.
 
-The shapes that the motions show (`modes`) keep theirs while their frequencies move, so that the motion of a mode n
-in a string that starts at rest is, with its start q_n and all starts' energies E_m(t) = q_m² e^{-2σ_m t},
+The shapes that the motions show (`modes`) keep theirs while their frequencies move. So the motion of a mode n in a
+string that starts at rest is, with its start q_n and all starts' energies E_m(t) = q_m² e^{-2σ_m t},
 
     q_n(t) = q_n Re s_n exp[(-σ_n + iω_n) t + i Σ_m κ_nm ∫₀ᵗ E_m(s) ds],     s_n ≈ 1,
 
 where σ_n, ω_n, s_n and the row κ_n are found by least squares, one mode after another. A phase can only be followed
-while it is known to less than half a turn, so the first fit sees a dozen frames, and each further one more of them.
+while it is known to less than half a turn. So the first fit sees a dozen frames, and each further one more of them.
 """
 
 from __future__ import annotations
@@ -49,27 +49,27 @@ def fit_phases(modes: Modes, seed: int) -> StringModes:
     trajectories, frames, count = motions.shape
     generator = np.random.default_rng(seed)
     energies = motions[:, 0] ** 2
-    found = [first_guess(motions[..., mode], count) for mode in range(count)]
+    guesses = [first_guess(motions[..., mode], count) for mode in range(count)]
     last = min(FIRST_FRAMES, frames - 1)
     while True:
         rows, times = generator.integers(trajectories, size=SAMPLES), generator.integers(1, last + 1, size=SAMPLES)
         slowest = SLOWEST / (frames - 1)  # of energies: a fit to a few frames may find them growing
-        sigma = np.array([max(guess[1], slowest) for guess in found])
+        sigma = np.array([max(guess[1], slowest) for guess in guesses])
         integrals = energies[rows] * -np.expm1(-2 * sigma * times[:, None]) / (2 * sigma)
-        for mode, guess in enumerate(found):
+        for mode, guess in enumerate(guesses):
             motion = Motion(motions[rows, 0, mode], motions[rows, times, mode], times.astype(float), integrals)
-            found[mode] = motion.fitted(guess)
+            guesses[mode] = motion.fitted(guess)
         if last == frames - 1:
             break
         last = min(frames - 1, int(MORE_FRAMES * last) + 1)
-    return string_modes([upright(guess) for guess in found], slowest, modes)
+    return string_modes([upright(guess) for guess in guesses], slowest, modes)
 
 
-def string_modes(found: list[Floats], slowest: float, modes: Modes) -> StringModes:
+def string_modes(motions: list[Floats], slowest: float, modes: Modes) -> StringModes:
     """The modes as fitted; uncoupled where there is no κ."""
-    omega, sigma, real, imag = np.array(found)[:, :4].T
-    count = len(found)
-    coupling = np.array(found)[:, 4:] if len(found[0]) > 4 else np.zeros((count, count))
+    omega, sigma, real, imag = np.array(motions)[:, :4].T
+    count = len(motions)
+    coupling = np.array(motions)[:, 4:] if len(motions[0]) > 4 else np.zeros((count, count))
     return StringModes(
         modes.shapes,
         torch.from_numpy(-np.maximum(sigma, slowest) + 1j * omega),

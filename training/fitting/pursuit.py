@@ -2,7 +2,7 @@
 
 With a linear decoder and given eigenvalues the best latents of a trajectory are a least-squares fit. So the
 eigenvalues are chosen first: for each mode the exponentials that explain most of all its motions, one
-after the other, from a grid of frequencies that it may have and of decay rates (simultaneous
+after the other. They come from a grid of frequencies that it may have and of decay rates (simultaneous
 orthogonal matching pursuit; Tropp, Gilbert, Strauss 2006). The decoder sums them, each in its mode's shape. Then
 the encoder learns the fitted latents, in orthonormal coordinates: the distance there *is* the error of the prediction
 over every frame of the horizon, at the cost of no rollout.
@@ -140,14 +140,14 @@ def pursue(
     modes = found_modes(dataset, steps) if blind else known_modes(dataset, steps)
     n, count = model.configuration.state_size, len(modes.grids)
     most = min(n, 3 * (-(-n // count)))
-    heard = modes.motions[:, 1:]
-    chains = [_pursuit(grid, heard[:TRAJECTORIES, :, mode], most) for mode, grid in enumerate(modes.grids)]
+    motions = modes.motions[:, 1:]
+    chains = [_pursuit(grid, motions[:TRAJECTORIES, :, mode], most) for mode, grid in enumerate(modes.grids)]
     lengths = _share_out([chain.gains for chain in chains], n)
 
     log_eigenvalues = torch.full((n,), complex(-1.0 / steps, math.pi / 2), dtype=torch.complex128)
     shapes = torch.zeros(n, c.grid_points, dtype=torch.float64)
     mixing = torch.zeros(2 * n, 2 * n, dtype=torch.float64)
-    targets = torch.zeros(len(heard), 2 * n, dtype=torch.float64)
+    targets = torch.zeros(len(motions), 2 * n, dtype=torch.float64)
     mirror = torch.ones(2 * n)
     first = 0
     for mode, (chain, length) in enumerate(zip(chains, lengths, strict=True)):
@@ -160,7 +160,7 @@ def pursue(
         places = torch.cat([here, n + here])
         coordinates = torch.arange(2 * first, 2 * (first + length))
         mixing[places[:, None], coordinates] = math.sqrt(steps) * torch.linalg.inv(basis.T @ columns)
-        targets[:, coordinates] = heard[:, :, mode] @ basis / math.sqrt(steps)
+        targets[:, coordinates] = motions[:, :, mode] @ basis / math.sqrt(steps)
         mirror[coordinates] = modes.mirror[mode]
         first += length
     unit = float(targets.square().mean().sqrt())
@@ -190,7 +190,9 @@ def _pursuit(grid: Tensor, motions: Tensor, most: int) -> _Chain:
     pairs = torch.stack([exponentials.real, exponentials.imag], dim=1)  # (grid, 2, steps)
     pairs = pairs / pairs.square().sum(-1, keepdim=True).sqrt()
     products = torch.einsum("st,gkt->gks", motions, pairs)
-    chosen, gains, basis = [], [], []
+    chosen = []
+    gains = []
+    basis = []
     for _ in range(most):
         gram = pairs @ pairs.mT
         determinant = gram[:, 0, 0] * gram[:, 1, 1] - gram[:, 0, 1].square()

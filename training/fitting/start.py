@@ -27,7 +27,7 @@ def begin(configuration: TrainingConfiguration, dataset: Dataset) -> Made:
 
 
 def new_model(
-    configuration: TrainingConfiguration, scale_m: float, found: Mapping[str, int] | None = None
+    configuration: TrainingConfiguration, scale_m: float, counts: Mapping[str, int] | None = None
 ) -> StringModel[Any]:
     """The untrained model of a run, drawn from its seed; where another start is to come, by the model's default.
 
@@ -36,7 +36,7 @@ def new_model(
         found: sizes that its data have set.
     """
     data = configuration.data
-    model = build_model(configuration.model, {**configuration.model_configuration, **(found or {})})
+    model = build_model(configuration.model, {**configuration.model_configuration, **(counts or {})})
     size = LARGEST_HEADER_BYTES + sum(part.nbytes for part in model.state_dict().values())
     if size > LARGEST_PRESET_BYTES:
         raise ValueError(
@@ -77,8 +77,8 @@ def _from_phases(configuration: TrainingConfiguration, dataset: Dataset) -> Made
         raise ValueError(f"{configuration.title}: {WIRED}")
     modes = found_modes(dataset, configuration.steps)
     counted = configuration.model != "koopman_integrated" or "state_size" in configuration.model_configuration
-    found = None if counted else {"state_size": len(modes.shapes)}
-    model = new_model(configuration, dataset.scale_m, found)
+    counts = None if counted else {"state_size": len(modes.shapes)}
+    model = new_model(configuration, dataset.scale_m, counts)
     store(model, modes, configuration.recipe.seed)
     return model, None
 

@@ -5,7 +5,7 @@ Their weights are stacked, and the model is mapped over them.
 A small model leaves a GPU waiting for launches; the mapped pass launches as many kernels as one seed does. A CPU does
 not wait, and its caches have no room for five: a step of five seeds of Koopman_var took 2.5 s mapped and 0.8 s one
 after another (two threads, timed by hand; LRU and S5 alike). Each seed keeps its own weights, batches, optimiser and
-checkpoint, so that one trained with others is the one trained alone, up to the rounding of batched products.
+checkpoint. One trained with others is the one trained alone, up to the rounding of batched products.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ def backward(models: Sequence[StringModel[Any]], batches: Sequence[Batch], recip
     frames = batches[0].frames if same else torch.stack([batch.frames for batch in batches])
 
     def loss(weights: dict[str, Tensor], statistics: dict[str, Tensor], *batch: Tensor) -> tuple[Tensor, Tensor]:
-        found: tuple[Tensor, Tensor] = functional_call(template, (weights, statistics), batch)
-        return found
+        gradients: tuple[Tensor, Tensor] = functional_call(template, (weights, statistics), batch)
+        return gradients
 
     losses, errors = vmap(loss, in_dims=(0, 0, 0, None if same else 0, 0))(
         parameters, buffers, initial, frames, target
@@ -77,7 +77,9 @@ class _Loss(nn.Module):
 
     def __init__(self, model: StringModel[Any], recipe: Recipe, every: bool) -> None:
         super().__init__()
-        self.model, self._recipe, self._every = model, recipe, every
+        self.model = model
+        self._recipe = recipe
+        self._every = every
 
     def forward(self, initial: Tensor, frames: Tensor, target: Tensor) -> tuple[Tensor, Tensor]:
         return training_loss(self.model, Batch(initial, frames, target, self._every), self._recipe)

@@ -31,22 +31,22 @@ def attack_force(note: Note, learned: RecordedNote, impulse: Array, impulse_hz: 
     rate = note.rate_hz
     sound = learned.sound(rate)[: len(note.samples)]
     end = min(len(sound), note.onset + round(FADED_S * rate))
-    heard = (note.samples[: len(sound)] - sound)[note.onset : end]
+    attack = (note.samples[: len(sound)] - sound)[note.onset : end]
     shared = math.gcd(rate, impulse_hz)
     body = signal.resample_poly(impulse, rate // shared, impulse_hz // shared) * impulse_hz / rate
-    size = fft.next_fast_len(len(heard) + len(body), real=True)
+    size = fft.next_fast_len(len(attack) + len(body), real=True)
     gain = fft.rfft(body, size)
     least = float(np.abs(gain).max()) ** 2 * 10 ** (LEAST_DB / 10)
-    force = fft.irfft(fft.rfft(heard, size) * gain.conj() / (np.abs(gain) ** 2 + least), size)[: len(heard)]
+    force = fft.irfft(fft.rfft(attack, size) * gain.conj() / (np.abs(gain) ** 2 + least), size)[: len(attack)]
     whole = min(len(force), round(WHOLE_S * rate))
     force[whole:] *= np.cos(np.linspace(0, math.pi / 2, len(force) - whole)) ** 2
     return force if np.abs(force).max() > 0 else None
 
 
-def first_distance_db(truth: Array, found: Array, rate_hz: int) -> float:
+def first_distance_db(truth: Array, model: Array, rate_hz: int) -> float:
     """Log spectral distance of the first 30 ms of two notes of one length, made equally loud, by one Hann window."""
-    found = found * math.sqrt(float(truth @ truth) / max(float(found @ found), 1e-30))
+    model = model * math.sqrt(float(truth @ truth) / max(float(model @ model), 1e-30))
     size = min(len(truth), round(FIRST_S * rate_hz))
-    theirs, ours = (np.abs(fft.rfft(each[:size] * np.hanning(size))) for each in (truth, found))
+    theirs, ours = (np.abs(fft.rfft(sound[:size] * np.hanning(size))) for sound in (truth, model))
     floor = float(theirs.max()) * 10 ** (FIRST_FLOOR_DB / 20)
     return float(np.sqrt(np.mean((20 * np.log10(np.maximum(theirs, floor) / np.maximum(ours, floor))) ** 2)))

@@ -69,12 +69,12 @@ class State:
 
 def checkpoint_of(folder: Path, notes: Sequence[tuple[Note, Series]]) -> Path:
     """The file of a fit of these notes: its name is a digest of all that the fit depends on."""
-    found = hashlib.sha256(json.dumps(VERSION).encode())
+    digest = hashlib.sha256(json.dumps(VERSION).encode())
     for note, series in notes:
         numbers = [note.rate_hz, note.onset, series.f0_hz, series.stiffness, list(series.present)]
-        found.update(json.dumps(numbers).encode())
-        found.update(np.ascontiguousarray(note.samples).tobytes())
-    return folder / f"{found.hexdigest()[:32]}.json"
+        digest.update(json.dumps(numbers).encode())
+        digest.update(np.ascontiguousarray(note.samples).tobytes())
+    return folder / f"{digest.hexdigest()[:32]}.json"
 
 
 def save(path: Path, takes: Takes, steps: int) -> None:

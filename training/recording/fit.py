@@ -119,8 +119,8 @@ def fit_takes(
     if glides:
         settle_slow(takes.fits)
     return [
-        _learned(note, series, fit, own)
-        for (note, series), fit, own in zip(notes, takes.fits, intervals, strict=True)
+        _learned(note, series, fit, of_take)
+        for (note, series), fit, of_take in zip(notes, takes.fits, intervals, strict=True)
     ]
 
 
@@ -165,12 +165,12 @@ def _steps(
         glide(round_ < LAST_SWEEPS - 1)
 
     steps: list[tuple[float, Callable[[], None]]] = [(0.1, start)]
-    steps += [(0.1 + 0.2 * (each + 1) / FIRST_SWEEPS, first_sweep) for each in range(FIRST_SWEEPS)]
+    steps += [(0.1 + 0.2 * (turn + 1) / FIRST_SWEEPS, first_sweep) for turn in range(FIRST_SWEEPS)]
     if poles_a_partial > 1:
         steps.append((0.3, second_poles))
-    steps += [(0.3 + 0.3 * (each + 1) / SWEEPS, sweep) for each in range(SWEEPS)]
-    steps += [(0.6 + 0.3 * (each + 1) / free, partial(add_free, each)) for each in range(free)]
-    steps += [(0.9 + 0.1 * (each + 1) / LAST_SWEEPS, partial(last_sweep, each)) for each in range(LAST_SWEEPS)]
+    steps += [(0.3 + 0.3 * (turn + 1) / SWEEPS, sweep) for turn in range(SWEEPS)]
+    steps += [(0.6 + 0.3 * (turn + 1) / free, partial(add_free, turn)) for turn in range(free)]
+    steps += [(0.9 + 0.1 * (turn + 1) / LAST_SWEEPS, partial(last_sweep, turn)) for turn in range(LAST_SWEEPS)]
     return [*steps, (1.0, takes.sweep)]
 
 
@@ -237,19 +237,21 @@ def _add_pole(takes: Takes, number: int, residuals: Sequence[NDArray[np.complex1
     wheres = [fit.bands[number] for fit in takes.fits]
     before = [fit.poles[number] for fit in takes.fits]
     targets = [
-        rest[where] + fit.part(own, where)
-        for fit, rest, own, where in zip(takes.fits, residuals, before, wheres, strict=True)
+        rest[where] + fit.part(earlier, where)
+        for fit, rest, earlier, where in zip(takes.fits, residuals, before, wheres, strict=True)
     ]
     one, left, _ = takes.improved(before, targets, wheres, FIRST_DAMPING, number)
     first = one[0][0]
     beside = Pole(complex(2.5 * first.s.real, first.s.imag + 2.0), partial=first.partial)
     tried = [[first, beside]]
-    found = _loudest(takes, number).start(number, 2)
-    if len(found) == 2:
-        tried.append(found)
+    start_poles = _loudest(takes, number).start(number, 2)
+    if len(start_poles) == 2:
+        tried.append(start_poles)
     best = None
     for poles in tried:
-        two, after, damping = [list(poles) for _ in takes.fits], left, FIRST_DAMPING
+        two = [list(poles) for _ in takes.fits]
+        after = left
+        damping = FIRST_DAMPING
         for _ in range(5):
             two, after, damping = takes.improved(two, targets, wheres, damping, number)
         if best is None or after < best[0]:
@@ -281,7 +283,7 @@ def _add_free(takes: Takes) -> None:
                 left, start, _ = fit.solve(start, residual[where], where)
                 moved, left, _ = alone.improved([start], [residual[where]], [where], FIRST_DAMPING, None)
                 tried.append((weight * (left - whole), moved[0][0]))
-    found = min(tried, key=lambda each: each[0])[1]
+    pole = min(tried, key=lambda trial: trial[0])[1]
     for fit in takes.fits:
-        fit.free = [*fit.free, found]
+        fit.free = [*fit.free, pole]
     takes.free_damping = FIRST_DAMPING

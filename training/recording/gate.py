@@ -68,7 +68,7 @@ class Finding:
 
 def examine(samples: Array, note: Note, series: Series | None) -> tuple[Finding, ...]:
     """The findings against a recording; empty: nothing speaks against it."""
-    found = [
+    findings = [
         clipped(samples, note),
         already_playing(note),
         slow_attack(note),
@@ -79,8 +79,8 @@ def examine(samples: Array, note: Note, series: Series | None) -> tuple[Finding,
         no_series(series),
     ]
     if series is not None:
-        found.append(second_series(note, series))
-    return tuple(each for each in found if each is not None)
+        findings.append(second_series(note, series))
+    return tuple(finding for finding in findings if finding is not None)
 
 
 def clipped(samples: Array, note: Note) -> Finding | None:
@@ -186,8 +186,8 @@ def looped(note: Note) -> Finding | None:
     earlier = sound[: max(0, last + block - round(LOOP_LAG_S * note.rate_hz))]
     if last == 0 or len(earlier) < block:
         return None
-    found, energy = sound[last : last + block], float(energies[loud[-1]])
-    products = signal.fftconvolve(earlier, found[::-1], mode="valid")
+    pattern, energy = sound[last : last + block], float(energies[loud[-1]])
+    products = signal.fftconvolve(earlier, pattern[::-1], mode="valid")
     squares = signal.fftconvolve(earlier**2, np.ones(block), mode="valid")
     # of a loop, the level is the same too; a decaying note's is lower by then
     equal = 1 - (squares + energy - 2 * products) / energy
@@ -261,21 +261,21 @@ def second_series(note: Note, series: Series) -> Finding | None:
     peaks = peaks_of(part, note.rate_hz, note.noise_power)
     if len(peaks.hz) == 0:
         return None
-    own = followed(peaks, series)
+    first_series = followed(peaks, series)
     remedy = "record one note alone; drums, slaps and strums are no strings"
-    if (both := _two_in(peaks, own)) is not None:
+    if (both := _two_in(peaks, first_series)) is not None:
         words = "two notes sound, at {:.1f} Hz and {:.1f} Hz".format(*both)
         return Finding("chord", words, remedy, refused=True)
-    rest = peaks.without(own, CLEAR_DB, _hum_db(note, part))
+    rest = peaks.without(first_series, CLEAR_DB, _hum_db(note, part))
     lasting = np.minimum(rest.hz, HIGHEST_BODY_HZ) / BODY_HZ
     if float(np.sum(lasting * rest.power)) < MOST_OFF * float(np.sum(peaks.power)):
         return None
     other = number(rest.loudest(LOUD_DB))
     if other is not None and rest.near(other).sum() >= LEAST_SECOND:
-        words = f"a second note sounds at {other.f0_hz:.1f} Hz beside {own.f0_hz:.1f} Hz"
+        words = f"a second note sounds at {other.f0_hz:.1f} Hz beside {first_series.f0_hz:.1f} Hz"
         return Finding("chord", words, remedy, refused=True)
     loudest_hz = float(rest.hz[np.argmax(rest.level_db)])
-    words = f"a sound at {loudest_hz:.1f} Hz is off the partials of one string at {own.f0_hz:.1f} Hz"
+    words = f"a sound at {loudest_hz:.1f} Hz is off the partials of one string at {first_series.f0_hz:.1f} Hz"
     return Finding("off the law", words, remedy, refused=True)
 
 
@@ -299,6 +299,6 @@ def _hum_db(note: Note, part: Array) -> float:
     block = round(HUM_BLOCK_S * note.rate_hz)
     count = max(0, note.onset - round(ATTACK_S * note.rate_hz)) // block
     powers = np.var(note.samples[: count * block].reshape(count, block), axis=1)
-    heard = powers[powers > 0]
-    power = float(np.median(heard)) if len(heard) else 0.0
+    positive = powers[powers > 0]
+    power = float(np.median(positive)) if len(positive) else 0.0
     return float(10 * np.log10(power / 2 * np.sum(np.hanning(len(part) + 2)) ** 2 + 1e-30))

@@ -90,12 +90,12 @@ def glide_of_phases(bands: list[tuple[float, float, NDArray[np.complex128]]]) ->
         # beats turn the phase where the envelope is small; a common offset is the partial's own frequency
         t = np.asarray((np.arange(len(off)) + 0.5) * step, np.float64)
         columns = np.concatenate([rate_basis(t), np.ones((len(t), 1))], 1)
-        own = weight / (weight.max() + 1e-30) * np.sqrt(step)
+        row_scale = weight / (weight.max() + 1e-30) * np.sqrt(step)
         mean = columns[:, -1:]
-        projected = [v - mean * ((own**2 @ v) / (own**2).sum()) for v in (columns[:, :-1], off[:, None])]
+        projected = [v - mean * ((row_scale**2 @ v) / (row_scale**2).sum()) for v in (columns[:, :-1], off[:, None])]
         strength = math.sqrt(float(np.mean(np.abs(z) ** 2))) * hz
-        rows.append(projected[0] * own[:, None] * strength)
-        values.append(projected[1][:, 0] * own * strength)
+        rows.append(projected[0] * row_scale[:, None] * strength)
+        values.append(projected[1][:, 0] * row_scale * strength)
     design, target = np.concatenate(rows), np.concatenate(values)
     for _ in range(4):
         scale = np.sqrt(np.mean(target**2) + 1e-30)

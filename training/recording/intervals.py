@@ -2,7 +2,7 @@
 
 Three variances add up:
 
-- that of the poles. What a fit leaves is neither white nor even over a band, so it is counted where it lies, bin by
+- that of the poles. What a fit leaves is neither white nor even over a band. It is counted where it lies, bin by
   bin with its neighbours (White 1980; MacKinnon, White 1985: HC3; Newey, West 1987), not as a mean over the band;
 - that of the partial's unknown share of the tension (`rest`);
 - that of the model, which is not quite true (Kennedy, O'Hagan 2001): the root mean square that it is off on
@@ -50,27 +50,32 @@ def spreads(fit: Fit) -> dict[int, Spread]:
     """The spreads by the number of each partial that has poles."""
     residual = fit.data - fit.model()
     random = np.random.default_rng(0)
-    own = {number + 1: polarisations([pole for pole in poles if pole.a]) for number, poles in enumerate(fit.poles)}
-    own = {number: poles for number, poles in own.items() if poles}
-    rests = at_rest(fit.glide, own)
-    return {number: _spread(fit, number - 1, poles, rests[number], residual, random) for number, poles in own.items()}
+    by_number = {
+        number + 1: polarisations([pole for pole in poles if pole.a]) for number, poles in enumerate(fit.poles)
+    }
+    by_number = {number: poles for number, poles in by_number.items() if poles}
+    rests = at_rest(fit.glide, by_number)
+    return {
+        number: _spread(fit, number - 1, poles, rests[number], residual, random)
+        for number, poles in by_number.items()
+    }
 
 
 def _spread(
-    fit: Fit, band: int, own: list[Pole], rest: Rest, residual: Complex, random: np.random.Generator
+    fit: Fit, band: int, pair: list[Pole], rest: Rest, residual: Complex, random: np.random.Generator
 ) -> Spread:
     where = fit.bands[band]
     poles = [pole for pole in fit.poles[band] if pole.a]
     spread = covariance(np.concatenate(fit.columns(poles, where), 1), residual[where])
     values, vectors = np.linalg.eigh(spread)
     draws = random.standard_normal((DRAWS, len(values))) @ (vectors * np.sqrt(np.maximum(values, 0))).T
-    p, chosen = len(poles), [poles.index(pole) for pole in own]
+    p, chosen = len(poles), [poles.index(pole) for pole in pair]
     a = np.array([pole.a for pole in poles]) + draws[:, 0 : 2 * p : 2] + 1j * draws[:, 1 : 2 * p : 2]
     decay = np.array([pole.decay for pole in poles]) * np.exp(np.clip(draws[:, 2 * p :: 2], -3, 3))
     omega = np.array([pole.s.imag for pole in poles]) + draws[:, 2 * p + 1 :: 2]
     hz, mean_decay, level = figures_of(a[:, chosen], decay[:, chosen], omega[:, chosen])
-    columns = ([q.a for q in own], [q.decay for q in own], [q.s.imag for q in own])
-    value, rate, loud = (float(each[0]) for each in figures_of(*(np.array([each]) for each in columns)))
+    columns = ([q.a for q in pair], [q.decay for q in pair], [q.s.imag for q in pair])
+    value, rate, loud = (float(column[0]) for column in figures_of(*(np.array([column]) for column in columns)))
     middle = math.log(value * (1 + fit.glide.pitch)) + CENTS * rest.cents
     reach = CENTS * _reach("cents", _deviation(np.log(np.maximum(hz, 1e-9))) / CENTS, rest.error)
     decay_reach = _reach("decay", _deviation(np.log(mean_decay)))

@@ -26,22 +26,22 @@ def combined(learned: Sequence[Learned], settings: dict[str, Any]) -> RecordedSt
     """The additions of all recordings to the string of the first."""
     first = learned[0]
     note = recorded_note(first.note, first.fitted, first.source)
-    own = recorded_string(note, first.physics, first.strung, first.source, settings, figures(first.report))
-    others = [corrections(each.physics, _of_pitch(first.strung.string, first, each)) for each in learned[1:]]
+    first_string = recorded_string(note, first.physics, first.strung, first.source, settings, figures(first.report))
+    others = [corrections(take.physics, _of_pitch(first.strung.string, first, take)) for take in learned[1:]]
     if not others:
-        return own
-    hz = np.log(own.smooth_hz)
-    smooth = [np.log(own.smooth_ratio)]
-    smooth += [np.interp(hz, np.log(each["smooth_hz"]), np.log(each["smooth_ratio"])) for each in others]
-    same = [each for each, one in zip(others, learned[1:], strict=True) if abs(_cents(first, one)) < SAME_PITCH_CENTS]
+        return first_string
+    hz = np.log(first_string.smooth_hz)
+    smooth = [np.log(first_string.smooth_ratio)]
+    smooth += [np.interp(hz, np.log(take["smooth_hz"]), np.log(take["smooth_ratio"])) for take in others]
+    same = [take for take, one in zip(others, learned[1:], strict=True) if abs(_cents(first, one)) < SAME_PITCH_CENTS]
     shared: dict[str, Any] = {
         name: tuple(
-            float(np.median([own_value, *(each[name][place] for each in same if place < len(each[name]))]))
-            for place, own_value in enumerate(getattr(own, name))
+            float(np.median([own_value, *(take[name][place] for take in same if place < len(take[name]))]))
+            for place, own_value in enumerate(getattr(first_string, name))
         )
         for name in OF_PARTIALS
     }
-    return replace(own, smooth_ratio=tuple(np.exp(np.mean(smooth, axis=0)).tolist()), **shared)
+    return replace(first_string, smooth_ratio=tuple(np.exp(np.mean(smooth, axis=0)).tolist()), **shared)
 
 
 def _cents(first: Learned, other: Learned) -> float:

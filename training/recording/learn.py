@@ -31,7 +31,7 @@ class Refused(RecordingError):
     """The gate's refusal: each reason in words, with what to do."""
 
     def __init__(self, name: str, findings: tuple[Finding, ...]) -> None:
-        super().__init__(f"{name}: " + "; ".join(f"{each.reason}: {each.remedy}" for each in findings))
+        super().__init__(f"{name}: " + "; ".join(f"{finding.reason}: {finding.remedy}" for finding in findings))
 
 
 class NotFound(RecordingError):
@@ -72,7 +72,7 @@ class Examined:
     @property
     def refusals(self) -> tuple[Finding, ...]:
         """The findings of which one is enough: it cannot be fitted."""
-        return tuple(each for each in self.findings if each.refused)
+        return tuple(finding for finding in self.findings if finding.refused)
 
 
 def examined(samples: Array, rate_hz: int) -> Examined:
@@ -111,7 +111,7 @@ def learn(
         WriteError, OSError: a checkpoint cannot be written or read.
     """
     started = time.monotonic()
-    notes = [usable(found, anyway, source.name) for found, source in recordings]
+    notes = [usable(examined, anyway, source.name) for examined, source in recordings]
     lead = notes[0][1]
     takes = [place for place, (_, series) in enumerate(notes) if apart_cents(lead, series) < SAME_PITCH_CENTS]
     others = [place for place in range(len(notes)) if place not in takes]
@@ -126,14 +126,25 @@ def learn(
         unfinished += [path] if path is not None else []
         fitted |= dict(zip(job, fits, strict=True))
     learned = []
-    for place, ((found, source), (note, series)) in enumerate(zip(recordings, notes, strict=True)):
+    for place, ((examined, source), (note, series)) in enumerate(zip(recordings, notes, strict=True)):
         physics = physics_of(fitted[place])
-        own = strung(physics, kind, length_m, gauge_mm)
+        strung_string = strung(physics, kind, length_m, gauge_mm)
         report = report_of(note, fitted[place], physics)
         verdict = verdict_of(note, series, fitted[place], report)
         seconds = time.monotonic() - started
         learned.append(
-            Learned(source, note, series, fitted[place], physics, own, report, verdict, found.findings, seconds)
+            Learned(
+                source,
+                note,
+                series,
+                fitted[place],
+                physics,
+                strung_string,
+                report,
+                verdict,
+                examined.findings,
+                seconds,
+            )
         )
     progress(1.0)
     for path in unfinished:
@@ -145,17 +156,17 @@ def _part(progress: Progress, done: float, share: float, of_part: float) -> None
     progress(0.95 * (done + share * of_part))
 
 
-def usable(found: Examined, anyway: bool, name: str) -> tuple[Note, Series]:
+def usable(examined: Examined, anyway: bool, name: str) -> tuple[Note, Series]:
     """The note and series of what was examined. Raises Refused or RecordingError, which name its file."""
-    if found.refusals and not anyway:
-        raise Refused(name, found.refusals)
-    if found.series is None or not found.series.present:
+    if examined.refusals and not anyway:
+        raise Refused(name, examined.refusals)
+    if examined.series is None or not examined.series.present:
         raise RecordingError(f"{name}: it has no partials; record one plucked note")
-    return found.note, found.series
+    return examined.note, examined.series
 
 
 def require_found(learned: Sequence[Learned]) -> None:
     """Raise NotFound, which names the file, where a fit is of no string."""
-    for each in learned:
-        if not each.verdict.found:
-            raise NotFound(each.source.name, each.verdict)
+    for string in learned:
+        if not string.verdict.found:
+            raise NotFound(string.source.name, string.verdict)

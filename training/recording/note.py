@@ -102,8 +102,8 @@ def _mono(samples: Array) -> Array:
     sound = np.asarray(samples, np.float64)
     if sound.ndim == 1:
         return sound
-    heard = sound.shape[1] == 2 and bool(np.isfinite(sound).all() and (sound.std(0) > 0).all())
-    if heard and float(np.ravel(np.corrcoef(sound.T))[1]) > ALIKE:
+    stereo = sound.shape[1] == 2 and bool(np.isfinite(sound).all() and (sound.std(0) > 0).all())
+    if stereo and float(np.ravel(np.corrcoef(sound.T))[1]) > ALIKE:
         return sound.mean(1)
     loudest = int(np.argmax(np.nansum(np.where(np.isfinite(sound), sound, 0.0) ** 2, axis=0)))
     return sound[:, loudest]
@@ -120,15 +120,18 @@ def _without_silence(sound: Array) -> Array:
     # of two equal samples or more, none belongs to the note
     first = int(moves[0]) + 1 if moves[0] > 0 else 0
     end = int(moves[-1]) + 1 if moves[-1] < len(sound) - 2 else len(sound)
-    heard = sound[first:end]
-    return np.concatenate([np.zeros(first), heard - heard.mean()])
+    sounding = sound[first:end]
+    return np.concatenate([np.zeros(first), sounding - sounding.mean()])
 
 
 def _noise_power(samples: Array, rate_hz: int, onset: int) -> float:
     block = max(1, round(0.05 * rate_hz))
-    found = [samples[first : first + block] for first in range(0, max(0, onset - block // 2 - block), block)]
+    blocks = [samples[first : first + block] for first in range(0, max(0, onset - block // 2 - block), block)]
     count = min(6, (len(samples) - onset) // (2 * block))
-    found += [samples[len(samples) - (each + 1) * block : len(samples) - each * block] for each in range(count)]
-    powers = [float(np.mean(each**2)) for each in found if len(each)]
+    blocks += [
+        samples[len(samples) - (block_samples + 1) * block : len(samples) - block_samples * block]
+        for block_samples in range(count)
+    ]
+    powers = [float(np.mean(block_samples**2)) for block_samples in blocks if len(block_samples)]
     positive = [power for power in powers if power > 0]
     return min(positive, default=1e-14)

@@ -153,13 +153,15 @@ def peaks_of(samples: Array, rate_hz: int, noise_power: float = 0.0) -> Peaks:
     floor = np.interp(
         np.arange(len(level)), (np.arange(len(thinned)) + 0.5) * thin, ndimage.uniform_filter1d(floor, span)
     )
-    found, _ = signal.find_peaks(level, distance=max(1, round(width_hz / 2 / step)))
-    found = found[(found > 1) & (found < len(level) - 2) & (found * step > 20.0)]
-    above = level[found] - floor[found]
-    found = found[(above > PRESENT_DB) & (level[found] > level.max() - 75)]
-    before, at, after = level[found - 1], level[found], level[found + 1]
+    bins, _ = signal.find_peaks(level, distance=max(1, round(width_hz / 2 / step)))
+    bins = bins[(bins > 1) & (bins < len(level) - 2) & (bins * step > 20.0)]
+    above = level[bins] - floor[bins]
+    bins = bins[(above > PRESENT_DB) & (level[bins] > level.max() - 75)]
+    before = level[bins - 1]
+    at = level[bins]
+    after = level[bins + 1]
     shift = 0.5 * (before - after) / np.minimum(before - 2 * at + after, -1e-9)
-    return Peaks((found + shift) * step, at - floor[found], at, width_hz, highest_hz)
+    return Peaks((bins + shift) * step, at - floor[bins], at, width_hz, highest_hz)
 
 
 def number(peaks: Peaks, f0_range_hz: tuple[float, float] = F0_RANGE_HZ) -> Series | None:
@@ -186,12 +188,12 @@ def series_at(peaks: Peaks, f0_hz: float, stiffness: float) -> Series:
 def followed(peaks: Peaks, series: Series) -> Series:
     """The same string's series in other peaks of its note, where it may have glided."""
     tried = (series_at(peaks, series.f0_hz * 2 ** (cents / 1200), series.stiffness) for cents in GLIDES_CENTS)
-    return _best_refined(peaks, max(tried, key=lambda each: each.score))
+    return _best_refined(peaks, max(tried, key=lambda candidate: candidate.score))
 
 
 def _best_refined(peaks: Peaks, series: Series) -> Series:
     for _ in range(3):
-        series = max((_refined(peaks, series), series), key=lambda each: each.score)
+        series = max((_refined(peaks, series), series), key=lambda candidate: candidate.score)
     return series
 
 
@@ -208,9 +210,9 @@ def _candidates(peaks: Peaks, f0_range_hz: tuple[float, float]) -> Array:
     if len(every) == 0:
         return every
     kept = [every[0]]
-    for each in every[1:]:
-        if each > kept[-1] * 1.002:
-            kept.append(each)
+    for candidate_hz in every[1:]:
+        if candidate_hz > kept[-1] * 1.002:
+            kept.append(candidate_hz)
     return np.array(kept)
 
 
@@ -242,7 +244,7 @@ def _score(peaks: Peaks, f0_hz: float, stiffness: float) -> tuple[float, float, 
     missing = float(absent.sum() / count)
     first = 0.12 * float(absent[0])
     score = explained - MISSING * missing - first - 0.04 * (len(present) < 3)
-    return score, explained, missing, tuple(int(each) for each in present)
+    return score, explained, missing, tuple(int(number_present) for number_present in present)
 
 
 def _refined(peaks: Peaks, series: Series) -> Series:
@@ -252,7 +254,9 @@ def _refined(peaks: Peaks, series: Series) -> Series:
     used = (off < tolerance(peaks.hz, series.f0_hz, peaks.width_hz)) & (k <= MOST_PARTIALS)
     if len(np.unique(k[used])) < 3:
         return series
-    k, hz, weight = k[used], peaks.hz[used], peaks.strength[used] + 0.05
+    k = k[used]
+    hz = peaks.hz[used]
+    weight = peaks.strength[used] + 0.05
     # (f/k)² = f0² + f0² B k²
     rows = np.stack([np.ones_like(k), k**2], 1)
     scale = weight * k / hz  # errors in Hz are alike

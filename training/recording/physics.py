@@ -113,7 +113,7 @@ class Strung:
 
 def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
     """The partials with their poles, at rest; those without energy are left out."""
-    found = []
+    partials = []
     for number in sorted({pole.partial for pole in learned.poles if pole.partial}):
         poles = polarisations(_of_string(learned, number), MOST_DECAYS_APART)
         if not poles:
@@ -129,9 +129,9 @@ def partials_of(learned: LearnedNote) -> tuple[Partial, ...]:
         if energy <= 0 or moment <= 0:
             continue
         hz = float((-pairs * s[:, None] / sums).sum().imag / energy / (2 * math.pi))
-        found.append(Partial(number, hz, 0.5 * energy / moment, float(np.abs(a).sum()), energy, tuple(poles)))
-    loudest = max((each.energy for each in found), default=0.0)
-    return tuple(each for each in found if each.energy > LEAST_SHARE * loudest)
+        partials.append(Partial(number, hz, 0.5 * energy / moment, float(np.abs(a).sum()), energy, tuple(poles)))
+    loudest = max((partial.energy for partial in partials), default=0.0)
+    return tuple(partial for partial in partials if partial.energy > LEAST_SHARE * loudest)
 
 
 def _of_string(learned: LearnedNote, number: int) -> list[Pole]:
@@ -141,16 +141,16 @@ def _of_string(learned: LearnedNote, number: int) -> list[Pole]:
     """
     place = partial_hz(number, learned.f0_hz, learned.stiffness)
     far = 300 * math.log2((number + 1) / number)  # a quarter of the way to the next partial
-    own = [pole for pole in learned.poles if pole.partial == number and pole.a]
+    numbered = [pole for pole in learned.poles if pole.partial == number and pole.a]
     free = [pole for pole in learned.poles if pole.partial == 0 and pole.a and pole.hz > 0]
-    off = {id(pole): abs(1200 * math.log2(pole.hz / place)) for pole in (*own, *free)}
+    off = {id(pole): abs(1200 * math.log2(pole.hz / place)) for pole in (*numbered, *free)}
     for reach in (NEAR_CENTS, MOST_OFF_CENTS):
-        near = [pole for pole in own if off[id(pole)] < reach]
+        near = [pole for pole in numbered if off[id(pole)] < reach]
         if len(near) > 1:
             return near
         if near:
             return near + [pole for pole in free if off[id(pole)] < min(reach, far)]
-    return own
+    return numbered
 
 
 def physics_of(learned: LearnedNote) -> Physics:
@@ -159,10 +159,10 @@ def physics_of(learned: LearnedNote) -> Physics:
     Those pulled by the body count little for it.
     """
     partials = partials_of(learned)
-    k = np.array([each.number for each in partials], float)
-    hz = np.array([each.hz for each in partials])
-    loudest = max(each.energy for each in partials)
-    weight = np.array([(each.energy / loudest) ** 0.15 for each in partials])
+    k = np.array([partial.number for partial in partials], float)
+    hz = np.array([partial.hz for partial in partials])
+    loudest = max(partial.energy for partial in partials)
+    weight = np.array([(partial.energy / loudest) ** 0.15 for partial in partials])
     rows = np.stack([np.ones_like(k), k**2], 1)
     if len(k) >= 3:
         scale = weight * k / hz
@@ -183,7 +183,7 @@ def physics_of(learned: LearnedNote) -> Physics:
         f0_error, stiffness_error = math.inf, math.inf
     cents = 1200 * np.log2(hz / partial_hz(k, f0, stiffness))
     of_string = weight * np.where(np.abs(cents) > MOST_OFF_CENTS, PULLED_WEIGHT, 1.0)
-    smooth_hz, smooth = _smooth(hz, np.array([each.decay for each in partials]), of_string)
+    smooth_hz, smooth = _smooth(hz, np.array([partial.decay for partial in partials]), of_string)
     rise = float(learned.glide.shares.sum())
     return Physics(f0, f0_error, stiffness, stiffness_error, partials, smooth_hz, smooth, max(0.0, rise))
 
@@ -208,7 +208,9 @@ def strung(physics: Physics, kind: Kind, length_m: float | None = None, gauge_mm
         length_m: of the sounding length; None: assumed.
         gauge_mm: its diameter; None: assumed through the tension.
     """
-    build, f0, assumed = BUILDS[kind], physics.f0_hz, []
+    build = BUILDS[kind]
+    f0 = physics.f0_hz
+    assumed = []
     length = length_m or build.length_m
     if length_m is None:
         assumed.append(f"length {length:g} m of a {kind}")
@@ -249,8 +251,8 @@ def _damping(physics: Physics, mass: float, length: float) -> tuple[float, float
     eta = 2 * math.pi * hz / (2 * length * physics.f0_hz)  # of a flexible string
     rows = np.stack([np.ones_like(eta), eta**2], 1) / (2 * mass * sigma[:, None])
     scale = np.linalg.norm(rows, axis=0)
-    found, _ = optimize.nnls(rows / scale, np.ones(len(sigma)))
-    d1, d3 = found / scale
+    coefficients, _ = optimize.nnls(rows / scale, np.ones(len(sigma)))
+    d1, d3 = coefficients / scale
     least = 2 * mass * 0.02
     return float(max(d1, least)), float(d3)
 
@@ -260,27 +262,27 @@ def pluck_place(physics: Physics) -> float:
 
     Of places that fit nearly alike, that whose nodes cost the instrument least: it cannot make up for a node.
     """
-    k = np.array([each.number for each in physics.partials], float)
-    level = np.log([each.amplitude for each in physics.partials])
+    k = np.array([partial.number for partial in physics.partials], float)
+    level = np.log([partial.amplitude for partial in physics.partials])
     if len(k) < 6:
         return 0.2
     k, level = k[:40], level[:40]
     smooth = np.stack([np.ones_like(k), np.log(k), np.log(k) ** 2, k], 1)
-    found = []
+    candidates = []
     for place in np.linspace(0.06, 0.5, 111):
         heights = np.abs(np.sin(math.pi * k * place))
         comb = np.log(np.maximum(heights, 0.08))
         solution, *_ = np.linalg.lstsq(smooth, level - comb, rcond=None)
         left = float(np.sum((level - comb - smooth @ solution) ** 2))
         missing = np.log(COMB_FLOOR / np.clip(heights, 1e-3, COMB_FLOOR))
-        found.append((left, float(np.sum(missing**2)), float(place)))
-    most = NEARLY_ALIKE * min(left for left, _, _ in found)
-    return round(min((missing, place) for left, missing, place in found if left <= most)[1], 3)
+        candidates.append((left, float(np.sum(missing**2)), float(place)))
+    most = NEARLY_ALIKE * min(left for left, _, _ in candidates)
+    return round(min((missing, place) for left, missing, place in candidates if left <= most)[1], 3)
 
 
 def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[float, ...]]:
     """The corrections by the note's partials to the law of its string, as `engine.resonators.recorded` keeps them."""
-    count = max(each.number for each in physics.partials)
+    count = max(partial.number for partial in physics.partials)
     omega = undamped_frequencies(string, count)
     sigma = decay_rates(string, count)
     law = np.interp(np.log(physics.smooth_hz), np.log(omega / (2 * math.pi)), np.log(sigma))
@@ -288,22 +290,26 @@ def corrections(physics: Physics, string: StringParameters) -> dict[str, tuple[f
     smooth = sigma * np.exp(
         np.interp(np.log(omega), np.log(2 * math.pi * np.array(physics.smooth_hz)), np.log(smooth_ratio))
     )
-    shared = [each for each in physics.partials if len(each.poles) == 2]
-    split = float(np.median([_split(each.poles) for each in shared])) if shared else 0.0
-    slower = float(np.median([each.poles[1].decay / each.poles[0].decay for each in shared])) if shared else 1.0
+    shared = [partial for partial in physics.partials if len(partial.poles) == 2]
+    split = float(np.median([_split(partial.poles) for partial in shared])) if shared else 0.0
+    slower = (
+        float(np.median([partial.poles[1].decay / partial.poles[0].decay for partial in shared])) if shared else 1.0
+    )
     cents, ratio = np.zeros(count), np.ones(count)
-    second_cents, second_ratio, share = np.full(count, split), np.full(count, slower), np.zeros(count)
-    for each in physics.partials:
-        place = each.number - 1
-        first = each.poles[0]
+    second_cents = np.full(count, split)
+    second_ratio = np.full(count, slower)
+    share = np.zeros(count)
+    for partial in physics.partials:
+        place = partial.number - 1
+        first = partial.poles[0]
         cents[place] = 1200 * math.log2(abs(first.s) / omega[place])
-        beside = [pole.decay / smooth[place] for pole in each.poles]
+        beside = [pole.decay / smooth[place] for pole in partial.poles]
         if not any(1 / MOST_BESIDE_SMOOTH < apart < MOST_BESIDE_SMOOTH for apart in beside):
             continue  # of noise or the body, not of the string: it decays as its neighbours do
         ratio[place] = first.decay / smooth[place]
-        if len(each.poles) == 2:
-            second = each.poles[1]
-            second_cents[place] = _split(each.poles)
+        if len(partial.poles) == 2:
+            second = partial.poles[1]
+            second_cents[place] = _split(partial.poles)
             second_ratio[place] = second.decay / first.decay
             share[place] = abs(second.a) / (abs(first.a) + abs(second.a))
     return {

@@ -70,7 +70,7 @@ def recorded_string(
     errors: dict[str, float],
 ) -> RecordedString:
     """The additions of the recording to the law of its string."""
-    own: dict[str, Any] = corrections(physics, strung.string)
+    figures_of_string: dict[str, Any] = corrections(physics, strung.string)
     return RecordedString(
         pitch_hz=float(strung.string.undamped_frequency(1) / (2 * math.pi)),
         note=note,
@@ -79,7 +79,7 @@ def recorded_string(
         assumed=strung.assumed,
         settings=settings,
         errors={name: float(value) for name, value in errors.items() if math.isfinite(value)},
-        **own,
+        **figures_of_string,
     )
 
 
@@ -123,11 +123,11 @@ def body_response(physics: Physics, strung: Strung, partials: int, rate_hz: int)
     Its magnitude is that of the recorded partials over those of the same pluck of the bare string, at their
     frequencies, and interpolated between them; it is one note's, and a guess away from its partials.
     """
-    k = np.array([each.number for each in physics.partials], float)
-    hz = np.array([each.hz for each in physics.partials])
+    k = np.array([partial.number for partial in physics.partials], float)
+    hz = np.array([partial.hz for partial in physics.partials])
     comb = np.abs(np.sin(math.pi * k * strung.position))
     bare = np.maximum(comb, COMB_FLOOR) / k**2 * np.abs(np.sin(math.pi * k * listening_point(partials)))
-    level = np.log([each.amplitude for each in physics.partials]) - np.log(bare)
+    level = np.log([partial.amplitude for partial in physics.partials]) - np.log(bare)
     used = comb > COMB_FLOOR
     if used.sum() < 3:
         used = np.ones_like(used)

@@ -165,13 +165,13 @@ class Fit:
 
     def start(self, number: int, count: int) -> list[Pole]:
         """Poles of a band from its complex envelope, without amplitudes."""
-        first, last = (round(self.edges_hz[each] / self.step_hz) for each in (number, number + 1))
+        first, last = (round(self.edges_hz[edge] / self.step_hz) for edge in (number, number + 1))
         envelope = fft.ifft(self.data[first:last])
         step = self.size / ((last - first) * self.rate_hz)
         usable = int((last - first) * self.count / self.size)
-        found = subspace_poles(envelope[1 : max(2, usable - 1)], count)
+        roots = subspace_poles(envelope[1 : max(2, usable - 1)], count)
         poles = []
-        for z in found:
+        for z in roots:
             decay = -math.log(max(abs(z), 1e-9)) / step
             hz = (first * self.step_hz) + np.mod(np.angle(z), 2 * math.pi) / (2 * math.pi * step)
             if abs(hz - self.partials_hz[number]) < self._far_hz(number):
@@ -206,7 +206,7 @@ class Fit:
         omega = pole.s.imag + float(np.clip(step[1], -LARGEST_STEP, LARGEST_STEP))
         if number is not None:
             decay = min(max(decay, LEAST_DECAY), WIDEST * self.width_hz[number])
-            middle, far = (2 * math.pi * each for each in (self.partials_hz[number], self._far_hz(number)))
+            middle, far = (2 * math.pi * hz for hz in (self.partials_hz[number], self._far_hz(number)))
             omega = min(max(omega, middle - far), middle + far)
         else:
             decay = min(max(decay, LEAST_DECAY), MOST_FREE_DECAY)
@@ -251,11 +251,14 @@ class Fit:
         for number, where in enumerate(self.bands):
             if not self.poles[number]:
                 continue
-            own = np.concatenate([real_rows(part) for part in self.columns(self.poles[number], where)], 1)
-            own = own / (np.linalg.norm(own, axis=0) + 1e-300)
+            tangent = np.concatenate([real_rows(part) for part in self.columns(self.poles[number], where)], 1)
+            tangent = tangent / (np.linalg.norm(tangent, axis=0) + 1e-300)
             border, rest = real_rows(columns[where]), real_rows(residual[where])
-            inverse = np.linalg.pinv(own.T @ own, rcond=1e-9)
-            border, rest = border - own @ (inverse @ (own.T @ border)), rest - own @ (inverse @ (own.T @ rest))
+            inverse = np.linalg.pinv(tangent.T @ tangent, rcond=1e-9)
+            border, rest = (
+                border - tangent @ (inverse @ (tangent.T @ border)),
+                rest - tangent @ (inverse @ (tangent.T @ rest)),
+            )
             square += border.T @ border
             right += border.T @ rest
             left += float(rest @ rest)

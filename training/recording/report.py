@@ -93,38 +93,40 @@ class Report:
 def report_of(note: Note, learned: LearnedNote, physics: Physics) -> Report:
     """Compare a note with its recording."""
     truth = note.fitted()
-    found = learned.render(np.arange(len(truth)) / note.rate_hz)
-    errors = errors_of(truth, found, note.rate_hz, note.noise_power)
+    model = learned.render(np.arange(len(truth)) / note.rate_hz)
+    errors = errors_of(truth, model, note.rate_hz, note.noise_power)
     noise = note.noise_power * len(truth) / max(float(truth @ truth), 1e-30)
     return Report(
-        errors, noise, bands_of(truth, found, note.rate_hz, note.noise_power), partials_in(learned, physics)
+        errors, noise, bands_of(truth, model, note.rate_hz, note.noise_power), partials_in(learned, physics)
     )
 
 
 def partials_in(learned: LearnedNote, physics: Physics) -> tuple[PartialReport, ...]:
     """The partials of a note that have an interval."""
     spreads = learned.spreads
-    levels = {number: sum(each.level_db) / 2 for number, each in spreads.items()}
+    levels = {number: sum(spread.level_db) / 2 for number, spread in spreads.items()}
     loudest = max(levels.values(), default=0.0)
-    found = []
+    rows = []
     for number in sorted(spreads):
-        each = spreads[number]
+        spread = spreads[number]
         law = partial_hz(number, physics.f0_hz, physics.stiffness)
-        hz = sum(each.hz) / 2
-        low, high = each.level_db
-        decay = math.sqrt(each.decay[0] * each.decay[1])
+        hz = sum(spread.hz) / 2
+        low, high = spread.level_db
+        decay = math.sqrt(spread.decay[0] * spread.decay[1])
         poles = sum(pole.partial == number for pole in learned.poles)
         interval = low - loudest, high - loudest
         cents = 1200 * math.log2(hz / law)
-        found.append(
-            PartialReport(number, hz, each.hz, cents, levels[number] - loudest, interval, decay, each.decay, poles)
+        rows.append(
+            PartialReport(
+                number, hz, spread.hz, cents, levels[number] - loudest, interval, decay, spread.decay, poles
+            )
         )
-    return tuple(found)
+    return tuple(rows)
 
 
-def errors_of(truth: Array, found: Array, rate_hz: int, noise_power: float = 0.0) -> Errors:
+def errors_of(truth: Array, model: Array, rate_hz: int, noise_power: float = 0.0) -> Errors:
     """The errors between sounds of one length that begin 8 ms after the onset."""
-    moved, gain, delay = aligned(truth, found, rate_hz)
+    moved, gain, delay = aligned(truth, model, rate_hz)
     late = round((LATE_S - FIT_BEGINS_S) * rate_hz)
     convergence, log_db = spectral_distances(moved[None], truth[None], STFT_SIZES)
     return Errors(
@@ -137,13 +139,13 @@ def errors_of(truth: Array, found: Array, rate_hz: int, noise_power: float = 0.0
     )
 
 
-def aligned(truth: Array, found: Array, rate_hz: float) -> tuple[Array, float, float]:
+def aligned(truth: Array, model: Array, rate_hz: float) -> tuple[Array, float, float]:
     """The sound `found` with the gain and the delay, below 2 ms, that leave the least.
 
     Beside it the gain, and the delay in s.
     """
     size = fft.next_fast_len(2 * len(truth), real=True)
-    theirs, ours = fft.rfft(truth, size), fft.rfft(found, size)
+    theirs, ours = fft.rfft(truth, size), fft.rfft(model, size)
     cross = fft.irfft(theirs * ours.conj(), size)
     most = round(MOST_DELAY_S * rate_hz)
     lags = np.arange(-most, most + 1)
@@ -154,12 +156,12 @@ def aligned(truth: Array, found: Array, rate_hz: float) -> tuple[Array, float, f
         shift = 0.5 * (before - after) / min(before - 2 * at + after, -1e-30)
     delay = float(lags[place] + shift)
     turn = np.exp(-2j * math.pi * np.arange(len(ours)) * delay / size)
-    moved = fft.irfft(ours * turn, size)[: len(truth)] if abs(delay) > 1e-3 else found
+    moved = fft.irfft(ours * turn, size)[: len(truth)] if abs(delay) > 1e-3 else model
     gain = float(truth @ moved / max(float(moved @ moved), 1e-30))
     return gain * moved, gain, delay / rate_hz
 
 
-def bands_of(truth: Array, found: Array, rate_hz: int, noise_power: float) -> tuple[Band, ...]:
+def bands_of(truth: Array, model: Array, rate_hz: int, noise_power: float) -> tuple[Band, ...]:
     """T60 of each octave that the recording decays in by 10 dB or more."""
     bands = []
     for hz in BANDS_HZ:
@@ -169,7 +171,7 @@ def bands_of(truth: Array, found: Array, rate_hz: int, noise_power: float) -> tu
         share = 2 * hz / math.sqrt(2) / rate_hz
         theirs = _t60(signal.sosfilt(sections, truth), rate_hz, noise_power * share)
         if math.isfinite(theirs):
-            bands.append(Band(hz, theirs, _t60(signal.sosfilt(sections, found), rate_hz, noise_power * share)))
+            bands.append(Band(hz, theirs, _t60(signal.sosfilt(sections, model), rate_hz, noise_power * share)))
     return tuple(bands)
 
 

@@ -53,18 +53,22 @@ def at_rest(glide: Glide, poles: dict[int, list[Pole]]) -> dict[int, Rest]:
     if not poles or not glide.shares.any():
         return {number: Rest(0.0, 0.0) for number in poles}
     t = np.linspace(0, SECONDS, POINTS)
-    curves = {number: _energy(own, t) for number, own in poles.items()}
-    low = [each for each in sorted(poles)[:LAW_PARTIALS] if curves[each][-1] < LEAST_FALL * curves[each][0]]
+    curves = {number: _energy(partial_poles, t) for number, partial_poles in poles.items()}
+    low = [
+        number_low
+        for number_low in sorted(poles)[:LAW_PARTIALS]
+        if curves[number_low][-1] < LEAST_FALL * curves[number_low][0]
+    ]
     if not low:
         return {number: Rest(0.0, 0.0) for number in poles}
     energies = np.stack([curves[number] / curves[number][0] for number in low], 1)
-    known = np.sum([curves[number] * own[0].hz ** 2 for number, own in poles.items()], axis=0)
+    known = np.sum([curves[number] * partial_poles[0].hz ** 2 for number, partial_poles in poles.items()], axis=0)
     weight = np.sqrt(known / known.max() + LEAST_WEIGHT)
     rows = np.column_stack([energies, np.ones(POINTS), -np.ones(POINTS)])
     curve = glide.cents(t)
-    found, _ = optimize.nnls(rows * weight[:, None], curve * weight)
-    law = energies @ found[: len(low)]
-    misfit = float(np.sqrt(np.mean((curve - rows @ found) ** 2)))
+    law_shares, _ = optimize.nnls(rows * weight[:, None], curve * weight)
+    law = energies @ law_shares[: len(low)]
+    misfit = float(np.sqrt(np.mean((curve - rows @ law_shares) ** 2)))
     trusted = FIT_CENTS**2 / (FIT_CENTS**2 + misfit**2)
     law_error = misfit * math.sqrt(trusted)
     rests = {}

@@ -4,7 +4,7 @@ What lies beyond the end of the fit must not ring for ever.
 
 Two poles of a band can follow a slow change, of level or of pitch, with one of them that does not decay at all. Its
 decay is then unknown: its standard error is as large as itself. So each slow pole's log σ is averaged with that of a
-pole that falls by 11 dB until the end of the fit, each with the inverse of its variance. A decay that the recording
+pole that falls by 11 dB until the end of the fit. Each has the inverse of its variance. A decay that the recording
 shows stays. Amplitudes are fitted again.
 """
 
@@ -56,12 +56,12 @@ def _settled(
         ),
         np.zeros(len(before[0])),
     )
-    decays = [_decay(pole.decay, each, least) for pole, each in zip(before[0], known, strict=True)]
-    found = []
+    decays = [_decay(pole.decay, known_decay, least) for pole, known_decay in zip(before[0], known, strict=True)]
+    solved = []
     for fit, poles, rest, where in zip(fits, before, residuals, wheres, strict=True):
         slower = [replace(pole, s=complex(-decay, pole.s.imag)) for pole, decay in zip(poles, decays, strict=True)]
-        found.append(fit.solve(slower, rest[where] + fit.part(poles, where), where)[1])
-    return found
+        solved.append(fit.solve(slower, rest[where] + fit.part(poles, where), where)[1])
+    return solved
 
 
 def _decay(decay: float, known: float, least: float) -> float:
@@ -74,8 +74,8 @@ def _decay(decay: float, known: float, least: float) -> float:
 def _precision(fit: Fit, poles: list[Pole], residual: Complex, where: slice) -> NDArray[np.float64]:
     """Inverse variance of each pole's log σ, (poles,); 0 of one without amplitude."""
     loud = [place for place, pole in enumerate(poles) if pole.a]
-    found = np.zeros(len(poles))
+    inverse_variance = np.zeros(len(poles))
     if loud:
         columns = np.concatenate(fit.columns([poles[place] for place in loud], where), 1)
-        found[loud] = 1 / (np.diag(covariance(columns, residual))[2 * len(loud) :: 2] + 1e-9)
-    return found
+        inverse_variance[loud] = 1 / (np.diag(covariance(columns, residual))[2 * len(loud) :: 2] + 1e-9)
+    return inverse_variance

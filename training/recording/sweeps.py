@@ -19,7 +19,9 @@ Complex = NDArray[np.complex128]
 
 SETTLED = 1e-6  # of the energy: a band that gained less is visited less often
 REST = 3  # sweeps, for such a band
-FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 1e-2, 1e-4, 1e4
+FIRST_DAMPING = 1e-2
+LEAST_DAMPING = 1e-4
+MOST_DAMPING = 1e4
 
 
 @dataclass
@@ -58,8 +60,8 @@ class Takes:
         left, solved, rests = self._solved(poles, targets, wheres)
         square: Array = np.zeros((2 * len(poles[0]),) * 2)
         slope: Array = np.zeros(2 * len(poles[0]))
-        for fit, own, where, rest, weight in zip(self.fits, solved, wheres, rests, self.weights, strict=True):
-            columns, bent = fit.columns(own, where)
+        for fit, take_poles, where, rest, weight in zip(self.fits, solved, wheres, rests, self.weights, strict=True):
+            columns, bent = fit.columns(take_poles, where)
             jacobian = real_rows(bent - columns @ (projector(columns) @ real_rows(bent)))
             square += weight * jacobian.T @ jacobian
             slope += weight * jacobian.T @ real_rows(rest)
@@ -67,7 +69,10 @@ class Takes:
         lead = self.fits[0]
         for _ in range(tries):
             step: Array = np.asarray(np.linalg.solve(square + damping * scale, slope), np.float64).reshape(-1, 2)
-            moved = [[lead.moved(pole, each, number) for pole, each in zip(own, step, strict=True)] for own in solved]
+            moved = [
+                [lead.moved(pole, change, number) for pole, change in zip(take_poles, step, strict=True)]
+                for take_poles in solved
+            ]
             after, moved, _ = self._solved(moved, targets, wheres)
             if after < left:
                 return moved, after, max(LEAST_DAMPING, 0.3 * damping)
@@ -78,9 +83,13 @@ class Takes:
         self, poles: Sequence[list[Pole]], targets: Sequence[Complex], wheres: Sequence[slice]
     ) -> tuple[float, list[list[Pole]], list[Complex]]:
         """The weighted energy that is left with the best amplitudes, the poles with them, and the residuals."""
-        total, solved, rests = 0.0, [], []
-        for fit, own, target, where, weight in zip(self.fits, poles, targets, wheres, self.weights, strict=True):
-            left, with_amplitudes, rest = fit.solve(own, target, where)
+        total = 0.0
+        solved = []
+        rests = []
+        for fit, take_poles, target, where, weight in zip(
+            self.fits, poles, targets, wheres, self.weights, strict=True
+        ):
+            left, with_amplitudes, rest = fit.solve(take_poles, target, where)
             total += weight * left
             solved.append(with_amplitudes)
             rests.append(rest)
@@ -99,7 +108,7 @@ class Takes:
                 continue
             wheres = [fit.bands[number] for fit in self.fits]
             parts = list(zip(self.fits, residuals, before, wheres, strict=True))
-            targets = [rest[where] + fit.part(own, where) for fit, rest, own, where in parts]
+            targets = [rest[where] + fit.part(take_poles, where) for fit, rest, take_poles, where in parts]
             had = sum(
                 weight * float(np.vdot(rest[where], rest[where]).real)
                 for weight, (_, rest, _, where) in zip(self.weights, parts, strict=True)
@@ -111,9 +120,9 @@ class Takes:
                 )
             if had - left < SETTLED * self.fits[0].energy * len(self.fits):
                 self.rests[number] = REST
-            for place, (fit, rest, own, _) in enumerate(parts):
+            for place, (fit, rest, take_poles, _) in enumerate(parts):
                 fit.poles[number] = after[place]
-                for sign, poles in ((1, own), (-1, after[place])):
+                for sign, poles in ((1, take_poles), (-1, after[place])):
                     for pole in poles:
                         if pole.a:
                             changed = fit.reach(pole, loudest[place])
@@ -130,8 +139,8 @@ class Takes:
         free = [fit.free for fit in self.fits]
         for _ in range(steps):
             free, _, self.free_damping = self.improved(free, targets, wheres, self.free_damping, None)
-        for fit, own in zip(self.fits, free, strict=True):
-            fit.free = own
+        for fit, take_free in zip(self.fits, free, strict=True):
+            fit.free = take_free
 
     def step_glides(self) -> None:
         """The glide of each take, and the pitch of all but the first."""

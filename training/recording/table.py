@@ -15,7 +15,7 @@ def as_data(learned: Learned) -> dict[str, Any]:
     return {
         "file": learned.source.name,
         "digest": learned.source.digest,
-        "gate": [{"kind": each.kind, "reason": each.reason, "remedy": each.remedy} for each in learned.findings],
+        "gate": [{"kind": row.kind, "reason": row.reason, "remedy": row.remedy} for row in learned.findings],
         "found": learned.verdict.found,
         "linear_esr": _finite(learned.verdict.linear_esr),
         "loud_partials_on_law": learned.verdict.near,
@@ -29,21 +29,21 @@ def as_data(learned: Learned) -> dict[str, Any]:
         "errors": {name: _finite(value) for name, value in figures(report).items()},
         "partials": [
             {
-                "number": each.number,
-                "hz": each.hz,
-                "cents_from_law": each.cents,
-                "hz_interval": each.hz_interval,
-                "level_db": each.level_db,
-                "level_interval_db": each.level_interval_db,
-                "t60_s": math.log(1000) / each.decay,
-                "t60_interval_s": [math.log(1000) / each.decay_interval[1], math.log(1000) / each.decay_interval[0]],
-                "poles": each.poles,
+                "number": row.number,
+                "hz": row.hz,
+                "cents_from_law": row.cents,
+                "hz_interval": row.hz_interval,
+                "level_db": row.level_db,
+                "level_interval_db": row.level_interval_db,
+                "t60_s": math.log(1000) / row.decay,
+                "t60_interval_s": [math.log(1000) / row.decay_interval[1], math.log(1000) / row.decay_interval[0]],
+                "poles": row.poles,
             }
-            for each in report.partials
+            for row in report.partials
         ],
         "bands": [
-            {"hz": each.hz, "recorded_t60_s": _finite(each.recorded_s), "learned_t60_s": _finite(each.learned_s)}
-            for each in report.bands
+            {"hz": row.hz, "recorded_t60_s": _finite(row.recorded_s), "learned_t60_s": _finite(row.learned_s)}
+            for row in report.bands
         ],
     }
 
@@ -63,7 +63,8 @@ def as_text(learned: Learned) -> list[str]:
     lines.append(f"  decay by 60 dB in s, recorded/learned: {', '.join(bands) or 'no octave decays by 12 dB'}")
     lines += [f"  assumed: {words}" for words in learned.strung.assumed]
     lines += [
-        f"  {'overruled' if each.refused else 'warning'}: {each.reason}: {each.remedy}" for each in learned.findings
+        f"  {'overruled' if finding.refused else 'warning'}: {finding.reason}: {finding.remedy}"
+        for finding in learned.findings
     ]
     return lines
 

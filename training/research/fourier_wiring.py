@@ -3,17 +3,17 @@
 RUN and options are those of `train`. So the presets of FGRU and FRNN by our recipe were made.
 
 A Fourier convolution of a zero-padded field is any map that looks the same from every point: a kernel of lags for
-each pair of channels. A string is not the same at every point, so that its state is kept as numbers at single points
+each pair of channels. A string is not the same at every point. Its state is kept as numbers at single points
 of channels of their own, whose lags are theirs alone. From an end of the grid a mode's amplitude reaches every point
 by another lag, and spreads its shape there. A channel holds two such modes, one at each end.
 
-FRNN. ReLU is the identity where a bias lifts all that may come, and 0 where a bias holds it down, which leaves
+FRNN. ReLU is the identity where a bias lifts all that may come, and 0 where a bias holds it down. That leaves
 numbers only where they belong. The three layers are analysis of the field at the ends, one step of every mode, and
 synthesis. So the field is a part of the state, and a linear string is kept exactly.
 
 FGRU. tanh is the identity for numbers that are small, and the gates' biases are factors of single points: the cosine
 and the sine of mode n's phase per sample are r's at the point n of channels that hold copies of all modes'
-states, z's say where anything is written. How far a mode turns follows the squares of all: a product r ⊙ h of two
+states. z's say where anything is written. How far a mode turns follows the squares of all: a product r ⊙ h of two
 copies is a square; their sum, at one point, reaches each mode's r by the lag between them.
 """
 
@@ -156,7 +156,9 @@ def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
     pairs = end_channels(count)
     if 1 + 2 * pairs > width or depth != 3:
         raise ValueError(f"{count} modes need a width of {1 + 2 * pairs} and a depth of 3, not {width} and {depth}")
-    field, now, rate = 0, 1, 1 + pairs
+    field = 0
+    now = 1
+    rate = 1 + pairs
     last = points - 1
     analyse, turn, synthesise = layers = tuple(Kernels(points, width) for _ in range(3))
     for layer in layers:
@@ -193,9 +195,9 @@ def wire_frnn(modes: StringModes, width: int, depth: int) -> Wiring:
 
 def _two(of_modes: Tensor, here: slice) -> Tensor:
     """The two of a pair; zeros where the last has none."""
-    found = of_modes.new_zeros(ENDS, *of_modes.shape[1:])
-    found[: len(of_modes[here])] = of_modes[here]
-    return found
+    ends = of_modes.new_zeros(ENDS, *of_modes.shape[1:])
+    ends[: len(of_modes[here])] = of_modes[here]
+    return ends
 
 
 def _turns(modes: StringModes) -> Tensor:
@@ -299,9 +301,11 @@ class _Channels:
         return cls(0, 1, tuple(range(first, first + 6)), *range(first + 6, first + 12))
 
 
-def _turn(h: Kernels, own: tuple[int, ...], other: tuple[int, ...], sign: int, target: int, lag: int = 0) -> None:
+def _turn(
+    h: Kernels, from_modes: tuple[int, ...], other: tuple[int, ...], sign: int, target: int, lag: int = 0
+) -> None:
     """cos · own ± sin · other, where r shows (cosine, sine, one half) of either."""
-    (own_cosine, _, own_half), (_, other_sine, other_half) = own, other
+    (own_cosine, _, own_half), (_, other_sine, other_half) = from_modes, other
     for source, factor in ((own_cosine, 1), (own_half, -1), (other_sine, sign), (other_half, -sign)):
         h.add_shifted(source, target, factor / MARGIN, lag)
 
@@ -354,13 +358,13 @@ def shared_coupling(coupling: Tensor, squares: Tensor) -> tuple[Tensor, Tensor, 
 
     angles = squares @ coupling.T
     loud = squares.mean(0).sqrt()
-    own = 0.5
+    own_share = 0.5
     a = angles.mean(0)
     b = torch.zeros_like(a)
     eye = torch.eye(len(a), dtype=torch.float64)
     for _ in range(ALTERNATIONS):
         weights = a * loud
-        effects = squares[:, None] * (1 + own * eye)  # (strings, of, by)
+        effects = squares[:, None] * (1 + own_share * eye)  # (strings, of, by)
         system = torch.einsum("rni,rnj,n->ij", effects, effects, weights**2)
         right = torch.einsum("rni,rn,n->i", effects, angles, weights * loud)
         scale = torch.diagonal(system).sqrt().clamp(min=TINY)
@@ -369,13 +373,13 @@ def shared_coupling(coupling: Tensor, squares: Tensor) -> tuple[Tensor, Tensor, 
         b = torch.from_numpy(nnls(root.numpy(), target.numpy())[0]) / scale
         together, alone = (squares @ b)[:, None], squares * b
         excess = alone * weights
-        own = float((excess * (angles * loud - together * weights)).sum() / (excess**2).sum().clamp(min=TINY))
-        own = min(max(own, 0.0), MOST_OWN)
-        shared = together + own * alone
+        own_share = float((excess * (angles * loud - together * weights)).sum() / (excess**2).sum().clamp(min=TINY))
+        own_share = min(max(own_share, 0.0), MOST_OWN)
+        shared = together + own_share * alone
         a = (shared * angles).sum(0) / (shared**2).sum(0).clamp(min=TINY)
         size = float(b.max().clamp(min=TINY))
         a, b = a * size, b / size
-    return a, b, own
+    return a, b, own_share
 
 
 def _gates(modes: StringModes) -> tuple[Tensor, Tensor]:
@@ -411,9 +415,9 @@ def _release(h: Kernels, r: Kernels, modes: StringModes, channels: _Channels, at
     # two frames on, and the drift of two more steps, in which the squares are not known yet
     ahead = SMALL * torch.diag(modes.starts * torch.exp(2 * turn + 2j * modes.drift))
     for wanted, targets in ((ahead.real, channels.states[:3]), (ahead.imag, channels.states[3:])):
-        found = solve(torch.arange(count), wanted)
+        lag_values = solve(torch.arange(count), wanted)
         for target in targets:
-            h.lags[:, start, target] += found
+            h.lags[:, start, target] += lag_values
     for mode, (channel, end) in enumerate(at_end):
         h.lags[:, start, channel] += solve(torch.tensor([end]), ahead.real[mode : mode + 1])
     first = FIELD_SIZE * (modes.starts * torch.exp(turn)).real
@@ -437,9 +441,9 @@ class _LeastKernels:
         seen = self.shapes[:, source] * inside  # (modes, places, lags)
         rows = seen[..., None] * self.windows[source]  # (modes, places, lags, channels)
         rows = rows.transpose(0, 1).reshape(len(places) * len(self.shapes), -1)
-        found = torch.linalg.lstsq(rows, wanted.reshape(-1, 1), rcond=1e-4, driver="gelsd").solution
+        solution = torch.linalg.lstsq(rows, wanted.reshape(-1, 1), rcond=1e-4, driver="gelsd").solution
         kernels = torch.zeros(2 * points, channels, dtype=torch.float64)
-        kernels[lags] = found.view(len(lags), channels)
+        kernels[lags] = solution.view(len(lags), channels)
         return kernels
 
 
@@ -448,17 +452,17 @@ def mean_motions(modes: Modes) -> StringModes:
     motions = modes.motions.numpy()
     frames, count = motions.shape[1:]
     mean = np.einsum("rtn,rn->tn", motions, motions[:, 0]) / np.sum(motions[:, 0] ** 2, axis=0)
-    found = [phases.first_guess(motions[..., mode], 0) for mode in range(count)]
+    guesses = [phases.first_guess(motions[..., mode], 0) for mode in range(count)]
     last = min(phases.FIRST_FRAMES, frames - 1)
     while True:
         times = np.arange(1.0, last + 1)
-        for mode, guess in enumerate(found):
+        for mode, guess in enumerate(guesses):
             seen = mean[1 : last + 1, mode]
-            found[mode] = phases.Motion(np.ones(last), seen, times, np.empty((last, 0))).fitted(guess)
+            guesses[mode] = phases.Motion(np.ones(last), seen, times, np.empty((last, 0))).fitted(guess)
         if last == frames - 1:
             break
         last = min(frames - 1, int(phases.MORE_FRAMES * last) + 1)
-    return phases.string_modes([phases.upright(guess) for guess in found], SLOWEST / (frames - 1), modes)
+    return phases.string_modes([phases.upright(guess) for guess in guesses], SLOWEST / (frames - 1), modes)
 
 
 def _start_fgru(model: FGRU, modes: Modes, seed: int) -> None:

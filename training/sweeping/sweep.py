@@ -148,15 +148,15 @@ def sweep(plan: Plan, workers: Workers, options: Options, watch: Watch) -> list[
                 watch.progressed(run, progress)
         for future in ended:
             piece = running.pop(future)
-            found, error = _outcome(future)
+            finished, error = _outcome(future)
             failures[piece[0].name] += bool(error)
             if error and failures[piece[0].name] <= options.retries:
                 watch.failed(piece[0], error)
                 waiting.appendleft(piece)
                 continue
-            found = found or [_failed(run, error) for run in piece]
-            rows.update((other.digest, other) for other in add_rows(file, found))
-            for row in found:
+            finished = finished or [_failed(run, error) for run in piece]
+            rows.update((other.digest, other) for other in add_rows(file, finished))
+            for row in finished:
                 watch.finished(row)
     return [rows[run.digest] for run in plan.runs if run.digest in rows]
 

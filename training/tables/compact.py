@@ -25,15 +25,15 @@ RECIPE_WORDS = {"paper": ", paper's recipe", "published": ", authors' script"}
 
 def as_compact(rows: Sequence[Row], recipe: str = "all", metric: str = "rel_mse") -> str:
     """The tables of one metric, a line per model and recipe that was trained on the table's own horizon."""
-    found = sections(rows, recipe)
+    all_sections = sections(rows, recipe)
     parts = [LEGEND.format(metric=METRIC_NAMES[metric], none=NONE)]
     for horizon in HORIZONS:
-        shown = [section for section in found if section.horizon == horizon]
+        shown = [section for section in all_sections if section.horizon == horizon]
         parts.append(f"### {horizon} frames, relative {METRIC_NAMES[metric]}")
         head = ["string", "model", "training starts from", "seeds", *map(str, COLUMNS)]
         parts.append(markdown_table(head, [line for section in shown for line in _lines(section, metric)]))
-    parts.append("### Missing cells\n\n" + _missing(found))
-    if out := len(rows) - len(rows_of(found)):
+    parts.append("### Missing cells\n\n" + _missing(all_sections))
+    if out := len(rows) - len(rows_of(all_sections)):
         parts.append(
             f"{out} of {len(rows)} rows of the results file are not shown: other data, another horizon or recipe, "
             "a trial, or a recipe that has changed since."
@@ -54,19 +54,19 @@ def given(line: Line) -> str:
 
 def own_lines(section: Section) -> list[Line]:
     """The lines of a section that were trained on its own horizon, by model."""
-    own = [line for line in section.lines if line.trained == section.horizon]
-    return [line for model in section.models for line in own if line.model == model]
+    same_horizon = [line for line in section.lines if line.trained == section.horizon]
+    return [line for model in section.models for line in same_horizon if line.model == model]
 
 
 def _lines(section: Section, metric: str) -> list[list[str]]:
     table = []
     for model in section.models:
         name = (section.string, MODEL_NAMES[model])
-        own = [line for line in own_lines(section) if line.model == model]
-        for line in own:
+        lines = [line for line in own_lines(section) if line.model == model]
+        for line in lines:
             cells = (_cell(section, line, column, metric) for column in COLUMNS)
             table.append([*name, given(line), _seeds(section, line), *cells])
-        if not own:
+        if not lines:
             table.append([*name, NONE, "0", *(_not_run(section, model, column, metric) for column in COLUMNS)])
     return table
 
@@ -101,13 +101,13 @@ def _against(ours: Figure, paper: Figure | None) -> str:
     return {"better": f"**{words}**", "worse": f"*{words}*", "equal": words}[mark(ours, paper)]
 
 
-def _missing(found: Sequence[Section]) -> str:
+def _missing(all_sections: Sequence[Section]) -> str:
     """The models and data sets without a run on their own horizon."""
     lines = []
-    for section in found:
+    for section in all_sections:
         for model in section.models:
-            own = [line for line in own_lines(section) if line.model == model]
-            ran = {column for line in own for column in section.lines[line]}
+            of_model = [line for line in own_lines(section) if line.model == model]
+            ran = {column for line in of_model for column in section.lines[line]}
             if left := [str(column) for column in COLUMNS if column not in ran]:
                 where = "no cell" if not ran else "not " + ", ".join(left)
                 lines.append(f"- {MODEL_NAMES[model]}, {section.string} string, {section.horizon} frames: {where}.")

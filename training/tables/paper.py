@@ -73,13 +73,13 @@ class Errors:
 @cache
 def paper_errors() -> dict[tuple[str, int, str, Column], Errors]:
     """The paper's errors, by string, horizon, model and column."""
-    found = {}
+    errors = {}
     with PAPER.open(newline="", encoding="utf-8") as file:
         for line in csv.DictReader(file):
             mse, mae = (Figure(float(line[metric]), float(line[f"{metric}_std"])) for metric in METRICS)
             column = Column(line["initial"], int(line["rate_hz"]))
-            found[line["string"], int(line["horizon"]), line["model"], column] = Errors(mse, mae)
-    return found
+            errors[line["string"], int(line["horizon"]), line["model"], column] = Errors(mse, mae)
+    return errors
 
 
 def mark(ours: Figure, paper: Figure) -> Mark:

@@ -86,8 +86,8 @@ class Section:
 
     def paper(self, model: str, column: Column, metric: str) -> Figure | None:
         """The paper's figure there; None where it has nothing."""
-        found = paper_errors().get((self.string, self.horizon, model, column))
-        return found.figure(metric) if found else None
+        errors = paper_errors().get((self.string, self.horizon, model, column))
+        return errors.figure(metric) if errors else None
 
 
 def sections(rows: Iterable[Row], recipe: str = "all") -> list[Section]:
@@ -100,9 +100,11 @@ def sections(rows: Iterable[Row], recipe: str = "all") -> list[Section]:
     return [_section(chosen, string, horizon) for string in STRINGS for horizon in HORIZONS]
 
 
-def rows_of(found: Iterable[Section]) -> list[Row]:
+def rows_of(all_sections: Iterable[Section]) -> list[Row]:
     """Every row behind the figures of these tables, once, by name."""
-    rows = {row for s in found for entries in s.lines.values() for entry in entries.values() for row in entry.rows}
+    rows = {
+        row for s in all_sections for entries in s.lines.values() for entry in entries.values() for row in entry.rows
+    }
     return sorted(rows, key=lambda row: (row.name, row.digest))
 
 

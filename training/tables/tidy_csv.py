@@ -40,14 +40,16 @@ def _record(section: Section, model: str, line: Line | None, column: Column) -> 
     against the paper's; test_… of the test split's. runs: their names, separated by spaces, with those that diverged
     or failed. rel_mse_std …: over seeds; rel_mse_se …: over the trajectories of the split; see `Figure`.
     """
-    found = (section.lines[line].get(column) if line else None) or Entry(None, None)
+    entry = (section.lines[line].get(column) if line else None) or Entry(None, None)
     marks: dict[str, Any] = {}
     figures: dict[str, Any] = {}
-    for prefix, errors in (("", found), ("test_", found.test)):
+    for prefix, errors in (("", entry), ("test_", entry.test)):
         for metric in METRICS:
-            ours, paper, name = errors.figure(metric), section.paper(model, column, metric), f"{prefix}{metric}"
+            ours = errors.figure(metric)
+            paper = section.paper(model, column, metric)
+            name = f"{prefix}{metric}"
             figures[name], figures[f"{name}_std"], figures[f"{name}_se"] = ours or (None, None, None)
-            against = mark(ours, paper) if ours and paper else "" if found.rows else NOT_RUN
+            against = mark(ours, paper) if ours and paper else "" if entry.rows else NOT_RUN
             marks[name.replace("rel_", "") + "_mark"] = against
     for metric in METRICS:
         paper = section.paper(model, column, metric)
@@ -62,10 +64,10 @@ def _record(section: Section, model: str, line: Line | None, column: Column) -> 
         "trained": line.trained if line else None,
         "initial": column.initial,
         "rate_hz": column.rate_hz,
-        "seeds": len(found.done),
-        "diverged": len(found.diverged),
-        "failed": len(found.failed),
+        "seeds": len(entry.done),
+        "diverged": len(entry.diverged),
+        "failed": len(entry.failed),
         **marks,
-        "runs": " ".join(row.name for row in found.rows),
+        "runs": " ".join(row.name for row in entry.rows),
         **figures,
     }

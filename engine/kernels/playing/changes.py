@@ -62,15 +62,15 @@ def retune(
         address = note.voices[source]
         if address == 0 or slots.voice_over(address):
             continue
-        wished = voices.add_wish(player, note, source, seconds, frame, now)
-        own = wished_rows(wished, note.modes)
+        wish = voices.add_wish(player, note, source, seconds, frame, now)
+        target_rows = wished_rows(wish, note.modes)
         if filled == 0:
-            voices.fill(player, table, note, string, own)
-            filled = wished
+            voices.fill(player, table, note, string, target_rows)
+            filled = wish
         else:
             others = wished_rows(filled, note.modes)
-            for place in range(len(own)):
-                own[place] = others[place]
+            for place in range(len(target_rows)):
+                target_rows[place] = others[place]
 
 
 @njit(**COMPILED)
@@ -103,11 +103,11 @@ def damp(
             continue
         voice = voice_at(address)
         n, present = voice.modes, rows(voice, at.OMEGA_SQUARED, at.RESONATOR_ROWS)
-        wished = wished_rows(voices.add_wish(player, note, source, DAMPER_S, frame, now), n)
-        for place in range(len(wished)):
-            wished[place] = present[place]
+        target_rows = wished_rows(voices.add_wish(player, note, source, DAMPER_S, frame, now), n)
+        for place in range(len(target_rows)):
+            target_rows[place] = present[place]
             if n <= place < 2 * n:  # σ
-                wished[place] += math.log(1000.0) / t60_s
+                target_rows[place] += math.log(1000.0) / t60_s
 
 
 @njit(**COMPILED)

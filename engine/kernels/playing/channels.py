@@ -5,7 +5,7 @@ them alone may as well be a keyboard: until another has played, it plays any key
 chooses. So do all further channels, and the keys of the computer and the screen always.
 
 A channel's own wheel and pedal hold for what was struck on it. Those of the first channel hold for the keys of the
-computer and the screen too, which have none, and in MPE, as the master's, for every channel.
+computer and the screen too, which have none; in MPE, as the master's, for every channel.
 
 A release belongs to the earliest stroke of its key that has none: a key that is struck again before it was released
 is held until the last of its releases.
@@ -25,17 +25,18 @@ MPE_BEND_SEMITONES = 48.0  # range of the pitch wheel of a member channel
 WIDEST_SEMITONES = 96.0  # that messages may ask for
 HAMMER_S, SLIDE_S = 0.006, (0.02, 1.0)  # of the glide to the length of another key; of a slide, at times of 0 and 127
 # Controllers of MIDI
-DATA, FINE_DATA, INCREMENT, DECREMENT, FINE_OTHER, OTHER, FINE_REGISTERED, REGISTERED = (
-    6,
-    38,
-    96,
-    97,
-    98,
-    99,
-    100,
-    101,
-)
-NO_PARAMETER, BEND_RANGE, FINE_TUNING, COARSE_TUNING = 127, 0, 1, 2  # registered parameters
+DATA = 6
+FINE_DATA = 38
+INCREMENT = 96
+DECREMENT = 97
+FINE_OTHER = 98
+OTHER = 99
+FINE_REGISTERED = 100
+REGISTERED = 101
+NO_PARAMETER = 127
+BEND_RANGE = 0
+FINE_TUNING = 1
+COARSE_TUNING = 2  # registered parameters
 
 
 @njit(**COMPILED)
@@ -78,10 +79,10 @@ def begin(player: Player, number: int) -> None:
 def loudness(player: Player, mode: int, channel: int) -> float:
     """The factor of what was struck on a channel, by its volume and expression: General MIDI's squares."""
     share = 1.0
-    for each in range(of.CHANNELS):
-        if acts_on(mode, each, channel):
-            share *= player.channels[each].volume / of.USUAL_VOLUME
-            share *= player.channels[each].expression / 127
+    for number in range(of.CHANNELS):
+        if acts_on(mode, number, channel):
+            share *= player.channels[number].volume / of.USUAL_VOLUME
+            share *= player.channels[number].expression / 127
     return share * share
 
 
@@ -110,8 +111,8 @@ def acts_on(mode: int, channel: int, other: int) -> bool:
 def pedal_down(player: Player, mode: int, channel: int) -> bool:
     """Return True if a pedal holds what was struck on a channel."""
     down = False
-    for each in range(of.CHANNELS):
-        down = down or (player.channels[each].pedal != 0 and acts_on(mode, each, channel))
+    for number in range(of.CHANNELS):
+        down = down or (player.channels[number].pedal != 0 and acts_on(mode, number, channel))
     return down
 
 
@@ -119,12 +120,12 @@ def pedal_down(player: Player, mode: int, channel: int) -> bool:
 def semitones(player: Player, mode: int, channel: int) -> float:
     """The bend by pitch wheels of what was struck on a channel, plus its tuning, in semitones."""
     total = 0.0
-    for each in range(of.CHANNELS):
-        if acts_on(mode, each, channel):
-            own = player.channels[each]
-            total += own.coarse_tuning + own.fine_tuning / of.TUNING_STEPS
-            if own.bend != 0.0:
-                total += own.bend * _bend_range(player, mode, each)
+    for number in range(of.CHANNELS):
+        if acts_on(mode, number, channel):
+            state = player.channels[number]
+            total += state.coarse_tuning + state.fine_tuning / of.TUNING_STEPS
+            if state.bend != 0.0:
+                total += state.bend * _bend_range(player, mode, number)
     return total
 
 
@@ -148,17 +149,17 @@ def set_parameter(player: Player, mode: int, number: int, controller: int, value
 
     Increments are of the least step, as MIDI's RP-018 has it. A member's range of bends is that of all members.
     """
-    own = player.channels[number]
+    state = player.channels[number]
     if controller in (OTHER, FINE_OTHER):
-        own.coarse = NO_PARAMETER
-        own.fine = NO_PARAMETER
+        state.coarse = NO_PARAMETER
+        state.fine = NO_PARAMETER
     elif controller == REGISTERED:
-        own.coarse = value
+        state.coarse = value
     elif controller == FINE_REGISTERED:
-        own.fine = value
-    if controller not in (DATA, FINE_DATA, INCREMENT, DECREMENT) or own.coarse != 0:
+        state.fine = value
+    if controller not in (DATA, FINE_DATA, INCREMENT, DECREMENT) or state.coarse != 0:
         return False
-    chosen, step = own.fine, 1 if controller == INCREMENT else -1
+    chosen, step = state.fine, 1 if controller == INCREMENT else -1
     if chosen == BEND_RANGE:
         wide = _bend_range(player, mode, number)
         if controller == DATA:
@@ -167,21 +168,21 @@ def set_parameter(player: Player, mode: int, number: int, controller: int, value
             wide = math.floor(wide) + value / 100
         else:
             wide += step / 100
-        for each in range(of.CHANNELS):
-            if each == number or (_is_member(mode, number) and _is_member(mode, each)):
-                player.channels[each].range_semitones = min(max(wide, 0.0), WIDEST_SEMITONES)
+        for member in range(of.CHANNELS):
+            if member == number or (_is_member(mode, number) and _is_member(mode, member)):
+                player.channels[member].range_semitones = min(max(wide, 0.0), WIDEST_SEMITONES)
     elif chosen == FINE_TUNING:
-        steps = own.fine_tuning + of.TUNING_STEPS
+        steps = state.fine_tuning + of.TUNING_STEPS
         if controller == DATA:
             steps = 128 * value
         elif controller == FINE_DATA:
             steps = steps // 128 * 128 + value
         else:
             steps += step
-        own.fine_tuning = min(max(steps, 0), 2 * of.TUNING_STEPS - 1) - of.TUNING_STEPS
+        state.fine_tuning = min(max(steps, 0), 2 * of.TUNING_STEPS - 1) - of.TUNING_STEPS
     elif chosen == COARSE_TUNING and controller != FINE_DATA:
-        semitone = value - 64 if controller == DATA else own.coarse_tuning + step
-        own.coarse_tuning = min(max(semitone, -64), 63)
+        semitone = value - 64 if controller == DATA else state.coarse_tuning + step
+        state.coarse_tuning = min(max(semitone, -64), 63)
     else:
         return False
     return True
@@ -196,8 +197,8 @@ def _is_string(player: Player, table: Table, channel: int) -> bool:
     if table.strings > 0:
         count = min(count, table.strings)
     others = 0
-    for each in range(of.FIRST + 1, count):
-        others += player.channels[each].plays
+    for other in range(of.FIRST + 1, count):
+        others += player.channels[other].plays
     return channel < count and others > 0
 
 
@@ -258,16 +259,16 @@ def release_keys(player: Player, channel: int) -> None:
 def switched(player: Player, mode: int, channel: int, which: int) -> bool:
     """Return True if a footswitch, by its number, holds for a channel."""
     down = False
-    for each in range(of.CHANNELS):
-        down = down or (player.channels[each].switches[which] != 0 and acts_on(mode, each, channel))
+    for number in range(of.CHANNELS):
+        down = down or (player.channels[number].switches[which] != 0 and acts_on(mode, number, channel))
     return down
 
 
 @njit(**COMPILED)
 def moves_in_s(player: Player, mode: int, channel: int) -> float:
     """The time in which a note moves to another key of its channel."""
-    for each in range(of.CHANNELS):
-        own = player.channels[each]
-        if own.switches[of.SLIDES] != 0 and acts_on(mode, each, channel):
-            return SLIDE_S[0] * (SLIDE_S[1] / SLIDE_S[0]) ** (own.slide_time / 127)
+    for number in range(of.CHANNELS):
+        state = player.channels[number]
+        if state.switches[of.SLIDES] != 0 and acts_on(mode, number, channel):
+            return SLIDE_S[0] * (SLIDE_S[1] / SLIDE_S[0]) ** (state.slide_time / 127)
     return HAMMER_S

@@ -56,7 +56,9 @@ def _goes_up(player: Player, table: Table) -> bool:
 @njit(**COMPILED)
 def _swap(player: Player, first: Event, second: Event) -> None:
     """Exchange two events; each place keeps its frame."""
-    kept, frame, other_frame = player.kept_event, first.frame, second.frame
+    kept = player.kept_event
+    frame = first.frame
+    other_frame = second.frame
     copy(kept, first)
     copy(first, second)
     copy(second, kept)
@@ -77,8 +79,8 @@ def arrange(player: Player, now: int, ring: np.ndarray, place: int, end: int) ->
     if _strums_in(player, table, event) == 0 or _continues(player, frame):
         return
     up, best = _goes_up(player, table), event
-    for each in range(place + 1, end):
-        other = ring[each % len(ring)]
+    for later in range(place + 1, end):
+        other = ring[later % len(ring)]
         together = max(other.frame, now) == frame and other.chord == 0
         if not together or _strums_in(player, table, other) == 0:
             break
@@ -118,13 +120,13 @@ def strum(player: Player, table: Table, event: Event, now: int) -> bool:
     event.chord = 0
     later, up = -1, player.chord_up != 0
     for place in range(player.queued - 1, -1, -1):  # from the new one, which is the last, to its turn
-        each = player.queue[place]
-        if each.chord != chord:
+        waiting = player.queue[place]
+        if waiting.chord != chord:
             continue
         if later >= 0:
-            if (_height(player, table, each) < _height(player, table, player.queue[later])) != up:
+            if (_height(player, table, waiting) < _height(player, table, player.queue[later])) != up:
                 break
-            _swap(player, each, player.queue[later])
+            _swap(player, waiting, player.queue[later])
         later = place
     return True
 
@@ -135,18 +137,20 @@ def waits(player: Player, event: Event, now: int) -> bool:
 
     Returns True if it does.
     """
-    id, channel, key = event.id, event.channel, event.key
+    id = event.id
+    channel = event.channel
+    key = event.key
     by_id = id != 0 and event.kind in (of.TUNE, of.CHOKE)
     for place in range(player.queued):
-        each = player.queue[place]
-        if each.chord == 0:
+        waiting = player.queue[place]
+        if waiting.chord == 0:
             continue
-        meant = each.channel == channel and each.key == key
-        meant = meant and event.string in (0, each.string)
+        meant = waiting.channel == channel and waiting.key == key
+        meant = meant and event.string in (0, waiting.string)
         if by_id:
-            meant = each.id == id
+            meant = waiting.id == id
         if meant and player.queued < of.QUEUED:
-            later = each.frame - each.came
+            later = waiting.frame - waiting.came
             event.frame = max(event.frame, now) + later
             queue(player, event)
             return True

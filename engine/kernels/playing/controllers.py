@@ -11,8 +11,21 @@ from engine.kernels.playing import changes, channels, chords, hands, slots, voic
 from engine.kernels.records import Player, Table
 
 KNOB_S = 0.04  # of the glide to other modes
-MOD_WHEEL, SLIDE_TIME, VOLUME, EXPRESSION, SUSTAIN, PORTAMENTO, SOFT, LEGATO, SLIDE = 1, 5, 7, 11, 64, 65, 67, 68, 74
-HARMONICS, TREMOLO, STRUM, SOUND_OFF, RESET, NOTES_OFF = 80, 81, 82, 120, 121, 123
+MOD_WHEEL = 1
+SLIDE_TIME = 5
+VOLUME = 7
+EXPRESSION = 11
+SUSTAIN = 64
+PORTAMENTO = 65
+SOFT = 67
+LEGATO = 68
+SLIDE = 74
+HARMONICS = 80
+TREMOLO = 81
+STRUM = 82
+SOUND_OFF = 120
+RESET = 121
+NOTES_OFF = 123
 PEDAL_DOWN = 64  # from this value on
 LAST_MODE = 127  # messages from NOTES_OFF on choose a mode, and release all keys as well
 
@@ -25,8 +38,8 @@ def stop(player: Player, seconds: float, frame: int) -> None:
         if note.state == of.RINGS:
             voices.release_note(player, note, seconds, frame)
             note.has_place = 0
-    for each in range(of.CHANNELS):
-        channels.release_keys(player, each)
+    for channel in range(of.CHANNELS):
+        channels.release_keys(player, channel)
     chords.forget_turns(player, of.POLY, -1)
     player.next_up = 0
     player.sympathy.stops = slots.quanta(player, max(seconds, hands.STOP_S)) + 2
@@ -43,56 +56,58 @@ def controller(
     frame: int,
     now: int,
 ) -> None:
-    mode, own, wheel = table.mode, player.channels[channel], table.wheel
+    mode = table.mode
+    state = player.channels[channel]
+    wheel = table.wheel
     turns = 0 <= wheel < of.KNOBS or wheel == of.MUTE
     if number == SUSTAIN:
-        own.pedal = value >= PEDAL_DOWN
+        state.pedal = value >= PEDAL_DOWN
         changes.damp_unkept(player, table, frame, now)
     elif number == SLIDE:
-        own.slide = max(value, 0)
+        state.slide = max(value, 0)
     elif number == SOFT:
-        own.mute = min(max(value, 0), 127) / 127
+        state.mute = min(max(value, 0), 127) / 127
         changes.glide(player, table, channel, changes.DAMPER_S, frame, now)
     elif number == LEGATO:
-        own.switches[of.LEGATO] = value >= PEDAL_DOWN
+        state.switches[of.LEGATO] = value >= PEDAL_DOWN
     elif number == PORTAMENTO:
-        own.switches[of.SLIDES] = value >= PEDAL_DOWN
+        state.switches[of.SLIDES] = value >= PEDAL_DOWN
     elif number == HARMONICS:
-        own.switches[of.HARMONICS] = value >= PEDAL_DOWN
+        state.switches[of.HARMONICS] = value >= PEDAL_DOWN
     elif number == TREMOLO:
-        own.switches[of.TREMOLO] = value >= PEDAL_DOWN
+        state.switches[of.TREMOLO] = value >= PEDAL_DOWN
     elif number == STRUM:
-        own.switches[of.STRUMS] = value >= PEDAL_DOWN
+        state.switches[of.STRUMS] = value >= PEDAL_DOWN
     elif number == SLIDE_TIME:
-        own.slide_time = min(max(value, 0), 127)
+        state.slide_time = min(max(value, 0), 127)
     elif number == MOD_WHEEL:
         player.wheel = min(max(value, 0), 127)
         player.wheel_by = channel
         if turns:
             changes.glide(player, table, -1, KNOB_S, frame, now)
     elif number == VOLUME:
-        own.volume = min(max(value, 0), 127)
+        state.volume = min(max(value, 0), 127)
     elif number == EXPRESSION:
-        own.expression = min(max(value, 0), 127)
+        state.expression = min(max(value, 0), 127)
     elif number == SOUND_OFF:
         stop(player, hands.STOP_S, frame)
     elif NOTES_OFF <= number <= LAST_MODE:
-        for each in range(of.CHANNELS):
-            if channels.is_master(mode, channel, each):
-                channels.release_keys(player, each)
+        for other in range(of.CHANNELS):
+            if channels.is_master(mode, channel, other):
+                channels.release_keys(player, other)
         chords.forget_turns(player, mode, channel)
-        for each in range(of.MOST_NOTES):
-            note = player.notes[each]
+        for other in range(of.MOST_NOTES):
+            note = player.notes[other]
             if channels.is_master(mode, channel, note.channel) and slots.sounds(note):
                 note.held = 0
                 note.kept = 0
                 changes.damp(player, table, note, frame, now)
     elif number == RESET:
-        for each in range(of.CHANNELS):
-            if channels.is_master(mode, channel, each) and value == 0:
-                channels.reset(player, each)
-            elif channels.is_master(mode, channel, each):  # by this program: MIDI's own has no other value
-                channels.begin(player, each)
+        for other in range(of.CHANNELS):
+            if channels.is_master(mode, channel, other) and value == 0:
+                channels.reset(player, other)
+            elif channels.is_master(mode, channel, other):  # by this program: MIDI's own has no other value
+                channels.begin(player, other)
         if channels.is_master(mode, channel, player.wheel_by):
             player.wheel = 0
         changes.damp_unkept(player, table, frame, now)

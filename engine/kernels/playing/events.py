@@ -32,9 +32,9 @@ def _take_table(player: Player, address: int, frame: int, now: int) -> None:
     gains.forget_gains(player)
     if before != 0 and table_at(before).instrument != table.instrument:
         player.wheel = 0
-        for each in range(of.CHANNELS):
-            own = player.channels[each]
-            channels.rest(player, each, own.pedal, own.plays)
+        for channel in range(of.CHANNELS):
+            state = player.channels[channel]
+            channels.rest(player, channel, state.pedal, state.plays)
     changes.glide(player, table, -1, controllers.KNOB_S, frame, now)
     fence()
     player.serial = table.serial  # those before may be freed from here on
@@ -63,7 +63,9 @@ def _cancel(player: Player, id: int, now: int) -> None:
 @njit(**COMPILED)
 def _handle(player: Player, mixer: Mixer, event: Event) -> None:
     """Play an event now. Those of a player without a table do nothing, except for a note, which is refused."""
-    kind, frame, now = event.kind, event.frame, mixer.frames
+    kind = event.kind
+    frame = event.frame
+    now = mixer.frames
     channel, key = event.channel, event.key
     value, address = event.value, player.table
     if kind == of.TABLE:
@@ -185,5 +187,5 @@ def begin(player_address: int) -> None:
     player.here = player_address
     for number in range(of.MOST_NOTES):
         player.notes[number].number = number
-    for each in range(of.CHANNELS):
-        channels.begin(player, each)
+    for channel in range(of.CHANNELS):
+        channels.begin(player, channel)

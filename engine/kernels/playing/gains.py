@@ -36,12 +36,12 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
 
     The modulation wheel and the mute do not count: what they change is heard as louder or softer.
     """
-    own = player.bent
+    string_row = player.bent
     pitch_hz = keys.pitch_of(table, key)
     if not pitch_hz > 0.0:
         return 0
-    partials, shortened = keys.string_of(player, table, key, string, pitch_hz, False, own)
-    if partials < 1 or strings.overdamped(own, partials):
+    partials, shortened = keys.string_of(player, table, key, string, pitch_hz, False, string_row)
+    if partials < 1 or strings.overdamped(string_row, partials):
         return 0
     share = plucks.reference_share(player)
     amplitude_mm = velocities.between(player.values[of.SOFTEST_MM], player.values[of.HARDEST_MM], share) * shortened
@@ -49,12 +49,14 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
         pulled_m = min(amplitude_mm, LARGEST_AMPLITUDE_MM) / 1000
         player.amplitudes[mode] = pulled_m * player.reference[mode]
     release_s = velocities.contact_s(player.values[of.CONTACT_MS], player.values[of.CONTACT_HARD_MS], share)
-    plucks.release_pluck(player, table, own, partials, release_s)
-    modes, pairs, learned = partials, 0, table.recorded != 0
+    plucks.release_pluck(player, table, string_row, partials, release_s)
+    modes = partials
+    pairs = 0
+    learned = table.recorded != 0
     if learned:
         modes = keys.modes_of(table, partials)
         pairs = (modes + 1) // 2
-        recorded.split(keys.additions(table), own, modes, player.amplitudes[:modes])
+        recorded.split(keys.additions(table), string_row, modes, player.amplitudes[:modes])
     else:
         pairs = plucks.split(player, table, partials, 0.0)
         modes += pairs
@@ -64,7 +66,7 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
         together *= 1 + (table.course - 1) * table.bridge
     rows = player.sound[: of.SOUND_ROWS * modes]
     strings.rows(
-        own,
+        string_row,
         modes,
         pairs,
         table.detuning,
@@ -76,7 +78,7 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
         rows,
     )
     if learned:
-        recorded.correct(keys.additions(table), own, modes, rows)
+        recorded.correct(keys.additions(table), string_row, modes, rows)
     for mode in range(modes):
         partial, direction = strings.partial_of(mode, pairs), strings.direction_of(mode, pairs)
         omega = math.sqrt(rows[mode])
@@ -88,9 +90,9 @@ def _sound(player: Player, table: Table, key: int, string: int) -> int:
         rows[of.SOUND_OMEGA * modes + mode] = omega
         left, right = player.values[of.POINT], player.values[of.POINT + 1]
         stereo, aperture_m = table.points == 2, table.aperture_m
-        rows[of.SOUND_LEFT * modes + mode] = amplitude * voices.weight_of(own, partial, left, aperture_m)
+        rows[of.SOUND_LEFT * modes + mode] = amplitude * voices.weight_of(string_row, partial, left, aperture_m)
         rows[of.SOUND_RIGHT * modes + mode] = (
-            amplitude * voices.weight_of(own, partial, right, aperture_m) if stereo else 0.0
+            amplitude * voices.weight_of(string_row, partial, right, aperture_m) if stereo else 0.0
         )
     return modes
 
@@ -135,9 +137,9 @@ def gain_of(player: Player, table: Table, key: int, string: int) -> float:
         body, mix = _body(player, table)
         modes = _sound(player, table, key, string)
         sound = player.sound[: of.SOUND_ROWS * modes]
-        found = loudness.gain(sound, modes, table.points, body, mix)
-        found /= max(table.course, 1)  # of strings that swing together at first
-        player.gains[key, 1 + string] = found * player.limit * table.level
+        gain = loudness.gain(sound, modes, table.points, body, mix)
+        gain /= max(table.course, 1)  # of strings that swing together at first
+        player.gains[key, 1 + string] = gain * player.limit * table.level
         swing = 0.0
         for mode in range(modes):
             swing += player.amplitudes[mode] ** 2

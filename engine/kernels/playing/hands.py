@@ -52,9 +52,9 @@ def _move(
         return False
     if note.place % 256 != 0:  # a place for each key
         note.place += key - note.key
-        for each in range(of.MOST_NOTES):
-            other = player.notes[each]
-            if each != note.number and slots.sounds(other) and other.place == note.place:
+        for number in range(of.MOST_NOTES):
+            other = player.notes[number]
+            if number != note.number and slots.sounds(other) and other.place == note.place:
                 other.has_place = 0
                 voices.release_note(player, other, notes.PLUCK_STOPS_S, frame)
     note.string, note.key = string, key
@@ -102,7 +102,10 @@ def hammer_on(player: Player, table: Table, event: Event, frame: int, now: int) 
 
     Where the event gives a string, only a note on that string.
     """
-    channel, key, found, age = event.channel, event.key, -1, 0
+    channel = event.channel
+    key = event.key
+    ringing = -1
+    age = 0
     place = channels.place_of(player, table, event)
     if not channels.switched(player, table.mode, channel, of.LEGATO):
         return False
@@ -116,10 +119,10 @@ def hammer_on(player: Player, table: Table, event: Event, frame: int, now: int) 
             and note.age > age
             and slots.sounds(note)
         ):
-            found, age = number, note.age
-    if found < 0:
+            ringing, age = number, note.age
+    if ringing < 0:
         return False
-    note = player.notes[found]
+    note = player.notes[ringing]
     id, before = note.id, note.key
     if key == before or not _move(player, table, note, key, frame, now):
         return False
@@ -152,8 +155,8 @@ def _pull_off(
         return False
     for key in range(of.KEYS - 1, -1, -1):
         free = channels.is_down(player, channel, key)
-        for each in range(of.MOST_NOTES):
-            other = player.notes[each]
+        for number in range(of.MOST_NOTES):
+            other = player.notes[number]
             same = other.key == key and other.channel == channel
             same = same and other.member == 0
             free = free and not (same and other.held != 0 and slots.sounds(other))
@@ -177,8 +180,8 @@ def note_off(
         note = player.notes[turn % of.MOST_NOTES]
         same = note.key == key and note.channel == channel
         same = same and (note.member == 0) == (turn < of.MOST_NOTES)
-        given = event.string != 0
-        same = same and (not given or note.place % notes.MEMBERS_APART == place)
+        has_string = event.string != 0
+        same = same and (not has_string or note.place % notes.MEMBERS_APART == place)
         if same and note.held != 0 and slots.sounds(note):
             if note.member == 0 and _pull_off(player, table, note, frame, now):
                 continue
@@ -193,7 +196,9 @@ def _is_meant(event: Event, note: Note) -> bool:
 
     Its number, channel and key count as far as they are given.
     """
-    id, channel, key = event.id, event.channel, event.key
+    id = event.id
+    channel = event.channel
+    key = event.key
     if note.state != of.RINGS or (id != 0 and note.id != id):
         return False
     return channel in (of.ANY, note.channel) and key in (of.ANY, note.key)
@@ -213,7 +218,9 @@ def tune(player: Player, table: Table, event: Event, frame: int, now: int) -> No
 @njit(**COMPILED)
 def choke(player: Player, event: Event, frame: int) -> None:
     """Let single notes fade out fast, though their instrument lets them ring; no release of their keys follows."""
-    id, channel, key = event.id, event.channel, event.key
+    id = event.id
+    channel = event.channel
+    key = event.key
     seconds = event.value if event.value > 0.0 else STOP_S
     for number in range(of.MOST_NOTES):
         note = player.notes[number]
@@ -224,9 +231,9 @@ def choke(player: Player, event: Event, frame: int) -> None:
             note.has_place = 0
     if id != 0 and key == of.ANY:
         return
-    for each in range(of.CHANNELS * of.KEYS):  # whose notes may have ended
-        if channel in (of.ANY, each // of.KEYS) and key in (of.ANY, each % of.KEYS):
-            channels.release_key(player, each // of.KEYS, each % of.KEYS)
+    for held in range(of.CHANNELS * of.KEYS):  # whose notes may have ended
+        if channel in (of.ANY, held // of.KEYS) and key in (of.ANY, held % of.KEYS):
+            channels.release_key(player, held // of.KEYS, held % of.KEYS)
 
 
 @njit(**COMPILED)

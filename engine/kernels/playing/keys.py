@@ -29,9 +29,9 @@ def value_of(player: Player, table: Table, which: int) -> float:
 def mute_of(player: Player, table: Table, channel: int) -> float:
     """The strength of a hand's mute on what was struck on a channel, 0 … 1."""
     share = value_of(player, table, of.MUTE)
-    for each in range(of.CHANNELS):
-        if channels.acts_on(table.mode, each, channel):
-            share = max(share, player.channels[each].mute)
+    for number in range(of.CHANNELS):
+        if channels.acts_on(table.mode, number, channel):
+            share = max(share, player.channels[number].mute)
     return share
 
 
@@ -80,7 +80,9 @@ def string_of(
         number: on which of a set it is wanted, as of `strings.played`.
         wheeled: whether with the knob that the modulation wheel turns, as far as it does.
     """
-    whole, knobs, count = player.whole, player.knobs, table.strings
+    whole = player.whole
+    knobs = player.knobs
+    count = table.strings
     for which in range(of.KNOBS):
         knobs[which] = player.values[which]
         if wheeled:
@@ -117,11 +119,11 @@ def modes_of(table: Table, partials: int) -> int:
 @njit(**COMPILED)
 def additions(table: Table) -> recorded.Additions:
     """The additions of a recording to a string's law, of a table that has them."""
-    own = _recorded(table)
-    points, partials = own.smooth, own.partials
-    rows = behind(own, RECORDED_SLOTS + 2 * points, 5 * partials).reshape((5, partials))
-    smooth = behind(own, RECORDED_SLOTS, points), behind(own, RECORDED_SLOTS + points, points)
-    return own.pitch_hz, own.rest, smooth[0], smooth[1], rows
+    recorded_rows = _recorded(table)
+    points, partials = recorded_rows.smooth, recorded_rows.partials
+    rows = behind(recorded_rows, RECORDED_SLOTS + 2 * points, 5 * partials).reshape((5, partials))
+    smooth = behind(recorded_rows, RECORDED_SLOTS, points), behind(recorded_rows, RECORDED_SLOTS + points, points)
+    return recorded_rows.pitch_hz, recorded_rows.rest, smooth[0], smooth[1], rows
 
 
 @njit(**COMPILED)

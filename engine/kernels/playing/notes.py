@@ -133,7 +133,9 @@ def _cost(note: Note) -> int:
 def _make_room(player: Player) -> None:
     """Release the oldest notes where more ring than may; one that costs more and has not begun ends at once."""
     while True:
-        notes, cost, oldest = 0, 0, player.notes[0]
+        notes = 0
+        cost = 0
+        oldest = player.notes[0]
         for number in range(of.MOST_NOTES):
             note = player.notes[number]
             if note.state == of.FREE or note.released != 0 or slots.over(note):
@@ -180,7 +182,9 @@ def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: in
         _pluck(player, table, event, draft)
     note = free_note(player, mixer)
     player.age += 1
-    draft.number, draft.age, draft.began = note.number, player.age, max(event.frame, mixer.frames)
+    draft.number = note.number
+    draft.age = player.age
+    draft.began = max(event.frame, mixer.frames)
     copy(note, draft)
     _keep_of_table(player, table, note)
     _make_voices(player, table, note)
@@ -190,7 +194,9 @@ def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: in
     if member == 0:
         level_db = keys.value_of(player, table, of.ONSET_DB)
         level_db += channels.loudness_db(player, table.mode, note.channel)
-        strength, hardness, frame = note.strength, note.hardness, event.frame
+        strength = note.strength
+        hardness = note.hardness
+        frame = event.frame
         stroke = contact.Touch(of.STROKE, level_db, strength, hardness, note.stroke, note.key, frame, 0.0, 0.0)
         contact.touch(player, table, stroke)
     _make_room(player)
@@ -201,8 +207,12 @@ def note_on(player: Player, table: Table, mixer: Mixer, event: Event, member: in
 def _identify(player: Player, table: Table, event: Event, member: int, note: Note) -> None:
     """Set the note's identity, and the string that it is played on."""
     note.state, note.held = of.RINGS, 1
-    note.id, note.channel, note.key = event.id, event.channel, event.key
-    note.velocity, note.frame, note.member = event.value, event.frame, member
+    note.id = event.id
+    note.channel = event.channel
+    note.key = event.key
+    note.velocity = event.value
+    note.frame = event.frame
+    note.member = member
     note.by_hand = event.position > 0.0
     player.channels[note.channel].plays = 1
     note.place, note.string = channels.place_of(player, table, event), -1
@@ -217,16 +227,16 @@ def _identify(player: Player, table: Table, event: Event, member: int, note: Not
 @njit(**COMPILED)
 def _take_string(player: Player, table: Table, note: Note) -> bool:
     """The string of a note's key with its modes and its gain; False: it is impossible."""
-    pitch_hz, own = keys.pitch_of(table, note.key), note.own
+    pitch_hz, string_row = keys.pitch_of(table, note.key), note.own
     note.shortened = 1.0
     if pitch_hz > 0.0:
-        modes, shortened = keys.string_of(player, table, note.key, note.string, pitch_hz, False, own)
+        modes, shortened = keys.string_of(player, table, note.key, note.string, pitch_hz, False, string_row)
         note.modes, note.shortened = modes, shortened
     if note.octave != 0 and note.modes > 0:
-        strings.thin(own, pitch_hz)
-        modes = min(note.modes, strings.modes_below(own, of.HIGHEST_HZ)) if strings.possible(own) else 0
+        strings.thin(string_row, pitch_hz)
+        modes = min(note.modes, strings.modes_below(string_row, of.HIGHEST_HZ)) if strings.possible(string_row) else 0
         note.modes = modes
-    if note.modes < 1 or strings.overdamped(own, note.modes):
+    if note.modes < 1 or strings.overdamped(string_row, note.modes):
         return False
     note.gain = gains.gain_of(player, table, note.key, note.string)
     note.swing_m = player.swings_m[note.key, 1 + note.string]
@@ -254,7 +264,9 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
         position, width = event.position, event.width
     elif table.mode == of.MPE and slide >= 0:
         position = MPE_POSITIONS[0] + (MPE_POSITIONS[1] - MPE_POSITIONS[0]) * min(slide, 127) / 127
-    turned, varies, softest_ms = 0.0, table.variation, keys.value_of(player, table, of.CONTACT_MS)
+    turned = 0.0
+    varies = table.variation
+    softest_ms = keys.value_of(player, table, of.CONTACT_MS)
     release_s = velocities.contact_s(softest_ms, keys.value_of(player, table, of.CONTACT_HARD_MS), share)
     if varies > 0.0:
         note.stroke = player.age
@@ -266,7 +278,9 @@ def _pluck(player: Player, table: Table, event: Event, note: Note) -> None:
     if note.touched > 0 and note.by_hand == 0:
         position = min(position, HARMONIC_REACH / note.touched)
     position, amplitude_mm, width = plucks.nearest(position, amplitude_mm, width)
-    note.position, note.amplitude_mm, note.width = position, amplitude_mm, width
+    note.position = position
+    note.amplitude_mm = amplitude_mm
+    note.width = width
     shape = event.shape if note.by_hand != 0 else table.shape
     note.highest_m = plucks.pull(player, table, shape, note.modes, position, amplitude_mm / 1000, width)
     plucks.release_pluck(player, table, note.own, note.modes, release_s)
@@ -285,13 +299,13 @@ def _keep_of_table(player: Player, table: Table, note: Note) -> None:
     key, member = note.key, note.member
     note.detuning, note.aperture_m = table.detuning, table.aperture_m
     note.points, note.solo = table.points, table.solo
-    for each in range(3):
-        note.losses[each] = table.losses[each]
+    for slot in range(3):
+        note.losses[slot] = table.losses[slot]
     polarised = note.pairs > 0 and table.recorded == 0
-    for each in range(2):
-        note.heard[each] = table.heard[each] if polarised else 1.0
-        note.conductance[each] = table.conductance[each]
-        note.point[each] = player.values[of.POINT + each]
+    for slot in range(2):
+        note.heard[slot] = table.heard[slot] if polarised else 1.0
+        note.conductance[slot] = table.conductance[slot]
+        note.point[slot] = player.values[of.POINT + slot]
     octaves = keys.has_octave(table, key, note.string)
     if note.drum == 0 and not octaves and table.course > 1 and table.conductance[0] > 0.0 and note.pairs > 0:
         note.bridge = table.bridge
@@ -356,16 +370,20 @@ def _begin_voices(player: Player, mixer: Mixer, event: Event, note: Note) -> Non
 
 
 @njit(**COMPILED)
-def report_began(player: Player, table: Table, event: Event, note: Note, own: np.ndarray) -> None:
+def report_began(player: Player, table: Table, event: Event, note: Note, string_row: np.ndarray) -> None:
     """Report the note of an event, and the string of its key."""
     if note.member != 0:
         return
     made = report(player, of.BEGAN, note.id, note.channel, note.key, event.frame, event.value)
     made.string, made.table = note.string, table.serial
-    made.modes, made.note, made.gain = note.modes, note.number, note.gain
-    made.position, made.amplitude_mm, made.width = note.position, note.amplitude_mm, note.width
+    made.modes = note.modes
+    made.note = note.number
+    made.gain = note.gain
+    made.position = note.position
+    made.amplitude_mm = note.amplitude_mm
+    made.width = note.width
     for place in range(of.STRING):
-        made.own[place] = own[place]
+        made.own[place] = string_row[place]
     reported(player)
 
 

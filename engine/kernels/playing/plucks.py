@@ -19,7 +19,9 @@ LEAST_AMPLITUDE_MM = 1e-6  # -200 dB of the largest: silence, and no division by
 
 # By how much a pluck varies from stroke to stroke, at most, where an instrument varies by 1. Estimates: repeats then
 # differ by about -20 dB; those of a player that was recorded do by -4 … -12 dB
-VARIES_PLACE, VARIES_DB, VARIES_WIDTH = 0.08, 1.0, 0.12  # shares, dB
+VARIES_PLACE = 0.08
+VARIES_DB = 1.0
+VARIES_WIDTH = 0.12  # shares, dB
 
 
 @njit(**COMPILED)
@@ -47,15 +49,15 @@ def pull(
         x = point / (grid - 1)
         distance = (x - position) / width
         if shape == of.TRIANGULAR:
-            found = peak_m * pulses.triangle(x, position)
+            height_m = peak_m * pulses.triangle(x, position)
         elif point == 0 or point == grid - 1:
-            found = 0.0
+            height_m = 0.0
         elif shape == of.GAUSSIAN:
-            found = peak_m * pulses.gaussian(distance)
+            height_m = peak_m * pulses.gaussian(distance)
         else:
-            found = peak_m * pulses.raised_cosine(distance)
-        player.pulled[point] = found
-        highest = max(highest, found)
+            height_m = peak_m * pulses.raised_cosine(distance)
+        player.pulled[point] = height_m
+        highest = max(highest, height_m)
     turn = 2 * (grid - 1)
     for mode in range(modes):
         total, place = 0.0, 0
@@ -80,21 +82,23 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
 
     It peaks where the force pulls: elsewhere it is straight.
     """
-    turn, grid, highest = len(sines), len(sines) // 2 + 1, 0.0
+    turn = len(sines)
+    grid = len(sines) // 2 + 1
+    highest = 0.0
     near = int((position - width / 2) * (grid - 1)) - 1
     far = int((position + width / 2) * (grid - 1)) + 2
     low, high = max(near, 1), min(far, grid - 2) + 1
     for point in range(low, high):
         player.pulled[point] = 0.0
     for mode in range(1, grid - 1):
-        each, place = pulses.corner(mode, position, width), mode * low % turn
+        amplitude, place = pulses.corner(mode, position, width), mode * low % turn
         for point in range(low, high):
-            player.pulled[point] += each * sines[place]
+            player.pulled[point] += amplitude * sines[place]
             place += mode
             if place >= turn:
                 place -= turn
         if mode <= modes:
-            player.amplitudes[mode - 1] = each
+            player.amplitudes[mode - 1] = amplitude
     for point in range(low, high):
         highest = max(highest, player.pulled[point])
     for mode in range(modes):
@@ -102,17 +106,17 @@ def _round(player: Player, sines: np.ndarray, modes: int, position: float, peak_
 
 
 @njit(**COMPILED)
-def release_pluck(player: Player, table: Table, own: np.ndarray, partials: int, release_s: float) -> None:
+def release_pluck(player: Player, table: Table, string_row: np.ndarray, partials: int, release_s: float) -> None:
     """Release a pluck's partials within a time, or strike them for so long: see `engine.excitation.blow_factor`.
 
     What touches a string leaves it within a period of its lowest partial. So soft strokes of high keys are heard.
     """
-    release_s = min(release_s, MOST_PERIODS * 2 * math.pi / math.sqrt(strings.omega_squared(own, 1)))
+    release_s = min(release_s, MOST_PERIODS * 2 * math.pi / math.sqrt(strings.omega_squared(string_row, 1)))
     for mode in range(partials if table.strikes != 0 else 0):
-        share = math.sqrt(strings.omega_squared(own, 1) / strings.omega_squared(own, mode + 1))
+        share = math.sqrt(strings.omega_squared(string_row, 1) / strings.omega_squared(string_row, mode + 1))
         player.amplitudes[mode] *= 2 / math.pi * share
     for mode in range(partials if release_s > 0.0 else 0):
-        turns = math.sqrt(strings.omega_squared(own, mode + 1)) * release_s / (2 * math.pi)
+        turns = math.sqrt(strings.omega_squared(string_row, mode + 1)) * release_s / (2 * math.pi)
         player.amplitudes[mode] *= pulses.spectrum(turns)
 
 

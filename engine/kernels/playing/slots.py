@@ -69,8 +69,12 @@ def blank_voice(player: Player, table: Table, address: int, source: int, modes: 
     """A voice of a source at rest, with as many rows as are used set to zero."""
     voice, rate_hz = voice_at(address), player.rate_hz
     clear(voice)
-    voice.kind, voice.program, voice.modes = table.kinds[source], table.programs[source], modes
-    voice.points, voice.began_frame, voice.moving = table.points, -1, modes
+    voice.kind = table.kinds[source]
+    voice.program = table.programs[source]
+    voice.modes = modes
+    voice.points = table.points
+    voice.began_frame = -1
+    voice.moving = modes
     voice.fade_frames = round(at.FADE_S * rate_hz)
     voice.ends_at, voice.ends_in = round(at.LONGEST_S * rate_hz), round(at.END_FADE_S * rate_hz)
     voice.silent = at.SILENT_DB * math.log(10.0) / 20

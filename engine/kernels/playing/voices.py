@@ -24,11 +24,11 @@ WISH_BYTES = WISH.itemsize
 
 
 @njit(**COMPILED)
-def weight_of(own: np.ndarray, partial: int, place: float, aperture_m: float) -> float:
+def weight_of(string_row: np.ndarray, partial: int, place: float, aperture_m: float) -> float:
     """The level at a listening point of a partial's amplitude of 1 m, re full scale, averaged over an aperture."""
     if place == of.BRIDGE:
-        return strings.bridge_force(own, partial) / FULL_SCALE_N
-    half = math.pi * partial * aperture_m / (2 * own[of.LENGTH])
+        return strings.bridge_force(string_row, partial) / FULL_SCALE_N
+    half = math.pi * partial * aperture_m / (2 * string_row[of.LENGTH])
     averaged = math.sin(half) / half if half > 1e-6 else 1.0
     return averaged * math.sin(math.pi * partial * place) / FULL_SCALE_M
 
@@ -40,16 +40,16 @@ def _weigh(player: Player, voice: Voice, which: int, note: Note) -> None:
     Modes too high are not heard.
     """
     solo, pairs = note.solo, note.pairs
-    own, highest = note.own, TOO_HIGH * player.rate_hz
+    string_row, highest = note.own, TOO_HIGH * player.rate_hz
     for mode in range(note.modes):
         partial = strings.partial_of(mode, pairs)
         part = note.heard[strings.direction_of(mode, pairs)]
-        sigma = strings.decay_rate(own, partial)
-        omega = math.sqrt(max(strings.omega_squared(own, partial) - sigma * sigma, 0.0))
+        sigma = strings.decay_rate(string_row, partial)
+        omega = math.sqrt(max(strings.omega_squared(string_row, partial) - sigma * sigma, 0.0))
         for point in range(note.points):
-            weight = weight_of(own, partial, note.point[point], note.aperture_m)
-            heard = omega <= highest and (solo == 0 or solo == partial)
-            weights(voice, which, point, 0)[mode] = part * weight if heard else 0.0
+            weight = weight_of(string_row, partial, note.point[point], note.aperture_m)
+            audible = omega <= highest and (solo == 0 or solo == partial)
+            weights(voice, which, point, 0)[mode] = part * weight if audible else 0.0
             weights(voice, which, point, 1)[mode] = 0.0
     at_bridge = note.point[0] == of.BRIDGE and solo == 0
     voice.javari.heard = note.heard[0] / FULL_SCALE_N if at_bridge else 0.0
@@ -108,14 +108,18 @@ def make_voice(
     """
     rate_hz, n = player.rate_hz, note.modes
     voice = slots.blank_voice(player, table, address, source, n, at.TRUTH_ROWS)
-    voice.points, voice.velocity, voice.nearness = note.points, table.velocity, table.nearness
+    voice.points = note.points
+    voice.velocity = table.velocity
+    voice.nearness = table.nearness
     voice.attack, peak = round(at.ATTACK_S * rate_hz), max(note.highest_m, LEAST_PEAK_M)
     brighter = at.BRIGHTER if table.velocity != 0 else 1.0
     voice.peak, voice.limit = peak, RUNAWAY_FACTOR * peak / FULL_SCALE_M * brighter
-    amplitudes, speeds, own = row(voice, 0), row(voice, 1), note.own
+    amplitudes = row(voice, 0)
+    speeds = row(voice, 1)
+    string_row = note.own
     for mode in range(n):
         amplitudes[mode] = player.amplitudes[mode]
-    fill(player, table, note, own, rows(voice, at.OMEGA_SQUARED, at.RESONATOR_ROWS))
+    fill(player, table, note, string_row, rows(voice, at.OMEGA_SQUARED, at.RESONATOR_ROWS))
     if note.bridge > 0.0:
         voice.bridged = 2 * min(note.pairs, of.MOST_PAIRS)
     squares = row(voice, at.OMEGA_SQUARED)
@@ -123,15 +127,15 @@ def make_voice(
         speeds[mode] = amplitudes[mode] * math.sqrt(squares[mode])
         amplitudes[mode] = 0.0
     if table.javari[0] > 0.0:
-        javari.fit(voice, own, note.pairs, table.javari, rate_hz)
+        javari.fit(voice, string_row, note.pairs, table.javari, rate_hz)
     behind = lag_of(player, table, note.member)
     if behind > 0:
         run_up(voice, behind / rate_hz)
     _weigh(player, voice, 0, note)
     if note.point[0] == of.BRIDGE:
-        largest, heard = 0.0, weights(voice, 0, 0, 0)
+        largest, point_weights = 0.0, weights(voice, 0, 0, 0)
         for mode in range(n):
-            largest += abs(player.amplitudes[mode] * heard[mode])
+            largest += abs(player.amplitudes[mode] * point_weights[mode])
         voice.limit = max(voice.limit, RUNAWAY_FACTOR * largest)
 
 
@@ -142,14 +146,16 @@ def swing_m(note: Note) -> float:
         address = note.voices[source]
         if address == 0 or slots.voice_over(address):
             continue
-        voice, found = voice_at(address), 0.0
-        q, v, squares = row(voice, 0), row(voice, 1), row(voice, at.OMEGA_SQUARED)
+        voice, squared = voice_at(address), 0.0
+        q = row(voice, 0)
+        v = row(voice, 1)
+        squares = row(voice, at.OMEGA_SQUARED)
         if voice.kind == at.TENSION and voice.prepared != 0:
             q, v = row(voice, at.PHYSICAL), row(voice, at.PHYSICAL + 1)
             tension.physical(voice, q, v)
         for mode in range(voice.modes):
-            found += q[mode] * q[mode] + v[mode] * v[mode] / squares[mode]
-        return math.sqrt(found)
+            squared += q[mode] * q[mode] + v[mode] * v[mode] / squares[mode]
+        return math.sqrt(squared)
     return 0.0
 
 
@@ -200,35 +206,39 @@ def add_wish(
     """
     address = note.voices[source]
     voice = voice_at(address)
-    latest, taken, due = voice.resonator, voice.current_modes, _due(address, now)
+    latest = voice.resonator
+    taken = voice.current_modes
+    due = _due(address, now)
     first = voice.pending_modes if latest == 0 else wish_at(latest).next
-    tail, wished = 0, first
-    while wished != 0:
-        tail = wished
-        wished = wish_at(wished).next
-    found = 0
+    tail, block_address = 0, first
+    while block_address != 0:
+        tail = block_address
+        block_address = wish_at(block_address).next
+    free = 0
     if tail == 0 or (wish_at(tail).at <= due) != (frame <= due):
         size = WISH_BYTES + 8 * at.RESONATOR_ROWS * player.modes
         end = slots.address_of_voice(player, note.number, source + 1)
         for place in range(of.BLOCKS):
             block = end - (of.BLOCKS - place) * size
-            used, wished = block in (latest, taken), first
-            while wished != 0 and not used:
-                used = wished == block
-                wished = wish_at(wished).next
+            used, block_address = block in (latest, taken), first
+            while block_address != 0 and not used:
+                used = block_address == block
+                block_address = wish_at(block_address).next
             if not used:
-                found = block
-    if found == 0:
-        found = tail  # the latest counts
-    wish = wish_at(found)
-    wish.quanta, wish.next, wish.at = slots.quanta(player, seconds), 0, frame
-    if found != tail and tail != 0:
-        wish_at(tail).next = found
-    elif found != tail and latest != 0:
-        wish_at(latest).next = found
-    elif found != tail:
-        voice.pending_modes = found
-    return found
+                free = block
+    if free == 0:
+        free = tail  # the latest counts
+    wish = wish_at(free)
+    wish.quanta = slots.quanta(player, seconds)
+    wish.next = 0
+    wish.at = frame
+    if free != tail and tail != 0:
+        wish_at(tail).next = free
+    elif free != tail and latest != 0:
+        wish_at(latest).next = free
+    elif free != tail:
+        voice.pending_modes = free
+    return free
 
 
 @njit(**COMPILED)
@@ -236,12 +246,12 @@ def take_out(mixer: Mixer, address: int) -> None:
     """Take a voice out of the mixer at once; it is over."""
     kept = 0
     for place in range(mixer.active):
-        each = mixer.voices[place]
-        if each != address:
-            mixer.voices[kept] = each
+        other = mixer.voices[place]
+        if other != address:
+            mixer.voices[kept] = other
             kept += 1
-            if voice_at(each).previous_voice == address:
-                voice_at(each).previous_voice = 0
+            if voice_at(other).previous_voice == address:
+                voice_at(other).previous_voice = 0
     mixer.active = kept
     fence()
     voice_at(address).state = at.OVER
