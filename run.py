@@ -4,6 +4,7 @@
 python3 run.py                 open the app
 python3 run.py FILE ...        open it with these: presets, patches, MIDI files, WAVs, whatever can be dropped on it
 python3 run.py test [args]     ruff, mypy and lint-imports, then pytest (with args, if given)
+python3 run.py test --quick    the tests nearest to changed files, in a minute and a half
 python3 run.py test --fuzz     the attack on whatever reads a file, at length: thousands of damaged ones; and kills
 python3 run.py docs            build the documents as a site in site/; warnings are errors
 python3 run.py bench NAME      measure speed, sound and memory on this machine (without NAME: which there are)
@@ -156,6 +157,8 @@ def start(arguments: list[str]) -> int:
 def check(arguments: list[str]) -> int:
     """Run every lint, showing what the failed ones say, then pytest last; return non-zero if any failed."""
     env = {"QT_QPA_PLATFORM": "offscreen", **os.environ}
+    if arguments[:1] == ["--quick"]:
+        return subprocess.call([PYTHON, "-m", "tests.quick", *arguments[1:]], cwd=ROOT, env=env)
     if arguments[:1] == ["--fuzz"]:
         env |= {"LEARNED_STRINGS_FUZZ": "long", "OMP_NUM_THREADS": "1"}
         return subprocess.call(
