@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from app.instrument.compiled import InstrumentPlayer
 from app.instrument.events import Event, NoteOn, TimedEvent
 from app.instrument.offline import render_events
+from app.instrument.strings import KeyString, Strings
 from app.patches.patch import OpenString, Patch, StringSet
 from engine.kernels import constants as of
 from engine.kernels.constants import QUANTUM
@@ -41,6 +42,13 @@ def of_six_strings(guitar: Patch) -> Patch:
     """Six strings that differ in thickness."""
     strings = [OpenString(note=key, string=replace(STEEL, area_m2=5e-7 * 1.1**n)) for n, key in enumerate(OPEN)]
     return changed(guitar, strings=StringSet(strings=tuple(strings)))
+
+
+def string_of(patch: Patch, key: int, string: int | None = None) -> KeyString:
+    """The string of a key that has one."""
+    found = Strings(patch).of_key(key, string)
+    assert found is not None
+    return found
 
 
 def hz_of(key: float) -> float:

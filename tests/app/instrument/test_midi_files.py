@@ -278,7 +278,7 @@ OWN_RANGE = [TimedEvent(0.1, event) for event in bend_range(24, 1)]
         (
             [*TWO_CHANNELS, TimedEvent(0.2, NoteOn(40, 9, 0))],
             WIDE.model_copy(update={"mode": "mpe"}),  # the master's, and a member's
-            [*bend_range(12.5, 0), *bend_range(48, 3), NoteOn(50, 90), NoteOn(52, 90, 3)],
+            [*bend_range(12.5, 0), *bend_range(48, 3)],
         ),
         (  # a range that messages set stays until another instrument
             [TimedEvent(0.0, NoteOn(50, 90, 0)), *OWN_RANGE, *TURNED],
@@ -314,6 +314,7 @@ def notes_of(song: Song) -> list[tuple[int, int]]:
 A, DRUM, OTHER = (60, 0), (36, 9), (62, 1)
 GUITAR, MPE = (INSTRUMENT.model_copy(update={"mode": mode}) for mode in ("guitar", "mpe"))
 FEW_KEYS = NARROW.model_copy(update={"range": (40, 76)})
+PADS, TUNED = (read_patch(SHIPPED / f"{name}.json") for name in ("concert_toms", "tuned_toms"))
 NO_DRUMS = "song.mid is played without its drums (channel 10)"
 
 
@@ -327,6 +328,8 @@ NO_DRUMS = "song.mid is played without its drums (channel 10)"
         ([(60, 3), (64, 3), DRUM], None, [(60, 3), (64, 3)], NO_DRUMS),
         ([(60, 3), (64, 0)], GUITAR, [(60, 3), (64, 0)], ""),
         ([A], FEW_KEYS, [A], ""),
+        ([(38, 9), A, (40, 9)], PADS, [(38, 9), (40, 9)], "song.mid is played without its other channels (1)"),
+        ([(38, 9), A, (40, 9)], TUNED, [A], NO_DRUMS),
         (
             [(10, 0), A, (120, 0), DRUM],
             FEW_KEYS,

@@ -113,15 +113,6 @@ def test_tables_are_freed_when_the_kernel_has_left_them(koto: Stage) -> None:
 # Notes that wait, ring, and are ended
 
 
-def test_a_cancelled_note_is_reported(koto: Stage) -> None:
-    number = koto.player.handle(NoteOn(60, 90), 5000)
-    koto.run((), 2 * QUANTUM)
-    koto.player.cancel()
-    koto.run((), QUANTUM)
-    assert [(each.kind, each.id) for each in koto.reports] == [(of.REFUSED, number)]
-    assert not koto.mixer.active
-
-
 def test_a_single_note_can_be_released_and_its_events_cancelled(harp: Stage) -> None:
     one, other = (harp.player.handle(NoteOn(key, 90)) for key in (50, 57))
     harp.run((), 10 * QUANTUM)
@@ -210,13 +201,6 @@ def test_without_a_comparison_a_note_has_a_voice_of_the_audible_source_alone(nam
     np.testing.assert_array_equal(sounds[False], sounds[True])
 
 
-def test_gains_of_sources_may_change_while_notes_ring(koto: Stage) -> None:
-    koto.run([(1, NoteOn(60, 90))], 50 * QUANTUM)
-    koto.player.set_gains({"model": 0.0})
-    sound = koto.run((), 60 * QUANTUM)
-    assert sound[:200].any() and not sound[round(0.025 * RATE_HZ) :].any()
-
-
 # Strokes, and what is reported of them
 
 
@@ -250,15 +234,6 @@ def test_strokes_vary_where_the_instrument_says_so(preset: Preset) -> None:
     assert [len(np.unique(each, axis=0)) for each in found] == [5, 1]
 
 
-def test_strokes_of_a_tremolo_vary_and_repeat(patch: Patch, preset: Preset) -> None:
-    varied = changed(patch, technique={"tremolo_hz": 10}, pluck={"variation": 1.0})
-    first, again = Stage(varied, preset), Stage(varied, preset)
-    for stage in (first, again):
-        stage.run([(0, NoteOn(KEY, 60))], RATE_HZ // 2)
-    assert len({each.position for each in first.begun}) == 5
-    assert [each.position for each in first.begun] == [each.position for each in again.begun]
-
-
 @pytest.mark.parametrize(("node", "place"), [(2, 0.2), (5, 0.08)])
 def test_a_harmonic_is_plucked_short_of_its_first_node(patch: Patch, preset: Preset, node: int, place: float) -> None:
     stage = Stage(changed(patch, technique={"harmonic": node}), preset)
@@ -272,14 +247,6 @@ def test_slide_moves_the_pluck_until_all_is_released(patch: Patch, preset: Prese
     stage.play(Controller(events.RESET, 0, 1), on)  # RP-015: it is a sound controller
     stage.play(*release_all([1]), on)
     assert [each.position for each in stage.begun] == [pytest.approx(0.5)] * 2 + [patch.pluck.position]
-
-
-def test_levels_can_be_read(harp: Stage) -> None:
-    harp.run([(1, NoteOn(50, 30)), (2, NoteOn(57, 120))], 100 * QUANTUM)
-    soft, hard = harp.player.ringing()
-    assert (soft.key, hard.key) == (50, 57)
-    assert hard.level_db > soft.level_db + 6
-    assert soft.seconds == pytest.approx(100 * QUANTUM / RATE_HZ, abs=0.003)
 
 
 # Plucks by hand
@@ -458,16 +425,6 @@ def test_a_knob_goes_as_far_as_a_string_is_possible(patch: Patch, preset: Preset
     stage.play(NoteOn(52, 60))
     assert note.now.now.density_kg_m3 == densest
     assert stage.begun[-1].parameters.density_kg_m3 == densest  # type: ignore[union-attr]
-
-
-def test_a_wheel_that_moves_while_a_knob_is_turned_is_followed(patch: Patch, preset: Preset) -> None:
-    """In the end each string has the patch and the wheel."""
-    stage = Stage(patch, preset)
-    stage.play(NoteOn(45, 90), NoteOn(50, 90))
-    stage.take(changed(patch, knobs={"decay": 2.0}))
-    for note in stage.play(Bend(1.0)):
-        assert note.now.now.damping_d1_kg_m_s == pytest.approx(2 * note.now.own.damping_d1_kg_m_s)
-        assert note.now.now.tension_n > 1.2 * note.now.own.tension_n
 
 
 # Files of events
