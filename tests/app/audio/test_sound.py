@@ -222,7 +222,7 @@ def test_closing_frees_the_device_and_may_be_repeated(
     assert len(desk.outputs) == 1
 
 
-# Faults of devices: what happens, which problem is reported, and that sound or time goes on
+# Faults of devices: what happens, which problem is reported, and that sound or time continues
 
 
 def busy(device: AudioDevice) -> AudioUnavailable | None:

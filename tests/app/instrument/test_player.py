@@ -308,7 +308,7 @@ def test_a_pluck_at_a_place_is_none_of_a_key(koto: Stage) -> None:
 
 
 def test_another_player_begins_as_the_hands_are(preset: Preset) -> None:
-    """With wheels, pedals, footswitches, ranges and gains; and what is heard through is turned by the wheel."""
+    """With wheels, pedals, footswitches, ranges and gains; and body and room are turned by the wheel."""
     patch = shipped("concert_harp")  # the wheel turns its room
     stage = Stage(patch, preset)
     assert stage.player.at_hand == [] and stage.player.heard_through == patch

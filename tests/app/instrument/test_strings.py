@@ -48,13 +48,13 @@ def test_a_set_frets_the_highest_string_at_or_below_and_slackens_the_lowest(guit
     assert strings[30].length_m == pytest.approx(strings[40].length_m, rel=1e-3)
 
 
-def test_a_set_may_be_told_on_which_string(guitar: Patch) -> None:
+def test_a_set_may_be_asked_for_a_string(guitar: Patch) -> None:
     own = ((50, 60.0), (55, 70.0), (59, 80.0))
     strings = tuple(OpenString(note=note, string=replace(STEEL, tension_n=tension_n)) for note, tension_n in own)
-    told = changed(guitar, strings=StringSet(strings=strings))
+    chosen = changed(guitar, strings=StringSet(strings=strings))
 
     def tension_n(key: int, string: int | None) -> float:
-        found = string_of(told, key, string).parameters
+        found = string_of(chosen, key, string).parameters
         assert in_tune(found, hz_of(key))
         return found.tension_n
 

@@ -532,7 +532,7 @@ def test_a_recording_has_the_events_of_a_file_when_they_are_heard(played: Played
 
 
 def test_a_file_that_is_stopped_ends_what_was_handed_over(played: Played, clock: SimpleNamespace) -> None:
-    """And it is not in the recording; what rings goes on until it is let go."""
+    """And it is not in the recording; what rings continues until it is released."""
     ringing = played.strike(NoteOn(45, 90))
     played.hear(4_800)
     played.keys.begin_recording()

@@ -190,7 +190,7 @@ class Cable:
 
 
 def test_messages_of_an_input_are_heard(sound: Any, wait: Callable[[Callable[[], bool]], None]) -> None:
-    """In tune, bent, damped when let go or when the input is closed, held by the pedal."""
+    """In tune, bent, damped by a release or by closing the input, held by the pedal."""
     strings = {"polarisations": None, "sympathy_s_kg": 0.0, "damping": Damping(release_t60_s=0.15)}
     patch = read_patch(PATCHES / "steel_string_acoustic.json").model_copy(update=strings)
     notes, cable = Notes(sound, Sources(), find_shipped, lambda *report: pytest.fail(str(report))), Cable()
