@@ -331,7 +331,7 @@ def test_another_player_begins_as_the_hands_are(preset: Preset) -> None:
     )
     assert made.at_hand == stage.player.at_hand and set(switches) < set(made.at_hand)
     assert (made.rate_hz, made.compiled.source_gain(0)) == (44_100, 0.25)
-    assert stage.player.heard_through == made.heard_through != patch
+    assert stage.player.heard_through == made.heard_through != patch and made.compiled.wheel == (127, 3)
     stage.player.handle(Controller(events.RESET, 0, 3), 0)
     assert stage.player.heard_through == patch
 

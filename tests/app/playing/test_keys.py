@@ -222,6 +222,7 @@ def test_the_last_of_many_turns_counts(played: Played) -> None:
     played.notes.listen(Ear((0.1, 0.2), "velocity"))
     made = played.strike(NoteOn(50, 60))
     assert made.ear.points == (0.1, 0.2) and made.patch.knobs.stiffness == 3.0
+    assert made.pluck is not None and made.pluck.position == PATCH.pluck.position
     played.settle()
     assert played.now(struck).now.second_moment_m4 == pytest.approx(3 * before.second_moment_m4)
     exact = played.player
