@@ -1,9 +1,13 @@
-"""Outputs are known by name, and what goes wrong with them is said in plain words."""
+"""Outputs are known by name, and one table has what goes wrong with them, in plain words."""
 
+from __future__ import annotations
+
+import builtins
 import math
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -29,10 +33,13 @@ class FakeStream:
 
     latency, time, cpu_load, active = 0.02, 3.0, 0.1, False
 
-    def __init__(self) -> None:
+    def __init__(self, start_error: Exception | None) -> None:
         self.asked: list[str] = []
+        self.start_error = start_error
 
     def start(self) -> None:
+        if self.start_error is not None:
+            raise self.start_error
         self.asked.append("start")
         self.active = True
 
@@ -49,35 +56,30 @@ class FakeSoundDevice(SimpleNamespace):
 
     PortAudioError = PortAudioError
 
-    def __init__(self, entries: list[tuple[str, int, int]], default: int = -1) -> None:
+    def __init__(self, entries: list[tuple[str, int, int]], default: int) -> None:
         super().__init__(default=SimpleNamespace(device={"output": default}), opened=[], restarts=0)
         self.streams: list[FakeStream] = []
         self._ffi = SimpleNamespace(cast=lambda kind, address: (kind, address))
         self.entries = entries
-        self.refusal: Exception | None = None
+        self.open_error: Exception | None = None
+        self.start_error: Exception | None = None
 
     def query_hostapis(self) -> tuple[dict[str, Any], ...]:
         return ({"name": "ALSA"}, {"name": "JACK"})
 
     def query_devices(self, index: int | None = None) -> Any:
-        entries = [
-            {
-                "name": name,
-                "hostapi": api,
-                "max_output_channels": channels,
-                "default_samplerate": 48_000.0,
-                "default_high_output_latency": 0.035,
-                "default_low_output_latency": 0.01,
-            }
-            for name, api, channels in self.entries
+        times = {"default_high_output_latency": 0.035, "default_low_output_latency": 0.01}
+        names = ("name", "hostapi", "max_output_channels")
+        rows = [
+            {**dict(zip(names, each, strict=True)), "default_samplerate": 48_000.0} | times for each in self.entries
         ]
-        return entries if index is None else entries[index]
+        return rows if index is None else rows[index]
 
     def _StreamBase(self, **options: Any) -> FakeStream:
         self.opened.append(options)
-        if self.refusal is not None:
-            raise self.refusal
-        self.streams.append(FakeStream())
+        if self.open_error is not None:
+            raise self.open_error
+        self.streams.append(FakeStream(self.start_error))
         return self.streams[-1]
 
     def _terminate(self) -> None:
@@ -88,10 +90,9 @@ class FakeSoundDevice(SimpleNamespace):
 
 
 @pytest.fixture
-def sounddevice(monkeypatch: pytest.MonkeyPatch) -> FakeSoundDevice:
+def portaudio(monkeypatch: pytest.MonkeyPatch) -> FakeSoundDevice:
     fake = FakeSoundDevice([("Microphone", 0, 0), ("HDMI", 0, 8), ("Speakers", 0, 2), ("Speakers", 1, 1)], 2)
     monkeypatch.setitem(sys.modules, "sounddevice", fake)
-    monkeypatch.setattr("app.audio.devices._streams", set())
     return fake
 
 
@@ -100,54 +101,47 @@ def mixer() -> Mixer:
     return Mixer(48_000)
 
 
-def test_outputs_are_listed_with_the_default_first(sounddevice: FakeSoundDevice) -> None:
+def test_outputs_are_listed_with_the_default_first(portaudio: FakeSoundDevice) -> None:
     assert output_devices() == [
         AudioDevice("Speakers", "ALSA", 48_000, 2, is_default=True),
         AudioDevice("HDMI", "ALSA", 48_000, 8),
         AudioDevice("Speakers", "JACK", 48_000, 1),
     ]
     assert default_device().name == "Speakers"
-    sounddevice.default.device["output"] = -1
+    portaudio.default.device["output"] = -1
     assert default_device().name == "HDMI"
 
 
-def test_a_device_is_found_again_though_its_index_has_moved(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
-    wanted = find("Speakers", "ALSA")
-    sounddevice.entries.insert(0, ("Webcam", 0, 2))
-    open_device(wanted, 0.05, mixer)
-    (options,) = sounddevice.opened
-    assert options["device"] == 3
-    assert options["samplerate"] == 48_000
-    assert options["blocksize"] == 600  # a quarter of the buffer
-    assert (options["channels"], options["dtype"]) == (2, "float32")
-    assert options["latency"] == 0.05
-    open_device(wanted, 0.005, mixer)
-    assert (sounddevice.opened[1]["latency"], sounddevice.opened[1]["blocksize"]) == (0.01, 64)
-    open_device(wanted, 0.0, mixer)
-    assert sounddevice.opened[2]["blocksize"] == 64
+@pytest.mark.parametrize(("buffer_s", "latency_s", "block"), [(0.05, 0.05, 600), (0.005, 0.01, 64), (0.0, 0.01, 64)])
+def test_a_device_is_found_by_its_name_and_calls_the_compiled_mixer_itself(
+    portaudio: FakeSoundDevice, mixer: Mixer, buffer_s: float, latency_s: float, block: int
+) -> None:
+    """In blocks of a quarter of its buffer, of two of its channels."""
+    wanted = find("HDMI", "ALSA")
+    portaudio.entries.insert(0, ("Webcam", 0, 2))  # its index moves
+    close_device(open_device(wanted, buffer_s, mixer))
+    assert portaudio.opened == [
+        {
+            **{"kind": "output", "samplerate": 48_000, "blocksize": block, "device": 2, "channels": 2},
+            **{"dtype": "float32", "latency": latency_s, "callback": ("PaStreamCallback*", call.address)},
+            "userdata": ("void*", mixer.address),
+        }
+    ]
 
 
-def test_the_device_calls_the_compiled_mixer_itself(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
-    open_device(find("HDMI", "ALSA"), 0.05, mixer)
-    (options,) = sounddevice.opened
-    assert options["callback"] == ("PaStreamCallback*", call.address)
-    assert options["userdata"] == ("void*", mixer.address)
-    assert options["channels"] == 2  # of its eight
-
-
-def test_nothing_is_looked_for_again_while_a_stream_is_open(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
+def test_nothing_is_looked_for_again_while_a_stream_is_open(portaudio: FakeSoundDevice, mixer: Mixer) -> None:
     stream = open_device(find("Speakers", "ALSA"), 0.05, mixer)
     output_devices(rescan=True)
-    assert sounddevice.restarts == 0
+    assert portaudio.restarts == 0
     close_device(stream)
-    assert sounddevice.streams[0].asked == ["abort", "close"]  # though it could not stop
-    output_devices(rescan=True)
-    assert sounddevice.restarts == 1
+    assert portaudio.streams[0].asked == ["abort", "close"]  # though it could not stop
+    assert find("Headset", "ALSA", rescan=True).channels == 2, "it was plugged in"
+    assert portaudio.restarts == 1
 
 
 @pytest.mark.parametrize("value", [0.0, float("nan"), float("inf"), float("-inf"), -1795774879.331, 1e12])
 def test_times_of_a_device_that_cannot_be_are_not_shown(
-    sounddevice: FakeSoundDevice, mixer: Mixer, monkeypatch: pytest.MonkeyPatch, value: float
+    portaudio: FakeSoundDevice, mixer: Mixer, monkeypatch: pytest.MonkeyPatch, value: float
 ) -> None:
     for name in ("latency", "time", "cpu_load"):
         monkeypatch.setattr(FakeStream, name, value)
@@ -157,94 +151,106 @@ def test_times_of_a_device_that_cannot_be_are_not_shown(
     mixer.record["dac_s"] = value
     assert 0 <= mixer.output_latency_s < 1
     note_gap(mixer.record, 100, 1000 * value, CAUSE_DEVICE)
-    (gap,) = mixer.new_gaps()
-    assert gap.milliseconds == 0.0
+    assert [gap.milliseconds for gap in mixer.new_gaps()] == [0.0]
     output.close()
 
 
 def test_an_output_plays_stalls_and_is_lost(
-    sounddevice: FakeSoundDevice, mixer: Mixer, monkeypatch: pytest.MonkeyPatch
+    portaudio: FakeSoundDevice, mixer: Mixer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    now_s = 100.0
-    monkeypatch.setattr("app.audio.output.time.monotonic", lambda: now_s)
+    clock = SimpleNamespace(now_s=100.0)
+    monkeypatch.setattr("app.audio.output.time.monotonic", lambda: clock.now_s)
     output = DeviceOutput(find("Speakers", "ALSA"), 0.05, mixer)
-    (stream,) = sounddevice.streams
+    (stream,) = portaudio.streams
     assert (output.latency_s, output.now_s(), output.load()) == (0.02, 3.0, 0.1)
-    assert not output.stalled() and not output.lost()
-    now_s += 3.0
-    assert output.stalled() and not output.lost()
-    mixer.record["calls"] += 1
-    assert not output.stalled()
-    now_s += 7.0
-    assert output.lost()
-    mixer.record["calls"] += 1
-    assert not output.lost()
-    stream.active = False
-    assert output.lost()
+    found = []
+    for later_s, calls, active in (
+        (0, 0, True),
+        (3, 0, True),
+        (0, 1, True),
+        (7, 0, True),
+        (0, 1, True),
+        (0, 0, False),
+    ):
+        clock.now_s += later_s
+        mixer.record["calls"] += calls
+        stream.active = active
+        found.append((output.stalled(), output.lost()))
+    assert [stalled for stalled, _ in found[:3]] == [False, True, False]
+    assert [lost for _, lost in found] == [False, False, False, True, False, True]
     output.close()
     assert stream.asked == ["start", "abort", "close"]
     with pytest.raises(RuntimeError, match="closed"):
         output.now_s()  # its memory is PortAudio's again
 
 
-def test_an_output_that_does_not_start_is_freed(
-    sounddevice: FakeSoundDevice, mixer: Mixer, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refuse(self: FakeStream) -> None:
-        raise PortAudioError("busy", -9985)
-
-    monkeypatch.setattr(FakeStream, "start", refuse)
-    with pytest.raises(AudioUnavailable, match="in use by another program"):
-        DeviceOutput(find("Speakers", "ALSA"), 0.05, mixer)
-    assert sounddevice.streams[0].asked == ["abort", "close"]
-    output_devices(rescan=True)
-    assert sounddevice.restarts == 1
+# Faults
 
 
-def test_rescanning_finds_what_was_plugged_in(sounddevice: FakeSoundDevice) -> None:
-    with pytest.raises(AudioUnavailable):
-        find("Headset", "ALSA")
-    assert find("Headset", "ALSA", rescan=True).channels == 2
-    assert sounddevice.restarts == 1
-
-
-def test_a_vanished_device_is_named(sounddevice: FakeSoundDevice, mixer: Mixer) -> None:
-    with pytest.raises(AudioUnavailable, match="“Headset” was not found: it is disconnected") as caught:
-        open_device(AudioDevice("Headset", "ALSA", 48_000), 0.05, mixer)
-    assert caught.value.kind is ProblemKind.VANISHED
+def opening(error: Exception) -> Callable[[FakeSoundDevice], None]:
+    return lambda portaudio: setattr(portaudio, "open_error", error)
 
 
 @pytest.mark.parametrize(
-    ("error", "kind", "message"),
+    ("fault", "kind", "message"),
     [
-        (PortAudioError("Error opening", -9997), ProblemKind.RATE_REFUSED, "“Speakers” refuses 48000 Hz"),
-        (PortAudioError("Invalid sample rate"), ProblemKind.RATE_REFUSED, "refuses 48000 Hz"),
-        (PortAudioError("Device unavailable", -9985), ProblemKind.BUSY, "in use by another program"),
-        (PortAudioError("x", -9999, (0, -16, "Device or resource busy")), ProblemKind.BUSY, "in use"),
-        (PortAudioError("x", -9999, (0, 0, "AUDCLNT_E_DEVICE_IN_USE")), ProblemKind.BUSY, "in use"),
-        (PortAudioError("x", -9999, (0, -19, "No such device")), ProblemKind.VANISHED, "disconnected"),
-        (PortAudioError("Invalid device", -9996), ProblemKind.VANISHED, "disconnected"),
-        (PortAudioError("Internal PortAudio error", -9986), ProblemKind.OTHER, "could not be opened"),
-        (ValueError("strange"), ProblemKind.OTHER, "could not be opened"),
+        (opening(PortAudioError("Error opening", -9997)), ProblemKind.RATE_REFUSED, "“Speakers” refuses 48000 Hz"),
+        (opening(PortAudioError("Invalid sample rate")), ProblemKind.RATE_REFUSED, "refuses 48000 Hz"),
+        (opening(PortAudioError("Device unavailable", -9985)), ProblemKind.BUSY, "in use by another program"),
+        (opening(PortAudioError("x", -9999, (0, -16, "Device or resource busy"))), ProblemKind.BUSY, "in use"),
+        (opening(PortAudioError("x", -9999, (0, 0, "AUDCLNT_E_DEVICE_IN_USE"))), ProblemKind.BUSY, "in use"),
+        (opening(PortAudioError("x", -9999, (0, -19, "No such device"))), ProblemKind.VANISHED, "disconnected"),
+        (opening(PortAudioError("Invalid device", -9996)), ProblemKind.VANISHED, "disconnected"),
+        (opening(PortAudioError("Internal PortAudio error", -9986)), ProblemKind.OTHER, "could not be opened"),
+        (opening(ValueError("strange")), ProblemKind.OTHER, "could not be opened"),
+        (
+            lambda portaudio: setattr(portaudio, "start_error", PortAudioError("busy", -9985)),
+            *(ProblemKind.BUSY, "in use by another program"),
+        ),
+        (
+            lambda portaudio: portaudio.entries.pop(2),
+            ProblemKind.VANISHED,
+            "“Speakers” was not found: it is disconnected",
+        ),
+        (lambda portaudio: portaudio.entries.clear(), ProblemKind.VANISHED, "disconnected"),
     ],
 )
-def test_refusals_are_explained(
-    sounddevice: FakeSoundDevice, mixer: Mixer, error: Exception, kind: ProblemKind, message: str
+def test_a_device_that_cannot_be_opened_is_explained_and_freed(
+    portaudio: FakeSoundDevice, mixer: Mixer, fault: Callable[[Any], object], kind: ProblemKind, message: str
 ) -> None:
-    sounddevice.refusal = error
+    wanted = find("Speakers", "ALSA")
+    fault(portaudio)
     with pytest.raises(AudioUnavailable, match=message) as caught:
-        open_device(find("Speakers", "ALSA"), 0.05, mixer)
-    assert caught.value.kind is kind
-    assert caught.value.detail == str(error)
-    assert caught.value.remedy in str(caught.value)
+        DeviceOutput(wanted, 0.05, mixer)
+    error = portaudio.open_error or portaudio.start_error
+    assert caught.value.kind is kind and caught.value.remedy in str(caught.value)
+    assert error is None or caught.value.detail == str(error)
+    assert all(stream.asked == ["abort", "close"] for stream in portaudio.streams)
+    output_devices(rescan=True)
+    assert portaudio.restarts == 1, "no stream counts as open"
 
 
-def test_no_output_at_all(sounddevice: FakeSoundDevice) -> None:
-    sounddevice.entries[:] = [("Microphone", 0, 0)]
+def test_no_output_at_all(portaudio: FakeSoundDevice) -> None:
+    portaudio.entries[:] = [("Microphone", 0, 0)]
     assert output_devices() == []
     with pytest.raises(AudioUnavailable, match="No audio output") as caught:
         default_device()
     assert caught.value.kind is ProblemKind.NO_DEVICE
+
+
+def test_a_missing_portaudio_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
+    original = builtins.__import__
+
+    def refuse(name: str, *arguments: Any, **options: Any) -> Any:
+        if name == "sounddevice":
+            raise OSError("PortAudio library not found")
+        return original(name, *arguments, **options)
+
+    monkeypatch.setattr("builtins.__import__", refuse)
+    with pytest.raises(AudioUnavailable) as caught:
+        output_devices()
+    assert caught.value.kind is ProblemKind.PORTAUDIO_MISSING
+    assert caught.value.detail == "PortAudio library not found"
 
 
 def test_neither_portaudio_nor_qt_is_needed_for_the_import() -> None:
@@ -254,27 +260,12 @@ def test_neither_portaudio_nor_qt_is_needed_for_the_import() -> None:
     assert (done.stdout.strip(), done.stderr) == ("", "")
 
 
-def test_a_missing_portaudio_is_said_with_its_remedy(monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(name: str, *arguments: Any, **options: Any) -> Any:
-        if name == "sounddevice":
-            raise OSError("PortAudio library not found")
-        return original(name, *arguments, **options)
-
-    original = __import__
-    monkeypatch.delitem(sys.modules, "sounddevice", raising=False)
-    monkeypatch.setattr("builtins.__import__", refuse)
-    with pytest.raises(AudioUnavailable, match="apt-get install libportaudio2") as caught:
-        output_devices()
-    assert caught.value.kind is ProblemKind.PORTAUDIO_MISSING
-    assert caught.value.detail == "PortAudio library not found"
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="ALSA is Linux's")
 def test_alsa_prints_nothing_into_the_terminal() -> None:
     """In a process of its own: the handler stays."""
     script = (
-        "import ctypes, sys; from app.audio.devices import _silence_alsa\n"
-        "if sys.argv[1:]: _silence_alsa()\n"
+        "import ctypes, contextlib, sys; from app.audio.devices import output_devices\n"
+        "with contextlib.suppress(Exception): sys.argv[1:] and output_devices()\n"
         "ctypes.CDLL('libasound.so.2').snd_pcm_open(ctypes.byref(ctypes.c_void_p()), b'no_such_device', 0, 0)"
     )
     loud, quiet = (

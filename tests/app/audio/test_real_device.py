@@ -3,7 +3,8 @@
 A private PulseAudio with a null sink stands for the sound card; `parec` records what the sink was given.
 """
 
-import importlib.util
+from __future__ import annotations
+
 import json
 import os
 import shutil
@@ -11,9 +12,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -23,14 +23,20 @@ import app
 from app.audio.devices import output_devices
 from app.audio.problems import AudioUnavailable
 from engine.kernels.constants import QUANTUM
+from tests.app.audio import play_through_device as script
 
 RATE_HZ = 44_100  # what PortAudio calls the default rate of an ALSA plugin
-SCRIPT = Path(__file__).with_name("play_through_device.py")
 
 
 class SoundServer(NamedTuple):
     process: subprocess.Popen[bytes]
     environment: dict[str, str]
+
+
+def wait_for(condition: Callable[[], bool]) -> None:
+    deadline_s = time.monotonic() + 5
+    while not condition() and time.monotonic() < deadline_s:
+        time.sleep(0.02)
 
 
 @pytest.fixture
@@ -39,31 +45,21 @@ def sound_server() -> Iterator[SoundServer]:
         if shutil.which(program) is None:
             pytest.skip(f"{program} is not installed")
     with tempfile.TemporaryDirectory(prefix="sound") as folder:
-        home = Path(folder)
-        socket = home / "native"
-        (home / ".asoundrc").write_text("pcm.!default { type pulse }\nctl.!default { type pulse }\n")
-        environment = {
-            **os.environ,
-            "HOME": folder,
-            "XDG_RUNTIME_DIR": folder,
-            "XDG_CONFIG_HOME": folder,
-            "PULSE_RUNTIME_PATH": folder,
-            "PULSE_SERVER": f"unix:{socket}",
-            "PYTHONPATH": str(Path(app.__file__).parents[1]),
-        }
+        socket = Path(folder, "native")
+        Path(folder, ".asoundrc").write_text("pcm.!default { type pulse }\nctl.!default { type pulse }\n")
+        folders = dict.fromkeys(("HOME", "XDG_RUNTIME_DIR", "XDG_CONFIG_HOME", "PULSE_RUNTIME_PATH"), folder)
+        path = str(Path(app.__file__).parents[1])
+        environment = {**os.environ, **folders, "PULSE_SERVER": f"unix:{socket}", "PYTHONPATH": path}
         sink = f"module-null-sink sink_name=test rate={RATE_HZ} format=float32le channels=2"
         protocol = f"module-native-protocol-unix socket={socket} auth-anonymous=1"
-        options = ["--daemonize=no", "--exit-idle-time=-1", "--use-pid-file=no", "--disable-shm=yes"]
-        with (home / "log").open("wb") as log:
-            process = subprocess.Popen(
-                ["pulseaudio", "-n", *options, "-L", sink, "-L", protocol], env=environment, stderr=log
-            )
+        options = ["-n", "--daemonize=no", "--exit-idle-time=-1", "--use-pid-file=no", "--disable-shm=yes"]
+        with Path(folder, "log").open("wb") as log:
+            command = ["pulseaudio", *options, "-L", sink, "-L", protocol]
+            process = subprocess.Popen(command, env=environment, stderr=log)
         try:
-            deadline_s = time.monotonic() + 5
-            while not socket.exists() and time.monotonic() < deadline_s and process.poll() is None:
-                time.sleep(0.02)
+            wait_for(lambda: socket.exists() or process.poll() is not None)
             if not socket.exists():
-                pytest.skip("PulseAudio did not start: " + (home / "log").read_text()[-300:])
+                pytest.skip("PulseAudio did not start: " + Path(folder, "log").read_text()[-300:])
             yield SoundServer(process, environment)
         finally:
             process.kill()
@@ -71,16 +67,12 @@ def sound_server() -> Iterator[SoundServer]:
 
 
 def play(server: SoundServer, *action: str) -> dict[str, Any]:
-    done = subprocess.run(
-        [sys.executable, str(SCRIPT), str(RATE_HZ), *action],
-        env=server.environment,
-        capture_output=True,
-        text=True,
-        timeout=600,  # kernels may have to be compiled, on a busy computer
-    )
+    """The words of the sound."""
+    command = [sys.executable, script.__file__, str(RATE_HZ), *action]  # kernels may have to be compiled
+    done = subprocess.run(command, env=server.environment, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     said: dict[str, Any] = json.loads(done.stdout)
-    if "no_device" in said["problems"] or "portaudio_missing" in said["problems"]:
+    if {"no_device", "portaudio_missing"} & set(said["problems"]):
         pytest.skip(f"PortAudio or ALSA's pulse plugin is missing: {said}")
     return said
 
@@ -91,7 +83,7 @@ def play_and_record(server: SoundServer, *action: str) -> tuple[dict[str, Any], 
     with tempfile.TemporaryFile() as recording:
         recorder = subprocess.Popen([*command, "--latency-msec=20"], env=server.environment, stdout=recording)
         try:
-            time.sleep(0.5)
+            wait_for(lambda: os.fstat(recording.fileno()).st_size > 0)
             said = play(server, *action)
         finally:
             recorder.terminate()
@@ -118,19 +110,11 @@ def aligned(recorded: np.ndarray, beginning: np.ndarray, frames: int) -> np.ndar
     return recorded[start : start + frames]
 
 
-def the_script() -> ModuleType:
-    specification = importlib.util.spec_from_file_location(SCRIPT.stem, SCRIPT)
-    assert specification is not None and specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
-
-
 def test_overlapping_notes_and_a_switch_arrive_as_a_mixer_renders_them(sound_server: SoundServer) -> None:
-    script = the_script()
-    said: dict[str, Any] = {}
+    gaps = 0
     for _ in range(3):
         said, recorded = play_and_record(sound_server, "switch")
+        gaps = said["gaps"]
         assert said["problems"] == []
         if said["rate_hz"] != RATE_HZ:
             pytest.skip(f"PortAudio wants {said['rate_hz']} Hz here")
@@ -139,19 +123,15 @@ def test_overlapping_notes_and_a_switch_arrive_as_a_mixer_renders_them(sound_ser
         earliest, latest = (frame // QUANTUM for frame in said["switched"])
         # The gains were changed between two of the device's calls, and are heard from the quantum after it on.
         candidates = [script.expected(RATE_HZ, quantum * QUANTUM) for quantum in range(earliest, latest + 2)]
-        before = candidates[0][: earliest * QUANTUM]
-        heard = aligned(recorded, before, len(candidates[0]))
+        heard = aligned(recorded, candidates[0][: earliest * QUANTUM], len(candidates[0]))
         if any(np.array_equal(heard, candidate) for candidate in candidates):
             return
-        differences = [float(np.abs(heard - candidate).max()) for candidate in candidates]
-        print(f"closest {min(differences):.1e}, {said['gaps']} gaps, {said['underflows']} underflows")
-    # Gaps in what a busy computer played are no fault of the samples.
-    assert said["gaps"] > 0, "what was recorded is not what was rendered"
-    pytest.skip(f"this computer is too busy for gapless sound: {said['gaps']} gaps")
+    assert gaps > 0, "what was recorded is not what was rendered"
+    pytest.skip(f"this computer is too busy for gapless sound: {gaps} gaps")
 
 
 def test_a_sound_server_that_dies_is_reported_once_and_time_goes_on(sound_server: SoundServer) -> None:
-    said, _ = play_and_record(sound_server, "kill", str(sound_server.process.pid))
+    said = play(sound_server, "kill", str(sound_server.process.pid))
     assert said["problems"] == ["vanished"]
     assert said["over"] == [True] * 3, "all notes must come to their end without sound"
 

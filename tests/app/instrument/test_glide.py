@@ -5,17 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from app.instrument.events import NoteOn
 from app.instrument.glide import START_S, glides_cents
-from app.instrument.offline import render_note
 from app.instrument.strings import Strings
 from app.patches.library import find_patch
 from app.patches.patch import Body, Patch
 from app.patches.tuning import TuningChoice
 from engine.presets import Preset
 from engine.values.effects import Amp, Room
-from tests.bench.tune import pitch_hz
-
-RATE_HZ = 48_000
+from tests.app.instrument.stage import cents, pitch_hz, play
 
 
 @pytest.mark.parametrize("source", ["model", "truth"])
@@ -29,11 +27,10 @@ def test_a_rendered_note_starts_as_sharp(name: str, key: int, velocity: int, sou
     patch = patch.model_copy(update={"amp": Amp(), "body": Body(), "room": Room()})
     string = Strings(patch).of_key(key)
     assert string is not None
-    cents = glides_cents(patch)[key, velocity]
-    sound = render_note(patch, preset, key, velocity, 0.2, START_S, RATE_HZ, source)[:, 0]
-    found = 1200 * np.log2(pitch_hz(sound, string.pitch_hz * 2 ** (cents / 1200)) / string.pitch_hz)
-    print(f"{name}, key {key}, velocity {velocity}: {cents:.1f} cents, {source} {found:.1f}")
-    assert found == pytest.approx(cents, rel=0.15)
+    wanted = glides_cents(patch)[key, velocity]
+    sound = play(patch, preset, START_S, (0.0, NoteOn(key, velocity)), source=source)
+    found = cents(pitch_hz(sound, string.pitch_hz * 2 ** (wanted / 1200), 0.0, START_S, 0.06), string.pitch_hz)
+    assert found == pytest.approx(wanted, rel=0.15)
 
 
 def test_it_grows_with_amplitude_squared(patch: Patch) -> None:

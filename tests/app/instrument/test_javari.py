@@ -7,20 +7,16 @@ import pytest
 import scipy.integrate
 from numpy.typing import NDArray
 
-from app.instrument.events import Bend, Event, NoteOff, NoteOn, PatchTurned
+from app.instrument.events import NoteOn
 from app.patches.library import SHIPPED, read_patch
 from app.patches.patch import Course, Javari, Patch, Pickup
 from engine.kernels.constants import QUANTUM
 from engine.kernels.voice_records import COUPLING, JAVARI, OMEGA_SQUARED, SIGMA, STRETCH
 from engine.presets import Preset
-from engine.values.string import Polarisations
-from tests.app.instrument.test_techniques import KEY, RATE_HZ, play
-from tests.app.instrument.test_unisons import Watched, changed, linear
+from tests.app.instrument.stage import KEY, RATE_HZ, changed, play, relative
+from tests.app.instrument.test_unisons import SOURCES, Watched, linear
 
-SOURCE_NAMES = ("model", "truth")
-SOURCES = pytest.mark.parametrize("source", SOURCE_NAMES)
 EDGE = Javari(distance_mm=10, gap_um=3, stiffness_n_m=2e4, loss_s_m=0.5)
-MOVING = Polarisations(angle_deg=30, second_cents=2, conductance_s_kg=0.002, second_conductance_s_kg=0.0004)
 
 
 def buzzing(patch: Patch, **edge: float) -> Patch:
@@ -80,30 +76,19 @@ def test_energy_of_a_loud_string_and_edge_never_rises(patch: Patch, preset: Pres
 
 
 def test_truth_is_the_solution_of_its_equation(patch: Patch, preset: Preset) -> None:
-    """DOP853, on a short string, for 40 ms in which it meets the edge some fifty times."""
+    """DOP853, on a short string, for 10 ms in which it meets the edge a dozen times."""
     note, equation = watched(buzzing(patch, stiffness_n_m=1e4), preset, "truth", key=88)
     assert equation.stiffness == 1e4
-    quanta = 30
+    quanta = 8
     times_s = np.arange(1, quanta + 1) * QUANTUM / RATE_HZ
     first = np.concatenate([equation.q, np.zeros_like(equation.q)])
     solved = scipy.integrate.solve_ivp(
-        equation.rates, (0, times_s[-1] + 1e-9), first, "DOP853", times_s, rtol=1e-9, atol=1e-14, max_step=2e-6
+        equation.rates, (0, times_s[-1] + 1e-9), first, "DOP853", times_s, rtol=1e-9, atol=1e-14, max_step=4e-6
     )
     wanted = solved.y.T.reshape(quanta, 2, -1)[:, 0]
     found = note.states(quanta)[:, 0, 0]
     assert (wanted @ equation.shapes).min() < -2e-6 - equation.gap  # they meet
-    assert ((found - wanted) ** 2).sum() < 2e-4 * (wanted**2).sum()
-
-
-@pytest.mark.parametrize(
-    ("name", "keys"), [("tanpura_drone", (36, 43, 48, 60)), ("sitar", (43, 48, 60, 72))], ids=lambda each: str(each)
-)
-def test_model_and_truth_agree_where_it_buzzes(preset: Preset, name: str, keys: tuple[int, ...]) -> None:
-    shipped = read_patch(SHIPPED / f"{name}.json")
-    assert shipped.javari.distance_mm > 0
-    for key in keys:
-        model, truth = (play(shipped, preset, 1.0, (0.0, NoteOn(key, 100)), source=each) for each in SOURCE_NAMES)
-        assert ((model - truth) ** 2).sum() < 1e-6 * (truth**2).sum()
+    assert relative(found, wanted) < 2e-4
 
 
 @SOURCES
@@ -122,15 +107,11 @@ def test_high_partials_come_later(preset: Preset, source: str) -> None:
 
 
 @SOURCES
-def test_where_there_is_no_edge_nothing_changes(patch: Patch, preset: Preset, source: str) -> None:
-    events = (0.0, NoteOn(KEY, 90)), (0.3, NoteOn(KEY, 60)), (0.5, NoteOff(KEY))
-    plain, without = (
-        play(each, preset, 0.8, *events, source=source) for each in (patch, buzzing(patch, distance_mm=0))
+def test_an_edge_that_is_never_met_changes_nothing(patch: Patch, preset: Preset, source: str) -> None:
+    far, same = (
+        play(each, preset, 0.3, (0.0, NoteOn(KEY, 20)), source=source) for each in (buzzing(patch, gap_um=200), patch)
     )
-    np.testing.assert_array_equal(without, plain)
-    far = play(buzzing(patch, gap_um=200), preset, 0.3, (0.0, NoteOn(KEY, 20)), source=source)
-    same = play(patch, preset, 0.3, (0.0, NoteOn(KEY, 20)), source=source)
-    assert ((far - same) ** 2).sum() < 1e-9 * (same**2).sum()
+    assert relative(far, same) < 1e-9
 
 
 @SOURCES
@@ -146,29 +127,6 @@ def test_the_push_of_the_edge_is_heard_in_the_force_on_the_bridge(patch: Patch, 
     assert abs(np.mean(heard)) < 0.2 * pushed
     point, _ = watched(buzzing(patch), preset, source)
     assert point.voices()[0][0]["javari"]["heard"] == 0
-
-
-@pytest.mark.parametrize("stops", [True, False])
-@pytest.mark.parametrize("kind", ["bridge", "velocity"])
-def test_it_plays_as_other_strings(patch: Patch, preset: Preset, kind: str, stops: bool) -> None:
-    """Plucked while it rings, bent, retuned by a knob, its gap turned: model and truth agree."""
-    moving = changed(
-        buzzing(patch),
-        polarisations=MOVING,
-        pickup=Pickup(points=(0.2, 0.8), kind=kind),
-        pluck=patch.pluck.model_copy(update={"stops": stops}),
-    )
-    turned = [changed(moving, javari=EDGE.model_copy(update={"gap_um": gap})) for gap in (60, 0)]
-    events: list[tuple[float, Event]] = [
-        (0.001, NoteOn(KEY, 60)),
-        (0.01, NoteOn(KEY + 24, 70)),
-        (0.2, Bend(0.5)),
-        (0.31, NoteOn(KEY, 50)),
-    ]
-    events += [(0.4, PatchTurned(turned[0])), (0.45, Bend(0.0)), (0.5, PatchTurned(turned[1])), (0.6, NoteOff(KEY))]
-    model, truth = (play(moving, preset, 0.8, *events, source=each) for each in SOURCE_NAMES)
-    assert np.isfinite(model).all()
-    assert ((model - truth) ** 2).sum() < 1e-5 * (truth**2).sum()
 
 
 @pytest.mark.parametrize("course", [Course(strings=2, bridge=1.0), Course(bridge=0.5)])

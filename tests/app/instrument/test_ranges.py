@@ -9,7 +9,6 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from app.instrument.compiled import InstrumentPlayer
 from app.instrument.drum_keys import DrumKeys
 from app.instrument.events import HARMONICS, MOD_WHEEL, SLIDE, Controller, Event, NoteOn, PatchTurned
 from app.instrument.strings import KNOBS
@@ -17,7 +16,6 @@ from app.instrument.table import wheeled
 from app.patches.drums import Drums
 from app.patches.library import SHIPPED, list_patches
 from app.patches.patch import ASSIGNABLE, VELOCITIES, WHEEL, Fretted, Patch
-from app.playing.key_note import KeyNote
 from app.shared.parameters import OF_PATCHES
 from engine.bounds import AMPLITUDE_MM_RANGE, POSITION_RANGE, WIDTH_RANGE
 from engine.kernels import constants as of
@@ -27,13 +25,13 @@ from engine.pluck import Pluck
 from engine.presets import Preset
 from engine.strike import Strike
 from engine.values.ear import Ear
-from engine.voices import Mixer
+from engine.voices.player import Report
+from tests.app.instrument.stage import RATE_HZ, Stage, changed
 
-RATE_HZ = 48_000
 STROKES = 40
-PATCHES = [entry.patch for entry in list_patches(SHIPPED)[0]]
-DRUMS = [patch for patch in PATCHES if isinstance(patch.strings, Drums)]
+PATCHES = {entry.patch.name: entry.patch for entry in list_patches(SHIPPED)[0]}
 PLUCKING = [field for field in ASSIGNABLE if field.startswith("pluck.")]
+EVERY = pytest.mark.parametrize("patch", PATCHES.values(), ids=PATCHES)
 
 
 def with_ends(patch: Patch, fields: list[str], draw: random.Random) -> Patch:
@@ -49,81 +47,57 @@ def with_ends(patch: Patch, fields: list[str], draw: random.Random) -> Patch:
     return patch
 
 
-def turned_to_ends(patch: Patch) -> Iterator[Patch]:
+def at_ends(patch: Patch) -> Iterator[Patch]:
     """Each macro and each knob of the pluck at either end, then some at random together."""
     draw = random.Random(patch.name)
     for macro, end in itertools.product(range(len(patch.macros)), (0.0, 1.0)):
         yield patch.turned(macro, end)
-    for field in PLUCKING:
-        yield with_ends(patch, [field], draw)
+    for fields in ([field] for field in PLUCKING):
+        yield with_ends(patch, fields, draw)
     for _ in range(4):
         yield with_ends(patch, draw.sample(PLUCKING, 6), draw)
 
 
-@pytest.mark.parametrize("patch", PATCHES, ids=lambda patch: patch.name)
+@EVERY
 def test_every_stroke_of_every_knob_is_a_pluck(patch: Patch) -> None:
     draw = random.Random(patch.name)
-    for turned in turned_to_ends(patch):
+    for turned in at_ends(patch):
         for velocity in (*VELOCITIES, draw.randint(2, 126)):
             pluck = turned.pluck.pluck(velocity)
+            own = pluck.position, pluck.amplitude_mm, pluck.width
             for _ in range(STROKES):
                 stroke, key = draw.randrange(1_000_000), draw.randrange(128)
-                position, amplitude_mm, width = vary(
-                    pluck.position, pluck.amplitude_mm, pluck.width, turned.pluck.variation, stroke, key
-                )
+                position, amplitude_mm, width = vary(*own, turned.pluck.variation, stroke, key)
                 Pluck(position, amplitude_mm, pluck.shape, width)
         for wheel in (-1, 0, 127, 128):
             wheeled(turned, wheel, "")
 
 
-@pytest.mark.parametrize("patch", PATCHES, ids=lambda patch: patch.name)
-def test_no_knob_turns_a_string_into_an_impossible_one(patch: Patch) -> None:
-    limits = [OF_PATCHES[f"knobs.{name}"].limits for name in KNOBS]
-    found, chosen = np.empty(of.STRING), patch.strings
+@EVERY
+def test_no_knob_makes_a_string_or_a_blow_impossible(patch: Patch) -> None:
+    chosen, found = patch.strings, np.empty(of.STRING)
     if isinstance(chosen, Drums):
+        keys, (low, high) = DrumKeys(patch, Ear(tuple(patch.pickup.points))), patch.range
+        for key, curve in itertools.product(range(low, high + 1), OF_PATCHES["pluck.curve"].limits):
+            drum = keys.of_key(key)
+            assert (drum is None) == (keys.tuned_to(key) is None)
+            assert drum is None or all(isinstance(drum.strike(each, curve), Strike) for each in VELOCITIES)
         return
     own = [chosen.string] if isinstance(chosen, Fretted) else [each.string for each in chosen.strings]
+    limits = [OF_PATCHES[f"knobs.{name}"].limits for name in KNOBS]
     for string, knobs in itertools.product(own[:: max(len(own) - 1, 1)], itertools.product(*limits)):
         strings.turned(np.array(string.row), np.array(knobs), found)
         assert strings.possible(found), (knobs, found)
 
 
-@pytest.mark.parametrize("patch", DRUMS, ids=lambda patch: patch.name)
-def test_every_blow_of_a_drum_is_possible(patch: Patch) -> None:
-    keys, (low, high) = DrumKeys(patch, Ear(tuple(patch.pickup.points))), patch.range
-    for key, curve in itertools.product(range(low, high + 1), OF_PATCHES["pluck.curve"].limits):
-        if keys.tuned_to(key) is not None:
-            found = keys.of_key(key)
-            assert found is not None
-            for velocity in VELOCITIES:
-                assert isinstance(found.strike(velocity, curve), Strike)
-
-
-class Stage:
-    """A player in a mixer, with the notes as the app follows them."""
-
-    def __init__(self, patch: Patch, preset: Preset) -> None:
-        self.mixer = Mixer(RATE_HZ)
-        self.player = InstrumentPlayer(patch, preset, RATE_HZ, {"model": 1.0})
-        self.mixer.set_player(self.player.compiled)
-        self._notes: dict[int, KeyNote] = {}
-
-    def play(self, *events: Event) -> list[Pluck]:
-        """The plucks of the notes, each begun with quanta of its own, or later where it is strummed."""
-        begun = []
-        for event in events:
-            id = self.player.handle(event)
-            if isinstance(event, NoteOn):
-                begun.append(KeyNote(self.player, self.mixer, id, event, self.player.preset.path))
-                self._notes[id] = begun[-1]
-            self._follow(128)
-        self._follow(RATE_HZ // 2)
-        return [note.pluck for note in begun if note.pluck is not None]
-
-    def _follow(self, frames: int) -> None:
-        assert np.isfinite(self.mixer.render(frames)).all()
-        for report in self.player.reports():
-            self._notes[report.id].take(report)
+def plucks(stage: Stage, *events: Event) -> list[Report]:
+    """What the notes of events began with, each note with a quantum of its own."""
+    before = len(stage.begun)
+    for event in events:
+        stage.player.handle(event)
+        assert np.isfinite(stage.left(128)).all()
+    assert np.isfinite(stage.left(RATE_HZ // 2)).all()
+    return stage.begun[before:]
 
 
 def scattered(count: int) -> list[Event]:
@@ -131,51 +105,41 @@ def scattered(count: int) -> list[Event]:
     return [NoteOn(draw.randrange(40, 76), draw.randint(*VELOCITIES)) for _ in range(count)]
 
 
-def test_a_tone_at_zero_plays_on(preset: Preset) -> None:
-    """Its macro brings both widths to an end of their range, from which strokes vary."""
-    patch = next(each for each in PATCHES if each.name == "Classical guitar")
-    tone = next(number for number, macro in enumerate(patch.macros) if macro.name == "Tone")
-    wide = Stage(patch.turned(tone, 0.0), preset).play(*scattered(60))
-    assert len(wide) == 60 and max(pluck.width for pluck in wide) == WIDTH_RANGE[1]
-    narrow = patch.with_values({"pluck.width": WIDTH_RANGE[0], "pluck.width_hard": WIDTH_RANGE[0]})
-    thin = Stage(narrow, preset).play(*scattered(60))
-    assert len(thin) == 60 and min(pluck.width for pluck in thin) == WIDTH_RANGE[0]
+@pytest.mark.parametrize("end", WIDTH_RANGE)
+def test_a_tone_at_its_end_plays_on(preset: Preset, end: float) -> None:
+    """Both widths are at an end of their range, from which strokes vary."""
+    patch = PATCHES["Classical guitar"].with_values({"pluck.width": end, "pluck.width_hard": end})
+    found = plucks(Stage(patch, preset), *scattered(60))
+    assert len(found) == 60
+    assert (max if end == WIDTH_RANGE[1] else min)(each.width for each in found) == end
 
 
-def test_wheels_slides_hands_and_techniques_stay_within_ranges(preset: Preset) -> None:
-    patch = next(each for each in PATCHES if each.name == "Classical guitar")
-    extreme = patch.with_values({"pluck.position": POSITION_RANGE[0], "pluck.hardest_mm": AMPLITUDE_MM_RANGE[1]})
-    extreme = extreme.model_copy(update={"pluck": extreme.pluck.model_copy(update={"variation": 1.0})})
-    draw = random.Random(1)
+@pytest.mark.parametrize("mode", ["poly", "mpe"])
+def test_wheels_slides_hands_and_techniques_stay_within_ranges(preset: Preset, mode: str) -> None:
+    extreme = PATCHES["Classical guitar"].with_values(
+        {"pluck.position": POSITION_RANGE[0], "pluck.hardest_mm": AMPLITUDE_MM_RANGE[1]}
+    )
     fields = [field for field in WHEEL if field.startswith(("pluck.", "technique."))]
-    for field, mode in itertools.product(draw.sample(fields, 6), ("poly", "mpe")):
-        turned = extreme.model_copy(update={"mod_wheel": field, "mode": mode})
-        stage = Stage(turned, preset)
+    wild = [Pluck(at, mm, "gaussian", w) for at in POSITION_RANGE for mm in (0.0, 20.0) for w in WIDTH_RANGE]
+    for field in random.Random(1).sample(fields, 6):
+        stage = Stage(changed(extreme, pluck={"variation": 1.0}, mod_wheel=field, mode=mode), preset)
         for value in (0, 127, 128):
             switches = [Controller(number, value) for number in (MOD_WHEEL, SLIDE, HARMONICS)]
-            assert len(stage.play(*switches, *scattered(8))) == 8
-        by_hand = [
-            Pluck(at, mm, "gaussian", width) for at in POSITION_RANGE for mm in (0.0, 20.0) for width in WIDTH_RANGE
-        ]
-        plucks = stage.play(*(NoteOn(50, 90, pluck=pluck) for pluck in by_hand))
-        assert [(each.position, each.width) for each in plucks] == [(each.position, each.width) for each in by_hand]
+            assert len({each.id for each in plucks(stage, *switches, *scattered(8))}) == 8
+        found = {each.id: each for each in plucks(stage, *(NoteOn(50, 90, pluck=pluck) for pluck in wild))}
+        assert [(each.position, each.width) for each in found.values()] == [(p.position, p.width) for p in wild]
 
 
 def test_a_knob_may_go_to_every_end_while_strings_ring(preset: Preset) -> None:
-    """Of the strings and of the pluck, with a note after each."""
-    patch = next(each for each in PATCHES if each.name == "Steel-string acoustic")
+    """Of the strings and of the pluck, with notes after each."""
+    patch = PATCHES["Steel-string acoustic"]
     stage, draw = Stage(patch, preset), random.Random(2)
-    turns = [
-        PatchTurned(with_ends(patch, draw.sample([*PLUCKING, *(f"knobs.{name}" for name in KNOBS)], 5), draw))
-        for _ in range(12)
-    ]
-    events = [event for turn in turns for event in (turn, *scattered(3))]
-    assert len(stage.play(*events)) == 36
+    fields = [*PLUCKING, *(f"knobs.{name}" for name in KNOBS)]
+    knobs = [PatchTurned(with_ends(patch, draw.sample(fields, 5), draw)) for _ in range(12)]
+    assert len(plucks(stage, *(event for knob in knobs for event in (knob, *scattered(3))))) == 36
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf"), -1.0, 1e300])
 def test_the_nearest_pluck_is_always_one(value: float) -> None:
     made = Pluck(shape="rounded").nearest(position=value, amplitude_mm=value, width=value)
-    assert made.shape == "rounded"
-    low, high = POSITION_RANGE
-    assert low <= made.position <= high
+    assert made.shape == "rounded" and POSITION_RANGE[0] <= made.position <= POSITION_RANGE[1]

@@ -8,21 +8,26 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from app.instrument.events import PluckAt
+from app.patches.instrument import SingleString
+from app.playing.keyboard import PluckRange
 from app.playing.note import Note
 from app.playing.notes import Notes
 from app.playing.sources import Sources
+from app.presets.library import PresetEntry
 from app.rendering import RenderRequest
 from engine.pluck import Pluck
-from engine.presets import SHIPPED
+from engine.presets import SHIPPED, read_info
 from engine.values.ear import Ear
-from engine.voices import Mixer
+from engine.voices import Mixer, Voice
 from tests.app.monitors import hears
 
 DEADLINE_S = 30.0
 EAR = Ear((0.37,))
+Wait = Callable[[Callable[[], object]], None]
 
 
 class StandingSound:
@@ -52,6 +57,80 @@ class StandingSound:
         self._watch(self.status())
 
 
+class Lab:
+    """Notes of single strings, whose sound the test takes.
+
+    Attributes:
+        bank: a model that sounds at once.
+        small_preset: one that is rendered before it is heard.
+        sources: with both loaded at 48 kHz; nobody may change it.
+        reports: messages and details.
+    """
+
+    def __init__(self, sound: StandingSound, sources: Sources, bank: Path, small_preset: Path, wait: Wait) -> None:
+        self.sound, self.sources, self.bank, self.small_preset, self.wait = sound, sources, bank, small_preset, wait
+        self.reports: list[tuple[str, str]] = []
+        self.entry = PresetEntry("bank", bank, read_info(bank), 0)
+        report = lambda message, detail: self.reports.append((message, detail))  # noqa: E731
+        self.notes = Notes(sound, sources, {"bank": self.entry}.get, report)  # type: ignore[arg-type]
+        self.notes.set_monitor(hears("model"))
+
+    @property
+    def mixer(self) -> Mixer:
+        return self.sound.mixer
+
+    @mixer.setter
+    def mixer(self, mixer: Mixer) -> None:
+        self.sound.mixer = mixer
+
+    def pluck_of(
+        self,
+        path: Path | None = None,
+        position: float = 0.35,
+        others: tuple[Path, ...] = (),
+        seconds: float = 1.0,
+        ear: Ear = EAR,
+        amplitude_mm: float = 3.0,
+    ) -> RenderRequest:
+        return RenderRequest(path or self.bank, Pluck(position, amplitude_mm), seconds, ear, 1.0, others)
+
+    def strike(
+        self,
+        plucked: RenderRequest | Path | None = None,
+        *,
+        from_s: float = 0.0,
+        alone: bool = False,
+        begin_frame: int = 0,
+        **options: Any,
+    ) -> Note:
+        """Chooses a pluck and plays it: as an event, or from some time or frame on."""
+        request = plucked if isinstance(plucked, RenderRequest) else self.pluck_of(plucked, **options)
+        self.notes.choose(request)
+        if from_s or alone or begin_frame:
+            note = self.notes.ring(from_s, begin_frame, alone)
+        else:
+            note = self.notes.handle(PluckAt(request.pluck))  # type: ignore[assignment]
+        assert note is not None
+        return note
+
+    def play_string(self) -> PluckRange:
+        """Let a single string be the instrument; return its reach."""
+        self.notes.choose(self.pluck_of())
+        self.notes.set_instrument(SingleString(preset="bank"), EAR)
+        return PluckRange.of(self.entry.info)
+
+    def hear(self, seconds: float) -> np.ndarray:
+        """(frames,), left."""
+        return self.mixer.render(round(seconds * self.mixer.rate_hz))[:, 0]
+
+    def alone(self, pluck: RenderRequest, seconds: float, source: str = "model") -> np.ndarray:
+        """The sound of one source of a pluck in a mixer of its own, (frames,)."""
+        mixer = Mixer(48_000)
+        initial_m, begin = self.sources.begin(pluck.preset, source, 48_000, pluck.pluck)
+        mixer.add(Voice(self.sources.program(pluck.preset, source, 48_000), initial_m, pluck.ear, begin=begin))
+        return mixer.render(round(48_000 * seconds))[:, 0]
+
+
 @pytest.fixture
 def sound() -> StandingSound:
     made = StandingSound()
@@ -61,13 +140,11 @@ def sound() -> StandingSound:
 
 @pytest.fixture(scope="session")
 def bank() -> Path:
-    """A model that sounds at once."""
     return SHIPPED / "nylon_nonlinear_gaussian_4k_koopman_integrated.safetensors"
 
 
 @pytest.fixture(scope="session")
 def sources(bank: Path, small_preset: Path) -> Sources:
-    """With both presets loaded at 48 kHz; nobody may change it."""
     made = Sources()
     for path in (bank, small_preset):
         made.prepare(path, 48_000)
@@ -75,57 +152,17 @@ def sources(bank: Path, small_preset: Path) -> Sources:
 
 
 @pytest.fixture
-def reports() -> list[tuple[str, str]]:
-    return []
-
-
-@pytest.fixture
-def notes(sound: StandingSound, sources: Sources, reports: list[tuple[str, str]]) -> Iterator[Notes]:
-    report = lambda message, detail: reports.append((message, detail))  # noqa: E731
-    made = Notes(sound, sources, lambda name: None, report)  # type: ignore[arg-type]
-    made.set_monitor(hears("model"))
+def lab(sound: StandingSound, sources: Sources, bank: Path, small_preset: Path, wait: Wait) -> Iterator[Lab]:
+    made = Lab(sound, sources, bank, small_preset, wait)
     yield made
-    made.close()
+    made.notes.close()
 
 
 @pytest.fixture
-def pluck_of() -> Callable[..., RenderRequest]:
-    """pluck_of(path, position=…, others=…, seconds=…, ear=…, amplitude_mm=…)"""
-
-    def made(
-        path: Path,
-        position: float = 0.35,
-        others: tuple[Path, ...] = (),
-        seconds: float = 1.0,
-        ear: Ear = EAR,
-        amplitude_mm: float = 3.0,
-    ) -> RenderRequest:
-        return RenderRequest(path, Pluck(position, amplitude_mm), seconds, ear, 1.0, others)
-
-    return made
-
-
-@pytest.fixture
-def strike(notes: Notes) -> Callable[..., Note]:
-    """Chooses a pluck and plays it: as an event, or from some time or frame on."""
-
-    def made(request: RenderRequest, from_s: float = 0.0, alone: bool = False, begin_frame: int = 0) -> Note:
-        notes.choose(request)
-        if from_s or alone or begin_frame:
-            note = notes.ring(from_s, begin_frame, alone)
-        else:
-            note = notes.handle(PluckAt(request.pluck))
-        assert note is not None
-        return note
-
-    return made
-
-
-@pytest.fixture
-def wait() -> Callable[[Callable[[], bool]], None]:
+def wait() -> Wait:
     """For what another thread does."""
 
-    def until(done: Callable[[], bool]) -> None:
+    def until(done: Callable[[], object]) -> None:
         deadline = time.monotonic() + DEADLINE_S
         while not done():
             assert time.monotonic() < deadline, "nothing came"

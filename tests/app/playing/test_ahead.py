@@ -4,88 +4,74 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-import torch
 
 from app.playing.ahead import CARE, LEAST_S, Ahead, AheadVoice
-from app.playing.sources import Sources
 from engine.levels import FULL_SCALE_M
-from engine.models.koopman_var import KoopmanState, KoopmanVar
+from engine.models.koopman_var import KoopmanVar
 from engine.pluck import Pluck
 from engine.resonators.sine_transform import project
-from engine.sources import ModelSource
-from engine.values.ear import Ear
 from engine.voices import Mixer, Voice
 from engine.voices.ear import weights_of
+from tests.app.playing.conftest import EAR, Lab
 
 RATE_HZ = 4_000  # of the small preset and of the mixer: samples are heard as they are rendered
-EAR = Ear((0.37,))
-Wait = Callable[[Callable[[], bool]], None]
+ADVANCE = KoopmanVar.advance
 
 
-@pytest.fixture
-def ahead(threads_begun: Callable[[], list[str]]) -> Iterator[Ahead]:
-    made = Ahead()
-    yield made
-    made.close()
-    assert threads_begun() == []
+class Ahead4k:
+    """Renders voices of the small preset, and notes what they report."""
 
-
-class Reported:
-    """What an ahead voice says."""
-
-    def __init__(self) -> None:
+    def __init__(self, lab: Lab) -> None:
+        self.ahead, self.wait = Ahead(), lab.wait
+        self.model = lab.sources.load(lab.small_preset)
+        self.program = lab.sources.program(lab.small_preset, "model", RATE_HZ)
         self.begun_s: list[float] = []  # how much was rendered then
         self.errors: list[Exception] = []
         self.given_up = False
 
-
-Make = Callable[..., tuple[AheadVoice, Reported]]
-
-
-@pytest.fixture
-def make(sources: Sources, small_preset: Path) -> Make:
-    loaded = sources.load(small_preset)
-    info = loaded.preset.info
-    program = sources.program(small_preset, "model", RATE_HZ)
-
-    def made(
-        seconds: float = 1.0,
-        from_s: float = 0.0,
-        key: object = None,
-        model: ModelSource = loaded.model,
-        amplitude_mm: float = 3.0,
-    ) -> tuple[AheadVoice, Reported]:
-        reported = Reported()
+    def render(
+        self, seconds: float = 1.0, from_s: float = 0.0, key: object = None, amplitude_mm: float = 3.0
+    ) -> AheadVoice:
+        info = self.model.preset.info
         initial_m = project(Pluck(0.4, amplitude_mm).displacement(info.grid_points), info.modes)
         voice = AheadVoice(
-            Voice(program, initial_m, EAR, 1.0, seconds, info.rate_hz),
-            model,
+            Voice(self.program, initial_m, EAR, 1.0, seconds, info.rate_hz),
+            self.model.model,
             initial_m,
             weights_of(EAR, info.grid_points),
             (key or object(),),
-            lambda: reported.begun_s.append(voice.rendered_s),
-            reported.errors.append,
-            lambda: reported.given_up,
+            lambda: self.begun_s.append(voice.rendered_s),
+            self.errors.append,
+            lambda: self.given_up,
             from_s,
         )
-        return voice, reported
+        self.ahead.render(voice)
+        return voice
 
-    return made
+    def finished(self, **options: Any) -> AheadVoice:
+        voice = self.render(**options)
+        self.wait(lambda: voice.finished and voice.begun)
+        return voice
+
+
+@pytest.fixture
+def at(lab: Lab, threads_begun: Callable[[], list[str]]) -> Iterator[Ahead4k]:
+    made = Ahead4k(lab)
+    yield made
+    made.ahead.close()
+    assert "render-ahead" not in threads_begun()
 
 
 def slow_down(monkeypatch: pytest.MonkeyPatch, speed: float) -> None:
     """The model makes so many seconds of sound in a second, about."""
-    advance = KoopmanVar.advance
 
-    def slow(
-        self: KoopmanVar, state: KoopmanState, steps: int, readout: torch.Tensor | None = None
-    ) -> tuple[torch.Tensor, KoopmanState]:
+    def slow(self: KoopmanVar, state: Any, steps: int, readout: Any = None) -> Any:
         time.sleep(steps / RATE_HZ / speed)
-        return advance(self, state, steps, readout)
+        return ADVANCE(self, state, steps, readout)
 
     monkeypatch.setattr(KoopmanVar, "advance", slow)
 
@@ -98,126 +84,85 @@ def heard(voice: Voice, frames: int) -> np.ndarray:
     return mixer.render(frames)[:, 0]
 
 
-def test_it_begins_when_a_little_is_there_and_is_the_models_signal(ahead: Ahead, make: Make, wait: Wait) -> None:
-    voice, reported = make()
-    ahead.render(voice)
-    wait(lambda: voice.finished and reported.begun_s != [])
-    assert len(reported.begun_s) == 1
-    assert LEAST_S <= reported.begun_s[0] < 1.0
-    assert voice.waits_s == 0
+def test_it_begins_when_a_little_is_there_and_is_the_models_signal(at: Ahead4k) -> None:
+    voice = at.finished()
+    (begun_s,) = at.begun_s
+    assert LEAST_S <= begun_s < 1.0 and voice.waits_s == 0
     frames, _ = voice.source.advance(voice.source.start(voice.initial_m[None]), 2_000, voice.weights)
-    expected = frames[0, :, 0] / FULL_SCALE_M
-    attack = 16
+    attack, expected = 16, frames[0, :, 0] / FULL_SCALE_M
     assert heard(voice.voice, 2_001)[1 + attack :] == pytest.approx(expected[attack:], abs=1e-5)
 
 
 def test_a_slow_model_begins_when_the_rest_will_be_ready_in_time(
-    ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
+    at: Ahead4k, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     slow_down(monkeypatch, speed=0.8)
-    voice, reported = make(seconds=1.0)
-    ahead.render(voice)
-    wait(lambda: voice.waits_s > 0)
-    wait(lambda: reported.begun_s != [])  # it is `begun` a moment before that is reported
-    (begun_s,) = reported.begun_s
-    assert 1 - CARE * 0.8 <= begun_s < 1.0, "some of it is rendered while it is heard"
-    assert voice.waits_s == 0
+    voice = at.render()
+    at.wait(lambda: voice.waits_s > 0)
+    at.wait(lambda: at.begun_s)
+    assert 1 - CARE * 0.8 <= at.begun_s[0] < 1.0, "some of it is rendered while it is heard"
 
 
-def test_what_was_rendered_once_is_there_at_once(ahead: Ahead, make: Make, wait: Wait) -> None:
-    first, _ = make(key="a")
-    ahead.render(first)
-    wait(lambda: first.finished)
-    wait(lambda: ("a",) in ahead._known)
-    again, reported = make(key="a")
-    ahead.render(again)
-    assert reported.begun_s == [first.rendered_s]
+def test_what_was_rendered_once_is_there_at_once(at: Ahead4k) -> None:
+    first = at.finished(key="a")
+    at.finished(key="b")  # the first is remembered by now: one thread renders both
+    again = at.render(key="a")
+    assert again.begun and again.finished
     np.testing.assert_array_equal(heard(again.voice, 3_000), heard(first.voice, 3_000))
-    other, _ = make(key="b")
-    ahead.render(other)
-    assert not other.finished or other.done
 
 
-def test_where_a_seek_begins_in_the_middle_it_waits_for_that(
-    ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize(("from_s", "least_s"), [(0.8, 0.8 + LEAST_S), (5.0, 1.0)])
+def test_where_a_seek_begins_in_the_middle_it_waits_for_that(at: Ahead4k, from_s: float, least_s: float) -> None:
+    """Behind its end it is there when all is."""
+    at.finished(from_s=from_s)
+    assert at.begun_s[0] >= least_s - 1e-3
+
+
+def test_a_model_that_runs_away_ends_there_and_is_not_remembered(
+    at: Ahead4k, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    voice, reported = make(from_s=0.8)
-    ahead.render(voice)
-    wait(lambda: reported.begun_s != [])
-    assert reported.begun_s[0] >= 0.8 + LEAST_S
-    late, reported = make(from_s=5.0)  # behind its end
-    ahead.render(late)
-    wait(lambda: late.begun)
-    assert late.finished
-
-
-def test_a_model_that_runs_away_ends_there(
-    ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    advance = KoopmanVar.advance
-
-    def faulty(
-        self: KoopmanVar, state: KoopmanState, steps: int, readout: torch.Tensor | None = None
-    ) -> tuple[torch.Tensor, KoopmanState]:
-        frames, after = advance(self, state, steps, readout)
+    def faulty(self: KoopmanVar, state: Any, steps: int, readout: Any = None) -> Any:
+        frames, after = ADVANCE(self, state, steps, readout)
         return (frames * float("nan") if state.step >= 512 else frames), after
 
     monkeypatch.setattr(KoopmanVar, "advance", faulty)
-    voice, reported = make(key="wild")
-    ahead.render(voice)
-    wait(lambda: voice.finished)
-    wait(lambda: voice.begun)
+    voice = at.finished(key="wild")
     assert voice.ends_s == pytest.approx(voice.rendered_s, abs=1 / RATE_HZ)
     samples = heard(voice.voice, 4_000)
     assert np.abs(samples[voice.done - 200 : voice.done]).max() > 0.01
-    assert not samples[voice.done + 128 :].any()
-    assert reported.errors == []
-    assert ahead._known == {}
+    assert not samples[voice.done + 128 :].any() and at.errors == []
+    monkeypatch.setattr(KoopmanVar, "advance", ADVANCE)
+    assert at.finished(key="wild").done > voice.done
 
 
-def test_a_fault_is_reported_and_the_others_go_on(
-    ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    voice, reported = make()
+def test_a_fault_is_reported_and_the_others_go_on(at: Ahead4k, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as broken:
         broken.setattr(KoopmanVar, "encode", lambda *_: 1 / 0)
-        ahead.render(voice)
-        wait(lambda: reported.errors != [])
-    assert isinstance(reported.errors[0], ZeroDivisionError)
-    assert reported.begun_s == []
-    other, reported = make()
-    ahead.render(other)
-    wait(lambda: other.finished and reported.begun_s != [])
+        at.render()
+        at.wait(lambda: at.errors)
+    assert isinstance(at.errors[0], ZeroDivisionError) and at.begun_s == []
+    at.finished()
 
 
-def test_what_nobody_wants_is_rendered_no_further(
-    ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    slow_down(monkeypatch, speed=2.0)
-    voice, reported = make(seconds=60.0)
-    ahead.render(voice)
-    wait(lambda: voice.done > 1_000)
-    reported.given_up = True
-    wait(lambda: ahead._voices == [])
+def test_what_nobody_wants_is_rendered_no_further(at: Ahead4k, monkeypatch: pytest.MonkeyPatch) -> None:
+    slow_down(monkeypatch, speed=4.0)
+    voice = at.render(seconds=60.0)
+    at.wait(lambda: voice.done > 1_000)
+    at.given_up = True
+    done = -1
+    while voice.done != done:  # a block may be under way
+        done = voice.done
+        time.sleep(0.1)
     assert not voice.finished
 
 
-def test_the_one_that_is_heard_soonest_goes_first(
-    ahead: Ahead, make: Make, wait: Wait, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_one_that_is_heard_soonest_goes_first(at: Ahead4k, monkeypatch: pytest.MonkeyPatch) -> None:
     """A new pluck does not wait for all of those before it."""
     slow_down(monkeypatch, speed=5.0)
-    first, second = make(seconds=20.0)[0], make(seconds=20.0)[0]
-    ahead.render(first)
-    wait(lambda: first.begun)
-    ahead.render(second)
-    wait(lambda: second.begun)
-    assert not first.finished
-    assert first.done < 10 * second.done + 10 * RATE_HZ
+    first, second = (at.render(seconds=20.0) for _ in range(2))
+    at.wait(lambda: first.begun and second.begun)
+    assert not first.finished and first.done < 10 * second.done + 10 * RATE_HZ
 
 
-def test_a_string_that_is_silent_is_not_rendered_to_its_end(ahead: Ahead, make: Make, wait: Wait) -> None:
-    voice, _ = make(seconds=30.0, amplitude_mm=1e-6)
-    ahead.render(voice)
-    wait(lambda: voice.finished)
-    assert voice.rendered_s < 10
+def test_a_string_that_is_silent_is_not_rendered_to_its_end(at: Ahead4k) -> None:
+    assert at.finished(seconds=30.0, amplitude_mm=1e-6).rendered_s < 10

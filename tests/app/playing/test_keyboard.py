@@ -27,58 +27,53 @@ from engine.presets import find_preset, read_info
 REACH = PluckRange((0.3, 0.7), (1.0, 10.0))
 
 
-def test_the_row_goes_from_end_to_end_of_what_is_trained() -> None:
+def test_rows_of_keys_are_places_and_a_piano() -> None:
     assert [place_of(KeyPress(letter), "darwin") for letter in "ASDFGHJKL;"] == list(range(10))
     assert REACH.row == pytest.approx([0.3 + 0.4 * i / 9 for i in range(10)], abs=5e-5)
-
-
-def test_keys_of_a_single_string_are_places_and_velocity_is_amplitude() -> None:
-    wide = Pluck(0.5, 4.0, "raised_cosine", 0.2)
-    low, high, beyond = (REACH.pluck(*key, wide) for key in ((LOWEST_PLACE, 1), (HIGHEST_PLACE, 127), (127, 127)))
-    assert (low.position, low.amplitude_mm) == pytest.approx((0.3, 1))
-    assert (high.position, high.amplitude_mm) == pytest.approx((0.7, 10))
-    assert (low.shape, low.width) == ("raised_cosine", 0.2)
-    assert beyond == high
+    assert [semitone_of(KeyPress(letter), "darwin") for letter in "AWSEDFTGYHUJKOLP;'"] == list(range(18))
+    assert letters_of(1)[LOWEST_C + 12] == "A"
 
 
 @pytest.mark.parametrize(
-    ("platform", "press", "place"),
+    ("platform", "press", "place", "semitone"),
     [
-        ("linux", KeyPress("Q", 38), 0),  # AZERTY: Q is where A is elsewhere
-        ("linux", KeyPress("A", 24), None),
-        ("linux", KeyPress("", 47), 9),  # ö
-        ("win32", KeyPress("Q", 0x1E), 0),
-        ("darwin", KeyPress("d", 2), 2),  # its codes are not reported: the letter counts
-        ("linux", KeyPress("q"), None),
-        ("linux", KeyPress(""), None),
+        ("linux", KeyPress("Q", 38), 0, 0),  # AZERTY: Q is where A is elsewhere
+        ("linux", KeyPress("A", 24), None, None),
+        ("linux", KeyPress("z", 25), None, 1),
+        ("linux", KeyPress("", 47), 9, 16),  # ö
+        ("linux", KeyPress("", 48), None, 17),
+        ("win32", KeyPress("Q", 0x1E), 0, 0),
+        ("darwin", KeyPress("d", 2), 2, 4),  # its codes are not reported: the letter counts
+        ("darwin", KeyPress("Q"), None, None),
+        ("linux", KeyPress("q"), None, None),
+        ("linux", KeyPress(""), None, None),
     ],
 )
-def test_keys_are_known_by_their_place(platform: str, press: KeyPress, place: int | None) -> None:
-    assert place_of(press, platform) == place
+def test_keys_are_known_by_their_place(
+    platform: str, press: KeyPress, place: int | None, semitone: int | None
+) -> None:
+    assert (place_of(press, platform), semitone_of(press, platform)) == (place, semitone)
 
 
-def test_digits_and_c_and_v_set_the_amplitude() -> None:
+def test_digits_and_c_and_v_set_the_amplitude_and_others_nothing() -> None:
     levels = [REACH.turned(KeyPress(digit), 4.0) or 0.0 for digit in "123456789"]
-    assert levels == sorted(levels)
-    assert (levels[0], levels[-1]) == pytest.approx((1.0, 10.0))
-    harder, softer = REACH.turned(KeyPress("V"), 4.0), REACH.turned(KeyPress("c"), 4.0)
-    assert harder is not None and softer is not None
-    assert softer < 4 < harder
-    assert REACH.turned(KeyPress("V"), 10.0) == 10
+    assert levels == sorted(levels) and (levels[0], levels[-1]) == pytest.approx((1.0, 10.0))
+    softer, harder, hardest = (
+        REACH.turned(KeyPress(key), mm) or 0.0 for key, mm in (("c", 4.0), ("V", 4.0), ("V", 10))
+    )
+    assert softer < 4 < harder and hardest == 10
+    for letter in ("X", "0", " ", "", "É"):
+        assert REACH.turned(KeyPress(letter), 4.0) is place_of(KeyPress(letter), "darwin") is None
 
 
-@pytest.mark.parametrize("letter", ["X", "0", " ", "", "É"])
-def test_other_keys_are_left_alone(letter: str) -> None:
-    assert REACH.turned(KeyPress(letter), 4.0) is None
-    assert place_of(KeyPress(letter), "darwin") is None
-
-
-def test_velocity_and_amplitude_go_back_and_forth_in_equal_steps_of_level() -> None:
+def test_keys_of_a_single_string_are_places_and_velocity_is_amplitude_in_equal_steps_of_level() -> None:
+    wide = Pluck(0.5, 4.0, "raised_cosine", 0.2)
+    low, high, beyond = (REACH.pluck(*key, wide) for key in ((LOWEST_PLACE, 1), (HIGHEST_PLACE, 127), (127, 127)))
+    assert (low.position, low.amplitude_mm, low.shape, low.width) == pytest.approx((0.3, 1, "raised_cosine", 0.2))
+    assert (high.position, high.amplitude_mm) == pytest.approx((0.7, 10)) and beyond == high
     for velocity in (1, 40, 64, 127):
         assert REACH.velocity_of(REACH.amplitude_of(velocity)) == velocity
-    assert REACH.amplitude_of(64) == 3.1623
-    assert REACH.amplitude_of(999) == 10
-    assert REACH.velocity_of(0.0) == 1
+    assert (REACH.amplitude_of(64), REACH.amplitude_of(999), REACH.velocity_of(0.0)) == (3.1623, 10, 1)
 
 
 def test_what_is_played_is_round_and_within_reach() -> None:
@@ -89,61 +84,56 @@ def test_what_is_played_is_round_and_within_reach() -> None:
 
 
 def test_reach_is_what_a_preset_was_trained_on(small_preset: Path) -> None:
-    assert PluckRange.of(read_info(small_preset)) == PluckRange((0.3, 0.7), (1.0, 10.0))
+    """Of many strings up to the rise of tension; one that bears more than the loudest key is played as any other."""
+    assert PluckRange.of(read_info(small_preset)) == REACH
     assert PluckRange.of(None).position == (0.05, 0.95)
-
-
-def test_keys_of_a_model_of_many_strings_reach_as_hard_as_it_was_trained() -> None:
-    """Up to the rise of tension; a string that bears more than the loudest key is played as any other."""
     nylon, harp = (read_info(find_preset(name)) for name in ("studio_any_string", "studio_any_harp_c6"))
     assert PluckRange.of(nylon) == PluckRange((0.06, 0.94), (0.5, 10.0))
     low_mm, high_mm = PluckRange.of(harp).amplitude_mm
-    assert low_mm == 0.5
-    assert harp.tension_rise(Pluck(amplitude_mm=high_mm)) == pytest.approx(0.5)
+    assert low_mm == 0.5 and harp.tension_rise(Pluck(amplitude_mm=high_mm)) == pytest.approx(0.5)
 
 
-def test_two_rows_are_a_piano() -> None:
-    played = [semitone_of(KeyPress(letter), "darwin") for letter in "AWSEDFTGYHUJKOLP;'"]
-    assert played == list(range(18))
-    assert semitone_of(KeyPress("Q"), "darwin") is None
-    assert semitone_of(KeyPress("Q", 38), "linux") == 0  # AZERTY: by its place
-    assert semitone_of(KeyPress("z", 25), "linux") == 1
-    assert semitone_of(KeyPress("", 48), "linux") == 17
-    assert letters_of(1)[LOWEST_C + 12] == "A"
+@pytest.mark.parametrize(
+    ("letter", "octave", "velocity", "expected"),
+    [
+        ("z", 0, 90, (-1, 90)),
+        ("X", HIGHEST_OCTAVE, 90, (HIGHEST_OCTAVE, 90)),
+        ("Z", LOWEST_OCTAVE, 90, (LOWEST_OCTAVE, 90)),
+        ("9", 0, 90, (0, 127)),
+        ("1", 0, 90, (0, 1)),
+        ("v", 0, 120, (0, 127)),
+        ("c", 0, 5, (0, 1)),
+        ("m", 0, 5, None),
+    ],
+)
+def test_octave_and_velocity_keys_stay_within_bounds(
+    letter: str, octave: int, velocity: int, expected: tuple[int, int] | None
+) -> None:
+    assert turn(KeyPress(letter), octave, velocity) == expected
 
 
-def test_octave_and_velocity_keys_stay_within_bounds() -> None:
-    assert turn(KeyPress("z"), 0, 90) == (-1, 90)
-    assert turn(KeyPress("X"), HIGHEST_OCTAVE, 90) == (HIGHEST_OCTAVE, 90)
-    assert turn(KeyPress("Z"), LOWEST_OCTAVE, 90) == (LOWEST_OCTAVE, 90)
-    assert turn(KeyPress("9"), 0, 90) == (0, 127)
-    assert turn(KeyPress("1"), 0, 90) == (0, 1)
-    assert turn(KeyPress("v"), 0, 120) == (0, 127)
-    assert turn(KeyPress("c"), 0, 5) == (0, 1)
-    assert turn(KeyPress("m"), 0, 5) is None
-
-
-@pytest.mark.parametrize("low", range(0, 108, 7))
-@pytest.mark.parametrize("keys", [0, 1, 11, 40])
-def test_octaves_are_those_in_which_a_key_sounds(low: int, keys: int) -> None:
-    """Compared with every octave tried."""
-    high = min(low + keys, 107)  # the last key of the highest octave
-    own = range(12)  # further keys of the row are those of the next octave
-    sounding = [
-        octave
-        for octave in range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)
-        if any(low <= LOWEST_C + 12 * octave + semitone <= high for semitone in own)
-    ]
-    assert octaves_of(low, high) == (sounding[0], sounding[-1])
-
-
-def test_the_octave_is_the_nearest_with_most_keys() -> None:
-    guitar, toms, three_pads = range(40, 87), range(36, 52), (50, 51, 52)  # E2 to D6, C2 to D♯3
-    assert [octave_near(octave, guitar) for octave in (-4, -1, 0, 2, 4)] == [0, 0, 0, 2, 2]
-    assert [octave_near(octave, toms) for octave in (-4, 0, 4)] == [-1, -1, -1]
-    assert octave_near(0, three_pads) == 0
-    assert octave_near(3, range(120, 128)) == 3, "no octave has any of them"
-
-
-def test_a_range_that_no_key_reaches_has_the_nearest_octave() -> None:
+def test_octaves_are_those_in_which_a_key_sounds() -> None:
+    """Compared with every octave tried; a range that no key reaches has the nearest."""
+    every = range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)
+    for low in range(0, 108, 7):
+        for high in (min(low + keys, 107) for keys in (0, 1, 11, 40)):
+            sounding = [
+                each
+                for each in every
+                if set(range(12)) & {key - LOWEST_C - 12 * each for key in range(low, high + 1)}
+            ]
+            assert octaves_of(low, high) == (sounding[0], sounding[-1]), (low, high)
     assert octaves_of(120, 127) == (HIGHEST_OCTAVE, HIGHEST_OCTAVE)
+
+
+@pytest.mark.parametrize(
+    ("keys", "octaves", "nearest"),
+    [
+        (range(40, 87), (-4, -1, 0, 2, 4), [0, 0, 0, 2, 2]),  # a guitar, E2 to D6
+        (range(36, 52), (-4, 0, 4), [-1, -1, -1]),  # toms
+        ((50, 51, 52), (0,), [0]),  # three pads
+        (range(120, 128), (3,), [3]),  # no octave has any of them
+    ],
+)
+def test_the_octave_is_the_nearest_with_most_keys(keys: range, octaves: tuple[int, ...], nearest: list[int]) -> None:
+    assert [octave_near(octave, keys) for octave in octaves] == nearest

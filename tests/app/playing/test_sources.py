@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import threading
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +16,6 @@ from engine.presets import Preset, PresetError, load_preset
 from engine.resonators.sine_transform import project
 
 RATE_HZ = 8_000
-Wait = Callable[[Callable[[], bool]], None]
 
 
 @pytest.fixture
@@ -33,61 +31,53 @@ def loaded(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     return read
 
 
-def copies(small_preset: Path, folder: Path, number: int) -> list[Path]:
-    return [Path(shutil.copy(small_preset, folder / f"{index}.safetensors")) for index in range(number)]
-
-
-def test_what_is_prepared_is_there_at_its_rate(small_preset: Path, loaded: list[Path]) -> None:
-    sources = Sources()
-    assert not sources.has(small_preset, RATE_HZ)
-    sources.program(small_preset, "model", RATE_HZ)
-    assert not sources.has(small_preset, RATE_HZ), "the truth would be waited for"
-    sources.prepare(small_preset, RATE_HZ)
-    assert sources.has(small_preset, RATE_HZ)
-    assert not sources.has(small_preset, 2 * RATE_HZ)
-    assert sources.program(small_preset, "model", RATE_HZ) is sources.program(small_preset, "model", RATE_HZ)
-    sources.prepare(small_preset, 2 * RATE_HZ)
-    assert sources.load(small_preset) is sources.load(small_preset)
+def test_what_is_prepared_is_there_at_its_rate_and_read_once(small_preset: Path, loaded: list[Path]) -> None:
+    made = Sources()
+    assert not made.has(small_preset, RATE_HZ)
+    made.program(small_preset, "model", RATE_HZ)
+    assert not made.has(small_preset, RATE_HZ), "the truth would be waited for"
+    made.prepare(small_preset, RATE_HZ)
+    assert made.has(small_preset, RATE_HZ) and not made.has(small_preset, 2 * RATE_HZ)
+    assert made.program(small_preset, "model", RATE_HZ) is made.program(small_preset, "model", RATE_HZ)
+    made.prepare(small_preset, 2 * RATE_HZ)
     assert loaded == [small_preset]
+    initial_m, rows = made.begin(small_preset, "truth", RATE_HZ, Pluck(0.4, 3.0))
+    info = made.load(small_preset).preset.info
+    expected = project(Pluck(0.4, 3.0).displacement(info.grid_points), info.modes)
+    np.testing.assert_array_equal(initial_m, expected)
+    again, other = (made.begin(small_preset, "truth", RATE_HZ, Pluck(at, 3.0))[1] for at in (0.4, 0.5))
+    assert again is rows and other is not rows, "the beginning of a pluck is remembered"
 
 
 def test_the_presets_that_were_used_last_are_kept(
     small_preset: Path, tmp_path: Path, loaded: list[Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "KEPT_PRESETS", 2)
-    sources, (first, second, third) = Sources(), copies(small_preset, tmp_path, 3)
+    first, second, third = (Path(shutil.copy(small_preset, tmp_path / f"{n}.safetensors")) for n in range(3))
+    made = Sources()
     for path in (first, second):
-        sources.prepare(path, RATE_HZ)
-    sources.load(first)
-    sources.prepare(third, RATE_HZ)
-    assert [sources.has(path, RATE_HZ) for path in (first, second, third)] == [True, False, True]
-    sources.prepare(second, RATE_HZ)
+        made.prepare(path, RATE_HZ)
+    made.load(first)
+    made.prepare(third, RATE_HZ)
+    assert [made.has(path, RATE_HZ) for path in (first, second, third)] == [True, False, True]
+    made.prepare(second, RATE_HZ)
     assert loaded == [first, second, third, second]
 
 
-def test_what_a_pluck_begins_with_is_remembered(small_preset: Path, loaded: list[Path]) -> None:
-    sources, pluck = Sources(), Pluck(0.4, 3.0)
-    initial_m, rows = sources.begin(small_preset, "truth", RATE_HZ, pluck)
-    info = sources.load(small_preset).preset.info
-    np.testing.assert_array_equal(initial_m, project(pluck.displacement(info.grid_points), info.modes))
-    assert sources.begin(small_preset, "truth", RATE_HZ, Pluck(0.4, 3.0))[1] is rows
-    assert sources.begin(small_preset, "truth", RATE_HZ, Pluck(0.5, 3.0))[1] is not rows
-
-
 def test_a_damaged_preset_is_named(tmp_path: Path) -> None:
-    (tmp_path / "broken.safetensors").write_bytes(b"damaged")
-    sources = Sources()
-    for ask in (sources.load, lambda path: sources.prepare(path, RATE_HZ)):
+    path, made = tmp_path / "broken.safetensors", Sources()
+    path.write_bytes(b"damaged")
+    for ask in (made.load, lambda path: made.prepare(path, RATE_HZ)):
         with pytest.raises(PresetError, match=r"broken\.safetensors"):
-            ask(tmp_path / "broken.safetensors")
-    assert not sources.has(tmp_path / "broken.safetensors", RATE_HZ)
+            ask(path)
+    assert not made.has(path, RATE_HZ)
 
 
 def test_what_is_there_waits_for_nothing_that_is_loaded(
-    small_preset: Path, tmp_path: Path, wait: Wait, monkeypatch: pytest.MonkeyPatch
+    small_preset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    sources, (slow,) = Sources(), copies(small_preset, tmp_path, 1)
-    sources.prepare(small_preset, RATE_HZ)
+    made, slow = Sources(), Path(shutil.copy(small_preset, tmp_path))
+    made.prepare(small_preset, RATE_HZ)
     begun, go_on = threading.Event(), threading.Event()
 
     def load(path: Path) -> Preset:
@@ -96,14 +86,13 @@ def test_what_is_there_waits_for_nothing_that_is_loaded(
         return load_preset(path)
 
     monkeypatch.setattr(module, "load_preset", load)
-    loading = threading.Thread(target=sources.prepare, args=(slow, RATE_HZ))
+    loading = threading.Thread(target=made.prepare, args=(slow, RATE_HZ))
     loading.start()
-    assert begun.wait(20)
-    assert sources.has(small_preset, RATE_HZ)
+    assert begun.wait(20) and made.has(small_preset, RATE_HZ)
     for kind in ("model", "truth"):
-        sources.program(small_preset, kind, RATE_HZ)
-        sources.begin(small_preset, kind, RATE_HZ, Pluck(0.45))
+        made.program(small_preset, kind, RATE_HZ)
+        made.begin(small_preset, kind, RATE_HZ, Pluck(0.45))
     assert loading.is_alive()
     go_on.set()
-    wait(lambda: sources.has(slow, RATE_HZ))
     loading.join()
+    assert made.has(slow, RATE_HZ)

@@ -1,0 +1,363 @@
+"""Sound files as notes and bodies: valid ones of an independent writer, odd ones, and one line for refused ones."""
+
+from __future__ import annotations
+
+import random
+import struct
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import soundfile
+from numpy.typing import NDArray
+
+from app.audio.impulse_file import ImpulseError, cut_words, read_impulse
+from app.audio.note_file import NoteFileError, read_note
+from engine import bounds
+
+FORMATS: dict[
+    str, tuple[int, int, float, Callable[[NDArray[np.float64]], bytes]]
+] = {  # tag, bytes, tolerance, writer
+    "u8": (1, 1, 0.013, lambda x: (np.round(x * 127) + 128).astype("u1").tobytes()),
+    "i16": (1, 2, 1e-4, lambda x: np.round(x * 32767).astype("i2").tobytes()),
+    "i24": (1, 3, 1e-6, lambda x: np.round(x * 8388607).astype("<i4").view("u1").reshape(-1, 4)[:, :3].tobytes()),
+    "i32": (1, 4, 1e-8, lambda x: np.round(x * 2147483647).astype("i4").tobytes()),
+    "f32": (3, 4, 1e-7, lambda x: x.astype("f4").tobytes()),
+    "f64": (3, 8, 1e-16, lambda x: x.tobytes()),
+}
+GUID = bytes.fromhex("000000001000800000aa00389b71")
+DECAYING = 0.5 * np.random.default_rng(0).uniform(-1, 1, (3000, 2)) * np.geomspace(1, 1e-3, 3000)[:, None]
+
+
+def chunk(name: bytes, content: bytes, size: int | None = None, order: str = "<", padded: bool = True) -> bytes:
+    odd = len(content) % 2 and padded
+    return name + struct.pack(order + "I", len(content) if size is None else size) + content + b"\0" * odd
+
+
+def format_of(bits: int = 16, tag: int = 1, rate_hz: int = 8_000) -> bytes:
+    width = (bits + 7) // 8
+    return chunk(b"fmt ", struct.pack("<HHIIHH", tag, 1, rate_hz, rate_hz * width, width, bits))
+
+
+def riff(*chunks: bytes) -> bytes:
+    return chunk(b"RIFF", b"WAVE" + b"".join(chunks))
+
+
+DATA = chunk(b"data", struct.pack("<3h", 1, 2, 3))
+TEXTS = b"INFO" + chunk(b"ISFT", b"five5")
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "a.wav"
+
+
+def samples_of(path: Path, data: bytes) -> list[float]:
+    """Of the first channel, in steps of 16 bits."""
+    path.write_bytes(data)
+    return list(read_note(path).samples[:, 0] * 32_768)
+
+
+# Valid files
+
+
+def made_wav(draw: random.Random) -> tuple[bytes, NDArray[np.float64], int, str]:
+    """A valid file, or one that is wrong in a way that tools write; its samples, rate and format."""
+    kind = draw.choice(list(FORMATS))
+    tag, width, _, write = FORMATS[kind]
+    channels, rate_hz = draw.choice((1, 1, 2, 2, 3, 5, 8)), draw.choice((8_000, 22_050, 44_100, 48_000, 96_000))
+    frames = draw.randrange(1, 400)
+    samples = np.random.default_rng(draw.randrange(2**32)).uniform(-1, 1, (frames, channels))
+    data = write(samples.ravel())
+    form = draw.choice((b"RIFF", b"RIFF", b"RIFF", b"RIFX", b"RF64", b"BW64"))
+    order = ">" if form == b"RIFX" else "<"
+    if order == ">":
+        data = np.frombuffer(data, "u1").reshape(-1, width)[:, ::-1].tobytes()
+    padded, extensible = draw.random() < 0.6, draw.random() < 0.3
+    sizes = (channels, rate_hz, rate_hz * channels * width, channels * width, 8 * width)
+    head = struct.pack(order + "HHIIHH", 0xFFFE if extensible else tag, *sizes)
+    if extensible:
+        head += struct.pack(order + "HHIH", 22, 8 * width, 0, tag) + GUID
+    elif draw.random() < 0.3:
+        head += struct.pack(order + "H", 0)
+    names = draw.sample((b"JUNK", b"bext", b"ID3 ", b"id3 ", b"fact", b"PEAK", b"smpl", b"cue "), 3)
+    others = [chunk(name, draw.randbytes(draw.randrange(60)), None, order, padded) for name in names]
+    others.append(chunk(b"LIST", b"INFO" + chunk(b"ISFT", b"five5", None, order, padded), None, order, padded))
+    draw.shuffle(others)
+    parts = [chunk(b"fmt ", head, None, order), *others[:2]]
+    draw.shuffle(parts)
+    how, size = draw.choice(("right", "right", "zero", "unknown", "beyond")), len(data)
+    stated = {"right": size, "zero": 0, "unknown": 2**32 - 1, "beyond": size + 100_000}[how]
+    if form in (b"RF64", b"BW64"):
+        stated, long = 2**32 - 1, draw.choice((size, 0)) if how == "zero" else size
+        how = "zero" if long == 0 else how
+        parts.insert(0, chunk(b"ds64", struct.pack("<QQQI", 0, long, frames, 0)))
+    behind = others[2:] if how == "right" else []
+    body = b"".join([b"WAVE", *parts, chunk(b"data", data, stated, order, padded and how == "right"), *behind])
+    return form + struct.pack(order + "I", draw.choice((len(body), 0, 2**32 - 1))) + body, samples, rate_hz, kind
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_random_files_are_read_as_they_were_meant(seed: int, path: Path) -> None:
+    draw = random.Random(seed)
+    for number in range(60):
+        data, samples, rate_hz, kind = made_wav(draw)
+        path.write_bytes(data)
+        read = read_note(path)
+        assert (read.rate_hz, read.samples.shape) == (rate_hz, samples.shape), (number, kind)
+        np.testing.assert_allclose(read.samples, samples, rtol=0, atol=FORMATS[kind][2], err_msg=str(number))
+
+
+@pytest.mark.parametrize(
+    ("ending", "subtype"),
+    [
+        *(("wav", subtype) for subtype in ("PCM_U8", "PCM_16", "PCM_24", "PCM_32", "FLOAT", "DOUBLE")),
+        *(("wav", subtype) for subtype in ("ULAW", "ALAW", "IMA_ADPCM", "MS_ADPCM")),
+        *(("flac", "PCM_24"), ("flac", "PCM_16"), ("aiff", "PCM_24"), ("aiff", "FLOAT")),
+    ],
+)
+@pytest.mark.parametrize("channels", [1, 2])
+def test_what_libsndfile_writes_is_read_as_note_and_as_body(
+    tmp_path: Path, ending: str, subtype: str, channels: int
+) -> None:
+    path = tmp_path / f"a.{ending}"
+    soundfile.write(path, DECAYING[:, :channels], 44_100, subtype)
+    whole = soundfile.read(path, always_2d=True)[0]
+    for read in (read_note(path), read_impulse(path)):
+        assert read.rate_hz == 44_100 and len(read.samples) == len(whole)
+        np.testing.assert_allclose(read.samples[:3_000], whole[:3_000], atol=2e-7)  # behind are remains of a block
+
+
+@pytest.mark.parametrize(
+    ("data", "expected"),
+    [
+        (
+            riff(chunk(b"LIST", TEXTS + (b"ICMT\x20\0\0\0abcd")[:6]), format_of(), DATA),
+            [1, 2, 3],
+        ),  # a list is cut off
+        (riff(format_of(), DATA) + bytes(100_000), [1, 2, 3]),  # as of a recorder that fills its blocks
+        (riff(format_of(12), chunk(b"data", struct.pack("<3h", 16384, -16384, 16))), [16384, -16384, 16]),
+    ],
+)
+def test_odd_files_cost_no_samples(path: Path, data: bytes, expected: list[float]) -> None:
+    assert samples_of(path, data) == expected
+
+
+@pytest.mark.parametrize("name", [b"DISP", b"_PMX", b"LIST"])
+@pytest.mark.parametrize(("length", "filled"), [(1, 33), (17, 0), (603, 100)])
+def test_odd_chunks_without_padding_before_chunks_of_any_name(
+    name: bytes, length: int, filled: int, path: Path
+) -> None:
+    """A name less its first letter, and a size of 100, look like a name too."""
+    odd = chunk(b"strc", bytes([filled]) * length, padded=False)
+    text = chunk(name, (b"INFO" if name == b"LIST" else b"") + bytes([filled]) * 100)
+    assert samples_of(path, riff(odd, text, format_of(), DATA)) == [1, 2, 3]
+
+
+@pytest.mark.parametrize(("subtype", "kind"), [("ULAW", 7), ("ALAW", 6)])
+def test_a_compressed_body_with_an_extensible_header(subtype: str, kind: int, path: Path) -> None:
+    raw = path.with_suffix(".raw")
+    soundfile.write(raw, DECAYING[:, 0], 48_000, subtype=subtype, format="RAW")
+    head = struct.pack("<HHIIHH", 0xFFFE, 1, 48_000, 48_000, 1, 8) + struct.pack("<HHIH", 22, 8, 0, kind) + GUID
+    path.write_bytes(riff(chunk(b"fmt ", head), chunk(b"data", raw.read_bytes())))
+    whole = soundfile.read(raw, channels=1, samplerate=48_000, subtype=subtype, format="RAW")[0]
+    np.testing.assert_array_equal(read_impulse(path).samples[:, 0], whole)
+
+
+# FLAC
+
+
+def about(bits: int = 16, frames: int = 0) -> bytes:
+    """The description of a stream of one channel."""
+    return struct.pack(">HH", 100, 100) + bytes(6) + (44_100 << 44 | bits - 1 << 36 | frames).to_bytes(8) + bytes(16)
+
+
+def flac_block(samples: NDArray[np.int16], number: int, code: int) -> bytes:
+    """A block of one channel as it is, after RFC 9639."""
+    head = bytes([0xFF, 0xF8, 0x60, code << 1, number, len(samples) - 1])
+    block = head + bytes([remainder(head, 0x07, 8)]) + b"\2" + samples.tobytes()
+    return block + remainder(block, 0x8005, 16).to_bytes(2)
+
+
+def remainder(data: bytes, polynomial: int, bits: int) -> int:
+    found = int.from_bytes(data) << bits
+    for place in range(8 * len(data) + bits - 1, bits - 1, -1):
+        if found >> place & 1:
+            found ^= (polynomial | 1 << bits) << (place - bits)
+    return found
+
+
+@pytest.mark.parametrize("code", [0, 4])
+def test_the_last_block_of_a_flac_stream_may_name_its_bits_another_way(code: int, path: Path) -> None:
+    """Blocks may state 16 bits, or refer to the file's first block for them. A stream's last one was left out."""
+    samples = np.arange(-90, 90, dtype=">i2")
+    blocks = flac_block(samples[:100], 0, 4 - code) + flac_block(samples[100:], 1, code)
+    assert samples_of(path, b"fLaC\x80\0\0\x22" + about() + blocks) == list(samples)
+
+
+@pytest.mark.parametrize("frames", [1, 192, 4_096, 600_000])
+def test_a_flac_stream_that_states_no_length_or_is_cut_off(frames: int, path: Path) -> None:
+    """Also behind a tag of MP3 players."""
+    samples = np.random.default_rng(0).uniform(-0.5, 0.5, (frames, 2))
+    soundfile.write(path, samples, 44_100, "PCM_24", format="FLAC")
+    data = bytearray(path.read_bytes())
+    data[21:26] = bytes([data[21] & 0xF0, 0, 0, 0, 0])
+    for before in (b"", b"ID3\4\0\0\0\0\1\1" + bytes(129)):
+        path.write_bytes(before + data)
+        np.testing.assert_allclose(read_note(path).samples, samples, atol=1e-6)
+    for length in (30, 42, 46, 60, len(data) - 1, len(data) - 3):
+        path.write_bytes(data[:length])
+        readable_or_named(path, frames)
+
+
+def readable_or_named(path: Path, most_frames: int = 10**9) -> None:
+    try:
+        assert 0 < len(read_note(path).samples) <= most_frames
+    except NoteFileError as error:
+        assert str(error).startswith(f"{path}: ") and str(error).isprintable() and len(str(error)) < 400
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_damage_of_any_kind_is_read_or_named(seed: int, path: Path) -> None:
+    draw = random.Random(seed)
+    for _ in range(100):
+        data = bytearray(made_wav(draw)[0])
+        for _ in range(draw.randrange(1, 8)):
+            data[draw.randrange(len(data))] = draw.choice((0, 1, 127, 255, draw.randrange(256)))
+        path.write_bytes(data[: draw.choice((len(data), draw.randrange(len(data))))])
+        readable_or_named(path)
+
+
+# Bodies
+
+
+@pytest.mark.parametrize("seconds", [3.0, 3.0 + 1 / 48_000, 6.97])
+def test_of_a_long_response_the_beginning_is_used_and_fades_out(path: Path, seconds: float) -> None:
+    frames, most = round(48_000 * seconds), 3 * 48_000
+    samples = np.random.default_rng(0).uniform(-0.5, 0.5, (frames, 2))
+    soundfile.write(path, samples, 48_000, "FLOAT")
+    found, words = read_impulse(path).samples, cut_words(path)
+    whole = most if frames == most else round(2.7 * 48_000)
+    assert len(found) == most
+    np.testing.assert_allclose(found[:whole], samples[:whole], atol=1e-7)
+    assert frames == most or np.abs(found[-100:]).max() < 1e-4, "no click at its end"
+    assert words == (
+        "" if frames == most else f"a.wav lasts {seconds:.2f} s: its first 3 s, faded out, are the body."
+    )
+
+
+@pytest.mark.parametrize("silent_s", [0.0, 0.05, 5.0])
+def test_silence_before_a_body_is_left_out(silent_s: float, path: Path) -> None:
+    response = DECAYING.copy()
+    response[0] = 0.5
+    silence = np.random.default_rng(1).uniform(-1e-3, 1e-3, (round(silent_s * 48_000), 2))
+    soundfile.write(path, np.concatenate([silence, response]), 48_000, "FLOAT")
+    found, kept = read_impulse(path).samples, 48 if silent_s else 0
+    assert len(found) == len(response) + kept
+    np.testing.assert_allclose(found[kept:], response, atol=1e-7)
+    cut_ms = f"a.wav is the body without {1000 * silent_s - 1:.0f} ms of silence before it."
+    assert cut_words(path) == (cut_ms if silent_s else "")
+
+
+# What is refused
+
+
+def written(samples: NDArray[np.floating], rate_hz: int = 48_000, **form: str) -> Callable[[Path], object]:
+    return lambda path: soundfile.write(path, samples, rate_hz, **{"subtype": "FLOAT", **form})
+
+
+def huge(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(bounds.LARGEST_IMPULSE_BYTES + 1)
+
+
+def raw(data: bytes) -> Callable[[Path], object]:
+    return lambda path: path.write_bytes(data)
+
+
+SINE = np.sin(np.arange(8_000) / 20)
+NOT_FINITE = np.where(np.arange(6_000).reshape(-1, 2) == 200, np.nan, DECAYING)
+REFUSED = [
+    (raw(b""), "it is empty"),
+    (raw(b"no sound at all"), "it is no WAV"),
+    (raw(b"RIFF\0\0\0\0AVI "), "it is no WAV"),
+    (raw(b"RIFF\0\0\0\0RMID" + chunk(b"data", b"MThd")), "it is no WAV"),
+    (raw(b"RIFF\0\0\0\0WAVE"), "no format"),
+    (raw(riff(chunk(b"fmt ", b"\1\0"))), "no samples|cut off"),
+    (raw(riff(chunk(b"fmt ", bytes(16)), chunk(b"data", b"1234"))), "0 channels"),
+    (raw(riff(chunk(b"JUNK", b"") * 20_000)), "chunks"),
+    (raw(riff(format_of(tag=0x161), DATA)), "kind 0x161"),
+    (raw(riff(format_of(40), DATA)), "40 bits"),
+    (raw(b"OggS\0\2" + bytes(20) + b"\1\x33\x7fFLAC\1\0\0\2fLaC"), "it is FLAC within Ogg"),
+    *(
+        (raw(b"fLaC\x80\0\0\x22" + about(n, 100) + bytes(100)), f"it is FLAC of {n} bits, not of 8,")
+        for n in (4, 12, 32)
+    ),
+    (raw(b"fLaC\0\0\0\x22" + about() + bytes(400_000)), "no samples, or is cut off"),  # empty blocks to its end
+    *(
+        (written(SINE, 8_000, format=form, subtype=None), "it is no WAV, FLAC")
+        for form in ("AU", "CAF", "W64", "MP3", "SDS")
+    ),
+]
+
+
+@pytest.mark.parametrize(("make", "reported"), REFUSED)
+def test_what_is_no_sound_file_is_named_in_one_line(
+    path: Path, make: Callable[[Path], object], reported: str
+) -> None:
+    """As a note and as a body."""
+    make(path)
+    for read, error in ((read_note, NoteFileError), (read_impulse, ImpulseError)):
+        with pytest.raises(error, match=reported) as caught:
+            read(path)
+        assert str(caught.value).startswith(f"{path}: ") and str(caught.value).isprintable()
+        assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("make", "as_note", "as_body"),
+    [
+        (lambda path: None, "no file", "no file"),
+        (Path.mkdir, "a folder or a device, no file", "no file"),
+        (huge, "", "64 MiB"),
+        (written(np.tile(DECAYING, (500, 1))), "", r"its length must lie in 0 … 30 s, not 31\.25\).*of up to 30 s"),
+        (written(DECAYING[:, :1].repeat(3, 1)), "", "its channels"),
+        (written(np.zeros((50, 33)), 8_000), "has 33 channels; export one or two", ""),
+        (written(DECAYING, 4_000), "", "its rate"),
+        (written(0 * DECAYING), "", "silent"),
+        (raw(riff(format_of(), chunk(b"data", b""), chunk(b"LIST", TEXTS))), "holds no samples", "silent"),
+        (written(NOT_FINITE), "", "no numbers"),
+        (written(DECAYING, format="OGG", subtype="VORBIS"), "", "save it as WAV"),
+        (written(np.zeros(600 * 8_000), 8_000, subtype="PCM_U8"), "lasts 600 s; cut out one note", ""),
+        (written(2.0**31 * SINE), r"a\.wav: its largest sample is 2.15e\+09 times full scale; normalise it", ""),
+        (written(2.0**31 * SINE, format="AIFF"), "its largest sample is 2.15e", ""),
+    ],
+)
+def test_what_cannot_be_used_is_named_in_one_line(
+    path: Path, make: Callable[[Path], object], as_note: str, as_body: str
+) -> None:
+    make(path)
+    for read, error, reported in ((read_note, NoteFileError, as_note), (read_impulse, ImpulseError, as_body)):
+        if reported:
+            with pytest.raises(error, match=reported) as caught:
+                read(path)
+            assert str(caught.value).startswith(f"{path}: ") and str(caught.value).isprintable()
+
+
+def test_a_loud_note_within_bounds_is_read(path: Path) -> None:
+    written(32_767 * SINE)(path)
+    read = read_note(path)
+    assert np.abs(read.samples).max() == pytest.approx(32_767, rel=1e-3) and len(read.digest) == 64
+
+
+def test_many_channels_at_a_high_rate_are_refused_before_they_fill_memory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A minute of silence of eight channels at 384 kHz is a small FLAC, and 1.5 GB of samples."""
+    with soundfile.SoundFile(tmp_path / "a.flac", "w", 384_000, 8, "PCM_16") as file:
+        for _ in range(6):
+            file.write(np.zeros((384_000 * 3, 8), np.int16))
+    monkeypatch.setattr(soundfile.SoundFile, "read", lambda *_, **__: pytest.fail("it was read"))
+    with pytest.raises(NoteFileError, match="has 8 channels of 384000 Hz for 18 s, which is too much; export one or"):
+        read_note(tmp_path / "a.flac")

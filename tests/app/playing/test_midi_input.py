@@ -1,0 +1,280 @@
+"""MIDI input: through JACK, of other kinds of ports, with faults in plain words; its sound; what controllers turn."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+import threading
+import types
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from app.instrument.events import Bend, Controller, NoteOff, NoteOn, release_all
+from app.instrument.midi_file import event_of
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import read_patch
+from app.patches.patch import Damping, Pickup
+from app.playing.midi import MidiChoices, turns_of
+from app.playing.midi_backend import VARIABLE, MidiUnavailable, RtMidiInput, load_backend
+from app.playing.midi_port import MidiInput
+from app.playing.notes import Notes
+from app.playing.sources import Sources
+from app.session.choices import Choices
+from app.shared.parameters import LEARNABLE, OF_CHOICES, OF_PATCHES
+from engine.values.ear import Ear
+from tests.app.instrument.stage import cents, level_db, pitch_hz
+from tests.app.monitors import find_shipped, hears
+
+ROOT = Path(__file__).parents[3]
+GUITAR = read_patch(PATCHES / "classical_guitar.json")
+
+
+@pytest.mark.skipif(shutil.which("jackd") is None, reason="no JACK server is installed")
+def test_messages_come_through_jack_and_an_input_closes_while_they_stream(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "tests.app.playing.through_jack", str(tmp_path)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=150)
+    if "cannot be" in (tmp_path / "log").read_text(errors="replace") and done.returncode:
+        pytest.skip("JACK does not start here")
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout.splitlines()[-1])
+    came = [NoteOn(60, 100, 2), Bend(-1.0), Controller(64, 127), NoteOff(60, 2)]
+    assert found["came"] == [repr(each) for each in came]
+    assert found["closed"] == 20 and found["streamed"]
+    gone, back = [each for each in found["looks"] if each]
+    assert found["looks"][0] == "" and "was disconnected" in gone and "is connected again" in back
+    assert found["came again"] == repr(NoteOn(60, 100))
+    assert "Nobody:nothing is not connected" in found["absent"]
+    assert "does not answer" in found["no server"]
+    assert "leaked" not in done.stderr
+
+
+# The package
+
+
+@pytest.mark.parametrize(
+    ("text", "reported"),
+    [(None, r"-m pip install supriya-midi"), ("raise RuntimeError('not built')", r"not built.*pip install")],
+)
+def test_a_package_that_cannot_be_loaded_has_its_remedy(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, text: str | None, reported: str
+) -> None:
+    monkeypatch.delitem(sys.modules, "supriya_midi", raising=False)
+    if text is None:
+        monkeypatch.setitem(sys.modules, "supriya_midi", None)
+    else:
+        (tmp_path / "supriya_midi.py").write_text(text)
+        monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(MidiUnavailable, match=reported):
+        load_backend()
+
+
+@pytest.fixture
+def library(monkeypatch: pytest.MonkeyPatch) -> types.SimpleNamespace:
+    """A package whose port belongs to another program, as Windows has it; it notes what is asked."""
+
+    class RtMidiError(Exception):
+        pass
+
+    class MidiIn:
+        def __init__(self, api: int, name: str, queue: int) -> None:
+            library.systems.append(api)
+
+        def get_ports(self) -> list[str]:
+            return library.ports
+
+        def open_port(self, number: int) -> None:
+            library.opened.append(number)
+            if library.busy:
+                raise RtMidiError("error creating Windows MM MIDI input port")
+
+        def get_message(self) -> None:
+            return None
+
+        def close_port(self) -> None:
+            return None
+
+        def delete(self) -> None:
+            library.deleted += 1
+
+    names = {1: "winmm", 2: "jack"}
+    library = types.SimpleNamespace(ports=["Keys 0"], systems=[], opened=[], busy=True, deleted=0)
+    library.RtMidiError, library.MidiIn = RtMidiError, MidiIn
+    library.get_api_name, library.get_compiled_apis = names.get, lambda: list(names)
+    monkeypatch.setitem(sys.modules, "supriya_midi", library)
+    return library
+
+
+def test_a_busy_input_is_a_message_and_leaves_no_client(library: types.SimpleNamespace) -> None:
+    midi = MidiInput(lambda event: None)
+    with pytest.raises(MidiUnavailable, match=r"Keys 0 cannot be opened \(error creating.*Another program"):
+        midi.open("Keys 0")
+    assert library.deleted == len(library.systems) == 2  # of the list of names, and of the try
+
+
+def test_inputs_of_one_name_can_be_chosen_and_seen_to_be_gone(library: types.SimpleNamespace) -> None:
+    library.busy, library.ports = False, ["Keys", "Pads", "Keys", "Keys"]
+    midi = MidiInput(lambda event: None)
+    assert midi.names() == ["Keys", "Pads", "Keys #2", "Keys #3"]
+    midi.open("Keys #2")
+    assert (library.opened, midi.name, midi.look()) == ([2], "Keys #2", "")
+    library.ports = library.ports[:2]
+    assert "Keys #2 was disconnected" in midi.look()
+    midi.close()
+
+
+@pytest.mark.parametrize(("name", "system"), [("", 1), ("jack", 2), ("oss", None)])
+def test_a_variable_names_the_system(
+    library: types.SimpleNamespace, monkeypatch: pytest.MonkeyPatch, name: str, system: int | None
+) -> None:
+    monkeypatch.setenv(VARIABLE, name)
+    if system is None:
+        with pytest.raises(MidiUnavailable, match=r"LEARNED_STRINGS_MIDI is oss.*winmm, jack"):
+            load_backend()
+        return
+    assert load_backend().get_input_names() == ["Keys 0"]
+    assert library.systems == [system]
+
+
+def test_noise_and_a_fault_cost_one_message_and_not_the_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    waiting = [([0xF4], 0.0), ([0x90, 60, 1], 0.0), ([0x90, 61, 1], 0.0)]
+    client = types.SimpleNamespace(get_message=lambda: waiting.pop(0) if waiting else None)
+    client.close_port, client.delete = lambda: None, lambda: None
+    faults: list[threading.ExceptHookArgs] = []
+    monkeypatch.setattr(threading, "excepthook", faults.append)
+    came: list[Sequence[int]] = []
+    arrived = threading.Event()
+
+    def play(message: Sequence[int]) -> None:
+        if message == [0x90, 60, 1]:
+            raise ValueError("no such string")
+        came.append(message)
+        if message == [0x90, 61, 1]:
+            arrived.set()
+
+    port = RtMidiInput(client, "Keys", play)
+    assert arrived.wait(10)
+    port.close()
+    assert came == [[0xF4], [0x90, 61, 1]] and event_of(came[0]) is None
+    assert [str(each.exc_value) for each in faults] == ["no such string"]
+
+
+# To sound
+
+
+class Cable:
+    """A system for MIDI of one input, in this process, whose messages a thread of its own delivers."""
+
+    def get_input_names(self) -> list[str]:
+        return ["Keys"]
+
+    def open_input(self, name: str, *, callback: Callable[[Sequence[int]], None]) -> Cable:
+        self._callback = callback
+        return self
+
+    def close(self) -> None: ...
+
+    def connected(self) -> bool:
+        return True
+
+    def send(self, *message: int) -> None:
+        thread = threading.Thread(target=self._callback, args=(message,))
+        thread.start()
+        thread.join()
+
+
+def test_messages_of_an_input_are_heard(sound: Any, wait: Callable[[Callable[[], bool]], None]) -> None:
+    """In tune, bent, damped by a release or by closing the input, held by the pedal."""
+    strings = {"polarisations": None, "sympathy_s_kg": 0.0, "damping": Damping(release_t60_s=0.15)}
+    patch = read_patch(PATCHES / "steel_string_acoustic.json").model_copy(update=strings)
+    notes, cable = Notes(sound, Sources(), find_shipped, lambda *report: pytest.fail(str(report))), Cable()
+    notes.set_monitor(hears("model"))
+    notes.set_instrument(patch, Ear((0.3,)))
+    wait(lambda: notes.keys.player is not None)
+    released: list[object] = []
+    midi = MidiInput(notes.handle, lambda: cable, lambda event: released.append(event) or notes.handle(event))
+
+    def hear(seconds: float) -> np.ndarray:
+        heard: np.ndarray = sound.mixer.render(round(48_000 * seconds))[:, 0].astype(np.float64)
+        return heard
+
+    def falls_db() -> float:
+        """By how much from one 40 ms to those that begin 60 ms later."""
+        heard = hear(0.15)
+        return level_db(heard, 0.02, 0.06) - level_db(heard, 0.08, 0.12)
+
+    def send_key(*release: int) -> float:
+        cable.send(0x90, 57, 90)
+        hear(0.1)
+        cable.send(*release)
+        return falls_db()
+
+    midi.open("Keys")
+    cable.send(0x90, 57, 8)
+    for high, semitones in ((0x40, 0.0), (0x7F, 2.0), (0x00, -2.0), (0x40, 0.0)):
+        cable.send(0xE0, 0x7F if high == 0x7F else 0, high)
+        wanted_hz = 220 * 2 ** (semitones / 12)
+        assert abs(cents(pitch_hz(hear(1.0), wanted_hz), wanted_hz)) < 1.5
+    cable.send(0x80, 57, 64)
+    assert send_key(0x80, 57, 64) > 15 and send_key(0x90, 57, 0) > 15
+    cable.send(0xB0, 64, 127)
+    assert send_key(0x80, 57, 0) < 6
+    cable.send(0xB0, 64, 0)
+    assert falls_db() > 15
+    assert send_key(0xB0, 120, 0) > 60
+    cable.send(0x90, 57, 90)
+    assert falls_db() < 6
+    midi.close()
+    assert falls_db() > 15 and released == release_all([0])
+    notes.close()
+
+
+# What controllers turn
+
+
+def test_a_taught_controller_goes_through_all_of_its_field() -> None:
+    choices = MidiChoices()
+    learned = [field for field in LEARNABLE if field in OF_CHOICES]
+    for number, field in enumerate(learned, 16):
+        choices = choices.learned(field, number)
+    for number, field in enumerate(learned, 16):
+        for value, expected in zip((0, 127), OF_CHOICES[field].limits, strict=True):
+            turns = turns_of(Controller(number, value), choices, None)
+            assert turns == {field: pytest.approx(expected)}
+            Choices(**turns)  # allowed to the last bit
+    assert OF_CHOICES["speed"].value(64 / 127) == pytest.approx(0.001**0.5, rel=0.05)
+
+
+@pytest.mark.parametrize("field", [field for field in LEARNABLE if field in OF_PATCHES])
+def test_a_controller_turns_every_parameter_of_the_patch(field: str) -> None:
+    patch = GUITAR.model_copy(update={"pickup": Pickup(points=(0.3, 0.7))})
+    patch = patch.with_value("pluck.softest_mm", 0.001)  # which may not be above the hardest
+    turns = turns_of(Controller(16, 64), MidiChoices().learned(field, 16), patch)
+    assert turns["patch"].value(field) == pytest.approx(OF_PATCHES[field].value(64 / 127))
+    assert turns_of(Controller(16, 64), MidiChoices().learned(field, 16), None) == {}
+
+
+def test_a_controller_turns_a_macro_and_leaves_what_is_impossible() -> None:
+    soft = GUITAR.with_value("pluck.hardest_mm", 0.5)
+    for field, patch, expected in (
+        ("macros.0", GUITAR, GUITAR.turned(0, 1.0)),
+        ("macros.7", GUITAR, GUITAR),  # it has fewer
+        ("pluck.softest_mm", soft, soft),  # it may not be above the hardest
+    ):
+        assert turns_of(Controller(16, 127), MidiChoices().learned(field, 16), patch)["patch"] == expected
+
+
+def test_learn_and_forget() -> None:
+    choices = MidiChoices().learned("width", 74).learned("listen", 1)
+    assert choices.controllers == {"width": 74, "listen": 1}
+    assert choices.learned("listen", 74).controllers == {"listen": 74}  # one controller turns one thing
+    assert choices.forgotten("width").controllers == {"listen": 1}
+    for field, number in (("colour", 1), ("width", 128)):
+        with pytest.raises(ValidationError):
+            choices.learned(field, number)
