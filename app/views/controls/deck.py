@@ -15,6 +15,7 @@ class Deck(QTabWidget):
         super().__init__(parent)
         self.setAccessibleName(name)
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # its tab bar has it; both would hold the Tab key
+        self.tabBar().setFocusPolicy(Qt.FocusPolicy.TabFocus)  # the line above took it from the bar too
         self.tabBar().setAccessibleName(name)
         self.setDocumentMode(True)
         self.setUsesScrollButtons(True)
