@@ -38,7 +38,7 @@ def opened(
 ) -> Iterator[Open]:
     """Opens windows with the presets `first` and `second` and these shipped ones; none leaves a thread.
 
-    `settings`: fields of `Settings`, but for `choices`, which are the other words.
+    `settings`: fields of `Settings`; the other words are `choices`.
     """
     monkeypatch.setenv("LEARNED_STRINGS_RECORDINGS", str(tmp_path / "unsaved recordings"))
     monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
@@ -102,31 +102,15 @@ def themed(qapp: QApplication) -> Iterator[Callable[..., None]]:
 
 
 @pytest.fixture
-def played(opened: Open) -> Window:
-    """A window in which keys play a guitar."""
-    made = opened("studio_any_string", instrument=read_patch(PATCHES / "steel_string_acoustic.json"))
-    made.wait_for_keys()
-    made.window.setFocus()
-    return made
-
-
-@pytest.fixture
-def speakers(numb_output: Any) -> Callable[[Any], Sound]:
-    """A sound with a device that takes frames at the pace of time and makes none."""
-    return lambda on_problem: Sound(on_problem, look_up=lambda *_: SPEAKERS, open_output=numb_output)
-
-
-@pytest.fixture
-def themed(qapp: QApplication) -> Iterator[Callable[..., None]]:
-    """Puts on a theme, by default the dark one, as users see it; afterwards the look is as before."""
-    sheet, font, palette = qapp.styleSheet(), qapp.font(), qapp.palette()
-
-    def put_on(name: Any = "dark", percent: int = 100) -> None:
-        theme.apply_theme(qapp, name, percent)
-
-    put_on()
-    yield put_on
-    put_on()
-    qapp.setStyleSheet(sheet)
-    qapp.setFont(font)
-    qapp.setPalette(palette)
+def played(
+    qtbot: QtBot, preset_folder: Path, controller: Controller, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> Controller:
+    """A window with a patch, and the preset that plays it."""
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(tmp_path / "own"))
+    shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder)
+    controller.library.refresh()
+    controller.patches.choose("steel_string_acoustic")
+    qtbot.waitUntil(lambda: controller.performance.notes.keys.player is not None)
+    controller.session.update(face="play")
+    controller.window.setFocus()
+    return controller

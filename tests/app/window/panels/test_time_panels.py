@@ -265,7 +265,7 @@ def test_a_slot_with_the_difference_is_drawn_with_its_gain(make: Make, take: Tak
     for heard, kind in (("b", "difference"), ("a", "model")):
         choose(waveform, heard=heard)
         top = max(items(waveform.plot, pg.PlotDataItem), key=lambda item: item.zValue())
-        assert (top.getData()[1] == drawn(waveform, kind)).all(), "what is heard is on top"
+        assert (top.getData()[1] == drawn(waveform, kind)).all(), "the heard curve is on top"
     choose(waveform, a="truth", b="truth", solo=2, stereo=True)
     assert curves(waveform.plot).keys() == {"truth"}
     hear(take, waveform.session.choices.ear)
