@@ -15,14 +15,17 @@ from app.audio.devices import AudioDevice
 from app.audio.sound import Sound
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
+from app.playing.midi_port import MidiInput
 from app.session.choices import Choices
 from app.views import theme
+from app.window import midi_control
 from app.window.controller import Controller
 from app.window.main_window import MainWindow
 from app.window.settings import InstrumentChoice, Settings
 from engine.presets.finding import SHIPPED
 from tests.app.conftest import make_sound
 from tests.app.window.driver import Window
+from tests.app.window.midi import FakeBackend
 
 Open = Callable[..., Window]
 SPEAKERS = AudioDevice("Speakers", "Test API", 48_000)
@@ -80,9 +83,24 @@ def guitar(opened: Open) -> Window:
 
 
 @pytest.fixture
-def speakers(numb_output: Any) -> Callable[[Any], Sound]:
+def devices() -> list[AudioDevice]:
+    """The sound devices; the last is there."""
+    return [SPEAKERS]
+
+
+@pytest.fixture
+def speakers(devices: list[AudioDevice], numb_output: Any) -> Callable[[Any], Sound]:
     """A sound with a device that takes frames at the pace of time and makes none."""
-    return lambda on_problem: Sound(on_problem, look_up=lambda *_: SPEAKERS, open_output=numb_output)
+    return lambda on_problem: Sound(on_problem, look_up=lambda *_: devices[-1], open_output=numb_output)
+
+
+@pytest.fixture
+def backend(monkeypatch: pytest.MonkeyPatch) -> FakeBackend:
+    """The MIDI system of windows that are opened afterwards."""
+    made = FakeBackend()
+    made_with = lambda receive, load, release: MidiInput(receive, lambda: made, release)  # noqa: E731
+    monkeypatch.setattr(midi_control, "MidiInput", made_with)
+    return made
 
 
 @pytest.fixture
