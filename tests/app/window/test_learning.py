@@ -30,11 +30,14 @@ def note(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+def open_in(played: Controller) -> list[LearnDialog]:
+    return [each for each in played.window.findChildren(LearnDialog) if each.isVisible()]
+
+
 def dialog_of(qtbot: QtBot, played: Controller, file: Path) -> LearnDialog:
     """The dialog when it has examined the file."""
     played.take_file(file)
-    dialog = played._learning
-    assert dialog is not None
+    (dialog,) = open_in(played)
     qtbot.waitUntil(lambda: dialog.string.isChecked() or dialog.body.isChecked(), timeout=LEARNED_MS)
     return dialog
 
@@ -47,23 +50,21 @@ def test_a_note_is_learned_compared_kept_and_played(qtbot: QtBot, played: Contro
     dialog.kind.setCurrentIndex(dialog.kind.findData("bass"))
     dialog.start.click()
     assert not dialog.start.isEnabled()
-    qtbot.waitUntil(lambda: dialog._learned is not None, timeout=LEARNED_MS)
+    qtbot.waitUntil(lambda: "Nothing is written yet" in dialog.state.text(), timeout=LEARNED_MS)
     assert "error-to-signal ratio 0.0" in dialog.report.toPlainText()
     assert dialog.state.text() == f"Nothing is written yet. {ON_KEYS}"
     assert not own_patches().exists()
     for heard, other in (("learned", "recording"), ("recording", "learned")):
         dialog.heard[heard].click()
-        assert dialog._pair is not None
-        assert dialog._pair._heard == heard
         assert dialog.heard[heard].isChecked() and not dialog.heard[other].isChecked()
     for key in (Qt.Key.Key_Escape, Qt.Key.Key_Return):  # no key discards what took minutes
         for leave in (dialog.reject, lambda: played.take_file(note)):
             with answered(key) as asked:
                 leave()
             assert asked == ["Discard the instrument?"]
-            assert played._learning is dialog
+            assert open_in(played) == [dialog]
     dialog.start.click()
-    qtbot.waitUntil(lambda: played._learning is None, timeout=LEARNED_MS)
+    qtbot.waitUntil(lambda: not open_in(played), timeout=LEARNED_MS)
     patch = played.session.choices.patch
     assert patch is not None
     assert (patch.name, patch.category, patch.preset) == ("Low string", "bass", "low_string")
@@ -91,7 +92,7 @@ def test_what_is_no_note_is_a_body_or_learned_all_the_same(qtbot: QtBot, played:
     assert "although" in dialog.state.text()
     dialog.body.setChecked(True)
     dialog.start.click()
-    assert played._learning is None
+    assert not open_in(played)
     assert (own_bodies() / "room.wav").exists()
     assert "now has the body room" in played.window.notices.text
 
@@ -102,7 +103,7 @@ def test_where_no_string_is_found_keeping_is_no_default(qtbot: QtBot, played: Co
     dialog = dialog_of(qtbot, played, tmp_path / "drum.wav")
     dialog.string.setChecked(True)
     dialog.start.click()
-    qtbot.waitUntil(lambda: dialog._learned is not None, timeout=LEARNED_MS)
+    qtbot.waitUntil(lambda: "Nothing is written yet" in dialog.state.text(), timeout=LEARNED_MS)
     assert "no string found: " in dialog.report.toPlainText()
     assert dialog.state.text() == f"Nothing is written yet. {NOT_FOUND}"
     assert dialog.start.text() == "Keep all the same" and not dialog.start.isDefault()
@@ -142,5 +143,5 @@ def test_a_name_that_is_taken_is_refused_and_the_learning_can_be_cancelled(
     qtbot.waitUntil(lambda: "Cancelled" in dialog.state.text(), timeout=LEARNED_MS)
     assert dialog.start.isEnabled()
     dialog.reject()
-    assert played._learning is None
+    assert not open_in(played)
     assert not own_patches().exists()
