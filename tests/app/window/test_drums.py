@@ -231,9 +231,15 @@ def test_a_click_on_the_drum_sounds_and_its_picture_is_of_the_blow_that_sounds(
     toms.wait(lambda: max(levels, default=-99) > -60)
     toms.wait(lambda: view.frame is not None)
     first: Any = view.frame
-    toms.wait(lambda: (first.pictures_m["model"] != view.frame.pictures_m["model"]).any())  # type: ignore[union-attr]
-    model, truth = (view.frame.pictures_m[source] for source in ("model", "truth"))  # type: ignore[union-attr]
-    assert 0 < np.abs(model - truth).max() < 1e-4 * np.abs(truth).max()
+
+    def moved() -> bool:
+        frame = view.frame
+        return frame is not None and bool((frame.pictures_m["model"] != first.pictures_m["model"]).any())
+
+    toms.wait(moved)
+    second: Any = view.frame
+    model, truth = second.pictures_m["model"], second.pictures_m["truth"]
+    assert np.abs(truth).max() > 0 and np.abs(model - truth).max() < 1e-4 * np.abs(truth).max()
     toms.wait(lambda: "Error of this blow" in toms.window.error_label.text())
     take = whole(toms)
     assert take.request.strike.place == note.event.place

@@ -14,7 +14,6 @@ from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QDialog, QLineEdit
 from pytestqt.qtbot import QtBot
 
 from app.shared.typed_number import SIGNS, typed_number
-from app.shared.vocabulary import Face
 from app.views.controls.knob import Knob
 from app.views.controls.notice_list import NoticeList
 from app.views.controls.number_box import CountBox, NumberBox
@@ -25,11 +24,7 @@ from app.views.dialogs.help_dialog import HelpDialog
 from app.views.dialogs.learn_dialog import LearnDialog
 from app.views.dialogs.midi_dialog import MidiDialog
 from app.window.controller import Controller
-
-
-@pytest.fixture
-def face() -> Face:
-    return "lab"
+from tests.app.window.driver import Window
 
 
 @pytest.fixture(params=["de_DE", "fr_FR", "C"])
@@ -38,13 +33,6 @@ def locale(request: pytest.FixtureRequest) -> Iterator[str]:
     QLocale.setDefault(QLocale(request.param))
     yield request.param
     QLocale.setDefault(before)
-
-
-@pytest.fixture
-def patched(qtbot: QtBot, controller: Controller) -> Controller:
-    controller.patches.choose("classical_guitar")
-    qtbot.waitUntil(lambda: controller.session.choices.string is not None)
-    return controller
 
 
 def type_in(widget: QWidget, text: str) -> None:
@@ -64,8 +52,10 @@ def typed_on(qtbot: QtBot, knob: Knob, text: str) -> None:
     editor.hide()
 
 
-def test_every_knob(qtbot: QtBot, locale: str, patched: Controller) -> None:
-    knobs = [knob for knob in patched.window.findChildren(Knob) if knob.isEnabled() and not knob.isHidden()]
+def test_every_knob(qtbot: QtBot, locale: str, lab: Window) -> None:
+    lab.controller.patches.choose("classical_guitar")
+    lab.wait(lambda: lab.choices.string is not None)
+    knobs = [knob for knob in lab.window.findChildren(Knob) if knob.isEnabled() and not knob.isHidden()]
     assert len(knobs) > 30
     for knob in knobs:
         asked: list[float] = []
@@ -113,7 +103,8 @@ def texts_of(box: NumberBox | CountBox) -> Iterator[tuple[str, bool]]:
         yield typed, False
 
 
-def test_every_field_of_every_dialog(qtbot: QtBot, locale: str, controller: Controller, tmp_path: Path) -> None:
+def test_every_field_of_every_dialog(locale: str, lab: Window, tmp_path: Path) -> None:
+    controller = lab.controller
     assert set(kinds_of(QDialog)) == set(OPENED)
     soundfile.write(tmp_path / "sound.wav", np.zeros(24_000), 48_000)
     for kind, show in OPENED.items():
