@@ -14,7 +14,9 @@ class Deck(QTabWidget):
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAccessibleName(name)
-        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # its tab bar has it; both would hold the Tab key
+        # its tab bar has the keyboard, by itself: both would hold the Tab key
+        self.setFocusProxy(None)  # type: ignore[arg-type]
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self.tabBar().setAccessibleName(name)
         self.setDocumentMode(True)
         self.setUsesScrollButtons(True)

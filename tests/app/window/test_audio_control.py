@@ -8,29 +8,38 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from PySide6.QtWidgets import QLabel
 from pytestqt.qtbot import QtBot
 
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.audio.devices import AudioDevice
 from app.audio.problems import AudioProblem, ProblemKind, internal, stalled
 from app.audio.sound import SoundStatus
+from app.views.dialogs.audio_dialog import AudioDialog
 from app.window import audio_control
 from app.window.audio_control import FREQUENT_GAPS, AudioControl
 from app.window.main_window import MainWindow
 from engine.voices import Gap
+from tests.app.window.driver import press
 
 SPEAKERS = AudioDevice("Speakers", "ALSA", 48_000)
 GAPS = tuple(Gap(0.5 * number, "device", 2.0) for number in range(4))
 WISH = (DeviceChoice(name="Loud", host_api="JACK"), SoundChoice(rate_hz=96_000, buffer=256))
 
 
-class FakeSound:
-    """Notes what it is asked for; the test says what became of it."""
+class Desk:
+    """The control, its dialog, and an output that notes what it is asked for."""
 
-    def __init__(self) -> None:
+    def __init__(self, window: MainWindow) -> None:
         self.opened: list[tuple[Any, ...]] = []
         self.tones: list[str] = []
         self.present = SoundStatus(device=SPEAKERS, gaps=GAPS)
+        self.forgotten = 0
+        self.notices = window.notices
+        self.control = AudioControl(window, self, None, SoundChoice())  # type: ignore[arg-type]
+        self.control.open()
+        self.control.show_dialog()
+        (self.dialog,) = window.findChildren(AudioDialog)
 
     def open(self, *arguments: Any) -> None:
         self.opened.append(arguments)
@@ -41,130 +50,96 @@ class FakeSound:
     def status(self) -> SoundStatus:
         return self.present
 
+    def forget_latencies(self) -> None:
+        self.forgotten += 1
+
+    def show(self, latencies_s: tuple[float, ...] = (), **status: Any) -> None:
+        """Tell the control the state of the output, as the window does ten times a second."""
+        notes = SimpleNamespace(latencies_s=latencies_s, forget_latencies=self.forget_latencies)
+        self.control.show(SoundStatus(**{"device": SPEAKERS, **status}), notes, None)  # type: ignore[arg-type]
+
+    @property
+    def saved(self) -> tuple[DeviceChoice | None, SoundChoice]:
+        return self.control.device, self.control.sound
+
+    def says(self, words: str) -> bool:
+        return any(words in label.text() for label in self.dialog.findChildren(QLabel))
+
 
 @pytest.fixture
-def output() -> FakeSound:
-    return FakeSound()
-
-
-@pytest.fixture
-def control(qtbot: QtBot, output: FakeSound, monkeypatch: pytest.MonkeyPatch) -> Iterator[AudioControl]:
+def desk(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
     monkeypatch.setattr(audio_control, "output_devices", lambda rescan=False: [SPEAKERS])
     window = MainWindow()
     qtbot.addWidget(window)
-    made = AudioControl(window, output, None, SoundChoice())  # type: ignore[arg-type]
-    made.open()
+    made = Desk(window)
     yield made
-    if made._dialog is not None:
-        made._dialog.close()
+    made.dialog.close()
 
 
-def show(control: AudioControl, status: SoundStatus, latencies_s: tuple[float, ...] = ()) -> None:
-    control.show(status, SimpleNamespace(latencies_s=latencies_s, forget_latencies=lambda: None), None)  # type: ignore[arg-type]
+def test_a_choice_is_opened_and_saved_once_it_plays(desk: Desk) -> None:
+    assert desk.opened == [(None, 0.012, 0, 0, False)]
+    desk.dialog.choice_made.emit(*WISH)
+    assert desk.opened[-1] == (AudioDevice("Loud", "JACK"), 0.012, 96_000, 256, False)
+    desk.show(changes_done=1)
+    assert desk.saved == (None, SoundChoice())
+    desk.show(device=AudioDevice("Loud", "JACK", 96_000), changes_done=2)
+    assert desk.saved == WISH
+    press(desk.dialog, "Rescan")
+    assert desk.opened[-1] == (*desk.opened[-2][:-1], True)
+    press(desk.dialog, "Left")
+    assert desk.tones == ["left"]
 
 
-def test_the_first_opening(control: AudioControl, output: FakeSound) -> None:
-    assert output.opened == [(None, 0.012, 0, 0, False)]
+def test_a_refused_choice_is_reported_until_sound_is_back_and_not_saved(desk: Desk) -> None:
+    desk.dialog.choice_made.emit(*WISH)
+    desk.present = SoundStatus(device=SPEAKERS, changes_done=2, problem="It refuses 96000 Hz.")
+    desk.control.report(AudioProblem(ProblemKind.RATE_REFUSED, "It refuses 96000 Hz.", "Choose another.", "code"))
+    desk.show(changes_done=2, problem="It refuses 96000 Hz.")
+    assert "Playback continues on “Speakers”" in desk.notices.text and desk.notices.notices[-1].details == "code"
+    assert desk.saved == (None, SoundChoice()) and desk.says("It refuses 96000 Hz.")
+    desk.show(changes_done=3)
+    assert desk.notices.text == ""
+    desk.control.report(stalled("Speakers"))
+    assert "keeps trying" in desk.notices.text and "Playback continues on" not in desk.notices.text
+    desk.show()
+    assert desk.notices.text == ""
+    desk.control.report(internal("Traceback"))
+    desk.show()
+    assert "internal error" in desk.notices.text and "Playback continues." in desk.notices.text, "to be reported"
+    assert desk.notices.notices[-1].details == "Traceback"
 
 
-def test_a_choice_is_saved_once_it_plays(control: AudioControl, output: FakeSound) -> None:
-    control.show_dialog()
-    assert control._dialog is not None
-    control._dialog.choice_made.emit(*WISH)
-    assert output.opened[-1] == (AudioDevice("Loud", "JACK"), 0.012, 96_000, 256, False)
-    show(control, SoundStatus(device=SPEAKERS, changes_done=1))
-    assert (control.device, control.sound) == (None, SoundChoice())
-    show(control, SoundStatus(device=AudioDevice("Loud", "JACK", 96_000), changes_done=2))
-    assert (control.device, control.sound) == WISH
-
-
-def test_a_refused_choice_is_reported_and_not_saved(control: AudioControl, output: FakeSound) -> None:
-    control.show_dialog()
-    assert control._dialog is not None
-    control._dialog.choice_made.emit(*WISH)
-    output.present = SoundStatus(device=SPEAKERS, changes_done=2, problem="It refuses 96000 Hz.")
-    control.report(AudioProblem(ProblemKind.RATE_REFUSED, "It refuses 96000 Hz.", "Choose another.", "code"))
-    show(control, output.present)
-    notices = control._window.notices
-    assert "Playback continues on “Speakers”" in notices.text
-    assert notices.notices[-1].details == "code"
-    assert (control.device, control.sound) == (None, SoundChoice())
-    assert "refuses" in control._dialog._problem_label.text()
-    control._dialog.rescan_asked.emit()
-    assert output.opened[-1][:4] == output.opened[-2][:4]
-    show(control, SoundStatus(device=SPEAKERS, changes_done=3))
-    assert notices.text == ""
-
-
-def test_an_internal_fault_stays_to_be_reported(control: AudioControl, output: FakeSound) -> None:
-    control.report(internal("Traceback"))
-    show(control, SoundStatus(device=SPEAKERS))
-    notices = control._window.notices
-    assert "internal error" in notices.text and "Playback continues." in notices.text
-    assert notices.notices[-1].details == "Traceback"
-
-
-def test_a_stall_is_reported_without_a_word_on_what_plays(control: AudioControl, output: FakeSound) -> None:
-    control.report(stalled("Speakers"))
-    notices = control._window.notices
-    assert "keeps trying" in notices.text
-    assert "Playback continues on" not in notices.text
-    show(control, SoundStatus(device=SPEAKERS))
-    assert notices.text == ""
-
-
-def test_looking_again_and_the_tone(control: AudioControl, output: FakeSound) -> None:
-    control.show_dialog()
-    assert control._dialog is not None
-    control._dialog.rescan_asked.emit()
-    assert output.opened[-1][-1] is True
-    control._dialog.tone_asked.emit("left")
-    assert output.tones == ["left"]
-
-
-def test_gaps_count_from_the_reset(control: AudioControl, output: FakeSound) -> None:
-    control.show_dialog()
-    assert control._dialog is not None
-    counter = control._dialog._gaps
-    assert counter.text() == "4, the last at 1.5 s: device"
-    control._dialog.gaps_reset.emit()
-    show(control, SoundStatus(device=SPEAKERS, gaps=GAPS))
-    assert counter.text() == "0"
+def test_gaps_count_from_the_reset_and_frequent_ones_are_reported_once_for_a_buffer(desk: Desk) -> None:
+    assert desk.says("4, the last at 1.5 s: device")
+    press(desk.dialog, "Reset") if desk.dialog.isHidden() else desk.dialog.gaps_reset.emit()
     late = Gap(7.25, "rendering", 0.0)
-    show(control, SoundStatus(device=SPEAKERS, gaps=(*GAPS, late)))
-    assert counter.text() == "1, the last at 7.2 s: rendering"
-    show(control, SoundStatus(device=SPEAKERS, gaps=(GAPS[-1], late)))  # only so many are remembered
-    assert counter.text() == "1, the last at 7.2 s: rendering"
-    show(control, SoundStatus(device=SPEAKERS, gaps=(late,)))
-    assert counter.text() == "1, the last at 7.2 s: rendering"
-
-
-def test_frequent_gaps_are_reported_once_for_a_buffer(control: AudioControl) -> None:
+    for gaps, words in (
+        (GAPS, "0"),
+        ((*GAPS, late), "1, the last at 7.2 s: rendering"),
+        ((GAPS[-1], late), "1, the last at 7.2 s: rendering"),  # only so many are remembered
+        ((late,), "1, the last at 7.2 s: rendering"),
+    ):
+        desk.show(gaps=gaps)
+        assert words in [label.text() for label in desk.dialog.findChildren(QLabel)]
+    desk.dialog.choice_made.emit(None, SoundChoice())
+    desk.notices.withdraw(FREQUENT_GAPS)
     close = tuple(Gap(time_s, "the sound device was late", 5.0) for time_s in (20.0, 21.0, 22.0))
     apart = tuple(replace(gap, time_s=20 * gap.time_s) for gap in close)
     for gaps, reported in ((close[:2], False), (apart, False), (close, True)):
-        show(control, SoundStatus(device=SPEAKERS, gaps=gaps))
-        assert (control._window.notices.text == FREQUENT_GAPS) == reported
-    control._window.notices.withdraw(FREQUENT_GAPS)
-    show(control, SoundStatus(device=SPEAKERS, gaps=close))
-    assert control._window.notices.isHidden()
-    control._choose(None, SoundChoice(buffer="high"))
-    show(control, SoundStatus(device=SPEAKERS, gaps=close))
-    assert not control._window.notices.isHidden()
+        desk.show(gaps=gaps)
+        assert (desk.notices.text == FREQUENT_GAPS) == reported
+    for buffer, reported in ((None, False), ("high", True)):
+        desk.notices.withdraw(FREQUENT_GAPS)
+        if buffer:
+            desk.dialog.choice_made.emit(None, SoundChoice(buffer=buffer))
+        desk.show(gaps=close)
+        assert desk.notices.isHidden() is not reported
 
 
-def test_the_latency_that_was_measured_is_reported(control: AudioControl) -> None:
-    control.show_dialog()
-    assert control._dialog is not None
-    facts = control._dialog._state_label
-    assert "key to device" not in facts.text()
-    show(control, SoundStatus(device=SPEAKERS, latency_s=0.012), latencies_s=(0.5, 0.004, 0.0031))
-    assert "48 kHz, buffer 12 ms, key to device 4.0 ms (measured)" in facts.text()
-
-
-def test_latencies_of_another_buffer_are_forgotten(control: AudioControl) -> None:
-    forgotten: list[float] = []
-    notes = SimpleNamespace(latencies_s=(), forget_latencies=lambda: forgotten.append(1))
-    for buffer_s in (0.012, 0.012, 0.05):
-        control.show(SoundStatus(device=SPEAKERS, latency_s=buffer_s), notes, None)  # type: ignore[arg-type]
-    assert len(forgotten) == 1
+def test_latencies_are_shown_and_those_of_another_buffer_forgotten(desk: Desk) -> None:
+    assert not desk.says("key to device")
+    desk.show(latency_s=0.012, latencies_s=(0.5, 0.004, 0.0031))
+    assert desk.says("48 kHz, buffer 12 ms, key to device 4.0 ms (measured)")
+    for buffer_s in (0.012, 0.05):
+        desk.show(latency_s=buffer_s)
+    assert desk.forgotten == 1

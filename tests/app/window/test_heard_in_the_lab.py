@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import soundfile
 from numpy.typing import NDArray
+from PySide6.QtWidgets import QPushButton
 from pytestqt.qtbot import QtBot
 
 from app.audio.devices import AudioDevice
@@ -26,13 +27,16 @@ from app.playing.key_note import KeyNote
 from app.playing.note import Note
 from app.session.choices import Choices
 from app.shared.vocabulary import Source
+from app.views.dialogs.abx_dialog import AbxDialog
 from app.window.controller import Controller
+from app.window.instruments import LOOK_MS
 from app.window.main_window import MainWindow
 from app.window.settings import Settings
 from engine.kernels.constants import AHEAD, QUANTUM
 from engine.presets import SHIPPED, load_preset, of_string
 from engine.values.ear import PICKUPS
 from engine.voices import Mixer
+from tests.app.window.driver import find, press
 
 RATE_HZ = 48_000
 SECONDS = 0.5  # of a pluck; the last part of it fades out
@@ -165,15 +169,13 @@ def assert_same(found: Samples, expected: Samples, words: str, gain_counts: bool
 def blind(qtbot: QtBot, lab: Controller) -> dict[str, Samples]:
     """The sound of A and B in the listening test."""
     lab.listening_test()
-    dialog = lab._abx
-    assert dialog is not None
-    dialog._watch.setInterval(5)
-    qtbot.waitUntil(lambda: dialog._stimuli is not None)
+    dialog = find(lab.window, AbxDialog)
+    qtbot.waitUntil(find(dialog, QPushButton, "Start the test").isEnabled)
     found = {}
-    for sound, slot in (("A", "a"), ("B", "b")):
-        dialog._audition(sound, again=True)  # type: ignore[arg-type]
+    for slot, name in (("a", "▶  Hear A"), ("b", "Hear B")):
+        press(dialog, name)
         found[slot] = take(lab, 0.3)[AHEAD:]
-        dialog._hush()
+        press(dialog, "Start the test")  # which ends what sounds
         take(lab, 0.05)
     dialog.abandon()
     return found
@@ -234,8 +236,8 @@ def test_a_key_that_is_reported_after_a_preset_was_chosen_is_not_what_is_plucked
     late = lab.instruments.latest
     lab.session.update(preset=KINDS["koopman_var"], amplitude_mm=2.0, position=0.3)
     take(lab, 0.1)
-    lab.instruments._tell_session()
-    qtbot.waitUntil(lambda: isinstance(late, KeyNote) and late.known and not lab.instruments._look_timer.isActive())
+    qtbot.waitUntil(lambda: isinstance(late, KeyNote) and late.known)
+    qtbot.wait(3 * LOOK_MS)
     assert lab.session.choices.string is None and lab.session.choices.position == 0.3
     choose(qtbot, lab, KINDS["koopman_var"])
     for slot, source in SOURCES.items():
@@ -321,12 +323,15 @@ def test_a_key_is_exported_with_its_instrument_also_where_a_slot_holds_another_p
     lab.exports.dialog.reject()
 
 
-def test_a_pluck_outside_the_training_is_red_only_where_its_error_is_large(qtbot: QtBot, lab: Controller) -> None:
-    label = lab.window.outside_label
+def test_a_pluck_outside_the_training_is_red_only_where_its_error_is_large(
+    qtbot: QtBot, lab: Controller, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    label, view, warned = lab.window.outside_label, lab.string.view, [("", False)]
+    monkeypatch.setattr(view, "set_warning", lambda text, grave=True: warned.append((text, grave)))
     play_instrument(qtbot, lab, PLAYED["brass_strung_harp"])
     qtbot.waitUntil(lambda: label.text().startswith("accurate, although decay time near 3 kHz"))
-    assert label.objectName() == "faint" and not lab.string.view._grave
+    assert label.objectName() == "faint" and not warned[-1][1]
     lab.session.update(preset=KINDS["lru"], shape="rounded", position=0.1)
-    assert not lab.string.view._grave, "not measured yet"
-    qtbot.waitUntil(lambda: lab.string.view._grave)
-    assert lab.string.view._warning.startswith("inaccurate: ")
+    assert not warned[-1][1], "not measured yet"
+    qtbot.waitUntil(lambda: warned[-1][1])
+    assert warned[-1][0].startswith("inaccurate: ")

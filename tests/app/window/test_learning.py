@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 import soundfile
-from PySide6.QtCore import Qt
-from pytestqt.qtbot import QtBot
 
 from app.instrument.bodies import own_bodies
 from app.patches.library import own_patches
 from app.views.dialogs.learn_dialog import NOT_FOUND, ON_KEYS, LearnDialog
-from app.window.controller import Controller
 from engine.presets import find_preset, read_info
 from tests.app.questions import answered
+from tests.app.window.driver import KEY, Window
 from tests.training.recording.sounds import membrane
 from tests.training.recording.synthetic import synthetic_note
 
-LEARNED_MS = 90_000
+UNWRITTEN = "Nothing is written yet. "
+Sound = tuple[np.ndarray, int]
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def note(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("note") / "Low string.wav"
     made = synthetic_note(2, seconds=1.0)
@@ -30,117 +30,118 @@ def note(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def dialog_of(qtbot: QtBot, played: Controller, file: Path) -> LearnDialog:
+def dialogs(w: Window) -> list[LearnDialog]:
+    return [each for each in w.window.findChildren(LearnDialog) if each.isVisible()]
+
+
+def dialog_of(w: Window, file: Path) -> LearnDialog:
     """The dialog when it has examined the file."""
-    played.take_file(file)
-    dialog = played._learning
-    assert dialog is not None
-    qtbot.waitUntil(lambda: dialog.string.isChecked() or dialog.body.isChecked(), timeout=LEARNED_MS)
+    w.drop(file)
+    (dialog,) = dialogs(w)
+    w.wait(lambda: dialog.string.isChecked() or dialog.body.isChecked())
     return dialog
 
 
-def test_a_note_is_learned_compared_kept_and_played(qtbot: QtBot, played: Controller, note: Path) -> None:
-    dialog = dialog_of(qtbot, played, note)
-    assert dialog.string.isChecked()
-    assert dialog.name.text() == "Low string"
+def test_a_note_is_learned_compared_kept_and_played(guitar: Window, note: Path) -> None:
+    dialog = dialog_of(guitar, note)
+    assert dialog.string.isChecked() and dialog.name.text() == "Low string"
     assert dialog.length_m.text() == dialog.gauge_mm.text() == "assumed"
     dialog.kind.setCurrentIndex(dialog.kind.findData("bass"))
     dialog.start.click()
     assert not dialog.start.isEnabled()
-    qtbot.waitUntil(lambda: dialog._learned is not None, timeout=LEARNED_MS)
-    assert "error-to-signal ratio 0.0" in dialog.report.toPlainText()
-    assert dialog.state.text() == f"Nothing is written yet. {ON_KEYS}"
-    assert not own_patches().exists()
+    guitar.wait(lambda: dialog.state.text() == UNWRITTEN + ON_KEYS)
+    assert "error-to-signal ratio 0.0" in dialog.report.toPlainText() and not own_patches().exists()
     for heard, other in (("learned", "recording"), ("recording", "learned")):
         dialog.heard[heard].click()
-        assert dialog._pair is not None
-        assert dialog._pair._heard == heard
         assert dialog.heard[heard].isChecked() and not dialog.heard[other].isChecked()
-    for key in (Qt.Key.Key_Escape, Qt.Key.Key_Return):  # no key discards what took minutes
-        for leave in (dialog.reject, lambda: played.take_file(note)):
+        guitar.wait(lambda: guitar.controller.sound.mixer.active > 0)
+    for key in (KEY.Key_Escape, KEY.Key_Return):  # no key discards what took minutes
+        for leave in (dialog.reject, lambda: guitar.controller.take_file(note)):
             with answered(key) as asked:
                 leave()
-            assert asked == ["Discard the instrument?"]
-            assert played._learning is dialog
+            assert asked == ["Discard the instrument?"] and dialogs(guitar) == [dialog]
     dialog.start.click()
-    qtbot.waitUntil(lambda: played._learning is None, timeout=LEARNED_MS)
-    patch = played.session.choices.patch
-    assert patch is not None
+    guitar.wait(lambda: not dialogs(guitar))
+    patch = guitar.patch
     assert (patch.name, patch.category, patch.preset) == ("Low string", "bass", "low_string")
     assert (own_bodies() / "low_string.wav").exists()
-    notice = played.window.notices.notices[-1]
-    assert notice.message.startswith("low_string: learned.")
-    assert not notice.error
-    recorded = read_info(find_preset("low_string", [entry.path for entry in played.library.entries])).recorded
-    assert recorded is not None
-    assert recorded.errors["esr"] < 0.1
-    qtbot.waitUntil(lambda: played.patches.entry is not None)
-    notes = played.performance.notes
-    qtbot.waitUntil(lambda: notes.keys.player is not None, timeout=LEARNED_MS)
-    played.window.instrument.pressed.emit(43, 100, None)
-    qtbot.waitUntil(lambda: notes.keys.sounding().get(43, 0.0) > 0.3, timeout=LEARNED_MS)
+    notice = guitar.window.notices.notices[-1]
+    assert notice.message.startswith("low_string: learned.") and not notice.error
+    recorded = read_info(
+        find_preset("low_string", [each.path for each in guitar.controller.library.entries])
+    ).recorded
+    assert recorded is not None and recorded.errors["esr"] < 0.1
+    guitar.wait_for_keys()
+    guitar.play(43, hold=True)
+    guitar.wait(lambda: guitar.keys.sounding().get(43, 0.0) > 0.3)
 
 
-def test_what_is_no_note_is_a_body_or_learned_all_the_same(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
-    noise = np.random.default_rng(1).uniform(-0.5, 0.5, 24_000) * np.geomspace(1, 1e-3, 24_000)
-    soundfile.write(tmp_path / "room.wav", noise, 48_000)
-    dialog = dialog_of(qtbot, played, tmp_path / "room.wav")
-    assert dialog.body.isChecked()
-    assert "•" in dialog.state.text()
-    dialog.string.setChecked(True)
-    assert "although" in dialog.state.text()
-    dialog.body.setChecked(True)
+def noise() -> Sound:
+    return np.random.default_rng(1).uniform(-0.5, 0.5, 24_000) * np.geomspace(1, 1e-3, 24_000), 48_000
+
+
+def silence() -> Sound:
+    return np.zeros(48_000), 48_000
+
+
+def hot() -> Sound:
+    made = synthetic_note(2, seconds=1.0)
+    limit = np.sort(np.abs(made.samples))[-8]
+    return np.clip(made.samples, -limit, limit), made.rate_hz
+
+
+@pytest.mark.parametrize(
+    ("sound", "is_string", "words", "notice"),
+    [
+        (noise, False, "•", "now has the body sound"),
+        (silence, None, "it is silent; check the cable", "no impulse response"),
+        (hot, True, "• it is clipped", ""),
+    ],
+)
+def test_the_dialog_says_what_a_sound_is_and_that_is_done_all_the_same(
+    guitar: Window, tmp_path: Path, sound: Callable[[], Sound], is_string: bool | None, words: str, notice: str
+) -> None:
+    """What is only unusual is a warning; a silent recording can only be a body."""
+    samples, rate_hz = sound()
+    soundfile.write(tmp_path / "sound.wav", samples, rate_hz, "FLOAT")
+    dialog = dialog_of(guitar, tmp_path / "sound.wav")
+    assert (dialog.string.isChecked(), dialog.string.isEnabled()) == (bool(is_string), is_string is not None)
+    assert words in dialog.state.text()
+    if is_string:
+        assert "shows whether a string was found" in dialog.state.text()
+        return
+    if is_string is not None:
+        dialog.string.setChecked(True)
+        assert "although" in dialog.state.text()
+        dialog.body.setChecked(True)
     dialog.start.click()
-    assert played._learning is None
-    assert (own_bodies() / "room.wav").exists()
-    assert "now has the body room" in played.window.notices.text
+    assert notice in guitar.window.notices.text and not dialogs(guitar)
+    assert (own_bodies() / "sound.wav").exists() == (is_string is not None)
 
 
-def test_where_no_string_is_found_keeping_is_no_default(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
+def test_where_no_string_is_found_keeping_is_no_default(guitar: Window, tmp_path: Path) -> None:
     samples, rate_hz = membrane(np.random.default_rng(15))
     soundfile.write(tmp_path / "drum.wav", samples[:rate_hz], rate_hz, "FLOAT")
-    dialog = dialog_of(qtbot, played, tmp_path / "drum.wav")
+    dialog = dialog_of(guitar, tmp_path / "drum.wav")
     dialog.string.setChecked(True)
     dialog.start.click()
-    qtbot.waitUntil(lambda: dialog._learned is not None, timeout=LEARNED_MS)
+    guitar.wait(lambda: dialog.state.text() == UNWRITTEN + NOT_FOUND)
     assert "no string found: " in dialog.report.toPlainText()
-    assert dialog.state.text() == f"Nothing is written yet. {NOT_FOUND}"
     assert dialog.start.text() == "Keep all the same" and not dialog.start.isDefault()
     with answered("Discard"):
         dialog.reject()
     assert not own_patches().exists()
 
 
-def test_what_is_only_unusual_is_a_warning(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
-    made = synthetic_note(2, seconds=1.0)
-    limit = np.sort(np.abs(made.samples))[-8]
-    soundfile.write(tmp_path / "hot.wav", np.clip(made.samples, -limit, limit), made.rate_hz, "FLOAT")
-    dialog = dialog_of(qtbot, played, tmp_path / "hot.wav")
-    assert dialog.string.isChecked()
-    assert "• it is clipped" in dialog.state.text() and "shows whether a string was found" in dialog.state.text()
-
-
-def test_a_silent_recording_can_only_be_a_body(qtbot: QtBot, played: Controller, tmp_path: Path) -> None:
-    soundfile.write(tmp_path / "silence.wav", np.zeros(48_000), 48_000)
-    dialog = dialog_of(qtbot, played, tmp_path / "silence.wav")
-    assert not dialog.string.isEnabled()
-    assert "it is silent; check the cable" in dialog.state.text()
-    dialog.start.click()
-    assert "no impulse response" in played.window.notices.text
-
-
-def test_a_name_that_is_taken_is_refused_and_the_learning_can_be_cancelled(
-    qtbot: QtBot, played: Controller, note: Path
-) -> None:
-    dialog = dialog_of(qtbot, played, note)
+def test_a_name_that_is_taken_is_refused_and_the_learning_can_be_cancelled(guitar: Window, note: Path) -> None:
+    dialog = dialog_of(guitar, note)
     dialog.name.setText("studio any string")
     dialog.start.click()
-    qtbot.waitUntil(lambda: "exists already" in dialog.state.text())
+    guitar.wait(lambda: "exists already" in dialog.state.text())
     dialog.name.setText("Mine")
     dialog.start.click()
     dialog.reject()
-    qtbot.waitUntil(lambda: "Cancelled" in dialog.state.text(), timeout=LEARNED_MS)
+    guitar.wait(lambda: "Cancelled" in dialog.state.text())
     assert dialog.start.isEnabled()
     dialog.reject()
-    assert played._learning is None
-    assert not own_patches().exists()
+    assert not dialogs(guitar) and not own_patches().exists()

@@ -1,4 +1,4 @@
-"""The input with a backend of our own in place of the system's, and what the window makes of it."""
+"""MIDI in the window: inputs come and go, notes are played at once, and controllers are assigned in the dialog."""
 
 from __future__ import annotations
 
@@ -7,74 +7,53 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import mido
 import pytest
-from PySide6.QtCore import QCoreApplication, Qt
-from PySide6.QtWidgets import QComboBox, QPushButton, QWidget
+from PySide6.QtCore import QCoreApplication
+from PySide6.QtWidgets import QComboBox, QLabel, QPushButton, QWidget
 from pytestqt.qtbot import QtBot
 
 from app.instrument.events import Bend, Controller, Event, NoteOff, NoteOn, release_all
 from app.patches.library import SHIPPED as PATCHES
 from app.patches.library import read_patch
-from app.patches.patch import Patch
 from app.playing.midi import MidiChoices
 from app.playing.midi_backend import MidiUnavailable
 from app.playing.midi_port import MidiInput, same_device
+from app.views.dialogs.midi_dialog import MidiDialog
+from app.window import midi_control
 from app.window.midi_control import MidiControl
+from app.window.settings import load_settings
+from tests.app.window.driver import CONTROL, KEY, LEFT, Window, choose, find
+from tests.app.window.midi import KEYS, PADS, FakeBackend
+
+Rig = Any
+WIDTH, LISTEN = "Assign a controller to pluck width", "Assign a controller to listen"
 
 
-class FakeBackend:
-    """Two inputs; `send` speaks in a thread of its own, as the system's does."""
-
-    def __init__(self) -> None:
-        self.names = ["Keys:Keys 20:0", "Pads:Pads 24:0"]
-        self.busy = False
-        self.open_name = ""
-        self._callback: Callable[[Any], None] | None = None
-
-    def get_input_names(self) -> list[str]:
-        return self.names
-
-    def open_input(self, name: str, *, callback: Callable[[Any], None]) -> FakeBackend:
-        if self.busy:
-            raise OSError("resource busy")
-        self.open_name, self._callback = name, callback
-        return self
-
-    def close(self) -> None:
-        self.open_name, self._callback = "", None
-
-    def connected(self) -> bool:
-        return self.open_name in self.names
-
-    def send(self, kind: str, **facts: int) -> None:
-        callback = self._callback
-        assert callback is not None
-        thread = threading.Thread(target=callback, args=(mido.Message(kind, **facts).bytes(),))
-        thread.start()
-        thread.join()
-
-
-def test_an_input_is_found_again_under_new_numbers() -> None:
-    backend, heard = FakeBackend(), list[Event]()
-    midi = MidiInput(heard.append, lambda: backend)
+def test_an_input_is_found_again_under_new_numbers_and_faults_are_in_plain_words(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    backend, heard, released = FakeBackend(), list[Event](), list[Event]()
+    midi = MidiInput(heard.append, lambda: backend, released.append)
     midi.open("Pads:Pads 31:0")
-    assert (midi.name, backend.open_name) == ("Pads:Pads 24:0", "Pads:Pads 24:0")
-    backend.send("control_change", control=1, value=2, channel=0)
-    backend.send("clock")
+    assert (midi.name, backend.open_name) == (PADS, PADS)
+    backend.send(Controller(1, 2), b"\xf8")  # the latter is a clock
     assert heard == [Controller(1, 2)]
+    with pytest.raises(MidiUnavailable, match="Strings is not connected"):
+        midi.open("Strings")
+    backend.busy = True
+    with pytest.raises(MidiUnavailable, match="Another program"):
+        midi.open(KEYS)
+    assert midi.name == ""
+    backend.busy = False
+    backend.names = ["Keys:Keys MIDI 1 20:0", "Keys:Keys MIDI 1 24:0", "Keys:Keys MIDI 1 28:0"]
+    for name in backend.names:  # of one make
+        midi.open(name)
+        assert (midi.name, backend.open_name) == (name, name)
     midi.close()
     midi.close()
-    assert (midi.name, backend.open_name) == ("", "")
-    assert not same_device("Keys 1", "Keys 2")
-
-
-def test_on_windows_an_input_is_found_again_at_another_place(monkeypatch: pytest.MonkeyPatch) -> None:
-    """RtMidi ends names with the place in the list, which another device moves."""
-    monkeypatch.setattr(sys, "platform", "win32")
-    backend = FakeBackend()
+    assert (midi.name, backend.open_name) == ("", "") and not same_device("Keys 1", "Keys 2")
+    monkeypatch.setattr(sys, "platform", "win32")  # names end with the place in the list, which another device moves
     backend.names = ["Pads 0", "Keys 61 1"]
-    midi = MidiInput(lambda event: None, lambda: backend)
     midi.open("Keys 61 1")
     backend.names = ["Keys 61 0"]
     assert "Keys 61 1 was disconnected" in midi.look()
@@ -82,342 +61,211 @@ def test_on_windows_an_input_is_found_again_at_another_place(monkeypatch: pytest
     assert not same_device("Keys 61 0", "Keys 49 0")
 
 
-def test_of_two_inputs_of_one_make_the_one_that_was_chosen_opens() -> None:
-    backend = FakeBackend()
-    backend.names = ["Keys:Keys MIDI 1 20:0", "Keys:Keys MIDI 1 24:0", "Keys:Keys MIDI 1 28:0"]
-    midi = MidiInput(lambda event: None, lambda: backend)
-    for name in backend.names:
-        midi.open(name)
-        assert (midi.name, backend.open_name) == (name, name)
-
-
 def test_an_input_that_is_unplugged_releases_its_keys_and_comes_back_by_itself() -> None:
     backend, heard, released = FakeBackend(), list[Event](), list[Event]()
     midi = MidiInput(heard.append, lambda: backend, released.append)
-    midi.open("Keys:Keys 20:0")
-    backend.send("note_on", note=60, velocity=90, channel=2)
+    midi.open(KEYS)
+    backend.send(NoteOn(60, 90, 2))
     assert midi.look() == ""
-    backend.names = ["Pads:Pads 24:0"]
-    assert "Keys:Keys 20:0 was disconnected" in midi.look()
+    backend.names = [PADS]
+    assert f"{KEYS} was disconnected" in midi.look()
     assert released == release_all([2])
     assert (midi.name, backend.open_name, midi.look()) == ("", "", "")
-    backend.names = ["Pads:Pads 24:0", "Keys:Keys 31:0"]  # another number, as ALSA gives
+    backend.names = [PADS, "Keys:Keys 31:0"]  # another number, as ALSA gives
     backend.busy = True
     assert midi.look() == ""
     backend.busy = False
     assert "Keys:Keys 31:0 is connected again" in midi.look()
-    backend.send("note_on", note=62, velocity=90, channel=2)
+    backend.send(NoteOn(62, 90, 2))
     assert heard[-1] == NoteOn(62, 90, 2)
     midi.close()
     backend.names = []
-    assert midi.look() == ""  # none is wanted
+    assert midi.look() == "", "none is wanted"
 
 
-def test_faults_are_reported_in_plain_words() -> None:
-    backend = FakeBackend()
-    midi = MidiInput(lambda message: None, lambda: backend)
-    with pytest.raises(MidiUnavailable, match="Strings is not connected"):
-        midi.open("Strings")
-    backend.busy = True
-    with pytest.raises(MidiUnavailable, match="Another program"):
-        midi.open("Keys:Keys 20:0")
-    assert midi.name == ""
+class Desk:
+    """The control with its dialog, and what it has played and said."""
 
+    def __init__(self, backend: FakeBackend, choices: MidiChoices, window: QWidget) -> None:
+        self.backend, self.window = backend, window
+        self.came: list[Event] = []
+        self.played: list[tuple[NoteOn, str]] = []
+        self.threads: list[threading.Thread] = []
+        self.said: list[str] = []
+        self.performed: list[dict[str, Any]] = []
 
-@pytest.fixture
-def backend() -> FakeBackend:
-    return FakeBackend()
+        def handle(event: Event) -> None:
+            self.came.append(event)
+            self.threads.append(threading.current_thread())
 
+        def play_note(event: NoteOn, mode: str) -> None:
+            self.played.append((event, mode))
+            self.threads.append(threading.current_thread())
 
-Played = list[tuple[NoteOn, str, threading.Thread]]
+        self.midi = MidiControl(choices, handle, play_note, load=lambda: backend)
+        self.midi.reported.connect(self.said.append)
+        self.midi.informed.connect(self.said.append)
+        self.midi.performed.connect(self.performed.append)
+        self.midi.start()
+        self.midi.show_dialog(window)
+        (self.dialog,) = window.findChildren(MidiDialog)
 
-
-@pytest.fixture
-def played() -> Played:
-    """Notes, and the threads that they were played in."""
-    return []
-
-
-def control(
-    choices: MidiChoices,
-    played: Played,
-    load: Callable[[], FakeBackend],
-    handle: Callable[[Event], object] = lambda event: None,
-) -> MidiControl:
-    def play_note(event: NoteOn, mode: str) -> None:
-        played.append((event, mode, threading.current_thread()))
-
-    return MidiControl(choices, handle, play_note, load=load)
+    def words(self) -> list[str]:
+        return [label.text() for label in self.dialog.findChildren(QLabel) if label.isVisible() and label.text()]
 
 
 @pytest.fixture
-def midi(qtbot: QtBot, backend: FakeBackend, played: Played) -> MidiControl:
-    return control(MidiChoices(port="Keys:Keys 9:0"), played, lambda: backend)
+def desk(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Desk]]:
+    monkeypatch.setattr(midi_control, "LOOK_MS", 5)
+    made: list[Desk] = []
+
+    def make(names: tuple[str, ...] = (KEYS, PADS), **choices: Any) -> Desk:
+        window, backend = QWidget(), FakeBackend()
+        qtbot.addWidget(window)
+        backend.names = list(names)
+        made.append(Desk(backend, MidiChoices(**{"port": "Keys:Keys 9:0", **choices}), window))
+        return made[-1]
+
+    yield make
+    for each in made:
+        each.midi.close()
 
 
-def test_a_note_is_played_at_once_in_the_thread_that_brings_it(
-    qtbot: QtBot, midi: MidiControl, backend: FakeBackend, played: Played
+def test_notes_are_played_at_once_in_the_thread_that_brings_them_and_controllers_in_the_windows(
+    qtbot: QtBot, desk: Callable[..., Desk]
 ) -> None:
-    """The window may be busy with anything; it hears nothing of it here."""
-    midi.start()
-    midi._remember(midi.choices.model_copy(update={"notes": "position"}))
-    with qtbot.assertNotEmitted(midi.performed, wait=50):
-        backend.send("note_on", note=96, velocity=127, channel=0)
-        ((event, mode, thread),) = played
-        assert (event, mode) == (NoteOn(96, 127), "position")
-        assert thread is not threading.main_thread()
-        backend.send("note_on", note=96, velocity=0, channel=0)  # a key is released
-        backend.send("note_off", note=96, velocity=64, channel=0)
-    assert len(played) == 1
-
-
-def test_keys_of_the_instrument_are_played_with_bends_pedals_and_releases(
-    qtbot: QtBot, backend: FakeBackend, played: Played
-) -> None:
-    came: list[tuple[Event, bool]] = []
-
-    def handle(event: Event) -> None:
-        came.append((event, threading.current_thread() is threading.main_thread()))
-
-    midi = control(MidiChoices(port="Keys"), played, lambda: backend, handle)
-    backend.names = ["Keys"]
-    midi.start()
-    midi._remember(midi.choices.learned("width", 74))
-    backend.send("note_on", note=60, velocity=90, channel=3)
-    backend.send("pitchwheel", pitch=-8192, channel=3)
-    backend.send("control_change", control=64, value=127, channel=3)
-    backend.send("note_off", note=60, velocity=0, channel=3)
-    with qtbot.waitSignal(midi.performed):
-        backend.send("control_change", control=74, value=0, channel=3)  # taught: it turns what it was taught
-    assert came == [
-        (event, False) for event in (NoteOn(60, 90, 3), Bend(-1.0, 3), Controller(64, 127, 3), NoteOff(60, 3))
-    ]
-    assert played == []
-
-
-@pytest.fixture
-def came() -> list[Event]:
-    """What the patch was given to play."""
-    return []
-
-
-@pytest.fixture
-def heard(qtbot: QtBot, backend: FakeBackend, played: Played, came: list[Event]) -> Iterator[MidiControl]:
-    """An input through which a patch is played, with the dialog open; a controller is assigned."""
-    choices = MidiChoices(port="Keys:Keys 9:0", controllers={"width": 74})
-    midi = control(choices, played, lambda: backend, came.append)
-    window = QWidget()
-    qtbot.addWidget(window)
-    midi.start()
-    midi.show_dialog(window)
-    yield midi
-    midi.close()
+    """The window may be busy with anything; a taught controller turns what it was taught, and is not played."""
+    keys = desk(controllers={"width": 74})
+    events = [NoteOn(60, 90, 3), Bend(-1.0, 3), Controller(64, 127, 3), NoteOff(60, 3)]
+    keys.backend.send(*events)
+    assert keys.came == events and keys.performed == keys.played == []
+    assert threading.main_thread() not in keys.threads
+    keys.backend.send(Controller(74, 0, 3))
+    qtbot.waitUntil(lambda: keys.performed == [{"width": pytest.approx(0.02)}])
+    assert keys.came == events
+    choose(find(keys.dialog, QComboBox, "MIDI notes control"), "position")
+    del keys.came[:]
+    keys.backend.send(NoteOn(96, 127), NoteOn(96, 0), NoteOff(96))
+    assert (keys.played, keys.came) == ([(NoteOn(96, 127), "position")], [])
 
 
 @pytest.mark.parametrize("change", ["another", "none", "close", "notes"])
-def test_what_an_input_holds_is_let_go_with_it(
-    heard: MidiControl, backend: FakeBackend, came: list[Event], change: str
-) -> None:
+def test_keys_that_an_input_holds_are_released_with_it(desk: Callable[..., Desk], change: str) -> None:
     """And nothing of that is learned, or taken for a controller that somebody moved."""
-    performed: list[dict[str, Any]] = []
-    heard.performed.connect(performed.append)
-    dialog = heard._dialog
-    assert dialog is not None
-    backend.send("note_on", note=60, velocity=90, channel=2)
-    backend.send("pitchwheel", pitch=-8192, channel=2)
-    dialog.learn_asked.emit("listen")
-    came.clear()
+    keys = desk(controllers={"width": 74})
+    keys.backend.send(NoteOn(60, 90, 2), Bend(-1.0, 2))
+    find(keys.dialog, QPushButton, LISTEN).click()
+    keys.came.clear()
     changes: dict[str, Callable[[], object]] = {
-        "another": lambda: dialog.port_chosen.emit("Pads:Pads 24:0"),
-        "none": lambda: dialog.port_chosen.emit(""),
-        "close": heard.close,
-        "notes": lambda: dialog.notes_chosen.emit("position"),
+        "another": lambda: keys.dialog.port_chosen.emit(PADS),
+        "none": lambda: keys.dialog.port_chosen.emit(""),
+        "close": keys.midi.close,
+        "notes": lambda: keys.dialog.notes_chosen.emit("position"),
     }
     changes[change]()
-    assert came == release_all([2])
-    heard.close()
-    assert came == release_all([2])
+    assert keys.came == release_all([2])
+    keys.midi.close()
+    assert keys.came == release_all([2])
     QCoreApplication.processEvents()
-    assert performed == []
-    assert heard.choices.controllers == {"width": 74}
+    assert keys.performed == [] and keys.midi.choices.controllers == {"width": 74}
 
 
-def test_a_wheel_that_is_assigned_while_it_is_turned_does_not_stay_there(
-    qtbot: QtBot, heard: MidiControl, backend: FakeBackend, came: list[Event]
-) -> None:
-    backend.send("control_change", control=1, value=127, channel=1)
-    assert came == [Controller(1, 127, 1)]
-    heard._learn("listen")
-    with qtbot.waitSignal(heard.performed):
-        backend.send("control_change", control=1, value=127, channel=1)
-    assert came[1:] == release_all([1])
+def test_a_controller_is_learned_in_the_dialog_and_forgotten_there(qtbot: QtBot, desk: Callable[..., Desk]) -> None:
+    keys = desk()
+    learn, forget = find(keys.dialog, QPushButton, WIDTH), find(keys.dialog, QPushButton, "Unassign pluck width")
+    assert not forget.isEnabled()
+    keys.backend.send(Controller(1, 127, 1))  # a wheel that is assigned while it is turned does not stay there
+    qtbot.mouseClick(learn, LEFT)
+    assert "Move a control …" in keys.words()
+    keys.backend.send(Controller(1, 127, 1))
+    qtbot.waitUntil(lambda: keys.midi.choices.controllers == {"width": 1} and len(keys.performed) == 1)
+    assert keys.came == [Controller(1, 127, 1), *release_all([1])] and "Controller 1" in keys.words()
+    qtbot.mouseClick(forget, LEFT)
+    assert keys.midi.choices.controllers == {}
+    for waits in (True, False):  # thought better of it
+        qtbot.mouseClick(learn, LEFT)
+        assert learn.isChecked() == waits
 
 
 @pytest.mark.parametrize("number", [64, 6, 101, 120, 123])
-def test_a_controller_with_a_function_of_its_own_is_not_learned(
-    qtbot: QtBot, heard: MidiControl, backend: FakeBackend, came: list[Event], number: int
+def test_a_controller_with_a_function_of_its_own_is_played_and_not_learned(
+    qtbot: QtBot, desk: Callable[..., Desk], number: int
 ) -> None:
-    """It is played, the dialog says why it is not assigned, and another one is still waited for."""
-    dialog = heard._dialog
-    assert dialog is not None
-    taught, learn, _ = dialog._rows["listen"]
-    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
-    backend.send("control_change", control=number, value=127, channel=1)
-    qtbot.waitUntil(lambda: f"Controller {number} " in dialog._problem.text())
-    assert "move another" in dialog._problem.text()
-    assert dialog._problem.isVisible()
-    assert came == [Controller(number, 127, 1)]
-    assert heard.choices.controllers == {"width": 74}
-    assert learn.isChecked()
-    with qtbot.waitSignal(heard.performed):
-        backend.send("control_change", control=20, value=127, channel=1)
-    assert heard.choices.controllers == {"width": 74, "listen": 20}
-    assert taught.text() == "Controller 20"
-    assert dialog._problem.text() == ""
-    backend.send("control_change", control=number, value=0, channel=1)
-    assert came[-1] == Controller(number, 0, 1)
+    """The dialog says why, and another one is still waited for; a pedal that an earlier version assigned is one."""
+    choices = MidiChoices.model_validate_json(f'{{"controllers": {{"width": {number}, "volume_db": 7}}}}')
+    keys = desk(controllers=choices.controllers)
+    learn = find(keys.dialog, QPushButton, LISTEN)
+    qtbot.mouseClick(learn, LEFT)
+    keys.backend.send(Controller(number, 127, 1))
+    qtbot.waitUntil(lambda: any(f"Controller {number} " in each and "move another" in each for each in keys.words()))
+    assert keys.came == [Controller(number, 127, 1)]
+    assert keys.midi.choices.controllers == {"volume_db": 7} and learn.isChecked()
+    keys.backend.send(Controller(20, 127, 1))
+    qtbot.waitUntil(lambda: keys.midi.choices.controllers == {"volume_db": 7, "listen": 20})
+    assert "Controller 20" in keys.words() and not any("move another" in each for each in keys.words())
+    keys.backend.send(Controller(number, 0, 1))
+    assert keys.came[-1] == Controller(number, 0, 1)
 
 
-def test_a_pedal_that_an_earlier_version_assigned_is_the_pedal(
-    backend: FakeBackend, played: Played, came: list[Event]
+def test_an_input_that_comes_and_goes_is_reported_shown_and_remembered(
+    qtbot: QtBot, desk: Callable[..., Desk]
 ) -> None:
-    choices = MidiChoices.model_validate_json('{"port": "Keys:Keys 9:0", "controllers": {"width": 64, "listen": 7}}')
-    midi = control(choices, played, lambda: backend, came.append)
-    midi.start()
-    backend.send("control_change", control=64, value=127, channel=0)
-    assert came == [Controller(64, 127, 0)]
-    assert midi.choices.controllers == {"listen": 7}
-    midi.close()
+    keys = desk(names=())
+    box = find(keys.dialog, QComboBox, "MIDI input")
+    assert "not connected" in keys.said[0] and box.currentText() == "No MIDI input found"
+    for names, words, shown in (([KEYS, PADS], f"{KEYS} is connected again", KEYS), ([PADS], "disconnected", "None")):
+        keys.backend.names = names
+        qtbot.waitUntil(lambda words=words: words in keys.said[-1])
+        qtbot.waitUntil(lambda shown=shown: box.currentText() == shown)
+    assert keys.midi.choices.port == "Keys:Keys 9:0"
+    keys.dialog.port_chosen.emit("Strings")  # a wrong choice is not waited for
+    before, keys.backend.names = len(keys.said), ["Strings"]
+    qtbot.wait(20)
+    assert len(keys.said) == before
 
 
-def test_controllers_reach_the_windows_thread(
-    qtbot: QtBot, midi: MidiControl, backend: FakeBackend, played: Played
+def test_the_patch_says_what_channels_and_wheels_do_and_without_the_package_nothing_is_learned(
+    desk: Callable[..., Desk], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    midi.start()
-    midi._remember(midi.choices.learned("width", 74))
-    threads = []
-    midi.performed.connect(lambda changes: threads.append(threading.current_thread()))
-    with qtbot.waitSignal(midi.performed) as performed:
-        backend.send("control_change", control=74, value=0, channel=0)
-    assert performed.args == [{"width": pytest.approx(0.02)}]
-    assert threads == [threading.main_thread()]
-    assert played == []
-
-
-def test_learn_and_forget_in_the_dialog(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
-    window = QWidget()
-    qtbot.addWidget(window)
-    midi.show_dialog(window)
-    dialog = midi._dialog
-    assert dialog is not None
-    taught, learn, forget = dialog._rows["width"]
-    assert not forget.isEnabled()
-    dialog.port_chosen.emit("Pads:Pads 24:0")
-    assert midi.choices.port == "Pads:Pads 24:0"
-    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
-    assert "Move" in taught.text()
-    with qtbot.waitSignal(midi.performed):
-        backend.send("control_change", control=74, value=127, channel=0)
-    assert midi.choices.controllers == {"width": 74}
-    assert taught.text() == "Controller 74"
-    with qtbot.waitSignal(midi.performed) as performed:
-        backend.send("control_change", control=74, value=0, channel=0)
-    assert performed.args == [{"width": pytest.approx(0.02)}]
-    qtbot.mouseClick(forget, Qt.MouseButton.LeftButton)
-    assert midi.choices.controllers == {}
-    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)
-    qtbot.mouseClick(learn, Qt.MouseButton.LeftButton)  # thought better of it
-    assert not learn.isChecked()
-
-
-def test_without_the_package_nothing_can_be_learned(qtbot: QtBot) -> None:
-    """And the dialog says how to get it; with it, they can."""
-    window, missing = QWidget(), True
-    qtbot.addWidget(window)
-
-    def load() -> FakeBackend:
-        if missing:
-            raise MidiUnavailable("Install it with: pip install supriya-midi")
-        return FakeBackend()
-
-    midi = control(MidiChoices(), [], load)
-    midi.show_dialog(window)
-    dialog = midi._dialog
-    assert dialog is not None
-    for _, learn, _ in dialog._rows.values():
-        assert not learn.isEnabled()
-        assert "pip install supriya-midi" in learn.toolTip()
-    assert "pip install supriya-midi" in dialog._problem.text()
-    missing = False
-    midi.show_dialog(window)
-    assert all(learn.isEnabled() for _, learn, _ in dialog._rows.values())
-    assert "move a control" in dialog._rows["width"][1].toolTip()
-
-
-def test_the_patch_says_what_channels_and_wheels_do(qtbot: QtBot, midi: MidiControl) -> None:
-    window = QWidget()
-    qtbot.addWidget(window)
-    midi.show_dialog(window)
-    dialog = midi._dialog
-    assert dialog is not None
-    assert not dialog._wheel.isEnabled()  # there is no patch
-    patch = read_patch(PATCHES / "classical_guitar.json")
+    keys = desk()
+    boxes = [find(keys.dialog, QComboBox, name) for name in ("Channels", "Bend range", "Pitch bend", "Modulation")]
+    assert not boxes[3].isEnabled(), "there is no patch"
     hands = {"mode": "guitar", "bend_semitones": 2.5, "bend_by": "length", "mod_wheel": "knobs.decay"}
-    midi.show_patch(patch.model_copy(update=hands))
-    shown = [box.currentData() for box in (dialog._channels, dialog._bends, dialog._bends_by, dialog._wheel)]
-    assert shown == ["guitar", 2.5, "length", "knobs.decay"]
-    turned: list[Patch] = []
-    midi.performed.connect(lambda changes: turned.append(changes["patch"]))
-    for box, value in (
-        (dialog._channels, "mpe"),
-        (dialog._bends, 12.0),
-        (dialog._bends_by, "tension"),
-        (dialog._wheel, "pluck.position"),
-    ):
-        box.activated.emit(box.findData(value))
-    found = [each.mode for each in turned], turned[1].bend_semitones, turned[2].bend_by, turned[3].mod_wheel
-    assert found == (["mpe", "guitar", "guitar", "guitar"], 12.0, "tension", "pluck.position")
-    boxes, buttons = dialog.findChildren(QComboBox), dialog.findChildren(QPushButton)
-    assert [each.accessibleName() for each in (*boxes, *buttons) if not each.toolTip()] == []
+    keys.midi.show_patch(read_patch(PATCHES / "classical_guitar.json").model_copy(update=hands))
+    assert [box.currentData() for box in boxes] == list(hands.values())
+    for (field, _), box, value in zip(hands.items(), boxes, ("mpe", 12.0, "tension", "pluck.position"), strict=True):
+        choose(box, value)
+        assert getattr(keys.performed[-1]["patch"], field) == value
+    for control in (*keys.dialog.findChildren(QComboBox), *keys.dialog.findChildren(QPushButton)):
+        assert control.toolTip(), control.accessibleName()
+    learns = [each for each in keys.dialog.findChildren(QPushButton) if each.accessibleName().startswith("Assign")]
+
+    def missing() -> list[str]:
+        raise MidiUnavailable("Install it with: pip install supriya-midi")
+
+    for names, enabled, tip in ((missing, False, "pip install"), (lambda: [KEYS], True, "move a control")):
+        monkeypatch.setattr(keys.midi.input, "names", names)
+        keys.midi.show_dialog(keys.window)
+        assert all(learn.isEnabled() == enabled and tip in learn.toolTip() for learn in learns)
+        assert any("pip install supriya-midi" in each for each in keys.words()) is not enabled
 
 
-def test_an_input_that_comes_and_goes_is_reported_and_shown(
-    qtbot: QtBot, midi: MidiControl, backend: FakeBackend, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(midi._look_timer, "start", lambda: None)
-    present, backend.names = backend.names, []
-    with qtbot.waitSignal(midi.reported):
-        midi.start()
-    window = QWidget()
-    qtbot.addWidget(window)
-    midi.show_dialog(window)
-    assert midi._dialog is not None
-    backend.names = present
-    with qtbot.waitSignal(midi.informed) as informed:
-        midi._look()
-    assert "Keys:Keys 20:0 is connected again" in informed.args[0]
-    assert midi._dialog._inputs.currentText() == "Keys:Keys 20:0"
-    backend.names = ["Pads:Pads 24:0"]
-    with qtbot.waitSignal(midi.reported) as reported:
-        midi._look()
-    assert "disconnected" in reported.args[0]
-    assert midi._dialog._inputs.currentText() == "None"
-    assert midi.choices.port == "Keys:Keys 9:0"  # still remembered
-    midi._dialog.port_chosen.emit("Strings")  # a wrong choice is not waited for
-    backend.names = ["Strings"]
-    with qtbot.assertNotEmitted(midi.informed, wait=10):
-        midi._look()
-    midi.close()
-
-
-def test_an_input_that_is_gone_is_reported_and_kept(qtbot: QtBot, midi: MidiControl, backend: FakeBackend) -> None:
-    backend.names = []
-    with qtbot.waitSignal(midi.reported) as reported:
-        midi.start()
-    assert "not connected" in reported.args[0]
-    assert midi.choices.port == "Keys:Keys 9:0"
-    window = QWidget()
-    qtbot.addWidget(window)
-    midi.show_dialog(window)
-    assert midi._dialog is not None
-    assert midi._dialog._inputs.currentText() == "No MIDI input found"
+def test_midi_plays_the_window_and_what_it_learned_is_saved(backend: FakeBackend, lab: Window, tmp_path: Any) -> None:
+    lab.wait_for_take()
+    lab.key(KEY.Key_M, CONTROL)
+    (dialog,) = lab.window.findChildren(MidiDialog)
+    assert dialog.isVisible()
+    choose(find(dialog, QComboBox, "MIDI input"), KEYS)
+    before = lab.choices
+    backend.send(NoteOn(96, 127))
+    (note,) = lab.struck
+    assert (note.request.pluck.position, note.request.pluck.amplitude_mm) == pytest.approx((0.7, 10))
+    assert lab.choices.position == before.position, "the window has had no time yet"
+    lab.wait(lambda: (lab.choices.position, lab.choices.amplitude_mm) == pytest.approx((0.7, 10)))
+    assert not lab.controller.history.undo_words
+    lab.wait(lambda: lab.performance.position_s > 0)
+    find(dialog, QPushButton, WIDTH).click()
+    backend.send(Controller(74, 0))
+    lab.wait(lambda: lab.choices.width == pytest.approx(0.02))
+    lab.close()
+    assert load_settings(tmp_path / "settings.json")[0].midi == MidiChoices(port=KEYS, controllers={"width": 74})

@@ -1,9 +1,19 @@
-"""Settings survive a round trip; a broken file is set aside."""
+"""Settings survive a round trip and a kill; any file lets the app start, and loses no more than what is wrong."""
+
+from __future__ import annotations
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
+from PySide6.QtCore import QObject
+from pytestqt.qtbot import QtBot
 
 from app.audio.choices import DeviceChoice, SoundChoice
 from app.export.choices import ExportChoices
@@ -12,11 +22,22 @@ from app.patches.library import SHIPPED as PATCHES
 from app.playing.midi import MidiChoices
 from app.session.choices import Choices
 from app.views.look import Look
+from app.window import remembering
+from app.window.remembering import SettingsSaver
 from app.window.settings import Settings, load_settings, save_settings, settings_file
 
 
-def test_round_trip(tmp_path: Path) -> None:
+def load(path: Path, text: str | bytes) -> tuple[Settings, str]:
+    path.write_bytes(text.encode() if isinstance(text, str) else text)
+    return load_settings(path)
+
+
+def test_settings_survive_a_round_trip_in_a_place_that_can_be_given(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = tmp_path / "new folder" / "settings.json"
+    monkeypatch.setenv("LEARNED_STRINGS_SETTINGS", str(path))
+    assert settings_file() == path and load_settings(path) == (Settings(), ""), "a first start has defaults"
     settings = Settings(
         choices=Choices(position=0.7, heard="b", b="difference", loop=True),
         export=ExportChoices(folder="/music", bits="32f", rate_hz=0),
@@ -29,18 +50,20 @@ def test_round_trip(tmp_path: Path) -> None:
     )
     save_settings(path, settings)
     assert load_settings(path) == (settings, "")
-    assert [p.name for p in path.parent.iterdir()] == ["settings.json"]
+    assert [each.name for each in path.parent.iterdir()] == ["settings.json"]
 
 
-def test_a_first_start_has_defaults_and_no_notice(tmp_path: Path) -> None:
-    assert load_settings(tmp_path / "nothing.json") == (Settings(), "")
-
-
-def test_a_file_of_a_version_without_midi_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "settings.json"
-    path.write_text('{"version": 1, "choices": {"position": 0.6}}')
-    settings, notice = load_settings(path)
-    assert (settings.choices.position, settings.midi, notice) == (0.6, MidiChoices(), "")
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ('{"version": 1, "choices": {"position": 0.6}}', Settings(choices=Choices(position=0.6))),  # without MIDI
+        ('{"version": 1, "choices": {"loop": true}, "device": null}', Settings(choices=Choices(loop=True))),
+        ('{"choices": {"heard": "truth"}}', Settings(choices=Choices(heard="b"))),  # from before the slots
+        ('{"look": {"face": "light"}}', Settings(look=Look(theme="light"))),  # of version 0.1
+    ],
+)
+def test_a_file_of_an_earlier_version_loads_without_a_notice(tmp_path: Path, text: str, expected: Settings) -> None:
+    assert load(tmp_path / "settings.json", text) == (expected, "")
 
 
 @pytest.mark.parametrize(
@@ -54,71 +77,118 @@ def test_a_file_of_a_version_without_midi_is_read(tmp_path: Path) -> None:
         ('{"midi": {"controllers": {"colour": 1}}}', "midi.controllers"),
         ('{"sampled": {"layers": 1e30}}', "sampled.layers"),
         ('{"version": 2}', "version"),
+        ("[" * 100_000, ""),
+        ('{"version": 1, "colour": ' + "7" * 5000 + "}", ""),
+        ('{"choices": ' + '{"a": ' * 500 + "1" + "}" * 500 + "}", ""),
+        ('{"window_geometry": "' + "x" * 3_000_000 + '"}', ""),
+        (b"\xff\xfe", ""),
+        ('{"choices": {"position": NaN}}', ""),
+        ('{"favourites": ["\\u001b[2J"], "\\u001b]0;owned\\u0007": 1}', ""),
     ],
+    ids=lambda text: repr(text[:24]),
 )
-def test_a_broken_file_is_set_aside_and_reported(tmp_path: Path, text: str, names: str) -> None:
+def test_a_broken_file_is_set_aside_and_reported_and_lets_the_app_start(
+    tmp_path: Path, text: str | bytes, names: str
+) -> None:
     path = tmp_path / "settings.json"
-    path.write_text(text)
-    settings, notice = load_settings(path)
-    assert settings == Settings()
-    assert names in notice
-    assert "settings.broken.json" in notice
-    assert (tmp_path / "settings.broken.json").read_text() == text
-    assert load_settings(path) == (Settings(), "")
+    settings, notice = load(path, text)
+    assert names in notice and notice.isprintable() and len(notice) <= 500
+    if names:
+        assert settings == Settings() and "settings.broken.json" in notice
+        assert (tmp_path / "settings.broken.json").read_text() == text
+        assert load_settings(path) == (Settings(), "")
+    save_settings(path, settings)
+    assert load_settings(path) == (settings, "")
 
 
-def test_a_wrong_field_does_not_lose_the_others(tmp_path: Path) -> None:
-    path = tmp_path / "settings.json"
-    path.write_text(
-        '{"choices": {"position": 9, "listen": 0.2}, "sound": {"buffer": 3, "rate_hz": 96000}, "look": 7,'
-        ' "colour": 1, "device": {"name": "Loud"}, "export": {"bits": "32f"}}'
-    )
-    settings, notice = load_settings(path)
-    assert settings == Settings(
-        choices=Choices(listen=0.2), sound=SoundChoice(rate_hz=96_000), export=ExportChoices(bits="32f")
-    )
-    assert "choices.position" in notice
-    assert "settings.broken.json" in notice
-
-
-def test_a_wrong_string_loses_no_more_than_itself(tmp_path: Path) -> None:
+def test_a_wrong_field_loses_no_more_than_itself(tmp_path: Path) -> None:
     """What is dropped for one fault is not there for the next, and may be necessary where it was."""
     path = tmp_path / "settings.json"
+    settings, notice = load(
+        path,
+        '{"choices": {"position": 9, "listen": 0.2}, "sound": {"buffer": 3, "rate_hz": 96000}, "look": 7,'
+        ' "colour": 1, "device": {"name": "Loud"}, "export": {"bits": "32f"}}',
+    )
+    sound, export = SoundChoice(rate_hz=96_000), ExportChoices(bits="32f")
+    assert settings == Settings(choices=Choices(listen=0.2), sound=sound, export=export)
+    assert "choices.position" in notice and "settings.broken.json" in notice
     patch = json.loads((PATCHES / "classical_guitar.json").read_text())
     kept = {"volume_db": -12.0, "patch": patch, "string": {"length_m": 0.65}}
-    path.write_text(json.dumps({"choices": kept, "favourites": ["mine"]}))
-    settings, notice = load_settings(path)
-    assert (settings.choices.volume_db, settings.favourites, settings.choices.string) == (-12.0, ("mine",), None)
-    assert settings.choices.patch is not None
-    assert "choices.string" in notice
-    patch["strings"] |= {"kind": "set", "extra": 1}
-    path.write_text(json.dumps({"choices": kept, "favourites": ["mine"]}))
-    settings, _ = load_settings(path)
-    assert (settings.choices.volume_db, settings.favourites, settings.choices.patch) == (-12.0, ("mine",), None)
+    for extra, is_there in (({}, True), ({"kind": "set", "extra": 1}, False)):
+        patch["strings"] |= extra
+        settings, notice = load(path, json.dumps({"choices": kept, "favourites": ["mine"]}))
+        assert (settings.choices.volume_db, settings.favourites) == (-12.0, ("mine",))
+        assert settings.choices.string is None and (settings.choices.patch is not None) == is_there
+        assert "choices.string" in notice or not is_there
 
 
-def test_a_file_of_the_first_version_still_loads(tmp_path: Path) -> None:
+class Desk:
+    """What is to be remembered of one instance; the test says when it looks."""
+
+    def __init__(self, path: Path, owner: QObject) -> None:
+        self.now, self.failed = load_settings(path)[0], list[str]()
+        self.keeper = SettingsSaver(path, self.now, lambda: self.now, owner)
+        self.keeper.failed.connect(self.failed.append)
+
+    def place(self, position: float) -> None:
+        choices = Choices.model_validate({**self.now.choices.model_dump(), "position": position})
+        self.now = self.now.model_copy(update={"choices": choices})
+
+    def look(self) -> None:
+        self.keeper.look()
+        for thread in threading.enumerate():
+            if thread.name == "settings":
+                thread.join()
+
+
+def test_a_change_is_saved_once_it_rests_and_where_that_fails_later(
+    qtbot: QtBot, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(remembering, "LOOK_EVERY_MS", 10**8)
+    owner, path, folder = QObject(), tmp_path / "settings.json", tmp_path / "folder"
+    desk = Desk(path, owner)
+    desk.place(0.41)
+    for written in (False, True):  # it may be under way
+        desk.look()
+        assert path.exists() == written
+    assert load_settings(path)[0].choices.position == 0.41
+    before = path.stat().st_mtime_ns
+    desk.look()
+    desk.keeper.close()
+    assert path.stat().st_mtime_ns == before, "nothing new, nothing written"
+    folder.write_text("in the way, as a full disk is for a moment")
+    desk = Desk(folder / "settings.json", owner)
+    for position in (0.42, 0.43):
+        desk.place(position)
+        desk.look()
+        desk.look()
+    qtbot.waitUntil(lambda: len(desk.failed) == 1 and "cannot be written" in desk.failed[0])  # once
+    folder.unlink()
+    desk.keeper.close()
+    assert load_settings(folder / "settings.json")[0].choices.position == 0.43
+
+
+KILLED = """
+import sys
+from pathlib import Path
+from PySide6.QtCore import QCoreApplication, QTimer
+from app.session.choices import Choices
+from app.window.remembering import SettingsSaver
+from app.window.settings import Settings
+application = QCoreApplication([])
+box = [Settings()]
+keeper = SettingsSaver(Path(sys.argv[1]), box[0], lambda: box[0], application)
+QTimer.singleShot(0, lambda: box.__setitem__(0, Settings(choices=Choices(position=0.41))))
+application.exec()
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="kills as POSIX does")
+def test_a_kill_loses_nothing_that_rested(tmp_path: Path) -> None:
     path = tmp_path / "settings.json"
-    path.write_text('{"version": 1, "choices": {"loop": true}, "device": null, "window_geometry": ""}')
-    assert load_settings(path) == (Settings(choices=Choices(loop=True)), "")
-
-
-def test_the_place_can_be_given(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("LEARNED_STRINGS_SETTINGS", str(tmp_path / "x.json"))
-    assert settings_file() == tmp_path / "x.json"
-
-
-def test_a_file_from_before_the_slots_loads_without_a_notice(tmp_path: Path) -> None:
-    path = tmp_path / "settings.json"
-    path.write_text('{"choices": {"heard": "truth", "position": 0.4}}')
-    settings, notice = load_settings(path)
-    assert notice == ""
-    assert settings.choices.source_heard == "truth"
-
-
-def test_a_theme_of_version_0_1_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "settings.json"
-    path.write_text('{"look": {"face": "light"}}', encoding="utf-8")
-    settings, notice = load_settings(path)
-    assert (settings.look, notice) == (Look(theme="light"), "")
-    assert '"theme":"light"' in settings.model_dump_json()
+    with subprocess.Popen([sys.executable, "-c", KILLED, str(path)]) as process:
+        end_s = time.monotonic() + 60
+        while not path.exists() and time.monotonic() < end_s:
+            time.sleep(0.05)
+        os.kill(process.pid, signal.SIGKILL)
+    assert load_settings(path)[0].choices.position == 0.41

@@ -1,0 +1,199 @@
+"""Laws of every panel of the registry, and of the jobs that panels compute."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from threading import Event
+from typing import Any
+
+import pytest
+import torch
+from PySide6.QtCore import QRect, Qt
+from PySide6.QtWidgets import QAbstractButton, QTabBar, QWidget
+from pytestqt.qtbot import QtBot
+
+from app.presets.library import Library
+from app.rendering import Take
+from app.session.choices import Choices, Session
+from app.shared.worker import Job
+from app.window.panels import Moment, Panel, StringPanel, base
+from app.window.panels.drum import DrumPanel
+from app.window.panels.rack import LEFT, RIGHT
+from tests.app.window.driver import KEY, Window
+from tests.app.window.panels.conftest import Make
+
+DECKS = (*LEFT, *RIGHT)
+EVERY = (StringPanel, DrumPanel, *DECKS)
+KEYS = (KEY.Key_Left, KEY.Key_Up, KEY.Key_Plus, KEY.Key_Minus, KEY.Key_Home, KEY.Key_Return, KEY.Key_Escape)
+
+
+def focusable(panel: QWidget) -> list[QWidget]:
+    """What has the keyboard by the Tab key."""
+    inside = [panel, *panel.findChildren(QWidget)]
+    return [
+        each
+        for each in inside
+        if each.focusPolicy() & Qt.FocusPolicy.TabFocus
+        and each.focusProxy() is None
+        and each.isEnabled()
+        and each.isVisible()
+    ]
+
+
+def by_arrows(control: QWidget) -> bool:
+    """Return True if arrow keys lead to it from the one of its group that is checked."""
+    return isinstance(control, QAbstractButton) and control.group() is not None and not control.isChecked()
+
+
+def lightness(panel: QWidget) -> float:
+    """The mean of its picture, 0 … 255."""
+    picture = panel.grab().toImage()
+    places = [(x, y) for x in range(0, picture.width(), 7) for y in range(0, picture.height(), 7)]
+    return sum(picture.pixelColor(*place).lightness() for place in places) / len(places)
+
+
+@pytest.mark.parametrize("kind", EVERY, ids=lambda kind: kind.key)
+def test_a_panel_is_named_and_themed_empty_and_with_a_take_and_leaves_no_thread(
+    kind: type[Panel], make: Make, take: Take, themed: Callable[..., None], qtbot: QtBot
+) -> None:
+    """`make` sees to the threads."""
+    assert kind.title and kind.help.endswith(".")
+    empty = kind(Session(Choices(face="lab")), Library([]))
+    qtbot.addWidget(empty)
+    empty.resize(700, 300)
+    empty.show()
+    for _ in range(8):
+        empty.show_moment(Moment(None, 0.0, False, 0.016))
+    light = {name: themed(name) or lightness(empty) for name in ("light", "dark")}
+    assert light["light"] > light["dark"] + 60
+    empty.cover("Drums are played")
+    assert empty.covered == "Drums are played"
+    empty.end()
+    if kind is not DrumPanel:
+        panel = make(kind)
+        for position_s in (0.0, 0.5, take.seconds):
+            for _ in range(8):
+                panel.show_moment(Moment(take, position_s, True, 0.016))
+        panel.take_finished(take)
+        panel.show_moment(Moment(take, 0.5, False, 0.016))
+        for control in focusable(panel):
+            assert control.accessibleName(), control
+            assert control.toolTip() or isinstance(control, QTabBar), control.accessibleName()
+
+
+def test_every_panel_of_the_decks_is_reached_and_operated_by_the_keyboard_alone(lab: Window) -> None:
+    """From the deck's names by arrows to the panel, and by Tab to each of its controls and out again."""
+    lab.wait_for_take()
+    for deck, kinds in ((lab.window.left, LEFT), (lab.window.right, RIGHT)):
+        (names,) = deck.findChildren(QTabBar)
+        names.setFocus()
+        lab.key(KEY.Key_Home, on=names)
+        while names.currentIndex() > 0:
+            lab.key(KEY.Key_Left, on=names)
+        for kind in kinds:
+            panel = deck.currentWidget()
+            assert isinstance(panel, kind) and panel.isVisible()
+            controls = [each for each in focusable(panel) if not by_arrows(each)]
+            met = set[QWidget]()
+            while not met or panel.isAncestorOf(lab.window.focusWidget()):
+                lab.key(KEY.Key_Tab, on=lab.window.focusWidget())
+                met.add(lab.window.focusWidget())
+                assert len(met) <= len(controls) + 1
+            assert set(controls) <= met and controls
+            for control in controls:
+                for key in KEYS[: 1 if isinstance(control, QAbstractButton) else None]:
+                    lab.key(key, on=control)
+            lab.key(KEY.Key_Escape)
+            names.setFocus()
+            lab.key(KEY.Key_Right, on=names)
+    assert lab.said == []
+
+
+def test_every_panel_fits_the_window_of_a_small_laptop_with_text_of_150_percent(
+    lab: Window, themed: Callable[..., None]
+) -> None:
+    themed("dark", 150)
+    lab.window.show_keys(False)
+    lab.window.resize(1280, 720)
+    for kind in DECKS:
+        panel = lab.panel(kind.key)
+        lab.wait(
+            lambda: lab.window.centralWidget().minimumSizeHint().expandedTo(lab.window.size()) == lab.window.size()
+        )
+        assert panel.isVisible() and panel.height() >= panel.minimumSizeHint().height() > 0
+        for control in focusable(panel):
+            place = QRect(control.mapTo(panel, control.rect().topLeft()), control.size())
+            assert panel.rect().contains(place), (kind.key, control.accessibleName())
+
+
+class AnyPanel(Panel):
+    key = "any"
+
+
+@pytest.fixture
+def panel(qtbot: QtBot, monkeypatch: pytest.MonkeyPatch) -> Iterator[Panel]:
+    monkeypatch.setattr(base, "UNSEEN_S", 60.0)  # nobody looks here, however late a job begins
+    made = AnyPanel(Session(), Library([]))
+    yield made
+    made.end()
+
+
+class Growing:
+    """A take that grows with each look at it, until it has grown so often."""
+
+    complete = False
+
+    def __init__(self, looks: float) -> None:
+        self.ready_frames_seen, self.looks = 0, looks
+
+    @property
+    def ready_frames(self) -> int:
+        if self.looks == 0:
+            return 100
+        self.ready_frames_seen += 1
+        self.complete = self.ready_frames_seen >= self.looks
+        return self.ready_frames_seen
+
+
+@pytest.mark.parametrize(("looks", "complete"), [(5, True), (0, False)], ids=["rendered", "abandoned"])
+def test_a_job_rests_while_a_pluck_is_rendered_and_not_for_one_that_no_longer_grows(
+    qtbot: QtBot, panel: Panel, looks: int, complete: bool
+) -> None:
+    take: Any = Growing(looks)
+    panel.take_started(take)
+
+    def work(job: Job) -> bool:
+        job.report(0.5)
+        return take.complete
+
+    with qtbot.waitSignal(panel.background.finished) as finished:
+        panel.compute(work)
+    assert finished.args == [complete]
+
+
+def test_a_job_rests_while_nobody_looks(qtbot: QtBot, panel: Panel, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(base, "UNSEEN_S", 0.2)
+    shares, ended, resting = list[float](), list[object](), Event()
+    panel.background.finished.connect(ended.append)
+    panel.background.progressed.connect(lambda share: shares.append(share))
+
+    def work(job: Job) -> None:
+        time.sleep(base.UNSEEN_S + 0.05)
+        resting.set()
+        job.report(0.5, so_far="half")
+
+    panel.compute(work)
+    assert resting.wait(60)
+    qtbot.wait(50)
+    assert shares == []
+    qtbot.waitUntil(lambda: panel.look() or bool(ended))  # again and again: each look holds for UNSEEN_S
+    assert shares == [0.5]
+
+
+def test_a_job_has_one_core_and_gives_the_others_back(qtbot: QtBot, panel: Panel) -> None:
+    usual = torch.get_num_threads()
+    with qtbot.waitSignal(panel.background.finished) as finished:
+        panel.compute(lambda job: torch.get_num_threads())
+    assert finished.args == [1]
+    assert torch.get_num_threads() == usual

@@ -1,0 +1,265 @@
+"""Eigenvalues, partials, the map of errors and the table of presets, in the Lab: read, pointed at and chosen from."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+from threading import Event
+from typing import Any
+
+import numpy as np
+import pyqtgraph as pg
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QComboBox, QToolButton
+
+from app.analysis import error_plane
+from app.analysis.error_plane import AMPLITUDES_MM, POSITIONS
+from app.views import theme
+from app.views.controls.elided_label import ElidedLabel
+from app.window.panels import compare as compare_module
+from engine.pluck import Pluck
+from tests.app.window.driver import KEY, LEFT, Window, choose, find, press
+from tests.app.window.panels.conftest import at, items
+
+LEARNED, STRING, PLUCK = 13, 6, 13  # pixels of the points
+
+
+def points(plot: pg.PlotWidget, size: int) -> np.ndarray:
+    """The places of a plot's points of this size, (points, 2)."""
+    (found,) = (each for each in items(plot, pg.ScatterPlotItem) if each.opts["size"] == size)
+    return np.stack(found.getData(), axis=1)
+
+
+def words_of(panel: Any) -> str:
+    return panel.findChild(ElidedLabel).text()
+
+
+def test_eigenvalues_are_pointed_at_and_heard_alone_by_mouse_and_keyboard(lab: Window, themed: Any) -> None:
+    panel = lab.panel("eigenvalues")
+    plane = panel.plane
+    lab.wait(lambda: len(points(plane, LEARNED)) > 0)
+    panel.grab()  # axes take their final room when they are first painted
+
+    def nearest() -> bool:
+        place = at(plane, *points(plane, LEARNED)[2])
+        for pixel in (place + QPoint(40, 0), place):
+            lab.qtbot.mouseMove(plane.viewport(), pixel)
+        return "nearest to mode 3" in panel.words
+
+    lab.wait(nearest)
+    assert "cents" in panel.words and "T60" in panel.words
+    for solo in (3, 0):
+        lab.qtbot.mouseClick(plane.viewport(), LEFT, pos=at(plane, *points(plane, LEARNED)[2]))
+        assert lab.choices.solo == solo
+    plane.setFocus()
+    lab.key(KEY.Key_Escape, on=plane)
+    lab.qtbot.mouseMove(plane.viewport(), QPoint(1, 1))
+    lab.key(KEY.Key_Right, on=plane)
+    assert "mode 1" in panel.words.lower()
+    lab.key(KEY.Key_Return, on=plane)
+    assert lab.choices.solo == 1 and "Mode 1 is soloed" in panel.words
+    lab.key(KEY.Key_Escape, on=plane)
+    assert lab.choices.solo == 0
+    count = len(points(plane, LEARNED))
+    choose(find(panel, QComboBox, "Axes"), "complex")
+    shown = np.concatenate([points(plane, LEARNED), points(plane, STRING)])
+    assert len(points(plane, LEARNED)) == count and (np.hypot(*shown.T) <= 1).all()
+    (left, right), (bottom, top) = plane.getPlotItem().viewRange()
+    assert ((left, bottom) <= shown).all() and (shown <= (right, top)).all()
+    for name in ("light", "dark"):
+        themed(name)
+        learned, string = (
+            next(each for each in items(plane, pg.ScatterPlotItem) if each.opts["size"] == size)
+            for size in (LEARNED, STRING)
+        )
+        assert learned.points()[0].pen().color().name() == theme.MODEL.lower()
+        assert string.points()[0].brush().color().name() == theme.TRUTH.lower()
+
+
+def test_partials_of_a_pluck_are_measured_greyed_and_heard_alone(lab: Window) -> None:
+    panel = lab.panel("partials")
+    table = panel.table
+    lab.wait(lambda: len(table.rows) == 10)
+
+    def rows() -> dict[object, tuple[Any, ...]]:
+        return {row.key: row.values for row in table.rows}
+
+    def colours() -> set[str]:
+        role = Qt.ItemDataRole.ForegroundRole
+        return {table.model().index(0, column).data(role).color().name() for column in range(3)}
+
+    trained = rows()
+    assert trained[1][1] == pytest.approx(247, abs=5)
+    assert panel.progress.share is None and len(colours()) > 1
+    window = find(panel, QComboBox, "Window of time")
+    window.setCurrentIndex(1)
+    window.activated.emit(1)
+    assert rows() != trained and any(row.grey for row in table.rows), "above half the rate, at least"
+    lab.qtbot.mouseClick(table.viewport(), LEFT, pos=table.visualRect(table.model().index(3, 1)).center())
+    assert lab.choices.solo == 4
+    lab.change(solo=2)
+    assert table.chosen_key == 2
+    lab.key(KEY.Key_Return, on=table)
+    assert (lab.choices.solo, table.chosen_key) == (0, None)
+    lab.change(position=0.5)
+    lab.wait(lambda: words_of(panel) != "" and colours() == {theme.FAINT.lower()})
+    lab.wait(lambda: words_of(panel) == "" and len(colours()) > 1)
+    assert "60 dB" in rows()[2][-1], "a pluck in the middle has no second mode"
+
+
+@pytest.fixture
+def asked(monkeypatch: pytest.MonkeyPatch) -> list[Pluck]:
+    """The plucks of which errors were computed, quickly."""
+    plucks: list[Pluck] = []
+
+    def errors_of(some: list[Pluck], job: Any) -> Any:
+        plucks.extend(some)
+        return np.full(len(some), 0.05 if some[0].shape == "gaussian" else math.inf)
+
+    monkeypatch.setattr(error_plane, "error_of_plucks", lambda preset: errors_of)
+    return plucks
+
+
+def test_the_map_of_errors_is_computed_once_a_shape_pointed_at_and_plucked_in(
+    asked: list[Pluck], lab: Window
+) -> None:
+    panel = lab.panel("error_plane")
+    plane, count = panel.map, len(POSITIONS) * len(AMPLITUDES_MM)
+
+    def computed(times: int) -> None:
+        lab.key(KEY.Key_Escape, on=plane)  # the words are those of the map again
+        lab.wait(lambda: "a click plucks there" in panel.words and panel.progress.share is None)
+        assert len(asked) == times * count
+
+    def point(position: float, amplitude_mm: float) -> QPoint:
+        place = at(plane, position, math.log10(amplitude_mm))
+        lab.qtbot.mouseMove(plane.viewport(), place + QPoint(3, 0))
+        lab.qtbot.mouseMove(plane.viewport(), place)
+        return place
+
+    computed(1)
+    panel.grab()
+    for position, amplitude_mm, outside in ((0.5, 5.0, False), (0.1, 5.0, True), (0.5, 15.0, True)):
+        point(position, amplitude_mm)
+        lab.wait(lambda words=f"Pluck at {position:.2f}": words in panel.words)
+        assert ("outside the training range" in panel.words) == outside
+    lab.qtbot.mouseClick(plane.viewport(), LEFT, pos=point(0.6, 8.0))
+    assert "error as trained about 5 %" in panel.words
+    assert lab.choices.position == pytest.approx(0.6, abs=0.01) == round(lab.choices.position, 3)
+    assert lab.choices.amplitude_mm == pytest.approx(8, rel=0.05)
+    lab.wait(lambda: lab.performance.playing)
+    here = [lab.choices.position, math.log10(lab.choices.amplitude_mm)]
+    lab.wait(lambda: points(plane, PLUCK)[0].tolist() == pytest.approx(here))
+    lab.key(KEY.Key_Escape, on=plane)
+    assert plane.cursor is None
+    before, (x, y) = lab.choices, error_plane.nearest_cell(lab.choices.position, lab.choices.amplitude_mm)
+    for key in (KEY.Key_Left, KEY.Key_Down, KEY.Key_Down):
+        lab.key(key, on=plane)
+    assert plane.cursor == (POSITIONS[x - 1], AMPLITUDES_MM[y - 2]) and lab.choices == before
+    lab.key(KEY.Key_Return, on=plane)
+    assert lab.choices.position == pytest.approx(POSITIONS[x - 1], abs=5e-4)
+    lab.change(shape="triangular")
+    assert "a click plucks there" not in panel.words
+    computed(2)
+    point(0.5, 5.0)
+    lab.wait(lambda: "diverges" in panel.words)
+    lab.key(KEY.Key_Escape, on=plane)
+    for again in ({"shape": "gaussian"}, {"preset": "second"}):  # the same file under another name
+        lab.change(**again)
+        computed(2)
+
+
+def test_trained_amplitudes_of_the_map_may_have_any_range_and_depend_on_the_place(lab: Window) -> None:
+    """As where plucks were scaled to a rise of tension, which one near an end reaches with less."""
+    plane = lab.panel("error_plane").map
+    for trained_mm in ((0.0, 20.0), (1e-9, 1e9), (0.0, 0.0)):
+        plane.set_trained((0.1, 0.9), lambda _, trained_mm=trained_mm: trained_mm)
+    assert not plane.is_trained(0.5, 3.0)
+    plane.set_trained((0.1, 0.9), lambda place: (0.0, 20 * place))
+    assert plane.is_trained(0.5, 9.9) and plane.is_trained(0.5, 1e-3) and not plane.is_trained(0.2, 9.9)
+    (outline,) = items(plane, pg.PlotDataItem)
+    places, levels = outline.getData()
+    for place, highest_mm in ((0.1, 2.0), (0.5, 10.0)):
+        assert 10 ** max(levels[places == place]) == pytest.approx(highest_mm)
+
+
+def figures(panel: Any) -> dict[object, tuple[Any, ...]]:
+    return {row.key: row.values for row in panel.table.rows}
+
+
+def computed(panel: Any) -> set[object]:
+    """The presets with figures of the present pluck."""
+    return {row.key for row in panel.table.rows if not row.grey and row.values[1] is not None}
+
+
+def menu_of(panel: Any) -> list[QAction]:
+    return find(panel, QToolButton, "Presets to compare").menu().actions()
+
+
+def test_presets_are_compared_on_this_pluck_stopped_taken_out_and_loaded(lab: Window, preset_folder: Path) -> None:
+    panel, both = lab.panel("compare"), {"first", "second"}
+    lab.wait(lambda: panel.background.busy)
+    press(panel, "Stop comparing")
+    assert panel.progress.share is None and not panel.background.busy
+    press(panel, "Compare again")
+    lab.wait(lambda: computed(panel) == both)
+    before = figures(panel)
+    assert before["first"][1] == before["second"][1]
+    assert [row.key for row in panel.table.rows if row.bold] == ["first"]
+    assert words_of(panel) == "2 presets on this pluck, 0.5 s"
+    (second,) = (row for row in panel.table.rows if row.key == "second")
+    assert second.tip.splitlines() == [second.values[0], "second.safetensors"]
+    order: list[str] = []
+    panel.background.progressed.connect(lambda share, text, row: order.append(row.name) if row else None)
+    lab.change(preset="second", position=0.6)
+    lab.wait(lambda: all(row.grey for row in panel.table.rows))
+    assert words_of(panel) == "0 of 2 presets on this pluck, 0.5 s; grey: an earlier pluck"
+    lab.wait(lambda: computed(panel) == both)
+    assert order == ["second", "first"], "the preset on the screen first"
+    assert figures(panel)["first"][1] != before["first"][1]
+    first = next(each for each in menu_of(panel) if each.isCheckable())
+    for left in (["second"], ["second", "first"]):
+        first.trigger()
+        assert set(figures(panel)) == set(left)
+    panel.table.choose("second")
+    lab.key(KEY.Key_Delete, on=panel.table)
+    assert list(figures(panel)) == ["first"]
+    menu_of(panel)[1].trigger()  # all
+    panel.table.setFocus()
+    panel.table.choose("first")
+    lab.key(KEY.Key_Return, on=panel.table)
+    assert lab.choices.preset == "first"
+    lab.wait(lambda: [row.key for row in panel.table.rows if row.bold] == ["first"])
+    shutil.copy(preset_folder / "first.safetensors", preset_folder / "third.safetensors")
+    lab.controller.library.refresh()
+    assert sum(each.isCheckable() for each in menu_of(panel)) == 3
+    damaged = preset_folder / "damaged"
+    damaged.write_bytes(b"damaged")
+    damaged.replace(preset_folder / "second.safetensors")  # not in place: another thread may be reading the old one
+    lab.change(amplitude_mm=lab.choices.amplitude_mm + 0.5)  # or have read it
+    lab.wait(lambda: "second.safetensors" in figures(panel)["second"][-1])
+
+
+def test_a_pluck_that_comes_back_while_it_is_compared_is_computed(
+    lab: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    panel = lab.panel("compare")
+    lab.wait(lambda: computed(panel) == {"first", "second"})
+    begun, held, compare = list[object](), Event(), compare_module.compare
+
+    def slow(missing: Any, basis: Any, job: Any) -> object:
+        begun.append(basis)
+        while not held.wait(0.01):
+            job.check()
+        return compare(missing, basis, job)
+
+    monkeypatch.setattr(compare_module, "compare", slow)
+    lab.change(position=0.6)
+    lab.wait(lambda: len(begun) == 1)
+    for position in (0.61, 0.6):
+        lab.change(position=position)
+    held.set()
+    lab.wait(lambda: computed(panel) == {"first", "second"})

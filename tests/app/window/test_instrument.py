@@ -1,0 +1,543 @@
+"""The instrument in the window: keys and plucks by hand play it, knobs change it, files and names keep it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from PySide6.QtCore import QPoint
+from PySide6.QtWidgets import QComboBox, QInputDialog, QToolButton, QToolTip
+
+from app.instrument.events import KEYS, NoteOff, NoteOn, PluckAt, TimedEvent
+from app.instrument.midi_file import midi_bytes
+from app.instrument.string_keys import on_string
+from app.instrument.strings import Strings
+from app.patches.instrument import SingleString
+from app.patches.library import SHIPPED as PATCHES
+from app.patches.library import own_patches, read_patch
+from app.patches.patch import Macro, Patch, Pickup, Target
+from app.patches.tuning import TuningChoice
+from app.playing.key_note import KeyNote
+from app.playing.keyboard import HIGHEST_PLACE, LOWEST_PLACE, PLACES
+from app.playing.note import Note
+from app.rendering.subject import path_of, string_of
+from app.session.choices import Choices
+from app.shared.key_names import note_name
+from app.views.controls.playing_keys import PlayingKeys
+from app.window.instruments import OWN_MS
+from engine.pluck import SHAPES, Pluck
+from engine.presets.finding import SHIPPED
+from tests.app.instrument.conftest import STEEL
+from tests.app.instrument.seen import Seen, sounding
+from tests.app.window.driver import CONTROL, KEY, LEFT, PLAIN, SHIFT, Window, choose
+from tests.app.window.midi import FakeBackend
+
+HARP = read_patch(PATCHES / "concert_harp.json")
+FIVE_STEPS = "! five.scl\n!\nFive equal steps\n 5\n!\n" + "".join(f" {240 * n}.\n" for n in range(1, 6))
+
+
+def ringing(w: Window) -> list[Seen]:
+    """The notes of keys that have their places."""
+    assert w.keys.player is not None
+    return sounding(w.keys.player)
+
+
+def key_note(w: Window) -> Any:
+    """The latest note, of a key, once its string is known."""
+    note = w.struck[-1]
+    assert isinstance(note, KeyNote)
+    w.wait(lambda: note.request is not None)
+    return note
+
+
+def turn(w: Window, field: str, value: object) -> None:
+    """Turn a knob of the instrument."""
+    w.window.instrument.knobs.changed.emit(field, value)
+
+
+@pytest.fixture
+def named(monkeypatch: pytest.MonkeyPatch) -> Callable[..., list[tuple[str, str]]]:
+    """Answers questions for a name with these; gives what was asked, and the name that stood there."""
+
+    def answer(*names: str) -> list[tuple[str, str]]:
+        asked, left = list[tuple[str, str]](), list(names)
+
+        def ask(parent: object, title: str, label: str, text: str) -> tuple[str, bool]:
+            asked.append((label, text))
+            return left.pop(0), True
+
+        monkeypatch.setattr(QInputDialog, "getText", ask)
+        return asked
+
+    return answer
+
+
+def test_keys_of_computer_and_screen_play_pitches_and_the_window_shows_the_string(guitar: Window) -> None:
+    strip = guitar.window.instrument
+    assert strip.knobs.facts.accessibleDescription().startswith(f"key {note_name(sum(guitar.patch.range) // 2)}, ")
+    guitar.qtbot.keyPress(guitar.window, KEY.Key_A)
+    guitar.sounds(48)
+    guitar.wait_for_string()
+    wanted_hz = 440 * 2 ** ((48 - 69) / 12)
+    guitar.wait(lambda: (take := guitar.performance.take) and abs(take.fundamental_hz / wanted_hz - 1) < 1e-3)
+    guitar.wait(lambda: strip.keys.level(48) > 0.1)
+    guitar.wait_for_take()
+    assert not ringing(guitar)[0].damped
+    guitar.qtbot.keyRelease(guitar.window, KEY.Key_A)
+    guitar.wait(lambda: ringing(guitar)[0].damped)
+    guitar.controller.play_or_stop()
+    for key in (KEY.Key_X, KEY.Key_9):
+        guitar.key(key)
+    assert (guitar.choices.octave, guitar.choices.velocity) == (1, 127)
+    assert strip.bar.velocity.text() == "velocity 127" and strip.bar.velocity.isVisible()
+    guitar.qtbot.keyPress(guitar.window, KEY.Key_K)
+    guitar.wait(lambda: 72 in guitar.keys.sounding())
+    guitar.qtbot.keyRelease(guitar.window, KEY.Key_K)
+    guitar.play(50, hold=True)
+    guitar.wait(lambda: strip.knobs.facts.accessibleDescription().startswith("key D3, pitch 146.8 Hz"))
+    tension, length = strip.knobs.knobs["knobs.tension"], strip.knobs.knobs["knobs.length"]
+    long_mm = float(length.accessibleDescription().split()[0])
+    strip.knobs.figure_asked.emit("knobs.tension", 200.0)
+    assert tension.accessibleDescription().startswith("200 N (× ")
+    now_mm = float(length.accessibleDescription().split()[0])
+    assert now_mm == pytest.approx(long_mm * guitar.patch.knobs.tension**0.5, rel=0.01)
+    strip.knobs.figure_asked.emit("knobs.tension", 1e9)
+    assert guitar.patch.knobs.tension == pytest.approx(16.0)
+
+
+def test_the_switch_of_keys_is_remembered_and_places_are_prepared_for_them_alone(
+    guitar: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepared: list[list[float]] = []
+    watch = lambda subject, plucks: prepared.append([pluck.position for pluck in plucks])  # noqa: E731
+    monkeypatch.setattr(guitar.notes, "prepare_plucks", watch)
+    plays = guitar.window.instrument.plays
+    pitches, places = plays.menu().actions()
+    guitar.play(52)
+    guitar.wait_for_string()
+    assert prepared == [] and plays.text().startswith("Keys play notes")
+    places.trigger()
+    assert (
+        plays.text().startswith("Keys set pluck position") and not guitar.window.instrument.bar.velocity.isVisible()
+    )
+    assert guitar.choices.preset == "studio_any_string" and not guitar.controller.settings().choices.plays_patch
+    guitar.change(amplitude_mm=3.3)
+    assert [len(set(positions)) for positions in prepared] == [PLACES, PLACES]
+    guitar.wait(lambda: not guitar.keys.sounding())
+    guitar.key(KEY.Key_A)
+    assert isinstance(guitar.struck[-1], Note) and guitar.keys.sounding() == {}
+    pitches.trigger()
+    guitar.qtbot.keyPress(guitar.window, KEY.Key_A)
+    guitar.sounds(48)
+    guitar.qtbot.keyRelease(guitar.window, KEY.Key_A)
+
+
+def test_a_pluck_by_hand_is_a_note_of_the_instrument_except_beside_another_preset(guitar: Window) -> None:
+    instruments = guitar.controller.instruments
+    guitar.wait(lambda: guitar.choices.string is not None and guitar.performance.playable)
+    guitar.pluck()
+    assert instruments.struck is not None and instruments.struck.event.pluck == guitar.choices.pluck
+    guitar.play(52)
+    guitar.wait_for_string()
+    shown, other = guitar.choices.string, next(each for each in SHAPES if each != guitar.choices.shape)
+    guitar.change(position=0.31, amplitude_mm=1.2, shape=other)
+    guitar.keys.begin_recording()
+    guitar.pluck()
+    note = key_note(guitar)
+    pluck = note.request.pluck
+    assert (pluck.position, pluck.amplitude_mm, pluck.shape) == (0.31, 1.2, other)
+    guitar.wait(lambda: guitar.performance.ready)
+    assert guitar.choices.string == shown and guitar.choices.pluck == pluck
+    assert (ringing(guitar)[-1].key, ringing(guitar)[-1].damped) == (52, False)
+    recorded = [each.event for each in guitar.keys.recorder.end()]
+    assert NoteOn(52, note.event.velocity, KEYS, pluck=pluck) in recorded
+    guitar.change(position=0.41)
+    assert instruments.struck.event.pluck == guitar.choices.pluck, "an export has the pluck that is shown"
+    guitar.change(b="preset:second")
+    assert instruments.struck is None and isinstance(guitar.pluck(), Note)
+
+
+def test_each_turn_of_a_loop_stays_with_the_instrument_when_pluck_and_string_change(
+    guitar: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rung: list[object] = []
+    monkeypatch.setattr(guitar.notes, "ring", lambda *places, **more: rung.append(more))
+    guitar.change(seconds=0.5, loop=True)
+    guitar.play(52, hold=True)
+
+    def turns(key: int, position: float | None = None) -> bool:
+        latest = guitar.notes.latest
+        pluck = latest.event.pluck if isinstance(latest, KeyNote) and latest.event.key == key else None
+        return pluck is not None and pluck == guitar.choices.pluck and position in (None, pluck.position)
+
+    guitar.wait(lambda: turns(52))
+    guitar.change(position=0.41)
+    guitar.wait(lambda: turns(52, 0.41))
+    guitar.controller.instruments.play(NoteOn(57, 80, KEYS))
+    guitar.wait(lambda: turns(57))
+    shape = next(each for each in ("gaussian", "triangular") if each != guitar.patch.pluck.shape)
+    turn(guitar, "pluck.shape", shape)
+    guitar.wait(lambda: guitar.choices.shape == shape and turns(57))
+    assert rung == [], "no string sounds by itself"
+
+
+def test_octaves_stop_and_move_to_where_keys_sound_and_the_strip_says_so(guitar: Window) -> None:
+    bar = guitar.window.instrument.bar
+    guitar.choose("toy_wires")  # C3 to D♯6
+    for key, octave, words in ((KEY.Key_Z, 0, "Lowest"), (KEY.Key_X, 3, "Highest")):
+        QToolTip.hideText()
+        for _ in range(6):
+            guitar.key(key)
+        assert guitar.choices.octave == octave and QToolTip.text() == f"{words} octave: Toy wires has C3 to D♯6"
+    assert bar.octave.text() == "octave C6"
+    bar.octave_asked.emit(1)
+    guitar.controller.patches.change("knobs.decay", 3.0)
+    assert guitar.choices.octave == 3, "four keys sound"
+    guitar.change(octave=2)  # C5 to F6
+    for patch, octave in (("slack_bass", -1), ("concert_harp", -1), ("mandolin", 1)):
+        guitar.controller.patches.choose(patch)
+        assert guitar.choices.octave == octave
+        assert patch != "slack_bass" or QToolTip.text() == "Octave moved: Slack bass has C1 to A♯3"
+
+
+def test_knobs_change_the_patch_its_pluck_and_its_pick_up_and_undo_takes_them_back(guitar: Window) -> None:
+    history, start, knobs = guitar.controller.history, guitar.choices, guitar.window.instrument.knobs
+    turn(guitar, "knobs.stiffness", 2.0)
+    assert guitar.patch.knobs.stiffness == 2.0
+    turn(guitar, "knobs.stiffness", 99.0)
+    assert guitar.patch.knobs.stiffness == 2.0
+    history.undo()
+    assert guitar.patch == start.patch
+    history.redo()
+    guitar.controller.patches.revert()
+    assert guitar.patch == start.patch
+    for shape, name in (("triangular", "Triangle"), ("gaussian", "Gaussian"), ("raised_cosine", "Raised cosine")):
+        turn(guitar, "pluck.shape", shape)
+        assert (guitar.patch.pluck.shape, knobs.shape.currentText()) == (shape, name)
+        assert knobs.knobs["pluck.width_hard"].isEnabled() == (shape != "triangular")
+        assert history.undo_words == "pluck shape"
+    turn(guitar, "pickup.points.0", 0.11)
+    assert guitar.choices.listen == 0.11
+    guitar.play(60)
+    note = key_note(guitar)
+    assert (note.request.pluck.shape, note.request.ear.points[0]) == ("raised_cosine", 0.11)
+    history.undo()
+    assert guitar.choices.listen == start.listen
+    knobs.knobs["tuning.transpose"].value_asked.emit(2.2)
+    assert guitar.patch.tuning.transpose == 2
+    tuning = TuningChoice(a4_hz=432.0, scale=FIVE_STEPS)
+    guitar.change(patch=guitar.patch.model_copy(update={"tuning": tuning}))
+    scala = guitar.window.instrument.bar.scala
+    assert scala.isVisible() and "Five equal steps" in scala.toolTip()
+    scala.click()
+    assert not scala.isVisible() and guitar.patch.tuning == TuningChoice(a4_hz=432.0)
+    history.undo()
+    assert guitar.patch.tuning == tuning
+
+
+def test_the_transport_changes_where_the_patch_is_heard(guitar: Window) -> None:
+    stereo, pickup = guitar.find(QToolButton, "Stereo"), guitar.find(QComboBox, "Pick-up")
+    before = guitar.choices.stereo
+    choose(pickup, "bridge")
+    stereo.setChecked(not before)
+    guitar.session.move_listening_point(0.21)
+    heard = guitar.patch.pickup
+    assert (heard.kind, heard.points[0], len(heard.points) == 2) == ("bridge", 0.21, not before)
+    assert guitar.window.instrument.bar.save.isEnabled() and guitar.keys.player.patch == guitar.patch  # type: ignore[union-attr]
+    guitar.choose("concert_harp")
+    assert (pickup.currentData(), stereo.isChecked()) == (HARP.pickup.kind, len(HARP.pickup.points) == 2)
+    macro = Macro(name="Width", targets=(Target(field="pickup.points.1", low=0.5, high=0.9),))
+    guitar.change(patch=HARP.model_copy(update={"pickup": Pickup(points=(0.2, 0.8)), "macros": (macro,)}))
+    stereo.click()
+    assert stereo.isChecked() and "stays in stereo: its macro Width" in guitar.window.notices.text
+
+
+def test_a_patch_is_saved_renamed_compared_and_deleted(guitar: Window, named: Callable[..., Any]) -> None:
+    patches, bar = guitar.controller.patches, guitar.window.instrument.bar
+    asked = named("AC/DC", "My Bass.", "Classical guitar", "Mine", "Yours")
+    patches.change("knobs.decay", 3.0)
+    patches.browser.search.setText("harpsichord")
+    guitar.key(KEY.Key_S, CONTROL)
+    file = own_patches() / "mine.json"
+    assert read_patch(file).knobs.decay == 3.0
+    assert [text for _, text in asked[1:]] == ["AC/DC", "My Bass.", "Classical guitar"], "the typed name stays"
+    assert "must not begin or end with a full stop, or hold one of" in asked[1][0]
+    assert "a factory instrument has this name" in asked[3][0]
+    assert "mine" in patches.browser.listed, "an old search does not hide it"
+    patches.change("knobs.decay", 4.0)
+    saved, mine = read_patch(file), guitar.patch
+
+    def heard() -> tuple[bool, Patch]:
+        return bar.compare.isChecked(), guitar.keys.player.patch  # type: ignore[union-attr]
+
+    bar.compare.click()
+    assert heard() == (True, saved) and guitar.patch == mine
+    bar.compare.click()
+    assert heard() == (False, mine)
+    for ends in (lambda: patches.change("level_db", -3.0), guitar.controller.history.undo, patches.revert):
+        bar.compare.click()
+        ends()  # it is of the choice, not of the sound
+        assert heard() == (False, guitar.patch)
+    assert guitar.patch == saved and not bar.compare.isEnabled()
+    patches.change("knobs.decay", 5.0)
+    bar.compare.click()
+    patches.save()  # the user's own, without a question
+    assert read_patch(file).knobs.decay == 5.0 and heard() == (False, guitar.patch)
+    patches.browser.favourite_asked.emit("mine")
+    copy = Path(shutil.copy(file, own_patches() / "mine (copy).json"))
+    patches.reload()
+    patches.choose("mine")
+    patches.change("knobs.decay", 6.0)
+    patches.save()
+    assert (read_patch(file).knobs.decay, read_patch(copy).knobs.decay) == (6.0, 5.0), "each by itself"
+    names = {patches.desk.step(1) or patches.entry.name for _ in range(patches.browser.total)}  # type: ignore[union-attr]
+    assert names == set(patches.browser.listed)
+    copy.unlink()
+    patches.choose("mine")
+    patches.rename()
+    assert not file.exists() and read_patch(own_patches() / "yours.json").name == "Yours"
+    assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (False, True), "it is saved, and one's own"
+    assert "yours" in patches.desk.favourites and "mine" not in patches.desk.favourites
+    patches.delete("yours")
+    assert not list(own_patches().glob("*.json")) and "yours" not in patches.desk.favourites
+    assert (bar.save.isEnabled(), bar.rename.isEnabled()) == (True, False)
+
+
+def test_the_browser_of_instruments_is_searched_without_playing_and_filters_the_steps(guitar: Window) -> None:
+    patches, bar, pressed = guitar.controller.patches, guitar.window.instrument.bar, list[object]()
+    (keys,) = guitar.window.findChildren(PlayingKeys)
+    keys.pressed.connect(pressed.append)
+    guitar.wait(guitar.window.isActiveWindow)
+    patches.desk.toggle()
+    browser = patches.browser
+    guitar.key(KEY.Key_Down, on=browser.search)
+    guitar.wait(browser.list.hasFocus)
+    for letter in "harp":
+        guitar.key(letter, on=guitar.window.focusWidget())
+    guitar.window.instrument.keys.setFocus()  # as by a click on a key, which the browser leaves in sight
+    for letter in "ab":
+        guitar.key(letter, on=guitar.window.focusWidget())
+    assert (browser.search.text(), pressed, guitar.choices.heard) == ("harpab", [], "a")
+    browser.search.setText("mandolin")
+    patches.choose("mandolin")
+    assert bar.filtered.isVisible() and bar.filtered.text() == f"{len(browser.listed)} of {browser.total}  ✕"
+    bar.filtered.click()
+    assert not bar.filtered.isVisible() and len(browser.listed) == browser.total
+    bar.next_asked.emit()
+    assert guitar.patch.name != "Mandolin"
+    bar.previous_asked.emit()
+    patches.change("knobs.decay", 3.0)
+    changed = guitar.patch
+    guitar.session.play_string()
+    patches.audition("mandolin")  # it is there already, with its changes
+    assert guitar.choices.instrument == changed
+    patches.audition("concert_harp")
+    assert guitar.patch == HARP
+
+
+def test_dropped_songs_are_played_without_drums_and_instruments_added_once(
+    guitar: Window, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    song, file = tmp_path / "song.mid", tmp_path / "from a friend.json"
+    notes = [TimedEvent(0.0, NoteOn(40, 90, 9)), TimedEvent(0.0, NoteOn(52, 90)), TimedEvent(30.0, NoteOff(52))]
+    song.write_bytes(midi_bytes(notes))  # at the end of a file all is released: it must not end before it is seen
+    guitar.drop(song)
+    guitar.sounds(52)
+    assert guitar.said == ["song.mid is played without its drums (channel 10)."]
+    guitar.key(KEY.Key_Space)
+    assert not guitar.controller.patches.playing
+    song.write_bytes(b"no")
+    guitar.drop(song)
+    assert "song.mid" in guitar.said[-1]
+    tuned, names = HARP.model_copy(update={"level_db": HARP.level_db - 2}), []
+    for patch in (tuned, tuned, HARP, tuned.model_copy(update={"description": "Another"})):
+        file.write_text(patch.model_dump_json())
+        guitar.drop(file)
+        names.append(guitar.patch.name)
+        assert guitar.patch.model_copy(update={"name": patch.name}) == patch
+    assert names == ["Concert harp 2", "Concert harp 2", "Concert harp", "Concert harp 3"]
+    assert sorted(path.stem for path in own_patches().glob("*.json")) == ["concert_harp_2", "concert_harp_3"]
+    guitar.drop(own_patches() / "concert_harp_2.json")  # it is there already
+    before = (own_patches() / "concert_harp_2.json").read_bytes()
+    file.write_text(tuned.model_copy(update={"name": "Concert-harp 2!"}).model_dump_json())  # the same file's name
+    guitar.drop(file)
+    assert (own_patches() / "concert_harp_2.json").read_bytes() == before
+    assert len(list(own_patches().glob("*.json"))) == 3
+    monkeypatch.setenv("LEARNED_STRINGS_PRESETS", str(song))  # a file: nothing can be added there
+    mine = tuned.model_copy(update={"name": "Mine"})
+    file.write_text(mine.model_dump_json())
+    guitar.drop(file)
+    assert guitar.patch == mine and "not added to your library" in guitar.window.notices.text
+
+
+def test_what_is_beyond_training_is_reported_and_follows_the_knobs(guitar: Window) -> None:
+    tip = guitar.window.outside_label.toolTip
+
+    def turned(decay: float, brightness: float, beyond: bool) -> None:
+        guitar.controller.patches.change("knobs.brightness_decay", brightness)
+        guitar.controller.patches.change("knobs.decay", decay)
+        guitar.wait(lambda: ("decay time near 3 kHz" in tip()) == beyond)
+
+    turned(0.5, 0.1, False)  # nothing was struck
+    guitar.play(80, hold=True)
+    guitar.wait(lambda: "decay time near 3 kHz" in tip())
+    turned(1.5, 0.1, True)
+    turn(guitar, "knobs.stiffness", 10.0)
+    turned(1.5, 3.0, False)  # the inharmonicity is beyond the training, and no error grows with it
+    assert "inharmonicity" not in tip()
+    turned(0.5, 0.1, True)  # before the next key
+    guitar.session.play_string()
+    assert not tip()
+    guitar.session.play_patch()
+    guitar.play(80, hold=True)
+    guitar.wait(lambda: "decay time near 3 kHz" in tip())
+    guitar.choose("concert_harp")
+    assert not tip()
+
+
+def test_keys_say_once_that_they_do_not_play_another_preset_and_the_difference_is_dry(
+    guitar: Window, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def said() -> int:
+        return sum("Keys sound with the model of their instrument" in each for each in guitar.said)
+
+    guitar.change(a="preset:second", heard="a")
+    assert said() == 1
+    for _ in range(2):
+        guitar.session.switch_source()
+    turn(guitar, "knobs.decay", 2.0)
+    guitar.session.play_string()
+    guitar.change(a="preset:first")
+    assert said() == 1
+    guitar.session.play_patch()
+    assert guitar.window.notices.notices[-1].times == 2 or said() == 2
+    dry: list[bool] = []
+    monkeypatch.setattr(guitar.notes, "hear_dry", dry.append)
+    guitar.change(a="model", b="difference", heard="b")
+    guitar.performance.hear_dry(True)
+    guitar.performance.hear_dry(False)  # a listening test has ended
+    guitar.change(heard="a")
+    assert dry[-4:] == [True, True, True, False]
+
+
+def test_an_instrument_shows_its_own_string_and_pluck_until_something_is_restored(
+    guitar: Window, preset_folder: Path
+) -> None:
+    history = guitar.controller.history
+    for name in ("classical_guitar", "concert_harp"):
+        patch = read_patch(PATCHES / f"{name}.json")
+        guitar.choose(name)
+        key = sum(patch.range) // 2
+        string = Strings(patch).of_key(key)
+        assert string is not None
+        guitar.wait(lambda own=string: guitar.choices.string == own.parameters)
+        assert guitar.choices.pluck == on_string(string, patch.pluck.pluck(guitar.choices.velocity))
+    guitar.wait(lambda: guitar.performance.playable)
+    note = guitar.pluck()
+    assert note.event.key == key and abs(note.event.velocity - guitar.choices.velocity) <= 1
+    assert history.undo_words.startswith("instrument")
+    guitar.choose("classical_guitar")
+    guitar.play(52)
+    guitar.wait_for_string()
+    guitar.wait(lambda: guitar.choices.string is not None)
+    own, patch = guitar.choices.string, guitar.patch
+    pluck = patch.pluck.model_copy(update={"position": 0.22, "shape": "raised_cosine"})
+    guitar.change(patch=patch.model_copy(update={"pluck": pluck}))
+    guitar.wait(lambda: (guitar.choices.position, guitar.choices.shape) == (0.22, "raised_cosine"))
+    assert guitar.choices.string == own
+    guitar.change(position=0.45)
+    guitar.change(patch=guitar.patch.with_value("knobs.decay", 2.0))
+    guitar.qtbot.wait(2 * OWN_MS)
+    assert guitar.choices.position == 0.45, "a knob of the string leaves what was drawn"
+    low = Strings(HARP).of_key(43)
+    assert low is not None
+    for string in (STEEL, low.parameters):
+        guitar.change(instrument=HARP, string=string, position=0.2, shape=HARP.pluck.shape)
+        guitar.qtbot.wait(2 * OWN_MS)
+        assert (guitar.choices.string, guitar.choices.position) == (string, 0.2)
+        guitar.change(instrument=patch)
+        guitar.qtbot.wait(2 * OWN_MS)
+    guitar.change(instrument=HARP, string=low.parameters)
+    guitar.wait(lambda: guitar.performance.playable)
+    guitar.qtbot.wait(2 * OWN_MS)
+    assert guitar.pluck().event.key == 43, "the string that was restored"
+    shutil.copy(SHIPPED / "studio_any_string.safetensors", preset_folder / "another.safetensors")
+    guitar.controller.library.refresh()
+    other = read_patch(PATCHES / "cimbalom.json").model_copy(update={"preset": "another"})
+    guitar.change(instrument=patch)
+    guitar.wait(lambda: guitar.choices.shape == patch.pluck.shape != other.pluck.shape)
+    guitar.qtbot.wait(2 * OWN_MS)
+    before = guitar.choices.string, guitar.choices.shape
+    guitar.change(instrument=other)
+    guitar.wait(lambda: guitar.choices.shape == other.pluck.shape)
+    history.undo()
+    guitar.wait(lambda: (guitar.choices.string, guitar.choices.shape) == before)
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["window knows", "window is busy"])
+def test_notes_of_midi_choose_places_and_presets_and_a_pluck_after_them_is_of_that_preset(
+    backend: FakeBackend, guitar: Window, known: bool
+) -> None:
+    """Also on the string of the key that was struck last."""
+    instruments, session = guitar.controller.instruments, guitar.session
+    guitar.play(52)
+    if known:
+        guitar.wait_for_string()
+        string, reach = guitar.choices.string, instruments.reach
+        backend.play(guitar, "position", NoteOn(HIGHEST_PLACE, 127))
+        guitar.wait(lambda: guitar.choices.position == reach.position[1])
+        assert guitar.choices.amplitude_mm == reach.amplitude_mm[1]
+        assert (guitar.choices.string, guitar.choices.plays_patch) == (string, True)
+    backend.play(guitar, "preset", NoteOn(LOWEST_PLACE + guitar.controller.library.names.index("second"), 100))
+    note = guitar.struck[-1]
+    assert path_of(note.request.preset).stem == "second"
+    assert string_of(note.request.preset) is None, "not the string of the instrument's key"
+    if known:
+        guitar.wait(lambda: guitar.choices.preset == "second")
+        assert guitar.choices.string is None
+    session.update(volume_db=-3.0)  # another choice takes nothing back
+    instruments.play(PluckAt(Pluck(0.6, 2.5)))
+    assert path_of(guitar.struck[-1].request.preset).stem == "second"
+    guitar.wait(lambda: (guitar.choices.preset, guitar.choices.position) == ("second", 0.6))
+    assert guitar.choices.instrument == SingleString(preset="second") and guitar.choices.amplitude_mm == 2.5
+    guitar.wait(lambda: all(each.seconds > 0 or each.cut for each in guitar.struck[-2:]))
+    assert not guitar.struck[-1].cut and "cannot" not in guitar.window.notices.text
+
+
+def test_the_menu_and_the_key_name_the_steps_of_undo_and_a_lost_release_ends_a_drag(lab: Window) -> None:
+    menu, history = lab.window.menu, lab.controller.history
+
+    def words() -> list[str]:
+        menu.aboutToShow.emit()
+        return [menu.action[name].text() for name in ("undo", "redo")]
+
+    lab.wait(lab.window.isActiveWindow)
+    assert words() == ["Undo", "Redo"]
+    lab.change(width=0.2)
+    assert words() == ["Undo: pluck width", "Redo"]
+    for held, said in ((CONTROL, "Undone: pluck width"), (CONTROL, "Nothing to undo"), (CONTROL | SHIFT, "Redone:")):
+        lab.key(KEY.Key_Z, held)
+        assert QToolTip.text().startswith(said)
+    menu.action["undo"].trigger()
+    assert words() == ["Undo", "Redo: pluck width"]
+    lab.controller.patches.choose("classical_guitar")
+    assert words()[0] == "Undo: instrument Classical guitar"
+    history.undo()
+    knob = lab.window.transport.knobs["position"]
+    middle = knob.rect().center()
+    lab.qtbot.mousePress(knob, LEFT, pos=middle)
+    for pixels in (4, 8):  # one step
+        lab.qtbot.mouseMove(knob, middle - QPoint(0, pixels))
+    assert history.undo_words == "pluck position"
+    lab.qtbot.mouseRelease(lab.window, LEFT, PLAIN)  # as where a dialog takes the mouse
+    lab.change(amplitude_mm=7.0)
+    lab.change(width=0.2)
+    for step in ("pluck width", "amplitude", "pluck position"):
+        assert history.undo_words == step
+        history.undo()
+    assert not history.undo_words and lab.choices.position == Choices().position
+    assert replace(lab.choices.pluck, position=0.5) != lab.choices.pluck
