@@ -121,7 +121,9 @@ def _compare_one(
     ear = listening_weights(np.array([basis.listen]), info.grid_points).astype(np.float32)
     steps = len(true)
     string, sound = ErrorSums(steps), ErrorSums(steps)
-    first, work_s, note = 0, 0.0, ""
+    first = 0
+    work_s = 0.0
+    note = ""
     try:
         _warm_up(source, basis, info)
         for predicted, spent_s in _frames(source, basis, info, job):

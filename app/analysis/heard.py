@@ -56,12 +56,12 @@ class _Heard(Generic[Owner, Each]):
     @property
     def ready(self) -> int:
         """Frames so far."""
-        return min(each.ready_frames for each in self._series)
+        return min(series.ready_frames for series in self._series)
 
     def read_all(self, first: int, stop: int) -> NDArray[np.float32]:
         """The frames first … stop - 1 that are ready, (frames, places)."""
         stop = min(stop, self.ready)
-        return _combined([each.read(first, stop) for each in self._series], self.gain)
+        return _combined([series.read(first, stop) for series in self._series], self.gain)
 
 
 class HeardMotion(_Heard[Take, Motion]):

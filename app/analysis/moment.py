@@ -123,7 +123,9 @@ def frame_at(
         speed: of slow motion; 1 is real time.
     """
     there = [motion for motion in motions if motion.there]
-    shapes, lowest, highest = {}, {}, {}
+    shapes = {}
+    lowest = {}
+    highest = {}
     for motion in there:
         last = min(max(math.ceil(position_s * motion.rate_hz), 1), motion.ready)
         frames = motion.read_all(max(0, last - math.ceil(BLUR_S * motion.rate_hz)), last)

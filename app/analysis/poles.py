@@ -71,12 +71,12 @@ class PoleFigure:
 def pole_figure(preset: Preset) -> PoleFigure:
     """The eigenvalues of a preset's model, and those of its string for small amplitudes."""
     info = preset.info
-    own = info.resonator.eigenvalues() / info.rate_hz
-    found = [log.numpy() for log in preset.model.log_eigenvalues()]
+    string_logs = info.resonator.eigenvalues() / info.rate_hz
+    layer_logs = [log.numpy() for log in preset.model.log_eigenvalues()]
     note = _NOTES.get(info.model, "")
-    if not found:
+    if not layer_logs:
         note = f"a {info.model} has no eigenvalues: its whole field goes through a network at every sample"
-    return PoleFigure(info.rate_hz, _poles(found, info), _poles([own], info), len(found), note)
+    return PoleFigure(info.rate_hz, _poles(layer_logs, info), _poles([string_logs], info), len(layer_logs), note)
 
 
 def _poles(layers: list[NDArray[np.complex128]], info: PresetInfo) -> Poles:

@@ -68,7 +68,7 @@ class Spectrogram:
 
     def _possible(self) -> int:
         """The number of columns whose window is rendered to its end."""
-        return self._columns_of(min(heard.ready for heard in self._heard.values()))
+        return self._columns_of(min(signal.ready for signal in self._heard.values()))
 
     def _columns_of(self, frames: int) -> int:
         half = self.window_frames // 2
@@ -78,10 +78,10 @@ class Spectrogram:
         """(count, bins) of the next columns."""
         first = self.ready * self.hop - self.window_frames // 2
         last = first + (count - 1) * self.hop + self.window_frames
-        heard = self._heard[source]
-        signal = heard.read(max(first, 0), last)
+        source_signal = self._heard[source]
+        signal = source_signal.read(max(first, 0), last)
         if first < 0:
-            mirror = heard.read(1, 1 - first)[::-1]
+            mirror = source_signal.read(1, 1 - first)[::-1]
             if isinstance(self.take, BlowTake) or self.listened.ear.pickup == "velocity":
                 mirror = -mirror
             signal = np.concatenate([mirror, signal])

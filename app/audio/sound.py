@@ -69,9 +69,9 @@ class _Wish:
     buffer_frames: int = 0
     rescan: bool = False
 
-    def at_its_rate(self, found: AudioDevice) -> AudioDevice:
-        """`found` with the wanted rate, or, for 0, with its own."""
-        return replace(found, default_rate_hz=self.rate_hz) if self.rate_hz else found
+    def at_its_rate(self, device: AudioDevice) -> AudioDevice:
+        """The device with the wanted rate, or, for 0, with its own."""
+        return replace(device, default_rate_hz=self.rate_hz) if self.rate_hz else device
 
     def buffer_s_at(self, rate_hz: int) -> float:
         return self.buffer_frames / rate_hz if self.buffer_frames else self.buffer_s
@@ -296,17 +296,20 @@ class Sound:
             if isinstance(error, AudioUnavailable):
                 raise
             raise unexpected(error, device.name) from error
-        self.mixer, self._wish, self._stalled, self._calls_before = mixer, wish, False, mixer.calls
+        self.mixer = mixer
+        self._wish = wish
+        self._stalled = False
+        self._calls_before = mixer.calls
         self._set_up(mixer)  # what was set while the device was being opened went to the old one
         self._status = replace(self._status, problem=None)
 
     def _set_up(self, mixer: Mixer) -> None:
         """Give it volume and effects, the latest where another thread sets them meanwhile."""
-        given: object = None
-        while given != (wished := (self._volume_db, self._effects)):
-            mixer.set_volume(10 ** (wished[0] / 20))
-            self._carry_on(partial(mixer.set_effects, wished[1]))  # else all would be silent
-            given = wished
+        set_values: object = None
+        while set_values != (wanted_values := (self._volume_db, self._effects)):
+            mixer.set_volume(10 ** (wanted_values[0] / 20))
+            self._carry_on(partial(mixer.set_effects, wanted_values[1]))  # else all would be silent
+            set_values = wanted_values
 
     def _reopen(self, device: AudioDevice, wish: _Wish) -> None:
         """Open the device again as before a change that was refused; if that fails too, it counts as lost."""

@@ -22,7 +22,9 @@ if TYPE_CHECKING:
     from _typeshed import WriteableBuffer
 
 KINDS = "WAV, FLAC, AIFF or Ogg"
-_PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
+_PCM = 1
+_FLOAT = 3
+_EXTENSIBLE = 0xFFFE
 _COMPRESSED = (2, 6, 7, 0x11, 0x31, 0x38, 0x40, 0x55)  # ADPCM, A-law, µ-law, GSM and MP3, which libsndfile reads
 _MOST_CHUNKS = 10_000
 _KEPT, _LARGEST_TEXT = (b"fmt ", b"fact"), 2**16  # chunks that are kept besides a list of texts; bytes of each
@@ -69,7 +71,9 @@ class _Spliced(io.RawIOBase):
     """A file: bytes of our own, then a part of another file."""
 
     def __init__(self, head: bytes, file: BinaryIO, start: int, length: int) -> None:
-        self._head, self._file, self._start = head, file, start
+        self._head = head
+        self._file = file
+        self._start = start
         self._length, self._at = len(head) + length, 0
 
     def seekable(self) -> bool:
@@ -89,13 +93,13 @@ class _Spliced(io.RawIOBase):
     def readinto(self, buffer: WriteableBuffer) -> int:
         view = memoryview(buffer).cast("B")
         wanted = min(len(view), max(0, self._length - self._at))
-        own = self._head[self._at : self._at + wanted]
-        view[: len(own)] = own
+        head_part = self._head[self._at : self._at + wanted]
+        view[: len(head_part)] = head_part
         self._file.seek(self._start + max(0, self._at - len(self._head)))
-        rest = self._file.read(wanted - len(own))
-        view[len(own) : len(own) + len(rest)] = rest
-        self._at += len(own) + len(rest)
-        return len(own) + len(rest)
+        rest = self._file.read(wanted - len(head_part))
+        view[len(head_part) : len(head_part) + len(rest)] = rest
+        self._at += len(head_part) + len(rest)
+        return len(head_part) + len(rest)
 
 
 def _recognised(file: BinaryIO, end: int) -> _Spliced:
@@ -137,13 +141,13 @@ def _counted(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
     first = _bytes_at(file, at, 4)
     place = max(at, end - _LARGEST_FLAC_BLOCK)
     rest = _bytes_at(file, place, max(0, end - place)) + bytes(16)
-    found, length = len(rest) - 16, 0
+    block_at, length = len(rest) - 16, 0
     for _ in range(_MOST_CHUNKS):
-        found = rest.rfind(first[:2], 0, max(found, 0)) if len(first) == 4 else -1
-        if found < 0 or length:
+        block_at = rest.rfind(first[:2], 0, max(block_at, 0)) if len(first) == 4 else -1
+        if block_at < 0 or length:
             break
-        if all(_agree(rest[found + place] & 15, first[place] & 15) for place in (2, 3)):  # rate and bits
-            length = _end_of_flac_block(rest[found : found + 16], int.from_bytes(head[8:10]))
+        if all(_agree(rest[block_at + place] & 15, first[place] & 15) for place in (2, 3)):  # rate and bits
+            length = _end_of_flac_block(rest[block_at : block_at + 16], int.from_bytes(head[8:10]))
     if length == 0:
         raise UnreadableSound("it has no samples, or is cut off")
     return head[:21] + (int.from_bytes(head[21:26]) | min(length, _FLAC_FRAMES)).to_bytes(5) + head[26:]
@@ -180,7 +184,7 @@ def _end_of_flac_block(data: bytes, block_frames: int) -> int:
 def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, int]:
     """A header, the file, and place and length of its samples."""
     byte_order = ">" if _bytes_at(file, start, 4) == b"RIFX" else "<"
-    found: dict[bytes, bytes] = {}
+    chunks: dict[bytes, bytes] = {}
     samples, stated = (0, 0), 0  # place and length; the length that ds64 states
     at = start + 12
     for _ in range(_MOST_CHUNKS):
@@ -201,37 +205,37 @@ def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, i
         elif name == b"ds64" and size >= 16:
             stated = struct.unpack(byte_order + "Q", _bytes_at(file, at + 8, 8).ljust(8, b"\0"))[0]
         elif size <= _LARGEST_TEXT and (name in _KEPT or (name == b"LIST" and _bytes_at(file, at, 4) == b"INFO")):
-            found.setdefault(name, _bytes_at(file, at, size))
+            chunks.setdefault(name, _bytes_at(file, at, size))
         at = _next_chunk(file, at + size, size, byte_order)
     else:
         raise UnreadableSound(f"it has more than {_MOST_CHUNKS} chunks")
-    if b"fmt " not in found or samples[0] == 0:
-        raise UnreadableSound("it has no format" if b"fmt " not in found else "it has no samples")
-    if b"LIST" in found:
-        found[b"LIST"] = _whole_texts(found[b"LIST"], byte_order)
-    found[b"fmt "], frame_bytes, compressed = _format(found[b"fmt "], byte_order)
+    if b"fmt " not in chunks or samples[0] == 0:
+        raise UnreadableSound("it has no format" if b"fmt " not in chunks else "it has no samples")
+    if b"LIST" in chunks:
+        chunks[b"LIST"] = _whole_texts(chunks[b"LIST"], byte_order)
+    chunks[b"fmt "], frame_bytes, compressed = _format(chunks[b"fmt "], byte_order)
     length = min(samples[1], _LARGEST_DATA) // frame_bytes * frame_bytes
-    chunks = b"".join(
-        struct.pack(byte_order + "4sI", name, len(found[name])) + found[name] + b"\0" * (len(found[name]) % 2)
+    body = b"".join(
+        struct.pack(byte_order + "4sI", name, len(chunks[name])) + chunks[name] + b"\0" * (len(chunks[name]) % 2)
         for name in (b"fmt ", b"fact", b"LIST")
-        if name in found and (compressed or name != b"fact")
+        if name in chunks and (compressed or name != b"fact")
     )
     kind = b"RIFX" if byte_order == ">" else b"RIFF"
-    head = struct.pack(byte_order + "4sI4s", kind, 12 + len(chunks) + length, b"WAVE") + chunks
+    head = struct.pack(byte_order + "4sI4s", kind, 12 + len(body) + length, b"WAVE") + body
     return head + struct.pack(byte_order + "4sI", b"data", length), file, samples[0], length
 
 
-def _format(given: bytes, byte_order: str) -> tuple[bytes, int, bool]:
+def _format(chunk: bytes, byte_order: str) -> tuple[bytes, int, bool]:
     """A format chunk as libsndfile reads it, how many bytes a frame has, and whether it is compressed."""
-    if len(given) < 16:
+    if len(chunk) < 16:
         raise UnreadableSound("its format is cut off")
-    kind, channels, rate_hz, _, frame_bytes, bits = struct.unpack(byte_order + "HHIIHH", given[:16])
-    if kind == _EXTENSIBLE and len(given) >= 26:
-        kind = struct.unpack(byte_order + "H", given[24:26])[0]
+    kind, channels, rate_hz, _, frame_bytes, bits = struct.unpack(byte_order + "HHIIHH", chunk[:16])
+    if kind == _EXTENSIBLE and len(chunk) >= 26:
+        kind = struct.unpack(byte_order + "H", chunk[24:26])[0]
     if channels == 0 or rate_hz == 0:
         raise UnreadableSound(f"its format states {channels} channels at {rate_hz} Hz")
     if kind in _COMPRESSED:
-        return struct.pack(byte_order + "H", kind) + given[2:], max(frame_bytes, 1), True
+        return struct.pack(byte_order + "H", kind) + chunk[2:], max(frame_bytes, 1), True
     if kind not in (_PCM, _FLOAT):
         raise UnreadableSound(f"its samples are compressed as kind {kind:#x}")
     sample_bytes = -(-bits // 8)
@@ -244,15 +248,15 @@ def _format(given: bytes, byte_order: str) -> tuple[bytes, int, bool]:
     return struct.pack(byte_order + "HHIIHH", *rest), frame_bytes, False
 
 
-def _whole_texts(given: bytes, byte_order: str) -> bytes:
+def _whole_texts(chunk: bytes, byte_order: str) -> bytes:
     """A list of texts up to the first that is cut off. From that one libsndfile would read on into the samples."""
     end = 4  # of "INFO"
-    while len(given) >= end + 8:
-        size = struct.unpack(byte_order + "I", given[end + 4 : end + 8])[0]
-        if end + 8 + size > len(given):
+    while len(chunk) >= end + 8:
+        size = struct.unpack(byte_order + "I", chunk[end + 4 : end + 8])[0]
+        if end + 8 + size > len(chunk):
             break
-        end = min(end + 8 + size + size % 2, len(given))
-    return given[:end]
+        end = min(end + 8 + size + size % 2, len(chunk))
+    return chunk[:end]
 
 
 def _next_chunk(file: BinaryIO, after: int, size: int, byte_order: str) -> int:

@@ -120,8 +120,8 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
     entries: dict[str, PresetEntry] = {}
     folders = folders or (SHIPPED, user_folder())
     tables = [read_heard(folder) for folder in folders]
-    heard = {digest: found for known, _ in tables for digest, found in known.items()}
-    problems = [problem for _, found in tables for problem in found]
+    records = {digest: by_digest for known, _ in tables for digest, by_digest in known.items()}
+    problems = [problem for _, table_problems in tables for problem in table_problems]
     for folder in folders:
         problems += [problem] if (problem := unreadable(folder)) else []
         for path in preset_files(folder):
@@ -132,7 +132,7 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
                     continue
                 state = path.stat()
                 entry = _read_entry(path, state.st_mtime_ns, state.st_size)
-                entries[name] = replace(entry, heard=heard.get(preset_digest(path))) if heard else entry
+                entries[name] = replace(entry, heard=records.get(preset_digest(path))) if records else entry
             except PresetError as error:
                 problems.append(str(error))
             except OSError as error:  # such as a file that was deleted meanwhile

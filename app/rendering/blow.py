@@ -56,10 +56,11 @@ class BlowRequest:
         """Return True if model and truth move alike: only listening points may differ."""
         if not isinstance(other, BlowRequest):
             return False
-        own, others = (
-            (each.preset, each.modes.drum, len(each.modes), each.strike, each.seconds) for each in (self, other)
+        own_motion, other_motion = (
+            (request.preset, request.modes.drum, len(request.modes), request.strike, request.seconds)
+            for request in (self, other)
         )
-        return own == others
+        return own_motion == other_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,9 +86,9 @@ class Head:
 
     def picture(self, amplitudes: NDArray[np.floating]) -> NDArray[np.float32]:
         """Displacement (rows, columns) of modal amplitudes (modes,), in their unit; 0 outside the drum."""
-        found = np.zeros(self.inside.shape, np.float32)
-        found[self.inside] = amplitudes.astype(np.float32) @ self.shapes[: len(amplitudes)]
-        return found
+        picture_m = np.zeros(self.inside.shape, np.float32)
+        picture_m[self.inside] = amplitudes.astype(np.float32) @ self.shapes[: len(amplitudes)]
+        return picture_m
 
 
 def grid_of(surface: Surface, sides: tuple[float, float], points: int = GRID) -> tuple[NDArray[np.bool_], Array]:
@@ -150,7 +151,9 @@ class BlowTake:
     """
 
     def __init__(self, request: BlowRequest, head: Head) -> None:
-        self.request, self.head, self.seconds = request, head, request.seconds
+        self.request = request
+        self.head = head
+        self.seconds = request.seconds
         self.frames = int(request.seconds * RATE_HZ) + 2
         self.motions = {name: ModalMotion(int(request.seconds * FLASH_HZ) + 1, len(head.shapes)) for name in SOURCES}
         omega, sigma = request.modes.omega[0], request.modes.sigma[0]
@@ -211,8 +214,8 @@ class BlowTake:
         shown = parts[-1]
         begins, angle = shown.angle[0], shown.angle[flash]
         slowed = begins + min(speed, 1.0) * (angle - begins)
-        found = shown.size_m[flash] * np.cos(slowed)
+        modal_m = shown.size_m[flash] * np.cos(slowed)
         if source == "difference":
             model = parts[0]
-            found = model.size_m[flash] * np.cos(slowed + model.angle[flash] - angle) - found
-        return np.asarray(found * self.scale)
+            modal_m = model.size_m[flash] * np.cos(slowed + model.angle[flash] - angle) - modal_m
+        return np.asarray(modal_m * self.scale)

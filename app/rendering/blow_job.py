@@ -110,8 +110,8 @@ class _Mover:
         """The next frames, (frames, modes) in m; the first of all is that of the blow, at rest."""
         if self._begun:
             return self._more(frames).numpy()
-        self._begun, found = True, self._more(frames - 1).numpy()
-        return np.concatenate([np.zeros((1, found.shape[1])), found])
+        self._begun, amplitudes_m = True, self._more(frames - 1).numpy()
+        return np.concatenate([np.zeros((1, amplitudes_m.shape[1])), amplitudes_m])
 
     def show(self, block: Array, motion: ModalMotion, omega: Array) -> None:
         """Take the flashes of these frames, which follow those of the last call; a speed needs the next frame.
@@ -154,5 +154,5 @@ def _weights(request: BlowRequest) -> Array:
 def _append(listened: Listened, blocks: dict[str, Array], weights: Array) -> None:
     for name, block in blocks.items():
         signal = listened.signals[name]
-        heard = block[: signal.frames - signal.ready_frames] @ weights[: block.shape[1]]
-        signal.append(heard.astype(np.float32))
+        samples = block[: signal.frames - signal.ready_frames] @ weights[: block.shape[1]]
+        signal.append(samples.astype(np.float32))

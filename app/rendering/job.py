@@ -76,7 +76,10 @@ class Job(Rendering[RenderRequest, Take]):
             name = OTHER + path.stem
             if name in self._lines:
                 continue
-            info, stride, source, program = take.info, take.stride, None, None
+            info = take.info
+            stride = take.stride
+            source = None
+            program = None
             try:
                 loaded = self._load(path)
                 source, program = loaded.model, loaded.model_program
@@ -137,8 +140,8 @@ class Job(Rendering[RenderRequest, Take]):
         behind = {line: min(BLOCK_FRAMES * line.stride, line.until(end_s)) for line in others}
         pending = [self._helper.submit(line.advance, count) for line, count in ({truth: frames} | behind).items()]
         model.advance(frames)
-        for each in pending:
-            each.result()
+        for call in pending:
+            call.result()
         take.model_ends_s = model.ends_s
 
     def _wanted(self) -> list[str]:

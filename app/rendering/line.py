@@ -44,9 +44,13 @@ class Line:
         seconds: float,
         stride: int,
     ) -> None:
-        self.rate_hz, self.stride, self.motion = info.rate_hz, stride, motion
+        self.rate_hz = info.rate_hz
+        self.stride = stride
+        self.motion = motion
         self.frames = int(seconds * info.rate_hz + 1e-6) + 1
-        self._seconds, self._source, self._program = seconds, source, program
+        self._seconds = seconds
+        self._source = source
+        self._program = program
         self._initial = _initial_m(pluck, info.grid_points, info.modes)
         self._pictures = _Frames(source, self._initial)
         self._flashes: Flashes | None = None
@@ -99,7 +103,9 @@ class Line:
 
     def advance(self, samples: int) -> None:
         """Render pictures and flashes of the next samples, flashes that are behind, and a block of the signal."""
-        first, stop, flashes = self.done, self.done + samples, self._flashes
+        first = self.done
+        stop = self.done + samples
+        flashes = self._flashes
         if samples:
             numbers = np.arange(-(-first // self.stride) * self.stride, stop, self.stride)
             wanted, joint = numbers, flashes is not None and self._shown is None
@@ -148,8 +154,8 @@ class _Frames:
             assert self._source is not None
             ahead = numbers[following:] - self._state.frame
             try:
-                found, self._state = self._source.sample(self._state, ahead, stop - 1 - self._state.frame)
-                out[following:] = found[0]
+                frames, self._state = self._source.sample(self._state, ahead, stop - 1 - self._state.frame)
+                out[following:] = frames[0]
             except Runaway:  # at rest from here on: such values must never reach a loudspeaker
                 self._state, self.ends = None, max(self.done - 1, 0)
         self.done = stop

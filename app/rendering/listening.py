@@ -44,7 +44,11 @@ class Listening:
         motion: Motion | None,
     ) -> None:
         self.signal = signal
-        self._source, self._program, self._initial, self._ear, self._motion = source, program, initial_m, ear, motion
+        self._source = source
+        self._program = program
+        self._initial = initial_m
+        self._ear = ear
+        self._motion = motion
         seconds = (signal.frames + MIRRORED) / signal.rate_hz if program.rendered else 0.0
         self._offline = OfflineVoice(program, initial_m[0], ear, seconds, signal.rate_hz)
         self._offline.voice.begin_at_once()

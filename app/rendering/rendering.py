@@ -34,7 +34,9 @@ class Rendering(ABC, Generic[Request, Made]):
     ) -> None:
         self.request: Request = request
         self.take: Made | None = None
-        self._load, self._listener, self._helper = load, listener, helper
+        self._load = load
+        self._listener = listener
+        self._helper = helper
         self._finished = False  # whether the listener has been called for it
         self._begun_s = time.monotonic()
 

@@ -209,7 +209,7 @@ class Take:
     @property
     def error(self) -> float:
         """The larger of `errors_by_training` as far as there are, so far; not a number where there are none."""
-        return max((each for each in self.errors_by_training if not math.isnan(each)), default=math.nan)
+        return max((error for error in self.errors_by_training if not math.isnan(error)), default=math.nan)
 
     @property
     def errors_by_training(self) -> tuple[float, ...]:
@@ -241,7 +241,7 @@ class Take:
             self.listened,
             *(motion.ready_frames for motion in motions),
             *(signal.ready_frames for signal in signals),
-            *((each, each.ready) for each in flashes),
+            *((motion_flashes, motion_flashes.ready) for motion_flashes in flashes),
         )
 
     def bytes(self, source: str) -> int:

@@ -48,7 +48,10 @@ class RenderWorker:
         hurried: Callable[[], bool] = lambda: False,
         sounds: Callable[[], bool] = lambda: True,
     ) -> None:
-        self._listener, self._load, self._hurried, self._sounds = listener, load, hurried, sounds
+        self._listener = listener
+        self._load = load
+        self._hurried = hurried
+        self._sounds = sounds
         self._mailbox = threading.Condition()
         self._request: RenderRequest | BlowRequest | None = None
         self._closing = False
