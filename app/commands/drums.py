@@ -70,12 +70,12 @@ def modes(
 ) -> None:
     """Print frequencies and decays of a drum's modes. Air counts, and the drop of pitch is added."""
     patch, struck = drum_of(drum, key)
-    found = struck.modes
+    drum_modes = struck.modes
     drops = {str(velocity): struck.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)}
-    facts = {"modes": len(found), "hardest_m_s": struck.played.hardest_m_s, "drop_cents": drops}
+    facts = {"modes": len(drum_modes), "hardest_m_s": struck.played.hardest_m_s, "drop_cents": drops}
     rows = [
         {"m": m, "n": n, "hz": hz, "t60_s": t60, "air_mass": mass}
-        for m, n, hz, t60, mass in mode_rows(found, min(count, len(found)))
+        for m, n, hz, t60, mass in mode_rows(drum_modes, min(count, len(drum_modes)))
     ]
     if json:
         print_json({**facts, "lowest": rows})
@@ -85,7 +85,7 @@ def modes(
         [[r["m"], r["n"], round(r["hz"], 2), round(r["t60_s"], 3), round(r["air_mass"], 3)] for r in rows],
     )
     words = ", ".join(f"{cents:.0f} cents at velocity {velocity}" for velocity, cents in drops.items())
-    print(f"{len(found)} modes; pitch drop {words}; hardest blow {struck.played.hardest_m_s:g} m/s")
+    print(f"{len(drum_modes)} modes; pitch drop {words}; hardest blow {struck.played.hardest_m_s:g} m/s")
 
 
 @drums.command()
@@ -263,14 +263,14 @@ def _blow_of(
     patch, struck = drum_of(drum, key)
     if preset is not None:
         patch = patch.model_copy(update={"preset": preset})
-    own = struck.strike(velocity, patch.pluck.curve)
+    own_strike = struck.strike(velocity, patch.pluck.curve)
     if place is None:
-        return _Blow(patch, struck, own)
+        return _Blow(patch, struck, own_strike)
     if not struck.modes.surface.inside(np.array([place])):
         raise typer.BadParameter(
             f"must be on the drum, not {place[0]:g} {place[1]:g}; choose one nearer the centre", param_hint="--place"
         )
-    return _Blow(patch, struck, Strike(place, own.speed_m_s, own.mallet))
+    return _Blow(patch, struck, Strike(place, own_strike.speed_m_s, own_strike.mallet))
 
 
 def drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
@@ -291,15 +291,15 @@ def drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
         patch = find_patch(name).patch
     if not isinstance(patch.strings, Drums):
         raise Failure(f"{patch.name} has no drums; choose one of those that `instruments` lists under drums")
-    played = ", ".join(str(each.note) for each in patch.strings.drums)
+    played = ", ".join(str(drum.note) for drum in patch.strings.drums)
     if key is None:
         raise typer.BadParameter(
             f"is missing; give a MIDI key of {patch.name}: its drums have {played}", param_hint="--key"
         )
-    found = DrumKeys(patch, Ear(tuple(patch.pickup.points))).of_key(key)
-    if found is None:
+    drum_key = DrumKeys(patch, Ear(tuple(patch.pickup.points))).of_key(key)
+    if drum_key is None:
         raise Failure(f"{patch.name} has no drum on key {key}; its drums have the keys {played}")
-    return patch, found
+    return patch, drum_key
 
 
 def _with_file(path: Path) -> Patch:
@@ -340,15 +340,15 @@ def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, repo
     from app.commands import arrays
     from app.rendering.blow import grid_of
 
-    found = blow.key.modes
-    inside, places = grid_of(found.surface, (found.drum.length_m, found.drum.width_m), points)
+    drum_modes = blow.key.modes
+    inside, places = grid_of(drum_modes.surface, (drum_modes.drum.length_m, drum_modes.drum.width_m), points)
     arrays.check_result_size(1, steps + 1, inside.size)
-    if (size := 8 * len(found) * len(places)) > LARGEST_SHAPES_BYTES:
+    if (size := 8 * len(drum_modes) * len(places)) > LARGEST_SHAPES_BYTES:
         raise Failure(
-            f"the shapes of {len(found)} modes at {len(places)} points would take {size / 2**20:.0f} MiB, more than "
-            f"the {LARGEST_SHAPES_BYTES // 2**20} MiB allowed; lower --points"
+            f"the shapes of {len(drum_modes)} modes at {len(places)} points would take {size / 2**20:.0f} MiB, more "
+            f"than the {LARGEST_SHAPES_BYTES // 2**20} MiB allowed; lower --points"
         )
-    shapes = found.shapes(places)
+    shapes = drum_modes.shapes(places)
     at_once = max(1, min(FRAMES_AT_ONCE, arrays.BYTES_AT_ONCE // (8 * inside.size)))
 
     def pictures() -> Iterator[Array]:
@@ -362,16 +362,18 @@ def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, repo
     arrays.write_array(out, (steps + 1, *inside.shape), pictures(), report)
 
 
-def mode_rows(found: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:
+def mode_rows(drum_modes: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:
     """m, n, frequency in Hz, T60 in s and the mass with air, relatively, of the lowest modes."""
     import math
 
-    rows, circles, surface = [], dict[tuple[int, int], int](), found.surface
+    rows = []
+    circles = dict[tuple[int, int], int]()
+    surface = drum_modes.surface
     for place in range(count):
-        omega, sigma = float(found.omega[place]), float(found.sigma[place])
+        omega, sigma = float(drum_modes.omega[place]), float(drum_modes.sigma[place])
         m, n = int(surface.m[place]), int(surface.n[place])
         if surface.round:
             circles[m, n] = n = circles.get((m, n), 0) + 1
         t60_s = math.log(1000) / max(sigma, 1e-9)
-        rows.append((m, n, omega / math.tau, t60_s, float(found.scale[place]) ** -2))
+        rows.append((m, n, omega / math.tau, t60_s, float(drum_modes.scale[place]) ** -2))
     return rows

@@ -143,11 +143,11 @@ def _outside_family(info: PresetInfo, initial: Array) -> list[str]:
     """The deviations of a string and its displacements from a preset of many strings, where the error grows."""
     if info.family is None:
         return []
-    found = info.family.warnings(info.string)
+    warnings = info.family.warnings(info.string)
     rise = float(info.resonator.relative_tension_rise(info.resonator.to_modes(initial)).max())
     if rise > (limit := info.family.tension_rise[1]):
-        found.append(f"the displacement raises the tension by {rise:.0%}, beyond the trained {limit:.0%}")
-    return found
+        warnings.append(f"the displacement raises the tension by {rise:.0%}, beyond the trained {limit:.0%}")
+    return warnings
 
 
 def compare(
@@ -175,18 +175,18 @@ def compare(
         raise typer.BadParameter(
             f"must hold a sample of {info.rate_hz} Hz, not {seconds:g} s", param_hint="--seconds"
         )
-    found = _comparison(loaded, pluck, steps)
-    for warning in found["warnings"]:
+    facts = _comparison(loaded, pluck, steps)
+    for warning in facts["warnings"]:
         say(f"warning: {warning}")
     if json:
-        print_json(found)
+        print_json(facts)
         return
-    print(f"{one_line(str(loaded.name))}: rel. MSE {number(found['rel_mse'])}, rel. MAE {number(found['rel_mae'])}")
+    print(f"{one_line(str(loaded.name))}: rel. MSE {number(facts['rel_mse'])}, rel. MAE {number(facts['rel_mae'])}")
     columns = ("from s", "to s", "rel. MSE", "rel. MAE", "")
     figures = ("start_s", "stop_s", "rel_mse", "rel_mae")
     rows = [
         [*(w[name] for name in figures), "past the training horizon" if w["past_horizon"] else ""]
-        for w in found["windows"]
+        for w in facts["windows"]
     ]
     print_table(columns, rows)
 

@@ -73,16 +73,18 @@ def plugin(
         ids = {image.id for image in images}
         name = BANK if instruments == [ALL] else _bank_name([patch.name for patch in chosen])
         wanted = list[tuple[str, str, Path]]()
-        for each in targets:
+        for system in targets:
             for kind in FORMATS if form == ALL else (form,):
-                folder = install_folder(kind, each) if install else (out or Path()) / (each if target == ALL else "")
-                wanted.append((kind, each, plugin_path(folder / name, kind)))
+                folder = (
+                    install_folder(kind, system) if install else (out or Path()) / (system if target == ALL else "")
+                )
+                wanted.append((kind, system, plugin_path(folder / name, kind)))
         if not replace:
             for _, _, path in wanted:  # all before the first is written
                 check_kept(path, ids)
-        for kind, each, path in wanted:
+        for kind, system, path in wanted:
             began_s, there = time.monotonic(), path.exists()
-            build_plugin(images, kind, each, path, kept, _Steps(), replace=replace)
+            build_plugin(images, kind, system, path, kept, _Steps(), replace=replace)
             done = f"{_size(path) / 1e6:.1f} MB, {time.monotonic() - began_s:.1f} s"
             print(f"{one_line(str(path))}: {done}{', replaces the one before' if there else ''}")
     except (ValueError, OSError) as error:
@@ -115,4 +117,4 @@ class _Steps:
 
 
 def _size(path: Path) -> int:
-    return sum(each.stat().st_size for each in path.rglob("*")) if path.is_dir() else path.stat().st_size
+    return sum(file.stat().st_size for file in path.rglob("*")) if path.is_dir() else path.stat().st_size

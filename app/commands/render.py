@@ -94,8 +94,8 @@ def render(
     """
     if recipe is not None:
         sources = {name: context.get_parameter_source(name) for name in context.params}
-        given = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
-        if out is not None or given - {"preset", "recipe"}:
+        names = {name for name, source in sources.items() if source is not None and source.name == "COMMANDLINE"}
+        if out is not None or names - {"preset", "recipe"}:
             raise typer.BadParameter(
                 "holds all that its sound was made with; give OUT.wav alone beside it",
                 param_hint="--recipe",
