@@ -57,8 +57,8 @@ _RECORDED = TypeAdapter(datetime)
 
 def recordings_folder() -> Path:
     """The path in LEARNED_STRINGS_RECORDINGS, else `recordings` in the platform's folder for a program's state."""
-    given = os.environ.get(FOLDER_VARIABLE)
-    return Path(given) if given else user_state_path("learned-strings", appauthor=False) / "recordings"
+    folder = os.environ.get(FOLDER_VARIABLE)
+    return Path(folder) if folder else user_state_path("learned-strings", appauthor=False) / "recordings"
 
 
 class Journal:
@@ -92,7 +92,7 @@ class Journal:
 
     def write(self, events: Iterable[TimedEvent]) -> None:
         """Append events, in the order of their times from the beginning of the recording. Raises OSError."""
-        self._append([self._line(each) for each in events])
+        self._append([self._line(event) for event in events])
 
     def hear(self, source: PlayedSource, difference_gain_db: float) -> None:
         """Append the source that is heard from now on. Raises OSError."""
@@ -130,8 +130,8 @@ class Journal:
                 break
         return read.played()
 
-    def _line(self, each: TimedEvent) -> dict[str, Any]:
-        event, line = each.event, {"t": each.time_s}
+    def _line(self, entry: TimedEvent) -> dict[str, Any]:
+        event, line = entry.event, {"t": entry.time_s}
         if isinstance(event, PatchTurned):
             before, self._patch = self._patch, event.patch.model_dump(mode="json")
             turned = {"patch": self._patch} if before is None else {"turned": list(_changes(before, self._patch))}
@@ -242,8 +242,8 @@ class _Read:
         """The recording, with what is down at its end released."""
         if self.recorded is None:
             raise ValueError(f"{self.where}: no recording of this program (it is empty)")
-        patch = next((each.event.patch for each in self.events if isinstance(each.event, PatchTurned)), None)
-        last_s = max((each.time_s for each in self.events), default=0.0)
+        patch = next((entry.event.patch for entry in self.events if isinstance(entry.event, PatchTurned)), None)
+        last_s = max((entry.time_s for entry in self.events), default=0.0)
         events = played_from(self.events, last_s if self.end_s is None else self.end_s)
         if patch is None or not events:
             return None

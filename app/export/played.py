@@ -149,11 +149,11 @@ class PlayedExport:
             difference_gain_db=played.difference_gain_db,
             recorded=played.recorded,
         )
-        heard, level = (
+        sound, level = (
             source_words(played.source, played.difference_gain_db),
             f"peak {written.level.peak_db:.1f} dBFS",
         )
-        return f"Saved {sound_file} and {midi_file.name}: {written.seconds:.1f} s of {heard}, {level}."
+        return f"Saved {sound_file} and {midi_file.name}: {written.seconds:.1f} s of {sound}, {level}."
 
     def cancelled(self) -> str:
         return "the MIDI file is kept."

@@ -204,13 +204,13 @@ def read_recipe(path: Path) -> Recipe:
         NotesElsewhere: it was played on an instrument.
         NoRecipe, RecipeError: as `read_origin`.
     """
-    found = read_origin(path)
-    if isinstance(found, InstrumentSound):
+    origin = read_origin(path)
+    if isinstance(origin, InstrumentSound):
         raise NotesElsewhere(
-            f"{path}: is {found.words}. It has no recipe to render again:"
-            f" its notes are in the MIDI file {found.midi}, beside it unless it was moved"
+            f"{path}: is {origin.words}. It has no recipe to render again:"
+            f" its notes are in the MIDI file {origin.midi}, beside it unless it was moved"
         )
-    return found
+    return origin
 
 
 def request_of(recipe: Recipe, preset: Preset, path: Path) -> SoundRequest:

@@ -144,8 +144,8 @@ class Voices:
 
     def samples(self, source: Source, difference_gain_db: float = 0.0) -> Samples:
         """All samples of a source: (frames,), or (frames, 2) in stereo and for "both"."""
-        found = Mixed(self, source, difference_gain_db)[:]
-        return found[:, 0] if found.shape[1] == 1 else found
+        mixed = Mixed(self, source, difference_gain_db)[:]
+        return mixed[:, 0] if mixed.shape[1] == 1 else mixed
 
 
 @dataclass(frozen=True)
@@ -254,13 +254,13 @@ def _render(request: SoundRequest, voice: Voice, rate_hz: int, progress: Callabl
     preset, info = request.preset, request.preset.info
     decay_db = None if request.decay_db is None else request.decay_db + DECAYED_FOR_SURE_DB
     if request.struck is not None:
-        found = Recording(channels_of(request.struck.patch))
+        struck_recording = Recording(channels_of(request.struck.patch))
         dry = request.source == "difference"
         for block in request.struck.sound(preset, voice, rate_hz, request.seconds, decay_db, dry, progress):
             if not np.isfinite(block).all():
-                raise Runaway(len(found) / rate_hz)
-            found.append(block)
-        return found
+                raise Runaway(len(struck_recording) / rate_hz)
+            struck_recording.append(block)
+        return struck_recording
     program = truth_program(info, rate_hz) if voice == "truth" else model_program(preset, rate_hz)
     ear = Ear(request.points, request.pickup)
     through, recording = request.through, None

@@ -93,7 +93,7 @@ def _built(
     cache: Path,
     advanced: Callable[[str, float], None],
 ) -> Path:
-    own = FORMATS[form]
+    plugin_format = FORMATS[form]
     path.parent.mkdir(parents=True, exist_ok=True)
     with working_folder(path.parent, path.name):  # it can be written: found before work that takes a minute
         pass
@@ -109,7 +109,7 @@ def _built(
         library = folder / "library"
         _link(
             folder,
-            (*COMMON, *own.sources, "images.c", "stubs.c"),
+            (*COMMON, *plugin_format.sources, "images.c", "stubs.c"),
             kernels,
             target,
             library,
@@ -219,17 +219,18 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
             "    lv2:designation lv2:latency ; lv2:portProperty lv2:reportsLatency, lv2:integer ;\n"
             "    lv2:minimum 0.0 ; lv2:maximum 192000.0",
         ]
-        for number, each in enumerate(image.parameters):
-            symbol = "".join(c if c.isalnum() else "_" for c in each.id)
-            stepped = " lv2:portProperty lv2:integer, lv2:enumeration ;" if each.steps else ""
+        for number, control in enumerate(image.parameters):
+            symbol = "".join(c if c.isalnum() else "_" for c in control.id)
+            stepped = " lv2:portProperty lv2:integer, lv2:enumeration ;" if control.steps else ""
             points = "".join(
                 f' lv2:scalePoint [ rdfs:label "{word}" ; rdf:value {value} ] ;'
-                for value, word in enumerate(each.steps, round(each.low))
+                for value, word in enumerate(control.steps, round(control.low))
             )
             ports.append(
                 f'a lv2:InputPort, lv2:ControlPort ; lv2:index {4 + number} ; lv2:symbol "{symbol}" ;\n'
-                f'    lv2:name "{_quoted(each.name)}" ;{stepped}{points}\n'
-                f"    lv2:minimum {each.low:.9f} ; lv2:maximum {each.high:.9f} ; lv2:default {each.standard:.9f}"
+                f'    lv2:name "{_quoted(control.name)}" ;{stepped}{points}\n'
+                f"    lv2:minimum {control.low:.9f} ; lv2:maximum {control.high:.9f} ; "
+                f"lv2:default {control.standard:.9f}"
             )
         described.append(
             f'{head}\n  doap:name "{_quoted(image.name)}" ;\n  doap:maintainer [ foaf:name "{MAKER}" ] ;\n'
@@ -245,10 +246,10 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
 
 def _lv2_version(version: str) -> tuple[int, int]:
     """The minor and the micro version, which rise with the program's: even for a release, odd for all before it."""
-    found = re.match(r"(\d{1,4})\.(\d{1,3})(?:\.(\d{1,4}))?(.*)", version)
-    if found is None:
+    match = re.match(r"(\d{1,4})\.(\d{1,3})(?:\.(\d{1,4}))?(.*)", version)
+    if match is None:
         return 1, 1
-    major, minor, patch, rest = found.groups()
+    major, minor, patch, rest = match.groups()
     return 2 * (1000 * int(major) + int(minor)), 2 * int(patch or 0) + bool(rest)
 
 

@@ -86,10 +86,10 @@ TARGETS: Mapping[str, Target] = {
 
 def this_target() -> str:
     """The target of this computer. Raises PluginError: it is none of `TARGETS`."""
-    found = f"{_HERE.get(platform.system(), '')}-{_MACHINES.get(platform.machine().lower(), '')}"
-    if found not in TARGETS:
+    target = f"{_HERE.get(platform.system(), '')}-{_MACHINES.get(platform.machine().lower(), '')}"
+    if target not in TARGETS:
         raise PluginError(f"no plug-ins are built for this system; choose one of {', '.join(TARGETS)}")
-    return found
+    return target
 
 
 def install_folder(form: str, target: str) -> Path:

@@ -43,9 +43,9 @@ def held_in(path: Path) -> frozenset[str]:
     Raises:
         OSError: it cannot be read.
     """
-    files = [each for each in path.rglob("*") if each.is_file()] if path.is_dir() else [path]
-    found = {match.decode(errors="replace") for file in files for match in _HELD.findall(file.read_bytes())}
-    return frozenset(PREFIX + each for each in found)
+    files = [file for file in path.rglob("*") if file.is_file()] if path.is_dir() else [path]
+    suffixes = {match.decode(errors="replace") for file in files for match in _HELD.findall(file.read_bytes())}
+    return frozenset(PREFIX + suffix for suffix in suffixes)
 
 
 def lost_with(path: Path, ids: Collection[str]) -> frozenset[str]:
@@ -89,4 +89,4 @@ def _spelled(folded: str) -> str:
 
 @cache
 def _factory_names() -> dict[str, str]:
-    return {_folded(each.patch.name): each.patch.name for each in list_patches(SHIPPED)[0]}
+    return {_folded(entry.patch.name): entry.patch.name for entry in list_patches(SHIPPED)[0]}

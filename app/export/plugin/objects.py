@@ -50,12 +50,12 @@ class ObjectError(ValueError):
 def digest() -> str:
     """The digest of the kernels and of what compiles them: it changes with either."""
     kernels = Path(sys.modules["engine"].__file__ or "").parent / "kernels"
-    found = hashlib.sha256()
+    sha256 = hashlib.sha256()
     for source in (*sorted(kernels.rglob("*.py")), Path(__file__), Path(texts.__file__)):
-        found.update(source.read_bytes())
+        sha256.update(source.read_bytes())
     for package in ("numba", "llvmlite"):
-        found.update(version(package).encode())
-    return found.hexdigest()[:16]
+        sha256.update(version(package).encode())
+    return sha256.hexdigest()[:16]
 
 
 def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = lambda share: None) -> tuple[Path, ...]:
@@ -80,12 +80,12 @@ def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = la
     missing = [(*wanted, path) for path, wanted in made.items() if not path.exists()]
     if missing:
         folder.mkdir(parents=True, exist_ok=True)
-        found = _texts(folder, lambda share: advanced(TEXT_SHARE * share))
+        text_files = _texts(folder, lambda share: advanced(TEXT_SHARE * share))
         with contextlib.ExitStack() as parts:
             _run(
                 __name__,
                 [
-                    [str(found[part]), target, str(number), str(parts.enter_context(whole_file(path)))]
+                    [str(text_files[part]), target, str(number), str(parts.enter_context(whole_file(path)))]
                     for part, number, path in missing
                 ],
                 STEPS,
@@ -96,13 +96,13 @@ def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = la
 
 def _texts(folder: Path, advanced: Callable[[float], None]) -> dict[str, Path]:
     """LLVM code of each part."""
-    found = {part: folder / f"kernels-{digest()}-{part}.ll" for part in texts.PARTS}
-    missing = [(part, path) for part, path in found.items() if not path.exists()]
+    text_files = {part: folder / f"kernels-{digest()}-{part}.ll" for part in texts.PARTS}
+    missing = [(part, path) for part, path in text_files.items() if not path.exists()]
     if missing:
         with contextlib.ExitStack() as parts:
             calls = [[part, str(parts.enter_context(whole_file(path)))] for part, path in missing]
             _run(texts.__name__, calls, FUNCTIONS, advanced)
-    return found
+    return text_files
 
 
 def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Callable[[float], None]) -> None:
@@ -143,7 +143,7 @@ def run_waiting(
         waiting: is called a few times a second with the number of bytes that the commands have printed.
     """
     with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as printed:
-        running = [subprocess.Popen(each, env=environment, stdout=printed, stderr=said) for each in commands]
+        running = [subprocess.Popen(command, env=environment, stdout=printed, stderr=said) for command in commands]
         try:
             for process in running:
                 while process.poll() is None:
@@ -157,7 +157,8 @@ def run_waiting(
                 process.kill()
                 process.wait()
         said.seek(0)
-        return next((each.returncode for each in running if each.returncode), 0), said.read().decode(errors="replace")
+        status = next((process.returncode for process in running if process.returncode), 0)
+        return status, said.read().decode(errors="replace")
 
 
 def _environment() -> dict[str, str]:
@@ -218,7 +219,9 @@ def _without_counts(text: str) -> str:
 def _check_names(module: object, entries: set[str]) -> None:
     """Raise ObjectError where the code refers to anything that the shell or the C library does not give."""
     functions = module.functions  # type: ignore[attr-defined]
-    asked = {each.name for each in functions if each.is_declaration and not each.name.startswith("llvm.")}
+    asked = {
+        function.name for function in functions if function.is_declaration and not function.name.startswith("llvm.")
+    }
     unknown = asked - ALLOWED - STUBS - entries
     if unknown:
         raise ObjectError(f"the kernels refer to {', '.join(sorted(unknown))}, which no plug-in has")

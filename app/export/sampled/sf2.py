@@ -35,15 +35,24 @@ TIMECENTS_RANGE = (-12_000, 8_000)
 HARD_PAN = 500  # per mille to either side
 
 # Generators (8.1.2)
-PAN, RELEASE_VOL_ENV, INSTRUMENT, KEY_RANGE, VEL_RANGE, SAMPLE_ID, EXCLUSIVE_CLASS = 17, 38, 41, 43, 44, 53, 57
-ATTENUATION, FILTER_CUTOFF = 48, 8
+FILTER_CUTOFF = 8
+PAN = 17
+RELEASE_VOL_ENV = 38
+INSTRUMENT = 41
+KEY_RANGE = 43
+VEL_RANGE = 44
+ATTENUATION = 48
+SAMPLE_ID = 53
+EXCLUSIVE_CLASS = 57
 # Default modulators that are switched off, as (source, destination, amount's source) (8.4.1, 8.4.2): velocity to
 # attenuation, which is not the patch's; velocity to the filter, in the forms of 2.01 and of 2.04.
 SWITCHED_OFF = ((0x0502, ATTENUATION, 0), (0x0102, FILTER_CUTOFF, 0x0D02), (0x0102, FILTER_CUTOFF, 0))
 MOST_RAISED_DB = 6.0  # of a layer above the hardest: a bit of resolution
 FALLING_VELOCITY = 0x0102  # 1 - velocity / 128, linear (8.2)
 # Kinds of samples (7.10)
-MONO, RIGHT, LEFT = 1, 2, 4
+MONO = 1
+RIGHT = 2
+LEFT = 4
 
 Generator = tuple[int, int]
 
@@ -123,7 +132,7 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
     So the level continues within a layer as it does from layer to layer; less where a soft layer, which has to be
     raised for it, would be much louder than the hardest.
     """
-    found = {}
+    attenuations_cb = {}
     for layers, stored in by_key(samples):
         levels_db = velocity_levels(patch, layers, stored)
         for zone in layers:
@@ -131,8 +140,8 @@ def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict
             below = max(1, zone.velocities[0] - 1)  # the velocity of the layer before
             step = (levels_db[hardest] - levels_db[below]) / max(1, hardest - below)
             most = (levels_db[-1] - levels_db[hardest] + MOST_RAISED_DB) / (128 - hardest)
-            found[zone] = round(10 * 128 * max(0.0, min(step, most)))
-    return found
+            attenuations_cb[zone] = round(10 * 128 * max(0.0, min(step, most)))
+    return attenuations_cb
 
 
 def _raised_db(attenuation_cb: int, zone: Zone) -> float:
