@@ -104,19 +104,19 @@ def install_body(file: Path) -> str:
 
 def _own_files() -> dict[str, Path]:
     """Name -> file. Of two files of one name the first; none of the name of an engine's body."""
-    found: dict[str, Path] = {}
+    files: dict[str, Path] = {}
     try:
         paths = sorted(path for path in own_bodies().iterdir() if path.suffix.lower() in ENDINGS)
     except OSError:  # most often it is not there
-        return found
+        return files
     for path in paths:
         try:
             _NAME.validate_python(path.stem)
         except ValidationError:  # no patch could name it
             continue
         if path.stem not in BODIES and path.is_file():
-            found.setdefault(path.stem, path)
-    return found
+            files.setdefault(path.stem, path)
+    return files
 
 
 @lru_cache(maxsize=16)

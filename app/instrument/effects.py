@@ -74,7 +74,9 @@ def body_curves(patch: Patch) -> NDArray[np.float64] | None:
 
 def _body(chosen: ChosenBody) -> tuple[Body | None, str]:
     """The body, and why it cannot be used."""
-    name, mix, size = chosen.name, chosen.mix, chosen.size
+    name = chosen.name
+    mix = chosen.mix
+    size = chosen.size
     if not name or mix == 0:
         return None, ""
     if name in BODIES:

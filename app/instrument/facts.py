@@ -120,12 +120,12 @@ def knob_for(patch: Patch, key: tuple[int, int | None], field: str, wanted: floa
         middle = math.sqrt(low * high)
         turned = patch.model_copy(update={"knobs": patch.knobs.model_copy(update={name: middle})})
         try:
-            found = Strings(turned).of_key(*key)
+            key_string = Strings(turned).of_key(*key)
         except ValueError:  # there is no such string, as there is one at 1
             above = middle > 1
         else:
-            if found is None:
+            if key_string is None:
                 raise ValueError(f"key {key[0]} of {patch.name} is silent; choose another")
-            above = (figure.of(found.parameters, turned) > wanted) != figure.falls
+            above = (figure.of(key_string.parameters, turned) > wanted) != figure.falls
         low, high = (low, middle) if above else (middle, high)
     return math.sqrt(low * high)

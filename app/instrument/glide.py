@@ -49,7 +49,7 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
     shapes_m = np.stack([pluck.displacement(GRID_POINTS) for pluck in plucks])
     modal_m = shapes_m @ analysis_matrix(GRID_POINTS, MOST_MODES)
     blows = [blow_factor(np.ones(1), shape) for shape in shapes_m / (amplitudes_mm[:, None] / 1000)]
-    found = np.full((HIGHEST_KEY + 1, len(plucks)), np.nan)
+    glides = np.full((HIGHEST_KEY + 1, len(plucks)), np.nan)
     low, high = patch.range
     for key in range(low, high + 1):
         try:
@@ -62,22 +62,22 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
             if patch.pluck.is_blow:
                 omega = undamped_frequencies(string.parameters, string.modes)
                 sets_out_m = sets_out_m * np.stack(blows) * (omega[0] / omega)
-            found[key] = _of_string(patch, string, sets_out_m)
-    found.setflags(write=False)
-    return found
+            glides[key] = _of_string(patch, string, sets_out_m)
+    glides.setflags(write=False)
+    return glides
 
 
 def _of_drums(patch: Patch) -> NDArray[np.float64]:
     """Compute the glides as `glides_cents`, by the mean tension of a blow's first swing."""
     keys = DrumKeys(patch, Ear(tuple(patch.pickup.points)))
-    found = np.full((HIGHEST_KEY + 1, VELOCITIES[1] + 1), np.nan)
+    glides = np.full((HIGHEST_KEY + 1, VELOCITIES[1] + 1), np.nan)
     low, high = patch.range
     for key in range(low, high + 1):
         with contextlib.suppress(ValueError):
             if (drum := keys.of_key(key)) is not None:
-                found[key] = [drum.drop_cents(velocity, patch.pluck.curve) for velocity in range(len(found[key]))]
-    found.setflags(write=False)
-    return found
+                glides[key] = [drum.drop_cents(velocity, patch.pluck.curve) for velocity in range(len(glides[key]))]
+    glides.setflags(write=False)
+    return glides
 
 
 def _of_string(patch: Patch, string: KeyString, modal_m: NDArray[np.float64]) -> NDArray[np.float64]:

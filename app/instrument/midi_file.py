@@ -69,7 +69,7 @@ class Song:
     @property
     def length_s(self) -> float:
         """The time of the last note or release."""
-        return max(each.time_s for each in self.events if isinstance(each.event, NoteOn | NoteOff))
+        return max(entry.time_s for entry in self.events if isinstance(entry.event, NoteOn | NoteOff))
 
 
 def event_of(message: Sequence[int]) -> Event | None:
@@ -111,41 +111,41 @@ def _messages_in(path: Path) -> MidiMessages:
 
 
 def _events_of(path: Path, messages: MidiMessages) -> list[TimedEvent]:
-    found: list[TimedEvent] = []
+    timed_events: list[TimedEvent] = []
     notes, last_note_s = False, 0.0
     for time_s, message in messages.timed:
         if (event := event_of(message)) is None:
             continue
-        found.append(TimedEvent(time_s, event))
+        timed_events.append(TimedEvent(time_s, event))
         if isinstance(event, NoteOn | NoteOff):
             notes, last_note_s = notes or isinstance(event, NoteOn), time_s
     if not notes:
         raise MidiFileError(f"{path}: holds no note; give a MIDI file with notes")
     if not last_note_s <= LONGEST_S:
         raise MidiFileError(f"{path}: more than an hour of music; give a shorter MIDI file")
-    while found[-1].time_s > min(last_note_s + AFTER_LAST_NOTE_S, LONGEST_S):
-        found.pop()
-    return found
+    while timed_events[-1].time_s > min(last_note_s + AFTER_LAST_NOTE_S, LONGEST_S):
+        timed_events.pop()
+    return timed_events
 
 
 def _ignored(messages: MidiMessages) -> list[str]:
     """The messages that change nothing here, in words."""
-    found = []
+    left_out = []
     if messages.missing_tracks:
-        found.append(f"{_count(messages.missing_tracks, 'track')} that its header counts")
+        left_out.append(f"{_count(messages.missing_tracks, 'track')} that its header counts")
     if messages.skipped:
-        found.append(f"{_count(messages.skipped, 'message')} of a key or a controller above 127")
+        left_out.append(f"{_count(messages.skipped, 'message')} of a key or a controller above 127")
     if messages.clipped:
-        found.append(f"what exceeds 127 in {_count(messages.clipped, 'message')}")
+        left_out.append(f"what exceeds 127 in {_count(messages.clipped, 'message')}")
     kinds = {message[0] & 0xF0 for _, message in messages.timed}
     if PROGRAM in kinds:
-        found.append("its program changes")
+        left_out.append("its program changes")
     if kinds & {KEY_PRESSURE, PRESSURE}:
-        found.append("its pressure")
+        left_out.append("its pressure")
     sent = {message[1] for _, message in messages.timed if message[0] & 0xF0 == CONTROLLER}
     if unknown := [str(number) for number in sorted(sent) if not is_obeyed(number)]:
-        found.append(f"its controller{'s' if len(unknown) > 1 else ''} {', '.join(unknown)}")
-    return found
+        left_out.append(f"its controller{'s' if len(unknown) > 1 else ''} {', '.join(unknown)}")
+    return left_out
 
 
 def _count(count: int, noun: str) -> str:
@@ -166,11 +166,11 @@ def read_song(path: Path, patch: Patch | None) -> Song:
     messages = _messages_in(path)
     timed, mode = _events_of(path, messages), patch.mode if patch is not None else "poly"
     ignored = _ignored(messages)
-    notes_on = {each.event.channel for each in timed if isinstance(each.event, NoteOn)}
+    notes_on = {entry.event.channel for entry in timed if isinstance(entry.event, NoteOn)}
     pads = patch is not None and isinstance(patch.strings, Drums) and patch.strings.keys == "pads"
     drums = set() if mode == "mpe" else notes_on & {DRUMS}
     if pads and drums:
-        timed = [each for each in timed if channels_in([each.event]) in (drums, set())]
+        timed = [entry for entry in timed if channels_in([entry.event]) in (drums, set())]
         others = [f"its other channels ({len(notes_on) - 1})"] if len(notes_on) > 1 else []
         return _song(path, patch, timed, others + ignored)
     if pads:
@@ -179,15 +179,17 @@ def read_song(path: Path, patch: Patch | None) -> Song:
     if not channels:
         raise MidiFileError(f"{path}: holds only drums (channel 10); give a MIDI file with other notes")
     if drums:
-        timed = [each for each in timed if channels_in([each.event]) != drums]
+        timed = [entry for entry in timed if channels_in([entry.event]) != drums]
     if mode == "guitar" and len(channels) == 1:
-        timed = [replace(each, event=_on_keys(each.event)) for each in timed if channels_in([each.event]) == channels]
+        timed = [
+            replace(entry, event=_on_keys(entry.event)) for entry in timed if channels_in([entry.event]) == channels
+        ]
     return _song(path, patch, timed, (["its drums (channel 10)"] if drums else []) + ignored)
 
 
 def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: list[str]) -> Song:
     """The song; `left_out` with the notes for which the patch has no sound."""
-    keys = [each.event.key for each in timed if isinstance(each.event, NoteOn)]
+    keys = [entry.event.key for entry in timed if isinstance(entry.event, NoteOn)]
     if patch is not None and (silent := _silent(patch, keys)):
         low, high = (note_name(key) for key in patch.range)
         sounding = "drum" if isinstance(patch.strings, Drums) else "string"
@@ -227,9 +229,9 @@ def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes
 
     track = mido.MidiTrack([mido.MetaMessage("set_tempo", tempo=TEMPO)])
     tick = 0
-    for each in sorted(timed, key=lambda one: one.time_s):
-        now = round(mido.second2tick(each.time_s, TICKS, TEMPO))
-        for message in messages_of(each.event):
+    for entry in sorted(timed, key=lambda one: one.time_s):
+        now = round(mido.second2tick(entry.time_s, TICKS, TEMPO))
+        for message in messages_of(entry.event):
             track.append(message.copy(time=max(0, now - tick)))
             tick = max(tick, now)
     file = mido.MidiFile(type=0, ticks_per_beat=TICKS)
@@ -241,29 +243,31 @@ def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes
 
 def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
     """The events with messages for the range of bends, where a channel has the patch's and not its own."""
-    channels, own, found = sorted(channels_in(each.event for each in timed)), set[int](), list[TimedEvent]()
+    channels = sorted(channels_in(entry.event for entry in timed))
+    with_own_range = set[int]()
+    track = list[TimedEvent]()
 
     def set_ranges(time_s: float, of: Iterable[int]) -> None:
         for channel in of:
-            found.extend(TimedEvent(time_s, event) for event in bend_range(_bend_semitones(patch, channel), channel))
+            track.extend(TimedEvent(time_s, event) for event in bend_range(_bend_semitones(patch, channel), channel))
 
     set_ranges(0.0, channels)
-    for each in sorted(timed, key=lambda one: one.time_s):
-        event, time_s = each.event, each.time_s
-        found.append(each)
+    for entry in sorted(timed, key=lambda one: one.time_s):
+        event, time_s = entry.event, entry.time_s
+        track.append(entry)
         if isinstance(event, PatchTurned):
             if is_another(event.patch, patch):
-                own.clear()
+                with_own_range.clear()
             moved = (event.patch.bend_semitones, event.patch.mode) != (patch.bend_semitones, patch.mode)
             patch = event.patch
-            set_ranges(time_s, [channel for channel in channels if moved and channel not in own])
+            set_ranges(time_s, [channel for channel in channels if moved and channel not in with_own_range])
         elif isinstance(event, Controller) and event.number in SETS_PARAMETER:
-            own.add(event.channel)
+            with_own_range.add(event.channel)
         elif isinstance(event, Controller) and (event.number, event.value) == (RESET, AT_REST):
-            own.discard(event.channel)
+            with_own_range.discard(event.channel)
             set_ranges(time_s, [event.channel])
-            found.append(TimedEvent(time_s, Controller(VOLUME, USUAL_VOLUME, event.channel)))
-    return found
+            track.append(TimedEvent(time_s, Controller(VOLUME, USUAL_VOLUME, event.channel)))
+    return track
 
 
 def _bend_semitones(patch: Patch, channel: int) -> float:

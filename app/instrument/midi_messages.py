@@ -13,7 +13,9 @@ from dataclasses import dataclass
 LONGEST_NUMBER = 4  # bytes of a number of variable length, by the standard
 USUAL_TEMPO_US = 500_000  # of a quarter note
 FRAME_RATES_HZ = {24: 24.0, 25: 25.0, 29: 30_000 / 1_001, 30: 30.0}  # SMPTE's; 29: 30 drop
-META, TEMPO, END_OF_TRACK = 0xFF, 0x51, 0x2F
+META = 0xFF
+TEMPO = 0x51
+END_OF_TRACK = 0x2F
 SYSTEM_EXCLUSIVE = (0xF0, 0xF7)  # and what follows an escape: a length, then any bytes
 DATA_BYTES = {0x80: 2, 0x90: 2, 0xA0: 2, 0xB0: 2, 0xC0: 1, 0xD0: 1, 0xE0: 2, 0xF1: 1, 0xF2: 2, 0xF3: 1}  # by kind
 LARGEST_VALUE = 127
@@ -64,7 +66,7 @@ def read_messages(file: bytes, most: int) -> MidiMessages:
     if kind == 2 and reader.tracks > 1:
         raise NotMidi(f"holds {reader.tracks} songs of their own (format 2): save one of them in a file")
     return MidiMessages(
-        list(clock.timed(sorted(reader.ticked, key=lambda each: each[0]))),
+        list(clock.timed(sorted(reader.ticked, key=lambda message: message[0]))),
         max(0, counted - reader.tracks),
         reader.clipped,
         reader.skipped,
@@ -124,7 +126,9 @@ class _Reader:
     """
 
     def __init__(self, raw: bytes, most: int) -> None:
-        self._raw, self._most, self._left = raw, most, most
+        self._raw = raw
+        self._most = most
+        self._left = most
         self.ticked: list[tuple[int, int | Message]] = []
         self.tracks = self.clipped = self.skipped = 0
 

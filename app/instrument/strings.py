@@ -98,11 +98,11 @@ class Strings:
             if key < chosen.note:
                 slackened = pitch_hz / self._tuning.hz(chosen.note)
         knobs = [getattr(self._patch.knobs, name) for name in KNOBS]
-        whole, own = [0.0] * of.STRING, [0.0] * of.STRING
-        law.stop(string.row, knobs, slackened, pitch_hz, whole, own)
+        whole, stopped_row = [0.0] * of.STRING, [0.0] * of.STRING
+        law.stop(string.row, knobs, slackened, pitch_hz, whole, stopped_row)
         if not whole[of.TENSION] > 0:
             raise ValueError(f"key {key}: no tension slackens its string so far; choose a higher key")
-        parameters = StringParameters(*own)  # or what is out of bounds is named
+        parameters = StringParameters(*stopped_row)  # or what is out of bounds is named
         return parameters, parameters.length_m / whole[LENGTH]
 
 

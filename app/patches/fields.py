@@ -77,7 +77,7 @@ def _given_whole(kind: type, data: Any) -> Any:
     The engine's default is a string or drum of its own, parts of which no other shall have.
     """
     if isinstance(data, Mapping):
-        missing = [each.name for each in fields(kind) if each.default != 0 and each.name not in data]
+        missing = [field.name for field in fields(kind) if field.default != 0 and field.name not in data]
         if missing:
             raise ValueError(f"{', '.join(missing)} must be given; add what is missing")
     return data

@@ -115,11 +115,11 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
 
 def _other_than(taken: set[str], name: str) -> str:
     """`name`, with a number where it is taken."""
-    number, found = 2, name
-    while found.casefold() in taken:
+    number, free_name = 2, name
+    while free_name.casefold() in taken:
         end = f" {number}"
-        number, found = number + 1, name[: LONGEST_NAME - len(end)] + end
-    return found
+        number, free_name = number + 1, name[: LONGEST_NAME - len(end)] + end
+    return free_name
 
 
 def find_patch(name_or_path: str) -> PatchEntry:

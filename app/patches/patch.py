@@ -43,8 +43,8 @@ from engine.values.string import Losses, Polarisations
 Category = Literal["guitar", "bass", "harp", "keys", "world", "drums", "experimental"]
 CATEGORIES: tuple[Category, ...] = get_args(Category)
 Mode = Literal["poly", "guitar", "mpe"]
-ASSIGNABLE = tuple(each.id for each in modulated_by("macro"))  # what macros may turn
-WHEEL = tuple(each.id for each in modulated_by("wheel"))  # what the modulation wheel may turn
+ASSIGNABLE = tuple(knob.id for knob in modulated_by("macro"))  # what macros may turn
+WHEEL = tuple(knob.id for knob in modulated_by("wheel"))  # what the modulation wheel may turn
 
 MOST_STRINGS = 128
 MOST_TARGETS = 8
@@ -376,10 +376,10 @@ class Patch(Value):
             raise ValueError(
                 f"field: {bounds.brief(field)} is no parameter of this instrument; try {', '.join(OF_PATCHES)}"
             )
-        found: Any = self
+        value: Any = self
         for part in field.split("."):
-            found = found[int(part)] if isinstance(found, tuple) else getattr(found, part)
-        return float(found)
+            value = value[int(part)] if isinstance(value, tuple) else getattr(value, part)
+        return float(value)
 
     def with_value(self, field: str, value: float) -> Patch:
         """The patch with one of ASSIGNABLE changed. Raises ValueError: an unknown field, or a value out of bounds."""

@@ -91,10 +91,10 @@ def parse_scale(text: str) -> Scale:
     """
     lines = [line for line in _LINE_END.split(text) if not line.startswith("!")]
     count_line, *listed = _filled(lines[1:]) or [""]  # the first, which may be empty, is the description
-    found = _COUNT.match(count_line)
-    if found is None:
+    count_match = _COUNT.match(count_line)
+    if count_match is None:
         raise ValueError(f"its number of notes, below its description, is {brief(count_line)}; it is no scale")
-    said = found.group().lstrip("0") or "0"
+    said = count_match.group().lstrip("0") or "0"
     count = int(said[:9])
     if count <= min(len(listed), MOST_NOTES):
         octaves = tuple(_octaves(line) for line in listed[:count])
@@ -120,8 +120,8 @@ def parse_keymap(text: str) -> Keymap:
     last = _whole(lines[2], "last key", 0, HIGHEST_KEY)
     middle = _whole(lines[3], "middle key", 0, HIGHEST_KEY)
     reference = _whole(lines[4], "reference key", 0, HIGHEST_KEY)
-    found = _FREQUENCY.match(lines[5])
-    reference_hz = float(found.group()) if found else 0.0
+    frequency = _FREQUENCY.match(lines[5])
+    reference_hz = float(frequency.group()) if frequency else 0.0
     if not 0 < reference_hz < math.inf:
         raise ValueError(f"its reference frequency is {brief(lines[5])}, and must be a number above 0, as 440.0")
     octave = _whole(lines[6], "formal octave", -MOST_KEYS, MOST_KEYS)
@@ -142,10 +142,10 @@ def _filled(lines: list[str]) -> list[str]:
 
 def _octaves(line: str) -> float:
     """The pitch of a line: cents where its number has a full stop, else a ratio. Text behind it is ignored."""
-    if found := _CENTS.match(line):
-        cents = float(found.group())
-    elif found := _RATIO.match(line):
-        above, below = found.group(1), found.group(2) or "1"
+    if match := _CENTS.match(line):
+        cents = float(match.group())
+    elif match := _RATIO.match(line):
+        above, below = match.group(1), match.group(2) or "1"
         if max(len(above), len(below)) > MOST_DIGITS:
             raise ValueError(f"{brief(line)} has a number of more than {MOST_DIGITS} digits")
         if int(above) <= 0 or int(below) <= 0:
@@ -159,10 +159,10 @@ def _octaves(line: str) -> float:
 
 
 def _whole(line: str, name: str, low: int, high: int) -> int:
-    found = _WHOLE.match(line)
-    if found is None or len(found.group()) > MOST_DIGITS or not low <= int(found.group()) <= high:
+    match = _WHOLE.match(line)
+    if match is None or len(match.group()) > MOST_DIGITS or not low <= int(match.group()) <= high:
         raise ValueError(f"its {name} is {brief(line)}, and must be a whole number of {low} … {high}")
-    return int(found.group())
+    return int(match.group())
 
 
 def _entry(line: str) -> int | None:
