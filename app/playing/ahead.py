@@ -172,12 +172,14 @@ class Ahead:
         while True:
             with self._mailbox:
                 self._voices = [
-                    each for each in self._voices if not each.finished and not each.voice.over and not each.given_up()
+                    voice
+                    for voice in self._voices
+                    if not voice.finished and not voice.voice.over and not voice.given_up()
                 ]
                 self._mailbox.wait_for(lambda: bool(self._voices) or self._closing)
                 if self._closing:
                     return
-                voice = min(self._voices, key=lambda each: each.lead_s)
+                voice = min(self._voices, key=lambda voice: voice.lead_s)
             try:
                 voice.advance()
                 if voice.finished and voice.ends_s is None:

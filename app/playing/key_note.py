@@ -41,13 +41,21 @@ class KeyNote:
         timed: its latency has been noted.
     """
 
-    from_s, waits_s, pending = 0.0, 0.0, False
+    from_s = 0.0
+    waits_s = 0.0
+    pending = False
 
     def __init__(
         self, player: InstrumentPlayer, mixer: Mixer, id: int, event: NoteOn, path: Path, begin_frame: int = 0
     ) -> None:
-        self.player, self.mixer, self.id, self.event, self._path = player, mixer, id, event, path
-        self.begin_frame, self.patch, self.ear = begin_frame, player.patch, player.ear
+        self.player = player
+        self.mixer = mixer
+        self.id = id
+        self.event = event
+        self._path = path
+        self.begin_frame = begin_frame
+        self.patch = player.patch
+        self.ear = player.ear
         self.request: RenderRequest | None = None
         self.string: int | None = None
         self.gain = 1.0

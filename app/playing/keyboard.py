@@ -132,9 +132,9 @@ def octave_near(octave: int, keys: Collection[int]) -> int:
     Args:
         keys: of MIDI, which sound; some instruments have fewer than the computer.
     """
-    counts = {each: len(letters_of(each).keys() & set(keys)) for each in range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)}
+    counts = {other: len(letters_of(other).keys() & set(keys)) for other in range(LOWEST_OCTAVE, HIGHEST_OCTAVE + 1)}
     enough = MOST_OF_BEST * max(counts.values())
-    return min((each for each in counts if counts[each] >= enough), key=lambda each: abs(each - octave))
+    return min((other for other in counts if counts[other] >= enough), key=lambda other: abs(other - octave))
 
 
 def octaves_of(low: int, high: int) -> tuple[int, int]:
@@ -159,8 +159,8 @@ def place_of(press: KeyPress, platform: str = sys.platform) -> int | None:
     codes = _ROW_CODES.get(platform)
     if codes and press.code:
         return codes.index(press.code) if press.code in codes else None
-    found = _ROW_LETTERS.find(press.letter.upper()) if press.letter else -1
-    return found if found >= 0 else None
+    place = _ROW_LETTERS.find(press.letter.upper()) if press.letter else -1
+    return place if place >= 0 else None
 
 
 def _rounded(value: float, low: float, high: float) -> float:

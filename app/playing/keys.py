@@ -96,8 +96,12 @@ class Keys:
         report: Callable[[str, str], None],
         set_effects: Callable[[Effects | None], None],
     ) -> None:
-        self._sources, self._find, self._mixer = sources, find, mixer
-        self._in_background, self._report, self._set_effects = in_background, report, set_effects
+        self._sources = sources
+        self._find = find
+        self._mixer = mixer
+        self._in_background = in_background
+        self._report = report
+        self._set_effects = set_effects
         self.recorder = EventRecorder(report)
         self._lock = threading.RLock()
         self._player: InstrumentPlayer | None = None
@@ -195,11 +199,11 @@ class Keys:
         if event.number in SWITCHES:
             self._switches[event.number, event.channel] = event
         elif event.number == RESET:
-            self._switches = {at: each for at, each in self._switches.items() if each.channel != event.channel}
+            self._switches = {at: switch for at, switch in self._switches.items() if switch.channel != event.channel}
 
     def look(self) -> list[KeyNote]:
         """Follow the player's reports; the notes that began since it was asked for the last time. Any thread."""
-        found = []
+        begun_notes = []
         with self._lock:  # a note is known before its report is read
             for player in self._playing:
                 for report in player.reports():
@@ -213,14 +217,14 @@ class Keys:
                     if note.over:
                         del self._notes[player, report.id]
                     elif report.kind == BEGAN:
-                        found.append(note)
-                own = [id for each, id in self._notes if each is player]
-                for id in player.compiled.missing(own):
+                        begun_notes.append(note)
+                ids = [id for owner, id in self._notes if owner is player]
+                for id in player.compiled.missing(ids):
                     self._notes.pop((player, id)).end()
             self._notes = {key: note for key, note in self._notes.items() if not note.over}
             held = {player for player, _ in self._notes}
-            self._playing = [each for each in self._playing if each is self._player or each in held]
-        return found
+            self._playing = [player for player in self._playing if player is self._player or player in held]
+        return begun_notes
 
     def cancel(self) -> None:
         """Cancel the events that were handed over and are not due yet."""
@@ -237,10 +241,10 @@ class Keys:
 
     def sounding(self) -> dict[int, float]:
         """Key -> how loud its string rings: 0 at SEEN_DB below full scale, 1 at full scale."""
-        found: dict[int, float] = {}
-        for each in self.sounding_notes():
-            found[each.key] = max(found.get(each.key, 0.0), each.level)
-        return found
+        levels: dict[int, float] = {}
+        for note in self.sounding_notes():
+            levels[note.key] = max(levels.get(note.key, 0.0), note.level)
+        return levels
 
     def sounding_notes(self) -> list[SoundingNote]:
         """The notes that ring, with their strings; none while the output stands."""
@@ -248,8 +252,8 @@ class Keys:
         if player is None or self._in is not mixer or self._stands(mixer):
             return []
         return [
-            SoundingNote(each.key, min(max(1 + each.level_db / SEEN_DB, 0.0), 1.0), each.string, player.slid(each))
-            for each in player.ringing()
+            SoundingNote(note.key, min(max(1 + note.level_db / SEEN_DB, 0.0), 1.0), note.string, player.slid(note))
+            for note in player.ringing()
         ]
 
     def _stands(self, mixer: Mixer) -> bool:
@@ -391,5 +395,5 @@ def _holds(player: InstrumentPlayer, patch: Patch) -> bool:
 
 def _turned(player: InstrumentPlayer) -> PatchTurned:
     """The patch with the pick-up it is heard through. That is not its own where a single string is played."""
-    heard = {"points": player.ear.points, "kind": player.ear.pickup}
-    return PatchTurned(player.patch.model_copy(update={"pickup": player.patch.pickup.model_copy(update=heard)}))
+    pickup = {"points": player.ear.points, "kind": player.ear.pickup}
+    return PatchTurned(player.patch.model_copy(update={"pickup": player.patch.pickup.model_copy(update=pickup)}))

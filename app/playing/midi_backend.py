@@ -115,14 +115,14 @@ class RtMidi:
 
 def _distinct(names: Iterable[str]) -> list[str]:
     """Names of ports; further ones of the same name are numbered, as some systems do not."""
-    found: list[str] = []
+    distinct_names: list[str] = []
     for name in names:
         number, distinct = 1, name
-        while distinct in found:
+        while distinct in distinct_names:
             number += 1
             distinct = f"{name} #{number}"
-        found.append(distinct)
-    return found
+        distinct_names.append(distinct)
+    return distinct_names
 
 
 class RtMidiInput:
@@ -133,7 +133,9 @@ class RtMidiInput:
     """
 
     def __init__(self, client: Any, name: str, callback: Callable[[Sequence[int]], None]) -> None:
-        self._client, self._name, self._callback = client, name, callback
+        self._client = client
+        self._name = name
+        self._callback = callback
         self._open = True
         self._thread = threading.Thread(target=self._fetch, name="midi-input", daemon=True)
         self._thread.start()
@@ -156,9 +158,9 @@ class RtMidiInput:
     def _fetch(self) -> None:
         while self._open:
             time.sleep(PERIOD_S)
-            while self._open and (found := self._client.get_message()) is not None:
+            while self._open and (message := self._client.get_message()) is not None:
                 try:
-                    self._callback(found[0])
+                    self._callback(message[0])
                 except Exception as error:  # is reported, and costs this message only
                     threading.excepthook(
                         threading.ExceptHookArgs((type(error), error, error.__traceback__, self._thread))

@@ -79,13 +79,13 @@ class Note:
     @property
     def began(self) -> bool:
         """Return True if the device has any of its samples, or it was cut after it was handed over."""
-        return not self.pending and (self.cut or any(each.sounding or each.over for each in self.voices.values()))
+        return not self.pending and (self.cut or any(voice.sounding or voice.over for voice in self.voices.values()))
 
     @property
     def waits_s(self) -> float:
         """The seconds that it will still be rendered before it sounds; 0: it does not wait, or not known."""
         waits = self.pending and not self.over
-        return max((each.waits_s for each in self.ahead), default=0.0) if waits else 0.0
+        return max((voice.waits_s for voice in self.ahead), default=0.0) if waits else 0.0
 
     @property
     def began_frame(self) -> int:

@@ -80,7 +80,9 @@ class Notes:
         report: Report,
         set_effects: Callable[[Effects | None], None] = lambda effects: None,
     ) -> None:
-        self._sound, self._sources, self._find = sound, sources, find
+        self._sound = sound
+        self._sources = sources
+        self._find = find
         self._report = report = faultless(report, "while a note was reported")
         self._lock = threading.RLock()
         self._notes: list[Note | KeyNote] = []
@@ -117,7 +119,9 @@ class Notes:
         reach = PluckRange.of(entry.info if entry is not None else None) if single else None
         with self._lock:
             plucked_before = self._reach is not None
-            self._reach, self._ear, chosen = reach, ear, self._chosen
+            self._reach = reach
+            self._ear = ear
+            chosen = self._chosen
             if chosen is not None and entry is not None and path_of(chosen.preset) != entry.path:
                 self._chosen = replace(chosen, preset=entry.path)
         if single and not plucked_before:
@@ -426,7 +430,9 @@ class Notes:
         plucks = [note for note in left if isinstance(note, Note) and note.seconds and not note.released]
         for note in left:
             if isinstance(note, Note) and note in plucks[-MOST_CARRIED:]:
-                note.from_s, note.begin_frame, note.mixer = note.seconds, 0, None
+                note.from_s = note.seconds
+                note.begin_frame = 0
+                note.mixer = None
                 note.pending, note.handed_over = True, False
                 self.in_background(partial(self._begin, note, 0.0), note)
             else:
@@ -445,8 +451,8 @@ class Notes:
             self._make_voices(note, mixer.rate_hz, struck_s)
             note.set_begin(struck_s)
             if note.ahead:
-                for each in note.ahead:
-                    self._ahead.render(each)
+                for voice in note.ahead:
+                    self._ahead.render(voice)
                 return
             self._skip(note)
             if self._hand_over(note, mixer):
@@ -494,7 +500,7 @@ class Notes:
     def _rendered_enough(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
         """Hand the note over once all its models are rendered far enough. Any thread."""
         with self._lock:
-            if note.handed_over or ahead is not note.ahead or not all(each.begun for each in ahead):
+            if note.handed_over or ahead is not note.ahead or not all(voice.begun for voice in ahead):
                 return
             note.handed_over = True  # or two that are ready at the same time would both do it
         self._skip(note)

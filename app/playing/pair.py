@@ -27,8 +27,8 @@ class Pair:
     def select(self, name: str) -> None:
         """Set which one is heard; where they sound, it is a cross-fade."""
         self._heard = name
-        for each, voice in self._voices.items():
-            voice.set_gain(float(each == name))
+        for source, voice in self._voices.items():
+            voice.set_gain(float(source == name))
 
     def play(self, restart: bool = False) -> None:
         """Start both where nothing sounds, or `again`; otherwise they continue."""

@@ -65,7 +65,11 @@ class EventRecorder:
             if self._recorded is not None:
                 played_s = time.monotonic() - self._began_s
                 self._recorded, self._unfetched = (
-                    [each for each in part if each.time_s <= played_s or (event is not None and each.event != event)]
+                    [
+                        timed_event
+                        for timed_event in part
+                        if timed_event.time_s <= played_s or (event is not None and timed_event.event != event)
+                    ]
                     for part in (self._recorded, self._unfetched)
                 )
 
@@ -74,14 +78,14 @@ class EventRecorder:
         with self._lock:
             recorded, self._recorded = self._recorded or [], None
             self.ended_s = time.monotonic() - self._began_s
-            self._unfetched = [each for each in self._unfetched if each.time_s <= self.ended_s]
+            self._unfetched = [timed_event for timed_event in self._unfetched if timed_event.time_s <= self.ended_s]
         return played_from(recorded, self.ended_s)
 
     def fetch(self) -> list[TimedEvent]:
         """The events whose time has come since the last call, with times in s from the beginning."""
         with self._lock:
             now_s = time.monotonic() - self._began_s
-            fetched = [each for each in self._unfetched if each.time_s <= now_s]
+            fetched = [timed_event for timed_event in self._unfetched if timed_event.time_s <= now_s]
             if fetched:
-                self._unfetched = [each for each in self._unfetched if each.time_s > now_s]
-        return sorted(fetched, key=lambda each: each.time_s)
+                self._unfetched = [timed_event for timed_event in self._unfetched if timed_event.time_s > now_s]
+        return sorted(fetched, key=lambda timed_event: timed_event.time_s)
