@@ -118,11 +118,11 @@ class Choices(Monitor, Listener, PluckedString):
             checked = Choices.model_validate({"a": self.a, "b": self.b, **changes})
         except ValidationError as error:
             raise ValueError(explained(error)) from error
-        found = self.model_copy(update={name: getattr(checked, name) for name in changes})
-        follow: dict[str, Any] = {"kept": None} if found.plays_patch else {}
-        if found.preset != self.preset and "string" not in changes:
+        choices = self.model_copy(update={name: getattr(checked, name) for name in changes})
+        follow: dict[str, Any] = {"kept": None} if choices.plays_patch else {}
+        if choices.preset != self.preset and "string" not in changes:
             follow["string"] = None
-        return _with_one_pickup(found.model_copy(update=follow), changes)
+        return _with_one_pickup(choices.model_copy(update=follow), changes)
 
 
 OBSERVED = (*Choices.model_fields, "preset", "patch")  # names that `Session.changed` carries

@@ -121,7 +121,9 @@ class History:
         for name in fields - step.keys():
             step[name] = self._present[name]
         self._redo.clear()
-        self._open_fields, self._changed_s, self._present = turned, now_s, values
+        self._open_fields = turned
+        self._changed_s = now_s
+        self._present = values
 
 
 def _recorded(choices: Choices) -> Values:

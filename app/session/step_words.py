@@ -60,12 +60,12 @@ def step_words(before: Mapping[str, Any], after: Mapping[str, Any]) -> str:
 
 def turned_fields(names: Iterable[str], before: Mapping[str, Any], after: Mapping[str, Any]) -> frozenset[str]:
     """The changed fields: `names` of `Choices` and, of a patch that has kept its name, its own as "patch.PATH"."""
-    found = set(names)
+    changed_names = set(names)
     for field in ("instrument", "kept"):
         old, new = before.get(field), after.get(field)
-        if field in found and isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name:
-            found |= {f"patch.{path}" for path in _changed(old, new)}
-    return frozenset(found)
+        if field in changed_names and isinstance(old, Patch) and isinstance(new, Patch) and old.name == new.name:
+            changed_names |= {f"patch.{path}" for path in _changed(old, new)}
+    return frozenset(changed_names)
 
 
 def _of_ears(changed: list[str], before: Patch, after: Patch) -> str:
@@ -112,7 +112,7 @@ def _names(part: object) -> Collection[str]:
     """The names of the fields of a part of a patch; none where it has no parts."""
     if isinstance(part, Value):
         return type(part).model_fields
-    return [each.name for each in fields(part)] if is_dataclass(part) else ()
+    return [part_field.name for part_field in fields(part)] if is_dataclass(part) else ()
 
 
 def _together(words: list[str]) -> str:

@@ -34,8 +34,8 @@ _log = logging.getLogger("learned_strings")
 
 def log_file() -> Path:
     """The path in LEARNED_STRINGS_LOG, else `learned-strings.log` in the platform's folder for a user's logs."""
-    given = os.environ.get(FILE_VARIABLE)
-    return Path(given) if given else user_log_path("learned-strings", appauthor=False) / "learned-strings.log"
+    path = os.environ.get(FILE_VARIABLE)
+    return Path(path) if path else user_log_path("learned-strings", appauthor=False) / "learned-strings.log"
 
 
 @contextmanager

@@ -35,14 +35,14 @@ def typed_number(text: str, unit: str = "", prefix: str = "") -> float | None:
         if shown and text.casefold().endswith(shown):
             text = text[: -len(shown)].strip()
             break
-    found = _NUMBER.fullmatch(text)
-    if found is None:
+    match = _NUMBER.fullmatch(text)
+    if match is None:
         return None
-    if found["plain"] is not None:
-        digits = found["plain"].replace(",", ".")
+    if match["plain"] is not None:
+        digits = match["plain"].replace(",", ".")
     else:
-        digits = found["grouped"].replace(found["group"], "") + (found["rest"] or "").replace(",", ".")
-    number = float(found["sign"] + digits + (found["exponent"] or "").replace(" ", ""))
+        digits = match["grouped"].replace(match["group"], "") + (match["rest"] or "").replace(",", ".")
+    number = float(match["sign"] + digits + (match["exponent"] or "").replace(" ", ""))
     return number if math.isfinite(number) else None
 
 
@@ -53,10 +53,10 @@ def begins_number(text: str, unit: str = "", prefix: str = "") -> bool:
         return True
     text = text.removeprefix(prefix).strip()
     return any(
-        shown.startswith(text[found:].strip().casefold())
+        shown.startswith(text[end:].strip().casefold())
         for shown in _ways(unit)
-        for found in range(len(text) + 1)
-        if _BEGUN.fullmatch(text[:found])
+        for end in range(len(text) + 1)
+        if _BEGUN.fullmatch(text[:end])
     )
 
 

@@ -112,7 +112,10 @@ class Worker:
         expected: tuple[type[Exception], ...] = (),
         rests: Callable[[], bool] = lambda: False,
     ) -> None:
-        self._name, self._say, self._expected, self._rests = name, say, expected, rests
+        self._name = name
+        self._say = say
+        self._expected = expected
+        self._rests = rests
         self._mailbox = threading.Condition()
         self._next: tuple[Job, Work] | None = None
         self._job: Job | None = None  # the latest
