@@ -23,7 +23,9 @@ from app.views.controls.parts import tool_button
 from app.views.plots.legend import paint_sources
 from engine.pluck import DEFAULT_LISTEN
 
-MARGIN_X, MARGIN_TOP, MARGIN_BOTTOM = 54, 38, 40  # pixels around the picture
+MARGIN_X = 54  # pixels around the picture
+MARGIN_TOP = 38
+MARGIN_BOTTOM = 40
 LEGEND_Y = 17.5  # the middle of the line above the picture
 LEGEND_SHARE = 0.45  # of that line, which a warning leaves to the legend
 GRAB_PIXELS = 14  # how near a mark counts as on it
@@ -131,7 +133,7 @@ class StageView(QWidget):
     @property
     def _heard_remark(self) -> str:
         """The source that sounds instead of the model, in words, for a picture without a legend."""
-        others = (each.title for each in self._sources if each.heard and each.source != "model")
+        others = (source.title for source in self._sources if source.heard and source.source != "model")
         return next((f"You hear: {title}" for title in others), "")
 
     def _paint_ground(self, painter: QPainter) -> None:
@@ -232,7 +234,7 @@ def label_places(
     """The place of each label: under its mark, but within `width` and clear of its neighbour."""
     texts = sorted(marks)
     widths = [metrics.horizontalAdvance(text) + 2 for _, text in texts]
-    lefts = [x - own / 2 for (x, _), own in zip(texts, widths, strict=True)]
+    lefts = [x - width_px / 2 for (x, _), width_px in zip(texts, widths, strict=True)]
     for second in range(1, len(texts)):
         overlap = max(0.0, lefts[second - 1] + widths[second - 1] + LABEL_GAP - lefts[second])
         lefts[second - 1] -= overlap / 2
@@ -240,6 +242,6 @@ def label_places(
     right = lefts[-1] + widths[-1]
     aside = max(0.0, -lefts[0]) + min(0.0, width - right)
     return [
-        (QRectF(left + aside, bottom + 16, own, 18), text)
-        for left, own, (_, text) in zip(lefts, widths, texts, strict=True)
+        (QRectF(left + aside, bottom + 16, label_width, 18), text)
+        for left, label_width, (_, text) in zip(lefts, widths, texts, strict=True)
     ]

@@ -146,8 +146,8 @@ def _luminance(colour: QColor) -> float:
 def _style_sheet() -> str:
     tick = SIGNS / f"tick_{'dark' if is_dark() else 'light'}.svg"
     values = {**asdict(present), "tick": tick.as_posix()}
-    sheet = re.sub(r"font-size: (\d+)px", lambda found: f"font-size: {px(int(found[1]))}px", SHEET.read_text("utf-8"))
-    return re.sub(r"@(\w+)", lambda found: str(values[found[1]]), sheet)
+    sheet = re.sub(r"font-size: (\d+)px", lambda match: f"font-size: {px(int(match[1]))}px", SHEET.read_text("utf-8"))
+    return re.sub(r"@(\w+)", lambda match: str(values[match[1]]), sheet)
 
 
 def _palette() -> QPalette:
@@ -201,7 +201,9 @@ class _Fixed(QObject):
 
     def __init__(self, widget: QWidget, width: int | None, height: int | None) -> None:
         super().__init__(widget)
-        self._widget, self._width, self._height = widget, width, height
+        self._widget = widget
+        self._width = width
+        self._height = height
         changes.theme_changed.connect(self.fit)
         self.fit()
 

@@ -89,7 +89,9 @@ class Browser(QFrame):
         super().__init__(parent)
         self.setObjectName("browser")
         self.setAccessibleName(f"Browser of {what}")
-        self.what, self._size, self._at_rest = what, size, at_rest
+        self.what = what
+        self._size = size
+        self._at_rest = at_rest
         self.loaded = self.selected = self._folder = ""
         self._before: QWidget | None = None  # had the focus
         self._filling = False
@@ -200,8 +202,8 @@ class Browser(QFrame):
             self._favourites,
         )
         self._filling = False
-        found, total = len(self.listed), self.total
-        count = f"{found} of {total} {self.what}" if found < total else f"{total} {self.what}"
+        matches, total = len(self.listed), self.total
+        count = f"{matches} of {total} {self.what}" if matches < total else f"{total} {self.what}"
         self.state.setText(f"{count}   ·   your own: {self._folder}")
         self.select(self.selected)
         self.listed_changed.emit()

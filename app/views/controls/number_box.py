@@ -94,16 +94,16 @@ class NumberBox(_Typed, QDoubleSpinBox):
         return int(self.decimals())
 
     def valueFromText(self, text: str) -> float:
-        found = self.understood(text)
-        return self.value() if found is None else found
+        number = self.understood(text)
+        return self.value() if number is None else number
 
 
 class CountBox(_Typed, QSpinBox):
     """A field for a whole number."""
 
     def valueFromText(self, text: str) -> int:
-        found = self.understood(text)
-        return self.value() if found is None else int(found)
+        number = self.understood(text)
+        return self.value() if number is None else int(number)
 
 
 def prepared(box: QAbstractSpinBox, name: str, tip: str, width: int) -> None:

@@ -20,7 +20,9 @@ if TYPE_CHECKING:
 
 SLOTS = ("a", "b")
 DIFFERENCE_GAINS_DB = range(0, int(DIFFERENCE_GAIN_RANGE_DB[1]) + 1, 10)
-WIDTH, NARROW_WIDTH, TIGHT_WIDTH = 148, 108, 82  # fixed, so that a longer title moves nothing
+WIDTH = 148  # this and the next two: fixed, so that a longer title moves nothing
+NARROW_WIDTH = 108
+TIGHT_WIDTH = 82
 PADDING = 16  # of the style sheet, with the borders
 
 _SOURCES = (

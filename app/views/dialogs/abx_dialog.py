@@ -64,7 +64,10 @@ class AbxDialog(QDialog):
         super().__init__(parent)
         self.setWindowTitle("Listening test (ABX)")
         self.resize(680, 470)
-        self._output, self._material, self._seed, self._render = output, material, seed, render
+        self._output = output
+        self._material = material
+        self._seed = seed
+        self._render = render
         self._rendering: Future[Mapping[str, NDArray[np.float32]]] | None = None
         self._rate_hz = 0  # at which it is, or was, rendered
         self._pair: Pair | None = None
@@ -77,11 +80,9 @@ class AbxDialog(QDialog):
         self._folder = choices.folder
         self._volume_db = float(str(material.through["volume_db"]))
         labels = material.a.label, material.b.label
-        self._setup, self._trial, self._result = (
-            SetupPage(material.words, labels, choices),
-            TrialPage(labels),
-            ResultPage(),
-        )
+        self._setup = SetupPage(material.words, labels, choices)
+        self._trial = TrialPage(labels)
+        self._result = ResultPage()
         self._pages = QStackedWidget()
         for page in (self._setup, self._trial, self._result):
             self._pages.addWidget(page)
@@ -113,7 +114,9 @@ class AbxDialog(QDialog):
         self._leave()
 
     def _connect(self) -> None:
-        setup, trial, result = self._setup, self._trial, self._result
+        setup = self._setup
+        trial = self._trial
+        result = self._result
         setup.start.clicked.connect(self._start)
         setup.audition_asked.connect(self._audition)
         trial.audition_asked.connect(self._audition)
@@ -144,7 +147,7 @@ class AbxDialog(QDialog):
                 self._silence = str(error)
             else:
                 self._stimuli, self._silence = made, ""
-                self._pair = Pair(self._output.mixer, {str(name): each for name, each in made.samples.items()})
+                self._pair = Pair(self._output.mixer, {str(name): samples for name, samples in made.samples.items()})
         self._show_state()
 
     def _audition(self, sound: Sound, again: bool = False) -> None:

@@ -115,8 +115,8 @@ class AudioDialog(QDialog):
         self._buffer.setCurrentIndex(self._buffer.findData(sound.buffer))
 
     def show_state(self, state: AudioState) -> None:
-        heard = bool(state.playing_on)
-        _set(self._state_label, f"Sound goes to {state.playing_on}, {state.facts}." if heard else "No audio output.")
+        output = bool(state.playing_on)
+        _set(self._state_label, f"Sound goes to {state.playing_on}, {state.facts}." if output else "No audio output.")
         _set(self._problem_label, state.problem)
         latest = f", the last at {state.gaps[-1]}" if state.gaps else ""
         _set(self._gaps, f"{len(state.gaps)}{latest}")
@@ -128,7 +128,7 @@ class AudioDialog(QDialog):
             self._problem.setVisible(bool(state.problem))
             self.adjustSize()
         for button in self._tones:
-            button.setEnabled(heard)
+            button.setEnabled(output)
 
     def _choose(self) -> None:
         self.choice_made.emit(self.device, self.sound)

@@ -170,7 +170,7 @@ class LearnDialog(GrowingDialog):
             words = "Learned all the same, although:"
         else:
             words = "Learning takes about five seconds, and shows whether a string was found."
-        self.state.setText("\n".join([words, *(f"• {each}" for each in (*refusals, *warnings))]))
+        self.state.setText("\n".join([words, *(f"• {finding}" for finding in (*refusals, *warnings))]))
         self.start.setText("Use as body" if self.body.isChecked() else "Learn")
         self.start.setEnabled(self.body.isChecked() or self.string.isChecked())
 
@@ -223,11 +223,11 @@ class LearnDialog(GrowingDialog):
         self._pair = Pair(self._output.mixer, sounds)
         self.report.setPlainText("\n".join(as_text(self._learned)))
         self._pages.setCurrentIndex(1)
-        found = self._learned.verdict.found
-        self._ready(f"Nothing is written yet. {ON_KEYS if found else NOT_FOUND}")
-        self.start.setText("Keep and play" if found else "Keep all the same")
-        self.start.setDefault(found)
-        self.start.setAutoDefault(found)
+        has_string = self._learned.verdict.found
+        self._ready(f"Nothing is written yet. {ON_KEYS if has_string else NOT_FOUND}")
+        self.start.setText("Keep and play" if has_string else "Keep all the same")
+        self.start.setDefault(has_string)
+        self.start.setAutoDefault(has_string)
         self.start.setEnabled(True)
         self.heard["learned"].setFocus()
 
@@ -245,7 +245,9 @@ class LearnDialog(GrowingDialog):
     # The end
 
     def _keep(self) -> None:
-        learned, name, kind = self._learned, self.name.text(), self.kind.currentData()
+        learned = self._learned
+        name = self.name.text()
+        kind = self.kind.currentData()
 
         def work(job: Job) -> Any:
             from app.instrument.learned import keep

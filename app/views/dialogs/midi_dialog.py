@@ -62,7 +62,7 @@ class MidiDialog(QDialog):
         self._notes.setToolTip("Velocity always sets how hard the string is plucked")
         self._notes.activated.connect(lambda row: self.notes_chosen.emit(self._notes.itemData(row)))
         self._channels = combo_box("Channels", CHANNELS)
-        self._bends = combo_box("Bend range", [(_semitones(each), each) for each in BENDS])
+        self._bends = combo_box("Bend range", [(_semitones(semitones), semitones) for semitones in BENDS])
         turnable = [(name[:1].upper() + name[1:], field) for field, name in wheel.items()]
         self._wheel = combo_box("Modulation wheel", [("Nothing", "none"), *turnable])
         self._bends_by = combo_box("Pitch bend changes", BENDS_BY)

@@ -63,7 +63,7 @@ def image_of(picture_m: NDArray[np.float32], scale_m: float) -> QImage:
 def _colours(*ends_and_rest: str) -> NDArray[np.uint32]:
     """(COLOURS,) as 0xffRRGGBB, evenly between the colours of down, rest and up."""
     colours = [QColor(name) for name in ends_and_rest]
-    stops = np.array([(each.red(), each.green(), each.blue()) for each in colours], np.float64)
+    stops = np.array([(colour.red(), colour.green(), colour.blue()) for colour in colours], np.float64)
     places = np.linspace(-1, 1, COLOURS)
     red, green, blue = (np.rint(np.interp(places, (-1, 0, 1), part)).astype(np.uint32) for part in stops.T)
     return np.asarray(0xFF000000 | red << 16 | green << 8 | blue, np.uint32)

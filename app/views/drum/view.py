@@ -39,7 +39,9 @@ TIPS: dict[str | None, str] = {  # by what the pointer is on
     "right": MARK_TIP.replace("Shift", "Ctrl, Shift"),
 }
 
-_Key, _Shift, _Control = Qt.Key, Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
+_Key = Qt.Key
+_Shift = Qt.KeyboardModifier.ShiftModifier
+_Control = Qt.KeyboardModifier.ControlModifier
 
 
 class DrumView(StageView):
@@ -64,7 +66,9 @@ class DrumView(StageView):
     def set_drum(self, name: str, shape: Shape, sides: tuple[float, float]) -> None:
         """The drum that a click strikes; `sides`: its length and width in m."""
         if (name, shape, sides) != (self._name, self._shape, self._sides):
-            self._name, self._shape, self._sides = name, shape, sides
+            self._name = name
+            self._shape = shape
+            self._sides = sides
             self._frame = None
             self._describe()
             self.update()
@@ -76,8 +80,8 @@ class DrumView(StageView):
         self.update()
 
     def _describe(self) -> None:
-        heard = " and ".join(angle_words(point) for point in self._listening.values())
-        where = f", heard from {heard}" if heard else ""
+        angles = " and ".join(angle_words(point) for point in self._listening.values())
+        where = f", heard from {angles}" if angles else ""
         self.setAccessibleDescription(f"{self._name}, struck at {place_words(self._place)}{where}")
 
     def set_listening_points(self, left: float, right: float | None = None) -> None:

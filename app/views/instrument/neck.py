@@ -190,8 +190,8 @@ class Neck(Playable):
         if not self.in_rows:
             return super().typed(all_strings)
         rows = range(len(self._strings)) if all_strings else [self._row_of(self.chosen)]
-        found = [self._stopped(row, self._strings[row][1] + self._fret_of(self.chosen)) for row in rows]
-        return [spot for spot in found if self.sounds(spot.key)]
+        spots = [self._stopped(row, self._strings[row][1] + self._fret_of(self.chosen)) for row in rows]
+        return [spot for spot in spots if self.sounds(spot.key)]
 
     def _row_at(self, at: QPointF) -> int:
         height = (self.height() - theme.px(_FOOT)) / len(self._strings)

@@ -383,7 +383,9 @@ class PatchBar(QFrame):
             text, name = "●  Unsaved  ▾", "Recording that is not saved"
             tip = "What was played is not saved yet: save it, or discard it to record again"
         else:
-            text, name, tip = "●  Record", "Record what is played", "Record what is played"
+            text = "●  Record"
+            name = "Record what is played"
+            tip = "Record what is played"
         button.setText(text)
         button.setAccessibleName(name)
         button.setToolTip(tip)

@@ -127,10 +127,10 @@ class PianoKeys(Playable):
     def _filling(self, key: int) -> QColor:
         if not self.sounds(key):
             return _mute(key)
-        level, own = self.level(key), _own(key)
+        level, key_colour = self.level(key), _own(key)
         if level > 0:
-            return theme.blended(self.colour.name(), own, 0.35 + 0.65 * level)
-        return theme.blended(theme.FAINT, own, 0.45) if self.is_down(key) else QColor(own)
+            return theme.blended(self.colour.name(), key_colour, 0.35 + 0.65 * level)
+        return theme.blended(theme.FAINT, key_colour, 0.45) if self.is_down(key) else QColor(key_colour)
 
     def _paint_key(self, painter: QPainter, key: int, filling: QColor) -> None:
         rect = self.key_rect(key)

@@ -273,7 +273,9 @@ class Playable(QWidget):
                 self._held.add(spot)
                 self._press(spot, velocity)
         elif event.button() == Qt.MouseButton.LeftButton:
-            self._down, self._at, self._clicked = spot, event.position(), velocity
+            self._down = spot
+            self._at = event.position()
+            self._clicked = velocity
             self._press(spot, velocity)
         self._show_velocity(event.position(), velocity)
 
@@ -297,7 +299,7 @@ class Playable(QWidget):
         """Play what the mouse has met next."""
         before, self._down = self._down, spot
         assert before is not None
-        for left in [each for each in self._strummed if each.string == spot.string]:
+        for left in [other for other in self._strummed if other.string == spot.string]:
             self._strummed.remove(left)
             self._release_left(left)
         if not self.legato and before.string != spot.string:

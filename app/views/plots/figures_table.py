@@ -181,8 +181,8 @@ class _Cell(QTableWidgetItem):
         self.setToolTip(plain_tip(row.tip))
         if row.bold:
             self.setFont(theme.small_font(12, bold=True))
-        own = theme.SOURCE_COLOURS[column.source] if column.source else theme.TEXT
-        self.setForeground(QColor(theme.FAINT if dimmed or row.grey or value is None else own))
+        column_colour = theme.SOURCE_COLOURS[column.source] if column.source else theme.TEXT
+        self.setForeground(QColor(theme.FAINT if dimmed or row.grey or value is None else column_colour))
 
     def __lt__(self, other: QTableWidgetItem) -> bool:
         one, another = self._value, cast("_Cell", other)._value

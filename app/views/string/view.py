@@ -51,7 +51,9 @@ TIPS: dict[str | None, str] = {  # by what the pointer is on
     "right": MARKER_TIP.replace("Shift", "Ctrl, Shift"),
 }
 
-_Key, _Shift, _Control = Qt.Key, Qt.KeyboardModifier.ShiftModifier, Qt.KeyboardModifier.ControlModifier
+_Key = Qt.Key
+_Shift = Qt.KeyboardModifier.ShiftModifier
+_Control = Qt.KeyboardModifier.ControlModifier
 
 
 class StringView(StageView):
@@ -115,7 +117,9 @@ class StringView(StageView):
 
     def show_frame(self, frame: StringFrame | None) -> None:
         """A moment of the motion; None goes back to the pluck."""
-        before, self._frame, span_mm = self._frame, frame, self._span_mm
+        before = self._frame
+        self._frame = frame
+        span_mm = self._span_mm
         self._fit_span()
         if frame is None or before is None or self._span_mm != span_mm:
             if frame is not before:
@@ -157,7 +161,9 @@ class StringView(StageView):
         self.drag_started.emit()
         self._drag = on or "pluck"
         self._dragged_at = self._pressed_at = at
-        self._far, self._on_bare_string, self._amplitude_mm = False, on is None, self._pluck.amplitude_mm
+        self._far = False
+        self._on_bare_string = on is None
+        self._amplitude_mm = self._pluck.amplitude_mm
         if on == "pluck":
             self._dragged = (self._pluck.position, self._pluck.amplitude_mm)
             self.setCursor(Qt.CursorShape.ClosedHandCursor)
