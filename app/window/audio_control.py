@@ -134,11 +134,11 @@ class AudioControl(QObject):
         """List the devices when they have changed. Without PortAudio they are asked for once: that takes long."""
         first = self._listed is None
         try:
-            found = output_devices(rescan=first and self._output.status().device is None)
+            devices = output_devices(rescan=first and self._output.status().device is None)
         except AudioUnavailable:
-            found, listed = [], None
+            devices, listed = [], None
         else:
-            listed = [DeviceChoice(name=device.name, host_api=device.host_api) for device in found]
+            listed = [DeviceChoice(name=device.name, host_api=device.host_api) for device in devices]
         if self._dialog is not None and (first or listed != self._listed):
             self._dialog.show_devices(listed or [], self._wish[0])
         self._listed = listed

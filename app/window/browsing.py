@@ -38,7 +38,9 @@ class BrowserDesk(QObject):
     ) -> None:
         super().__init__(browser)
         self.browser, self.favourites = browser, set(favourites)
-        self._rows, self._chosen, self._choose = rows, chosen, choose
+        self._rows = rows
+        self._chosen = chosen
+        self._choose = choose
         self._folder = folder
         browser.chosen.connect(choose)
         browser.favourite_asked.connect(self.toggle_favourite)

@@ -330,7 +330,9 @@ class Controller(QObject):
 
     def listening_test(self) -> None:
         """Open the ABX test of what an export would write; until it is closed nothing else plays."""
-        entry, choices, struck = self.entry, self.session.choices, self.instruments.struck
+        entry = self.entry
+        choices = self.session.choices
+        struck = self.instruments.struck
         if entry is None:
             self.window.notices.report("The listening test needs a preset that can be plucked: choose one first.")
             return
@@ -521,7 +523,9 @@ class Controller(QObject):
     def _tick(self) -> None:
         now_s = time.monotonic()
         elapsed_s, self._last_tick_s = now_s - self._last_tick_s, now_s
-        window, performance, status = self.window, self.performance, self.sound.status()
+        window = self.window
+        performance = self.performance
+        status = self.sound.status()
         performance.tick()
         playing, take = performance.playing, performance.take
         window.transport.show_playing(playing)
@@ -549,7 +553,9 @@ class Controller(QObject):
 
         So each painting is short: a key that is played waits for it.
         """
-        on_the_left, now_s, performance = bool(self._ticks % 2), time.monotonic(), self.performance
+        on_the_left = bool(self._ticks % 2)
+        now_s = time.monotonic()
+        performance = self.performance
         elapsed_s, self._decks_shown_s[on_the_left] = now_s - self._decks_shown_s[on_the_left], now_s
         moment = performance.moment(elapsed_s)
         for panel in self.panels:

@@ -119,14 +119,14 @@ def restored_choices(recipe: Recipe) -> dict[str, Any]:
     Of a single string, the patch that is there and its pick-up stay as they are.
     A sound that ends by its decay has a longest duration alone, and leaves the chosen one.
     """
-    found: dict[str, Any] = {
+    fields: dict[str, Any] = {
         "solo": 0,
         "a": "difference" if recipe.source == "difference" else "model",
         "b": "truth",
         "heard": "b" if recipe.source == "truth" else "a",
     }
     if recipe.struck is None:
-        found |= {
+        fields |= {
             **asdict(recipe.pluck),
             "string": None if recipe.string is None else asdict(recipe.string),
             "listen": recipe.listen,
@@ -134,9 +134,9 @@ def restored_choices(recipe: Recipe) -> dict[str, Any]:
             "pickup": recipe.pickup,
         }
         if recipe.listen_right is not None:
-            found["listen_right"] = recipe.listen_right
+            fields["listen_right"] = recipe.listen_right
     if recipe.decay_db is None:
-        found["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
+        fields["seconds"] = OF_CHOICES["seconds"].clamped(recipe.seconds)
     if recipe.source == "difference":
-        found["difference_gain_db"] = OF_CHOICES["difference_gain_db"].clamped(recipe.difference_gain_db)
-    return found
+        fields["difference_gain_db"] = OF_CHOICES["difference_gain_db"].clamped(recipe.difference_gain_db)
+    return fields

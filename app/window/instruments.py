@@ -73,7 +73,9 @@ class Instruments(QObject):
         super().__init__(window)
         self._session = session
         self._library = library
-        self._handle, self._play_preset, self._look = handle, play_preset, look
+        self._handle = handle
+        self._play_preset = play_preset
+        self._look = look
         self.latest_key: tuple[int, int | None] | None = None
         self._lock = threading.Lock()
         self._reported: dict[str, Any] = {}  # values of `Choices` of notes, not in the session yet
@@ -131,15 +133,15 @@ class Instruments(QObject):
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums):
             return
         another = before is not None and is_another(patch, before)
-        own = choices.string is None or (another and "string" not in chosen)
-        if choices.string is not None and not own and (another or before is None):
+        takes_string = choices.string is None or (another and "string" not in chosen)
+        if choices.string is not None and not takes_string and (another or before is None):
             self.latest_key = _key_of(patch, choices.string) or self.latest_key
-        if not own and (before is None or patch.pluck == before.pluck or (another and chosen - {"string"})):
+        if not takes_string and (before is None or patch.pluck == before.pluck or (another and chosen - {"string"})):
             return
         with contextlib.suppress(ValueError):  # an impossible string is reported when its key is struck
-            if (found := Strings(patch).of_key(*self.shown_key(patch))) is not None:
-                shown = asdict(on_string(found, patch.pluck.pluck(choices.velocity)))
-                self._session.play(**shown, **({"string": found.parameters} if own else {}))
+            if (key_string := Strings(patch).of_key(*self.shown_key(patch))) is not None:
+                shown = asdict(on_string(key_string, patch.pluck.pluck(choices.velocity)))
+                self._session.play(**shown, **({"string": key_string.parameters} if takes_string else {}))
 
     def play(self, event: Event, due: Due | None = None, drawn: bool = False) -> None:
         """Play an event, at once or when it is due. Any thread. `drawn`: its pluck is the one of the session."""
@@ -189,7 +191,7 @@ class Instruments(QObject):
         patch, alone = choices.instrument, PluckAt(pluck)
         if not isinstance(patch, Patch) or isinstance(patch.strings, Drums) or pluck.amplitude_mm == 0:
             return alone
-        if any(other_preset(each) for each in choices.voices):
+        if any(other_preset(voice) for voice in choices.voices):
             return alone
         key, number = self.shown_key(patch)
         try:
@@ -217,7 +219,9 @@ class Instruments(QObject):
 
         After a pluck by hand it is the pluck that is shown. None: a string is plucked by itself.
         """
-        choices, latest, drum = self._session.choices, self.latest, self.drum_key
+        choices = self._session.choices
+        latest = self.latest
+        drum = self.drum_key
         patch = choices.instrument
         if not isinstance(patch, Patch):
             return None
@@ -326,8 +330,8 @@ def _key_of(patch: Patch, string: StringParameters) -> tuple[int, int | None] | 
         return None
     for number in (None, *range(len(patch.strings.strings) if isinstance(patch.strings, StringSet) else 0)):
         with contextlib.suppress(ValueError):  # reported when it is struck
-            found = strings.of_key(key, number)
-            if found is not None and _same(found.parameters.length_m, string.length_m):
+            key_string = strings.of_key(key, number)
+            if key_string is not None and _same(key_string.parameters.length_m, string.length_m):
                 return key, number
     return key, None
 

@@ -68,7 +68,10 @@ class _Start(QObject):
     ) -> None:
         super().__init__()
         self._files = list(files)
-        self._window, self._settings, self._path, self._notice = window, settings, path, notice
+        self._window = window
+        self._settings = settings
+        self._path = path
+        self._notice = notice
         self._alive = alive
         self._thread = threading.Thread(target=self._load, name="engine-loader")
         self._torch = threading.Thread(target=load_torch, name="torch-loader", daemon=True)

@@ -53,7 +53,10 @@ class Performance(QObject):
         self, window: MainWindow, session: Session, library: Library, sound: Sound, panels: Sequence[Panel]
     ) -> None:
         super().__init__(window)
-        self._window, self._session, self._library, self._sound = window, session, library, sound
+        self._window = window
+        self._session = session
+        self._library = library
+        self._sound = sound
         self._panels = panels
         self.by_hand: Callable[[], NoteOn | PluckAt] = lambda: PluckAt(session.choices.pluck)
         self._asked: RenderRequest | None = None
@@ -262,7 +265,9 @@ class Performance(QObject):
     def _turn(self) -> None:
         """Hand the next turn of the loop to the mixer, shortly before it begins."""
         # once another pluck is chosen, the note that rings is not the shown one, and its turn is the new pluck's
-        note, take, turn = self._shown.note or self.notes.latest, self._shown.take, self._next_turn
+        note = self._shown.note or self.notes.latest
+        take = self._shown.take
+        turn = self._next_turn
         if note is None or take is None or note.request is None or not note.began:
             return
         if turn is not None:
@@ -357,15 +362,15 @@ class Performance(QObject):
         return (take.preset_name, take.info.string, take.pluck, take.seconds) == chosen
 
 
-def growth_words(errors: Sequence[float], own: float | None) -> str:
+def growth_words(errors: Sequence[float], validation_mae: float | None) -> str:
     """The words for people that the error of a pluck has grown; "" where it has not.
 
     Args:
         errors: relative mean absolute errors within the training range and beyond, as far as there are.
-        own: that of the preset on validation data; None: not known.
+        validation_mae: that of the preset on validation data; None: not known.
     """
     largest = max((error for error in errors if not math.isnan(error)), default=0.0)
-    if largest < max(NOTICEABLE, GROWN * (own or 0.0)):
+    if largest < max(NOTICEABLE, GROWN * (validation_mae or 0.0)):
         return ""
     where = "on this pluck" if errors and errors[0] == largest else "past the end of its training"
     return f"The model's error grows to {percent(largest)} {where}. The Lab shows it (F9)."

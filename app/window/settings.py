@@ -60,8 +60,8 @@ class Settings(Value):
 
 def settings_file() -> Path:
     """LEARNED_STRINGS_SETTINGS, else the platform's place for a user's configuration."""
-    given = os.environ.get("LEARNED_STRINGS_SETTINGS")
-    return Path(given) if given else user_config_path("learned-strings", appauthor=False) / "settings.json"
+    path = os.environ.get("LEARNED_STRINGS_SETTINGS")
+    return Path(path) if path else user_config_path("learned-strings", appauthor=False) / "settings.json"
 
 
 def load_settings(path: Path) -> tuple[Settings, str]:
@@ -111,8 +111,8 @@ def _usable(text: bytes) -> Settings | None:
             try:
                 return Settings.model_validate(data)
             except ValidationError as error:
-                found = error.errors(include_url=False, include_input=False)[0]["loc"]
-                path = [str(part) for part in found if part not in (PATCH, SINGLE)]
+                location = error.errors(include_url=False, include_input=False)[0]["loc"]
+                path = [str(part) for part in location if part not in (PATCH, SINGLE)]
             if path[:1] in ([], ["version"]):  # no settings, or those of another version
                 return None
             _drop(data, path)

@@ -169,8 +169,8 @@ class ComparePanel(Panel):
 
     def _urgency(self, name: str) -> int:
         choices = self.session.choices
-        heard = [choices.preset, other_preset(choices.a), other_preset(choices.b)]
-        return heard.index(name) if name in heard else len(heard)
+        presets_in_use = [choices.preset, other_preset(choices.a), other_preset(choices.b)]
+        return presets_in_use.index(name) if name in presets_in_use else len(presets_in_use)
 
     def _progressed(self, share: float, _: str, row: ComparedRow | None) -> None:
         self._set_computing(share)
@@ -218,7 +218,9 @@ class ComparePanel(Panel):
 
     def _show(self) -> None:
         self._stale = False
-        entries, basis, present = self._entries, self._basis, self.session.choices.preset
+        entries = self._entries
+        basis = self._basis
+        present = self.session.choices.preset
         chosen = {entry.name for entry in entries}
         for name, action in self._actions.items():
             with QSignalBlocker(action):

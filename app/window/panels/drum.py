@@ -67,8 +67,8 @@ class DrumPanel(StagePanel):
     def _sources(self) -> tuple[ShownSource, ...]:
         """The drawn sources: both slots, or in Play the audible one; of another preset the model plays drums."""
         choices = self.session.choices
-        sources = tuple(each for each in shown_sources(choices, self.library) if each.source in DRAWN)
-        return tuple(each for each in sources if each.heard) if choices.face == "play" else sources
+        sources = tuple(source for source in shown_sources(choices, self.library) if source.source in DRAWN)
+        return tuple(source for source in sources if source.heard) if choices.face == "play" else sources
 
     @property
     def _drum(self) -> PlayedDrum | None:
@@ -111,9 +111,9 @@ class DrumPanel(StagePanel):
         """Return True if a blow is on a drum of the shown shape: another pad may just have been struck."""
         if (played := self._drum) is None:
             return False
-        own, shown = blow.request.modes.drum, played.drum
-        alike = math.isclose(own.width_m * shown.length_m, shown.width_m * own.length_m, rel_tol=1e-6)
-        return alike and own.shape == shown.shape
+        drum, shown = blow.request.modes.drum, played.drum
+        alike = math.isclose(drum.width_m * shown.length_m, shown.width_m * drum.length_m, rel_tol=1e-6)
+        return alike and drum.shape == shown.shape
 
     # Gestures
 

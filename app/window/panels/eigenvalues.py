@@ -148,8 +148,8 @@ class EigenvaluesPanel(Panel):
         mode = int(poles.mode[place])
         name, short = ("Learned, nearest to", "Learned,") if learned else ("The string’s", "String’s")
         pitch = f"{poles.mode_hz[place]:.1f} Hz"
-        heard = poles.folded_hz[place]
-        folded = f" (heard at {heard:.0f} Hz)" if heard < poles.mode_hz[place] - 0.1 else ""
+        folded_hz = poles.folded_hz[place]
+        folded = f" (heard at {folded_hz:.0f} Hz)" if folded_hz < poles.mode_hz[place] - 0.1 else ""
         decay = f"T60 {_t60_text(poles.t60_s[place])}"
         if not learned:
             return [f"{name} mode {mode}:  {pitch}{folded},  {decay}", f"{short} mode {mode}:  {pitch},  {decay}"]
@@ -216,14 +216,14 @@ class _Plane(PointedPlot):
         self._places, self._at = np.concatenate([learned, string]), -1
         self._learned_count = len(learned)
         self._ring.setData([], [])
-        heard = np.ones(len(self._places), bool) if alone is None else alone
+        bright = np.ones(len(self._places), bool) if alone is None else alone
         pens = [
             pg.mkPen(
                 theme.translucent(theme.MODEL if first else theme.FAINT, 230 if loud else 60), width=2 if first else 1
             )
-            for first, loud in zip(first_layer, heard, strict=False)
+            for first, loud in zip(first_layer, bright, strict=False)
         ]
-        brushes = [pg.mkBrush(theme.translucent(theme.TRUTH, 255 if loud else 80)) for loud in heard[len(learned) :]]
+        brushes = [pg.mkBrush(theme.translucent(theme.TRUTH, 255 if loud else 80)) for loud in bright[len(learned) :]]
         self._learned.setData(x=learned[:, 0], y=learned[:, 1], pen=pens)
         self._string.setData(x=string[:, 0], y=string[:, 1], brush=brushes)
 

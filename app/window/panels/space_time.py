@@ -110,7 +110,9 @@ class SpaceTimePanel(TimePanel[Envelopes]):
         return Envelopes(take)
 
     def _draw(self, made: Envelopes) -> None:
-        quantity, times_s, columns = self.quantities.key, self.plot.times_s, self.plot.columns
+        quantity = self.quantities.key
+        times_s = self.plot.times_s
+        columns = self.plot.columns
         shown = (made, made.take.ready_frames, made.ready, quantity, times_s, columns)
         if shown == self._shown:
             return

@@ -96,8 +96,8 @@ class SpectrogramPanel(TimePanel[Spectrogram]):
 
     def take_started(self, take: Take | BlowTake) -> None:
         super().take_started(take)
-        own = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
-        self._bar_label.set(f"dB re {own}", "dB")
+        scale = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
+        self._bar_label.set(f"dB re {scale}", "dB")
         if take.rate_hz / 2 != self._highest_hz:
             self._highest_hz = take.rate_hz / 2
             self._label_frequencies()

@@ -163,8 +163,8 @@ class SpectrumPanel(Panel):
     def take_started(self, take: Take | BlowTake) -> None:
         self._shown = self._standing = ()  # which would hold the last take
         self._partials_hz = take.partials_hz
-        own = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
-        self._label.set(f"dB re {own}", "dB")
+        scale = f"{take.full_scale:g} Pa" if isinstance(take, BlowTake) else full_scale_words(self.session.choices)
+        self._label.set(f"dB re {scale}", "dB")
 
     def show_moment(self, moment: Moment) -> None:
         self._moments += 1
@@ -190,12 +190,12 @@ class SpectrumPanel(Panel):
                 self._clear(signal.source)
         self._show_readout()
 
-    def _draw(self, heard: HeardSignal, position_s: float, full_scale: float) -> None:
-        analyser = analyser_at(heard.rate_hz)
-        last_window = heard.ready - analyser.window_frames  # the window does not pass the end of the signal
+    def _draw(self, signal: HeardSignal, position_s: float, full_scale: float) -> None:
+        analyser = analyser_at(signal.rate_hz)
+        last_window = signal.ready - analyser.window_frames  # the window does not pass the end of the signal
         first = max(0, min(round(position_s * analyser.rate_hz), last_window))
-        signal = heard.read(first, first + analyser.window_frames) / full_scale
-        self.show_signal(heard.source, signal, analyser)
+        samples = signal.read(first, first + analyser.window_frames) / full_scale
+        self.show_signal(signal.source, samples, analyser)
 
     def set_rate(self, rate_hz: int) -> None:
         """Fit the frequency axis to a rate."""

@@ -83,7 +83,7 @@ class StringPanel(StagePanel):
     def _sources(self) -> tuple[ShownSource, ...]:
         """The drawn sources: both slots, or in Play the audible one."""
         sources = shown_sources(self.session.choices, self.library)
-        return tuple(each for each in sources if each.heard) if self._plain else sources
+        return tuple(source for source in sources if source.heard) if self._plain else sources
 
     def take_started(self, take: Take | BlowTake) -> None:
         self._envelope = Envelope()
@@ -94,7 +94,9 @@ class StringPanel(StagePanel):
         self.view.set_warning(*self._pluck_warning())
 
     def show_moment(self, moment: Moment) -> None:
-        take, position_s, choices = moment.take, moment.position_s, self.session.choices
+        take = moment.take
+        position_s = moment.position_s
+        choices = self.session.choices
         self._judge()
         standing = moment.standing(choices)
         if not moment.playing and standing == self._standing:
@@ -127,7 +129,9 @@ class StringPanel(StagePanel):
             self.view.set_warning(*self._pluck_warning())
 
     def _show_pluck(self) -> None:
-        choices, entry, view = self.session.choices, self.library.find(self.session.choices.preset), self.view
+        choices = self.session.choices
+        entry = self.library.find(self.session.choices.preset)
+        view = self.view
         shape_mm = choices.pluck.displacement(SHAPE_POINTS) * MM
         view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
         left, right = choices.listen, choices.listen_right if choices.stereo else None
@@ -147,8 +151,8 @@ class StringPanel(StagePanel):
         patch, string = choices.patch, choices.string
         if patch is None or string is None or not choices.plays_patch:
             return judged("; ".join(outside_training(info_of(choices, entry), choices.pluck)), error)
-        heard = by_two_numbers(patch, string)  # as the head of the Lab reports it
-        return judged("; ".join(outside_of_string(entry.info, heard, choices.pluck)), error)
+        drawn_string = by_two_numbers(patch, string)  # as the head of the Lab reports it
+        return judged("; ".join(outside_of_string(entry.info, drawn_string, choices.pluck)), error)
 
     # Gestures
 

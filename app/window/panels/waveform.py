@@ -38,17 +38,17 @@ FEW_PIXELS = 4
 class _Drawn:
     """A signal as far as it has been read."""
 
-    heard: HeardSignal
+    origin: HeardSignal
     signal: NDArray[np.float32] = field(init=False)
     ready: int = 0
     peak: float = 0.0
 
     def __post_init__(self) -> None:
-        self.signal = np.empty(self.heard.frames, np.float32)
+        self.signal = np.empty(self.origin.frames, np.float32)
 
     def catch_up(self) -> bool:
         """Read on, MOST_FRAMES at most; whether there was something to read."""
-        new = self.heard.read(self.ready, self.ready + MOST_FRAMES)
+        new = self.origin.read(self.ready, self.ready + MOST_FRAMES)
         self.signal[self.ready : self.ready + len(new)] = new
         self.ready += len(new)
         self.peak = max(self.peak, float(np.abs(new).max(initial=0.0)))
@@ -100,7 +100,9 @@ class WaveformPanel(Panel):
             self._shown = ()
 
     def take_started(self, take: Take | BlowTake) -> None:
-        self._take, self._drawn, self._full = take, {}, 0.0
+        self._take = take
+        self._drawn = {}
+        self._full = 0.0
         self._shown = self._caught_up = ()  # which would hold the last take
         self._period_s = 1 / take.fundamental_hz
         self.plot.set_times(take.seconds, take.horizon_s)
@@ -131,10 +133,10 @@ class WaveformPanel(Panel):
         choices, moved = self.session.choices, False
         before, self._drawn = self._drawn, {}
         for source in shown_sources(choices, self.library):
-            heard, known = HeardSignal(take.listened, source.source, source.gain), before.get(source.source)
-            if not heard.there:
+            origin, known = HeardSignal(take.listened, source.source, source.gain), before.get(source.source)
+            if not origin.there:
                 continue  # another preset's model, not yet rendered
-            drawn = known if known is not None and known.heard == heard else _Drawn(heard)
+            drawn = known if known is not None and known.origin == origin else _Drawn(origin)
             moved |= drawn.catch_up()
             self._drawn[source.source] = drawn
         if any(self._drawn.get(name) is not drawn for name, drawn in before.items()):
@@ -151,7 +153,7 @@ class WaveformPanel(Panel):
         for source, curve in self._curves.items():
             if source in self._drawn:
                 drawn = self._drawn[source]
-                self.show_signal(source, np.float32(factor) * drawn.signal[: drawn.ready], drawn.heard.rate_hz)
+                self.show_signal(source, np.float32(factor) * drawn.signal[: drawn.ready], drawn.origin.rate_hz)
             else:
                 curve.setData([], [])
 
