@@ -99,7 +99,7 @@ class _Truths:
         self._known: dict[tuple[object, ...], Floats] = {}
 
     def amplitudes(self, info: PresetInfo, job: Job) -> Floats:
-        """float32 (frames, modes) in m, of the frames after the first."""
+        """Return the amplitudes, float32 (frames, modes) in m, of the frames after the first."""
         key = (info.string, info.tension_modulated, info.rate_hz, info.modes, info.grid_points)
         if key not in self._known:
             blocks = []

@@ -94,7 +94,7 @@ class Envelopes:
         return self._largest_m[quantity][: self.ready]
 
     def typical_m(self, quantity: str, times_s: tuple[float, float]) -> float:
-        """1.5 times the median, over these times, of the string's peak, as far as it is ready. 0 where nothing is."""
+        """The 1.5-fold median, over these times, of the string's peak, as far as it is ready. 0 where nothing is."""
         column_s = self.stride / self.take.picture_hz
         first, last = int(times_s[0] / column_s), int(times_s[1] / column_s) + 1
         peaks_m = self._peaks_m[quantity][first : min(last, self.ready)]

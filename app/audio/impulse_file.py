@@ -1,4 +1,4 @@
-"""Reads an impulse response from a sound file, which may come from anywhere and is checked in every respect."""
+"""A reader of impulse responses: sound files, which may come from anywhere and are checked in every respect."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ class Sound:
             return 0.0
 
     def set_volume_db(self, volume_db: float) -> None:
-        """0 dB leaves the samples as they are, minus infinity mutes.
+        """Set the volume: 0 dB leaves the samples as they are, minus infinity mutes.
 
         Raises:
             ValueError: it is not a number, or plus infinity.

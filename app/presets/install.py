@@ -1,4 +1,4 @@
-"""Copies a preset file into the user's own folder, after all checks."""
+"""Installation of a preset file in the user's own folder, after all checks."""
 
 from __future__ import annotations
 

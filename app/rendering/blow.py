@@ -1,8 +1,8 @@
 """A blow on a drum as it is drawn: motion of model and truth, error, and sound, which grow.
 
 A string's take has pictures of points. A drum's has its lowest modes at flashes: amplitude, and the angle that the
-mode has turned through since the blow. A picture at any speed of slow motion follows from these: each mode turns more
-slowly by the same factor, as under a stroboscope of its own, while it decays in real time. Waves that run out from
+mode has turned through since the blow. A picture at any speed of slow motion follows from these: all modes turn more
+slowly by one factor, and decay in real time. Waves that run out from
 the mallet are thus seen as they run, only slower.
 """
 
@@ -79,7 +79,7 @@ class Head:
 
     @classmethod
     def of(cls, surface: Surface, sides: tuple[float, float]) -> Head:
-        """`sides`: length and width, for the numbers of columns and rows."""
+        """The head on a grid; `sides`: length and width, for the numbers of columns and rows."""
         inside, places = grid_of(surface, sides)
         shapes = surface.picked(np.arange(min(len(surface.wavenumber), MOST_SHOWN))).shapes(places)
         return cls(inside, shapes.astype(np.float32), places)
@@ -198,7 +198,7 @@ class BlowTake:
 
     @property
     def scale(self) -> Array:
-        """(modes,): from amplitudes of the modes to those that `head` has shapes of."""
+        """The factors (modes,) from amplitudes of the modes to those that `head` has shapes of."""
         return self.request.modes.scale[: len(self.head.shapes)]
 
     def modal_m(self, source: str, position_s: float, speed: float) -> Array | None:

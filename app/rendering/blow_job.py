@@ -24,7 +24,7 @@ TURNS = 4  # samples in a turn of the fastest mode that is shown, at least: its 
 
 
 class BlowJob(Rendering[BlowRequest, BlowTake]):
-    """Renders a blow of a preset of many strings."""
+    """The rendering of a blow of a preset of many strings."""
 
     def __init__(
         self, request: BlowRequest, load: Callable[[Subject], Loaded], listener: RenderListener, helper: Executor
@@ -147,7 +147,7 @@ def _listened(request: BlowRequest) -> Listened:
 
 
 def _weights(request: BlowRequest) -> Array:
-    """(modes, points): amplitudes in m @ weights = pressure in Pa at 1 m."""
+    """The weights (modes, points): amplitudes in m @ weights = pressure in Pa at 1 m."""
     return np.stack([request.modes.radiated((2 * point - 1, 0.0)) for point in request.ear.points], axis=1)
 
 

@@ -22,7 +22,7 @@ BLOCK_FRAMES = 2048  # pictures; blocks double up to this length, which the next
 
 
 class Job(Rendering[RenderRequest, Take]):
-    """Renders a pluck.
+    """The rendering of a pluck.
 
     Requests for the same motion differ in listening points, slow motion or other presets.
     """

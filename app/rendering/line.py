@@ -20,7 +20,7 @@ from engine.voices import Program
 
 
 class Line:
-    """Renders a source into its motion and its signal.
+    """The rendering of a source into its motion and its signal.
 
     Args:
         source: None for a string at rest.
@@ -131,7 +131,7 @@ class Line:
 
 
 class _Frames:
-    """Renders wanted frames of a source in ascending order; the string is at rest from where it runs away.
+    """The frames of a source, rendered in ascending order; the string is at rest from where it runs away.
 
     Attributes:
         done: frames that are passed, wanted or not.

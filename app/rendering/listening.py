@@ -1,7 +1,7 @@
 """The signal of a source at the listening points, sample by sample, read from its voice.
 
-A compiled voice renders itself. Any other is given its samples: rendered at the listening points alone where the
-model can compute any frame, and read from the motion where that has every frame.
+A compiled voice renders itself; any other is given its samples. They are rendered at the listening points alone where
+the model can compute any frame, and read from the motion where that has every frame.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MIRRORED = 2 * REACH + 2 * QUANTUM  # samples added after the end, which the dif
 
 
 class Listening:
-    """Reads the voice of a source into `signal`.
+    """A reader of a source's voice into `signal`.
 
     Args:
         program: of the voice.

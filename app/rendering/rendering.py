@@ -19,7 +19,7 @@ Made = TypeVar("Made", Take, BlowTake)
 
 
 class Rendering(ABC, Generic[Request, Made]):
-    """Renders a request; `advance` does the next block of it, and calls `listener` in its thread.
+    """The rendering of a request; `advance` does the next block of it, and calls `listener` in its thread.
 
     Args:
         load: returns a preset's model and truth; raises PresetError.

@@ -21,8 +21,8 @@ class Strobe:
     """The flashes of a motion, `FLASH_HZ` for each second of the playhead.
 
     Attributes:
-        speed: by how many periods the shown phase advances in one period of the string; from 1 on each flash shows
-            the string at the playhead itself.
+        speed: advance of the shown phase, in periods, during one period of the string. From 1 on each flash shows the
+            string at the playhead itself.
         fundamental_hz: of the string at small amplitudes.
         seconds: of the motion.
     """

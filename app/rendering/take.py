@@ -1,8 +1,8 @@
 """A take: one pluck as pictures and signals, which grow while it is rendered.
 
 Each source has a *motion*, the string as a series of pictures, and a *signal*, its sound at the present
-listening points, sample by sample. One thread appends and any thread reads: values are written first, then the count
-of what is ready is raised, and values below it never change.
+listening points, sample by sample. One thread appends and any thread reads. Values are written first, then the count
+of ready ones is raised; values below it never change.
 """
 
 from __future__ import annotations

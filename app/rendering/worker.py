@@ -36,8 +36,8 @@ class RenderWorker:
 
     Args:
         load: returns a preset's model and truth; called in the worker's thread.
-        hurried: whether plucks are being played. A new motion is then rendered no faster than its sound for a while,
-            so that plucks in quick succession leave processor time for everything else.
+        hurried: whether plucks are being played. A new motion is then rendered no faster than its sound for a while:
+            plucks in quick succession leave processor time for all else.
         sounds: whether a pluck would sound. The first motion, which may load torch, waits for that, for some seconds.
     """
 
