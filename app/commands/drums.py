@@ -1,4 +1,4 @@
-"""drums: modes of a drum, its motion by the physics and by a model, their errors, and its sound."""
+"""Command `drums`: modes of a drum, its motion by the physics and by a model, their errors, and its sound."""
 
 from __future__ import annotations
 
@@ -192,8 +192,8 @@ def compare(
 ) -> None:
     """Compare a drum's models with the truth.
 
-    Prints relative errors over the whole surface, in total and by second: of the model, of a series of backward
-    error analysis, and of the linear drum.
+    Prints relative errors over the whole surface, in total and by second. They are those of the model, of a series of
+    backward error analysis, and of the linear drum.
     """
     arguments.check_range("--seconds", seconds, 0.01, LONGEST_S, "s")
     blow = _blow_of(drum, key, velocity, place, preset)
@@ -363,7 +363,7 @@ def _write(out: Path, blow: _Blow, motion: Blocks, steps: int, points: int, repo
 
 
 def mode_rows(drum_modes: DrumModes, count: int) -> list[tuple[int, int, float, float, float]]:
-    """m, n, frequency in Hz, T60 in s and the mass with air, relatively, of the lowest modes."""
+    """Return m, n, frequency in Hz, T60 in s and the relative mass with air of the lowest modes."""
     import math
 
     rows = []

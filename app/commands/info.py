@@ -1,4 +1,4 @@
-"""info: what a WAV file is."""
+"""Command `info`: the kind of a WAV file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""learn: recordings of a string to an instrument."""
+"""Command `learn`: recordings of a string to an instrument."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""presets, models, instruments: lists of them."""
+"""Commands `presets`, `models`, `instruments`: lists of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""simulate, predict, compare: the motion of the whole string, by the physics and by models."""
+"""Commands `simulate`, `predict`, `compare`: motion of the whole string, by the physics and by models."""
 
 from __future__ import annotations
 

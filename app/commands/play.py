@@ -1,4 +1,4 @@
-"""play: a MIDI file, played by an instrument, to a WAV file."""
+"""Command `play`: a MIDI file, played by an instrument, to a WAV file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""plugin: instruments as a native plug-in for a DAW."""
+"""Command `plugin`: instruments as a native plug-in for a DAW."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def _print_sizes(images: Sequence[Image]) -> None:
 
 
 class _Steps:
-    """Says each step once, and each tenth of the build."""
+    """A printer of progress: each step once, and each tenth of the build."""
 
     def __init__(self) -> None:
         self._latest = ("", 0)

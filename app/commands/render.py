@@ -1,4 +1,4 @@
-"""render: a pluck to a WAV file, or the recipe of a WAV file once more."""
+"""Command `render`: a pluck to a WAV file, or the recipe of a WAV file once more."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""sampled: an instrument for samplers, in SFZ or SoundFont 2."""
+"""Command `sampled`: an instrument for samplers, in SFZ or SoundFont 2."""
 
 from __future__ import annotations
 
