@@ -130,14 +130,14 @@ def export_sounds(
 
 
 def settings_of(request: SoundRequest, settings: WavSettings) -> WavSettings:
-    """`settings` with the longer fade-out of a sound that ends by its decay."""
+    """The settings with the longer fade-out of a sound that ends by its decay."""
     if request.decay_db is None:
         return settings
     return replace(settings, fade_out_s=max(settings.fade_out_s, DECAY_FADE_S))
 
 
 def default_file_name(preset: str, pluck: Pluck, rate_hz: int, source: Source) -> str:
-    """`{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`: a name alone, no path, whatever `preset` is."""
+    """The name `{preset}_x{position}_a{amplitude in mm}_{rate}_{source}.wav`; never a path, whatever `preset` is."""
     preset = re.sub(r"[^\w .+-]", "_", preset[:LONGEST_NAME]).lstrip(". -") or "preset"
     place, height = _digits(pluck.position, 2), _digits(pluck.amplitude_mm, 1)
     return f"{preset}_x{place}_a{height}_{rate_hz}_{source}.wav"

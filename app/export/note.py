@@ -157,7 +157,7 @@ class HeardNote:
 
 @dataclass(frozen=True)
 class NoteExport:
-    """Renders a note once, and writes a file for each source. See `ExportJob`.
+    """The export of a note, rendered once, with a file for each source. See `ExportJob`.
 
     Attributes:
         paths: the files to write, by source.
@@ -193,7 +193,7 @@ class NoteExport:
 
 
 def _words(reports: list[WavReport], of_family: bool) -> list[str]:
-    """`of_family`: whether the model is of many strings, whose error does not grow past its training."""
+    """The warnings of reports; `of_family`: the model is of many strings, whose error does not grow past training."""
     lines = []
     for report in reports:
         level = f"peak {report.peak_db:.1f} dBFS, {report.clipped} clipped"

@@ -116,7 +116,7 @@ def recorded_files(path: Path) -> tuple[Path, Path]:
 
 @dataclass(frozen=True, eq=False)
 class PlayedExport:
-    """Writes what was played to `recorded_files` of `path`. See `ExportJob`.
+    """The export of a recording to `recorded_files` of `path`. See `ExportJob`.
 
     Attributes:
         preset: the file of the preset that plays the patch.

@@ -82,7 +82,7 @@ class SoundRequest:
         listen_right: the listening point of a right channel; None for mono.
         pickup: 10 mm of "displacement" or 30 m/s of "velocity" are full scale.
         difference_gain_db: gain of the difference.
-        decay_db: the sound ends where both model and truth have fallen this far below their maximum, so that all
+        decay_db: the sound ends where both model and truth have fallen this far below their maximum. So all
             files of a pluck have the same length. None: it lasts `seconds`.
         through: level, amplifier, body and room of an instrument; a difference has its level alone. None: the string
             alone.

@@ -191,8 +191,8 @@ def quantised(
 ) -> tuple[NDArray[np.generic], int]:
     """The numbers that the file stores, as soundfile takes them, and how many were clipped.
 
-    At 16 bits triangular dither of ±1 step makes the rounding error a noise independent of the sound; at 24 bits the
-    step is 144 dB below full scale, below any converter's own noise.
+    At 16 bits triangular dither of ±1 step makes the rounding error a noise independent of the sound. At 24 bits
+    there is none: the step is 144 dB below full scale, below any converter's own noise.
 
     Args:
         first, total: the samples are a block that begins at frame `first` of `total`, and get its part of the dither.

@@ -54,8 +54,8 @@ def build_plugin(
         form: one of FORMATS.
         path: see `plugin_path`.
         cache: a folder that keeps object files for the next build.
-        advanced: is called a few times a second with the name of the step and the share of the whole build that is
-            done, 0 … 1; may raise, to end it.
+        advanced: is called a few times a second with the name of the step and the done share of the whole, 0 … 1.
+            May raise, to end it.
         replace: a plug-in that is there and holds other instruments, too.
 
     Raises:

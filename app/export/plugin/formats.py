@@ -65,8 +65,8 @@ class Target:
 
     Attributes:
         triple: of LLVM; `linker`: of the linker, where it has another name for it.
-        cpus: processors whose kernels are built in; the first is the oldest that is served, and the plug-in takes the
-            last that the computer has all instructions of.
+        cpus: processors whose kernels are built in, the oldest first. The plug-in takes the last of which the
+            computer has all instructions.
     """
 
     triple: str

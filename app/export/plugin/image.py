@@ -1,7 +1,7 @@
 """An instrument as one block of bytes, and the header from which the shell has all places in memory.
 
-It holds the sound of an instrument: the table of its keys with their gains, the model's and the solver's
-programs, the modes of its body, its macros and parameters. Nothing depends on the rate, which the shell sets when
+It holds the table of an instrument's keys with their gains, the programs of model and solver, the modes of its
+body, macros and parameters. Nothing depends on the rate, which the shell sets when
 the host does. The responses of body and room are computed then.
 """
 

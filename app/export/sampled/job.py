@@ -42,8 +42,8 @@ class SampledReport:
         samples: how many the instrument has.
         size_bytes: of the instrument with all its samples.
         cut: samples that still rang at their end, and were faded out.
-        gain_db: by how much the whole is louder than the patch: an SFZ is softer where a note would clip, a SoundFont
-            is raised to full level.
+        gain_db: of the whole over the patch. An SFZ is softer where a note would clip; a SoundFont is raised to full
+            level.
         peak_db: of its loudest note as a sampler plays it, relative to full scale.
     """
 
@@ -56,7 +56,7 @@ class SampledReport:
 
 
 def plain_stem(text: str) -> str:
-    """`text` with ASCII letters, digits and `_.+-` alone, which every SFZ player accepts on every system."""
+    """The text with ASCII letters, digits and `_.+-` alone, which every SFZ player accepts on every system."""
     return re.sub(r"[^A-Za-z0-9_.+-]+", "_", text[:LONGEST_STEM]).strip("._-") or "patch"
 
 

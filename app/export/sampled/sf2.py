@@ -129,8 +129,8 @@ def write_sf2(
 def _attenuations_cb(patch: Patch, samples: Mapping[Zone, StoredSample]) -> dict[Zone, int]:
     """The attenuation by zone, in cB, that a velocity of 0 would have against one of 128.
 
-    So the level continues within a layer as it does from layer to layer; less where a soft layer, which has to be
-    raised for it, would be much louder than the hardest.
+    So the level continues within a layer as it does from layer to layer. A soft layer has to be raised for it; the
+    attenuation is less where that layer would become much louder than the hardest.
     """
     attenuations_cb = {}
     for layers, stored in by_key(samples):
