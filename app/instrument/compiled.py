@@ -49,7 +49,7 @@ class Tabled:
 
 
 class InstrumentPlayer:
-    """Plays one patch with the mixer's next quantum; what began is reported then.
+    """A player of one patch. Events count with the mixer's next quantum, which reports the notes that began.
 
     Every public method may be called from any thread. Strings that ring follow a patch that is taken.
     A mixer of another rate needs another player: see `again`.

@@ -1,12 +1,12 @@
 """Pitch glide: by how many cents a key starts above its resting pitch, in closed form.
 
 A pluck stretches the string, which raises its tension. Over a period of each mode, q_n² averages to half its peak and
-q_n³ to three quarters of it, so that the first partial is raised to
+q_n³ to three quarters of it. The first partial is raised to
 
     ω² = ω₁² + k₁ (Σ_m η_m² q_m² / 2 + η₁² q₁² / 4),
 
-with the symbols of `engine.resonators.base`. Each q_m² decays by exp(-2σ_m t); here it is its mean over the first
-START_S, as high modes of short strings die away before a pitch is heard. The glide grows with amplitude squared.
+with the symbols of `engine.resonators.base`. Each q_m² decays by exp(-2σ_m t). Its mean over the first START_S counts
+here, as high modes of short strings die away before a pitch is heard. The glide grows with amplitude squared.
 """
 
 from __future__ import annotations

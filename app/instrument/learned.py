@@ -69,8 +69,8 @@ def learn_files(
     """Learn recordings; the first is the note that gives the string, and those of its pitch are fitted together.
 
     Args:
-        progress: is called with the share that is done; may raise, to cancel: the same call continues later, with
-            the same result, from a checkpoint in `unfinished_folder`.
+        progress: is called with the share that is done; may raise, to cancel. The same call continues later from a
+            checkpoint in `unfinished_folder`, with the same result.
 
     Raises:
         NoteFileError, RecordingError: a file cannot be learned from; the message names it and the remedy.

@@ -1,8 +1,9 @@
 """The channel messages of a Standard MIDI File with their times in s, as far as the file is whole.
 
-Sources: Standard MIDI Files 1.0 (MMA RP-001) and, of .rmi files, RIFF's form RMID (MMA RP-029). What other programs
-write and most players read is read as well: chunks of any kind between tracks, another number of tracks than the
-header's, lengths that are too long or too short, tracks without their end, and running status across other messages.
+Sources: Standard MIDI Files 1.0 (MMA RP-001) and, of .rmi files, RIFF's form RMID (MMA RP-029). Deviations that
+other programs write and most players accept are accepted. These are chunks of any kind between tracks, another number
+of tracks than the header's, and tracks without their end. So are lengths that are too
+long or too short, and running status across other messages.
 """
 
 from __future__ import annotations

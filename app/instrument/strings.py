@@ -1,7 +1,7 @@
 """The string of each key, by the laws of `engine.kernels.strings`, as the player has it.
 
 Pitch is that of the first partial of a quiet pluck. A key changes the length alone, a slackened string the tension
-alone; both are solved for the pitch in closed form, so that it is exact.
+alone. Both are solved for the pitch in closed form and are exact.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Strings:
         """The string of a key; None for a key beyond the patch's range, or one that its tuning leaves out.
 
         Args:
-            string: on which of a set the key is played, counted from the highest, 0; None, or one that the set does
-                not have or that would have to be slackened too far: the one that the key itself chooses.
+            string: on which of a set the key is played, counted from the highest, 0. The key itself chooses where it
+                is None, is not in the set, or would have to be slackened too far.
 
         Raises:
             ValueError: no string has that pitch; the message names the key and what is impossible.

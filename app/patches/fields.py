@@ -94,7 +94,7 @@ else:
 
 
 class _OfRows(ModelMetaclass):
-    """Gives a class the fields of the rows of a part of the table of parameters that it does not state itself."""
+    """A metaclass that adds a field for each row of a part of the parameter table that the class does not state."""
 
     def __new__(
         meta, name: str, bases: tuple[type, ...], namespace: dict[str, Any], part: str = "", **options: Any

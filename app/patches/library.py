@@ -114,7 +114,7 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
 
 
 def _other_than(taken: set[str], name: str) -> str:
-    """`name`, with a number where it is taken."""
+    """The name, with a number where it is taken."""
     number, free_name = 2, name
     while free_name.casefold() in taken:
         end = f" {number}"

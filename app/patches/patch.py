@@ -83,7 +83,7 @@ class Knobs(Rows, part="knobs"):
     """Multipliers of the strings' own values; 1 leaves them as they are.
 
     The tuning says which pitch a key has. At one pitch and one mass the tension goes with the square of the length,
-    f = √(T₀/ρA) / 2ℓ for a flexible string: `tension` and `length` each take the other with them, and both multiply.
+    f = √(T₀/ρA) / 2ℓ for a flexible string. So `tension` and `length` each change the other, and both multiply.
     A heavier string (`density`, `gauge`) is tighter at the length that it has.
 
     Attributes:
@@ -286,8 +286,8 @@ class Patch(Value):
         preset: the model that plays it, by the name of a preset of many strings; never a path.
         range: the lowest and the highest key that sound.
         losses: None: strings decay by d₁ and d₃ alone, and through the bridge.
-        sympathy_s_kg: conductance of the bridge through which strings at rest ring with those that are played: of all
-            keys where strings are let ring, else the open strings of a set. 0: they do not.
+        sympathy_s_kg: conductance of the bridge through which strings at rest ring with those that are played. 0:
+            none do. They are the strings of all keys where strings are let ring, else the open strings of a set.
         polarisations: None: strings move in one direction alone, and lose nothing at a bridge.
         mode: "poly": a string for each key; "guitar": a string for each MIDI channel; "mpe".
         bend_by: whether the pitch wheel changes the tension, as a bent string, or the length, as a slide.
