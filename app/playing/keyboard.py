@@ -155,7 +155,7 @@ def turn(press: KeyPress, octave: int, velocity: int) -> tuple[int, int] | None:
 
 
 def place_of(press: KeyPress, platform: str = sys.platform) -> int | None:
-    """0 … 9 along the row; None for a key that is not of it."""
+    """The place 0 … 9 along the row; None for a key that is not of it."""
     codes = _ROW_CODES.get(platform)
     if codes and press.code:
         return codes.index(press.code) if press.code in codes else None

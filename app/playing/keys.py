@@ -71,10 +71,10 @@ class _Wanted:
 
 
 class Keys:
-    """Every public method may be called from any thread.
+    """The keys of a patch, and its notes. Every public method may be called from any thread.
 
-    A key waits for no knob. A turned patch is played at once, as loud as through the body of the patch before; where
-    its own is another, that is computed in the background. Nothing that takes milliseconds is computed under a lock.
+    A key waits for no knob. A turned patch is played at once, as loud as through the body of the patch before.
+    Another body is computed in the background. Nothing that takes milliseconds is computed under a lock.
 
     Args:
         find: the path of a preset by its name; None where there is none.

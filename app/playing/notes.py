@@ -408,7 +408,7 @@ class Notes:
         return all(self._sources.has(note.subject(source), rate_hz) for source in note.sources)
 
     def _guarded(self, work: Callable[[], None], note: Note | None = None) -> Callable[[], None]:
-        """`work` with its errors reported; they cut the note."""
+        """The work with its errors reported; they cut the note."""
 
         def guarded() -> None:
             try:

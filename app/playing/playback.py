@@ -1,4 +1,4 @@
-"""Plays a MIDI file. A thread of its own hands each event over before its time, with the frame at which it counts."""
+"""Playback of a MIDI file. A thread hands each event over before its time, with the frame at which it counts."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Clock(Protocol):
 
 
 class Playback:
-    """Plays one list of events at a time.
+    """A player of one list of events at a time.
 
     Args:
         handle: plays an event when it is due, or, for None, at once; called in the playback's thread.
