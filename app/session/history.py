@@ -1,8 +1,8 @@
 """Undo and redo of the choices that shape the sound.
 
-A step is one gesture: all that changes between `hold` and `release` (a drag), or changes of the same fields that
-follow each other within half a second (keys, wheel notches, a controller). Undo restores the fields that the step
-changed and no others. Notes that are played (`Session.play`) are no steps: what they changed stays as it is.
+A step is one gesture: all that changes between `hold` and `release` (a drag). Changes of the same fields that follow
+each other within half a second are one as well (keys, wheel notches, a controller). Undo restores the fields that
+the step changed and no others. Notes that are played (`Session.play`) are no steps: their changes stay.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ Values = dict[str, Any]  # of recorded fields
 
 
 class History:
-    """Records the changes of a session from now on.
+    """The record of a session's changes from now on.
 
     Args:
         now_s: a clock, replaced in tests.
-        held: whether a gesture that has begun may still be under way: its `release` may never come, as where a dialog
+        held: whether a gesture that has begun may still be under way. Its `release` may never come, as where a dialog
             or another window takes the mouse.
     """
 

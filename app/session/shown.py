@@ -43,7 +43,7 @@ class ShownSource:
 
     @property
     def gain(self) -> float:
-        """`gain_db` as a factor of the signal."""
+        """The gain as a factor of the signal."""
         return float(10 ** (self.gain_db / 20))
 
 

@@ -110,7 +110,7 @@ def log_fault(error: BaseException, where: str) -> str:
 
 
 def faultless(work: Callable[P, object], where: str) -> Callable[P, None]:
-    """`work`, whose exceptions are written to the log and go no further: what it reports to must not stop sound."""
+    """The work, whose exceptions are written to the log and go no further: what it reports to must not stop sound."""
 
     def guarded(*values: P.args, **named: P.kwargs) -> None:
         try:

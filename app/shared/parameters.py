@@ -41,8 +41,8 @@ class Taper:
     """The way in which a value moves and reads.
 
     Attributes:
-        step: of an arrow key or a wheel notch: of the value; a ratio above 1 where it is logarithmic; a share of the
-            way where it is curved.
+        step: of an arrow key or a wheel notch, in the value's unit. A ratio above 1 where it is logarithmic; a share
+            of the way where it is curved.
         text: format, with the unit.
         curve: how many times as fast the value rises at the end of its range as at the start; 1: evenly.
     """
@@ -114,7 +114,7 @@ class Parameter:
         return self.limits[1] / self.limits[0] if self.taper.logarithmic else self.taper.curve
 
     def share(self, value: float) -> float:
-        """0 … 1 along the range."""
+        """The share of a value along the range, 0 … 1."""
         (low, high), curve = self.limits, self.curve
         part = (value - low) / (high - low)
         return part if curve == 1.0 else math.log1p(part * (curve - 1)) / math.log(curve)
@@ -128,7 +128,7 @@ class Parameter:
         return self.clamped(low + part * (high - low))
 
     def stepped(self, value: float, steps: float) -> float:
-        """`value` moved by so many steps, within the range."""
+        """The value moved by so many steps, within the range."""
         step = self.taper.step
         if self.taper.logarithmic:
             return self.clamped(value * step**steps)
