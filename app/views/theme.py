@@ -197,7 +197,7 @@ def px(pixels: float) -> int:
 
 
 class _Fixed(QObject):
-    """Keeps a widget at a size that grows with the text; lives as long as the widget."""
+    """The size of a widget, which grows with the text; lives as long as the widget."""
 
     def __init__(self, widget: QWidget, width: int | None, height: int | None) -> None:
         super().__init__(widget)
@@ -229,7 +229,7 @@ def small_font(size_px: int = 11, bold: bool = False, grows: bool = True) -> QFo
 
 @lru_cache(maxsize=64)
 def blended(colour: str, ground: str, share: float) -> QColor:
-    """`share` (0 … 1) of `colour` over `ground`, as an opaque colour: that fills several times faster."""
+    """The opaque mix of a share (0 … 1) of `colour` and of `ground`, which fills several times faster than alpha."""
     over, under = QColor(colour), QColor(ground)
     mixed = (
         share * a + (1 - share) * b
@@ -239,7 +239,7 @@ def blended(colour: str, ground: str, share: float) -> QColor:
 
 
 def translucent(colour: str, alpha: int) -> QColor:
-    """`colour` with alpha 0 … 255."""
+    """The colour with alpha 0 … 255."""
     made = QColor(colour)
     made.setAlpha(alpha)
     return made

@@ -24,7 +24,7 @@ COARSE = 10  # of Page up and Page down
 
 
 class _Editor(QLineEdit):
-    """Takes a typed number; Enter and Escape, which are shortcuts of the window, are its own.
+    """A field for a typed number; Enter and Escape, which are shortcuts of the window, are its own.
 
     A key that no number with this unit has gives it up, and goes to the window: it plays.
     """

@@ -22,7 +22,7 @@ _HELD = (
 
 
 class PlayingKeys(QObject):
-    """Emits `pressed` for letters and digits, once for a key that is held down; not in text fields.
+    """The keys of the computer: `pressed` for letters and digits, once while a key is held; not in text fields.
 
     While a browser is open, keys that write go to its search instead.
 

@@ -36,7 +36,7 @@ _LARGE = "QPushButton { font-size: 17px; min-height: 74px; min-width: 130px; }"
 
 
 class SetupPage(QWidget):
-    """Asks with signals; `show_state` says whether the test can start. `words`: what is compared."""
+    """The page before the test; `show_state` shows whether it can start. `words`: the compared sounds."""
 
     audition_asked = Signal(str)  # "A" or "B"
 
@@ -75,7 +75,7 @@ class SetupPage(QWidget):
             self.audition_asked.emit(name)
 
     def show_state(self, obstacle: str, advice: str) -> None:
-        """`obstacle`: why the test cannot start, or ""; `advice`: what to know before it does, or ""."""
+        """Show why the test cannot start, and what to know before it does; "": nothing."""
         for button in (self.start, *self._listen):
             button.setEnabled(not obstacle)
         self._warning.setText(obstacle or advice)

@@ -41,7 +41,7 @@ CONTINUE, CANCEL = "Continue", "Cancel export"
 
 
 class ExportDialog(GrowingDialog):
-    """Follows what the window plays (`show_subjects`) until an export begins.
+    """The dialog of exports. It follows what the window plays (`show_subjects`) until an export begins.
 
     Attributes:
         state: a line or more on what is to come, on progress, or on the result.

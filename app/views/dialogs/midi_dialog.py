@@ -149,7 +149,7 @@ class MidiDialog(QDialog):
             box.setEnabled(turnable)
 
     def set_learnable(self, why_not: str) -> None:
-        """`why_not`: why no controller can be assigned, with the remedy; "" where one can."""
+        """Show why no controller can be assigned, with the remedy; "" where one can."""
         for field, (_, learn, _) in self._rows.items():
             learn.setEnabled(not why_not)
             learn.setToolTip(why_not or f"Click, then move a control to assign it to {self._turned[field]}")

@@ -61,7 +61,7 @@ def image_of(picture_m: NDArray[np.float32], scale_m: float) -> QImage:
 
 @lru_cache(maxsize=4)
 def _colours(*ends_and_rest: str) -> NDArray[np.uint32]:
-    """(COLOURS,) as 0xffRRGGBB, evenly between the colours of down, rest and up."""
+    """The colours (COLOURS,) as 0xffRRGGBB, evenly between the colours of down, rest and up."""
     colours = [QColor(name) for name in ends_and_rest]
     stops = np.array([(colour.red(), colour.green(), colour.blue()) for colour in colours], np.float64)
     places = np.linspace(-1, 1, COLOURS)

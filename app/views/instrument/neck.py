@@ -1,8 +1,8 @@
 """The strings of a patch: a neck with frets, or a fan of many strings. What sounds is lit where it is stopped.
 
 A few strings are rows, the highest on top, with fret n at 1 - 2^(-n/12) of the length from the nut. Many strings, or
-one that is shortened for every key, stand side by side, each as long as its key leaves it (drawn as the square root,
-or the highest would be too short to see).
+one that is shortened for every key, stand side by side, each as long as its key leaves it. The square root of the
+length is drawn, or the highest would be too short to see.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Neck(Playable):
     A click plays the string that was clicked. Keys of others play the highest string at or below them, as patches do.
 
     Fingers stay where they were put, and make no sound. While there are any, strings sound as these stop them, and
-    those without a finger sound open, wherever they are clicked: so chords can be strummed with one mouse.
+    those without a finger sound open, wherever they are clicked. So chords can be strummed with one mouse.
     """
 
     fingered = Signal(bool)  # whether there are fingers

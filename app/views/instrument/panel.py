@@ -1,6 +1,6 @@
 """The instrument's strip: the patch bar, the string's knobs (if shown), the keys or the neck, and what keys play.
 
-In a low window the string's knobs take the place of the keys and the switches of techniques, so that the strip is no
+In a low window the string's knobs take the place of the keys and the switches of techniques. So the strip is no
 higher with them.
 """
 
@@ -180,7 +180,7 @@ class InstrumentPanel(QFrame):
 
     @property
     def surface(self) -> str:
-        """ "keys" or "neck"."""
+        """The shown surface, "keys" or "neck"."""
         return self._choice.key
 
     def show_surface(self, surface: str) -> None:

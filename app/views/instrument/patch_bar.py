@@ -262,7 +262,7 @@ class PatchBar(QFrame):
             self._show_body(chosen or "")
 
     def show_patch(self, patch: Patch, own: bool, changed: bool = False) -> None:
-        """`own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""
+        """Show a patch; `own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""
         mark = "●  " if changed else ""
         self.name.setText(f"{mark}{patch.name}   ▾".replace("&", "&&"))
         self.name.setAccessibleName(f"Instrument: {patch.name}{', changed' if changed else ''}")

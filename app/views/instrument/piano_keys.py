@@ -40,7 +40,7 @@ def shown_range(low: int, high: int) -> tuple[int, int]:
 
 
 class PianoKeys(Playable):
-    """Shows whole octaves; keys without a string are grey."""
+    """Piano keys in whole octaves; those without a string are grey."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__("On-screen keyboard", TIP, parent)

@@ -150,7 +150,7 @@ class StringKnobs(QWidget):
         self.changed.emit(field, round(value) if OF_PATCHES[field].whole else value)
 
     def show_patch(self, patch: Patch, saved: Patch | None = None) -> None:
-        """`saved`: the values that a double-click resets to."""
+        """Show the values of a patch; `saved`: those that a double-click resets to."""
         for field, knob in self.knobs.items():
             value = patch.value(field)
             knob.set_barred(_why_barred(patch, field))

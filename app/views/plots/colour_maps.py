@@ -52,7 +52,7 @@ def share_map() -> pg.ColorMap:
 
 @lru_cache
 def _grounded(name: str, ground_at: float, panel: str) -> pg.ColorMap:
-    """pyqtgraph's map `name`, shifted so that its colour at `ground_at` (0 … 1) is `panel`; its ends keep theirs."""
+    """The pyqtgraph map, shifted so that its colour at `ground_at` (0 … 1) is `panel`; its ends keep theirs."""
     places = np.linspace(0, 1, _COLOURS)
     source = pg.colormap.get(name)
     colours = np.asarray(source.map(places, mode="float"))[:, :3]

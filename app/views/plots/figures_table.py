@@ -193,7 +193,7 @@ class _Cell(QTableWidgetItem):
 
 
 class _OwnColours(QStyledItemDelegate):
-    """Keeps the colours of the columns in the selected row."""
+    """A delegate that keeps the colours of the columns in the selected row."""
 
     def initStyleOption(self, option: QStyleOptionViewItem, index: Index) -> None:
         super().initStyleOption(option, index)

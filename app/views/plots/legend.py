@@ -53,7 +53,7 @@ class Legend(QWidget):
         return "   ".join([*([self._part] if self._part else []), *map(_caption, self._sources)])
 
     def show_sources(self, sources: tuple[ShownSource, ...], part: str = "") -> None:
-        """`part`: which part of the sound they are of, written before them; "" for all of it."""
+        """Show the sources; `part`: the part of the sound, written before them; "" for all of it."""
         self._sources, self._part = sources, part
         self.setAccessibleName(f"Drawn: {self.text}")
         self._place()

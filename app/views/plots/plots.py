@@ -1,7 +1,7 @@
 """The parts that all plots share: the colours of background and axes, and their change with the theme.
 
-A plot keeps the pens and brushes that it was made with. When the theme changes, every colour of the old one is
-exchanged for that of the same role in the new one, and keeps its alpha. So no view needs to follow the theme.
+A plot keeps the pens and brushes that it was made with. When the theme changes, the colour of the same role in
+the new one replaces each old one, which leaves its alpha. So no view needs to follow the theme.
 """
 
 from __future__ import annotations

@@ -30,7 +30,7 @@ class TimePlot(KeptPlot):
     hovered = Signal(float, float)  # the same, of the mouse; NaN where it has left
 
     def __init__(self, name: str, tip: str, parent: QWidget | None = None, *, shaded: bool = True) -> None:
-        """`shaded`: whether the time past training is shaded; not under an image, which would hide the shade."""
+        """Make a plot; `shaded`: the time past training is shaded; not under an image, which would hide the shade."""
         super().__init__(parent)
         self.setAccessibleName(name)
         self.setToolTip(tip)
