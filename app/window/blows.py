@@ -15,7 +15,7 @@ from engine.strike import Strike
 
 
 class Blows:
-    """Everything runs in the window's thread. Times are in s from the blow.
+    """The blows on a drum, in the window's thread. Times are in s from the blow.
 
     Args:
         submit: hands a request to the render worker.

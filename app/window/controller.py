@@ -75,7 +75,7 @@ ProblemListener = Callable[[AudioProblem], None]
 
 
 class _AudioMail(QObject):
-    """Carries a fault of the sound device from the caretaker's thread into the window's (Qt queues the signal)."""
+    """A signal that carries a fault of the sound device from its caretaker's thread into the window's."""
 
     reported = Signal(object)
 

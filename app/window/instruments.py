@@ -41,7 +41,7 @@ LOOK_MS = 8  # until the player has reported the note of a key, between two look
 
 
 class Instruments(QObject):
-    """Plays events at once, in the thread of each; the session, and with it the window, follows later.
+    """The player of events, at once in the thread of each; session and window follow later.
 
     Args:
         handle: plays an event and returns the note that it began; called in the event's thread.
@@ -50,8 +50,8 @@ class Instruments(QObject):
 
     Attributes:
         latest: the note that was begun last; None before the first.
-        latest_key: the key of a patch that was struck last, or whose string was restored, and on which string of its
-            set, as in `KeyNote`; None before the first.
+        latest_key: the key of a patch that was struck or restored last, and its string of the set, as in `KeyNote`;
+            None before the first.
     """
 
     played = Signal()  # a note has begun, and the session has its values

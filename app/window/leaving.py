@@ -18,7 +18,7 @@ CANCEL = "Cancel"
 
 
 class Leaving(QObject):
-    """Answers `MainWindow.may_close`. What the user finishes or saves first closes the window once that is done."""
+    """The answer to `MainWindow.may_close`. After what the user finishes or saves first, the window closes."""
 
     def __init__(self, window: MainWindow, recordings: Recordings, exports: Exports) -> None:
         super().__init__(window)

@@ -53,7 +53,7 @@ def with_patch(settings: Settings) -> Settings:
 
 
 class _Start(QObject):
-    """Loads the engine in a thread of its own once the window is painted, then makes the controller."""
+    """The start: a thread loads the engine once the window is painted; then the controller is made."""
 
     _loaded = Signal()
 

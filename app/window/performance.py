@@ -1,6 +1,6 @@
 """The note that is played and the pluck that is shown.
 
-An event begins a note, which sounds at once; the picture follows: the render worker makes the motion of the same
+An event begins a note, which sounds at once; the picture follows. The render worker makes the motion of the same
 pluck, and the views show it at the note's own time. All but `play_preset` runs in the window's thread.
 """
 
@@ -43,7 +43,7 @@ PLACED = {"instrument", *PluckedString.model_fields} - {"position"}  # what pluc
 
 
 class Performance(QObject):
-    """Owns the notes and the render worker. Times are in s from the pluck.
+    """The owner of the notes and the render worker. Times are in s from the pluck.
 
     Attributes:
         by_hand: the chosen pluck as an event, which loops play.
@@ -170,7 +170,7 @@ class Performance(QObject):
             self._shown.note, self._shown.parked_s = latest, latest.from_s
 
     def stop(self) -> None:
-        """Everything fades out; the playhead stays."""
+        """Fade all sound out; the playhead stays."""
         self._forget_turn()
         self._playhead.park(self.position_s)
         self.notes.stop()

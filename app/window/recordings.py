@@ -115,7 +115,7 @@ class Recordings(QObject):
         self._reading.start(lambda job: _read_left(job.check))
 
     def _ask_about(self, journals: dict[Played, Journal], problems: list[str]) -> None:
-        """`journals`: were left; `problems`: why other journals cannot be read."""
+        """Ask about journals that were left; `problems`: why others cannot be read."""
         for problem in problems:
             self.reported.emit(problem)
         if not journals:

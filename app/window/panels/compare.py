@@ -240,6 +240,6 @@ class ComparePanel(Panel):
 
 
 def _row(row: ComparedRow, fresh: bool, present: bool) -> TableRow:
-    """`fresh`: of the present pluck; `present`: of the chosen preset."""
+    """The row of the table; `fresh`: of the present pluck; `present`: of the chosen preset."""
     tip = "\n".join(line for line in (row.title, row.file, row.note) if line)
     return TableRow(row.name, values_of(row, COLUMNS), grey=not fresh, bold=present, tip=tip)

@@ -1,7 +1,7 @@
 """The eigenvalues that the chosen preset learned, with the string's own: frequency and decay time, or complex plane.
 
 Amber rings are learned, blue dots the string's: a dot within its ring is a mode well learned. The values of the point
-under the mouse are written above; a click, or Enter on the point chosen by the arrow keys, solos its mode.
+under the mouse are written above. A click, or Enter on the point chosen by the arrow keys, solos its mode.
 """
 
 from __future__ import annotations
@@ -164,7 +164,7 @@ class EigenvaluesPanel(Panel):
 
 
 def _musical_places(poles: Poles) -> Array:
-    """(points, 2): frequency in Hz, and log₁₀ of T60 in s, limited to the axis."""
+    """The places (points, 2): frequency in Hz, and log₁₀ of T60 in s, limited to the axis."""
     return np.stack([poles.folded_hz, np.log10(np.clip(poles.t60_s, SHORTEST_S, LONGEST_S))], axis=1)
 
 

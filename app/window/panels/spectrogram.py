@@ -34,7 +34,7 @@ SCALES = (("log", "Log", "Octaves of equal height"), ("linear", "Linear", "Parti
 
 
 class SpectrogramPanel(TimePanel[Spectrogram]):
-    """0 dB is a sine of full scale; levels below the chosen range have the colour of the background."""
+    """The spectrogram, 0 dB being a sine of full scale; levels below the range have the colour of the background."""
 
     of_strings = False
     key = "spectrogram"

@@ -53,7 +53,7 @@ class Analyser:
 
     @cached_property
     def column_hz(self) -> NDArray[np.float64]:
-        """(COLUMNS,), from LOWEST_HZ to half the rate."""
+        """The frequencies (COLUMNS,), from LOWEST_HZ to half the rate."""
         return np.geomspace(LOWEST_HZ, self.rate_hz / 2, COLUMNS)
 
     @cached_property

@@ -213,7 +213,7 @@ def extremes(signal: NDArray[np.float32], edges: NDArray[np.int64], around: int 
 
 
 def _neighbours(values: NDArray[np.float32], around: int) -> NDArray[np.float32]:
-    """(values, around): each value with its neighbours."""
+    """The neighbours (values, around): each value with its neighbours."""
     before = (around - 1) // 2
     padded = np.pad(values, (before, around - 1 - before), mode="edge")
     return np.lib.stride_tricks.sliding_window_view(padded, around)
