@@ -56,7 +56,7 @@ class Spectrogram:
         return self.take.rate_hz / self.window_frames
 
     def advance(self) -> bool:
-        count = min(self._possible() - self.ready, COLUMNS_AT_A_TIME)
+        count = min(self._ready_columns() - self.ready, COLUMNS_AT_A_TIME)
         if count <= 0:
             return False
         model, truth = (self._transforms(name, count) for name in ("model", "truth"))
@@ -66,7 +66,7 @@ class Spectrogram:
         self.ready += count
         return True
 
-    def _possible(self) -> int:
+    def _ready_columns(self) -> int:
         """The number of columns whose window is rendered to its end."""
         return self._columns_of(min(signal.ready for signal in self._heard.values()))
 

@@ -59,7 +59,7 @@ def open_sound(path: Path, largest_bytes: int | None = None) -> Iterator[soundfi
             size = file.seek(0, io.SEEK_END)
             if largest_bytes is not None and size > largest_bytes:
                 raise UnreadableSound(f"larger than the {largest_bytes // 2**20} MiB that it may have")
-            with soundfile.SoundFile(_recognised(file, size)) as sound:
+            with soundfile.SoundFile(_splice(file, size)) as sound:
                 yield sound
     except soundfile.SoundFileError as error:
         raise UnreadableSound(str(error).rpartition(":")[2].strip(" .")) from error
@@ -102,7 +102,7 @@ class _Spliced(io.RawIOBase):
         return len(head_part) + len(rest)
 
 
-def _recognised(file: BinaryIO, end: int) -> _Spliced:
+def _splice(file: BinaryIO, end: int) -> _Spliced:
     start = 0
     head = _bytes_at(file, 0, 12)
     if head[:3] == b"ID3" and len(head) >= 10:  # tags that players of MP3 put before any file
@@ -110,14 +110,16 @@ def _recognised(file: BinaryIO, end: int) -> _Spliced:
         head = _bytes_at(file, start, 12)
     kind, form = head[:4], head[8:12]
     if kind in (b"RIFF", b"RIFX", b"RF64", b"BW64") and form == b"WAVE":
-        return _Spliced(*_wave(file, start, end))
+        return _Spliced(*_wave_parts(file, start, end))
     if kind == b"fLaC":
         head = _bytes_at(file, start, _FLAC_HEAD)
         bits = (int.from_bytes(head[20:22]) >> 4) % 32 + 1
         if len(head) == _FLAC_HEAD and bits not in _FLAC_BITS:
             raise UnreadableSound(f"it is FLAC of {bits} bits, not of 8, 16 or 24")
         if not _flac_frames(head):
-            return _Spliced(_counted(head, file, start, end), file, start + len(head), end - start - len(head))
+            return _Spliced(
+                _with_frame_count(head, file, start, end), file, start + len(head), end - start - len(head)
+            )
     if kind == b"OggS" and _bytes_at(file, start + 28, 5) == b"\x7fFLAC":
         raise UnreadableSound("it is FLAC within Ogg")
     if kind in (b"fLaC", b"OggS") or (kind == b"FORM" and form in (b"AIFF", b"AIFC")):
@@ -130,7 +132,7 @@ def _flac_frames(head: bytes) -> int:
     return int.from_bytes(head[21:26]) & _FLAC_FRAMES
 
 
-def _counted(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
+def _with_frame_count(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
     """The beginning of a FLAC file that states no length, with the number of frames that it has."""
     at = start + 4
     for _ in range(_MOST_CHUNKS):  # what stands before the sound
@@ -146,14 +148,14 @@ def _counted(head: bytes, file: BinaryIO, start: int, end: int) -> bytes:
         block_at = rest.rfind(first[:2], 0, max(block_at, 0)) if len(first) == 4 else -1
         if block_at < 0 or length:
             break
-        if all(_agree(rest[block_at + place] & 15, first[place] & 15) for place in (2, 3)):  # rate and bits
+        if all(_codes_agree(rest[block_at + place] & 15, first[place] & 15) for place in (2, 3)):  # rate and bits
             length = _end_of_flac_block(rest[block_at : block_at + 16], int.from_bytes(head[8:10]))
     if length == 0:
         raise UnreadableSound("it has no samples, or is cut off")
     return head[:21] + (int.from_bytes(head[21:26]) | min(length, _FLAC_FRAMES)).to_bytes(5) + head[26:]
 
 
-def _agree(one: int, other: int) -> bool:
+def _codes_agree(one: int, other: int) -> bool:
     """Return True if two codes of rates or bits may mean the same; 0 is what the file's first block states."""
     return one == other or not (one and other)
 
@@ -181,7 +183,7 @@ def _end_of_flac_block(data: bytes, block_frames: int) -> int:
     return (number if data[1] & 1 else number * block_frames) + frames
 
 
-def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, int]:
+def _wave_parts(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, int]:
     """A header, the file, and place and length of its samples."""
     byte_order = ">" if _bytes_at(file, start, 4) == b"RIFX" else "<"
     chunks: dict[bytes, bytes] = {}
@@ -213,7 +215,7 @@ def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, i
         raise UnreadableSound("it has no format" if b"fmt " not in chunks else "it has no samples")
     if b"LIST" in chunks:
         chunks[b"LIST"] = _whole_texts(chunks[b"LIST"], byte_order)
-    chunks[b"fmt "], frame_bytes, compressed = _format(chunks[b"fmt "], byte_order)
+    chunks[b"fmt "], frame_bytes, compressed = _plain_format(chunks[b"fmt "], byte_order)
     length = min(samples[1], _LARGEST_DATA) // frame_bytes * frame_bytes
     body = b"".join(
         struct.pack(byte_order + "4sI", name, len(chunks[name])) + chunks[name] + b"\0" * (len(chunks[name]) % 2)
@@ -225,7 +227,7 @@ def _wave(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, int, i
     return head + struct.pack(byte_order + "4sI", b"data", length), file, samples[0], length
 
 
-def _format(chunk: bytes, byte_order: str) -> tuple[bytes, int, bool]:
+def _plain_format(chunk: bytes, byte_order: str) -> tuple[bytes, int, bool]:
     """A format chunk as libsndfile reads it, how many bytes a frame has, and whether it is compressed."""
     if len(chunk) < 16:
         raise UnreadableSound("its format is cut off")
@@ -262,11 +264,11 @@ def _whole_texts(chunk: bytes, byte_order: str) -> bytes:
 def _next_chunk(file: BinaryIO, after: int, size: int, byte_order: str) -> int:
     """The place of the chunk behind one that ends at `after`. An odd one should have a padding byte, and may not."""
     places = (after + size % 2, after + 1 - size % 2)
-    likely = [_likelihood(file, place, byte_order) for place in places]
+    likely = [_chunk_likelihood(file, place, byte_order) for place in places]
     return places[1] if likely[1] > likely[0] else places[0]
 
 
-def _likelihood(file: BinaryIO, place: int, byte_order: str) -> int:
+def _chunk_likelihood(file: BinaryIO, place: int, byte_order: str) -> int:
     """The likelihood, 0 … 4, that a chunk begins at a place.
 
     It is 0 without a name, 4 with a known one, else by its size and what follows.

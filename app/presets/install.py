@@ -49,7 +49,7 @@ def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> Install
         raise InstallError(str(error)) from error
     present = list(present)
     for path in present:
-        if _same(path, digest):
+        if _has_digest(path, digest):
             return Installed(name_text(path.stem), path, was_there=True)
     taken = {path.stem for path in present}
     stem = name_text(file.stem)
@@ -67,7 +67,7 @@ def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> Install
     return Installed(target.stem, target, was_there=False)
 
 
-def _same(path: Path, digest: str) -> bool:
+def _has_digest(path: Path, digest: str) -> bool:
     try:
         return preset_digest(path) == digest
     except PresetError:

@@ -52,11 +52,11 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
 
     def _begin(self) -> BlowTake:
         take = BlowTake(self.request, head_of(self.request.modes))
-        self._movers = self._set_out()
+        self._movers = self._begin_movers()
         take.listened, self._weights = _listened(self.request), _weights(self.request)
         return take
 
-    def _set_out(self) -> dict[str, _Mover]:
+    def _begin_movers(self) -> dict[str, _Mover]:
         request = self.request
         struck = StruckDrum.by(request.strike, request.modes)
         try:
@@ -88,7 +88,7 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
     def _listen(self, take: BlowTake) -> None:
         """Render the signals for other listening points; those that are there stay until these are complete."""
         if self._coming is None:
-            self._coming, self._weights = (_listened(self.request), self._set_out()), _weights(self.request)
+            self._coming, self._weights = (_listened(self.request), self._begin_movers()), _weights(self.request)
         listened, movers = self._coming
         done = listened.signals["truth"].ready_frames
         blocks = self._blocks(movers, min(BLOCK_FRAMES, listened.signals["truth"].frames - done))
