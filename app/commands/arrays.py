@@ -89,7 +89,7 @@ def write_array(path: Path, shape: tuple[int, ...], blocks: Iterator[Array], rep
     with whole_file(path) as file:
         npy.write_array_header_1_0(file, {"descr": "<f8", "fortran_order": False, "shape": shape})
         for block in blocks:
-            file.write(_finite(block).astype("<f8").tobytes())
+            file.write(_check_finite(block).astype("<f8").tobytes())
             done += block.size
             report(done / math.prod(shape))
 
@@ -119,7 +119,7 @@ def _load(path: Path) -> np.ndarray:
     return array
 
 
-def _finite(block: Array) -> Array:
+def _check_finite(block: Array) -> Array:
     if not np.isfinite(block).all():
         raise Failure("the motion is not finite; displacement is in m: lower U0, or raise --substeps")
     return block

@@ -134,7 +134,7 @@ def predict(
         )
     arrays.check_result_size(len(initial), steps + 1, points)
     with progress("predict") as report:
-        arrays.write_motion(out, initial, steps, _predicted(loaded, steps), report)
+        arrays.write_motion(out, initial, steps, _predicted_motion(loaded, steps), report)
     for words in _outside_family(loaded.info, initial):
         say(f"warning: {words}")
 
@@ -196,7 +196,7 @@ def _comparison(preset: Preset, pluck: Pluck, steps: int) -> dict[str, Any]:
 
     info = preset.info
     seconds = steps / info.rate_hz
-    sums = _compared(preset, pluck, steps)
+    sums = _error_sums(preset, pluck, steps)
     windows = [
         {**asdict(w), "past_horizon": w.start_s >= info.horizon_s}
         for w in sums.windows(info.rate_hz, window_edges(seconds, info))
@@ -219,7 +219,7 @@ def window_edges(seconds: float, info: PresetInfo) -> list[float]:
     return [*sorted(edge for edge in inner if edge < seconds), seconds]
 
 
-def _compared(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
+def _error_sums(preset: Preset, pluck: Pluck, steps: int) -> ErrorSums:
     from app.commands import arrays
     from engine.compare.relative import ErrorSums
     from engine.resonators.sine_transform import project
@@ -291,7 +291,7 @@ def _dop853(resonator: Resonator, rate_hz: float, steps: int, trajectories: int,
     return motion
 
 
-def _predicted(preset: Preset, steps: int) -> Motion:
+def _predicted_motion(preset: Preset, steps: int) -> Motion:
     from app.commands.arrays import blocks_of
     from engine.resonators.sine_transform import project
     from engine.sources import ModelSource
