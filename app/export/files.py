@@ -108,7 +108,7 @@ def export_sounds(
     with ExitStack() as files:
         recipes = {source: Recipe.of(one, settings) for source, one in requests.items()}
         # opened first, so that a folder that cannot be written to fails before the work
-        opened = {source: files.enter_context(_written_whole(path)) for source, path in paths.items()}
+        opened = {source: files.enter_context(_open_whole(path)) for source, path in paths.items()}
         rate_hz = settings.rate_hz or info.rate_hz
         try:
             voices = render_voices(request, paths, rate_hz, all_voices=settings.normalise, progress=progress)
@@ -120,7 +120,7 @@ def export_sounds(
         reports = []
         for source, file in opened.items():
             path, sound = paths[source], sounds[source]
-            with _explained(path):
+            with _explain_errors(path):
                 tags = _tags(info.title, recipes[source])
                 level = write_wav(file, sound, rate_hz, settings, tags, beside)
             report = _report(path, file, len(sound), rate_hz, level)
@@ -154,9 +154,9 @@ def _tags(title: str, recipe: Recipe) -> dict[str, str]:
 
 
 @contextmanager
-def _written_whole(path: Path) -> Iterator[BinaryIO]:
+def _open_whole(path: Path) -> Iterator[BinaryIO]:
     """A file to write to, which appears at `path` when the block ends well."""
-    with _explained(path), whole_file(path) as file:
+    with _explain_errors(path), whole_file(path) as file:
         yield file
 
 
@@ -166,7 +166,7 @@ def _report(path: Path, file: BinaryIO, frames: int, rate_hz: int, level: Level)
 
 
 @contextmanager
-def _explained(path: Path) -> Iterator[None]:
+def _explain_errors(path: Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:

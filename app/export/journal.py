@@ -80,7 +80,7 @@ class Journal:
         """
         folder.mkdir(parents=True, exist_ok=True)
         path = folder / f"{recorded:%Y%m%d-%H%M%S-%f}-{os.getpid()}{SUFFIX}"
-        if (lock := _locked(path)) is None:
+        if (lock := _lock_of(path)) is None:
             raise PermissionError(None, "its lock cannot be made", str(path))
         made = cls(path, lock)
         try:
@@ -153,10 +153,10 @@ def left_journals(folder: Path) -> list[Journal]:
         paths = sorted(path for path in folder.glob(f"*{SUFFIX}") if path.is_file())
     except OSError:
         return []
-    return [Journal(path, lock) for path in paths if (lock := _locked(path)) is not None]
+    return [Journal(path, lock) for path in paths if (lock := _lock_of(path)) is not None]
 
 
-def _locked(path: Path) -> QLockFile | None:
+def _lock_of(path: Path) -> QLockFile | None:
     """The lock of a journal; None: another process has it, or it cannot be made."""
     lock = QLockFile(str(path.with_suffix(".lock")))
     lock.setStaleLockTime(0)  # a lock is as old as its process; one of a dead process does not count
@@ -194,7 +194,7 @@ class _Read:
             data = parse_json(line, self.where)
             if not isinstance(data, dict):
                 raise SchemaError(f"{self.where}: a line is no JSON object")
-            self._take(data)
+            self._take_line(data)
         except (ValueError, LookupError, TypeError, OverflowError) as error:
             if self.recorded is None:
                 reason = one_line(str(error), 200)
@@ -202,29 +202,29 @@ class _Read:
             return False
         return len(self.events) < LONGEST_RECORDING
 
-    def _take(self, data: dict[str, Any]) -> None:
+    def _take_line(self, data: dict[str, Any]) -> None:
         if self.recorded is None:
             if data.get("version") != VERSION:
                 raise ValueError("version: made by another version of the program")
             self.recorded = _RECORDED.validate_python(data["recorded"])
         elif "end" in data:
-            self.end_s = _within(data["end"], (0.0, LONGEST_S))
+            self.end_s = _number_within(data["end"], (0.0, LONGEST_S))
         elif "source" in data:
             if data["source"] not in get_args(PlayedSource):
                 raise ValueError("source")
             self.source = data["source"]
-            self.difference_gain_db = _within(data["difference_gain_db"], DIFFERENCE_GAIN_RANGE_DB)
+            self.difference_gain_db = _number_within(data["difference_gain_db"], DIFFERENCE_GAIN_RANGE_DB)
         else:
-            time_s = _within(data.pop("t"), (-LONGEST_S, LONGEST_S))
+            time_s = _number_within(data.pop("t"), (-LONGEST_S, LONGEST_S))
             ((kind, value),) = data.items()
             self.events.append(TimedEvent(time_s, self._event(kind, value)))
 
     def _event(self, kind: str, value: Any) -> Event:
         if kind in ("patch", "turned"):
-            return PatchTurned(Patch.model_validate(self._turned(kind, value)))
+            return PatchTurned(Patch.model_validate(self._turn_patch(kind, value)))
         return _CHECKED[kind].validate_python(value)
 
-    def _turned(self, kind: str, value: Any) -> dict[str, Any]:
+    def _turn_patch(self, kind: str, value: Any) -> dict[str, Any]:
         if kind == "patch":
             self._patch = dict(value)
             return self._patch
@@ -250,7 +250,7 @@ class _Read:
         return Played(patch, tuple(events), self.source, self.difference_gain_db, self.recorded)
 
 
-def _within(value: Any, limits: tuple[float, float]) -> Any:
+def _number_within(value: Any, limits: tuple[float, float]) -> Any:
     """The number. Raises ValueError: it is out of its limits, or none."""
     if isinstance(value, bool) or not isinstance(value, int | float) or not limits[0] <= value <= limits[1]:
         raise ValueError(f"{bounds.brief(str(value))} is out of range")

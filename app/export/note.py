@@ -117,15 +117,15 @@ def musical_name(title: str, first_hz: float, softest_mm: float, hardest_mm: flo
     note = note_name(key) if 0 <= key <= 127 else f"{first_hz:.0f} Hz"
     softest_mm, amplitude_mm = max(softest_mm, LEAST_MM), max(amplitude_mm, LEAST_MM)
     share = math.log(amplitude_mm / softest_mm) / math.log(max(hardest_mm / softest_mm, 1.001))
-    return _named(title, note, share)
+    return _file_stem(title, note, share)
 
 
 def struck_name(struck: Struck) -> str:
     """A name as `musical_name`, of a key; soft and hard are the outer thirds of velocities."""
-    return _named(struck.patch.name, note_name(struck.event.key), struck.event.velocity / 127)
+    return _file_stem(struck.patch.name, note_name(struck.event.key), struck.event.velocity / 127)
 
 
-def _named(title: str, note: str, share: float) -> str:
+def _file_stem(title: str, note: str, share: float) -> str:
     short = re.split(r"[,—]| - ", title)[0]
     plain = " ".join(re.sub(r"[^\w .+-]", " ", short[:LONGEST_NAME]).split()).lstrip(". -") or "Note"
     note = note.replace("♯", "#")

@@ -192,9 +192,9 @@ def read_origin(path: Path) -> Recipe | InstrumentSound:
         played = isinstance(data, dict) and "kind" in data
         return InstrumentSound.model_validate(data) if played else Recipe.model_validate(data)
     except ValueError as error:
-        raise _unusable(path, explained(error)) from error
+        raise _unusable_error(path, explained(error)) from error
     except OverflowError as error:  # raised for numbers that are too long
-        raise _unusable(path, str(error)) from error
+        raise _unusable_error(path, str(error)) from error
 
 
 def read_recipe(path: Path) -> Recipe:
@@ -218,10 +218,10 @@ def request_of(recipe: Recipe, preset: Preset, path: Path) -> SoundRequest:
     try:
         return recipe.request(preset)
     except ValueError as error:
-        raise _unusable(path, str(error)) from error
+        raise _unusable_error(path, str(error)) from error
 
 
-def _unusable(path: Path, why: str) -> RecipeError:
+def _unusable_error(path: Path, why: str) -> RecipeError:
     return RecipeError(
         f"{path}: its recipe cannot be used ({why}); it is damaged, of another program, or of a newer version"
     )

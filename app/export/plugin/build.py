@@ -74,7 +74,7 @@ def build_plugin(
     path = plugin_path(path, form)
     (lost_with if replace else check_kept)(path, {image.id for image in images})
     try:
-        return _built(images, form, target, path, cache, advanced)
+        return _build_files(images, form, target, path, cache, advanced)
     except OSError as error:
         raise WriteError(explain(Path(os.fsdecode(error.filename or path)), error)) from error
 
@@ -85,7 +85,7 @@ def plugin_path(path: Path, form: str) -> Path:
     return path if path.suffix == ending else path.with_name(path.name + ending)
 
 
-def _built(
+def _build_files(
     images: Sequence[Image],
     form: str,
     target: str,
@@ -115,16 +115,16 @@ def _built(
             library,
             lambda: advanced("linking", COMPILING),
         )
-        return _placed(library, images, form, target, path)
+        return _place_library(library, images, form, target, path)
 
 
-def _placed(library: Path, images: Sequence[Image], form: str, target: str, path: Path) -> Path:
+def _place_library(library: Path, images: Sequence[Image], form: str, target: str, path: Path) -> Path:
     """Put the linked library where hosts look for it within what is built."""
     system = target.partition("-")[0]
     inside: dict[str, Path | str] = {}
     if form == "lv2":
         binary = f"{path.stem}{LIBRARY_ENDINGS[system]}"
-        inside = {binary: library, **_turtle(images, binary)}
+        inside = {binary: library, **_lv2_descriptions(images, binary)}
     elif system == "macos":
         plist = {
             "CFBundleExecutable": path.stem,
@@ -202,7 +202,7 @@ def _link(
         raise PluginError(f"linking for {target} failed: {reason_of(code, said)}{remedy}")
 
 
-def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
+def _lv2_descriptions(images: Sequence[Image], binary: str) -> dict[str, str]:
     """The descriptions of an LV2 bundle, by file name."""
     prefixes = "".join(f"@prefix {name}: <{uri}> .\n" for name, uri in _PREFIXES.items())
     listed, described = [prefixes], [prefixes]
@@ -228,12 +228,12 @@ def _turtle(images: Sequence[Image], binary: str) -> dict[str, str]:
             )
             ports.append(
                 f'a lv2:InputPort, lv2:ControlPort ; lv2:index {4 + number} ; lv2:symbol "{symbol}" ;\n'
-                f'    lv2:name "{_quoted(control.name)}" ;{stepped}{points}\n'
+                f'    lv2:name "{_escape_quotes(control.name)}" ;{stepped}{points}\n'
                 f"    lv2:minimum {control.low:.9f} ; lv2:maximum {control.high:.9f} ; "
                 f"lv2:default {control.standard:.9f}"
             )
         described.append(
-            f'{head}\n  doap:name "{_quoted(image.name)}" ;\n  doap:maintainer [ foaf:name "{MAKER}" ] ;\n'
+            f'{head}\n  doap:name "{_escape_quotes(image.name)}" ;\n  doap:maintainer [ foaf:name "{MAKER}" ] ;\n'
             "  doap:license <https://opensource.org/license/mit> ;\n"
             f"  lv2:minorVersion {minor} ; lv2:microVersion {micro} ;\n"
             "  lv2:requiredFeature urid:map ;\n  lv2:optionalFeature lv2:hardRTCapable ;\n"
@@ -253,7 +253,7 @@ def _lv2_version(version: str) -> tuple[int, int]:
     return 2 * (1000 * int(major) + int(minor)), 2 * int(patch or 0) + bool(rest)
 
 
-def _quoted(text: str) -> str:
+def _escape_quotes(text: str) -> str:
     return text.replace("\\", "\\\\").replace('"', '\\"')
 
 

@@ -27,10 +27,10 @@ def identifier(name: str) -> str:
     without more: the factory instrument's, else the one of words with spaces between them, the first capitalised. All
     others, as those too long, end with a digest of the name.
     """
-    folded = _folded(name)
+    folded = _folded_name(name)
     plain = PREFIX + folded
     digested = re.search(rf"-[0-9a-f]{{{DIGITS}}}$", folded)
-    if folded and name == _spelled(folded) and not digested and len(plain.encode()) <= MOST_BYTES:
+    if folded and name == _default_spelling(folded) and not digested and len(plain.encode()) <= MOST_BYTES:
         return plain
     digest = hashlib.sha256(name.encode(errors="surrogatepass")).hexdigest()[:DIGITS]
     short = plain.encode(errors="ignore")[: MOST_BYTES - DIGITS - 1].decode(errors="ignore")
@@ -77,11 +77,11 @@ def holding(ids: frozenset[str]) -> str:
     return f"holds {f'{len(ids)} other instruments, as' if rest else 'another instrument,'} {first}"
 
 
-def _folded(name: str) -> str:
+def _folded_name(name: str) -> str:
     return "".join(c if c.isalnum() else "-" for c in name.lower())
 
 
-def _spelled(folded: str) -> str:
+def _default_spelling(folded: str) -> str:
     """The one name that has an identifier without a digest."""
     words = folded.replace("-", " ")
     return _factory_names().get(folded, words[:1].upper() + words[1:])
@@ -89,4 +89,4 @@ def _spelled(folded: str) -> str:
 
 @cache
 def _factory_names() -> dict[str, str]:
-    return {_folded(entry.patch.name): entry.patch.name for entry in list_patches(SHIPPED)[0]}
+    return {_folded_name(entry.patch.name): entry.patch.name for entry in list_patches(SHIPPED)[0]}

@@ -100,7 +100,7 @@ def export_sampled(
         with working_folder(out.parent, folder.name) as unfinished:
             made = unfinished / folder.name
             made.mkdir()
-            samples = _rendered(plan, made, render, progress)
+            samples = _write_samples(plan, made, render, progress)
             if soundfont:
                 with whole_file(out) as file:
                     gain_db = write_sf2(file, plan, samples, made, progress)
@@ -136,7 +136,9 @@ def _check_replaceable(folder: Path, out: Path) -> None:
         raise WriteError(f"{folder}: holds other files; remove it, or choose another name for {out.name}")
 
 
-def _rendered(plan: SampledPlan, folder: Path, render: NoteRenderer, progress: Progress) -> dict[Zone, StoredSample]:
+def _write_samples(
+    plan: SampledPlan, folder: Path, render: NoteRenderer, progress: Progress
+) -> dict[Zone, StoredSample]:
     """Write the sample of each zone into a folder."""
     made = {}
     started = time.monotonic()
