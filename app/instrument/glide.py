@@ -42,7 +42,7 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
         ValueError: the tuning is impossible.
     """
     if isinstance(patch.strings, Drums):
-        return _of_drums(patch)
+        return _drum_glides(patch)
     strings = Strings(patch)
     plucks = [patch.pluck.pluck(velocity) for velocity in range(VELOCITIES[1] + 1)]
     amplitudes_mm = np.array([pluck.amplitude_mm for pluck in plucks])
@@ -62,12 +62,12 @@ def glides_cents(patch: Patch) -> NDArray[np.float64]:
             if patch.pluck.is_blow:
                 omega = undamped_frequencies(string.parameters, string.modes)
                 sets_out_m = sets_out_m * np.stack(blows) * (omega[0] / omega)
-            glides[key] = _of_string(patch, string, sets_out_m)
+            glides[key] = _string_glides(patch, string, sets_out_m)
     glides.setflags(write=False)
     return glides
 
 
-def _of_drums(patch: Patch) -> NDArray[np.float64]:
+def _drum_glides(patch: Patch) -> NDArray[np.float64]:
     """Compute the glides as `glides_cents`, by the mean tension of a blow's first swing."""
     keys = DrumKeys(patch, Ear(tuple(patch.pickup.points)))
     glides = np.full((HIGHEST_KEY + 1, VELOCITIES[1] + 1), np.nan)
@@ -80,7 +80,7 @@ def _of_drums(patch: Patch) -> NDArray[np.float64]:
     return glides
 
 
-def _of_string(patch: Patch, string: KeyString, modal_m: NDArray[np.float64]) -> NDArray[np.float64]:
+def _string_glides(patch: Patch, string: KeyString, modal_m: NDArray[np.float64]) -> NDArray[np.float64]:
     """The glides (plucks,) of plucks with these modal amplitudes, (plucks, at least the string's modes)."""
     parameters, modes = string.parameters, string.modes
     decayed = 2 * START_S * decay_rates(patch, parameters, modes)

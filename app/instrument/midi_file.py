@@ -128,7 +128,7 @@ def _events_of(path: Path, messages: MidiMessages) -> list[TimedEvent]:
     return timed_events
 
 
-def _ignored(messages: MidiMessages) -> list[str]:
+def _ignored_messages(messages: MidiMessages) -> list[str]:
     """The messages that change nothing here, in words."""
     left_out = []
     if messages.missing_tracks:
@@ -165,7 +165,7 @@ def read_song(path: Path, patch: Patch | None) -> Song:
     """
     messages = _messages_in(path)
     timed, mode = _events_of(path, messages), patch.mode if patch is not None else "poly"
-    ignored = _ignored(messages)
+    ignored = _ignored_messages(messages)
     notes_on = {entry.event.channel for entry in timed if isinstance(entry.event, NoteOn)}
     pads = patch is not None and isinstance(patch.strings, Drums) and patch.strings.keys == "pads"
     drums = set() if mode == "mpe" else notes_on & {DRUMS}
@@ -182,7 +182,9 @@ def read_song(path: Path, patch: Patch | None) -> Song:
         timed = [entry for entry in timed if channels_in([entry.event]) != drums]
     if mode == "guitar" and len(channels) == 1:
         timed = [
-            replace(entry, event=_on_keys(entry.event)) for entry in timed if channels_in([entry.event]) == channels
+            replace(entry, event=_on_channel_of_keys(entry.event))
+            for entry in timed
+            if channels_in([entry.event]) == channels
         ]
     return _song(path, patch, timed, (["its drums (channel 10)"] if drums else []) + ignored)
 
@@ -190,20 +192,20 @@ def read_song(path: Path, patch: Patch | None) -> Song:
 def _song(path: Path, patch: Patch | None, timed: list[TimedEvent], left_out: list[str]) -> Song:
     """The song; `left_out` with the notes for which the patch has no sound."""
     keys = [entry.event.key for entry in timed if isinstance(entry.event, NoteOn)]
-    if patch is not None and (silent := _silent(patch, keys)):
+    if patch is not None and (silent := _count_silent(patch, keys)):
         low, high = (note_name(key) for key in patch.range)
         sounding = "drum" if isinstance(patch.strings, Drums) else "string"
         left_out.append(
             f"{silent} of its {len(keys)} notes, for which {patch.name} has no {sounding} ({low} to {high})"
         )
-    return Song(timed, f"{path.name} is played without {_listed(left_out)}" if left_out else "")
+    return Song(timed, f"{path.name} is played without {_join_words(left_out)}" if left_out else "")
 
 
-def _listed(words: Sequence[str]) -> str:
+def _join_words(words: Sequence[str]) -> str:
     return " and ".join(filter(None, ("; ".join(words[:-1]), words[-1])))
 
 
-def _silent(patch: Patch, keys: Sequence[int]) -> int:
+def _count_silent(patch: Patch, keys: Sequence[int]) -> int:
     """The number of these keys for which a patch has no string."""
     strings, known = Strings(patch), dict.fromkeys(keys, False)
     for key in known:
@@ -212,7 +214,7 @@ def _silent(patch: Patch, keys: Sequence[int]) -> int:
     return sum(known[key] for key in keys)
 
 
-def _on_keys(event: Event) -> Event:
+def _on_channel_of_keys(event: Event) -> Event:
     return event if isinstance(event, PatchTurned | PluckAt) else replace(event, channel=KEYS)
 
 

@@ -103,7 +103,7 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
                 patch = read_patch(path)
                 if name_text(path.stem) in entries:
                     raise PatchError(f"{path}: an instrument of this name exists already; rename the file to use it")
-                name = _other_than(names, patch.name)
+                name = _free_name(names, patch.name)
                 names.add(name.casefold())
                 entries[name_text(path.stem)] = PatchEntry(path, patch.model_copy(update={"name": name}))
             except PatchError as error:
@@ -113,7 +113,7 @@ def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
     return sorted(entries.values(), key=_order), problems
 
 
-def _other_than(taken: set[str], name: str) -> str:
+def _free_name(taken: set[str], name: str) -> str:
     """The name, with a number where it is taken."""
     number, free_name = 2, name
     while free_name.casefold() in taken:
@@ -187,10 +187,10 @@ def add_patch(file: Path) -> tuple[PatchEntry, bool]:
             return entry, False
     names = {entry.patch.name.casefold() for entry in entries}
     stems = {path.stem for folder in (SHIPPED, own_patches()) for path in folder.glob(f"*{SUFFIX}")}
-    name = _other_than(names, patch.name)
+    name = _free_name(names, patch.name)
     while file_stem(name) in stems:
         names.add(name.casefold())
-        name = _other_than(names, patch.name)
+        name = _free_name(names, patch.name)
     return save_patch(patch.model_copy(update={"name": name})), True
 
 

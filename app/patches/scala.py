@@ -90,7 +90,7 @@ def parse_scale(text: str) -> Scale:
         ValueError: it is none, or one beyond the bounds of this module; the message quotes the line.
     """
     lines = [line for line in _LINE_END.split(text) if not line.startswith("!")]
-    count_line, *listed = _filled(lines[1:]) or [""]  # the first, which may be empty, is the description
+    count_line, *listed = _filled_lines(lines[1:]) or [""]  # the first, which may be empty, is the description
     count_match = _COUNT.match(count_line)
     if count_match is None:
         raise ValueError(f"its number of notes, below its description, is {brief(count_line)}; it is no scale")
@@ -112,19 +112,19 @@ def parse_keymap(text: str) -> Keymap:
     Raises:
         ValueError: it is none, or one beyond the bounds of this module; the message names the entry.
     """
-    lines = _filled(_LINE_END.split(text))
+    lines = _filled_lines(_LINE_END.split(text))
     if len(lines) < 7:
         raise ValueError(f"has {len(lines)} numbers before its keys, 7 are needed; it may have been cut off")
-    size = _whole(lines[0], "size of map", 0, MOST_KEYS)
-    first = _whole(lines[1], "first key", 0, HIGHEST_KEY)
-    last = _whole(lines[2], "last key", 0, HIGHEST_KEY)
-    middle = _whole(lines[3], "middle key", 0, HIGHEST_KEY)
-    reference = _whole(lines[4], "reference key", 0, HIGHEST_KEY)
+    size = _whole_number(lines[0], "size of map", 0, MOST_KEYS)
+    first = _whole_number(lines[1], "first key", 0, HIGHEST_KEY)
+    last = _whole_number(lines[2], "last key", 0, HIGHEST_KEY)
+    middle = _whole_number(lines[3], "middle key", 0, HIGHEST_KEY)
+    reference = _whole_number(lines[4], "reference key", 0, HIGHEST_KEY)
     frequency = _FREQUENCY.match(lines[5])
     reference_hz = float(frequency.group()) if frequency else 0.0
     if not 0 < reference_hz < math.inf:
         raise ValueError(f"its reference frequency is {brief(lines[5])}, and must be a number above 0, as 440.0")
-    octave = _whole(lines[6], "formal octave", -MOST_KEYS, MOST_KEYS)
+    octave = _whole_number(lines[6], "formal octave", -MOST_KEYS, MOST_KEYS)
     if first > last:
         raise ValueError(f"its first key {first} is above its last key {last}")
     entries = [_entry(line) for line in lines[7:]]
@@ -134,7 +134,7 @@ def parse_keymap(text: str) -> Keymap:
     return Keymap(first, last, middle, reference, reference_hz, octave, pattern)
 
 
-def _filled(lines: list[str]) -> list[str]:
+def _filled_lines(lines: list[str]) -> list[str]:
     """The lines that are neither comments nor empty, without white space around them."""
     stripped = (line.strip() for line in lines)
     return [line for line in stripped if line and not line.startswith("!")]
@@ -158,7 +158,7 @@ def _octaves(line: str) -> float:
     return cents / 1200
 
 
-def _whole(line: str, name: str, low: int, high: int) -> int:
+def _whole_number(line: str, name: str, low: int, high: int) -> int:
     match = _WHOLE.match(line)
     if match is None or len(match.group()) > MOST_DIGITS or not low <= int(match.group()) <= high:
         raise ValueError(f"its {name} is {brief(line)}, and must be a whole number of {low} … {high}")
@@ -167,4 +167,4 @@ def _whole(line: str, name: str, low: int, high: int) -> int:
 
 def _entry(line: str) -> int | None:
     """The degree of one key; None where it is unmapped."""
-    return None if _UNMAPPED.match(line) else _whole(line, "entry", -MOST_KEYS, MOST_KEYS)
+    return None if _UNMAPPED.match(line) else _whole_number(line, "entry", -MOST_KEYS, MOST_KEYS)
