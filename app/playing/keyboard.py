@@ -92,12 +92,12 @@ class PluckRange:
     def place(self, share: float) -> float:
         """The position at 0 … 1 of the keys."""
         low, high = self.position
-        return _rounded(low + min(max(share, 0.0), 1.0) * (high - low), low, high)
+        return _round_within(low + min(max(share, 0.0), 1.0) * (high - low), low, high)
 
     def amplitude_of(self, velocity: int) -> float:
         """Velocity 1 … 127 to an amplitude in mm: equal steps in dB."""
         low, high = self.amplitude_mm
-        return _rounded(velocities.between(low, high, velocities.share(velocity, 0.0)), low, high)
+        return _round_within(velocities.between(low, high, velocities.share(velocity, 0.0)), low, high)
 
     def velocity_of(self, amplitude_mm: float) -> int:
         """The velocity, 1 … 127, whose amplitude is nearest."""
@@ -149,7 +149,7 @@ def turn(press: KeyPress, octave: int, velocity: int) -> tuple[int, int] | None:
     if letter in OCTAVE_STEPS:
         return min(max(octave + OCTAVE_STEPS[letter], LOWEST_OCTAVE), HIGHEST_OCTAVE), velocity
     if letter and letter in "123456789":
-        return octave, _ninth(int(letter))
+        return octave, _velocity_of_digit(int(letter))
     step = {"C": -VELOCITY_STEP, "V": VELOCITY_STEP}.get(letter)
     return None if step is None else (octave, min(max(velocity + step, 1), LARGEST_VELOCITY))
 
@@ -163,9 +163,9 @@ def place_of(press: KeyPress, platform: str = sys.platform) -> int | None:
     return place if place >= 0 else None
 
 
-def _rounded(value: float, low: float, high: float) -> float:
+def _round_within(value: float, low: float, high: float) -> float:
     return min(max(round(value, DIGITS), low), high)
 
 
-def _ninth(digit: int) -> int:
+def _velocity_of_digit(digit: int) -> int:
     return round(1 + (digit - 1) / 8 * (LARGEST_VELOCITY - 1))

@@ -134,7 +134,7 @@ class Keys:
         """
         with self._lock:
             player = self._player
-            if patch is None or (player is not None and not _holds(player, patch)):
+            if patch is None or (player is not None and not _can_play(player, patch)):
                 self._player = None
             self._wanted = None if patch is None else _Wanted(patch, ear)
         self._follow_wish()
@@ -249,14 +249,14 @@ class Keys:
     def sounding_notes(self) -> list[SoundingNote]:
         """The notes that ring, with their strings; none while the output stands."""
         player, mixer = self._player, self._mixer()
-        if player is None or self._in is not mixer or self._stands(mixer):
+        if player is None or self._in is not mixer or self._mixer_stands(mixer):
             return []
         return [
             SoundingNote(note.key, min(max(1 + note.level_db / SEEN_DB, 0.0), 1.0), note.string, player.slid(note))
             for note in player.ringing()
         ]
 
-    def _stands(self, mixer: Mixer) -> bool:
+    def _mixer_stands(self, mixer: Mixer) -> bool:
         now_s, frames = time.monotonic(), mixer.frames
         if frames != self._frames:
             self._frames, self._moved_s = frames, now_s
@@ -274,7 +274,7 @@ class Keys:
         """Record events from now on, wheels and pedals as they stand; an earlier recording is discarded."""
         with self._lock:
             player = self._player
-            self.recorder.begin([] if player is None else [_turned(player), *player.at_hand])
+            self.recorder.begin([] if player is None else [_turned_event(player), *player.at_hand])
 
     def hear_dry(self, dry: bool) -> None:
         """Leave out body and room, or not, as while models are compared with the truth."""
@@ -300,10 +300,10 @@ class Keys:
         """The player in the present mixer; in a new one its strings are at rest. Under the lock."""
         player, mixer = self._player, self._mixer()
         if player is not None and mixer is not self._in:
-            self._give(player.again(mixer.rate_hz), mixer)
+            self._set_player(player.again(mixer.rate_hz), mixer)
         return self._player
 
-    def _give(self, player: InstrumentPlayer, mixer: Mixer) -> None:
+    def _set_player(self, player: InstrumentPlayer, mixer: Mixer) -> None:
         """Let keys play a player. Under the lock."""
         player.set_gains(self._gains, self._compared)
         mixer.set_player(player.compiled)
@@ -314,7 +314,7 @@ class Keys:
         """Play what is wanted; what takes milliseconds of it, in the background."""
         wanted, player = self._wanted, self._player
         if wanted is not None and player is not None and not player.of_drums:
-            self._bring(player, wanted, nearly=not is_another(wanted.patch, player.patch))
+            self._load_wanted(player, wanted, nearly=not is_another(wanted.patch, player.patch))
         self._in_background(self._complete)
 
     def _complete(self) -> None:
@@ -325,14 +325,14 @@ class Keys:
             if player is None:
                 self._begin(wanted)
             else:
-                self._bring(player, wanted)
+                self._load_wanted(player, wanted)
         self._set_present_effects()
 
-    def _bring(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
+    def _load_wanted(self, player: InstrumentPlayer, wanted: _Wanted, nearly: bool = False) -> None:
         """Let keys play what is wanted, unless something else is by now. `nearly`: as of `keys_of`."""
         try:
             keys = player.keys_of(wanted.patch, wanted.ear, nearly)
-            if isinstance(keys, DrumKeys) and not self._all_computed(keys):
+            if isinstance(keys, DrumKeys) and not self._compute_drums(keys):
                 return
             made = player.tabled(keys)
         except ValueError as error:
@@ -346,9 +346,9 @@ class Keys:
                 turned = (player.patch, player.ear) != (wanted.patch, wanted.ear)
                 player.take(made)
                 if turned:
-                    self.recorder.take(_turned(player))
+                    self.recorder.take(_turned_event(player))
 
-    def _all_computed(self, keys: DrumKeys) -> bool:
+    def _compute_drums(self, keys: DrumKeys) -> bool:
         """Compute a patch's drums, which takes up to seconds; False: another patch is wanted by now."""
         low, high = keys.patch.range
         for key in range(low, high + 1):
@@ -367,7 +367,7 @@ class Keys:
         try:
             preset, rate_hz = self._sources.load(path).preset, self._mixer().rate_hz
             drums = DrumKeys(patch, wanted.ear) if isinstance(patch.strings, Drums) else None
-            if drums is not None and not self._all_computed(drums):
+            if drums is not None and not self._compute_drums(drums):
                 return
             player = InstrumentPlayer(patch, preset, rate_hz, self._gains, wanted.ear, keys=drums)
         except (ValueError, PresetError) as error:
@@ -382,18 +382,18 @@ class Keys:
             for event in self._switches.values():
                 player.handle(event)
             self._path = path
-            self._give(player, mixer)
-            self.recorder.take(_turned(player))
+            self._set_player(player, mixer)
+            self.recorder.take(_turned_event(player))
         if now is not wanted:  # it is heard elsewhere by now
-            self._bring(player, now)
+            self._load_wanted(player, now)
 
 
-def _holds(player: InstrumentPlayer, patch: Patch) -> bool:
+def _can_play(player: InstrumentPlayer, patch: Patch) -> bool:
     """Return True if a player can play a patch too."""
     return player.patch.preset == patch.preset and player.of_drums == isinstance(patch.strings, Drums)
 
 
-def _turned(player: InstrumentPlayer) -> PatchTurned:
+def _turned_event(player: InstrumentPlayer) -> PatchTurned:
     """The patch with the pick-up it is heard through. That is not its own where a single string is played."""
     pickup = {"points": player.ear.points, "kind": player.ear.pickup}
     return PatchTurned(player.patch.model_copy(update={"pickup": player.patch.pickup.model_copy(update=pickup)}))

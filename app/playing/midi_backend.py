@@ -76,7 +76,7 @@ class RtMidi:
         with self._faults():
             client = self._client()
             try:
-                return _distinct(client.get_ports())
+                return _number_duplicates(client.get_ports())
             finally:
                 client.delete()
 
@@ -85,7 +85,7 @@ class RtMidi:
         with self._faults():
             client = self._client()
             try:
-                client.open_port(_distinct(client.get_ports()).index(name))
+                client.open_port(_number_duplicates(client.get_ports()).index(name))
             except BaseException:
                 client.delete()
                 raise
@@ -113,7 +113,7 @@ class RtMidi:
             raise OSError(str(error).strip()) from error
 
 
-def _distinct(names: Iterable[str]) -> list[str]:
+def _number_duplicates(names: Iterable[str]) -> list[str]:
     """Names of ports; further ones of the same name are numbered, as some systems do not."""
     distinct_names: list[str] = []
     for name in names:
@@ -151,7 +151,7 @@ class RtMidiInput:
     def connected(self) -> bool:
         """Return True if its device is still there. No other client of the system is needed to ask."""
         try:
-            return self._name in _distinct(self._client.get_ports())
+            return self._name in _number_duplicates(self._client.get_ports())
         except Exception:  # the system itself is gone
             return False
 

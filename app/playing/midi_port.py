@@ -42,7 +42,7 @@ class MidiInput:
             MidiUnavailable: no backend, or the system's MIDI does not answer.
         """
         try:
-            return self._loaded().get_input_names()
+            return self._load_backend().get_input_names()
         except OSError as error:
             raise MidiUnavailable(f"The system's MIDI does not answer ({error}).") from error
 
@@ -61,7 +61,7 @@ class MidiInput:
         if port_name is None:
             raise MidiUnavailable(f"The MIDI input {name} is not connected. Connect it, or choose another.")
         try:
-            self._port = self._loaded().open_input(port_name, callback=self._receive)
+            self._port = self._load_backend().open_input(port_name, callback=self._receive)
         except OSError as error:
             raise MidiUnavailable(
                 f"The MIDI input {port_name} cannot be opened ({error}). Another program may be using it."
@@ -103,7 +103,7 @@ class MidiInput:
         for event in release_all(channels):
             self._on_release_all(event)
 
-    def _loaded(self) -> Backend:
+    def _load_backend(self) -> Backend:
         if self._backend is None:
             self._backend = self._load()
         return self._backend

@@ -151,7 +151,7 @@ class Notes:
         with self._lock:
             self._monitor, self._compared = monitor, compared
             notes = self._plucks()
-            self._each(notes, self._apply_monitor)
+            self._do_for_each(notes, self._apply_monitor)
         self._set_gains_of_keys()
         for note in notes:
             if not note.pending and not note.over:
@@ -181,9 +181,9 @@ class Notes:
 
     def _handle(self, event: Event, due: Due | None) -> Note | KeyNote | None:
         struck_s = self._sound.now_s() if due is None else 0.0  # only gestures are timed
-        placed = self._place(event)
+        placed = self._as_pluck(event)
         if not isinstance(placed, PluckAt):
-            begun = self.keys.handle(placed, due, struck_s, self._adopt)
+            begun = self.keys.handle(placed, due, struck_s, self._keep_key_note)
             self.latest = begun or self.latest
             return begun
         with self._lock:
@@ -191,10 +191,10 @@ class Notes:
                 return None
             chosen = self._chosen = replace(self._chosen, pluck=placed.pluck)
         frame = 0 if due is None else due.frame_in(self._sound.mixer)
-        self.latest = note = self._ring(chosen, 0.0, frame, struck_s, due is not None)
+        self.latest = note = self._ring_pluck(chosen, 0.0, frame, struck_s, due is not None)
         return note
 
-    def _place(self, event: Event) -> Event:
+    def _as_pluck(self, event: Event) -> Event:
         """The pluck that a key of a single string is; any other event as it is."""
         reach, chosen = self._reach, self._chosen
         if reach is None or not isinstance(event, NoteOn) or event.velocity <= 0:
@@ -213,13 +213,13 @@ class Notes:
         """
         if alone:
             self.stop(REPLACED_S)
-        return None if self._chosen is None else self._ring(self._chosen, from_s, begin_frame)
+        return None if self._chosen is None else self._ring_pluck(self._chosen, from_s, begin_frame)
 
-    def _ring(
+    def _ring_pluck(
         self, chosen: RenderRequest, from_s: float, begin_frame: int, struck_s: float = 0.0, waits: bool = False
     ) -> Note:
         note = Note(chosen, self._voices_of(chosen), from_s, begin_frame)
-        note.ahead_of_event, loaded = waits, self._loaded(note)
+        note.ahead_of_event, loaded = waits, self._is_loaded(note)
         if begin_frame:
             note.mixer = self._sound.mixer  # whose frame it is
         with self._lock:
@@ -228,7 +228,7 @@ class Notes:
         if from_s > 0 or not loaded:
             self.in_background(begin, note)
         else:
-            self._guarded(begin, note)()
+            self._wrap_errors(begin, note)()
         return note
 
     def turn(self, note: Note | KeyNote, seconds: float, event: NoteOn | PluckAt) -> Note | KeyNote | None:
@@ -245,7 +245,7 @@ class Notes:
         if isinstance(event, PluckAt):
             return self.ring(begin_frame=frame)
         due = Due(mixer, frame, time.monotonic() + early / mixer.rate_hz)
-        return self.keys.handle(event, due, 0.0, self._adopt)
+        return self.keys.handle(event, due, 0.0, self._keep_key_note)
 
     def cancel(self) -> None:
         """Cancel what was handed over and is not due yet."""
@@ -258,7 +258,7 @@ class Notes:
     def stop(self, seconds: float = STOP_S) -> None:
         """Let all notes fade out; those that wait will not sound."""
         with self._lock:
-            self._each(self._notes, lambda note: note.release(seconds))
+            self._do_for_each(self._notes, lambda note: note.release(seconds))
         self.keys.stop(seconds)
 
     # Ahead of events
@@ -266,14 +266,14 @@ class Notes:
     def in_background(self, work: Callable[[], None], note: Note | None = None) -> None:
         """Do `work` in the helper's thread, after what waits there. Its errors are reported, and cut the note."""
         if not self._closed:
-            self._helper.submit(self._guarded(work, note))
+            self._helper.submit(self._wrap_errors(work, note))
 
     @property
     def at_hand(self) -> bool:
         """Return True if the chosen pluck would sound at once: nothing needs to be loaded for it."""
         with self._lock:
             chosen = self._chosen
-            return chosen is not None and self._loaded(Note(chosen, self._voices_of(chosen)))
+            return chosen is not None and self._is_loaded(Note(chosen, self._voices_of(chosen)))
 
     def prepare(self, *subjects: Subject) -> None:
         """Load presets in the background, so that a pluck need not wait."""
@@ -339,8 +339,8 @@ class Notes:
         with self._lock:
             self._move_to_new_mixer()
             self._notes = [note for note in self._notes if not note.over]
-            self._each(self._notes, self._take_latency)
-            self._each(self._plucks(), self._follow)
+            self._do_for_each(self._notes, self._take_latency)
+            self._do_for_each(self._plucks(), self._follow)
 
     def close(self) -> None:
         """End the threads; may be called again."""
@@ -350,7 +350,7 @@ class Notes:
 
     # How it is done
 
-    def _each(self, notes: Sequence[MadeNote], work: Callable[[MadeNote], None]) -> None:
+    def _do_for_each(self, notes: Sequence[MadeNote], work: Callable[[MadeNote], None]) -> None:
         """Do `work` with each note. One with which it fails is dropped, and the others continue."""
         for note in notes:
             try:
@@ -402,12 +402,12 @@ class Notes:
         here = {*SOURCES, *(f"{OTHER}{path.stem}" for path in request.others)}
         return tuple(source for source in self._monitor.voices if source in here) or ("model",)
 
-    def _loaded(self, note: Note) -> bool:
+    def _is_loaded(self, note: Note) -> bool:
         """Return True if nothing needs to be loaded for it."""
         rate_hz = self._sound.rate_hz
         return all(self._sources.has(note.subject(source), rate_hz) for source in note.sources)
 
-    def _guarded(self, work: Callable[[], None], note: Note | None = None) -> Callable[[], None]:
+    def _wrap_errors(self, work: Callable[[], None], note: Note | None = None) -> Callable[[], None]:
         """The work with its errors reported; they cut the note."""
 
         def guarded() -> None:
@@ -438,7 +438,7 @@ class Notes:
             else:
                 note.end()
 
-    def _adopt(self, note: KeyNote) -> None:
+    def _keep_key_note(self, note: KeyNote) -> None:
         """Keep the note of a key, which the player has been given."""
         with self._lock:
             self._notes.append(note)
@@ -489,7 +489,7 @@ class Notes:
                     initial_m,
                     program.grid_weights(asked.ear),
                     (subject, asked.pluck, asked.ear, asked.seconds),
-                    lambda: self._rendered_enough(note, ahead, struck_s),
+                    lambda: self._hand_over_rendered(note, ahead, struck_s),
                     lambda error: self._cannot_render(note, error),
                     lambda: note.over,
                     note.from_s,
@@ -497,7 +497,7 @@ class Notes:
             )
         note.ahead, note.voices = ahead, voices
 
-    def _rendered_enough(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
+    def _hand_over_rendered(self, note: Note, ahead: list[AheadVoice], struck_s: float) -> None:
         """Hand the note over once all its models are rendered far enough. Any thread."""
         with self._lock:
             if note.handed_over or ahead is not note.ahead or not all(voice.begun for voice in ahead):
@@ -552,7 +552,7 @@ class Notes:
     def _make_room(self, most: int) -> None:
         """Release the oldest notes where more than `most` ring."""
         ringing = [note for note in self._notes if not note.over and not note.released]
-        self._each(ringing[: max(0, len(ringing) - most)], lambda note: note.release(STOLEN_S))
+        self._do_for_each(ringing[: max(0, len(ringing) - most)], lambda note: note.release(STOLEN_S))
 
     def _apply_monitor(self, note: Note, at_once: bool = False) -> None:
         for source, voice in note.voices.items():
@@ -570,4 +570,4 @@ class Notes:
             notes = [note for note in self._plucks() if note.matching_key == key]
             for note in notes:
                 note.match = match
-            self._each(notes, self._apply_monitor)
+            self._do_for_each(notes, self._apply_monitor)
