@@ -126,7 +126,7 @@ class Browser(QFrame):
         self.play_button = _button(f"▶  {plays}", f"{plays} (Space)", self.play)
         self.star = _button("☆  Favourite", "Add to the favourites, or remove (Ctrl+D)", self.ask_favourite)
         tip = "Give your own another name"
-        self.rename = _button("Rename …", tip, lambda: self._tell(self.rename_asked))
+        self.rename = _button("Rename …", tip, lambda: self._emit_selected(self.rename_asked))
         self.delete = _button(DELETE, "Delete your own; needs a second click", self._ask_delete)
         self._lay_out(folder_tip, f"↑ ↓ load{' and play' if at_rest else ''}")
         for widget in self.findChildren(QWidget):
@@ -151,8 +151,8 @@ class Browser(QFrame):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(TITLE, QHeaderView.ResizeMode.Stretch)
         made.selectionModel().currentChanged.connect(self._current_changed)
-        made.clicked.connect(self._clicked)
-        made.doubleClicked.connect(self._double_clicked)
+        made.clicked.connect(self._click_row)
+        made.doubleClicked.connect(self._double_click_row)
         return made
 
     def _lay_out(self, folder_tip: str, arrows: str) -> None:
@@ -363,15 +363,15 @@ class Browser(QFrame):
 
     def ask_favourite(self) -> None:
         """Ask for the selected row to become a favourite, or none."""
-        self._tell(self.favourite_asked)
+        self._emit_selected(self.favourite_asked)
 
     def play(self) -> None:
         """Load the selected row, and have it played."""
         self._rest.stop()
         self.load(self.selected)
-        self._tell(self.played)
+        self._emit_selected(self.played)
 
-    def _tell(self, signal: SignalInstance) -> None:
+    def _emit_selected(self, signal: SignalInstance) -> None:
         if self.selected:
             signal.emit(self.selected)
 
@@ -380,7 +380,7 @@ class Browser(QFrame):
             self.delete.setText(REALLY)
         else:
             self.delete.setText(DELETE)
-            self._tell(self.delete_asked)
+            self._emit_selected(self.delete_asked)
 
     def _start_rest(self) -> None:
         if self._at_rest:
@@ -390,7 +390,7 @@ class Browser(QFrame):
         if not self._filling and index.isValid() and isinstance(line := self.list.line(index), Row):
             self.load(line.name)
 
-    def _clicked(self, index: QModelIndex) -> None:
+    def _click_row(self, index: QModelIndex) -> None:
         line = self.list.line(index)
         if isinstance(line, str):
             self.select(self.selected)  # a heading took the mark
@@ -400,7 +400,7 @@ class Browser(QFrame):
             self.load(line.name)  # the best hit may be selected and not loaded
             self._start_rest()
 
-    def _double_clicked(self, index: QModelIndex) -> None:
+    def _double_click_row(self, index: QModelIndex) -> None:
         if index.column() != STAR and isinstance(self.list.line(index), Row):
             self.dismiss()
 
@@ -420,7 +420,7 @@ class Browser(QFrame):
             return False
         if not isinstance(event, QKeyEvent) or event.type() == QEvent.Type.KeyRelease:
             return False
-        if self._is_ours(watched, event):
+        if self._is_browser_key(watched, event):
             if event.type() == QEvent.Type.ShortcutOverride:
                 event.accept()  # or a shortcut of the window would get it
             else:
@@ -428,7 +428,7 @@ class Browser(QFrame):
             return True
         return watched is not self.search and self.take_typed(event)
 
-    def _is_ours(self, watched: QObject, event: QKeyEvent) -> bool:
+    def _is_browser_key(self, watched: QObject, event: QKeyEvent) -> bool:
         """Return True if a key is one of `press`; buttons and boxes keep all of these but Escape."""
         control = event.modifiers() == Qt.KeyboardModifier.ControlModifier
         if watched not in (self.search, self.list):

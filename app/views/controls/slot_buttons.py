@@ -87,7 +87,7 @@ class SlotButtons(QWidget):
             source = getattr(self._choices, slot)
             title, short = self._title(source)
             gain = self._gain_text(slot)
-            button.setText(self._fitted(slot.upper(), short, gain))
+            button.setText(self._fit_text(slot.upper(), short, gain))
             button.setAccessibleName(f"Hear {slot.upper()}: {title}")
             gain_line = f"\nPlayed with {gain or '+0.0'} dB" + (
                 ", a stated gain" if source == "difference" else " to match the level of the truth"
@@ -110,7 +110,7 @@ class SlotButtons(QWidget):
         name = source.removeprefix("preset:")
         return name, "DIFF." if source == "difference" else name.upper()
 
-    def _fitted(self, letter: str, text: str, gain: str) -> str:
+    def _fit_text(self, letter: str, text: str, gain: str) -> str:
         """The text that fits a button: where room is short, the gain loses its unit, then `text` is cut."""
         metrics = QFontMetrics(theme.small_font(12, bold=True))
         room = theme.px(self._width) - PADDING

@@ -78,8 +78,8 @@ class LearnDialog(GrowingDialog):
         self._background = Background("learn", self, expected=EXPECTED)
         self._background.progressed.connect(self._show_progress)
         self._background.finished.connect(lambda result: self._then(result))
-        self._background.failed.connect(self._failed)
-        self._background.cancelled.connect(self._cancelled)
+        self._background.failed.connect(self._show_failure)
+        self._background.cancelled.connect(self._show_cancelled)
         self.string, self.body = QRadioButton("A string: learn it from this note"), QRadioButton("A body")
         self.body.setToolTip("The sound becomes an impulse response: instruments are played through it")
         self.string.setToolTip("The note becomes a preset and an instrument over two octaves")
@@ -224,7 +224,7 @@ class LearnDialog(GrowingDialog):
         self.report.setPlainText("\n".join(as_text(self._learned)))
         self._pages.setCurrentIndex(1)
         has_string = self._learned.verdict.found
-        self._ready(f"Nothing is written yet. {ON_KEYS if has_string else NOT_FOUND}")
+        self._show_ready(f"Nothing is written yet. {ON_KEYS if has_string else NOT_FOUND}")
         self.start.setText("Keep and play" if has_string else "Keep all the same")
         self.start.setDefault(has_string)
         self.start.setAutoDefault(has_string)
@@ -264,7 +264,7 @@ class LearnDialog(GrowingDialog):
         self.instrument_kept.emit(kept)
         self.accept()
 
-    def _failed(self, message: str, _details: str) -> None:
+    def _show_failure(self, message: str, _details: str) -> None:
         from app.instrument.learned import Reasons
 
         if self._against is None:  # not even examined: it can only be a body
@@ -273,14 +273,14 @@ class LearnDialog(GrowingDialog):
             self.body.setChecked(True)
             self._show_choice()
             return
-        self._ready(message)
+        self._show_ready(message)
         self.start.setEnabled(True)
 
-    def _cancelled(self) -> None:
-        self._ready("Cancelled. Learn continues there.")
+    def _show_cancelled(self) -> None:
+        self._show_ready("Cancelled. Learn continues there.")
         self.start.setEnabled(True)
 
-    def _ready(self, words: str) -> None:
+    def _show_ready(self, words: str) -> None:
         self.bar.hide()
         self._pages.setEnabled(True)
         self.state.setText(words)

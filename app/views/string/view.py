@@ -136,14 +136,14 @@ class StringView(StageView):
     def mousePressEvent(self, event: QMouseEvent) -> None:
         if event.button() != Qt.MouseButton.LeftButton:
             return
-        on = self._under(event.position())
+        on = self._part_at(event.position())
         follows = event.timestamp() - self._last_press_ms < QApplication.doubleClickInterval()
         self._on_handle_first = on == "pluck" and not follows
         self._last_press_ms = event.timestamp()
         self._start_drag(on, event.position())
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:
-        on = self._under(event.position())
+        on = self._part_at(event.position())
         if event.button() != Qt.MouseButton.LeftButton:
             return
         if on in self._listening:
@@ -177,7 +177,7 @@ class StringView(StageView):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:
         at = event.position()
         if self._drag is None:
-            self._hover(self._under(at))
+            self._hover(self._part_at(at))
             self.setToolTip(
                 plain_tip(self._warning) if at.y() < WORDS_HEIGHT and self._warning else TIPS[self._hovered]
             )
@@ -211,11 +211,11 @@ class StringView(StageView):
         if drag == "pluck":
             self.pluck_released.emit()
         self._hovered = None
-        self._hover(self._under(event.position()))
+        self._hover(self._part_at(event.position()))
         self.update()
 
     def wheelEvent(self, event: QWheelEvent) -> None:
-        if self._under(event.position()) != "pluck":
+        if self._part_at(event.position()) != "pluck":
             event.ignore()
             return
         notches = (event.angleDelta().y() or event.angleDelta().x()) / 120
@@ -261,7 +261,7 @@ class StringView(StageView):
             self._hovered = on
             self.update()
 
-    def _under(self, at: QPointF) -> str | None:
+    def _part_at(self, at: QPointF) -> str | None:
         """The part that can be grabbed there: "pluck", a side, or None for the bare string."""
         axes = self._axes()
         if at.y() > axes.bottom - 6:
@@ -297,7 +297,7 @@ class StringView(StageView):
         self._fit_span()
         axes = self._axes()
         painter = QPainter(self)
-        painter.drawPixmap(0, 0, self._behind(axes))
+        painter.drawPixmap(0, 0, self._backdrop_picture(axes))
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._frame is None or self._drag == "pluck":
             paint_pluck(painter, axes, self._pluck)
@@ -323,7 +323,7 @@ class StringView(StageView):
     def _heard(self) -> str:
         return next((source.source for source in self._sources if source.heard), "")
 
-    def _behind(self, axes: StringAxes) -> QPixmap:
+    def _backdrop_picture(self, axes: StringAxes) -> QPixmap:
         """The ground, and the envelopes of a motion, painted again only when one of them changes."""
         ground = self._ground(axes)
         if self._frame is None or self._shows_pluck or not self._frame.envelopes:
