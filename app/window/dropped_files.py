@@ -48,7 +48,7 @@ def receive(file: Path, library: Library) -> Dropped:
         if ending == SUFFIX:
             return _preset(file, library)
         if ending == ".wav":
-            return _recipe(file, library)
+            return _drop_recipe(file, library)
         if ending in SOUNDS:
             return _other_sound(file)
     except NoRecipe:
@@ -92,7 +92,7 @@ def _preset(file: Path, library: Library) -> Dropped:
     return Dropped({"preset": entry.name}, notice if installed.was_there else "")
 
 
-def _recipe(file: Path, library: Library) -> Dropped:
+def _drop_recipe(file: Path, library: Library) -> Dropped:
     recipe = read_recipe(file)
     path, exact = preset_of(recipe, [entry.path for entry in library.entries])
     try:

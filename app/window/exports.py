@@ -74,8 +74,8 @@ class Exports(QObject):
             return
         if self.dialog is None:
             self.dialog = ExportDialog(*self._choices, self._window)
-            self.dialog.finished.connect(self._closed)
-            self.dialog.exported.connect(self._exported)
+            self.dialog.finished.connect(self._end_dialog)
+            self.dialog.exported.connect(self._forget_saved)
             self.dialog.ended.connect(self.ended)
         self.dialog.show_subjects(subjects)
         self.dialog.open_at(kind)
@@ -126,11 +126,11 @@ class Exports(QObject):
             "plugin": instrument,
         }
 
-    def _exported(self, job: object) -> None:
+    def _forget_saved(self, job: object) -> None:
         if isinstance(job, PlayedExport):
             self._recordings.forget(job.played)
 
-    def _closed(self) -> None:
+    def _end_dialog(self) -> None:
         assert self.dialog is not None
         self._choices = self.choices
         self.dialog.deleteLater()

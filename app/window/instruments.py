@@ -155,10 +155,10 @@ class Instruments(QObject):
             self.latest_key = note.event.key, note.event.string
         else:
             self._unknown = None
-            self._tell(note.request, drawn)
+            self._show_in_session(note.request, drawn)
         self._begun.emit()
 
-    def _tell(self, request: RenderRequest, drawn: bool) -> None:
+    def _show_in_session(self, request: RenderRequest, drawn: bool) -> None:
         """The session is to show this string and its pluck; the string alone where it has drawn the pluck itself."""
         string = string_of(request.preset)
         shown: dict[str, Any] = {"string": string}
@@ -278,7 +278,7 @@ class Instruments(QObject):
             return  # another pluck was begun, or a single string chosen, meanwhile
         self.latest_key = note.event.key, note.string
         if note.request is not None:
-            self._tell(note.request, self._drawn)
+            self._show_in_session(note.request, self._drawn)
             self._tell_session()
         elif note.of_drum:
             self.played.emit()
@@ -325,17 +325,17 @@ def _key_of(patch: Patch, string: StringParameters) -> tuple[int, int | None] | 
     """The key with the pitch of a string, and the string of a set on which it has its length. None: there is none."""
     strings, pitch_hz = Strings(patch), string.pitch_hz
     low, high = patch.range
-    key = next((key for key in range(low, high + 1) if _same(strings.pitch_hz(key) or 0.0, pitch_hz)), None)
+    key = next((key for key in range(low, high + 1) if _nearly_equal(strings.pitch_hz(key) or 0.0, pitch_hz)), None)
     if key is None:
         return None
     for number in (None, *range(len(patch.strings.strings) if isinstance(patch.strings, StringSet) else 0)):
         with contextlib.suppress(ValueError):  # reported when it is struck
             key_string = strings.of_key(key, number)
-            if key_string is not None and _same(key_string.parameters.length_m, string.length_m):
+            if key_string is not None and _nearly_equal(key_string.parameters.length_m, string.length_m):
                 return key, number
     return key, None
 
 
-def _same(value: float, other: float) -> bool:
+def _nearly_equal(value: float, other: float) -> bool:
     """Return True if values are equal within rounding, for the player computes strings too."""
     return math.isclose(value, other, rel_tol=1e-6)

@@ -102,7 +102,7 @@ class _Start(QObject):
             self._collector = collect_between_events()
         except Exception as error:
             self.failure = error
-            self._failed(error)
+            self._show_failure(error)
             return
         if self._notice:
             self._window.notices.report(self._notice)
@@ -129,7 +129,7 @@ class _Start(QObject):
         if face == "lab" and self._torch.ident is None:
             self._torch.start()
 
-    def _failed(self, error: Exception) -> None:
+    def _show_failure(self, error: Exception) -> None:
         """Show the error as a notice; the window stays until its user closes it."""
         collect_anywhere()
         self._window.show_failed()

@@ -328,29 +328,29 @@ class MainWindow(QMainWindow):
         self._share_height()
 
     @property
-    def _wide(self) -> float:
+    def _width_px(self) -> float:
         """The window's width, in pixels at which text has its usual size."""
         return self.width() / theme.present.scale
 
     @property
-    def _high(self) -> float:
+    def _height_px(self) -> float:
         return self.height() / theme.present.scale
 
     def _share_width(self) -> None:
-        self._brand.setVisible(self._wide >= (WIDE if self.face == "play" else WIDE_LAB))
+        self._brand.setVisible(self._width_px >= (WIDE if self.face == "play" else WIDE_LAB))
         for button in (self._keys_button, self._test_button):
-            button.setVisible(self._wide >= WIDE and self._shows("test"))
+            button.setVisible(self._width_px >= WIDE and self._shows("test"))
 
     def _hold_rest(self) -> None:
         """Move the header's controls and the preset's facts that have no room to the overflow menu."""
-        buttons = (self._keys_button, self._test_button) if self._shows("test") and self._wide < WIDE else ()
-        hides_facts = self._shows("facts") and self._high < HIGH
+        buttons = (self._keys_button, self._test_button) if self._shows("test") and self._width_px < WIDE else ()
+        hides_facts = self._shows("facts") and self._height_px < HIGH
         facts = (self.presets.card, self.through_label, self.outside_label, self.error_label) if hides_facts else ()
         self._more.hold(*buttons, *facts)
 
     def _share_height(self) -> None:
         """A low window hides the plots while the keys are shown, a lower one also the preset's facts."""
-        height = self._high
+        height = self._height_px
         self.instrument.set_low(height < KNOBS_HIGH)
         views = self._alive and self._shows("views") and (height >= ALL_HIGH or not self.shows_keys)
         self._decks.setVisible(views)
@@ -445,8 +445,8 @@ class MainWindow(QMainWindow):
     def _fit(self) -> None:
         self._share_width()
         self._share_height()
-        narrow, low = self._wide < COMPACT_BELOW_PX, self._high < AIRY
-        self.transport.set_compact(narrow, self._wide < TIGHT and self.face == "lab")
+        narrow, low = self._width_px < COMPACT_BELOW_PX, self._height_px < AIRY
+        self.transport.set_compact(narrow, self._width_px < TIGHT and self.face == "lab")
         self._head.setSpacing(6 if narrow else 10)
         aside, above = 8 if narrow else 14, 6 if low else 12
         self._column.setContentsMargins(aside, above, aside, above)

@@ -67,21 +67,21 @@ def settings_file() -> Path:
 def load_settings(path: Path) -> tuple[Settings, str]:
     """The settings and a notice: empty, or what was not usable and where the broken file went."""
     try:
-        text = _bytes(path)
+        text = _read_bytes(path)
     except FileNotFoundError:
         return Settings(), ""
     except OSError as error:
         reported = error.strerror or error
         return Settings(), one_line(f"The settings {path} cannot be read ({reported}); starting with defaults.")
     try:
-        return _parsed(text), ""
+        return _parse(text), ""
     except (ValueError, OverflowError) as error:  # the latter of integers where numbers belong
         aside = path.with_suffix(".broken.json")
         try:
             path.replace(aside)
         except OSError:
             aside = path
-        kept = _usable(text) if isinstance(error, ValidationError) else None
+        kept = _usable_settings(text) if isinstance(error, ValidationError) else None
         why = explained(error) if isinstance(error, ValueError) else str(error)
         reported = (
             f"{'Some' if kept else 'The'} settings were not usable ({why}) and have their defaults "
@@ -90,15 +90,15 @@ def load_settings(path: Path) -> tuple[Settings, str]:
         return kept or Settings(), one_line(reported)
 
 
-def _bytes(path: Path) -> bytes:
+def _read_bytes(path: Path) -> bytes:
     return read_bounded(path, bounds.LARGEST_TEXT_BYTES)
 
 
-def _parsed(text: bytes) -> Settings:
+def _parse(text: bytes) -> Settings:
     return Settings.model_validate(parse_json(text, "the file"))
 
 
-def _usable(text: bytes) -> Settings | None:
+def _usable_settings(text: bytes) -> Settings | None:
     """The settings less what is wrong in them; None where nothing is left to keep.
 
     One fault at a time: what is dropped for one may end others, or lack in what holds it.

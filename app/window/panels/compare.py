@@ -97,7 +97,7 @@ class ComparePanel(Panel):
         self.table.row_entered.connect(lambda name: session.update(preset=name))
         self.table.row_deleted.connect(lambda name: self._toggle(name, False))
         self.progress = ProgressStrip("Progress of the comparison")
-        self.background.progressed.connect(self._progressed)
+        self.background.progressed.connect(self._show_progress)
         self.background.finished.connect(lambda: self._set_computing(None))
         self.background.failed.connect(lambda: self._set_computing(None))
         library.changed.connect(self._library_changed)
@@ -108,7 +108,7 @@ class ComparePanel(Panel):
     def choices_changed(self, names: frozenset[str]) -> None:
         if names & {"preset", "seconds", "listen", *PluckedString.model_fields}:
             self._unchanged_s = 0.0
-            if self._tried != self._wanted():
+            if self._tried != self._wanted_key():
                 self._abandon()
             self._stale = True  # shown by `show_moment`: a pluck may be waiting for this call
 
@@ -117,7 +117,7 @@ class ComparePanel(Panel):
         self._unchanged_s += moment.elapsed_s
         if self._stale:
             self._show()
-        if self._unchanged_s < SETTLED_S or self._stopped or self._tried == self._wanted():
+        if self._unchanged_s < SETTLED_S or self._stopped or self._tried == self._wanted_key():
             return
         self._compute()
 
@@ -155,11 +155,11 @@ class ComparePanel(Panel):
             return [present] if present is not None else []
         return [e for e in self.library.entries if present is not None and same_string(e.info, present.info)]
 
-    def _wanted(self) -> tuple[object, ...]:
+    def _wanted_key(self) -> tuple[object, ...]:
         return (self._basis, *(entry.name for entry in self._entries))
 
     def _compute(self) -> None:
-        self._tried, basis = self._wanted(), self._basis
+        self._tried, basis = self._wanted_key(), self._basis
         missing = [entry for entry in self._entries if self._rows.get(entry.name, (None, None))[0] != basis]
         missing.sort(key=lambda entry: self._urgency(entry.name))
         if missing:
@@ -172,7 +172,7 @@ class ComparePanel(Panel):
         presets_in_use = [choices.preset, other_preset(choices.a), other_preset(choices.b)]
         return presets_in_use.index(name) if name in presets_in_use else len(presets_in_use)
 
-    def _progressed(self, share: float, _: str, row: ComparedRow | None) -> None:
+    def _show_progress(self, share: float, _: str, row: ComparedRow | None) -> None:
         self._set_computing(share)
         if row is not None:
             self._rows[row.name] = (self._basis, row)
@@ -206,7 +206,7 @@ class ComparePanel(Panel):
 
     def _choose(self, names: list[str] | None) -> None:
         self._names = names
-        if self._tried != self._wanted():
+        if self._tried != self._wanted_key():
             self._abandon()
         self._show()
 

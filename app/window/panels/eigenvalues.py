@@ -61,7 +61,7 @@ class EigenvaluesPanel(Panel):
         self._layer.hide()
         self._words = words_label()
         self.plane = _Plane()
-        self.plane.pointed.connect(self._tell)
+        self.plane.pointed.connect(self._show_values)
         self.plane.taken.connect(lambda point: self.solo(int(self._modes[point])))
         self.plane.escaped.connect(lambda: self.solo(0))
         theme.changes.theme_changed.connect(self._take_theme)
@@ -126,9 +126,9 @@ class EigenvaluesPanel(Panel):
         self.plane.show_points(learned, first_layer, string, self._modes == solo if solo else None)
         if not keep_view:
             self.plane.set_axes(musical, figure.rate_hz)
-        self._tell(-1)
+        self._show_values(-1)
 
-    def _tell(self, point: int) -> None:
+    def _show_values(self, point: int) -> None:
         """Write the values of a point above the plane; -1: the note of the figure."""
         figure, solo = self._figure, self.session.choices.solo
         if figure is None:

@@ -72,7 +72,7 @@ class Analyser:
         return np.concatenate([self._bins[:1], np.sqrt(self._bins[1:] * self._bins[:-1])]).astype(int)
 
     @cached_property
-    def _wide(self) -> NDArray[np.bool_]:
+    def _wide_columns(self) -> NDArray[np.bool_]:
         last = PADDING * self.window_frames // 2 + 1
         return np.diff(self._first_bins, append=last) > 1
 
@@ -85,7 +85,7 @@ class Analyser:
         columns = np.interp(self._bins, np.arange(len(magnitude)), magnitude)
         # the loudest bin of a wide column, so that no partial falls between two
         loudest = np.maximum.reduceat(magnitude, self._first_bins)
-        columns = np.maximum(columns, np.where(self._wide, loudest, 0))
+        columns = np.maximum(columns, np.where(self._wide_columns, loudest, 0))
         return np.maximum(20 * np.log10(columns + 1e-12), FLOOR_DB)
 
 

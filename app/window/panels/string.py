@@ -136,7 +136,7 @@ class StringPanel(StagePanel):
         view.set_pluck(ShownPluck(choices.position, choices.amplitude_mm, shape_mm, _label(choices)))
         left, right = choices.listen, choices.listen_right if choices.stereo else None
         view.set_listening_points(*((None, None) if choices.pickup == "bridge" else (left, right)))
-        view.set_trained(_trained(info_of(choices, entry), choices.pluck) if entry else TrainedPlucks())
+        view.set_trained(_trained_plucks(info_of(choices, entry), choices.pluck) if entry else TrainedPlucks())
         view.set_warning(*self._pluck_warning())
 
     def _pluck_warning(self) -> tuple[str, bool]:
@@ -177,5 +177,5 @@ def _label(choices: Choices) -> str:
     return words if choices.shape == "triangular" else f"{words} {choices.width:.3f}"
 
 
-def _trained(info: PresetInfo, pluck: Pluck) -> TrainedPlucks:
+def _trained_plucks(info: PresetInfo, pluck: Pluck) -> TrainedPlucks:
     return TrainedPlucks(info.trained_range.position, info.trained_amplitudes_mm(pluck))
