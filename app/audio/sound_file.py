@@ -140,16 +140,16 @@ def _with_frame_count(head: bytes, file: BinaryIO, start: int, end: int) -> byte
         at += 4 + int.from_bytes(block[1:])
         if not block or block[0] >= 128:
             break
-    first = _bytes_at(file, at, 4)
-    place = max(at, end - _LARGEST_FLAC_BLOCK)
-    rest = _bytes_at(file, place, max(0, end - place)) + bytes(16)
-    block_at, length = len(rest) - 16, 0
+    block_head = _bytes_at(file, at, 4)
+    tail_at = max(at, end - _LARGEST_FLAC_BLOCK)
+    tail = _bytes_at(file, tail_at, max(0, end - tail_at)) + bytes(16)
+    block_at, length = len(tail) - 16, 0
     for _ in range(_MOST_CHUNKS):
-        block_at = rest.rfind(first[:2], 0, max(block_at, 0)) if len(first) == 4 else -1
+        block_at = tail.rfind(block_head[:2], 0, max(block_at, 0)) if len(block_head) == 4 else -1
         if block_at < 0 or length:
             break
-        if all(_codes_agree(rest[block_at + place] & 15, first[place] & 15) for place in (2, 3)):  # rate and bits
-            length = _end_of_flac_block(rest[block_at : block_at + 16], int.from_bytes(head[8:10]))
+        if all(_codes_agree(tail[block_at + byte] & 15, block_head[byte] & 15) for byte in (2, 3)):  # rate and bits
+            length = _end_of_flac_block(tail[block_at : block_at + 16], int.from_bytes(head[8:10]))
     if length == 0:
         raise UnreadableSound("it has no samples, or is cut off")
     return head[:21] + (int.from_bytes(head[21:26]) | min(length, _FLAC_FRAMES)).to_bytes(5) + head[26:]

@@ -101,9 +101,9 @@ def simulate(
     resonator = resonator_of(parameters, modes, tension_modulated=tension_modulated, grid_points=points)
     with progress("simulate") as report:
         if solver == "fast":
-            motion = _fast(resonator, rate, steps, substeps)
+            motion = _splitting_motion(resonator, rate, steps, substeps)
         else:
-            motion = _dop853(resonator, rate, steps, len(initial), report)
+            motion = _dop853_motion(resonator, rate, steps, len(initial), report)
         arrays.write_motion(out, initial, steps, motion, report)
     if (peak_m := float(abs(initial).max())) > arrays.IMPLAUSIBLE_PEAK_M:
         say(f"note: {u0} rises to {peak_m:g} m; displacement is in metres")
@@ -254,7 +254,7 @@ def _string_of(kind_or_file: str) -> tuple[StringParameters, bool]:
         raise typer.BadParameter(f"must be {kinds}, or a string: {error}", param_hint="--string") from error
 
 
-def _fast(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None) -> Motion:
+def _splitting_motion(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None) -> Motion:
     from app.commands.arrays import blocks_of
     from engine.truth import ModalState, SplittingSolver
 
@@ -270,7 +270,7 @@ def _fast(resonator: Resonator, rate_hz: float, steps: int, substeps: int | None
     return motion
 
 
-def _dop853(resonator: Resonator, rate_hz: float, steps: int, trajectories: int, report: Report) -> Motion:
+def _dop853_motion(resonator: Resonator, rate_hz: float, steps: int, trajectories: int, report: Report) -> Motion:
     from engine.truth import ModalState, solve_dop853
 
     solved = 0

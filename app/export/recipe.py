@@ -160,9 +160,9 @@ class Recipe(Value):
         """
         if self.string is not None:
             preset = of_string(preset, self.string, self.preset_rate_hz, self.modes)
-        asked: dict[str, Any] = {name: getattr(self, name) for name in REQUESTED}
+        arguments: dict[str, Any] = {name: getattr(self, name) for name in REQUESTED}
         struck = None if self.struck is None else self.struck.found()[0]
-        return SoundRequest(preset, **asked, difference_gain_db=self.difference_gain_db, struck=struck)
+        return SoundRequest(preset, **arguments, difference_gain_db=self.difference_gain_db, struck=struck)
 
     @property
     def settings(self) -> WavSettings:

@@ -359,6 +359,7 @@ class Notes:
                 drop(note, error, self._report)
 
     def _take_latency(self, note: Note | KeyNote) -> None:
+        """Add the latency of a note, once it is known, to the recent ones; notes rendered ahead have none."""
         ahead = isinstance(note, Note) and note.ahead
         if not note.timed and not ahead and (latency_s := note.latency_s) is not None:
             note.timed = True

@@ -31,7 +31,7 @@ class Pair:
             voice.set_gain(float(source == name))
 
     def play(self, restart: bool = False) -> None:
-        """Start both where nothing sounds, or `again`; otherwise they continue."""
+        """Start both where nothing sounds, or on `restart`; otherwise they continue."""
         if self._voices and not restart:
             return
         self.stop()

@@ -53,7 +53,7 @@ class Song(QObject):
         self.tick()
 
     def stop(self) -> None:
-        """Stop where it is."""
+        """Pause the song where it is."""
         if self._plays:
             self._from_s, self._plays = self.position_s, False
             self._playback.stop()

@@ -33,8 +33,8 @@ def _libraries(library: Any, seen: set[int]) -> Iterator[Any]:
             yield from _libraries(callee, seen)
 
 
-def _elsewhere(name: str) -> Any:
-    """An entry of another part, of two addresses."""
+def _external_entry(name: str) -> Any:
+    """A stand-in for an entry of another part: it calls that symbol with two addresses."""
     from llvmlite import ir
     from numba import types
     from numba.core import cgutils
@@ -72,7 +72,7 @@ def text(part: str) -> str:
         kind.generate = njit(lambda *_: None)  # type: ignore[attr-defined]
     for name in (entry for entries in PARTS.values() for entry in entries if hasattr(mixer, entry)):
         if name not in PARTS[part]:
-            setattr(mixer, name, _elsewhere(name))
+            setattr(mixer, name, _external_entry(name))
     private = llvm.Linkage.internal, llvm.Linkage.private
     whole = llvm.parse_assembly("")
     seen = set[int]()

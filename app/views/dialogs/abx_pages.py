@@ -113,7 +113,7 @@ class TrialPage(QWidget):
         self._bar.setAccessibleName("Trials answered")
         self._hint = _centred()
         texts = {"A": labels[0], "X": "?", "B": labels[1]}
-        self._sounds = {name: self._soundpush_button(name, text) for name, text in texts.items()}
+        self._sounds = {name: self._sound_button(name, text) for name, text in texts.items()}
         self._answers = {
             "A": push_button("←  X is A", "Answer: X is A (1 or ←)"),
             "B": push_button("X is B  →", "Answer: X is B (2 or →)"),
@@ -141,7 +141,7 @@ class TrialPage(QWidget):
             Qt.Key.Key_Space: self.replay_asked.emit,
         }
 
-    def _soundpush_button(self, name: str, text: str) -> QPushButton:
+    def _sound_button(self, name: str, text: str) -> QPushButton:
         button = push_button(f"{name}\n{text}", f"Hear {name} ({name})")
         button.setObjectName(text.lower() if name != "X" else "")  # its colour in the style sheet
         button.setAccessibleName(f"Hear {name}: {text}" if name != "X" else "Hear X")

@@ -334,7 +334,7 @@ class PatchBar(QFrame):
         self.body.setCurrentIndex(row)
 
     def show_voices(self, voices: int, most: int | None = None) -> None:
-        """The number of voices that ring, and the most that may."""
+        """Show the number of voices that ring, and the most that may."""
         of = f" of {most}" if most is not None else ""
         self.voices.setText(f"{voices}{of} voice{'' if voices == 1 and not of else 's'}")
 

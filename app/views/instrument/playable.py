@@ -99,7 +99,7 @@ class Playable(QWidget):
         return None if key is None else Spot(key)
 
     def spots_between(self, before: QPointF, at: QPointF) -> list[Spot]:
-        """The spots that the mouse meets on its way, without the first, and with where it is."""
+        """The spots on the mouse's way from one point to another, without the first and with the last."""
         spot = self.spot_at(at)
         return [] if spot is None else [spot]
 
