@@ -167,6 +167,7 @@ def _report(path: Path, file: BinaryIO, frames: int, rate_hz: int, level: Level)
 
 @contextmanager
 def _explain_errors(path: Path) -> Iterator[None]:
+    """Raise errors of the context as a WriteError that names file and remedy."""
     try:
         yield
     except OSError as error:

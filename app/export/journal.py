@@ -203,6 +203,7 @@ class _Read:
         return len(self.events) < LONGEST_RECORDING
 
     def _take_line(self, data: dict[str, Any]) -> None:
+        """Add the content of a line. Raises ValueError: it is not as this program writes it."""
         if self.recorded is None:
             if data.get("version") != VERSION:
                 raise ValueError("version: made by another version of the program")

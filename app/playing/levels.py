@@ -52,6 +52,7 @@ class Levels:
         self._in_background(lambda: take(key, self._match(note, min(rate_hz, HIGHEST_RATE_HZ))))
 
     def _match(self, note: Note, rate_hz: int) -> Mapping[str, float]:
+        """Compute the gain of each source of a note, and keep it for notes of the same pluck and ear."""
         key = note.matching_key
         try:
             seconds = min([MATCHED_S, *(voice.rendered_s for voice in note.ahead)])  # a pluck may be shorter

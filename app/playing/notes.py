@@ -218,6 +218,7 @@ class Notes:
     def _ring_pluck(
         self, chosen: RenderRequest, from_s: float, begin_frame: int, struck_s: float = 0.0, waits: bool = False
     ) -> Note:
+        """Begin the note of a pluck; in the background where something is to be loaded, or it begins late."""
         note = Note(chosen, self._voices_of(chosen), from_s, begin_frame)
         note.ahead_of_event, loaded = waits, self._is_loaded(note)
         if begin_frame:

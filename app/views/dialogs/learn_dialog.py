@@ -232,6 +232,7 @@ class LearnDialog(GrowingDialog):
         self.heard["learned"].setFocus()
 
     def _hear(self, name: str) -> None:
+        """Play the sound of a button, or stop where none is checked."""
         for key, button in self.heard.items():
             button.setChecked(key == name and button.isChecked())
         if self._pair is None:

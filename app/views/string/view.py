@@ -155,6 +155,7 @@ class StringView(StageView):
             self._start_drag(on, event.position())
 
     def _start_drag(self, on: str | None, at: QPointF) -> None:
+        """Begin a drag of the pluck or of a mark, by its name, or a pluck on the bare string (None)."""
         if on is None or on == "pluck":  # at the scale of the pluck, not of the decayed motion
             self._span_mm = max(self._span_mm, _span_mm(self._pluck.amplitude_mm))
         axes = self._axes()

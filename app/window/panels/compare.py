@@ -156,6 +156,7 @@ class ComparePanel(Panel):
         return [e for e in self.library.entries if present is not None and same_string(e.info, present.info)]
 
     def _wanted_key(self) -> tuple[object, ...]:
+        """The values that the table depends on."""
         return (self._basis, *(entry.name for entry in self._entries))
 
     def _compute(self) -> None:

@@ -109,6 +109,7 @@ class ErrorPlanePanel(Panel):
         self.compute(lambda job: self._planes.compute(subject, pluck, job))
 
     def _wanted_key(self) -> tuple[object, ...]:
+        """The values that the plane depends on."""
         return (self.session.choices.preset, self.session.choices.string, *_pluck_form(self.session.choices.pluck))
 
     def _show_progress(self, share: float, _: str, picture: PlanePicture | None) -> None:
