@@ -73,7 +73,7 @@ class Journal:
 
     @classmethod
     def begun(cls, folder: Path, recorded: datetime) -> Journal:
-        """A new one.
+        """A new journal, with its first line written.
 
         Raises:
             OSError: the folder cannot be made or written.

@@ -126,6 +126,7 @@ def struck_name(struck: Struck) -> str:
 
 
 def _file_stem(title: str, note: str, share: float) -> str:
+    """The name of a file without its ending: short title, note and loudness."""
     short = re.split(r"[,—]| - ", title)[0]
     plain = " ".join(re.sub(r"[^\w .+-]", " ", short[:LONGEST_NAME]).split()).lstrip(". -") or "Note"
     note = note.replace("♯", "#")

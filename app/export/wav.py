@@ -139,6 +139,7 @@ class _Noting:
         return self._call_file(self._file.read, size, failed=b"")
 
     def _call_file(self, call: Callable[..., T], *arguments: object, failed: T) -> T:
+        """Call a method of the file; from its first OSError on, which is kept, return `failed`."""
         if self._error is None:
             try:
                 return call(*arguments)

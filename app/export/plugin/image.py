@@ -252,6 +252,7 @@ def _id(name: str) -> int:
 def _record(
     name: str, kind: int, index: int, value: float, parameter: Parameter, module: str, label: str = ""
 ) -> tuple[str, _Parameter]:
+    """The name of a parameter, and its record for the shell."""
     low, high = parameter.limits
     unit = parameter.taper.text.rpartition("}")[2].strip()
     words = [parameter.shown(low + step) for step in range(round(high - low) + 1)] if parameter.whole else []

@@ -162,6 +162,7 @@ def release_timecents(patch: Patch) -> int:
 
 
 def _channels(samples: Mapping[Zone, StoredSample]) -> list[_Channel]:
+    """The channels of all samples, one or two each, with their first frames."""
     made: list[_Channel] = []
     start = 0
     for zone, stored in samples.items():
@@ -176,7 +177,7 @@ def _channels(samples: Mapping[Zone, StoredSample]) -> list[_Channel]:
 
 
 def _information(plan: SampledPlan) -> bytes:
-    """Version, engine and name are compulsory (5)."""
+    """The chunks of information, of which version, engine and name are compulsory (5)."""
     made_by = f"{PROGRAM} {program_version()}"
     lines = [one_line(plan.patch.description)] if plan.patch.description else []
     if plan.every > 1:
