@@ -83,9 +83,9 @@ class Envelopes:
         start, stop = self.ready * self.stride, (self.ready + count) * self.stride
         for name, largest in self._largest_m.items():
             frames = motion_of(self.take, name, start, stop).reshape(count, self.stride, -1)
-            here = slice(self.ready, self.ready + count)
-            largest[here] = np.maximum(frames.max(axis=1), -frames.min(axis=1))
-            self._peaks_m[name][here] = largest[here].max(axis=1)
+            columns = slice(self.ready, self.ready + count)
+            largest[columns] = np.maximum(frames.max(axis=1), -frames.min(axis=1))
+            self._peaks_m[name][columns] = largest[columns].max(axis=1)
         self.ready += count
         return True
 

@@ -92,11 +92,11 @@ class _Spliced(io.RawIOBase):
 
     def readinto(self, buffer: WriteableBuffer) -> int:
         view = memoryview(buffer).cast("B")
-        wanted = min(len(view), max(0, self._length - self._at))
-        head_part = self._head[self._at : self._at + wanted]
+        count = min(len(view), max(0, self._length - self._at))
+        head_part = self._head[self._at : self._at + count]
         view[: len(head_part)] = head_part
         self._file.seek(self._start + max(0, self._at - len(self._head)))
-        rest = self._file.read(wanted - len(head_part))
+        rest = self._file.read(count - len(head_part))
         view[len(head_part) : len(head_part) + len(rest)] = rest
         self._at += len(head_part) + len(rest)
         return len(head_part) + len(rest)
@@ -187,7 +187,7 @@ def _wave_parts(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, 
     """A header, the file, and place and length of its samples."""
     byte_order = ">" if _bytes_at(file, start, 4) == b"RIFX" else "<"
     chunks: dict[bytes, bytes] = {}
-    samples, stated = (0, 0), 0  # place and length; the length that ds64 states
+    samples, ds64_length = (0, 0), 0  # place and length; the length that ds64 states
     at = start + 12
     for _ in range(_MOST_CHUNKS):
         header = _bytes_at(file, at, 8)
@@ -198,14 +198,14 @@ def _wave_parts(file: BinaryIO, start: int, end: int) -> tuple[bytes, BinaryIO, 
             break
         at += 8
         if name == b"data":
-            if size >= _UNKNOWN and stated > 0:
-                size = stated
+            if size >= _UNKNOWN and ds64_length > 0:
+                size = ds64_length
             if at + size > end or (size == 0 and not _chunks_follow(file, at, end, byte_order)):
                 size = end - at
             if samples[1] == 0:
                 samples = at, size
         elif name == b"ds64" and size >= 16:
-            stated = struct.unpack(byte_order + "Q", _bytes_at(file, at + 8, 8).ljust(8, b"\0"))[0]
+            ds64_length = struct.unpack(byte_order + "Q", _bytes_at(file, at + 8, 8).ljust(8, b"\0"))[0]
         elif size <= _LARGEST_TEXT and (name in _KEPT or (name == b"LIST" and _bytes_at(file, at, 4) == b"INFO")):
             chunks.setdefault(name, _bytes_at(file, at, size))
         at = _next_chunk(file, at + size, size, byte_order)

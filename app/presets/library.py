@@ -107,8 +107,8 @@ class Library:
         if entries != self.entries:
             self.entries = entries
             self.changed.emit()
-        reported, self._problems = self._problems, problems
-        return [problem for problem in problems if problem not in reported]
+        problems_before, self._problems = self._problems, problems
+        return [problem for problem in problems if problem not in problems_before]
 
 
 def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:

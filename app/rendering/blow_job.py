@@ -58,12 +58,12 @@ class BlowJob(Rendering[BlowRequest, BlowTake]):
 
     def _begin_movers(self) -> dict[str, _Mover]:
         request = self.request
-        struck = StruckDrum.by(request.strike, request.modes)
+        struck_drum = StruckDrum.by(request.strike, request.modes)
         try:
             play = model_player(self._load(request.preset).preset.model)
         except ValueError as error:
             raise PresetError(f"{request.preset}: {error}") from error
-        return {"model": _Mover(play(struck, RATE_HZ)), "truth": _Mover(true_motion(struck, RATE_HZ))}
+        return {"model": _Mover(play(struck_drum, RATE_HZ)), "truth": _Mover(true_motion(struck_drum, RATE_HZ))}
 
     def _blocks(self, movers: dict[str, _Mover], frames: int) -> dict[str, Array]:
         """The next frames, (frames, modes) each, of the modes up to the last that moves; one source in the helper."""
@@ -128,13 +128,13 @@ class _Mover:
         q = np.concatenate([self._last[:, :moving], block[:, :moving]])
         stop = first + len(q) - 2
         numbers = np.arange(-(-first // self._step) * self._step, stop, self._step)
-        here = numbers - first + 1
-        swing = (q[here + 1] - q[here - 1]) / (2 * np.sin(turn))  # v/ω
-        size, angle = np.hypot(q[here], swing), np.arctan2(-swing, q[here])
+        indices = numbers - first + 1
+        swing = (q[indices + 1] - q[indices - 1]) / (2 * np.sin(turn))  # v/ω
+        size, angle = np.hypot(q[indices], swing), np.arctan2(-swing, q[indices])
         if len(numbers):
             before = angle[0] if first == 0 else self._wrapped[:moving]
-            turned = (np.diff(np.concatenate([before[None], angle]), axis=0) + math.pi) % math.tau - math.pi
-            angles = (before if first == 0 else self._angle[:moving]) + np.cumsum(turned, axis=0)
+            steps = (np.diff(np.concatenate([before[None], angle]), axis=0) + math.pi) % math.tau - math.pi
+            angles = (before if first == 0 else self._angle[:moving]) + np.cumsum(steps, axis=0)
             self._wrapped, self._angle = angle[-1], angles[-1]
             flash = numbers % between == 0
             motion.append(size[flash], angles[flash])

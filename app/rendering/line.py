@@ -108,13 +108,13 @@ class Line:
         flashes = self._flashes
         if samples:
             numbers = np.arange(-(-first // self.stride) * self.stride, stop, self.stride)
-            wanted, joint = numbers, flashes is not None and self._shown is None
+            union, joint = numbers, flashes is not None and self._shown is None
             if flashes is not None and joint:
-                wanted = np.union1d(numbers, flashes.needed(first, stop))
-            frames = self._pictures.take(wanted, stop)
+                union = np.union1d(numbers, flashes.needed(first, stop))
+            frames = self._pictures.take(union, stop)
             if flashes is not None and joint:
-                flashes.take(stop, wanted, frames)
-            self.motion.append(frames if len(wanted) == len(numbers) else frames[np.searchsorted(wanted, numbers)])
+                flashes.take(stop, union, frames)
+            self.motion.append(frames if len(union) == len(numbers) else frames[np.searchsorted(union, numbers)])
         if self._shown is not None and flashes is not None:
             self._catch_up(self._shown, flashes, max(samples, 2048 * self.stride))
         if self._listening is not None:

@@ -91,6 +91,6 @@ class Listening:
             self._given += len(samples_m)
             self._last = np.concatenate([self._last, samples_m])[-MIRRORED - 1 :]
             if self._given == self.signal.frames:  # a point reflection about its end keeps the signal's slope there
-                turned = 2 * self._last[-1:] - self._last[-2::-1]
-                voice.append(turned / np.float32(FULL_SCALE_M))
+                mirrored = 2 * self._last[-1:] - self._last[-2::-1]
+                voice.append(mirrored / np.float32(FULL_SCALE_M))
                 voice.end_here()

@@ -77,11 +77,11 @@ class Flashes:
 
         All frames needed before `stop` must be among these or have been added before.
         """
-        for wanted, shares in self._parts:
-            places = np.searchsorted(numbers, wanted)
-            here = np.flatnonzero(places < len(numbers))
-            here = here[numbers[places[here]] == wanted[here]]
-            self._shapes_m[here] += shares[here, None].astype(np.float32) * frames_m[places[here]]
+        for part_numbers, shares in self._parts:
+            places = np.searchsorted(numbers, part_numbers)
+            within = np.flatnonzero(places < len(numbers))
+            within = within[numbers[places[within]] == part_numbers[within]]
+            self._shapes_m[within] += shares[within, None].astype(np.float32) * frames_m[places[within]]
         late = self._last >= stop
         self.ready = int(late.argmax()) if late.any() else len(late)
 
