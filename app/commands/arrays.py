@@ -110,9 +110,9 @@ def _load(path: Path) -> np.ndarray:
     except OSError as error:
         raise Failure(f"{path}: cannot be read ({error.strerror or error}); give a NumPy .npy file") from error
     except Exception as error:  # NumPy parses the header as a Python literal, which may raise nearly anything
-        reported = one_line(str(error), 200)
+        reason = one_line(str(error), 200)
         raise Failure(
-            f"{path}: not a whole NumPy .npy file of numbers ({reported}); save it with numpy.save"
+            f"{path}: not a whole NumPy .npy file of numbers ({reason}); save it with numpy.save"
         ) from error
     if not isinstance(array, np.ndarray):
         raise Failure(f"{path}: an archive of arrays; save the one array with numpy.save")

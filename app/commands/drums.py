@@ -69,10 +69,10 @@ def modes(
     json: Json = False,
 ) -> None:
     """Print frequencies and decays of a drum's modes. Air counts, and the drop of pitch is added."""
-    patch, struck = drum_of(drum, key)
-    drum_modes = struck.modes
-    drops = {str(velocity): struck.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)}
-    facts = {"modes": len(drum_modes), "hardest_m_s": struck.played.hardest_m_s, "drop_cents": drops}
+    patch, drum_key = drum_of(drum, key)
+    drum_modes = drum_key.modes
+    drops = {str(velocity): drum_key.drop_cents(velocity, patch.pluck.curve) for velocity in (32, 64, 127)}
+    facts = {"modes": len(drum_modes), "hardest_m_s": drum_key.played.hardest_m_s, "drop_cents": drops}
     rows = [
         {"m": m, "n": n, "hz": hz, "t60_s": t60, "air_mass": mass}
         for m, n, hz, t60, mass in mode_rows(drum_modes, min(count, len(drum_modes)))
@@ -85,7 +85,7 @@ def modes(
         [[r["m"], r["n"], round(r["hz"], 2), round(r["t60_s"], 3), round(r["air_mass"], 3)] for r in rows],
     )
     words = ", ".join(f"{cents:.0f} cents at velocity {velocity}" for velocity, cents in drops.items())
-    print(f"{len(drum_modes)} modes; pitch drop {words}; hardest blow {struck.played.hardest_m_s:g} m/s")
+    print(f"{len(drum_modes)} modes; pitch drop {words}; hardest blow {drum_key.played.hardest_m_s:g} m/s")
 
 
 @drums.command()
@@ -207,22 +207,22 @@ def compare(
         "r = p = 1/12": untrained_player("series"),
         "linear drum": linear_drum,
     }
-    struck = blow.struck()
+    struck_drum = blow.struck()
     with progress("drums compare") as report:
-        whole, *windows = motion_errors(struck, players, rate, round(seconds * rate), report)
+        whole, *windows = motion_errors(struck_drum, players, rate, round(seconds * rate), report)
     if json:
         print_json(
             {
-                "modes": struck.resonator.modes,
-                "tension_rise": struck.tension_rise,
+                "modes": struck_drum.resonator.modes,
+                "tension_rise": struck_drum.tension_rise,
                 "rel_mse": whole.rel_mse,
                 "windows": [{"start_s": w.start_s, "stop_s": w.stop_s, "rel_mse": w.rel_mse} for w in windows],
             }
         )
         return
     print(
-        f"{blow.key.played.name}, {struck.resonator.modes} modes, rise of tension {struck.tension_rise:.3g}, "
-        f"{rate} Hz; relative MSE over the surface:"
+        f"{blow.key.played.name}, {struck_drum.resonator.modes} modes, "
+        f"rise of tension {struck_drum.tension_rise:.3g}, {rate} Hz; relative MSE over the surface:"
     )
     rows = [[f"{w.start_s:g} … {w.stop_s:g} s", *map(number, w.rel_mse.values())] for w in (*windows, whole)]
     print_table(("", *players), rows if len(windows) > 1 else rows[1:])
@@ -260,17 +260,17 @@ def _blow_of(
 
     from engine.strike import Strike
 
-    patch, struck = drum_of(drum, key)
+    patch, drum_key = drum_of(drum, key)
     if preset is not None:
         patch = patch.model_copy(update={"preset": preset})
-    own_strike = struck.strike(velocity, patch.pluck.curve)
+    own_strike = drum_key.strike(velocity, patch.pluck.curve)
     if place is None:
-        return _Blow(patch, struck, own_strike)
-    if not struck.modes.surface.inside(np.array([place])):
+        return _Blow(patch, drum_key, own_strike)
+    if not drum_key.modes.surface.inside(np.array([place])):
         raise typer.BadParameter(
             f"must be on the drum, not {place[0]:g} {place[1]:g}; choose one nearer the centre", param_hint="--place"
         )
-    return _Blow(patch, struck, Strike(place, own_strike.speed_m_s, own_strike.mallet))
+    return _Blow(patch, drum_key, Strike(place, own_strike.speed_m_s, own_strike.mallet))
 
 
 def drum_of(name: str, key: int | None) -> tuple[Patch, DrumKey]:
@@ -312,13 +312,13 @@ def _with_file(path: Path) -> Patch:
     return Patch(name="Drum", category="drums", strings=Drums(drums=(drum,), highest_hz=HIGHEST_HZ))
 
 
-def _dop853(struck: StruckDrum, rate_hz: int, steps: int, report: Report) -> Blocks:
+def _dop853(struck_drum: StruckDrum, rate_hz: int, steps: int, report: Report) -> Blocks:
     import torch
 
     from engine.truth import ModalState, solve_dop853
 
-    state = ModalState(*(torch.from_numpy(part)[None] for part in (struck.amplitudes_m, struck.speeds_m_s)))
-    amplitudes = solve_dop853(struck.resonator, state, rate_hz, steps, report=report)[0, 1:]
+    state = ModalState(*(torch.from_numpy(part)[None] for part in (struck_drum.amplitudes_m, struck_drum.speeds_m_s)))
+    amplitudes = solve_dop853(struck_drum.resonator, state, rate_hz, steps, report=report)[0, 1:]
     first = 0
 
     def following(count: int) -> Tensor:

@@ -72,21 +72,21 @@ def plugin(
         targets = tuple(TARGETS) if target == ALL else (this_target() if target == "this" else target,)
         ids = {image.id for image in images}
         name = BANK if instruments == [ALL] else _bank_name([patch.name for patch in chosen])
-        wanted = list[tuple[str, str, Path]]()
+        outputs = list[tuple[str, str, Path]]()
         for system in targets:
             for kind in FORMATS if form == ALL else (form,):
                 folder = (
                     install_folder(kind, system) if install else (out or Path()) / (system if target == ALL else "")
                 )
-                wanted.append((kind, system, plugin_path(folder / name, kind)))
+                outputs.append((kind, system, plugin_path(folder / name, kind)))
         if not replace:
-            for _, _, path in wanted:  # all before the first is written
+            for _, _, path in outputs:  # all before the first is written
                 check_kept(path, ids)
-        for kind, system, path in wanted:
-            began_s, there = time.monotonic(), path.exists()
+        for kind, system, path in outputs:
+            began_s, replaces = time.monotonic(), path.exists()
             build_plugin(images, kind, system, path, kept, _Steps(), replace=replace)
             done = f"{_size(path) / 1e6:.1f} MB, {time.monotonic() - began_s:.1f} s"
-            print(f"{one_line(str(path))}: {done}{', replaces the one before' if there else ''}")
+            print(f"{one_line(str(path))}: {done}{', replaces the one before' if replaces else ''}")
     except (ValueError, OSError) as error:
         raise Failure(str(error)) from error
 

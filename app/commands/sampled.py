@@ -96,10 +96,10 @@ def sampled(
 
     render = note_renderer(load_preset(preset_path), source)
     with progress("sampled") as report:
-        made = export_sampled(plan, out, render, progress=report)
-    for note in notes(plan, made, "--dry leaves"):
+        written = export_sampled(plan, out, render, progress=report)
+    for note in notes(plan, written, "--dry leaves"):
         say(f"note: {note}")
-    print(f"{one_line(str(out))}: {made.samples} samples, {megabytes(made.size_bytes)}; {pitch}")
+    print(f"{one_line(str(out))}: {written.samples} samples, {megabytes(written.size_bytes)}; {pitch}")
 
 
 def _keys(text: str | None) -> tuple[int, int] | None:
