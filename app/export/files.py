@@ -106,7 +106,7 @@ def export_sounds(
     request = next(iter(requests.values()))
     info = request.preset.info
     with ExitStack() as files:
-        recipes = {source: Recipe.of(one, settings) for source, one in requests.items()}
+        recipes = {source: Recipe.of(source_request, settings) for source, source_request in requests.items()}
         # opened first, so that a folder that cannot be written to fails before the work
         opened = {source: files.enter_context(_open_whole(path)) for source, path in paths.items()}
         rate_hz = settings.rate_hz or info.rate_hz

@@ -82,13 +82,13 @@ class Journal:
         path = folder / f"{recorded:%Y%m%d-%H%M%S-%f}-{os.getpid()}{SUFFIX}"
         if (lock := _lock_of(path)) is None:
             raise PermissionError(None, "its lock cannot be made", str(path))
-        made = cls(path, lock)
+        journal = cls(path, lock)
         try:
-            made._append([{"version": VERSION, "recorded": recorded.isoformat()}])
+            journal._append([{"version": VERSION, "recorded": recorded.isoformat()}])
         except OSError:
-            made.delete()
+            journal.delete()
             raise
-        return made
+        return journal
 
     def write(self, events: Iterable[TimedEvent]) -> None:
         """Append events, in the order of their times from the beginning of the recording. Raises OSError."""
@@ -134,8 +134,8 @@ class Journal:
         event, line = entry.event, {"t": entry.time_s}
         if isinstance(event, PatchTurned):
             before, self._patch = self._patch, event.patch.model_dump(mode="json")
-            turned = {"patch": self._patch} if before is None else {"turned": list(_changes(before, self._patch))}
-            return {**line, **turned}
+            change = {"patch": self._patch} if before is None else {"turned": list(_changes(before, self._patch))}
+            return {**line, **change}
         return {**line, _NAMES[type(event)]: asdict(event)}  # type: ignore[index]
 
     def _append(self, lines: list[dict[str, Any]]) -> None:

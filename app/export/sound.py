@@ -212,12 +212,12 @@ def render_voices(
     """
     sources, rate_hz = tuple(sources), rate_hz or request.preset.info.rate_hz
     needed = {voice for source in sources for voice in voices_of(source)}
-    wanted = [voice for voice in VOICES if voice in needed or all_voices or request.decay_db is not None]
+    voices = [voice for voice in VOICES if voice in needed or all_voices or request.decay_db is not None]
     sounds: dict[Voice, Recording] = {}
-    for place, voice in enumerate(wanted):
+    for place, voice in enumerate(voices):
 
         def part(share: float, place: int = place) -> None:
-            progress((place + share) / len(wanted))
+            progress((place + share) / len(voices))
 
         with suppress(*(() if voice in needed else (Runaway,))):
             sounds[voice] = _render(request, voice, rate_hz, part)

@@ -144,9 +144,9 @@ def _place_library(library: Path, images: Sequence[Image], form: str, target: st
         with whole_file(path) as part:
             shutil.copyfile(library, part)
         return path
-    with whole_folder(path) as made:
+    with whole_folder(path) as bundle:
         for name, content in inside.items():
-            place = made / name
+            place = bundle / name
             place.parent.mkdir(parents=True, exist_ok=True)
             if isinstance(content, Path):
                 shutil.copyfile(content, place)
@@ -193,13 +193,13 @@ def _link(
     command += [*(str(folder / name) for name in sources), *map(str, kernels), "-lm"]
     if target.startswith("linux"):
         command.append("-lpthread")
-    code, said = run_waiting([command], python_environment(), lambda _: waiting())
+    code, output = run_waiting([command], python_environment(), lambda _: waiting())
     full = code and shutil.disk_usage(folder).free < FULL_BYTES  # then even words of the compiler may be lost
-    if full or "NoSpaceLeft" in said or os.strerror(errno.ENOSPC) in said:
+    if full or "NoSpaceLeft" in output or os.strerror(errno.ENOSPC) in output:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder.parent))
     if code:
-        remedy = "; set ZIG_GLOBAL_CACHE_DIR to a folder that can be written" if "cache dir" in said else ""
-        raise PluginError(f"linking for {target} failed: {reason_of(code, said)}{remedy}")
+        remedy = "; set ZIG_GLOBAL_CACHE_DIR to a folder that can be written" if "cache dir" in output else ""
+        raise PluginError(f"linking for {target} failed: {reason_of(code, output)}{remedy}")
 
 
 def _lv2_descriptions(images: Sequence[Image], binary: str) -> dict[str, str]:

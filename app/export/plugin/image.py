@@ -324,13 +324,13 @@ def _macros(patch: Patch, ids: tuple[str, ...]) -> tuple[list[_Macro], tuple[str
 
 def layout_header(version: str) -> str:
     """The C header with places and constants of the kernels' memory."""
-    wanted = {
+    layout = {
         mixed: "EARLY REACH",
         of: "QUANTUM AHEAD NOTE_ON NOTE_OFF BEND CONTROLLER TUNE PARAMETER TABLE CHOKE ANY EVENTS REPORTS MOST_NOTES "
         "MOST_SOURCES KEYS CHANNELS BEGAN BODY_MIX BODY_SLOTS",
     }
     lines = [f'#define LS_VERSION "{version}"']
-    for module, names in wanted.items():
+    for module, names in layout.items():
         lines += [f"#define {name} {getattr(module, name)}" for name in names.split()]
     for name, kind in (
         ("PLAYER", PLAYER),

@@ -72,12 +72,12 @@ def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = la
     """
     if target not in TARGETS:
         raise ObjectError(f"target {target!r} is unknown; try {', '.join(TARGETS)}")
-    made = {
+    object_files = {
         folder / f"kernels-{digest()}-{target}-{cpu}-{part}.o": (part, number)
         for number, cpu in enumerate(TARGETS[target].cpus)
         for part in texts.PARTS
     }
-    missing = [(*wanted, path) for path, wanted in made.items() if not path.exists()]
+    missing = [(*part_and_cpu, path) for path, part_and_cpu in object_files.items() if not path.exists()]
     if missing:
         folder.mkdir(parents=True, exist_ok=True)
         text_files = _texts(folder, lambda share: advanced(TEXT_SHARE * share))
@@ -91,7 +91,7 @@ def objects_of(target: str, folder: Path, advanced: Callable[[float], None] = la
                 STEPS,
                 lambda share: advanced(TEXT_SHARE + (1 - TEXT_SHARE) * share),
             )
-    return tuple(made)
+    return tuple(object_files)
 
 
 def _texts(folder: Path, advanced: Callable[[float], None]) -> dict[str, Path]:
@@ -116,18 +116,18 @@ def _run(module: str, calls: Sequence[Sequence[str]], steps: int, advanced: Call
     Raises:
         ObjectError: one failed.
     """
-    code, said = run_waiting(
+    code, output = run_waiting(
         [python_command("-m", module, *arguments) for arguments in calls],
         _environment(),
         lambda dots: advanced(min(dots / (steps * len(calls)), 1.0)),
     )
     if code:
-        raise ObjectError(f"the kernels cannot be compiled: {reason_of(code, said)}")
+        raise ObjectError(f"the kernels cannot be compiled: {reason_of(code, output)}")
 
 
-def reason_of(code: int, said: str) -> str:
+def reason_of(code: int, output: str) -> str:
     """The reason why a process failed: its first line with an error, else its last; else its exit status."""
-    lines = [line.strip() for line in said.splitlines() if line.strip()]
+    lines = [line.strip() for line in output.splitlines() if line.strip()]
     named = [line for line in lines if "error:" in line.lower()]
     return next(iter(named or lines[-1:]), f"its process ended with status {code}; free some memory and try again")
 
@@ -142,8 +142,8 @@ def run_waiting(
     Args:
         waiting: is called a few times a second with the number of bytes that the commands have printed.
     """
-    with tempfile.TemporaryFile() as said, tempfile.TemporaryFile() as printed:
-        running = [subprocess.Popen(command, env=environment, stdout=printed, stderr=said) for command in commands]
+    with tempfile.TemporaryFile() as errors, tempfile.TemporaryFile() as printed:
+        running = [subprocess.Popen(command, env=environment, stdout=printed, stderr=errors) for command in commands]
         try:
             for process in running:
                 while process.poll() is None:
@@ -156,9 +156,9 @@ def run_waiting(
             for process in running:
                 process.kill()
                 process.wait()
-        said.seek(0)
+        errors.seek(0)
         status = next((process.returncode for process in running if process.returncode), 0)
-        return status, said.read().decode(errors="replace")
+        return status, errors.read().decode(errors="replace")
 
 
 def _environment() -> dict[str, str]:
@@ -219,10 +219,10 @@ def _without_counts(text: str) -> str:
 def _check_names(module: object, entries: set[str]) -> None:
     """Raise ObjectError where the code refers to anything that the shell or the C library does not give."""
     functions = module.functions  # type: ignore[attr-defined]
-    asked = {
+    declared = {
         function.name for function in functions if function.is_declaration and not function.name.startswith("llvm.")
     }
-    unknown = asked - ALLOWED - STUBS - entries
+    unknown = declared - ALLOWED - STUBS - entries
     if unknown:
         raise ObjectError(f"the kernels refer to {', '.join(sorted(unknown))}, which no plug-in has")
 

@@ -91,9 +91,9 @@ def kit_of(keys: DrumKeys) -> Kit:
         kind = drum.shape, drum.aspect
         (rows, air, reach), (rows_at, air_at) = around[kind], places[kind]
         furthest = max(furthest, reach / 2, rows[0, -1] * math.hypot(*played.place))
-        struck = np.zeros(1, KIT_DRUM)
-        struck[0] = struck_drum(played, drum), rows_at, rows.shape[1], air_at, *air.shape[1:], reach
-        places_of[played.note] = put(struck.view(np.float64))
+        record = np.zeros(1, KIT_DRUM)
+        record[0] = struck_drum(played, drum), rows_at, rows.shape[1], air_at, *air.shape[1:], reach
+        places_of[played.note] = put(record.view(np.float64))
     kit = record_of(memory, KIT)
     for key in range(of.KEYS):
         if (tuned := keys.tuned_to(key)) is not None:

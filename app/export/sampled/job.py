@@ -98,21 +98,21 @@ def export_sampled(
     try:
         replaceable(out)
         with working_folder(out.parent, folder.name) as unfinished:
-            made = unfinished / folder.name
-            made.mkdir()
-            samples = _write_samples(plan, made, render, progress)
+            samples_folder = unfinished / folder.name
+            samples_folder.mkdir()
+            samples = _write_samples(plan, samples_folder, render, progress)
             if soundfont:
                 with whole_file(out) as file:
-                    gain_db = write_sf2(file, plan, samples, made, progress)
+                    gain_db = write_sf2(file, plan, samples, samples_folder, progress)
                 size = out.stat().st_size
             else:
-                size = sum(path.stat().st_size for path in made.iterdir())
+                size = sum(path.stat().st_size for path in samples_folder.iterdir())
                 with whole_file(out) as file:
                     size += file.write(sfz_text(plan, samples, folder.name).encode())
                     file.flush()
                     if folder.exists():
                         shutil.rmtree(folder)
-                    made.replace(folder)
+                    samples_folder.replace(folder)
                 gain_db = sfz_gain_db(plan.patch, samples)
     except OSError as error:
         raise WriteError(explain(out, error)) from error
@@ -140,7 +140,7 @@ def _write_samples(
     plan: SampledPlan, folder: Path, render: NoteRenderer, progress: Progress
 ) -> dict[Zone, StoredSample]:
     """Write the sample of each zone into a folder."""
-    made = {}
+    stored_samples = {}
     started = time.monotonic()
     for done, zone in enumerate(plan.zones):
         share, text = done / len(plan.zones), f"{note_name(zone.key)}, velocity {zone.velocity}"
@@ -157,8 +157,8 @@ def _write_samples(
             raise WriteError(f"{path.name}: {error}") from error
         path.write_bytes(encoded(sample, plan.rate_hz, plan.format, plan.bits))
         frames, channels = sample.sound.shape
-        made[zone] = StoredSample(frames, channels, sample.gain_db, round(sample.level_db, 3), sample.cut)
-    return made
+        stored_samples[zone] = StoredSample(frames, channels, sample.gain_db, round(sample.level_db, 3), sample.cut)
+    return stored_samples
 
 
 def note_renderer(preset: Preset, source: SampledSource) -> NoteRenderer:

@@ -103,7 +103,7 @@ def write_sf2(
     channels = _channels(samples)
     attenuations_cb = _attenuations_cb(plan.patch, samples)
     tables = _tables(plan, channels, attenuations_cb)
-    size = 2 * sum(one.frames + ZEROS_BEHIND for one in channels)
+    size = 2 * sum(channel.frames + ZEROS_BEHIND for channel in channels)
     info = _list(b"INFO", _information(plan))
     body = 4 + len(info) + (8 + 4 + 8 + size) + len(tables)
     file.write(b"RIFF" + struct.pack("<I", body) + b"sfbk" + info)
@@ -163,17 +163,17 @@ def release_timecents(patch: Patch) -> int:
 
 def _channels(samples: Mapping[Zone, StoredSample]) -> list[_Channel]:
     """The channels of all samples, one or two each, with their first frames."""
-    made: list[_Channel] = []
+    channels: list[_Channel] = []
     start = 0
     for zone, stored in samples.items():
-        here = len(made)
+        here = len(channels)
         sides = [("", MONO, 0, 0)]
         if stored.channels == 2:
             sides = [("_L", LEFT, here + 1, -HARD_PAN), ("_R", RIGHT, here, HARD_PAN)]
         for suffix, kind, link, pan in sides:
-            made.append(_Channel(zone, zone.stem + suffix, start, stored.frames, kind, link, pan))
+            channels.append(_Channel(zone, zone.stem + suffix, start, stored.frames, kind, link, pan))
             start += stored.frames + ZEROS_BEHIND
-    return made
+    return channels
 
 
 def _information(plan: SampledPlan) -> bytes:
@@ -208,10 +208,10 @@ def _tables(plan: SampledPlan, channels: Sequence[_Channel], attenuations_cb: Ma
         zones.append([*zone, (SAMPLE_ID, number)])
     modulators = [struct.pack("<HHhHH", source, to, 0, by, 0) for source, to, by in SWITCHED_OFF]
     bags = [struct.pack("<HH", 0, 0)]
-    generators = [struct.pack("<HH", *one) for one in zones[0]]
+    generators = [struct.pack("<HH", *generator) for generator in zones[0]]
     for channel, zone in zip(channels, zones[1:], strict=True):
         bags.append(struct.pack("<HH", len(generators), len(modulators)))
-        generators += [struct.pack("<HH", *one) for one in zone]
+        generators += [struct.pack("<HH", *generator) for generator in zone]
         amount_cb = attenuations_cb[channel.zone]
         modulators.append(struct.pack("<HHhHH", FALLING_VELOCITY, ATTENUATION, amount_cb, 0, 0))
     bags.append(struct.pack("<HH", len(generators), len(modulators)))
@@ -227,7 +227,7 @@ def _tables(plan: SampledPlan, channels: Sequence[_Channel], attenuations_cb: Ma
                 _table(b"ibag", bags),
                 _table(b"imod", [*modulators, bytes(10)]),
                 _table(b"igen", [*generators, bytes(4)]),
-                _table(b"shdr", [*(_header(plan, one) for one in channels), struct.pack("<20s26x", b"EOS")]),
+                _table(b"shdr", [*(_header(plan, channel) for channel in channels), struct.pack("<20s26x", b"EOS")]),
             ]
         ),
     )
@@ -238,14 +238,16 @@ def _preset(name: bytes, bag: int) -> bytes:
     return struct.pack("<20sHHHIII", name, 0, 0, bag, 0, 0, 0)
 
 
-def _header(plan: SampledPlan, one: _Channel) -> bytes:
+def _header(plan: SampledPlan, channel: _Channel) -> bytes:
     """The header of a sample: its place, in frames, and its key (7.10).
 
     Its loop is not played, but has to lie within it.
     """
-    end = one.start + one.frames
-    places = (one.start, end, one.start + 8, end - 8)
-    return struct.pack("<20sIIIIIBbHH", _name(one.name), *places, plan.rate_hz, one.zone.key, 0, one.link, one.kind)
+    end = channel.start + channel.frames
+    places = (channel.start, end, channel.start + 8, end - 8)
+    return struct.pack(
+        "<20sIIIIIBbHH", _name(channel.name), *places, plan.rate_hz, channel.zone.key, 0, channel.link, channel.kind
+    )
 
 
 def _span(ends: tuple[int, int]) -> int:
