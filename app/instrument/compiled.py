@@ -105,10 +105,10 @@ class InstrumentPlayer:
         ear = self.ear
         most = self.most_notes
         keys = self._keys
-        made = InstrumentPlayer(patch, self._preset, rate_hz, gains, ear, most, self._varied, keys)
+        player = InstrumentPlayer(patch, self._preset, rate_hz, gains, ear, most, self._varied, keys)
         for event in self.at_hand:
-            made.handle(event)
-        return made
+            player.handle(event)
+        return player
 
     # What is played
 
@@ -216,19 +216,19 @@ class InstrumentPlayer:
         """The table of keys, which takes milliseconds, of drums more."""
         return Tabled(keys, table_of(keys, self.grid_points, self._sources, self._programs, self._varied))
 
-    def take(self, made: Tabled, frame: int = 0) -> None:
+    def take(self, tabled: Tabled, frame: int = 0) -> None:
         """Play these keys from a frame on, at once; strings that ring glide to them.
 
         Another patch begins with its wheels at rest, for what they turned may be something else now; pedals stay.
         """
         with self._lock:
-            if self.table is None or is_another(made.keys.patch, self._keys.patch):
+            if self.table is None or is_another(tabled.keys.patch, self._keys.patch):
                 self._instrument += 1
                 self._wheel = 0, 0
             self._serial += 1
-            record = made.table.record
+            record = tabled.table.record
             record["serial"], record["instrument"] = self._serial, self._instrument
-            self._keys, self.table = made.keys, made.table
+            self._keys, self.table = tabled.keys, tabled.table
             self.compiled.take(self.table, frame)
 
     # Events
@@ -255,10 +255,10 @@ class InstrumentPlayer:
             return 0
         if isinstance(event, PluckAt):
             return 0
-        struck = None
+        blow = None
         if isinstance(event, NoteOn) and event.velocity > 0:
             self._check(event)
-            struck = self._struck(event)
+            blow = self._struck(event)
         give = partial(self.compiled.give, channel=event.channel, frame=frame)
         if isinstance(event, NoteOn):
             return give(
@@ -267,7 +267,7 @@ class InstrumentPlayer:
                 value=event.velocity,
                 by_hand=None if self._of_drums else event.pluck,
                 struck_s=struck_s,
-                struck=struck,
+                struck=blow,
                 string=event.string,
             )
         elif isinstance(event, NoteOff):

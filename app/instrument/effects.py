@@ -24,10 +24,10 @@ def effects_of(patch: Patch) -> Effects | None:
 def effects_from(chosen: ChosenBody, room: Room, amp: Amp, level_db: float) -> Effects | None:
     """Build effects as `effects_of`; the level is behind the amplifier, and changes no drive."""
     driven = amp.drive_db > 0
-    made = Effects(
+    effects = Effects(
         _body(chosen)[0], room if room.mix > 0 else None, amp if driven else None, level_db if driven else 0.0
     )
-    return None if made == Effects() else made
+    return None if effects == Effects() else effects
 
 
 def added_words(patch: Patch) -> str:

@@ -189,8 +189,8 @@ def releases_for(events: Iterable[Event]) -> list[Event]:
         if isinstance(event, NoteOn | NoteOff):
             off = NoteOff(event.key, event.channel, event.string)
             strokes = down.pop(off, 0)
-            struck = isinstance(event, NoteOn) and event.velocity > 0
-            strokes = (1 if event.string is not None else strokes + 1) if struck else strokes - 1
+            begins = isinstance(event, NoteOn) and event.velocity > 0
+            strokes = (1 if event.string is not None else strokes + 1) if begins else strokes - 1
             if strokes > 0:
                 down[off] = strokes
         elif isinstance(event, Controller) and event.number == SUSTAIN:

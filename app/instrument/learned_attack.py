@@ -58,10 +58,10 @@ def with_attack(patch: Patch, preset: Preset, note: Note, f0_hz: float, level_db
     tuned = patch.model_copy(update={"tuning": tuning})
     shared = gcd(note.rate_hz, RESPONSE_HZ)
     truth = resample_poly(note.part(0, PART_S), RESPONSE_HZ // shared, note.rate_hz // shared)
-    struck, seconds = [TimedEvent(0.0, NoteOn(key, REFERENCE_VELOCITY))], len(truth) / RESPONSE_HZ
+    events, seconds = [TimedEvent(0.0, NoteOn(key, REFERENCE_VELOCITY))], len(truth) / RESPONSE_HZ
     dry = np.concatenate(
         list(
-            render_events(tuned, preset, struck, RESPONSE_HZ, seconds=seconds, limited=False, varied=False, dry=True)
+            render_events(tuned, preset, events, RESPONSE_HZ, seconds=seconds, limited=False, varied=False, dry=True)
         )
     )
     sound = fftconvolve(dry[:, 0].astype(np.float64), body)[: len(truth)]

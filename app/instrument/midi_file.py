@@ -77,16 +77,16 @@ def event_of(message: Sequence[int]) -> Event | None:
     if len(message) < 3:
         return None
     kind, channel = message[0] & 0xF0, message[0] & 0x0F
-    one, two = message[1] & 0x7F, message[2] & 0x7F
-    if kind == NOTE_ON and two > 0:
-        return NoteOn(one, two, channel)
+    first, second = message[1] & 0x7F, message[2] & 0x7F
+    if kind == NOTE_ON and second > 0:
+        return NoteOn(first, second, channel)
     if kind in (NOTE_ON, NOTE_OFF):
-        return NoteOff(one, channel)
+        return NoteOff(first, channel)
     if kind == BEND:
-        steps = one + 128 * two - BEND_STEPS
+        steps = first + 128 * second - BEND_STEPS
         return Bend(steps / BEND_STEPS if steps < 0 else steps / (BEND_STEPS - 1), channel)
     if kind == CONTROLLER:
-        return Controller(one, 0 if one == RESET else two, channel)
+        return Controller(first, 0 if first == RESET else second, channel)
     return None
 
 
@@ -231,7 +231,7 @@ def midi_bytes(timed: Sequence[TimedEvent], patch: Patch | None = None) -> bytes
 
     track = mido.MidiTrack([mido.MetaMessage("set_tempo", tempo=TEMPO)])
     tick = 0
-    for entry in sorted(timed, key=lambda one: one.time_s):
+    for entry in sorted(timed, key=lambda timed_event: timed_event.time_s):
         now = round(mido.second2tick(entry.time_s, TICKS, TEMPO))
         for message in messages_of(entry.event):
             track.append(message.copy(time=max(0, now - tick)))
@@ -254,7 +254,7 @@ def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
             track.extend(TimedEvent(time_s, event) for event in bend_range(_bend_semitones(patch, channel), channel))
 
     set_ranges(0.0, channels)
-    for entry in sorted(timed, key=lambda one: one.time_s):
+    for entry in sorted(timed, key=lambda timed_event: timed_event.time_s):
         event, time_s = entry.event, entry.time_s
         track.append(entry)
         if isinstance(event, PatchTurned):

@@ -229,10 +229,10 @@ class _Reader:
     def _number(self, place: int, limit: int) -> tuple[int, int]:
         """A number of variable length, and the place after it."""
         value = 0
-        for here in range(place, min(place + LONGEST_NUMBER, limit)):
-            value = value << 7 | self._raw[here] & 0x7F
-            if self._raw[here] < 0x80:
-                return value, here + 1
+        for at in range(place, min(place + LONGEST_NUMBER, limit)):
+            value = value << 7 | self._raw[at] & 0x7F
+            if self._raw[at] < 0x80:
+                return value, at + 1
         raise _CutOff("is no MIDI file: a number in it has no end")
 
 

@@ -158,9 +158,9 @@ def render_events(
         now = []
         while left and round(left[0].time_s * rate_hz) < end:
             now.append(left.popleft())
-        made = list(play_until(end, now))
-        loudest = max((float(np.abs(block).max(initial=0.0)) for block in made), default=0.0)
-        waiting += made
+        blocks = list(play_until(end, now))
+        loudest = max((float(np.abs(block).max(initial=0.0)) for block in blocks), default=0.0)
+        waiting += blocks
         if loudest >= quiet:
             yield from waiting
             waiting = []
@@ -175,9 +175,9 @@ def _sounds(event: Event) -> bool:
 def channels_played(patch: Patch, timed: Iterable[TimedEvent]) -> int:
     """The channels that `render_events` gives: 2 where the patch, or what it is turned to, sounds in two."""
     events = [timed_event.event for timed_event in timed]
-    turned = (event.patch for event in events if isinstance(event, PatchTurned))
+    later_patches = (event.patch for event in events if isinstance(event, PatchTurned))
     wheeled = any(isinstance(event, Controller) and event.number == MOD_WHEEL for event in events)
-    return max(channels_of(version, wheeled) for version in (patch, *turned))
+    return max(channels_of(version, wheeled) for version in (patch, *later_patches))
 
 
 def _gains(source: str, difference_gain_db: float) -> dict[str, float]:

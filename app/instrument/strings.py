@@ -85,7 +85,7 @@ class Strings:
         """The pitch of an open string, which the range does not limit."""
         return self._tuning.hz(note)
 
-    def _stopped(self, key: int, wanted: int | None, pitch_hz: float) -> tuple[StringParameters, float]:
+    def _stopped(self, key: int, string_number: int | None, pitch_hz: float) -> tuple[StringParameters, float]:
         """The string of a key with the patch's knobs, and its length as a share of the whole string's."""
         strings, slackened = self._patch.strings, 1.0
         assert not isinstance(strings, Drums)
@@ -93,7 +93,7 @@ class Strings:
             string = strings.string
         else:
             ordered = strings.strings[::-1]
-            chosen = ordered[law.played(ordered, len(ordered), key, -1 if wanted is None else wanted)]
+            chosen = ordered[law.played(ordered, len(ordered), key, -1 if string_number is None else string_number)]
             string = chosen.string
             if key < chosen.note:
                 slackened = pitch_hz / self._tuning.hz(chosen.note)

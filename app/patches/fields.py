@@ -101,11 +101,11 @@ class _OfRows(ModelMetaclass):
     def __new__(
         meta, name: str, bases: tuple[type, ...], namespace: dict[str, Any], part: str = "", **options: Any
     ) -> type:
-        stated = namespace.setdefault("__annotations__", {})
+        hints = namespace.setdefault("__annotations__", {})
         for id in OF_PATCHES:
             section, _, field = id.rpartition(".")
-            if part and section == part and field not in stated:
-                stated[field], namespace[field] = float, parameter(id)
+            if part and section == part and field not in hints:
+                hints[field], namespace[field] = float, parameter(id)
         return super().__new__(meta, name, bases, namespace, **options)
 
 

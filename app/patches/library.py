@@ -75,10 +75,8 @@ def read_patch(path: Path) -> Patch:
     except PatchError:
         raise
     except (ValueError, OverflowError) as error:
-        reported = explained(error) if isinstance(error, ValueError) else str(error)
-        raise PatchError(
-            f"{path}: {one_line(reported, 300)}; mend this field, or save the instrument again"
-        ) from error
+        reason = explained(error) if isinstance(error, ValueError) else str(error)
+        raise PatchError(f"{path}: {one_line(reason, 300)}; mend this field, or save the instrument again") from error
 
 
 def list_patches(*folders: Path) -> tuple[list[PatchEntry], list[str]]:
@@ -129,15 +127,15 @@ def find_patch(name_or_path: str) -> PatchEntry:
         PatchError: there is none, or its file cannot be used; the message lists like names, else all.
     """
     entries, _ = list_patches()
-    wanted = name_or_path.casefold()
+    folded_name = name_or_path.casefold()
     for entry in entries:
-        if wanted in (entry.name.casefold(), entry.patch.name.casefold()):
+        if folded_name in (entry.name.casefold(), entry.patch.name.casefold()):
             return entry
     path = Path(name_or_path)
     if path.suffix == SUFFIX:
         return PatchEntry(path, read_patch(path))
     names = [entry.name for entry in entries]
-    if close := get_close_matches(file_stem(wanted), names, cutoff=0.55):
+    if close := get_close_matches(file_stem(folded_name), names, cutoff=0.55):
         raise PatchError(f"no instrument {bounds.brief(name_or_path)}; did you mean {' or '.join(close)}?")
     known = ", ".join(names) or "none is installed"
     raise PatchError(f"no instrument {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {known}")

@@ -94,16 +94,16 @@ def parse_scale(text: str) -> Scale:
     count_match = _COUNT.match(count_line)
     if count_match is None:
         raise ValueError(f"its number of notes, below its description, is {brief(count_line)}; it is no scale")
-    said = count_match.group().lstrip("0") or "0"
-    count = int(said[:9])
+    digits = count_match.group().lstrip("0") or "0"
+    count = int(digits[:9])
     if count <= min(len(listed), MOST_NOTES):
         octaves = tuple(_octaves(line) for line in listed[:count])
         if not any(map(_NUMBER.match, listed[count:])):  # other text below the notes is a remark
             return Scale(octaves)
     numbers = sum(map(bool, map(_NUMBER.match, listed)))
-    if str(numbers) == said:
+    if str(numbers) == digits:
         raise ValueError(f"has {count} notes, at most {MOST_NOTES} may be given")
-    raise ValueError(f"says {said[:20]} notes and lists {numbers}; correct its count or its list of notes")
+    raise ValueError(f"says {digits[:20]} notes and lists {numbers}; correct its count or its list of notes")
 
 
 def parse_keymap(text: str) -> Keymap:
