@@ -86,8 +86,8 @@ class PluckRange:
 
     def turned(self, press: KeyPress, amplitude_mm: float) -> float | None:
         """The amplitude after a key that changes it, as `turn` does a velocity; None for another key."""
-        turned = turn(press, 0, self.velocity_of(amplitude_mm))
-        return None if turned is None or press.letter.upper() in OCTAVE_STEPS else self.amplitude_of(turned[1])
+        step = turn(press, 0, self.velocity_of(amplitude_mm))
+        return None if step is None or press.letter.upper() in OCTAVE_STEPS else self.amplitude_of(step[1])
 
     def place(self, share: float) -> float:
         """The position at 0 … 1 of the keys."""

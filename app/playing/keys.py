@@ -174,17 +174,17 @@ class Keys:
                 return None
             self.recorder.take(event, None if due is None else due.time_s)
             frame, id = 0 if due is None else due.frame_in(mixer), 0
-            struck = event if isinstance(event, NoteOn) and event.velocity > 0 else None
+            note_on = event if isinstance(event, NoteOn) and event.velocity > 0 else None
             try:
-                if struck is None or not player.silent(struck.key):
+                if note_on is None or not player.silent(note_on.key):
                     id = player.handle(event, frame, struck_s)
             except (ValueError, PresetError) as error:
                 self._report(str(error), "")
             if isinstance(event, Controller) and moves_effects(event, player.patch):
                 self._in_background(self._set_present_effects)
-            if struck is None or not id:
+            if note_on is None or not id:
                 return None
-            note = self._notes[player, id] = KeyNote(player, mixer, id, struck, self._path, frame)
+            note = self._notes[player, id] = KeyNote(player, mixer, id, note_on, self._path, frame)
             begun(note)
             return note
 
@@ -291,9 +291,9 @@ class Keys:
         if effects != self._effects:
             self._effects = effects
             self._set_effects(effects)
-        problem, reported = body_problem(patch) if patch is not None else "", self._reported_body
+        problem, reported_before = body_problem(patch) if patch is not None else "", self._reported_body
         self._reported_body = problem
-        if problem and problem != reported:
+        if problem and problem != reported_before:
             self._report(problem, "")
 
     def _present(self) -> InstrumentPlayer | None:
@@ -334,7 +334,7 @@ class Keys:
             keys = player.keys_of(wanted.patch, wanted.ear, nearly)
             if isinstance(keys, DrumKeys) and not self._compute_drums(keys):
                 return
-            made = player.tabled(keys)
+            table = player.tabled(keys)
         except ValueError as error:
             with self._lock:
                 if wanted is self._wanted:  # what is played stays
@@ -343,9 +343,9 @@ class Keys:
             return
         with self._lock:
             if wanted is self._wanted and player is self._player:
-                turned = (player.patch, player.ear) != (wanted.patch, wanted.ear)
-                player.take(made)
-                if turned:
+                is_outdated = (player.patch, player.ear) != (wanted.patch, wanted.ear)
+                player.take(table)
+                if is_outdated:
                     self.recorder.take(_turned_event(player))
 
     def _compute_drums(self, keys: DrumKeys) -> bool:

@@ -59,8 +59,8 @@ class Note:
     @property
     def matching_key(self) -> tuple[object, ...]:
         """The values that the levels of its sources depend on."""
-        asked = self.request
-        return asked.preset, asked.pluck, asked.ear, asked.others, self.sources
+        request = self.request
+        return request.preset, request.pluck, request.ear, request.others, self.sources
 
     @property
     def over(self) -> bool:

@@ -401,8 +401,8 @@ class Notes:
 
     def _voices_of(self, request: RenderRequest) -> tuple[str, ...]:
         """The sources that get a voice: what the monitor holds, without presets that are not here."""
-        here = {*SOURCES, *(f"{OTHER}{path.stem}" for path in request.others)}
-        return tuple(source for source in self._monitor.voices if source in here) or ("model",)
+        available = {*SOURCES, *(f"{OTHER}{path.stem}" for path in request.others)}
+        return tuple(source for source in self._monitor.voices if source in available) or ("model",)
 
     def _is_loaded(self, note: Note) -> bool:
         """Return True if nothing needs to be loaded for it."""
@@ -467,30 +467,32 @@ class Notes:
                 voice.skip(note.from_s, Mixer(voice.program.rate_hz))
 
     def _make_voices(self, note: Note, rate_hz: int, struck_s: float) -> None:
-        asked, voices = note.request, dict[str, Voice]()
+        request, voices = note.request, dict[str, Voice]()
         ahead: list[AheadVoice] = []
         for source in note.sources:
             subject = note.subject(source)
             try:
                 program = self._sources.program(subject, source, rate_hz)
-                initial_m, begin = self._sources.begin(subject, source, rate_hz, asked.pluck)
+                initial_m, begin = self._sources.begin(subject, source, rate_hz, request.pluck)
                 model = self._sources.load(subject).model if program.rendered else None
             except (PresetError, ValueError):
                 if source in SOURCES:
                     raise
                 continue  # another preset that cannot be used; the render worker reports why
             if model is None:
-                voices[source] = Voice(program, initial_m, asked.ear, 0.0, begin=begin)
+                voices[source] = Voice(program, initial_m, request.ear, 0.0, begin=begin)
                 continue
-            voice = voices[source] = Voice(program, initial_m, asked.ear, 0.0, asked.seconds, model.rate_hz, begin)
-            voice.fade_out_by(asked.seconds)  # behind it there are no samples
+            voice = voices[source] = Voice(
+                program, initial_m, request.ear, 0.0, request.seconds, model.rate_hz, begin
+            )
+            voice.fade_out_by(request.seconds)  # behind it there are no samples
             ahead.append(
                 AheadVoice(
                     voice,
                     model,
                     initial_m,
-                    program.grid_weights(asked.ear),
-                    (subject, asked.pluck, asked.ear, asked.seconds),
+                    program.grid_weights(request.ear),
+                    (subject, request.pluck, request.ear, request.seconds),
                     lambda: self._hand_over_rendered(note, ahead, struck_s),
                     lambda error: self._cannot_render(note, error),
                     lambda: note.over,

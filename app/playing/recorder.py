@@ -55,8 +55,8 @@ class EventRecorder:
                 taken = TimedEvent(at_s - self._began_s, event)
                 self._recorded.append(taken)
                 self._unfetched.append(taken)
-            reported, self._reported_full = self._reported_full, self._reported_full or full
-        if full and not reported:
+            reported_before, self._reported_full = self._reported_full, self._reported_full or full
+        if full and not reported_before:
             self._report(FULL, "")
 
     def cancel(self, event: Event | None = None) -> None:
