@@ -51,8 +51,8 @@ class Listener(Value):
         if not self.stereo:
             for macro in patch.macros:
                 if any(target.field == RIGHT_POINT for target in macro.targets):
-                    reported = f"its macro {macro.name} moves the right listening point"
-                    raise ValueError(f"{patch.name} stays in stereo: {reported}")
+                    reason = f"its macro {macro.name} moves the right listening point"
+                    raise ValueError(f"{patch.name} stays in stereo: {reason}")
         return patch.model_copy(update={"pickup": pickup})
 
 

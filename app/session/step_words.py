@@ -84,8 +84,8 @@ def _patch_words(before: Patch | None, after: Patch | None) -> str:
     if "name" in paths and len(paths) > 1:
         return f"instrument {after.name}"
     if "macros" in paths:
-        turned = [new.name for old, new in zip(before.macros, after.macros, strict=False) if old != new]
-        return _join_words(turned or ["macros"])
+        macro_names = [new.name for old, new in zip(before.macros, after.macros, strict=False) if old != new]
+        return _join_words(macro_names or ["macros"])
     return _join_words([field_words(field) for field in paths])
 
 

@@ -39,13 +39,13 @@ def log_file() -> Path:
 
 
 @contextmanager
-def faults_logged(reported: Callable[[str], None]) -> Iterator[None]:
+def faults_logged(report: Callable[[str], None]) -> Iterator[None]:
     """Write uncaught exceptions of any thread to the log while it is open, each different one once.
 
     A log that cannot be opened is done without.
 
     Args:
-        `reported`: called with the text of each of them, in the thread where it was raised.
+        `report`: called with the text of each of them, in the thread where it was raised.
     """
     handler = _open(log_file())
     before = sys.excepthook, threading.excepthook
@@ -56,7 +56,7 @@ def faults_logged(reported: Callable[[str], None]) -> Iterator[None]:
         if text not in known and len(known) < MOST_KINDS:  # one that is raised at every frame would fill the log
             known.add(text)
             _log.error("%s", text)
-            reported(text)
+            report(text)
 
     def of_main(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
         before[0](kind, error, trace)
