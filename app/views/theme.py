@@ -240,6 +240,6 @@ def blended(colour: str, ground: str, share: float) -> QColor:
 
 def translucent(colour: str, alpha: int) -> QColor:
     """The colour with alpha 0 … 255."""
-    made = QColor(colour)
-    made.setAlpha(alpha)
-    return made
+    mixed = QColor(colour)
+    mixed.setAlpha(alpha)
+    return mixed

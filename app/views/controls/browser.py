@@ -137,23 +137,23 @@ class Browser(QFrame):
         self.hide()
 
     def _build_list(self, columns: Sequence[Column]) -> RowList:
-        made = RowList(columns)
-        made.setAccessibleName(self.what.capitalize())
-        made.setToolTip("Arrows load, Space plays, Enter closes")
-        made.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # some differ at the end
-        made.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
-        made.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-        made.setHeaderHidden(len(columns) == 1)
-        header = made.header()
+        rows = RowList(columns)
+        rows.setAccessibleName(self.what.capitalize())
+        rows.setToolTip("Arrows load, Space plays, Enter closes")
+        rows.setTextElideMode(Qt.TextElideMode.ElideMiddle)  # some differ at the end
+        rows.setSelectionMode(QAbstractItemView.SelectionMode.SingleSelection)
+        rows.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        rows.setHeaderHidden(len(columns) == 1)
+        header = rows.header()
         header.setStretchLastSection(False)
         header.setMinimumSectionSize(26)
         for column in range(1 + len(columns)):
             header.setSectionResizeMode(column, QHeaderView.ResizeMode.ResizeToContents)
         header.setSectionResizeMode(TITLE, QHeaderView.ResizeMode.Stretch)
-        made.selectionModel().currentChanged.connect(self._current_changed)
-        made.clicked.connect(self._click_row)
-        made.doubleClicked.connect(self._double_click_row)
-        return made
+        rows.selectionModel().currentChanged.connect(self._current_changed)
+        rows.clicked.connect(self._click_row)
+        rows.doubleClicked.connect(self._double_click_row)
+        return rows
 
     def _lay_out(self, folder_tip: str, arrows: str) -> None:
         close = tool_button("✕", "Close the browser", "Close (Escape)")
@@ -441,11 +441,11 @@ class Browser(QFrame):
 
 
 def _button(text: str, tip: str, act: Callable[[], object]) -> QPushButton:
-    made = QPushButton(text)
-    made.setAccessibleName(text.lstrip("▶☆ "))
-    made.setToolTip(tip)
-    made.clicked.connect(lambda: act())
-    return made
+    button = QPushButton(text)
+    button.setAccessibleName(text.lstrip("▶☆ "))
+    button.setToolTip(tip)
+    button.clicked.connect(lambda: act())
+    return button
 
 
 def _refill(box: QComboBox, kinds: Sequence[tuple[object, str]]) -> None:

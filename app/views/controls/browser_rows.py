@@ -76,7 +76,7 @@ def listed_rows(
         row
         for row in rows
         if all(word in row.searched for word in words)
-        and all(wanted in ("", kind) for wanted, (kind, _) in zip(kinds, row.kinds, strict=False))
+        and all(filter_kind in ("", kind) for filter_kind, (kind, _) in zip(kinds, row.kinds, strict=False))
         and (not starred or row.name in favourites)
     ]
     return sorted(hits, key=lambda row: (headings.index(row.heading), row.name not in favourites, row.ranks[order]))

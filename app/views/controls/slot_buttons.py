@@ -141,25 +141,25 @@ class SlotButtons(QWidget):
 
     def _fill(self, menu: QMenu, slot: str) -> None:
         menu.clear()
-        held = QActionGroup(menu)
+        group = QActionGroup(menu)
         for source, title in _SOURCES:
-            self._add(menu, held, title, slot, source, getattr(self._choices, slot) == source)
+            self._add(menu, group, title, slot, source, getattr(self._choices, slot) == source)
         others = menu.addMenu("Another preset's model")
         others.setToolTipsVisible(True)
         for entry in self._entries:
             source = f"preset:{entry.name}"
-            action = self._add(others, held, entry.title, slot, source, getattr(self._choices, slot) == source)
-            reported = f"Its model on the same pluck, at {entry.info.rate_hz / 1000:g} kHz"
-            action.setToolTip(plain_tip(f"{reported}\n{entry.path.name}"))
+            action = self._add(others, group, entry.title, slot, source, getattr(self._choices, slot) == source)
+            tip = f"Its model on the same pluck, at {entry.info.rate_hz / 1000:g} kHz"
+            action.setToolTip(plain_tip(f"{tip}\n{entry.path.name}"))
         menu.addSeparator()
         match = QAction("Match levels to the truth", menu, checkable=True, checked=self._choices.level_match)
         match.toggled.connect(lambda on: self.change_asked.emit("level_match", on))
         menu.addAction(match)
         gains = menu.addMenu("Gain of the difference")
-        stated = QActionGroup(gains)
+        gain_group = QActionGroup(gains)
         for gain in DIFFERENCE_GAINS_DB:
             chosen = abs(self._choices.difference_gain_db - gain) < 0.5
-            self._add(gains, stated, f"+{gain} dB", "difference_gain_db", float(gain), chosen)
+            self._add(gains, gain_group, f"+{gain} dB", "difference_gain_db", float(gain), chosen)
 
     def _add(self, menu: QMenu, group: QActionGroup, title: str, field: str, value: object, chosen: bool) -> QAction:
         action = QAction(title, menu, checkable=True, checked=chosen)

@@ -142,12 +142,12 @@ class AbxDialog(QDialog):
         rendering = self._rendering
         if rendering is not None and rendering.done() and self._rate_hz == self._output.rate_hz:
             try:
-                made = make_stimuli(rendering.result(), self._rate_hz, self._volume_db)
+                stimuli = make_stimuli(rendering.result(), self._rate_hz, self._volume_db)
             except Exception as error:  # a model that ran away, or silence
                 self._silence = str(error)
             else:
-                self._stimuli, self._silence = made, ""
-                self._pair = Pair(self._output.mixer, {str(name): samples for name, samples in made.samples.items()})
+                self._stimuli, self._silence = stimuli, ""
+                self._pair = Pair(self._output.mixer, {str(name): sound for name, sound in stimuli.samples.items()})
         self._show_state()
 
     def _audition(self, sound: Sound, again: bool = False) -> None:

@@ -211,10 +211,10 @@ class ResultPage(QWidget):
 
 
 def _centred(style: str = "") -> QLabel:
-    made = label("" if style else "faint")
-    made.setAlignment(Qt.AlignmentFlag.AlignCenter)
-    made.setStyleSheet(style)
-    return made
+    text_label = label("" if style else "faint")
+    text_label.setAlignment(Qt.AlignmentFlag.AlignCenter)
+    text_label.setStyleSheet(style)
+    return text_label
 
 
 def _stack(page: QWidget, *parts: QWidget | QLayout | None) -> None:

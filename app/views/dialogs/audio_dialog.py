@@ -99,16 +99,16 @@ class AudioDialog(QDialog):
     def show_devices(self, devices: Sequence[DeviceChoice], chosen: DeviceChoice | None) -> None:
         """The connected outputs; the chosen one is listed even where it is not connected."""
         keys = [(device.name, device.host_api) for device in devices]
-        wanted = (chosen.name, chosen.host_api) if chosen else None
+        selected = (chosen.name, chosen.host_api) if chosen else None
         with QSignalBlocker(self._device):
             self._device.clear()
             self._device.addItem("System default", None)
             for key in keys:
                 self._device.addItem(f"{key[0]}   ({key[1]})", key)
-            if wanted and wanted not in keys:
-                self._device.addItem(f"{wanted[0]}   ({wanted[1]}), not connected", wanted)
+            if selected and selected not in keys:
+                self._device.addItem(f"{selected[0]}   ({selected[1]}), not connected", selected)
             rows = [self._device.itemData(row) for row in range(self._device.count())]
-            self._device.setCurrentIndex(next((row for row, key in enumerate(rows) if key == wanted), 0))
+            self._device.setCurrentIndex(next((row for row, key in enumerate(rows) if key == selected), 0))
 
     def show_sound(self, sound: SoundChoice) -> None:
         self._rate.setCurrentIndex(self._rate.findData(sound.rate_hz))

@@ -115,8 +115,8 @@ class LearnDialog(GrowingDialog):
         }
         for name, part in rows.items():
             form.addRow(form_label(name), part)
-        asked = label(text="String or body?")
-        column = filled(QVBoxLayout(question), asked, self.string, form, self.body, None)
+        heading = label(text="String or body?")
+        column = filled(QVBoxLayout(question), heading, self.string, form, self.body, None)
         column.setContentsMargins(0, 0, 0, 0)
         result, sounds = QWidget(), QHBoxLayout()
         for button in self.heard.values():

@@ -51,7 +51,7 @@ class MidiDialog(QDialog):
     forget_asked = Signal(str)
     patch_turned = Signal(str, object)  # a field of the patch, and its value
 
-    def __init__(self, turned: Mapping[str, str], wheel: Mapping[str, str], parent: QWidget | None = None) -> None:
+    def __init__(self, names: Mapping[str, str], wheel: Mapping[str, str], parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setWindowTitle("MIDI")
         self.setMinimumWidth(460)
@@ -75,7 +75,7 @@ class MidiDialog(QDialog):
             box.setToolTip(f"{tip}.\n{OF_THE_PATCH}")
             box.activated.connect(lambda row, box=box, field=field: self.patch_turned.emit(field, box.itemData(row)))
         self._problem = label("warning", selectable=True)
-        self._turned = turned
+        self._turned = names
         self._rows: dict[str, tuple[QLabel, QPushButton, QPushButton]] = {}
         form = QFormLayout()
         for name, box in (
@@ -96,25 +96,25 @@ class MidiDialog(QDialog):
         column.addWidget(self._problem)
         column.addWidget(faint("CONTROLLERS"))
         rows = QWidget()
-        rows.setLayout(self._build_rows(turned))
+        rows.setLayout(self._build_rows(names))
         column.addWidget(scrolled(rows), stretch=1)
         close = push_button("Close", "Close the dialog; MIDI plays on (Escape)")
         close.clicked.connect(self.reject)
         column.addWidget(close, alignment=Qt.AlignmentFlag.AlignRight)
         self.set_learnable("")
 
-    def _build_rows(self, turned: Mapping[str, str]) -> QGridLayout:
+    def _build_rows(self, names: Mapping[str, str]) -> QGridLayout:
         grid = QGridLayout()
         grid.setColumnStretch(1, 1)
         grid.setVerticalSpacing(6)
-        for row, (field, name) in enumerate(turned.items()):
+        for row, (field, name) in enumerate(names.items()):
             taught = Label()
             learn, forget = push_button("Learn"), push_button("Forget", f"Unassign {name}")
             learn.setCheckable(True)
             learn.setAccessibleName(f"Assign a controller to {name}")
             forget.setAccessibleName(f"Unassign {name}")
-            for button, asked in ((learn, self.learn_asked), (forget, self.forget_asked)):
-                button.clicked.connect(lambda _=False, asked=asked, field=field: asked.emit(field))
+            for button, signal in ((learn, self.learn_asked), (forget, self.forget_asked)):
+                button.clicked.connect(lambda _=False, signal=signal, field=field: signal.emit(field))
             for place, widget in enumerate((Label(name[:1].upper() + name[1:]), taught, learn, forget)):
                 grid.addWidget(widget, row, place)
             self._rows[field] = taught, learn, forget

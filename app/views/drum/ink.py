@@ -40,9 +40,9 @@ class HeadFrame:
 
 def fitting_scale_m(largest_m: float, air: float = 1.0) -> float:
     """The least of the round numbers that is at least `air` times a displacement."""
-    wanted = max(largest_m * air, LEAST_M)
-    decade = 10.0 ** math.floor(math.log10(wanted))
-    return next((step * decade for step in STEPS if step * decade >= wanted * (1 - 1e-9)), 10 * decade)
+    least_m = max(largest_m * air, LEAST_M)
+    decade = 10.0 ** math.floor(math.log10(least_m))
+    return next((step * decade for step in STEPS if step * decade >= least_m * (1 - 1e-9)), 10 * decade)
 
 
 def kept_scale_m(largest_m: float, before_m: float) -> float:

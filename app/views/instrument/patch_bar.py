@@ -95,11 +95,11 @@ class PatchBar(QFrame):
         self._before_macros = vertical_rule()
         self._before_macros.hide()
         row.addWidget(self._before_macros)
-        turned = QHBoxLayout()
-        turned.setSpacing(0)
+        knob_row = QHBoxLayout()
+        knob_row.setSpacing(0)
         for knob in self.macros:
-            turned.addWidget(knob)
-        row.addLayout(turned)
+            knob_row.addWidget(knob)
+        row.addLayout(knob_row)
         row.addWidget(vertical_rule())
         row.addLayout(self._build_sound())
 
@@ -266,8 +266,8 @@ class PatchBar(QFrame):
         mark = "●  " if changed else ""
         self.name.setText(f"{mark}{patch.name}   ▾".replace("&", "&&"))
         self.name.setAccessibleName(f"Instrument: {patch.name}{', changed' if changed else ''}")
-        reported = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
-        self.name.setToolTip(plain_tip(f"{reported}\nClick to browse the instruments"))
+        tip = f"{patch.name}{' (changed)' if changed else ''}\n{patch.description}".strip()
+        self.name.setToolTip(plain_tip(f"{tip}\nClick to browse the instruments"))
         self.category.setText(patch.category)
         self.save.setEnabled(changed)
         self.revert.setEnabled(changed)

@@ -144,9 +144,9 @@ class TimePlot(KeptPlot):
         if event.buttons() & Qt.MouseButton.LeftButton:
             self._follow(event)
         elif event.buttons() & _PAN_BUTTONS and self._pan_from is not None:
-            here = event.position()
-            moved = self._point_at(QPointF(self._pan_from, here.y())).x() - self._point_at(here).x()
-            self._pan_from = here.x()
+            at = event.position()
+            moved = self._point_at(QPointF(self._pan_from, at.y())).x() - self._point_at(at).x()
+            self._pan_from = at.x()
             self.pan(moved)
         if self._plot_rect_has(event.position()):
             point = self._point_at(event.position())
