@@ -34,9 +34,9 @@ class Blows:
     @property
     def settled(self) -> bool:
         """Return True if motion and signals are complete, so that views need not look for more."""
-        asked, take = self._asked, self.shown.take
-        return asked is None or (
-            take is not None and take.complete and take.request.same_motion(asked[0]) and take.listened.complete
+        latest, take = self._asked, self.shown.take
+        return latest is None or (
+            take is not None and take.complete and take.request.same_motion(latest[0]) and take.listened.complete
         )
 
     def follow(self, note: KeyNote) -> None:

@@ -68,8 +68,8 @@ class BrowserDesk(QObject):
         """
         names, chosen = self.browser.listed, self._chosen()
         if names:
-            here = names.index(chosen) if chosen in names else -1
-            self._choose(names[(here + step) % len(names) if here >= 0 else (0 if step > 0 else -1)])
+            index = names.index(chosen) if chosen in names else -1
+            self._choose(names[(index + step) % len(names) if index >= 0 else (0 if step > 0 else -1)])
 
     def toggle_favourite(self, name: str) -> None:
         self.favourites ^= {name}

@@ -244,8 +244,10 @@ class Instruments(QObject):
         key = self.drum_key
         if key is not None:
             place = None if x is None or y is None else (x, y)
-            struck = self._session.choices.velocity if velocity is None else round(min(max(velocity, 1.0), 127.0))
-            self.play(NoteOn(key, struck, KEYS, place))
+            strike_velocity = (
+                self._session.choices.velocity if velocity is None else round(min(max(velocity, 1.0), 127.0))
+            )
+            self.play(NoteOn(key, strike_velocity, KEYS, place))
             self.play(NoteOff(key, KEYS))
 
     def _play_note(self, event: NoteOn, mode: str) -> None:
@@ -289,10 +291,10 @@ class Instruments(QObject):
             self._look_timer.start()
             self._look_at_key()
         with self._lock:
-            reported = self._reported
+            changes = self._reported
             self._reported = {}
-        if reported:
-            self._session.play(**reported)
+        if changes:
+            self._session.play(**changes)
             self.played.emit()
 
     def _press(self, press: KeyPress) -> None:
@@ -312,8 +314,8 @@ class Instruments(QObject):
             if 0 <= key <= HIGHEST_KEY:
                 self._down[press] = key
                 self.play(NoteOn(key, choices.velocity, KEYS))
-        elif (turned := turn(press, choices.octave, choices.velocity)) is not None:
-            self._session.update(octave=turned[0], velocity=turned[1])
+        elif (step := turn(press, choices.octave, choices.velocity)) is not None:
+            self._session.update(octave=step[0], velocity=step[1])
 
     def _release(self, press: KeyPress) -> None:
         key = self._down.pop(press, None)

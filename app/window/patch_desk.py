@@ -249,8 +249,8 @@ class PatchDesk(QObject):
         """Ask for a name and do what it is for; again, with the reason, where the name is impossible."""
         reason = ""
         while True:
-            name, wanted = QInputDialog.getText(self._panel, title, f"{reason}{question}", text=name)
-            if not wanted:
+            name, typed_name = QInputDialog.getText(self._panel, title, f"{reason}{question}", text=name)
+            if not typed_name:
                 return
             try:
                 do(name)
@@ -422,24 +422,24 @@ class PatchDesk(QObject):
         """The lowest and the highest octave at which one of the computer's keys sounds."""
         return (LOWEST_OCTAVE, HIGHEST_OCTAVE) if self.patch is None else octaves_of(*self.patch.range)
 
-    def _keep_octave_in_range(self, asked: bool) -> None:
+    def _keep_octave_in_range(self, by_user: bool) -> None:
         """Move the octave of the computer's keys to where one sounds, or most do with another range; say why.
 
-        `asked`: the octave was to change; otherwise another patch made it change.
+        `by_user`: the octave was to change; otherwise another patch made it change.
         """
         patch = self.patch
         octave = self._session.choices.octave
         lowest, highest = self._octaves
         within = min(max(octave, lowest), highest)
         before, self._sounding = self._sounding, frozenset() if patch is None else _keys_of(patch)
-        if self._sounding and not asked and self._sounding != before:
+        if self._sounding and not by_user and self._sounding != before:
             within = octave_near(octave, self._sounding)
         if patch is None or within == octave:
             return
         end = "Lowest octave" if octave < lowest else "Highest octave"
         low, high = map(note_name, patch.range)
         self._session.update(octave=within)
-        self._panel.bar.say_octave(f"{end if asked else 'Octave moved'}: {patch.name} has {low} to {high}")
+        self._panel.bar.say_octave(f"{end if by_user else 'Octave moved'}: {patch.name} has {low} to {high}")
 
     def _show_source(self) -> None:
         """Light keys in the colour of their source.
@@ -483,8 +483,8 @@ class PatchDesk(QObject):
         if self.patch is not None:
             self._show_string(self.patch)
         latest, patch = self._instruments.latest, self.patch
-        turned = isinstance(latest, KeyNote) and patch is not None and latest.patch != patch
-        self._say("; ".join(self._outside()), of_shown=not turned)
+        is_outdated = isinstance(latest, KeyNote) and patch is not None and latest.patch != patch
+        self._say("; ".join(self._outside()), of_shown=not is_outdated)
 
     def _say(self, outside: str, of_shown: bool = True) -> None:
         """Report what is outside the training; in the bar, how pitches are had where there is no patch."""

@@ -196,27 +196,27 @@ class Performance(QObject):
             self.notes.set_instrument(choices.instrument, choices.ear, choices.kept)
         elif names & Listener.model_fields.keys():
             self.notes.listen(choices.ear)
-        asked = None if self._plays_drums else request_of(choices, self._library)
+        request = None if self._plays_drums else request_of(choices, self._library)
         if self._plays_drums:
             self._blows.listen()
         elif names & {"instrument", "patch"}:
             self._blows.forget()
-        if names & PLACED and not (choices.plays_patch or entry is None or asked is None):
-            plucks = [replace(asked.pluck, position=place) for place in PluckRange.of(entry.info).row]
-            self.notes.prepare_plucks(asked.preset, plucks)
+        if names & PLACED and not (choices.plays_patch or entry is None or request is None):
+            plucks = [replace(request.pluck, position=place) for place in PluckRange.of(entry.info).row]
+            self.notes.prepare_plucks(request.preset, plucks)
         if "loop" in names and not choices.loop:
             self._forget_turn()
-        if asked != self._asked:  # else an event may have chosen another pluck, which the session takes later
-            self._asked = asked
-            self.notes.choose(asked)
-            if asked is None:
+        if request != self._asked:  # else an event may have chosen another pluck, which the session takes later
+            self._asked = request
+            self.notes.choose(request)
+            if request is None:
                 self._forget_turn()
                 self._shown = Playhead()
                 self._show_error("")
                 self._window.show_growth("")
             else:
-                self.notes.prepare(asked.preset, *asked.others)
-                self._worker.submit(asked)
+                self.notes.prepare(request.preset, *request.others)
+                self._worker.submit(request)
         self.follow()
 
     def play_preset(self, name: str) -> None:
@@ -345,20 +345,20 @@ class Performance(QObject):
 
     def _is_chosen(self, note: Note | KeyNote) -> bool:
         """Return True if a note is of the chosen pluck."""
-        asked, request = self._asked, note.request
+        chosen, request = self._asked, note.request
         return (
-            asked is not None
+            chosen is not None
             and request is not None
-            and (request.preset, request.pluck) == (asked.preset, asked.pluck)
+            and (request.preset, request.pluck) == (chosen.preset, chosen.pluck)
         )
 
     def _is_of_chosen(self, take: Take) -> bool:
         """Return True if a take is of the chosen pluck."""
-        asked, entry = self._asked, self.entry
-        if asked is None or entry is None:
+        request, entry = self._asked, self.entry
+        if request is None or entry is None:
             return False
-        string = string_of(asked.preset) or entry.info.string
-        chosen = entry.name, string, asked.pluck, asked.seconds
+        string = string_of(request.preset) or entry.info.string
+        chosen = entry.name, string, request.pluck, request.seconds
         return (take.preset_name, take.info.string, take.pluck, take.seconds) == chosen
 
 

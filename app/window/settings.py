@@ -71,8 +71,8 @@ def load_settings(path: Path) -> tuple[Settings, str]:
     except FileNotFoundError:
         return Settings(), ""
     except OSError as error:
-        reported = error.strerror or error
-        return Settings(), one_line(f"The settings {path} cannot be read ({reported}); starting with defaults.")
+        reason = error.strerror or error
+        return Settings(), one_line(f"The settings {path} cannot be read ({reason}); starting with defaults.")
     try:
         return _parse(text), ""
     except (ValueError, OverflowError) as error:  # the latter of integers where numbers belong
@@ -83,11 +83,11 @@ def load_settings(path: Path) -> tuple[Settings, str]:
             aside = path
         kept = _usable_settings(text) if isinstance(error, ValidationError) else None
         why = explained(error) if isinstance(error, ValueError) else str(error)
-        reported = (
+        reason = (
             f"{'Some' if kept else 'The'} settings were not usable ({why}) and have their defaults "
             f"again; the file was set aside as {aside}."
         )
-        return kept or Settings(), one_line(reported)
+        return kept or Settings(), one_line(reason)
 
 
 def _read_bytes(path: Path) -> bytes:

@@ -176,15 +176,15 @@ class SpectrumPanel(Panel):
             return
         self._standing = standing
         signals = [HeardSignal(take.listened, s.source, s.gain) for s in shown_sources(choices, self.library)]
-        there = [signal for signal in signals if signal.there]
-        ready = tuple(-1 if signal.ready == signal.frames else signal.ready for signal in there)
+        rendered = [signal for signal in signals if signal.there]
+        ready = tuple(-1 if signal.ready == signal.frames else signal.ready for signal in rendered)
         shown = (take.listened, ready, moment.position_s)
         if shown == self._shown:
             return
         self._shown = shown
-        self.set_rate(max((signal.rate_hz for signal in there), default=take.rate_hz))
+        self.set_rate(max((signal.rate_hz for signal in rendered), default=take.rate_hz))
         for signal in signals:
-            if signal in there:
+            if signal in rendered:
                 self._draw(signal, moment.position_s, take.full_scale)
             else:
                 self._clear(signal.source)

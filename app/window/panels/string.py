@@ -107,10 +107,10 @@ class StringPanel(StagePanel):
             self._shown = ()
             return
         motions = [HeardMotion(take, s.source, s.gain) for s in self._sources]
-        there = [motion for motion in motions if motion.there]
+        rendered = [motion for motion in motions if motion.there]
         # the sound may be ahead of the motions, and one motion ahead of another: all are shown at one time
-        position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in there)])
-        strobes = [motion.strobes(position_s) for motion in there]
+        position_s = min([position_s, *((motion.ready - 1) / motion.rate_hz for motion in rendered)])
+        strobes = [motion.strobes(position_s) for motion in rendered]
         shown = (take, position_s, strobes, choices.speed, choices.envelope, choices.solo)
         if not moment.playing and shown == self._shown:
             return
@@ -168,8 +168,8 @@ class StringPanel(StagePanel):
             self.session.update(width=min(max(width, WIDTH_RANGE[0]), WIDTH_RANGE[1]))
 
     def _step_shape(self, steps: int) -> None:
-        here = SHAPES.index(self.session.choices.shape)
-        self.session.update(shape=SHAPES[(here + steps) % len(SHAPES)])
+        index = SHAPES.index(self.session.choices.shape)
+        self.session.update(shape=SHAPES[(index + steps) % len(SHAPES)])
 
 
 def _label(choices: Choices) -> str:

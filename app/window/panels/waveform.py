@@ -178,12 +178,12 @@ class WaveformPanel(Panel):
         if (high_s - low_s) * rate_hz > columns:
             borders_s = np.linspace(low_s, high_s, columns + 1)
             edges = np.ceil(borders_s * rate_hz).astype(np.int64).clip(0, len(signal))
-            there = np.flatnonzero(edges[1:] > edges[:-1])
-            middles_s = (borders_s[there] + borders_s[there + 1]) / 2
+            joints = np.flatnonzero(edges[1:] > edges[:-1])
+            middles_s = (borders_s[joints] + borders_s[joints + 1]) / 2
             # Where a period is a few pixels wide, each stroke has the extremes of a whole one, or they would beat.
             pixels = self._period_s * columns / (high_s - low_s)
             around = math.ceil(pixels) if 0 < pixels < FEW_PIXELS else 1
-            values = extremes(signal, edges[there[0] : there[-1] + 2], around) if len(there) else signal[:0]
+            values = extremes(signal, edges[joints[0] : joints[-1] + 2], around) if len(joints) else signal[:0]
             self._curves[source].setData(np.repeat(middles_s, 2), values, connect="pairs", antialias=False)
         else:
             first = min(max(int(low_s * rate_hz), 0), len(signal))
