@@ -51,10 +51,10 @@ def install_preset(file: Path, folder: Path, present: Iterable[Path]) -> Install
     for path in present:
         if _has_digest(path, digest):
             return Installed(name_text(path.stem), path, was_there=True)
-    taken = {path.stem for path in present}
+    stems = {path.stem for path in present}
     stem = name_text(file.stem)
     names = (stem if number == 1 else f"{stem}_{number}" for number in count(1))
-    target = next(path for name in names if name not in taken and not (path := folder / f"{name}{SUFFIX}").exists())
+    target = next(path for name in names if name not in stems and not (path := folder / f"{name}{SUFFIX}").exists())
     try:
         folder.mkdir(parents=True, exist_ok=True)
         data = read_bounded(file, LARGEST_PRESET_BYTES)

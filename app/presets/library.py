@@ -92,8 +92,8 @@ class Library:
 
     def first(self) -> PresetEntry | None:
         """The preset of the first start: `FIRST`, else the one of the least error among those of the highest rate."""
-        if (chosen := self.find(FIRST)) is not None:
-            return chosen
+        if (entry := self.find(FIRST)) is not None:
+            return entry
         highest_hz = max((entry.info.rate_hz for entry in self.entries), default=0)
         fullest = [entry for entry in self.entries if entry.info.rate_hz == highest_hz]
         return min(fullest, key=lambda e: 1.0 if e.info.rel_mae is None else e.info.rel_mae, default=None)
@@ -120,7 +120,7 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
     entries: dict[str, PresetEntry] = {}
     folders = folders or (SHIPPED, user_folder())
     tables = [read_heard(folder) for folder in folders]
-    records = {digest: by_digest for known, _ in tables for digest, by_digest in known.items()}
+    records = {digest: by_digest for table, _ in tables for digest, by_digest in table.items()}
     problems = [problem for _, table_problems in tables for problem in table_problems]
     for folder in folders:
         problems += [problem] if (problem := unreadable(folder)) else []
@@ -151,8 +151,8 @@ def list_presets(*folders: Path) -> tuple[list[PresetEntry], list[str]]:
 def _read_entry(path: Path, changed_ns: int, size_bytes: int) -> PresetEntry:
     """Read an entry, cached by time and size of the file: the browser lists all presets whenever it opens."""
     info = read_info(path)
-    listed = replace(info, title=display_title(name_text(path.stem), info))
-    return PresetEntry(name_text(path.stem), path, listed, size_bytes)
+    titled_info = replace(info, title=display_title(name_text(path.stem), info))
+    return PresetEntry(name_text(path.stem), path, titled_info, size_bytes)
 
 
 def display_title(name: str, info: PresetInfo) -> str:
@@ -167,5 +167,5 @@ def display_title(name: str, info: PresetInfo) -> str:
     if cell is None:
         return info.title
     named = cell.model, cell.tension_modulated, cell.initial, cell.rate_hz, cell.horizon
-    stored = info.model, info.tension_modulated, info.initial, info.rate_hz, info.horizon_steps
-    return cell.title if named == stored else info.title
+    key_facts = info.model, info.tension_modulated, info.initial, info.rate_hz, info.horizon_steps
+    return cell.title if named == key_facts else info.title

@@ -211,10 +211,10 @@ class BlowTake:
         if ready == 0:
             return None
         flash = min(int(position_s * FLASH_HZ), ready - 1)
-        shown = parts[-1]
-        begins, angle = shown.angle[0], shown.angle[flash]
+        motion = parts[-1]
+        begins, angle = motion.angle[0], motion.angle[flash]
         slowed = begins + min(speed, 1.0) * (angle - begins)
-        modal_m = shown.size_m[flash] * np.cos(slowed)
+        modal_m = motion.size_m[flash] * np.cos(slowed)
         if source == "difference":
             model = parts[0]
             modal_m = model.size_m[flash] * np.cos(slowed + model.angle[flash] - angle) - modal_m

@@ -118,11 +118,11 @@ class _Mover:
 
         Modes that the frames leave out rest from now on.
         """
-        shown, between = motion.size_m.shape[1], RATE_HZ // FLASH_HZ
-        first, moving = self._done, min(block.shape[1], shown)
+        modes, between = motion.size_m.shape[1], RATE_HZ // FLASH_HZ
+        first, moving = self._done, min(block.shape[1], modes)
         turn = omega[:moving] / RATE_HZ
         if first == 0:
-            most = max(1.0, math.tau / TURNS * RATE_HZ / float(omega[shown - 1]))
+            most = max(1.0, math.tau / TURNS * RATE_HZ / float(omega[modes - 1]))
             self._step = max(step for step in range(1, between + 1) if between % step == 0 and step <= most)
             self._last, block = np.stack([-block[1, :moving], block[0, :moving]]), block[1:]  # odd about the blow
         q = np.concatenate([self._last[:, :moving], block[:, :moving]])

@@ -122,10 +122,10 @@ class Line:
             if self._listening.signal.complete:
                 self._listening = None
 
-    def _catch_up(self, shown: _Frames, flashes: Flashes, most: int) -> None:
-        stop = min(shown.done + most, self.done)
-        numbers = flashes.needed(shown.done, stop)
-        flashes.take(stop, numbers, shown.take(numbers, stop))
+    def _catch_up(self, frames: _Frames, flashes: Flashes, most: int) -> None:
+        stop = min(frames.done + most, self.done)
+        numbers = flashes.needed(frames.done, stop)
+        flashes.take(stop, numbers, frames.take(numbers, stop))
         if stop == self.done:
             self._shown, self.motion.flashes = None, flashes
 

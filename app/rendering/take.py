@@ -92,11 +92,11 @@ class Motion(Series):
 
     def shape_m(self, position_s: float) -> NDArray[np.float32]:
         """The string (places,) that the strobe shows; the nearest picture where its flash is not ready."""
-        shown = self._flash_m(position_s)
-        if shown is None:
+        frame_m = self._flash_m(position_s)
+        if frame_m is None:
             nearest = min(max(round(position_s * self.rate_hz), 0), self.ready_frames - 1)
-            shown = self.read(nearest, nearest + 1)[0]
-        return shown
+            frame_m = self.read(nearest, nearest + 1)[0]
+        return frame_m
 
     def strobe_at(self, position_s: float) -> Strobe | None:
         """The strobe whose flash `shape_m` returns; None where that is a picture."""
