@@ -25,16 +25,16 @@ def presets(json: Json = False) -> None:
     from training.heard_file import read_heard
 
     files = usable_files()
-    known: dict[str, Heard] = {}
+    records_by_digest: dict[str, Heard] = {}
     for folder in dict.fromkeys(path.parent for path in files):
         records, problems = read_heard(folder)
-        known |= records
+        records_by_digest |= records
         for problem in problems:
             say(problem)
     rows = []
     for path in files:
         try:
-            rows.append(_facts(path, known))
+            rows.append(_facts(path, records_by_digest))
         except PresetError as error:
             say(str(error))
         except Exception as error:  # no fault of one file may keep the others from being listed
@@ -103,7 +103,7 @@ def _show(rows: list[dict[str, Any]], json: bool, but: Container[str] = ()) -> N
         print_table(columns, [[facts[name] for name in columns] for facts in rows])
 
 
-def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
+def _facts(path: Path, records_by_digest: dict[str, Heard]) -> dict[str, Any]:
     from engine.presets import described_parameters, preset_digest, read_info
     from training.heard_words import heard_word
 
@@ -120,6 +120,6 @@ def _facts(path: Path, known: dict[str, Heard]) -> dict[str, Any]:
         "rel_mae": info.rel_mae,
         "test_rel_mse": info.test_rel_mse,
         "test_rel_mae": info.test_rel_mae,
-        "heard": heard_word(known.get(preset_digest(path))),
+        "heard": heard_word(records_by_digest.get(preset_digest(path))),
         "file": str(path),
     }

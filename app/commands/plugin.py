@@ -57,21 +57,21 @@ def plugin(
         raise typer.BadParameter("leave out --out and --for: --install puts the plug-in of this system in its place")
     try:
         if instruments == [ALL]:
-            chosen = [entry.patch for entry in list_patches(SHIPPED)[0]]
+            patches = [entry.patch for entry in list_patches(SHIPPED)[0]]
         else:
-            chosen = [find_patch(name).patch for name in instruments]
+            patches = [find_patch(name).patch for name in instruments]
         images = []
-        for patch in chosen:
+        for patch in patches:
             images.append(image_of(patch, open_preset(patch.preset)))
             if images[-1].left_out:
                 say(f"note: {patch.name}: macros do not move {', '.join(images[-1].left_out)} in the plug-in")
         if dry_run:
             _print_sizes(images)
             return
-        kept = cache.folder() or Path(tempfile.gettempdir())
+        cache_folder = cache.folder() or Path(tempfile.gettempdir())
         targets = tuple(TARGETS) if target == ALL else (this_target() if target == "this" else target,)
         ids = {image.id for image in images}
-        name = BANK if instruments == [ALL] else _bank_name([patch.name for patch in chosen])
+        name = BANK if instruments == [ALL] else _bank_name([patch.name for patch in patches])
         outputs = list[tuple[str, str, Path]]()
         for system in targets:
             for kind in FORMATS if form == ALL else (form,):
@@ -84,7 +84,7 @@ def plugin(
                 check_kept(path, ids)
         for kind, system, path in outputs:
             began_s, replaces = time.monotonic(), path.exists()
-            build_plugin(images, kind, system, path, kept, _Steps(), replace=replace)
+            build_plugin(images, kind, system, path, cache_folder, _Steps(), replace=replace)
             done = f"{_size(path) / 1e6:.1f} MB, {time.monotonic() - began_s:.1f} s"
             print(f"{one_line(str(path))}: {done}{', replaces the one before' if replaces else ''}")
     except (ValueError, OSError) as error:

@@ -64,15 +64,15 @@ def sampled(
         raise typer.BadParameter(
             "--format and --bits are of an SFZ's samples; a SoundFont holds 16 bits", param_hint="OUT.sf2"
         )
-    chosen = find_patch(instrument).patch
+    patch = find_patch(instrument).patch
     if dry:
-        chosen = chosen.with_value("room.mix", 0.0)
-    if problem := body_problem(chosen):
+        patch = patch.with_value("room.mix", 0.0)
+    if problem := body_problem(patch):
         say(problem)
-    preset_path = find_preset(chosen.preset, usable_files())
+    preset_path = find_preset(patch.preset, usable_files())
     try:
         plan = SampledPlan(
-            chosen,
+            patch,
             _keys(keys),
             every,
             layers,
