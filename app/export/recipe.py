@@ -189,8 +189,8 @@ def read_origin(path: Path) -> Recipe | InstrumentSound:
         )
     try:
         data = parse_json(text, "the text")
-        played = isinstance(data, dict) and "kind" in data
-        return InstrumentSound.model_validate(data) if played else Recipe.model_validate(data)
+        on_instrument = isinstance(data, dict) and "kind" in data
+        return InstrumentSound.model_validate(data) if on_instrument else Recipe.model_validate(data)
     except ValueError as error:
         raise _unusable_error(path, explained(error)) from error
     except OverflowError as error:  # raised for numbers that are too long

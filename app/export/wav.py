@@ -105,9 +105,9 @@ def write_wav(
             setattr(out, name, text)
         for first, block in blocks(sound):
             faded = _fade_block(block, first, len(sound), fade_frames)
-            stored, cut = quantised(faded * gain, settings.bits, first, len(sound))
+            numbers, cut = quantised(faded * gain, settings.bits, first, len(sound))
             with suppress(soundfile.SoundFileError, AssertionError):  # of a full disk, whose OSError `check` raises
-                out.write(stored)
+                out.write(numbers)
             noting.check()
             clipped += cut
     noting.check()

@@ -205,11 +205,11 @@ def _link(
 def _lv2_descriptions(images: Sequence[Image], binary: str) -> dict[str, str]:
     """The descriptions of an LV2 bundle, by file name."""
     prefixes = "".join(f"@prefix {name}: <{uri}> .\n" for name, uri in _PREFIXES.items())
-    listed, described = [prefixes], [prefixes]
+    manifest, instruments = [prefixes], [prefixes]
     minor, micro = _lv2_version(program_version())
     for image in images:
         head = f"<urn:{image.id}> a lv2:Plugin, lv2:InstrumentPlugin, doap:Project ;"
-        listed.append(f"{head}\n  lv2:binary <{quote(binary)}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
+        manifest.append(f"{head}\n  lv2:binary <{quote(binary)}> ;\n  rdfs:seeAlso <instruments.ttl> .\n")
         ports = [
             "a lv2:InputPort, atom:AtomPort ; atom:bufferType atom:Sequence ; atom:supports midi:MidiEvent ;\n"
             '    lv2:designation lv2:control ; lv2:index 0 ; lv2:symbol "events" ; lv2:name "Events"',
@@ -232,7 +232,7 @@ def _lv2_descriptions(images: Sequence[Image], binary: str) -> dict[str, str]:
                 f"    lv2:minimum {control.low:.9f} ; lv2:maximum {control.high:.9f} ; "
                 f"lv2:default {control.standard:.9f}"
             )
-        described.append(
+        instruments.append(
             f'{head}\n  doap:name "{_escape_quotes(image.name)}" ;\n  doap:maintainer [ foaf:name "{MAKER}" ] ;\n'
             "  doap:license <https://opensource.org/license/mit> ;\n"
             f"  lv2:minorVersion {minor} ; lv2:microVersion {micro} ;\n"
@@ -241,7 +241,7 @@ def _lv2_descriptions(images: Sequence[Image], binary: str) -> dict[str, str]:
             + " ,\n  ".join(f"[\n    {port} ;\n  ]" for port in ports)
             + " .\n"
         )
-    return {"manifest.ttl": "\n".join(listed), "instruments.ttl": "\n".join(described)}
+    return {"manifest.ttl": "\n".join(manifest), "instruments.ttl": "\n".join(instruments)}
 
 
 def _lv2_version(version: str) -> tuple[int, int]:

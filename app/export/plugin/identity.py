@@ -57,12 +57,12 @@ def lost_with(path: Path, ids: Collection[str]) -> frozenset[str]:
     if not path.exists():
         return frozenset()
     try:
-        held = held_in(path)
+        identifiers = held_in(path)
     except OSError as error:
         raise PluginError(f"{path}: cannot be read ({error.strerror}); remove it, or choose another name") from error
-    if not held:
+    if not identifiers:
         raise PluginError(f"{path}: is no plug-in of this program; remove it, or choose another name")
-    return held.difference(ids)
+    return identifiers.difference(ids)
 
 
 def check_kept(path: Path, ids: Collection[str]) -> None:

@@ -162,9 +162,9 @@ def run_waiting(
 
 
 def _environment() -> dict[str, str]:
-    kept = {name: value for name, value in python_environment().items() if not name.startswith("NUMBA_")}
+    environment = {name: value for name, value in python_environment().items() if not name.startswith("NUMBA_")}
     processor = {"NUMBA_OPT": "0", "NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
-    return {**kept, **processor, "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
+    return {**environment, **processor, "NUMBA_DISABLE_ERROR_MESSAGE_HIGHLIGHTING": "1"}
 
 
 def _compiled(text: str, target: Target, number: int) -> bytes:

@@ -87,6 +87,6 @@ def sample_of(rendered: NDArray[np.floating], rate_hz: int) -> Sample:
 def encoded(sample: Sample, rate_hz: int, form: SampleFormat, bits: SampleBits) -> bytes:
     """The whole file; the same samples make the same bytes."""
     buffer = io.BytesIO()
-    stored, _ = quantised(sample.sound, bits)
-    soundfile.write(buffer, stored, rate_hz, _SUBTYPES[bits], format=form.upper())
+    numbers, _ = quantised(sample.sound, bits)
+    soundfile.write(buffer, numbers, rate_hz, _SUBTYPES[bits], format=form.upper())
     return buffer.getvalue()
