@@ -207,11 +207,11 @@ def _join_words(words: Sequence[str]) -> str:
 
 def _count_silent(patch: Patch, keys: Sequence[int]) -> int:
     """The number of these keys for which a patch has no string."""
-    strings, known = Strings(patch), dict.fromkeys(keys, False)
-    for key in known:
+    strings, is_silent = Strings(patch), dict.fromkeys(keys, False)
+    for key in is_silent:
         with contextlib.suppress(ValueError):  # an impossible string is reported when it is struck
-            known[key] = strings.of_key(key) is None
-    return sum(known[key] for key in keys)
+            is_silent[key] = strings.of_key(key) is None
+    return sum(is_silent[key] for key in keys)
 
 
 def _on_channel_of_keys(event: Event) -> Event:
@@ -260,9 +260,9 @@ def _with_ranges(timed: Sequence[TimedEvent], patch: Patch) -> list[TimedEvent]:
         if isinstance(event, PatchTurned):
             if is_another(event.patch, patch):
                 with_own_range.clear()
-            moved = (event.patch.bend_semitones, event.patch.mode) != (patch.bend_semitones, patch.mode)
+            range_changed = (event.patch.bend_semitones, event.patch.mode) != (patch.bend_semitones, patch.mode)
             patch = event.patch
-            set_ranges(time_s, [channel for channel in channels if moved and channel not in with_own_range])
+            set_ranges(time_s, [channel for channel in channels if range_changed and channel not in with_own_range])
         elif isinstance(event, Controller) and event.number in SETS_PARAMETER:
             with_own_range.add(event.channel)
         elif isinstance(event, Controller) and (event.number, event.value) == (RESET, AT_REST):

@@ -157,8 +157,8 @@ class _Reader:
 
         Returns the place at which the next chunk is to be looked for.
         """
-        raw, known = self._raw, end == len(self._raw) or self._begins_chunk(end)
-        limit = end if known else len(raw)
+        raw, length_is_right = self._raw, end == len(self._raw) or self._begins_chunk(end)
+        limit = end if length_is_right else len(raw)
         tick = running = 0
         up_to_end = None  # messages that lie within the length that the track says it has
         try:
@@ -173,7 +173,7 @@ class _Reader:
                 running, place, ended = self._read_message(tick, running, place, limit)
                 if ended:
                     after = raw[place : place + 4] == b"MTrk"
-                    return end if known and not after else place
+                    return end if length_is_right and not after else place
         except _CutOff as error:
             if up_to_end is None:
                 raise NotMidi(str(error)) from error

@@ -123,7 +123,7 @@ def render_events(
     channels = channels_played(patch, timed)
     skipped = AHEAD if limited else 0  # the delay of the limiter
     done, events = 0, sorted(timed, key=lambda timed_event: timed_event.time_s)
-    played = max((place for place, timed_event in enumerate(events) if _sounds(timed_event.event)), default=-1) + 1
+    tail = max((place for place, timed_event in enumerate(events) if _sounds(timed_event.event)), default=-1) + 1
 
     def blocks_until(frame: int) -> Iterator[NDArray[np.float32]]:
         nonlocal done, skipped
@@ -146,8 +146,8 @@ def render_events(
         end = round(seconds * rate_hz) + (AHEAD if limited else 0)
         yield from play_until(end, [timed_event for timed_event in events if timed_event.time_s < seconds])
         return
-    yield from play_until(0, events[:played])
-    left = deque(events[played:])  # as a pedal that is lifted: what rings follows them, and they keep nothing ringing
+    yield from play_until(0, events[:tail])
+    left = deque(events[tail:])  # as a pedal that is lifted: what rings follows them, and they keep nothing ringing
     last = done + round(LONGEST_TAIL_S * rate_hz)
     quiet = 10 ** (SILENT_DB / 20)
     quiet_s = 0.0  # until all effects have died away as well

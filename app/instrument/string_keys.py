@@ -53,8 +53,8 @@ class StringKeys:
 
 def polarisations_of(patch: Patch, preset: PresetInfo) -> Polarisations | None:
     """The polarisations of a patch. None: its strings move in one direction, or as a recording says."""
-    chosen = patch.polarisations
-    return None if chosen is None or preset.recorded is not None else chosen
+    polarisations = patch.polarisations
+    return None if polarisations is None or preset.recorded is not None else polarisations
 
 
 def on_string(string: KeyString, pluck: Pluck) -> Pluck:

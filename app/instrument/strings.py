@@ -85,7 +85,7 @@ class Strings:
         """The pitch of an open string, which the range does not limit."""
         return self._tuning.hz(note)
 
-    def _stopped(self, key: int, string_number: int | None, pitch_hz: float) -> tuple[StringParameters, float]:
+    def _stopped(self, key: int, number: int | None, pitch_hz: float) -> tuple[StringParameters, float]:
         """The string of a key with the patch's knobs, and its length as a share of the whole string's."""
         strings, slackened = self._patch.strings, 1.0
         assert not isinstance(strings, Drums)
@@ -93,10 +93,10 @@ class Strings:
             string = strings.string
         else:
             ordered = strings.strings[::-1]
-            chosen = ordered[law.played(ordered, len(ordered), key, -1 if string_number is None else string_number)]
-            string = chosen.string
-            if key < chosen.note:
-                slackened = pitch_hz / self._tuning.hz(chosen.note)
+            open_string = ordered[law.played(ordered, len(ordered), key, -1 if number is None else number)]
+            string = open_string.string
+            if key < open_string.note:
+                slackened = pitch_hz / self._tuning.hz(open_string.note)
         knobs = [getattr(self._patch.knobs, name) for name in KNOBS]
         whole, stopped_row = [0.0] * of.STRING, [0.0] * of.STRING
         law.stop(string.row, knobs, slackened, pitch_hz, whole, stopped_row)

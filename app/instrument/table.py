@@ -214,5 +214,5 @@ def _put_drums(tail: Tail, loud: DrumKeys) -> int:
 
 def strings_of(patch: Patch) -> int:
     """The number of strings of a set that channels of a guitar may choose."""
-    chosen = patch.mode == "guitar" and isinstance(patch.strings, StringSet)
-    return min(of.GUITAR_STRINGS, len(patch.strings.strings)) if chosen else 0  # type: ignore[union-attr]
+    by_channel = patch.mode == "guitar" and isinstance(patch.strings, StringSet)
+    return min(of.GUITAR_STRINGS, len(patch.strings.strings)) if by_channel else 0  # type: ignore[union-attr]

@@ -137,8 +137,8 @@ def find_patch(name_or_path: str) -> PatchEntry:
     names = [entry.name for entry in entries]
     if close := get_close_matches(file_stem(folded_name), names, cutoff=0.55):
         raise PatchError(f"no instrument {bounds.brief(name_or_path)}; did you mean {' or '.join(close)}?")
-    known = ", ".join(names) or "none is installed"
-    raise PatchError(f"no instrument {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {known}")
+    choices = ", ".join(names) or "none is installed"
+    raise PatchError(f"no instrument {bounds.brief(name_or_path)}; give a {SUFFIX} file or one of: {choices}")
 
 
 def save_patch(patch: Patch, replace: Path | None = None) -> PatchEntry:

@@ -411,11 +411,11 @@ class Patch(Value):
         A target stays where the others forbid its value: the softest pluck does not pass the hardest.
         """
         share = min(1.0, max(0.0, value))
-        chosen = self.macros[macro]
-        moved = chosen.model_copy(update={"value": share})
-        macros = (*self.macros[:macro], moved, *self.macros[macro + 1 :])
+        before = self.macros[macro]
+        after = before.model_copy(update={"value": share})
+        macros = (*self.macros[:macro], after, *self.macros[macro + 1 :])
         patch = self.model_copy(update={"macros": macros})
-        for target in chosen.targets:
+        for target in before.targets:
             with contextlib.suppress(ValueError):
                 patch = patch.with_value(target.field, target.low + share * (target.high - target.low))
         return patch

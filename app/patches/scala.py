@@ -90,17 +90,17 @@ def parse_scale(text: str) -> Scale:
         ValueError: it is none, or one beyond the bounds of this module; the message quotes the line.
     """
     lines = [line for line in _LINE_END.split(text) if not line.startswith("!")]
-    count_line, *listed = _filled_lines(lines[1:]) or [""]  # the first, which may be empty, is the description
+    count_line, *pitch_lines = _filled_lines(lines[1:]) or [""]  # the first, which may be empty, is the description
     count_match = _COUNT.match(count_line)
     if count_match is None:
         raise ValueError(f"its number of notes, below its description, is {brief(count_line)}; it is no scale")
     digits = count_match.group().lstrip("0") or "0"
     count = int(digits[:9])
-    if count <= min(len(listed), MOST_NOTES):
-        octaves = tuple(_octaves(line) for line in listed[:count])
-        if not any(map(_NUMBER.match, listed[count:])):  # other text below the notes is a remark
+    if count <= min(len(pitch_lines), MOST_NOTES):
+        octaves = tuple(_octaves(line) for line in pitch_lines[:count])
+        if not any(map(_NUMBER.match, pitch_lines[count:])):  # other text below the notes is a remark
             return Scale(octaves)
-    numbers = sum(map(bool, map(_NUMBER.match, listed)))
+    numbers = sum(map(bool, map(_NUMBER.match, pitch_lines)))
     if str(numbers) == digits:
         raise ValueError(f"has {count} notes, at most {MOST_NOTES} may be given")
     raise ValueError(f"says {digits[:20]} notes and lists {numbers}; correct its count or its list of notes")
