@@ -222,8 +222,8 @@ class Keys:
                 for id in player.compiled.missing(ids):
                     self._notes.pop((player, id)).end()
             self._notes = {key: note for key, note in self._notes.items() if not note.over}
-            held = {player for player, _ in self._notes}
-            self._playing = [player for player in self._playing if player is self._player or player in held]
+            with_notes = {player for player, _ in self._notes}
+            self._playing = [player for player in self._playing if player is self._player or player in with_notes]
         return begun_notes
 
     def cancel(self) -> None:

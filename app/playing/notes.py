@@ -121,9 +121,9 @@ class Notes:
             plucked_before = self._reach is not None
             self._reach = reach
             self._ear = ear
-            chosen = self._chosen
-            if chosen is not None and entry is not None and path_of(chosen.preset) != entry.path:
-                self._chosen = replace(chosen, preset=entry.path)
+            request = self._chosen
+            if request is not None and entry is not None and path_of(request.preset) != entry.path:
+                self._chosen = replace(request, preset=entry.path)
         if single and not plucked_before:
             self.keys.stop(REPLACED_S)
         self.keys.set_patch(instrument if isinstance(instrument, Patch) else patch, ear)
@@ -390,10 +390,10 @@ class Notes:
         """
         for note in self.keys.look():
             with self._lock:
-                request, chosen = note.request, self._chosen
-                if request is None or chosen is None or note is not self.latest or self._reach is not None:
+                request, chosen_request = note.request, self._chosen
+                if request is None or chosen_request is None or note is not self.latest or self._reach is not None:
                     continue
-                self._chosen = replace(chosen, preset=request.preset, pluck=request.pluck)
+                self._chosen = replace(chosen_request, preset=request.preset, pluck=request.pluck)
 
     def _path_of(self, preset: str) -> Path | None:
         entry = self._find(preset)

@@ -52,9 +52,9 @@ class EventRecorder:
             full = len(self._recorded) >= LONGEST_RECORDING
             if not full:
                 at_s = time.monotonic() if time_s is None else time_s
-                taken = TimedEvent(at_s - self._began_s, event)
-                self._recorded.append(taken)
-                self._unfetched.append(taken)
+                timed_event = TimedEvent(at_s - self._began_s, event)
+                self._recorded.append(timed_event)
+                self._unfetched.append(timed_event)
             reported_before, self._reported_full = self._reported_full, self._reported_full or full
         if full and not reported_before:
             self._report(FULL, "")
