@@ -152,9 +152,9 @@ def _with_instrument(data: dict[str, Any]) -> dict[str, Any]:
     preset, patch = old.get("preset", ""), old.get("patch")
     if patch is None or old.get("keys_play", "pitch") == "place":
         return {**rest, "instrument": {"preset": preset}, "kept": patch}
-    played = patch.get("preset", "studio_any_string") if isinstance(patch, dict) else getattr(patch, "preset", "")
+    model = patch.get("preset", "studio_any_string") if isinstance(patch, dict) else getattr(patch, "preset", "")
     string = rest.pop("string", None)
-    return {**rest, "instrument": patch, "string": string if preset in ("", played) else None}
+    return {**rest, "instrument": patch, "string": string if preset in ("", model) else None}
 
 
 class Session:
