@@ -107,9 +107,9 @@ class StageView(QWidget):
         side = min(near, key=lambda name: near[name], default=None)
         return side if side is not None and near[side] < GRAB_PIXELS else None
 
-    def _step_mark(self, held: Qt.KeyboardModifier, steps: int) -> None:
+    def _step_mark(self, modifiers: Qt.KeyboardModifier, steps: int) -> None:
         """Move the left mark, with Ctrl the right one."""
-        side = "right" if held & Qt.KeyboardModifier.ControlModifier else "left"
+        side = "right" if modifiers & Qt.KeyboardModifier.ControlModifier else "left"
         if side in self._listening:
             self.listening_point_moved.emit(side, min(max(self._listening[side] + STEP * steps, 0.0), 1.0))
 

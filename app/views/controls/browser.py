@@ -282,9 +282,9 @@ class Browser(QFrame):
 
     def take_typed(self, event: QKeyEvent) -> bool:
         """Give a key that writes to the search, wherever the focus is; False for another key."""
-        held = event.modifiers() & _COMMAND
+        modifiers = event.modifiers() & _COMMAND
         writes = event.key() == KEYS.Key_Backspace or (event.text().strip() and event.text().isprintable())
-        if not writes or (held and held != _ALT_GR):
+        if not writes or (modifiers and modifiers != _ALT_GR):
             return False
         if event.type() == QEvent.Type.ShortcutOverride:
             event.accept()  # or a shortcut of the window would get it
@@ -341,11 +341,11 @@ class Browser(QFrame):
 
     def move_selection(self, key: Qt.Key) -> None:
         """Load the selected entry, or, where it is loaded already, the one that one of MOVES goes to."""
-        listed = self.listed
-        if listed:
+        names = self.listed
+        if names:
             self.list.setFocus()  # where Space plays
-            row = listed.index(self.selected) + (self.step(key) if self.selected == self.loaded else 0)
-            self.load(listed[min(max(row, 0), len(listed) - 1)])
+            row = names.index(self.selected) + (self.step(key) if self.selected == self.loaded else 0)
+            self.load(names[min(max(row, 0), len(names) - 1)])
             self._start_rest()
 
     def press(self, key: Qt.Key) -> None:
@@ -451,12 +451,12 @@ def _button(text: str, tip: str, act: Callable[[], object]) -> QPushButton:
 def _refill(box: QComboBox, kinds: Sequence[tuple[object, str]]) -> None:
     """Refill a box with the kinds to filter by, after the entry for no filter; what is chosen stays."""
     with QSignalBlocker(box):
-        chosen = box.currentData()
+        previous = box.currentData()
         while box.count() > 1:
             box.removeItem(1)
         for value, words in kinds:
             box.addItem(words, value)
-        box.setCurrentIndex(max(0, box.findData(chosen)))
+        box.setCurrentIndex(max(0, box.findData(previous)))
 
 
 def open_browser(window: QWidget) -> Browser | None:

@@ -58,8 +58,8 @@ class _Editor(QLineEdit):
 
     def _is_alien(self, event: QKeyEvent) -> bool:
         """Return True if a key, as a letter, makes no number with the text before the cursor."""
-        held = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier)
-        if held or not event.text().isprintable() or event.text() in SIGNS:  # "" is in it
+        modifiers = event.modifiers() & (Qt.KeyboardModifier.ControlModifier | Qt.KeyboardModifier.AltModifier)
+        if modifiers or not event.text().isprintable() or event.text() in SIGNS:  # "" is in it
             return False
         before = self.text()[: self.selectionStart() if self.hasSelectedText() else self.cursorPosition()]
         return not begins_number(before + event.text(), self._unit, self._prefix)
@@ -257,11 +257,11 @@ class Knob(QWidget):
         elif self._figure:
             self.figure_asked.emit(value)
         else:
-            taken = self.parameter.clamped(value)
-            self.value_asked.emit(taken)
-            if taken != value:
-                end = "At most" if value > taken else "At least"
-                say_above(self, f"{end} {self.parameter.shown(taken)}")
+            clamped = self.parameter.clamped(value)
+            self.value_asked.emit(clamped)
+            if clamped != value:
+                end = "At most" if value > clamped else "At least"
+                say_above(self, f"{end} {self.parameter.shown(clamped)}")
 
     def _give_up(self) -> None:
         if self._editor is not None:

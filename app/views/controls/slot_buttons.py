@@ -158,11 +158,11 @@ class SlotButtons(QWidget):
         gains = menu.addMenu("Gain of the difference")
         gain_group = QActionGroup(gains)
         for gain in DIFFERENCE_GAINS_DB:
-            chosen = abs(self._choices.difference_gain_db - gain) < 0.5
-            self._add(gains, gain_group, f"+{gain} dB", "difference_gain_db", float(gain), chosen)
+            checked = abs(self._choices.difference_gain_db - gain) < 0.5
+            self._add(gains, gain_group, f"+{gain} dB", "difference_gain_db", float(gain), checked)
 
-    def _add(self, menu: QMenu, group: QActionGroup, title: str, field: str, value: object, chosen: bool) -> QAction:
-        action = QAction(title, menu, checkable=True, checked=chosen)
+    def _add(self, menu: QMenu, group: QActionGroup, title: str, field: str, value: object, checked: bool) -> QAction:
+        action = QAction(title, menu, checkable=True, checked=checked)
         action.triggered.connect(lambda: self.change_asked.emit(field, value))
         group.addAction(action)
         menu.addAction(action)

@@ -238,9 +238,9 @@ class AbxDialog(QDialog):
             self._result.show_saved(f"Saved {path}", failed=False)
 
     def _save_elsewhere(self) -> None:
-        if chosen := QFileDialog.getExistingDirectory(self, "Folder of the result"):
-            self._folder = chosen
-            self._save(Path(chosen))
+        if folder := QFileDialog.getExistingDirectory(self, "Folder of the result"):
+            self._folder = folder
+            self._save(Path(folder))
 
     # What is shown, and leaving
 
@@ -281,8 +281,8 @@ class AbxDialog(QDialog):
             self._leave()
             return
         answered, planned = len(self._run.trials), self._run.planned
-        kept = "The test would be recorded as incomplete." if answered else "Nothing would be recorded."
-        question = f"{answered} of {planned} trials are answered. {kept}"
+        consequence = "The test would be recorded as incomplete." if answered else "Nothing would be recorded."
+        question = f"{answered} of {planned} trials are answered. {consequence}"
         if ask(self, "Stop the test?", question, CONTINUE, STOP) == STOP and self.testing:
             self._end()
 

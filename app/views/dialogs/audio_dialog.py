@@ -170,6 +170,6 @@ def _button(text: str, tip: str, signal: object = None) -> QPushButton:
     return button
 
 
-def _set(shown: QLabel, text: str) -> None:
-    if shown.text() != text:
-        shown.setText(text)
+def _set(target: QLabel, text: str) -> None:
+    if target.text() != text:
+        target.setText(text)

@@ -232,8 +232,8 @@ class NotePage(ExportPage):
 
     def _show(self) -> None:
         decays = self.length.currentData()
-        for spin, shown in ((self.decay, decays), (self.longest, decays), (self.seconds, not decays)):
-            spin.setVisible(shown)
+        for spin, visible in ((self.decay, decays), (self.longest, decays), (self.seconds, not decays)):
+            spin.setVisible(visible)
         if self._subject is None:
             return
         note = self._subject.note
@@ -349,8 +349,8 @@ class SamplerPage(ExportPage):
             return
         patch, preset = subject.patch, subject.preset
         low, high = patch.range
-        chosen = keys if keys and low <= keys[0] <= keys[1] <= high else patch.range
-        for box, key in zip((self.lowest, self.highest), chosen, strict=True):
+        keys_range = keys if keys and low <= keys[0] <= keys[1] <= high else patch.range
+        for box, key in zip((self.lowest, self.highest), keys_range, strict=True):
             with QSignalBlocker(box):
                 box.setRange(low, high)
                 box.setValue(key)
@@ -385,18 +385,18 @@ class SamplerPage(ExportPage):
             raise ValueError(self.missing)
         if self.lowest.value() > self.highest.value():
             raise ValueError("keys: the lowest is above the highest; exchange them")
-        patch, chosen = self._subject.patch, self.choices()
+        patch, choices = self._subject.patch, self.choices()
         plan = SampledPlan(
-            patch.with_value("room.mix", 0.0) if chosen.dry else patch,
-            chosen.keys,
-            chosen.every,
-            chosen.layers,
-            chosen.seconds,
-            chosen.rate_hz,
-            source=chosen.source,
+            patch.with_value("room.mix", 0.0) if choices.dry else patch,
+            choices.keys,
+            choices.every,
+            choices.layers,
+            choices.seconds,
+            choices.rate_hz,
+            source=choices.source,
         )
-        if chosen.form != "sf2":
-            plan = replace(plan, format=chosen.form, bits=chosen.bits)
+        if choices.form != "sf2":
+            plan = replace(plan, format=choices.form, bits=choices.bits)
         return SampledExport(plan, self.file.path, self._subject.preset.path)
 
     def offer(self) -> tuple[str, str]:

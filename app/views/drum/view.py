@@ -151,17 +151,17 @@ class DrumView(StageView):
             self.update()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, held = _Key(event.key()), event.modifiers() & (_Shift | _Control)
+        key, modifiers = _Key(event.key()), event.modifiers() & (_Shift | _Control)
         sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key, 0)
         upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key, 0)
-        if sideways and held & _Shift:
-            self._step_mark(held, sideways)
-        elif (sideways or upwards) and not held & _Control:
-            step = FINE_STEP if held & _Shift else STEP
+        if sideways and modifiers & _Shift:
+            self._step_mark(modifiers, sideways)
+        elif (sideways or upwards) and not modifiers & _Control:
+            step = FINE_STEP if modifiers & _Shift else STEP
             place = self._place[0] + step * sideways, self._place[1] + step * upwards
             if self.axes.holds(place):
                 self.place_moved.emit(*place)
-        elif key == _Key.Key_Delete and held & _Shift:
+        elif key == _Key.Key_Delete and modifiers & _Shift:
             self._reset_marks()
         elif key == _Key.Key_Delete:
             self.place_reset.emit()

@@ -71,7 +71,7 @@ class Neck(Playable):
 
     def show_notes(self, notes: Iterable[SoundingNote]) -> None:
         """Show strings of a neck where they are stopped, which lies between two frets while they slide."""
-        shown: dict[tuple[int, float], int] = {}
+        strings: dict[tuple[int, float], int] = {}
         for note in notes if self.in_rows else ():
             string = len(self._strings) - 1 - note.string
             if not 0 <= note.string < len(self._strings):
@@ -80,10 +80,10 @@ class Neck(Playable):
             fret = min(max(fret, 0.0), float(self.frets))
             step = round(min(max(note.level, 0.0), 1.0) * LEVEL_STEPS)
             if step > 0:
-                shown[string, fret] = max(step, shown.get((string, fret), 0))
-        for string, _ in {at for at in self._stops.keys() | shown.keys() if self._stops.get(at) != shown.get(at)}:
+                strings[string, fret] = max(step, strings.get((string, fret), 0))
+        for string, _ in {at for at in self._stops.keys() | strings.keys() if self._stops.get(at) != strings.get(at)}:
             self.update(self.cell(string, 0).adjusted(0, -6, self.width(), 6).toAlignedRect())
-        self._stops = shown
+        self._stops = strings
 
     def set_strings(self, strings: Sequence[tuple[str, int]]) -> None:
         """Name and open key of each; none or one that is fretted for every key is shown as a fan."""

@@ -99,9 +99,9 @@ class InstrumentPanel(QFrame):
         self.keys = PianoKeys()
         self.neck = Neck()
         self.knobs = StringKnobs()
-        for played in (self.keys, self.neck):
-            played.pressed.connect(self._press)
-            played.released.connect(self.released)
+        for surface in (self.keys, self.neck):
+            surface.pressed.connect(self._press)
+            surface.released.connect(self.released)
         self._drums = False
         self.touch = Segments("Key while another is held", _TOUCHES)
         self.touch.chosen.connect(self._choose_touch)
@@ -185,9 +185,9 @@ class InstrumentPanel(QFrame):
 
     def show_surface(self, surface: str) -> None:
         self._choice.show_key(surface)
-        shown = "keys" if self._drums else surface
-        self._stack.setCurrentWidget(self.keys if shown == "keys" else self.neck)
-        self._hint.setText(HINTS[shown])
+        shown_surface = "keys" if self._drums else surface
+        self._stack.setCurrentWidget(self.keys if shown_surface == "keys" else self.neck)
+        self._hint.setText(HINTS[shown_surface])
         self._place_hint()
         self._show_lift()
 

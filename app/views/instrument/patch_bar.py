@@ -254,12 +254,12 @@ class PatchBar(QFrame):
 
     def set_bodies(self, bodies: Sequence[tuple[str, str]]) -> None:
         """The name and the title of each; "No body", of the name "", is always listed."""
-        chosen = self.body.currentData()
+        chosen_body = self.body.currentData()
         with QSignalBlocker(self.body):
             self.body.clear()
             for name, title in (("", "No body"), *(body for body in bodies if body[0])):
                 self.body.addItem(title, name)
-            self._show_body(chosen or "")
+            self._show_body(chosen_body or "")
 
     def show_patch(self, patch: Patch, own: bool, changed: bool = False) -> None:
         """Show a patch; `own`: it is the user's and can be renamed; `changed`: it differs from the saved one."""

@@ -59,5 +59,5 @@ def _shift_to_ground(name: str, ground_at: float, panel: str) -> pg.ColorMap:
     ground = np.array(QColor(panel).getRgbF()[:3])  # type: ignore[index]
     dark = np.asarray(source.map(ground_at, mode="float"))[:3]
     nearness = 1 - np.abs(places - ground_at) / max(ground_at, 1 - ground_at)
-    moved = np.clip(colours + (ground - dark) * nearness[:, None], 0, 1)
-    return pg.ColorMap(places, (255 * moved).round().astype(np.uint8))
+    shifted_colours = np.clip(colours + (ground - dark) * nearness[:, None], 0, 1)
+    return pg.ColorMap(places, (255 * shifted_colours).round().astype(np.uint8))

@@ -96,9 +96,9 @@ class FiguresTable(QTableWidget):
 
     def show_rows(self, rows: Sequence[TableRow]) -> None:
         """Replace all rows; the chosen one stays chosen where it is still there."""
-        chosen = self.chosen_key
+        key = self.chosen_key
         self._fill(rows)
-        self.choose(chosen)
+        self.choose(key)
 
     def _fill(self, rows: Sequence[TableRow]) -> None:
         self.setSortingEnabled(False)

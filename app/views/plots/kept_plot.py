@@ -42,8 +42,8 @@ class KeptPlot(pg.PlotWidget):
             self.viewport().update(changed)
 
     def paintEvent(self, event: QPaintEvent) -> None:
-        moved, self._moved = self._moved, QRegion()
-        if not event.region().subtracted(moved).isEmpty():
+        strips, self._moved = self._moved, QRegion()
+        if not event.region().subtracted(strips).isEmpty():
             self._picture = None
             self._next_strip = self._line_strip()
             super().paintEvent(event)

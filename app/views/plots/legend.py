@@ -114,8 +114,8 @@ def set_curves(
     plot: pg.PlotItem, curves: dict[str, pg.PlotDataItem], sources: Sequence[ShownSource], faint_alpha: int
 ) -> None:
     """Add curves that `curves` lacks, remove those of other sources, and set the pen and the order of all."""
-    shown = {source.source for source in sources}
-    for gone in [name for name in curves if name not in shown]:
+    names = {source.source for source in sources}
+    for gone in [name for name in curves if name not in names]:
         plot.removeItem(curves.pop(gone))
     for source in sources:
         if source.source not in curves:

@@ -145,9 +145,9 @@ class TimePlot(KeptPlot):
             self._follow(event)
         elif event.buttons() & _PAN_BUTTONS and self._pan_from is not None:
             at = event.position()
-            moved = self._point_at(QPointF(self._pan_from, at.y())).x() - self._point_at(at).x()
+            shift_s = self._point_at(QPointF(self._pan_from, at.y())).x() - self._point_at(at).x()
             self._pan_from = at.x()
-            self.pan(moved)
+            self.pan(shift_s)
         if self._plot_rect_has(event.position()):
             point = self._point_at(event.position())
             self.hovered.emit(point.x(), point.y())

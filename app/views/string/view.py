@@ -230,21 +230,21 @@ class StringView(StageView):
         event.accept()
 
     def keyPressEvent(self, event: QKeyEvent) -> None:
-        key, held = _Key(event.key()), event.modifiers() & (_Shift | _Control)
+        key, modifiers = _Key(event.key()), event.modifiers() & (_Shift | _Control)
         sideways = {_Key.Key_Left: -1, _Key.Key_Right: 1}.get(key)
         upwards = {_Key.Key_Up: 1, _Key.Key_Down: -1}.get(key)
-        if sideways is not None and held & _Shift:
-            self._step_mark(held, sideways)
-        elif sideways is not None and held & _Control:
+        if sideways is not None and modifiers & _Shift:
+            self._step_mark(modifiers, sideways)
+        elif sideways is not None and modifiers & _Control:
             self.shape_stepped.emit(sideways)
-        elif upwards is not None and held & _Control:
+        elif upwards is not None and modifiers & _Control:
             self.width_stepped.emit(float(upwards))
         elif sideways is not None:
             self.pluck_drawn.emit(self._pluck.position + 0.01 * sideways, self._pluck.amplitude_mm)
         elif upwards is not None:
-            step_mm = 0.5 * (FINE if held & _Shift else 1.0)
+            step_mm = 0.5 * (FINE if modifiers & _Shift else 1.0)
             self.pluck_drawn.emit(self._pluck.position, self._pluck.amplitude_mm + step_mm * upwards)
-        elif key == _Key.Key_Delete and held & _Shift:
+        elif key == _Key.Key_Delete and modifiers & _Shift:
             self._reset_marks()
         elif key == _Key.Key_Delete:
             self.pluck_reset.emit()
